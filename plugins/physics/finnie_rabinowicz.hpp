@@ -1,0 +1,232 @@
+// Tangential contact force after Finnie and Rabinowicz.
+//
+// This is a reconstruction from what the two authors published; no source was found that writes the law under both names.
+//
+// Rabinowicz: friction falls from its static to its kinetic value over a critical slip distance s_c,
+//     mu(s) = mu_k + (mu_s - mu_k) exp(-s / s_c),                                            (1)
+// s the slip accumulated since the contact last stuck; a contact that sticks again heals, s -> 0, at once or with a
+// healing time. E. Rabinowicz, J. Appl. Phys. 22 (1951) 1373; Proc. Phys. Soc. 71 (1958) 668.
+//
+// Finnie & Shaw: the real area of contact saturates towards the apparent one, A_r / A = 1 - exp(-mu N / (tau_s A)), and the
+// interface carries no more than its shear strength tau_s,
+//     T_max = tau_s A [1 - exp(-mu(s) N / (tau_s A))].                                       (2)
+// I. Finnie & M. C. Shaw, Trans. ASME 78 (1956) 1649. Low pressure: Coulomb, mu N; high pressure: tau_s A.
+//
+// Below the limit a Mindlin spring of stiffness k_t with the elastic displacement xi kept in the contact plane; at the limit
+// return mapping, the excess displacement goes to s and to dissipated energy. The pre-sliding curve is
+//     linear        T = k_t xi, or
+//     exponential   dT = k_t (du - T |du| / T_max), under monotone loading T = T_max (1 - exp(-k_t u / T_max))
+// (P. R. Dahl, AIAA J. 14 (1976) 1675).
+//
+// Ingredients switch off: mu_k = mu_s gives Coulomb friction, tau_s >= unlimited_strength no saturation, and both together with
+// `linear` the law of LIGGGHTS's `tangential history`.
+//
+// Units SI. N is the repulsive force of the normal law (>= 0): adhesion acts through the larger overlap that it causes.
+#pragma once
+
+#include <cmath>
+
+#include "vec3.hpp"
+
+namespace dembark {
+
+/// Shear strengths from here on (Pa) mean that the interface has no limit of its own; also +inf.
+constexpr double unlimited_strength = 1e30;
+
+enum class Presliding { linear, exponential };
+
+struct FinnieRabinowicz {
+  double static_friction = 0.5;                          ///< mu_s, >= mu_k
+  double kinetic_friction = 0.5;                         ///< mu_k, >= 0
+  double critical_slip_distance = 1e-5;                  ///< s_c, m, >= 0; 0 drops to mu_k with the first slip
+  double interface_shear_strength = unlimited_strength;  ///< tau_s, Pa, > 0
+  double healing_time = 0.0;                             ///< s, >= 0; time constant of s -> 0 while the contact sticks; 0 = at once
+  Presliding presliding = Presliding::linear;
+
+  /// The one clear line about what is wrong with these parameters, or nullptr.
+  const char* error() const {
+    if (!(static_friction >= 0.0) || std::isinf(static_friction)) return "static friction must be a number >= 0";
+    if (!(kinetic_friction >= 0.0)) return "kinetic friction must be a number >= 0";
+    if (kinetic_friction > static_friction) return "kinetic friction must not exceed static friction";
+    if (!(critical_slip_distance >= 0.0)) return "critical slip distance (m) must be >= 0";
+    if (!(interface_shear_strength > 0.0)) return "interface shear strength (Pa) must be > 0; 1e30 or more means unlimited";
+    if (!(healing_time >= 0.0)) return "healing time (s) must be >= 0";
+    return nullptr;
+  }
+};
+
+/// What an engine stores per contact.
+template <class Real>
+struct FrictionState {
+  Vec3<Real> displacement{};  ///< xi = -T / k_t on body 1, m, in the contact plane
+  Real slip{};                ///< s, m
+  Real dissipated_energy{};   ///< J, by slip and by tangential damping, since the contact began
+};
+
+/// mu(s), equation (1).
+template <class Real>
+inline Real friction_coefficient(const FinnieRabinowicz& law, Real slip) {
+  using std::exp;
+  if (!(slip > 0.0)) return Real(law.static_friction);
+  if (law.critical_slip_distance == 0.0) return Real(law.kinetic_friction);
+  return law.kinetic_friction + (law.static_friction - law.kinetic_friction) * exp(-slip / law.critical_slip_distance);
+}
+
+/// T_max (N), equation (2), for a friction coefficient mu.
+template <class Real>
+inline Real shear_limit(const FinnieRabinowicz& law, Real mu, Real normal_force, Real contact_area) {
+  using std::expm1;
+  if (!(normal_force > 0.0)) return Real(0.0);
+  const Real coulomb = mu * normal_force;
+  if (law.interface_shear_strength >= unlimited_strength) return coulomb;
+  const Real strength = law.interface_shear_strength * contact_area;
+  if (!(strength > 0.0)) return Real(0.0);
+  return -strength * expm1(-coulomb / strength);
+}
+
+namespace detail {
+
+/// The slip ds > 0 for which k_t (xi - ds) = T_max(s + ds): the return to the limit curve. Newton's method from the largest
+/// possible slip (kinetic limit) descends monotonically to the last root, because the residual is concave there; where the
+/// spring is softer than the drop of friction it thus takes the whole drop at once, as a quasi-static contact does.
+template <class Real>
+inline Real slip_to_limit(const FinnieRabinowicz& law, Real k_t, Real trial, Real slip, Real normal_force, Real contact_area) {
+  using std::abs;
+  using std::exp;
+  const Real kinetic_limit = shear_limit(law, Real(law.kinetic_friction), normal_force, contact_area);
+  Real ds = trial - kinetic_limit / k_t;
+  const double drop = law.static_friction - law.kinetic_friction;
+  if (drop == 0.0 || law.critical_slip_distance == 0.0) return ds;
+  for (int i = 0; i < 32; ++i) {
+    const Real weakening = drop * exp(-(slip + ds) / law.critical_slip_distance);
+    const Real mu = law.kinetic_friction + weakening;
+    const Real limit = shear_limit(law, mu, normal_force, contact_area);
+    Real gradient = -normal_force * weakening / law.critical_slip_distance;
+    if (law.interface_shear_strength < unlimited_strength)
+      gradient *= exp(-mu * normal_force / (law.interface_shear_strength * contact_area));
+    const Real residual = k_t * (trial - ds) - limit;
+    const Real slope = -k_t - gradient;
+    if (!(slope < 0.0)) break;
+    const Real step = residual / slope;
+    ds -= step;
+    if (abs(step) <= 1e-15 * trial) break;
+  }
+  return ds > 0.0 ? ds : Real(0.0);
+}
+
+template <class Real>
+inline void heal(const FinnieRabinowicz& law, Real dt, FrictionState<Real>& state) {
+  using std::exp;
+  if (law.healing_time > 0.0) state.slip *= exp(-dt / law.healing_time);
+  else state.slip = Real(0.0);
+}
+
+}  // namespace detail
+
+/// Turn the elastic displacement with the contact plane: into the plane of the new normal, then about the normal by the mean spin
+/// of the two bodies (`twist` = omega_n dt, rad). Its length stays as it is, so a pair that rotates as a rigid body keeps its
+/// force; its direction is exact for a displacement along or across the motion of the normal and right to second order in the
+/// angle of one step otherwise, without a stored normal. Unit normal.
+template <class Real>
+DEMBARK_HOT Vec3<Real> rotate_to_plane(Vec3<Real> v, const Vec3<Real>& normal, Real twist) {
+  using std::sqrt;
+  const Real size = dot(v, v);
+  const Real out_of_plane = dot(v, normal);
+  const Real lost = out_of_plane * out_of_plane;
+  const Real t = 0.5 * twist, t2 = t * t;
+  const Real factor = t2 < 1e-6 ? 2.0 * (1.0 - t2 * (1.0 - t2)) : 2.0 / (1.0 + t2);
+  const Vec3<Real> turned = (factor * t) * cross(normal, v);
+  v -= out_of_plane * normal;
+  Real length = 1.0;
+  // What follows stands in the innermost loop of an engine: the small angles of one step need no square root, and below 1e-7 rad
+  // no correction. A normal that jumps by more than 60 degrees is no rotation of one contact: the projection is all there is.
+  if (lost > 1e-14 * size) {
+    const Real q = lost / size;
+    if (q < 1e-5) length = 1.0 + q * (0.5 + q * (0.375 + q * 0.3125));
+    else if (q < 0.75) length = 1.0 / sqrt(1.0 - q);
+  }
+  return (length * (1.0 - factor * t2)) * v + length * turned;
+}
+
+namespace detail {
+
+/// A step of the exponential pre-sliding curve. Exact for the straight path of one step: T relaxes towards T_max along it.
+template <class Real>
+DEMBARK_COLD Vec3<Real> exponential_step(const FinnieRabinowicz& law, Real normal_force, Real stiffness, Real contact_area,
+                                   const Vec3<Real>& increment, Real dt, FrictionState<Real>& state) {
+  using std::exp;
+  const Real path = norm(increment);
+  const Vec3<Real> before = stiffness * state.displacement;
+  if (path > 0.0 && dot(before, increment) < 0.0) heal(law, dt, state);
+  const Real limit = shear_limit(law, friction_coefficient(law, state.slip), normal_force, contact_area);
+  if (!(limit > 0.0)) {
+    state.displacement = {};
+    state.slip += path;
+    return {};
+  }
+  Vec3<Real> force = before;
+  if (path > 0.0) {
+    const Vec3<Real> direction = increment * (1.0 / path);
+    force = limit * direction + exp(-stiffness * path / limit) * (before - limit * direction);
+    // |T| / T_max of the path is plastic; the work of T on it is the energy lost.
+    const Vec3<Real> mean = 0.5 * (before + force);
+    const Real share = norm(mean) / limit;
+    state.dissipated_energy += share * share * limit * path;
+    if (dot(mean, direction) > 0.0) state.slip += share * path;
+  }
+  const Real size = norm(force);
+  if (size > limit) {  // the load has fallen since the force was built up
+    state.dissipated_energy += limit * (size - limit) / stiffness;
+    force *= limit / size;
+  }
+  state.displacement = force * (1.0 / stiffness);
+  return -force;
+}
+
+/// The linear spring beyond static friction's first limit: slipping, or about to stick again.
+template <class Real>
+DEMBARK_COLD bool linear_slip(const FinnieRabinowicz& law, Real normal_force, Real stiffness, Real contact_area, FrictionState<Real>& state) {
+  const Real limit = shear_limit(law, friction_coefficient(law, state.slip), normal_force, contact_area);
+  const Real trial = norm(state.displacement);
+  if (!(stiffness * trial > limit)) return false;
+  const Real slip = slip_to_limit(law, stiffness, trial, state.slip, normal_force, contact_area);
+  state.slip += slip;
+  state.displacement *= (trial - slip) / trial;
+  state.dissipated_energy += stiffness * (trial - slip) * slip;
+  return true;
+}
+
+}  // namespace detail
+
+/// One step of the law.
+///
+/// normal_force  N, N (negative values count as 0)     stiffness  k_t, N/m, > 0      damping  gamma_t, N s/m (0 = none)
+/// contact_area  A, m^2                                 velocity   tangential velocity of body 1 relative to 2 at the contact, m/s
+/// dt            s: the displacement of this step is velocity * dt
+///
+/// `state.displacement` must already lie in the contact plane (rotate_to_plane). Returns the force on body 1 (N) and updates the
+/// state. The viscous part acts while the contact sticks.
+template <class Real>
+DEMBARK_HOT Vec3<Real> friction_step(const FinnieRabinowicz& law, Real normal_force, Real stiffness, Real damping, Real contact_area,
+                                const Vec3<Real>& velocity, Real dt, FrictionState<Real>& state) {
+  const Vec3<Real> increment = velocity * dt;
+  if (law.presliding == Presliding::exponential)
+    return detail::exponential_step(law, normal_force, stiffness, contact_area, increment, dt, state);
+
+  state.displacement += increment;
+  // Most contacts of a dense bed stick, far from their limit: they are told by a bound that needs neither root nor exponential,
+  // T_max >= mu_k N (1 - mu_k N / (2 tau_s A)).
+  const Real coulomb = (state.slip > 0.0 ? law.kinetic_friction : law.static_friction) * normal_force;
+  Real bound = coulomb;
+  if (law.interface_shear_strength < unlimited_strength) {
+    const Real strength = law.interface_shear_strength * contact_area;
+    bound = coulomb < strength ? coulomb - 0.5 * coulomb * coulomb / strength : Real(0.0);
+  }
+  const bool sticks = bound > 0.0 && stiffness * stiffness * dot(state.displacement, state.displacement) <= bound * bound;
+  if (!sticks && detail::linear_slip(law, normal_force, stiffness, contact_area, state)) return -stiffness * state.displacement;
+  if (state.slip > 0.0) detail::heal(law, dt, state);
+  state.dissipated_energy += damping * dot(velocity, velocity) * dt;
+  return -(stiffness * state.displacement + damping * velocity);
+}
+
+}  // namespace dembark

@@ -1,0 +1,94 @@
+// Normal contact force of two spheres, or of a sphere and a wall: Hertz and linear (Hooke), with damping from a
+// coefficient of restitution.
+//
+//   Hertz   F = 4/3 E* sqrt(R* delta) delta - gamma_n v_n,   gamma_n = -2 sqrt(5/6) beta sqrt(S_n m*),  S_n = 2 E* sqrt(R* delta)
+//           k_t = 8 G* sqrt(R* delta),                       gamma_t = -2 sqrt(5/6) beta sqrt(k_t m*)
+//   Hooke   F = k_n delta - gamma_n v_n,                     k_n = 16/15 sqrt(R*) E* (15 m* v_c^2 / (16 sqrt(R*) E*))^(1/5)
+//           k_t = k_n,                                       gamma_n = gamma_t = sqrt(4 m* k_n ln^2 e / (ln^2 e + pi^2))
+//
+// with beta = ln e / sqrt(ln^2 e + pi^2). These are the formulas of LIGGGHTS-PUBLIC 3.8.0 (`normal hertz`, `normal hooke`), so that
+// the same contact has the same force in every engine. Damping of the Hertz contact: Tsuji, Tanaka & Ishida, Powder Technology
+// 71 (1992) 239; k_t: Mindlin, J. Appl. Mech. 16 (1949) 259.
+//
+// Units SI. delta overlap (m, > 0), v_n relative normal velocity (m/s, > 0 when separating), R* = Ri Rj / (Ri + Rj) (wall: Ri),
+// m* likewise. In the limit e = 1 both are elastic.
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+namespace dembark {
+
+constexpr double pi = 3.14159265358979323846;
+
+/// Effective Young's modulus (Pa) of two materials, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
+inline double effective_youngs_modulus(double youngs_1, double poisson_1, double youngs_2, double poisson_2) {
+  return 1.0 / ((1.0 - poisson_1 * poisson_1) / youngs_1 + (1.0 - poisson_2 * poisson_2) / youngs_2);
+}
+
+/// Effective shear modulus (Pa), 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2 with G = E / (2 (1 + nu)).
+inline double effective_shear_modulus(double youngs_1, double poisson_1, double youngs_2, double poisson_2) {
+  return 1.0 / (2.0 * (2.0 - poisson_1) * (1.0 + poisson_1) / youngs_1 +
+                2.0 * (2.0 - poisson_2) * (1.0 + poisson_2) / youngs_2);
+}
+
+/// R* or m* of two bodies; an infinite partner (a wall) leaves the other's value.
+template <class Real>
+inline Real reduced(Real a, Real b) {
+  using std::isinf;
+  if (isinf(b)) return a;
+  if (isinf(a)) return b;
+  return a * b / (a + b);
+}
+
+/// What the normal contact hands on to the tangential law.
+template <class Real>
+struct NormalResponse {
+  Real force;                ///< N, along the normal, positive = repulsive, damping included
+  Real tangential_stiffness; ///< k_t, N/m
+  Real tangential_damping;   ///< gamma_t, N s/m
+  Real contact_area;         ///< pi R* delta, m^2: the apparent area of the Hertz contact
+};
+
+struct HertzParameters {
+  double effective_youngs_modulus; ///< E*, Pa, > 0
+  double effective_shear_modulus;  ///< G*, Pa, > 0
+  double restitution;              ///< e, 0 < e <= 1
+};
+
+struct HookeParameters {
+  double effective_youngs_modulus; ///< E*, Pa, > 0
+  double restitution;              ///< e, 0 < e <= 1
+  double characteristic_velocity;  ///< v_c, m/s, > 0: impact speed at which the overlap equals that of Hertz
+};
+
+/// beta = ln e / sqrt(ln^2 e + pi^2), in (-1, 0].
+inline double damping_factor(double restitution) {
+  const double log_e = std::log(restitution);
+  return log_e / std::sqrt(log_e * log_e + pi * pi);
+}
+
+template <class Real>
+inline NormalResponse<Real> hertz(const HertzParameters& p, Real effective_radius, Real effective_mass, Real overlap, Real normal_velocity) {
+  using std::sqrt;
+  const Real root = sqrt(effective_radius * overlap);
+  const Real stiffness = 2.0 * p.effective_youngs_modulus * root;
+  const Real k_t = 8.0 * p.effective_shear_modulus * root;
+  const double damping = -2.0 * 0.91287092917527685576161630466800355658790782499663875 * damping_factor(p.restitution);
+  return {4.0 / 3.0 * p.effective_youngs_modulus * root * overlap - damping * sqrt(stiffness * effective_mass) * normal_velocity,
+          k_t, damping * sqrt(k_t * effective_mass), pi * effective_radius * overlap};
+}
+
+template <class Real>
+inline NormalResponse<Real> hooke(const HookeParameters& p, Real effective_radius, Real effective_mass, Real overlap, Real normal_velocity) {
+  using std::pow;
+  using std::sqrt;
+  const Real rigidity = sqrt(effective_radius) * p.effective_youngs_modulus;
+  const Real k_n = 16.0 / 15.0 * rigidity *
+                   pow(15.0 * effective_mass * p.characteristic_velocity * p.characteristic_velocity / (16.0 * rigidity), Real(0.2));
+  const double log_e = std::log(p.restitution);
+  const Real damping = sqrt(4.0 * effective_mass * k_n * log_e * log_e / (log_e * log_e + pi * pi));
+  return {k_n * overlap - damping * normal_velocity, k_n, damping, pi * effective_radius * overlap};
+}
+
+}  // namespace dembark
