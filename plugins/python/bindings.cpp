@@ -1,0 +1,154 @@
+// dembark._physics: the law headers as Python sees them. Private; dembark.physics adds checks, shapes, units and documentation.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "dembark/contact.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace dembark;
+
+namespace {
+
+using Array = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Points = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using Result = nb::ndarray<nb::numpy, double, nb::ndim<1>>;
+using Vectors = nb::ndarray<nb::numpy, double, nb::shape<-1, 3>>;
+
+Result make_result(std::size_t n, double*& data) {
+  data = new double[n];
+  return Result(data, {n}, nb::capsule(data, [](void* p) noexcept { delete[] static_cast<double*>(p); }));
+}
+
+capillary::Model model_of(const std::string& name) {
+  capillary::Model model;
+  if (!capillary::model_from_name(name.c_str(), model)) throw std::invalid_argument("unknown capillary model '" + name + "'");
+  return model;
+}
+
+Vec3<double> vector(const nb::tuple& t) { return {nb::cast<double>(t[0]), nb::cast<double>(t[1]), nb::cast<double>(t[2])}; }
+nb::tuple tuple(const Vec3<double>& v) { return nb::make_tuple(v.x, v.y, v.z); }
+
+FinnieRabinowicz make_law(double static_friction, double kinetic_friction, double critical_slip_distance, double interface_shear_strength,
+                          double healing_time, const std::string& presliding) {
+  FinnieRabinowicz law;
+  law.static_friction = static_friction;
+  law.kinetic_friction = kinetic_friction;
+  law.critical_slip_distance = critical_slip_distance;
+  law.interface_shear_strength = interface_shear_strength;
+  law.healing_time = healing_time;
+  if (presliding != "linear" && presliding != "exponential") throw std::invalid_argument("presliding must be 'linear' or 'exponential', not '" + presliding + "'");
+  law.presliding = presliding == "linear" ? Presliding::linear : Presliding::exponential;
+  if (law.error()) throw std::invalid_argument(law.error());
+  return law;
+}
+
+/// Bridge law and contact parameters with the lifetime of the Python object that uses them.
+struct Contact {
+  ContactParameters parameters;
+  std::shared_ptr<const capillary::BridgeForce> bridge;
+  ContactState state;
+};
+
+}  // namespace
+
+NB_MODULE(_physics, m) {
+  m.attr("unlimited_strength") = unlimited_strength;
+  m.def("capillary_models", &capillary::model_names);
+
+  nb::class_<capillary::BridgeForce>(m, "BridgeForce")
+      .def("__init__", [](capillary::BridgeForce* self, const std::string& model, double contact_angle) {
+        new (self) capillary::BridgeForce(model_of(model), contact_angle);
+      }, "model"_a, "contact_angle"_a)
+      .def("force", [](const capillary::BridgeForce& self, Array radius, Array gap, Array volume, Array surface_tension) {
+        double* out;
+        const std::size_t n = radius.shape(0);
+        Result result = make_result(n, out);
+        for (std::size_t i = 0; i < n; ++i) out[i] = self.force(radius(i), gap(i), volume(i), surface_tension(i));
+        return result;
+      })
+      .def("rupture_distance", [](const capillary::BridgeForce& self, Array radius, Array volume) {
+        double* out;
+        const std::size_t n = radius.shape(0);
+        Result result = make_result(n, out);
+        for (std::size_t i = 0; i < n; ++i) out[i] = self.rupture_distance(radius(i), volume(i));
+        return result;
+      });
+
+  m.def("effective_youngs_modulus", &effective_youngs_modulus);
+  m.def("effective_shear_modulus", &effective_shear_modulus);
+
+  nb::class_<FinnieRabinowicz>(m, "FinnieRabinowicz")
+      .def("__init__", [](FinnieRabinowicz* self, double s, double k, double c, double t, double h, const std::string& p) {
+        new (self) FinnieRabinowicz(make_law(s, k, c, t, h, p));
+      })
+      .def("friction_coefficient", [](const FinnieRabinowicz& law, double slip) { return friction_coefficient(law, slip); })
+      .def("shear_limit", [](const FinnieRabinowicz& law, double mu, double normal_force, double area) { return shear_limit(law, mu, normal_force, area); })
+      .def("drive", [](const FinnieRabinowicz& law, Array normal_force, Array stiffness, Array area, Points path, Array time_step) {
+        const std::size_t n = path.shape(0);
+        double* force = new double[3 * n];
+        Vectors forces(force, {n, 3}, nb::capsule(force, [](void* p) noexcept { delete[] static_cast<double*>(p); }));
+        double *slip, *dissipated;
+        Result slips = make_result(n, slip), energies = make_result(n, dissipated);
+        FrictionState<double> state;
+        Vec3<double> last{};
+        for (std::size_t i = 0; i < n; ++i) {
+          const Vec3<double> here{path(i, 0), path(i, 1), path(i, 2)};
+          const double dt = time_step(i);
+          const Vec3<double> t = friction_step(law, normal_force(i), stiffness(i), 0.0, area(i), (here - last) * (1.0 / dt), dt, state);
+          last = here;
+          force[3 * i] = -t.x;
+          force[3 * i + 1] = -t.y;
+          force[3 * i + 2] = -t.z;
+          slip[i] = state.slip;
+          dissipated[i] = state.dissipated_energy;
+        }
+        return nb::make_tuple(forces, slips, energies);
+      });
+
+  nb::class_<Contact>(m, "Contact")
+      .def("__init__", [](Contact* self, const std::string& normal_law, double youngs, double shear, double restitution, double characteristic_velocity,
+                          bool tangential_damping, bool limit_force, const FinnieRabinowicz& friction, const std::string& capillary_model,
+                          double contact_angle, double surface_tension, double bridge_volume) {
+        new (self) Contact();
+        if (normal_law != "hertz" && normal_law != "hooke") throw std::invalid_argument("normal law must be 'hertz' or 'hooke', not '" + normal_law + "'");
+        ContactParameters& p = self->parameters;
+        p.normal_law = normal_law == "hertz" ? NormalLaw::hertz : NormalLaw::hooke;
+        p.elasticity = {youngs, shear, restitution};
+        p.characteristic_velocity = characteristic_velocity;
+        p.tangential_damping = tangential_damping;
+        p.limit_force = limit_force;
+        p.friction = friction;
+        if (bridge_volume > 0.0) {
+          self->bridge = std::make_shared<const capillary::BridgeForce>(model_of(capillary_model), contact_angle);
+          p.liquid = {self->bridge.get(), surface_tension, bridge_volume};
+        }
+      })
+      .def("step", [](Contact& self, const nb::tuple& separation, const nb::tuple& v1, const nb::tuple& v2, const nb::tuple& w1, const nb::tuple& w2,
+                      double radius_1, double radius_2, double mass_1, double mass_2, double dt, bool update) {
+        ContactBodies b;
+        b.separation = vector(separation);
+        b.velocity_1 = vector(v1);
+        b.velocity_2 = vector(v2);
+        b.angular_velocity_1 = vector(w1);
+        b.angular_velocity_2 = vector(w2);
+        b.radius_1 = radius_1;
+        b.radius_2 = radius_2;
+        b.mass_1 = mass_1;
+        b.mass_2 = mass_2;
+        const ContactForce f = contact_step(self.parameters, b, dt, self.state, update);
+        return nb::make_tuple(tuple(f.force), tuple(f.torque_1), tuple(f.torque_2), f.overlap, f.normal_force, f.capillary_force,
+                              tuple(f.tangential), f.interacting);
+      })
+      .def_prop_ro("slip", [](const Contact& self) { return self.state.friction.slip; })
+      .def_prop_ro("dissipated_energy", [](const Contact& self) { return self.state.friction.dissipated_energy; })
+      .def_prop_ro("bridge_volume", [](const Contact& self) { return self.state.bridge_volume; });
+}

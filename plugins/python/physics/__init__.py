@@ -1,0 +1,25 @@
+"""Contact laws of dembark on numpy arrays: the same headers that run in LIGGGHTS and YADE.
+
+All quantities are in SI units.
+"""
+
+from dembark.physics.capillary import CAPILLARY_MODELS, capillary_force, rupture_distance
+from dembark.physics.contact import Body, Contact, ContactForce, Trajectory, collide, drop
+from dembark.physics.friction import FinnieRabinowicz, FrictionPath
+from dembark.physics.normal import effective_shear_modulus, effective_youngs_modulus
+
+__all__ = [
+    "CAPILLARY_MODELS",
+    "Body",
+    "Contact",
+    "ContactForce",
+    "FinnieRabinowicz",
+    "FrictionPath",
+    "Trajectory",
+    "capillary_force",
+    "collide",
+    "drop",
+    "effective_shear_modulus",
+    "effective_youngs_modulus",
+    "rupture_distance",
+]

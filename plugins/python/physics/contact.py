@@ -1,0 +1,147 @@
+"""A single contact and small two-body systems without an engine, stepped like LIGGGHTS and YADE step them.
+
+The integrator is the leapfrog that both engines reduce to: forces at step n see the positions of step n and the velocities of the
+half step before; so the same contact gives the same numbers in all three to round-off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dembark import _physics
+from dembark.physics.friction import FinnieRabinowicz
+
+Vector = tuple[float, float, float]
+ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class ContactForce:
+    """One step of a contact. Forces in N on body 1, torques in N m, lengths in m."""
+
+    force: Vector
+    torque_1: Vector
+    torque_2: Vector
+    overlap: float  # negative = gap
+    normal_force: float  # repulsive, of the normal law alone
+    capillary_force: float  # attractive
+    tangential: Vector
+    interacting: bool  # touching or held by a bridge
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contact:
+    """The laws of one contact; `begin()` makes the state that goes with one pair of bodies.
+
+    effective_youngs_modulus, effective_shear_modulus : E*, G*, Pa
+    restitution : 0 < e <= 1
+    friction : the tangential law
+    normal_law : 'hertz' or 'hooke' (with characteristic_velocity, m/s)
+    bridge_volume : m^3 of each bridge, 0 = dry; with surface_tension (N/m), contact_angle (rad) and capillary_model
+    """
+
+    effective_youngs_modulus: float
+    effective_shear_modulus: float
+    restitution: float
+    friction: FinnieRabinowicz
+    normal_law: str = "hertz"
+    characteristic_velocity: float = 1.0
+    tangential_damping: bool = True
+    limit_force: bool = False
+    bridge_volume: float = 0.0
+    surface_tension: float = 0.0
+    contact_angle: float = 0.0
+    capillary_model: str = "exact"
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.restitution <= 1.0:
+            raise ValueError(f"restitution must be > 0 and <= 1, not {self.restitution:g}")
+        if not (self.effective_youngs_modulus > 0.0 and self.effective_shear_modulus > 0.0):
+            raise ValueError("effective elastic moduli must be > 0 Pa")
+
+    def begin(self) -> _physics.Contact:
+        """State of a contact that has not touched yet."""
+        return _physics.Contact(self.normal_law, self.effective_youngs_modulus, self.effective_shear_modulus, self.restitution,
+                                self.characteristic_velocity, self.tangential_damping, self.limit_force, self.friction._law,
+                                self.capillary_model, self.contact_angle, self.surface_tension, self.bridge_volume)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """A sphere. Lengths in m, mass in kg, velocities in m/s and rad/s."""
+
+    radius: float
+    mass: float
+    position: Sequence[float] = ZERO
+    velocity: Sequence[float] = ZERO
+    angular_velocity: Sequence[float] = ZERO
+
+
+@dataclass
+class Trajectory:
+    """Motion of the bodies; positions, velocities and angular velocities have the shape (steps, bodies, 3), forces (steps,)."""
+
+    time: NDArray[np.float64]
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    angular_velocity: NDArray[np.float64]
+    contacts: list[ContactForce] = field(repr=False)
+
+
+def _triple(vector: NDArray[np.float64]) -> Vector:
+    return (float(vector[0]), float(vector[1]), float(vector[2]))
+
+
+def _integrate(contact: Contact, bodies: Sequence[Body], wall: tuple[Vector, Vector] | None, gravity: Sequence[float], time_step: float,
+               steps: int) -> Trajectory:
+    n = len(bodies)
+    x = np.array([b.position for b in bodies], dtype=float)
+    v = np.array([b.velocity for b in bodies], dtype=float)
+    w = np.array([b.angular_velocity for b in bodies], dtype=float)
+    mass = np.array([b.mass for b in bodies])
+    inertia = 0.4 * mass * np.array([b.radius for b in bodies]) ** 2
+    g = np.asarray(gravity, dtype=float)
+    state = contact.begin()
+    out = Trajectory(time_step * np.arange(1, steps + 1), np.empty((steps, n, 3)), np.empty((steps, n, 3)), np.empty((steps, n, 3)), [])
+    # The first half step: no contact yet, gravity only, as the engines' set-up finds it.
+    v += 0.5 * time_step * g
+    for k in range(steps):
+        x += time_step * v
+        if wall is None:
+            separation, v2, w2, r2, m2 = x[0] - x[1], _triple(v[1]), _triple(w[1]), bodies[1].radius, bodies[1].mass
+        else:
+            point, normal = np.asarray(wall[0]), np.asarray(wall[1])
+            separation, v2, w2, r2, m2 = np.dot(x[0] - point, normal) * normal, ZERO, ZERO, np.inf, np.inf
+        step = ContactForce(*state.step(_triple(separation), _triple(v[0]), v2, _triple(w[0]), w2, bodies[0].radius, r2, bodies[0].mass, m2,
+                                        time_step, True))
+        acceleration = np.tile(g, (n, 1))
+        force = np.asarray(step.force)
+        acceleration[0] += force / mass[0]
+        spin_up = np.zeros((n, 3))
+        spin_up[0] = np.asarray(step.torque_1) / inertia[0]
+        if wall is None:
+            acceleration[1] -= force / mass[1]
+            spin_up[1] = np.asarray(step.torque_2) / inertia[1]
+        # Full-step velocities are what the engines write; the next half step goes on from there.
+        v += 0.5 * time_step * acceleration
+        w += 0.5 * time_step * spin_up
+        out.position[k], out.velocity[k], out.angular_velocity[k] = x, v, w
+        out.contacts.append(step)
+        v += 0.5 * time_step * acceleration
+        w += 0.5 * time_step * spin_up
+    return out
+
+
+def collide(contact: Contact, body_1: Body, body_2: Body, *, time_step: float, steps: int, gravity: Sequence[float] = ZERO) -> Trajectory:
+    """Free motion of two spheres through a contact; they must not touch at the start. `time_step` in s, `gravity` in m/s^2."""
+    return _integrate(contact, [body_1, body_2], None, gravity, time_step, steps)
+
+
+def drop(contact: Contact, body: Body, *, time_step: float, steps: int, gravity: Sequence[float] = (0.0, 0.0, -9.81),
+         wall_point: Vector = ZERO, wall_normal: Vector = (0.0, 0.0, 1.0)) -> Trajectory:
+    """Motion of a sphere above a fixed plane wall given by a point (m) and a unit normal into the free side."""
+    return _integrate(contact, [body], (wall_point, wall_normal), gravity, time_step, steps)

@@ -1,0 +1,85 @@
+"""The shooting solver checked on its own, and the force law of the engines checked against it."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dembark.physics import capillary_force, rupture_distance
+from dembark.physics.young_laplace import NoBridge, bridge, rupture, rupture_gap
+
+ANGLES = [0.0, np.radians(25.0), np.radians(60.0)]
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+@pytest.mark.parametrize("volume", [1e-5, 3e-2])
+def test_force_is_the_derivative_of_the_surface_energy(volume, angle):
+    end = rupture_gap(volume, angle)
+    for part in (0.05, 0.5, 0.9):
+        gap, step = part * end, 2e-4 * end
+        energies = [bridge(volume, gap + k * step, angle).energy for k in (-2, -1, 1, 2)]
+        slope = (energies[0] - 8.0 * energies[1] + 8.0 * energies[2] - energies[3]) / (12.0 * step)
+        assert bridge(volume, gap, angle).force == pytest.approx(slope, rel=1e-4)
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+def test_small_touching_bridge(angle):
+    limit = 2.0 * np.pi * np.cos(angle)
+    coarse, fine = (limit - bridge(v, 0.0, angle).force for v in (1.6e-6, 1e-7))
+    # The deviation goes with the half-filling angle, volume^(1/4).
+    assert 0.0 < coarse < 0.1 * limit
+    assert coarse / fine == pytest.approx(2.0, rel=0.05)
+
+
+def test_solution_is_what_was_asked_for():
+    b = bridge(2e-3, 0.05, 0.4)
+    assert (b.volume, b.gap) == pytest.approx((2e-3, 0.05), rel=1e-7)
+    assert b.force == pytest.approx(2.0 * np.pi * b.neck_radius - np.pi * b.neck_radius**2 * b.pressure)
+
+
+@pytest.mark.parametrize(("angle", "fit_error"), [(0.0, 0.01), (np.radians(20.0), 0.04)])
+@pytest.mark.parametrize("volume", [1e-6, 1e-4, 1e-3])
+def test_rupture_is_near_lians_fit(volume, angle, fit_error):
+    """Lian, Thornton & Adams (1993) fitted a straight line in the angle to their solutions of the same equation."""
+    assert rupture_gap(volume, angle) == pytest.approx((1.0 + 0.5 * angle) * volume ** (1.0 / 3.0), rel=fit_error)
+
+
+def test_rupture_is_a_fold():
+    """Two branches meet like a parabola: the force goes with the root of the distance to rupture."""
+    end = rupture(1e-3, 0.3)
+    far, near = (bridge(1e-3, end.gap * (1.0 - d), 0.3).force - end.force for d in (4e-4, 1e-4))
+    assert far / near == pytest.approx(2.0, rel=0.02)
+    with pytest.raises(NoBridge, match="beyond rupture"):
+        bridge(1e-3, 1.0001 * end.gap, 0.3)
+
+
+@pytest.mark.parametrize(("volume", "gap", "angle", "message"), [
+    (0.0, 0.0, 0.0, "volume"), (float("nan"), 0.0, 0.0, "volume"), (1e-3, -1e-9, 0.0, "gap"), (1e-3, 0.0, 1.5, "contact_angle"),
+])
+def test_ranges(volume, gap, angle, message):
+    with pytest.raises(ValueError, match=message):
+        bridge(volume, gap, angle)
+
+
+@settings(max_examples=8, deadline=None, derandomize=True)
+@given(volume=st.floats(-6.0, -1.0).map(lambda e: 10.0**e), degrees=st.floats(0.0, 60.0))
+def test_engines_force_law_against_the_reference(volume, degrees):
+    """1 % is promised from touching to rupture; 0.1 % holds up to 0.9999 of it."""
+    angle, radius, tension = np.radians(degrees), 1.7e-3, 0.0728
+    end = rupture(volume, angle)
+    assert rupture_distance(volume * radius**3, angle, radius, radius) == pytest.approx(end.gap * radius, rel=2e-5)
+    parts = np.array([0.0, 1e-4, 0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 0.99, 0.999, 0.9999])
+    law = capillary_force(radius, radius, parts * end.gap * radius, volume * radius**3, tension, angle) / (tension * radius)
+    reference = np.array([bridge(volume, p * end.gap, angle).force for p in parts])
+    np.testing.assert_allclose(law, reference, rtol=1e-3)
+    last = capillary_force(radius, radius, rupture_distance(volume * radius**3, angle, radius, radius), volume * radius**3, tension, angle)
+    assert last / (tension * radius) == pytest.approx(end.force, rel=1e-2)
+
+
+def test_wall_and_unequal_spheres_use_twice_the_reduced_radius():
+    volume, gap, angle = 1e-12, 3e-5, 0.2
+    radius = 2.0 * 1e-3 * 3e-3 / 4e-3
+    expected = bridge(volume / radius**3, gap / radius, angle).force * 0.07 * radius
+    assert capillary_force(1e-3, 3e-3, gap, volume, 0.07, angle) == pytest.approx(expected, rel=1e-3)
+    expected = bridge(volume / 2e-3**3, gap / 2e-3, angle).force * 0.07 * 2e-3
+    assert capillary_force(1e-3, np.inf, gap, volume, 0.07, angle) == pytest.approx(expected, rel=1e-3)
