@@ -1,0 +1,113 @@
+#include "granular_combinations.h"
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+
+// The library's headers depend on this order.
+#include "fix_insert_stream.h"
+#include "error.h"
+#include "lammps.h"
+#include "contact_models.h"
+#include "style_surface_model.h"
+#include "style_normal_model.h"
+#include "style_tangential_model.h"
+#include "style_cohesion_model.h"
+#include "style_rolling_model.h"
+#include "granular_pair_style.h"
+#include "granular_wall.h"
+#include "pair_gran_base.h"
+#include "fix_wall_gran_base.h"
+
+namespace dembark_liggghts {
+namespace {
+
+using LAMMPS_NS::LAMMPS;
+using namespace LIGGGHTS;
+using namespace LIGGGHTS::ContactModels;
+
+// What register_contact_models() compiles, in the words of a user.
+const char* const available =
+    "model hertz|hooke, tangential finnie_rabinowicz with cohesion off|capillary or tangential history with cohesion capillary, "
+    "rolling_friction off|cdt|epsd2, surface default";
+
+template <class Host>
+using Creator = Host* (*)(LAMMPS*, typename Host::ParentType*, std::int64_t);
+
+// The tables of the factories are private; an explicit instantiation may name a private member.
+template <class Host>
+using Table = std::map<std::pair<std::string, int>, Creator<Host>> Utils::AbstractFactory<Host>::*;
+struct PairTable {
+  typedef Table<PairStyles::IGranularPairStyle> type;
+  friend type table(PairTable);
+};
+struct WallTable {
+  typedef Table<Walls::IGranularWall> type;
+  friend type table(WallTable);
+};
+template <class Tag, typename Tag::type Member>
+struct Reach {
+  friend typename Tag::type table(Tag) { return Member; }
+};
+template struct Reach<PairTable, &Utils::AbstractFactory<PairStyles::IGranularPairStyle>::styleTable>;
+template struct Reach<WallTable, &Utils::AbstractFactory<Walls::IGranularWall>::styleTable>;
+
+template <class Host>
+Creator<Host> stock_fallback = nullptr;
+
+template <class Host>
+Host* fallback_or_refuse(LAMMPS* lammps, typename Host::ParentType* parent, std::int64_t hash) {
+  const int tangential = (hash >> 6) & 63, cohesion = (hash >> 12) & 63;
+  if (tangential == TANGENTIAL_FINNIE_RABINOWICZ || cohesion == COHESION_CAPILLARY) {
+    const std::string line = std::string("this combination of contact models is not compiled; there is ") + available;
+    lammps->error->all(FLERR, line.c_str());
+  }
+  return stock_fallback<Host>(lammps, parent, hash);
+}
+
+template <class Host, class Type>
+Host* create(LAMMPS* lammps, typename Host::ParentType* parent, std::int64_t hash) {
+  return new Type(lammps, parent, hash);
+}
+
+template <int Normal, int Tangential, int Cohesion, int Rolling>
+void add_combination() {
+  typedef GranStyle<Normal, Tangential, Cohesion, Rolling, SURFACE_DEFAULT> Style;
+  PairStyles::Factory::instance().addStyle("gran", Style::HASHCODE, &create<PairStyles::IGranularPairStyle, PairStyles::Granular<ContactModel<Style>>>);
+  Walls::Factory::instance().addStyle("gran", Style::HASHCODE, &create<Walls::IGranularWall, Walls::Granular<ContactModel<Style>>>);
+}
+
+template <int Tangential, int Cohesion>
+void add_with_normal_and_rolling() {
+  add_combination<HERTZ, Tangential, Cohesion, ROLLING_OFF>();
+  add_combination<HERTZ, Tangential, Cohesion, ROLLING_CDT>();
+  add_combination<HERTZ, Tangential, Cohesion, ROLLING_EPSD2>();
+  add_combination<HOOKE, Tangential, Cohesion, ROLLING_OFF>();
+  add_combination<HOOKE, Tangential, Cohesion, ROLLING_CDT>();
+  add_combination<HOOKE, Tangential, Cohesion, ROLLING_EPSD2>();
+}
+
+template <class Host, class Tag, class Factory>
+void guard_fallback(Factory& factory) {
+  Creator<Host>& creator = (factory.*table(Tag()))[{"gran", static_cast<int>(GranStyle<>::HASHCODE)}];
+  stock_fallback<Host> = creator;
+  creator = &fallback_or_refuse<Host>;
+}
+
+}  // namespace
+
+void register_contact_models() {
+  ContactModels::Factory& models = ContactModels::Factory::instance();
+  models.addTangentialModel("finnie_rabinowicz", TANGENTIAL_FINNIE_RABINOWICZ);
+  models.addCohesionModel("capillary", COHESION_CAPILLARY);
+
+  add_with_normal_and_rolling<TANGENTIAL_FINNIE_RABINOWICZ, COHESION_OFF>();
+  add_with_normal_and_rolling<TANGENTIAL_FINNIE_RABINOWICZ, COHESION_CAPILLARY>();
+  add_with_normal_and_rolling<TANGENTIAL_HISTORY, COHESION_CAPILLARY>();
+
+  guard_fallback<PairStyles::IGranularPairStyle, PairTable>(PairStyles::Factory::instance());
+  guard_fallback<Walls::IGranularWall, WallTable>(Walls::Factory::instance());
+}
+
+}  // namespace dembark_liggghts

@@ -1,0 +1,31 @@
+// liggghts-dembark: stock LIGGGHTS, from its shared library, plus dembark's styles.
+//
+// The command line and everything else is LIGGGHTS's own. Before the input is read, the contact models and their combinations are
+// entered into the tables that the library looks them up in.
+#include <mpi.h>
+
+#include <csignal>
+
+#include "input.h"
+#include "lammps.h"
+#include "signal_handling.h"
+
+#include "granular_combinations.h"
+
+int main(int argc, char** argv) {
+  // The library expects its host to route signals, so that a run that is told to stop still writes what it has.
+  struct sigaction stop = {}, restart = {};
+  stop.sa_handler = LAMMPS_NS::SignalHandler::int_handler;
+  restart.sa_handler = LAMMPS_NS::SignalHandler::usr1_handler;
+  sigaction(SIGINT, &stop, nullptr);
+  sigaction(SIGTERM, &stop, nullptr);
+  sigaction(SIGUSR1, &restart, nullptr);
+
+  MPI_Init(&argc, &argv);
+  LAMMPS_NS::LAMMPS* lammps = new LAMMPS_NS::LAMMPS(argc, argv, MPI_COMM_WORLD);
+  // The library enters its own combinations in this constructor; ours come after, where its fallback can be replaced.
+  dembark_liggghts::register_contact_models();
+  lammps->input->file();
+  delete lammps;
+  MPI_Finalize();
+}

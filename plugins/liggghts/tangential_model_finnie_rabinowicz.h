@@ -1,0 +1,131 @@
+// LIGGGHTS adapter of the Finnie-Rabinowicz tangential law: fetches the contact, calls dembark/finnie_rabinowicz.hpp, adds the force.
+//
+//   pair_style gran model hertz tangential finnie_rabinowicz [presliding linear|exponential]
+//
+// Works compiled out of tree into liggghts-dembark and, unchanged, copied into a LIGGGHTS src/ folder.
+#ifdef TANGENTIAL_MODEL
+TANGENTIAL_MODEL(TANGENTIAL_FINNIE_RABINOWICZ,finnie_rabinowicz,20)
+#else
+
+#ifndef TANGENTIAL_MODEL_FINNIE_RABINOWICZ_H_
+#define TANGENTIAL_MODEL_FINNIE_RABINOWICZ_H_
+
+#include <string>
+#include <vector>
+
+#include "contact_models.h"
+#include "tangential_model_base.h"
+#include "atom.h"
+#include "update.h"
+#include "global_properties.h"
+#include "neighbor.h"
+
+#include "dembark/finnie_rabinowicz.hpp"
+#include "dembark/normal_force.hpp"
+#include "model_properties.h"
+#include "settings_choice.h"
+
+namespace LIGGGHTS {
+namespace ContactModels {
+
+template <>
+class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase {
+  int offset_;
+  int presliding_ = 0;
+  int types_ = 0;
+  std::vector<dembark::FinnieRabinowicz> laws_;  // one a pair of types, row by row
+
+  static dembark::FrictionState<double> load(const double* h) { return {{h[0], h[1], h[2]}, h[3], h[4]}; }
+  static void store(double* h, const dembark::FrictionState<double>& s) {
+    h[0] = s.displacement.x;
+    h[1] = s.displacement.y;
+    h[2] = s.displacement.z;
+    h[3] = s.slip;
+    h[4] = s.dissipated_energy;
+  }
+
+ public:
+  TangentialModel(LAMMPS* lmp, IContactHistorySetup* hsetup, class ContactModelBase*) : TangentialModelBase(lmp, hsetup, nullptr) {
+    // "1": the sign turns when the engine swaps the two grains of a pair.
+    offset_ = hsetup->add_history_value("tangential_displacement_x", "1");
+    hsetup->add_history_value("tangential_displacement_y", "1");
+    hsetup->add_history_value("tangential_displacement_z", "1");
+    hsetup->add_history_value("slip", "0");
+    hsetup->add_history_value("friction_dissipated_energy", "0");
+  }
+
+  void registerSettings(Settings& settings) { dembark_liggghts::register_choice(settings, "presliding", presliding_, {"linear", "exponential"}); }
+
+  inline void postSettings(IContactHistorySetup*, ContactModelBase*) {}
+
+  void connectToProperties(PropertyRegistry& registry) {
+    dembark_liggghts::PropertyReader read(registry, modify, error, "tangential finnie_rabinowicz");
+    types_ = read.types() + 1;
+    laws_.assign(types_ * types_, {});
+    for (int i = 1; i < types_; ++i)
+      for (int j = 1; j < types_; ++j) {
+        dembark::FinnieRabinowicz& law = laws_[i * types_ + j];
+        law.static_friction = read.per_pair("staticFriction", i, j);
+        law.kinetic_friction = read.per_pair("kineticFriction", i, j);
+        law.critical_slip_distance = read.per_pair("criticalSlipDistance", i, j);
+        law.interface_shear_strength = read.per_pair("interfaceShearStrength", i, j, dembark::unlimited_strength);
+        law.healing_time = read.scalar("healingTime", 0.0);
+        law.presliding = presliding_ ? dembark::Presliding::exponential : dembark::Presliding::linear;
+        if (law.error()) read.fail(std::string(law.error()) + " (types " + std::to_string(i) + "-" + std::to_string(j) + ")");
+      }
+    // The engine tells a model of the end of a contact only within this factor of the radii; without it a grain that bounces
+    // between two builds of the neighbour list would keep the displacement of its last contact (as it does in `history`).
+    neighbor->register_contact_dist_factor(1.01);
+  }
+
+  inline void surfacesIntersect(const SurfacesIntersectData& sidata, ForceData& i_forces, ForceData& j_forces) {
+    if (sidata.contact_flags) *sidata.contact_flags |= CONTACT_TANGENTIAL_MODEL;
+    double* const history = &sidata.contact_history[offset_];
+    dembark::FrictionState<double> state = load(history);
+
+    // At the set-up of a run forces are those of the stored state; a step of zero length leaves it as it is.
+    const bool update_history = sidata.computeflag && sidata.shearupdate;
+    const double dt = update_history ? update->dt : 0.0;
+    const dembark::Vec3<double> normal{sidata.en[0], sidata.en[1], sidata.en[2]};
+    dembark::Vec3<double> spin{sidata.omega_i[0], sidata.omega_i[1], sidata.omega_i[2]};
+    if (!sidata.is_wall) spin += {sidata.omega_j[0], sidata.omega_j[1], sidata.omega_j[2]};
+    state.displacement = dembark::rotate_to_plane(state.displacement, normal, 0.5 * dt * dot(spin, normal));
+
+    const dembark::FinnieRabinowicz& law = laws_[sidata.itype * types_ + sidata.jtype];
+    double area = 0.0;  // only a limited strength asks for it
+    if (law.interface_shear_strength < dembark::unlimited_strength)
+      area = dembark::pi * (sidata.is_wall ? sidata.radi : sidata.radi * sidata.radj / sidata.radsum) * sidata.deltan;
+    const dembark::Vec3<double> force = dembark::friction_step(law, sidata.Fn, sidata.kt, sidata.gammat, area,
+                                                               dembark::Vec3<double>{sidata.vtr1, sidata.vtr2, sidata.vtr3}, dt, state);
+    if (update_history) store(history, state);
+
+    const dembark::Vec3<double> moment = cross(normal, force);
+    const double scale = sidata.is_wall ? sidata.area_ratio : 1.0;
+    add(i_forces, force, moment, scale, -scale * sidata.cri);
+    if (!sidata.is_wall) add(j_forces, force, moment, -1.0, -sidata.crj);
+  }
+
+  inline void surfacesClose(SurfacesCloseData& scdata, ForceData&, ForceData&) {
+    if (scdata.contact_flags) *scdata.contact_flags &= ~CONTACT_TANGENTIAL_MODEL;
+    if (scdata.contact_history) store(&scdata.contact_history[offset_], {});
+  }
+
+  inline void beginPass(SurfacesIntersectData&, ForceData&, ForceData&) {}
+  inline void endPass(SurfacesIntersectData&, ForceData&, ForceData&) {}
+
+ private:
+  static void add(ForceData& to, const dembark::Vec3<double>& force, const dembark::Vec3<double>& moment, double sign, double arm) {
+    to.delta_F[0] += sign * force.x;
+    to.delta_F[1] += sign * force.y;
+    to.delta_F[2] += sign * force.z;
+    to.delta_torque[0] += arm * moment.x;
+    to.delta_torque[1] += arm * moment.y;
+    to.delta_torque[2] += arm * moment.z;
+  }
+};
+
+}  // namespace ContactModels
+}  // namespace LIGGGHTS
+
+#endif  // TANGENTIAL_MODEL_FINNIE_RABINOWICZ_H_
+#endif
