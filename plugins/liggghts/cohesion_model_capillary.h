@@ -54,10 +54,16 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
 
   // A bridge longer than the neighbour list looks would vanish without a word.
   void check_reach(const SurfacesCloseData& d, double rupture_distance) {
+    char line[256];
+    if (d.is_wall && !d.mesh && rupture_distance > neighbor->skin) {
+      // The engine keeps the grains near a primitive wall within the skin only.
+      snprintf(line, sizeof line, "cohesion capillary: a bridge to a primitive wall reaches %g m but the neighbour skin is %g m; use neighbor %.3g bin",
+               rupture_distance, neighbor->skin, 1.01 * rupture_distance);
+      error->one(FLERR, line);
+    }
     const double reach = (neighbor->contactDistanceFactor - 1.0) * (d.is_wall ? d.radi : d.radsum);
     if (rupture_distance <= reach) return;
     const double needed = 1.0 + rupture_distance / (d.is_wall ? d.radi : d.radsum);
-    char line[256];
     snprintf(line, sizeof line, "cohesion capillary: a bridge reaches %g m but neighbours are kept to %g m only; use neigh_modify contact_distance_factor %.3g",
              rupture_distance, reach, needed * 1.01);
     error->one(FLERR, line);

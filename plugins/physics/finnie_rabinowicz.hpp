@@ -185,10 +185,14 @@ DEMBARK_COLD Vec3<Real> exponential_step(const FinnieRabinowicz& law, Real norma
 
 /// The linear spring beyond static friction's first limit: slipping, or about to stick again.
 template <class Real>
-DEMBARK_COLD bool linear_slip(const FinnieRabinowicz& law, Real normal_force, Real stiffness, Real contact_area, FrictionState<Real>& state) {
+DEMBARK_COLD bool linear_slip(const FinnieRabinowicz& law, Real normal_force, Real stiffness, Real contact_area, Real dt,
+                              FrictionState<Real>& state) {
   const Real limit = shear_limit(law, friction_coefficient(law, state.slip), normal_force, contact_area);
   const Real trial = norm(state.displacement);
-  if (!(stiffness * trial > limit)) return false;
+  if (!(stiffness * trial > limit)) {
+    // An engine may ask for the force of a contact that slides, in a step of zero length: its spring is at the limit, not beyond.
+    return dt == 0.0 && state.slip > 0.0 && stiffness * trial > limit * (1.0 - 1e-9);
+  }
   const Real slip = slip_to_limit(law, stiffness, trial, state.slip, normal_force, contact_area);
   state.slip += slip;
   state.displacement *= (trial - slip) / trial;
@@ -222,8 +226,8 @@ DEMBARK_HOT Vec3<Real> friction_step(const FinnieRabinowicz& law, Real normal_fo
     const Real strength = law.interface_shear_strength * contact_area;
     bound = coulomb < strength ? coulomb - 0.5 * coulomb * coulomb / strength : Real(0.0);
   }
-  const bool sticks = bound > 0.0 && stiffness * stiffness * dot(state.displacement, state.displacement) <= bound * bound;
-  if (!sticks && detail::linear_slip(law, normal_force, stiffness, contact_area, state)) return -stiffness * state.displacement;
+  const bool sticks = bound > 0.0 && stiffness * stiffness * dot(state.displacement, state.displacement) < bound * bound * (1.0 - 1e-8);
+  if (!sticks && detail::linear_slip(law, normal_force, stiffness, contact_area, dt, state)) return -stiffness * state.displacement;
   if (state.slip > 0.0) detail::heal(law, dt, state);
   state.dissipated_energy += damping * dot(velocity, velocity) * dt;
   return -(stiffness * state.displacement + damping * velocity);

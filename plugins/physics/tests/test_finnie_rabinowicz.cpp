@@ -198,3 +198,17 @@ TEST_CASE("impossible parameters are named") {
   CHECK(law(0.5, 0.3, 1e-5, 0.0).error() != nullptr);
   CHECK(law(NAN, 0.3, 1e-5).error() != nullptr);
 }
+
+TEST_CASE("asked again in a step of zero length, a sliding contact answers the same force, without viscous part") {
+  for (double sc : {0.0, 1e-7, 1e-3}) {
+    const FinnieRabinowicz l = law(0.5, 0.3, sc);
+    FrictionState<double> state;
+    const Vec3<double> velocity{0.1, 0, 0};
+    Vec3<double> force{};
+    for (int i = 0; i < 50; ++i) force = friction_step(l, N, k, 3.0, area, velocity, 1e-5, state);
+    REQUIRE(state.slip > 0.0);
+    FrictionState<double> copy = state;
+    CHECK_THAT(friction_step(l, N, k, 3.0, area, velocity, 0.0, copy).x, WithinRel(force.x, 1e-8));
+    CHECK(copy.slip == state.slip);
+  }
+}
