@@ -1,0 +1,128 @@
+"""Dumps come back as they were written, and broken ones are told in one line."""
+
+import numpy as np
+import pytest
+from dembark.postproc import ContactsDump, DumpError, GrainsDump, read_times, universe
+from dumps import contacts_text, grains_text, write_times
+
+PLACES = np.array([[0.01, 0.02, 0.03], [-0.04, 0.05, 0.123456789012], [0.07, -0.08, 0.09]])
+RADII = np.array([0.0025, 0.002, 0.003])
+
+
+@pytest.fixture
+def two_frames(tmp_path):
+    path = tmp_path / "grains.dump"
+    wall = np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0], [-4.0, 0.0, 0.5]])
+    box = ((0.0, 0.1), (-0.1, 0.1), (0.0, 1.0))
+    text = grains_text(
+        100, PLACES, RADII, velocities=2.0 * PLACES, walls={"side": wall, "base": 0.0 * wall}, box=box, flags="ff pp ff", order=[2, 0, 1]
+    )
+    path.write_text(
+        text
+        + grains_text(
+            200,
+            PLACES + 0.01,
+            RADII,
+            walls={"side": wall, "base": 0.0 * wall},
+            images=[[0, 1, 0], [0, 0, 0], [1, 0, 0]],
+            box=box,
+            flags="ff pp ff",
+        )
+    )
+    return path
+
+
+def test_frame_is_sorted_by_id_in_double_precision(two_frames):
+    frame = GrainsDump(two_frames)[0]
+    assert frame.step == 100
+    assert frame.ids.tolist() == [1, 2, 3]
+    np.testing.assert_allclose(frame.positions, PLACES, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(frame.velocities, 2.0 * PLACES, rtol=1e-11)
+    assert frame.wall_forces.keys() == {"side", "base"}
+    assert frame.wall_forces["side"][2].tolist() == [-4.0, 0.0, 0.5]
+
+
+def test_image_flags_unwrap_periodic_axes_only(two_frames):
+    frame = GrainsDump(two_frames)[1]
+    np.testing.assert_allclose(frame.positions[0] - frame.wrapped[0], [0.0, 0.2, 0.0])
+    np.testing.assert_allclose(frame.positions[2], frame.wrapped[2])
+
+
+def test_select_keeps_wall_forces_beside_their_grains(two_frames):
+    part = GrainsDump(two_frames)[0].select(np.array([False, False, True]))
+    assert part.ids.tolist() == [3]
+    assert part.wall_forces["side"].tolist() == [[-4.0, 0.0, 0.5]]
+
+
+@pytest.mark.parametrize("cut", [1, 30, 200])
+def test_cut_off_last_frame_is_told_or_left_out(two_frames, cut):
+    two_frames.write_bytes(two_frames.read_bytes()[:-cut])
+    with pytest.raises(DumpError, match=r"frame 2: truncated") as caught:
+        GrainsDump(two_frames)
+    assert "\n" not in str(caught.value)
+    dump = GrainsDump(two_frames, skip_truncated=True)
+    assert len(dump) == 1
+    assert "frame 2" in dump.truncated
+
+
+def test_whole_file_is_not_called_truncated(two_frames):
+    dump = GrainsDump(two_frames, skip_truncated=True)
+    assert len(dump) == 2
+    assert dump.truncated == ""
+
+
+@pytest.mark.parametrize(("text", "message"), [("", "empty"), ("hello\n", "does not begin"), (None, "does not exist")])
+def test_foreign_files_are_refused(tmp_path, text, message):
+    path = tmp_path / "grains.dump"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(DumpError, match=message):
+        GrainsDump(path)
+
+
+def test_numbers_that_are_not_finite_are_refused(two_frames):
+    two_frames.write_text(two_frames.read_text().replace("0.07 -0.08", "nan -0.08"))
+    with pytest.raises(DumpError, match="not finite"):
+        GrainsDump(two_frames)[0]
+
+
+def test_missing_column_is_named(tmp_path):
+    path = tmp_path / "grains.dump"
+    path.write_text(grains_text(1, PLACES, RADII).replace(" radius ", " r "))
+    with pytest.raises(DumpError, match="radius is missing"):
+        GrainsDump(path)[0]
+
+
+def test_mdanalysis_sees_the_same_grains(two_frames):
+    world = universe(two_frames, time_step=1e-3)
+    assert world.trajectory.n_frames == 2
+    np.testing.assert_allclose(world.atoms.radii, RADII)
+    assert world.select_atoms("prop z > 0.1").ids.tolist() == [2]
+    times = [(step.time, step.data["frame"].step) for step in world.trajectory]
+    assert times == [(0.1, 100), (0.2, 200)]
+    world.trajectory[0]
+    np.testing.assert_allclose(world.atoms.positions, PLACES, atol=1e-8)
+
+
+def test_contacts_take_the_nearest_image(tmp_path):
+    path = tmp_path / "contacts.dump"
+    box = ((-1.0, 1.0), (0.0, 0.025), (-1.0, 1.0))
+    path.write_text(contacts_text(5, [[0.0, 0.001, 0.0]], [[0.0, 0.024, 0.003]], [[3, 7]], [[0.0, 1.0, -2.0]], box=box, flags="ff pp ff"))
+    frame = ContactsDump(path)[0]
+    np.testing.assert_allclose(frame.branch, [[0.0, -0.002, 0.003]], atol=1e-15)
+    assert frame.ids.tolist() == [[3, 7]]
+    assert frame.forces.tolist() == [[0.0, 1.0, -2.0]]
+
+
+def test_frame_without_contacts(tmp_path):
+    path = tmp_path / "contacts.dump"
+    path.write_text(contacts_text(5, [], [], [], []))
+    assert len(ContactsDump(path)[0].forces) == 0
+
+
+def test_times(tmp_path):
+    write_times(tmp_path / "time.csv", {"step": [1, 2], "time": [0.1, 0.2], "kinetic_energy": [1.0, 0.5], "base_fz": [0.0, 3.0]})
+    assert read_times(tmp_path / "time.csv")["base_fz"].tolist() == [0.0, 3.0]
+    (tmp_path / "time.csv").write_text("step,time\n1,2\n")
+    with pytest.raises(DumpError, match="header"):
+        read_times(tmp_path / "time.csv")
