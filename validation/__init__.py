@@ -1,0 +1,1 @@
+"""The validation harness: cases and their runs, checks against references, the report."""

@@ -1,0 +1,207 @@
+"""Cases as data: find the folders that hold a `case.toml`, read them and check that what they declare makes sense."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from dembark.validation.errors import DembarkError
+from dembark.validation.expressions import Expression
+from dembark.validation.parameters import Parameter, Value, checked, nearest, pick
+from dembark.validation.units import known_unit
+
+ENGINES = ("liggghts", "yade")
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A condition between parameters and the sentence for whoever breaks it."""
+
+    expression: Expression
+    message: str
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """One line of `[runs]`: a variant and the engines it runs in."""
+
+    variant: str
+    engines: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case folder: its parameters, profiles and variants (overrides of parameters by name), and what a profile runs."""
+
+    name: str
+    title: str
+    description: str
+    source: tuple[str, ...]
+    engines: tuple[str, ...]
+    folder: Path
+    parameters: Mapping[str, Parameter]
+    profiles: Mapping[str, Mapping[str, Value]]
+    variants: Mapping[str, Mapping[str, Value]]
+    runs: Mapping[str, tuple[PlannedRun, ...]]
+    constraints: tuple[Constraint, ...] = ()
+
+    def deck(self, engine: str) -> Path:
+        """Deck of `engine` in this folder."""
+        return self.folder / {"liggghts": "liggghts.in", "yade": "yade.py"}[engine]
+
+
+def checkout() -> Path | None:
+    """Top of the source tree this package runs from; None for an installed copy."""
+    root = Path(__file__).resolve().parents[1]
+    return root if (root / "pyproject.toml").is_file() else None
+
+
+def deck_root() -> Path:
+    """Folder of the case folders: `DEMBARK_DECKS`, else the checkout's or installed `input_decks`, else the one below here."""
+    named = os.environ.get("DEMBARK_DECKS")
+    if named:
+        if not Path(named).is_dir():
+            raise DembarkError(f"DEMBARK_DECKS={named} is no folder", "", "set it to the folder that holds the case folders")
+        return Path(named).resolve()
+    # The decks lie beside this package in a checkout and in an installed copy alike.
+    for place in (Path(__file__).resolve().parents[1] / "input_decks", Path.cwd() / "input_decks"):
+        if place.is_dir():
+            return place.resolve()
+    raise DembarkError("no folder input_decks found", "", "set DEMBARK_DECKS to the folder that holds the case folders")
+
+
+def discover(root: Path | None = None) -> dict[str, Case]:
+    """All cases below `root` (default: `deck_root()`) by name; raises DembarkError at the first case.toml with a mistake."""
+    base = root or deck_root()
+    found = {}
+    for path in sorted(base.glob("*/case.toml")):
+        case = load(path)
+        found[case.name] = case
+    return found
+
+
+def find(name: str, root: Path | None = None) -> Case:
+    """The case called `name`; only its own file is read, so a mistake in another case does not matter."""
+    base = root or deck_root()
+    pick(name, [path.parent.name for path in base.glob("*/case.toml")], "case", f"in {base}")
+    return load(base / name / "case.toml")
+
+
+@cache
+def load(path: Path) -> Case:
+    """Read and check one case.toml; raises DembarkError saying what is wrong in which table."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DembarkError(f"{path} cannot be read", str(error)) from None
+    return _Reader(path).case(data)
+
+
+class _Reader:
+    """Turns the tables of one case.toml into a Case; each mistake names the table it is in."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def fail(self, table: str, what: str, right: str = "") -> DembarkError:
+        return DembarkError(what, f"[{table}] of {self.path}", right)
+
+    def table(self, data: Mapping[str, Any], name: str, keys: Mapping[str, type | tuple[type, ...]], required: Iterable[str] = ()) -> None:
+        for key, value in data.items():
+            if key not in keys:
+                raise self.fail(name, f"unknown key {key!r}", nearest(key, keys))
+            if not isinstance(value, keys[key]) or (isinstance(value, bool) and keys[key] is not bool):
+                raise self.fail(name, f"{key} = {value!r} has the wrong type")
+        for key in required:
+            if key not in data:
+                raise self.fail(name, f"{key} is missing")
+
+    def case(self, data: Mapping[str, Any]) -> Case:
+        tables = {"case": dict, "parameters": dict, "profiles": dict, "variants": dict, "runs": dict, "constraints": list}
+        self.table(data, "top level", tables, ("case", "parameters"))
+        head = data["case"]
+        keys = {"name": str, "title": str, "description": str, "source": list, "engines": list}
+        self.table(head, "case", keys, ("name", "title", "engines"))
+        if head["name"] != self.path.parent.name:
+            raise self.fail("case", f"name = {head['name']!r}", f"the name of its folder, {self.path.parent.name!r}")
+        for engine in head["engines"]:
+            pick(engine, ENGINES, "engine", f"[case] of {self.path}")
+        parameters = {name: self.parameter(name, entry) for name, entry in data["parameters"].items()}
+        variants = self.changes("variants", data.get("variants", {"default": {}}), parameters)
+        profiles = self.changes("profiles", data.get("profiles", {}), parameters)
+        return Case(
+            name=head["name"], title=head["title"], description=head.get("description", "").strip(), source=tuple(head.get("source", ())),
+            engines=tuple(head["engines"]), folder=self.path.parent, parameters=parameters, profiles=profiles, variants=variants,
+            runs=self.runs(data.get("runs", {}), profiles, variants, tuple(head["engines"])),
+            constraints=tuple(self.constraint(entry, parameters) for entry in data.get("constraints", ())))
+
+    def parameter(self, name: str, entry: Mapping[str, Any]) -> Parameter:
+        table, number = f"parameters.{name}", (int, float)
+        if not isinstance(entry, dict) or not name.isidentifier():
+            raise self.fail(table, "a parameter is a table with an identifier as name")
+        keys = {"value": (int, float, str), "unit": str, "type": str, "min": number, "max": number, "exclusive_min": bool,
+                "exclusive_max": bool, "doc": str, "values": list, "optional": bool}
+        self.table(entry, table, keys, ("type", "doc"))
+        pick(entry["type"], ("float", "int", "choice"), "type", f"[{table}] of {self.path}")
+        if "value" not in entry and not entry.get("optional"):
+            raise self.fail(table, "value is missing", "a value, or optional = true")
+        if (entry["type"] == "choice") != ("values" in entry):
+            raise self.fail(table, "type and values do not fit", 'values = [...] together with type = "choice"')
+        if not known_unit(entry.get("unit", "1")):
+            raise self.fail(table, f"unknown unit {entry['unit']!r}", 'an SI unit, or "1"')
+        parameter = Parameter(name=name, **{**entry, "values": tuple(entry.get("values", ()))})
+        self.check(table, parameter, parameter.value)
+        return parameter
+
+    def check(self, table: str, parameter: Parameter, value: Value) -> Value:
+        try:
+            return checked(parameter, value)
+        except DembarkError as error:
+            raise self.fail(table, str(error)) from None
+
+    def changes(self, kind: str, tables: Mapping[str, Any], parameters: Mapping[str, Parameter]) -> dict[str, dict[str, Value]]:
+        return {name: self.overrides(f"{kind}.{name}", entry, parameters) for name, entry in tables.items()}
+
+    def overrides(self, table: str, entry: Any, parameters: Mapping[str, Parameter]) -> dict[str, Value]:
+        if not isinstance(entry, dict):
+            raise self.fail(table, "overrides are a table of key = value")
+        for key in entry:
+            if key not in parameters:
+                raise self.fail(table, f"unknown parameter {key!r}", nearest(key, parameters))
+        return {key: self.check(table, parameters[key], value) for key, value in entry.items()}
+
+    def runs(self, data: Mapping[str, Any], profiles: Mapping[str, Any], variants: Mapping[str, Any],
+             engines: tuple[str, ...]) -> dict[str, tuple[PlannedRun, ...]]:
+        result = {}
+        for profile, entries in data.items():
+            pick(profile, profiles, "profile", f"[runs] of {self.path}")
+            planned = []
+            for entry in entries:
+                self.table(entry, "runs", {"variant": str, "engines": list}, ("variant",))
+                chosen = tuple(entry.get("engines", engines))
+                pick(entry["variant"], variants, "variant", f"[runs] of {self.path}")
+                for engine in chosen:
+                    pick(engine, engines, "engine", f"[runs] of {self.path}")
+                planned.append(PlannedRun(entry["variant"], chosen))
+            pairs = [(run.variant, engine) for run in planned for engine in run.engines]
+            if len(set(pairs)) < len(pairs):
+                raise self.fail("runs", f"{profile} names a variant twice for the same engine")
+            result[profile] = tuple(planned)
+        return result
+
+    def constraint(self, entry: Any, parameters: Mapping[str, Parameter]) -> Constraint:
+        if not isinstance(entry, dict):
+            raise self.fail("constraints", "a constraint is a table with expression and message")
+        self.table(entry, "constraints", {"expression": str, "message": str}, ("expression", "message"))
+        try:
+            expression = Expression(entry["expression"])
+        except DembarkError as error:
+            raise self.fail("constraints", str(error)) from None
+        for name in expression.names - parameters.keys():
+            raise self.fail("constraints", f"unknown parameter {name!r}", nearest(name, parameters))
+        return Constraint(expression, entry["message"])

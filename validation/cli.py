@@ -1,0 +1,178 @@
+"""The command `dembark`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from dembark.validation.errors import DembarkError, RunError
+
+app = typer.Typer(name="dembark", help="Granular contact laws and their validation, in LIGGGHTS and YADE.",
+                  pretty_exceptions_enable=False, rich_markup_mode=None, context_settings={"help_option_names": ["-h", "--help"]})
+
+_SET = 'Change a key; repeat for more. A unit may follow: --set "grain_diameter=4 mm".'
+_OUT = "Folder for the results; default: results/<profile>/<case>/<variant>/<engine>; needed with --set."
+
+Profile = Annotated[str, typer.Option(help="Size of the runs: quick, standard, full, ...")]
+Results = Annotated[Path, typer.Option(help="Folder of all results; a profile's own are in a folder below it.")]
+
+
+def _console() -> Console:
+    # Piped into a file, a table shall not be squeezed into 80 columns.
+    console = Console(highlight=False)
+    return console if console.is_terminal else Console(highlight=False, width=200)
+
+
+@app.command("cases")
+def show_cases(case: Annotated[str | None, typer.Argument(help="Show the keys, profiles and variants of this case.")] = None) -> None:
+    """List the cases, or everything about one."""
+    from dembark.validation import show
+    from dembark.validation.cases import discover, find
+
+    console = _console()
+    if case is None:
+        console.print(show.case_table(discover().values()))
+        return
+    one = find(case)
+    console.print(f"{one.name}: {one.title}\n{one.description}", markup=False)
+    console.print(show.key_table(one))
+    console.print(show.overrides_table(one))
+    for source in one.source:
+        console.print(f"source: {source}", markup=False)
+
+
+@app.command()
+def run(
+    case: Annotated[str, typer.Argument(help="Name of a case, see 'dembark cases'.")],
+    engine: Annotated[str, typer.Option(help="liggghts or yade.")],
+    profile: Profile = "quick",
+    variant: Annotated[str | None, typer.Option(help="Variant of the case; default: the first one.")] = None,
+    change: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=_SET)] = None,
+    out: Annotated[Path | None, typer.Option(help=_OUT)] = None,
+    ranks: Annotated[int, typer.Option(min=1, help="MPI processes for each run (LIGGGHTS).")] = 1,
+    threads: Annotated[int, typer.Option(min=1, help="Threads for each run.")] = 1,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Replicas at a time; default: as many as fit the cores.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace results of other inputs once the new ones are finished.")] = False,
+) -> None:
+    """Run a case in one engine, measure it and show each quantity beside its reference."""
+    from dembark.validation import engines, show
+    from dembark.validation.cases import ENGINES, find
+    from dembark.validation.execute import execute
+    from dembark.validation.jobs import cancelled_by_signal
+    from dembark.validation.parameters import pick
+    from dembark.validation.plan import series
+    from dembark.validation.resolve import resolve, settings
+    from dembark.validation.simulate import Resources
+
+    one = find(case)
+    changes = settings(change or ())
+    chosen = variant if variant is not None else next(iter(one.variants))
+    pick(engine, ENGINES, "engine", "in --engine")
+    # Everything the user wrote is checked before an engine is looked for.
+    resolve(one, profile, chosen, changes)
+    if out is None and changes:
+        raise DembarkError("--out is missing", "with --set the run is not the one of the profile", "name a folder for its results")
+    planned = series(one, chosen, profile, engines.find(engine), changes)
+    folder = (out or Path("results") / profile / planned.place).resolve()
+    metrics = execute(planned, folder, cancelled_by_signal(), Resources(ranks, threads), jobs, force)
+    console = _console()
+    console.print(show.quantity_table(metrics))
+    failed = sum(quantity.get("verdict") == "fail" for quantity in metrics.get("quantities", []))
+    if failed:
+        console.print(f"{failed} CHECKS FAILED" if failed > 1 else "1 CHECK FAILED", style="bold red")
+    console.print(str(folder / "metrics.json"), markup=False, soft_wrap=True)
+
+
+@app.command()
+def validate(
+    profile: Profile = "quick",
+    cores: Annotated[int | None, typer.Option(min=1, help="Runs at a time; default: all cores.")] = None,
+    results: Results = Path("results"),
+    case: Annotated[list[str] | None, typer.Option(help="Only this case; repeat for more.")] = None,
+    engine: Annotated[list[str] | None, typer.Option(help="Only this engine.")] = None,
+) -> None:
+    """Run all cases of a profile in both engines and build the report; finished runs are kept."""
+    from dembark.validation.jobs import cancelled_by_signal
+    from dembark.validation.workflow import validate as workflow
+
+    outcome = workflow(profile, cancelled_by_signal(), cores, results, tuple(case or ()), tuple(engine or ()))
+    console = _console()
+    for line in outcome.unfinished:
+        console.print(f"not finished: {line}", markup=False, style="red", soft_wrap=True)
+    for line in outcome.problems:
+        console.print(f"problem: {line}", markup=False, style="red", soft_wrap=True)
+    failed = f"{outcome.failed_checks} FAILED" if outcome.failed_checks else "none failed"
+    console.print(f"{outcome.runs - len(outcome.unfinished)} of {outcome.runs} runs finished, {outcome.checks} checks, {failed}",
+                  style="bold red" if outcome.failed_checks else "bold", soft_wrap=True)
+    if outcome.report:
+        console.print(str(outcome.report), markup=False, soft_wrap=True)
+    if not outcome.complete:
+        count = len(outcome.unfinished) + len(outcome.problems) + (outcome.report is None)
+        raise RunError("the validation is incomplete", f"{count} things went wrong (above)", "start again: what is finished is kept")
+
+
+@app.command("report")
+def make_report(profile: Profile = "quick", results: Results = Path("results")) -> None:
+    """Build the report again from the results that are there."""
+    from dembark.validation.jobs import build_report
+
+    folder = results.resolve() / profile
+    if not any(folder.glob("*/*/*/metrics.json")):
+        raise DembarkError(f"no results in {folder}", "", f"run 'dembark validate --profile {profile}' first, or give --results")
+    build_report(folder)
+    _console().print(f"{folder / 'report.html'}\n{folder / 'report.pdf'}", markup=False, soft_wrap=True)
+
+
+@app.command()
+def doctor() -> None:
+    """Say what is installed, what is missing and what to do; exit code 1 when something required is missing."""
+    from dembark.validation import show
+    from dembark.validation.doctor import examine
+
+    findings = examine()
+    _console().print(show.finding_table(findings))
+    if any(finding.required and not finding.found for finding in findings):
+        raise typer.Exit(1)
+
+
+@app.command(add_help_option=False, context_settings={"ignore_unknown_options": True, "allow_extra_args": True, "help_option_names": []})
+def yade(context: typer.Context) -> None:
+    """Start YADE with dembark's laws; all that follows is passed on to it."""
+    from dembark.validation import engines
+
+    found = engines.find("yade")
+    environment = found.environment()
+    if "DISPLAY" in os.environ:
+        environment["DISPLAY"] = os.environ["DISPLAY"]
+    sys.stdout.flush()
+    os.execve(found.executable, [str(found.executable), *context.args], environment)
+
+
+def main(words: list[str] | None = None) -> int:
+    """Run the command line; returns the exit code: 0 done, 1 a run or report failed, 2 the user's mistake, 130 interrupted."""
+    try:
+        given = sys.argv[1:] if words is None else words
+        code = app(args=given or ["--help"], prog_name="dembark", standalone_mode=False)
+    except DembarkError as error:
+        print(f"dembark: {error}", file=sys.stderr)
+        return error.exit_code
+    except (typer.Abort, KeyboardInterrupt):
+        print("dembark: interrupted", file=sys.stderr)
+        return 130
+    except Exception as error:
+        # Typer's own usage errors are told apart by this method; everything else is a defect and keeps its trace.
+        message = getattr(error, "format_message", None)
+        if message is None:
+            raise
+        print(f"dembark: {' '.join(message().split()).rstrip('.')}, see 'dembark --help'", file=sys.stderr)
+        return 2
+    return code if isinstance(code, int) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,64 @@
+"""What is installed, in which version, what is missing and what to do about it."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from dembark.validation import cases, engines, provenance
+from dembark.validation.errors import DembarkError
+
+_PACKAGES = ("numpy", "scipy", "MDAnalysis", "snakemake", "typer", "rich", "pint", "jinja2", "matplotlib", "weasyprint", "pyvista")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked for; `advice` says what to do when it was not found."""
+
+    what: str
+    found: str | None
+    required: bool = True
+    advice: str = ""
+
+
+def _asked(what: str, question: Callable[[], str], required: bool = True) -> Finding:
+    try:
+        return Finding(what, question(), required)
+    except DembarkError as error:
+        return Finding(what, None, required, str(error))
+
+
+def _engine(name: str) -> str:
+    engine = engines.find(name)
+    return f"{engine.version} ({engine.executable})"
+
+
+def _decks() -> str:
+    found = cases.discover()
+    if not found:
+        raise DembarkError(f"no case in {cases.deck_root()}", "", "set DEMBARK_DECKS to the folder that holds the case folders")
+    return f"{', '.join(found)} in {cases.deck_root()}"
+
+
+def examine() -> list[Finding]:
+    """All findings: Python and its packages, both engines, the cases, and what is useful but not required."""
+    packages = {name: provenance.package_version(name) for name in _PACKAGES}
+    absent = [name for name, version in packages.items() if version is None]
+    mpirun, commit = shutil.which("mpirun"), provenance.commit()
+    free = shutil.disk_usage(Path.cwd()).free
+    return [
+        Finding("Python", platform.python_version() if sys.version_info >= (3, 11) else None, advice="Python 3.11 or newer is needed"),
+        Finding("Python packages", None if absent else ", ".join(f"{name} {version}" for name, version in packages.items()),
+                advice=f"{', '.join(absent)} missing: run 'make'"),
+        *(_asked(what, lambda name=name: _engine(name)) for name, what in engines.NAMES.items()),
+        _asked("cases", _decks),
+        Finding("mpirun", mpirun, False, "install openmpi-bin to use --ranks"),
+        Finding("commit", commit["commit"] and commit["commit"][:12] + (" with changes" if commit["dirty"] else ""), False,
+                "not a Git checkout: results will not name a commit"),
+        Finding("machine", f"{os.cpu_count()} cores, {free >> 30} GB free in this folder", False),
+    ]

@@ -1,0 +1,130 @@
+"""Where the two engines are, which versions they have, and how they are called."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from dembark.validation.cases import checkout
+from dembark.validation.errors import DembarkError
+from dembark.validation.parameters import Value
+
+NAMES = {"liggghts": "LIGGGHTS with dembark's styles", "yade": "YADE with dembark's laws"}
+
+
+@dataclass(frozen=True)
+class Engine:
+    """An engine that was found: `identity` changes when the program or dembark's part of it is rebuilt differently."""
+
+    name: str
+    executable: Path
+    version: str
+    identity: str
+    prefix: Path | None = None
+
+    def command(self, deck: Path, values: Mapping[str, Value], ranks: int = 1, threads: int = 1) -> list[str]:
+        """Words that run `deck` with `values` (None = leave the deck's default) in the current folder."""
+        given = {key: repr(value) if isinstance(value, float) else str(value) for key, value in values.items() if value is not None}
+        if self.name == "yade":
+            if ranks > 1:
+                raise DembarkError(f"--ranks {ranks} with YADE", "", "use --threads: YADE runs in one process")
+            return [str(self.executable), f"-j{threads}", "-n", "-x", str(deck), *(f"{key}={value}" for key, value in given.items())]
+        # Without binding, two runs that go on at the same time do not end up on the same core.
+        launcher = ["mpirun", "-np", str(ranks), "--bind-to", "none", "--oversubscribe"] if ranks > 1 else []
+        variables = (word for key, value in given.items() for word in ("-var", key, value))
+        return [*launcher, str(self.executable), "-in", str(deck), "-log", "none", *variables]
+
+    def environment(self, threads: int = 1) -> dict[str, str]:
+        """Environment for the engine: one thread unless asked for more, and nothing of this Python's virtual environment."""
+        result = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "DISPLAY")}
+        result |= {"OMP_NUM_THREADS": str(threads), "PYTHONUNBUFFERED": "1"}
+        if self.name == "yade" and self.prefix:
+            result["YADE_PREFIX"] = str(self.prefix)
+            result["PATH"] = "/usr/bin:" + result.get("PATH", "")
+        if os.geteuid() == 0:
+            result |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+        return result
+
+
+def _executable(path: Path, variable: str) -> Path:
+    if not (path.is_file() and os.access(path, os.X_OK)):
+        raise DembarkError(f"{variable}={path} is no program", "", f"set {variable} to the engine's executable, or unset it")
+    return path
+
+
+def _find_liggghts() -> Path:
+    named = os.environ.get("DEMBARK_LIGGGHTS")
+    if named:
+        return _executable(Path(named), "DEMBARK_LIGGGHTS")
+    tree = checkout()
+    built = tree / "build/bin/liggghts-dembark" if tree else None
+    if built and os.access(built, os.X_OK):
+        return built
+    on_path = shutil.which("liggghts-dembark")
+    if on_path:
+        return Path(on_path)
+    raise DembarkError("liggghts-dembark not found", f"neither {built or 'in a build folder'} nor on PATH",
+                       "build it with 'make liggghts' or set DEMBARK_LIGGGHTS to the executable")
+
+
+def _find_yade() -> tuple[Path, Path]:
+    named = os.environ.get("DEMBARK_YADE")
+    if named:
+        place = Path(named)
+        prefix = place if place.is_dir() else place.parent.parent
+        return _executable(place / "bin/yade" if place.is_dir() else place, "DEMBARK_YADE"), prefix
+    tree = checkout()
+    prefix = tree / "build/yade-overlay" if tree else None
+    if prefix and os.access(prefix / "bin/yade", os.X_OK):
+        return prefix / "bin/yade", prefix
+    raise DembarkError("YADE with dembark's laws not found", f"no {prefix or 'build/yade-overlay'}",
+                       "build it with 'make yade-plugin' or set DEMBARK_YADE to its folder or executable")
+
+
+def _digest(files: Iterable[Path]) -> str:
+    total = hashlib.sha256()
+    for path in sorted(files):
+        total.update(path.name.encode())
+        total.update(path.read_bytes())
+    return total.hexdigest()
+
+
+def _own_files(prefix: Path) -> list[Path]:
+    # The overlay consists of links to YADE's own files; what is no link, or carries our name, is dembark's.
+    return [path for suffix in ("*.so", "*.py") for path in (prefix / "lib").rglob(suffix)
+            if path.is_file() and (not path.is_symlink() or "dembark" in path.name)]
+
+
+def _first_match(pattern: str, command: list[str], environment: Mapping[str, str] | None = None) -> str:
+    try:
+        with tempfile.TemporaryDirectory(prefix="dembark-") as folder:
+            done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, errors="replace",
+                                  stdin=subprocess.DEVNULL, timeout=120, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise DembarkError(f"{command[0]} does not start", "", str(error)) from None
+    found = re.search(pattern, done.stdout + done.stderr)
+    if found:
+        return found.group(1)
+    last = (done.stderr or done.stdout).strip().splitlines()[-1:] or [f"exit code {done.returncode} without a word"]
+    raise DembarkError(f"{command[0]} does not tell its version", "", last[0])
+
+
+@cache
+def find(name: str) -> Engine:
+    """The engine called `name` (`liggghts` or `yade`), asked for its version; DembarkError telling what to do if there is none."""
+    if name == "liggghts":
+        program = _find_liggghts()
+        version = _first_match(r"\(Version (?:LIGGGHTS-PUBLIC )?([^\s,)]+)", [str(program), "-in", "/dev/null", "-log", "none"])
+        return Engine(name, program, version, _digest([program]))
+    program, prefix = _find_yade()
+    bare = Engine(name, program, "", "", prefix)
+    version = _first_match(r"[Yy]ade version:?\s*(\S+)", [str(program), "--version"], bare.environment())
+    return Engine(name, program, version, _digest([program, *_own_files(prefix)]), prefix)

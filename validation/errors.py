@@ -1,0 +1,23 @@
+"""What a user is told when something cannot be done: one line, and the exit code that goes with it."""
+
+
+class DembarkError(Exception):
+    """A user's mistake (exit code 2): the message says what is wrong, where, and what would be right."""
+
+    exit_code = 2
+
+    def __init__(self, *parts: str) -> None:
+        """Join `parts` (what, where, what would be right) into one line without line breaks."""
+        super().__init__(", ".join(" ".join(part.split()) for part in parts if part))
+
+
+class RunError(DembarkError):
+    """A run, measurement or report that failed although it was asked for rightly (exit code 1)."""
+
+    exit_code = 1
+
+
+class Interrupted(RunError):
+    """The user or the machine ended the work (SIGINT, SIGTERM)."""
+
+    exit_code = 130

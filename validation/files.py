@@ -1,0 +1,156 @@
+"""Files that are either whole or not there: atomic writing, locks, folders moved into place, and checks of an engine's output."""
+
+from __future__ import annotations
+
+import csv
+import errno
+import fcntl
+import json
+import math
+import mmap
+import os
+import re
+import shutil
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from dembark.validation.errors import DembarkError, RunError
+
+_TIMESTEP = b"ITEM: TIMESTEP\n"
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Write `content` so that a reader sees the old file or the whole new one, also after a crash."""
+    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
+    part = path.with_name(f".{path.name}.part-{os.getpid()}")
+    try:
+        part.write_text(text, encoding="utf-8")
+        _sync(part)
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise disk_error(error, path) from None
+    _sync(path.parent)
+
+
+def read_json(path: Path) -> dict[str, Any] | None:
+    """Content of a JSON file that holds an object; None when there is no such file or it is not readable as one."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return content if isinstance(content, dict) else None
+
+
+def disk_error(error: OSError, path: Path) -> RunError:
+    """One line for an operating system error while writing to `path`."""
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return RunError("the disk is full", f"writing {path}", "free some space and start again; finished runs are kept")
+    return RunError(f"cannot write {path}", error.strerror or str(error))
+
+
+@contextmanager
+def lock(path: Path, message: str) -> Iterator[None]:
+    """Hold a lock that the system releases when this process ends in whatever way; DembarkError(message) when another has it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", encoding="utf-8") as handle:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise DembarkError(message, f"its lock is {path}", "wait for it to end or stop it") from None
+        yield
+
+
+def part_folder(target: Path) -> Path:
+    """Fresh hidden folder beside `target` to work in; it names host and process so that leftovers can be told from live ones."""
+    part = target.with_name(f".{target.name}.part-{socket.gethostname()}-{os.getpid()}")
+    shutil.rmtree(part, ignore_errors=True)
+    part.mkdir(parents=True)
+    return part
+
+
+def move_into_place(part: Path, target: Path) -> None:
+    """Make the finished folder `part` to `target`; what was there goes only when the new one stands."""
+    for path in part.rglob("*"):
+        if path.is_file():
+            _sync(path)
+    old = target.with_name(f".{target.name}.old")
+    shutil.rmtree(old, ignore_errors=True)
+    if target.exists():
+        target.rename(old)
+    part.rename(target)
+    _sync(target.parent)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def retire(path: Path) -> None:
+    """Move a result that no longer belongs to the current runs into the folder `superseded` beside it."""
+    if path.exists():
+        aside = path.parent / "superseded" / path.name
+        aside.parent.mkdir(exist_ok=True)
+        if aside.is_dir():
+            shutil.rmtree(aside)
+        path.replace(aside)
+
+
+def sweep(target: Path) -> None:
+    """Clear what processes that were killed left beside `target`, and bring back a result that one had just set aside."""
+    old = target.with_name(f".{target.name}.old")
+    if old.is_dir() and not target.exists():
+        old.rename(target)
+    shutil.rmtree(old, ignore_errors=True)
+    for part in target.parent.glob(f".{target.name}.part-{socket.gethostname()}-*"):
+        if not Path(f"/proc/{part.name.rpartition('-')[2]}").exists():
+            shutil.rmtree(part, ignore_errors=True)
+
+
+def count_frames(path: Path, count_key: str) -> int:
+    """Frames in a LAMMPS-format dump whose size line is `ITEM: NUMBER OF <count_key>`; RunError unless every frame is whole."""
+    if not path.is_file() or path.stat().st_size == 0:
+        raise RunError(f"the engine wrote no {path.name}")
+    pattern = re.compile(rb"\n\d+\nITEM: NUMBER OF " + count_key.encode() + rb"\n(\d+)\n")
+    with path.open("rb") as handle, mmap.mmap(handle.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        frames, start = 0, 0
+        if data[: len(_TIMESTEP)] != _TIMESTEP:
+            raise RunError(f"{path.name} does not begin with a frame")
+        while start < len(data):
+            following = data.find(b"\n" + _TIMESTEP, start)
+            end = len(data) if following < 0 else following + 1
+            size = pattern.match(data, start + len(_TIMESTEP) - 1, end)
+            # Nine header lines, then one line an entry.
+            lines = data[start:end].count(b"\n")
+            if not size or lines != 9 + int(size.group(1)) or data[end - 1] != 10:
+                raise RunError(f"{path.name} is truncated in frame {frames + 1}")
+            frames, start = frames + 1, end
+    return frames
+
+
+def check_times(path: Path) -> int:
+    """Number of rows of a `time.csv`; RunError when it is missing, cut off or holds something that is not a finite number."""
+    if not path.is_file():
+        raise RunError(f"the engine wrote no {path.name}")
+    text = path.read_text(encoding="utf-8", errors="replace")
+    rows = list(csv.reader(text.splitlines()))
+    if len(rows) < 2 or rows[0][:3] != ["step", "time", "kinetic_energy"]:
+        raise RunError(f"{path.name} has no rows, or no header step,time,kinetic_energy,...")
+    if not text.endswith("\n") or any(len(row) != len(rows[0]) for row in rows):
+        raise RunError(f"{path.name} is truncated after {len(rows) - 2} rows")
+    for row in rows[1:]:
+        try:
+            finite = all(math.isfinite(float(cell)) for cell in row)
+        except ValueError:
+            finite = False
+        if not finite:
+            raise RunError(f"the run became unstable: {path.name} holds no finite number at step {row[0]}")
+    return len(rows) - 1

@@ -1,0 +1,221 @@
+"""The steps of a workflow: simulate one replica, measure a series, compare engines, build the report. Snakemake calls them as
+`python -m dembark.validation.jobs <step> ...`; the commands of `dembark` use the same functions."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from dembark.validation.errors import DembarkError, RunError
+from dembark.validation.files import read_json, retire, write_json
+from dembark.validation.plan import Run, Series, campaign, finished, summary
+from dembark.validation.progress import FileBoard, Monitor, State, watched
+from dembark.validation.simulate import Resources, simulate
+
+PROGRESS_VARIABLE = "DEMBARK_PROGRESS"
+
+
+def cancelled_by_signal() -> threading.Event:
+    """An event that SIGINT and SIGTERM set from now on, instead of ending this process at once."""
+    event = threading.Event()
+
+    def handler(number: int, frame: FrameType | None) -> None:
+        event.set()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, handler)
+    return event
+
+
+def progress_folder(results: Path) -> Path:
+    """Where the jobs of results/<profile> tell how far they are."""
+    return results / ".progress"
+
+
+def measure_series(folder: Path, runs: Iterable[Run]) -> dict[str, Any]:
+    """Write `folder/metrics.json` from the finished ones of `runs` and return it; results of other inputs are put aside first.
+
+    Raises RunError when none is finished or the measurement fails; then there is no metrics.json, rather than an old one.
+    """
+    from dembark.validation.metrics import measure
+
+    wanted = {run.folder_name: run for run in runs}
+    for path in folder.glob("replica-*"):
+        if path.name not in wanted or not finished(path, wanted[path.name]):
+            retire(path)
+    done = [run for name, run in wanted.items() if (folder / name).is_dir()]
+    target = folder / "metrics.json"
+    if not done:
+        retire(target)
+        raise RunError(f"nothing to measure in {folder}", "none of its runs is finished")
+    target.unlink(missing_ok=True)
+    try:
+        content = measure(folder)
+    except DembarkError:
+        raise
+    except Exception as error:  # whatever goes wrong in the analysis is a failed measurement, to be told in one line
+        raise RunError(f"{folder} could not be measured", f"{type(error).__name__}: {error}") from error
+    content["inputs"] = [run.inputs for run in done]
+    content["replicas_missing"] = sorted(run.replica for run in wanted.values() if run not in done)
+    write_json(target, content)
+    return content
+
+
+def compare_engines(folder: Path) -> None:
+    """Write `folder/comparison.json` (folder = results/<profile>/<case>/<variant>); RunError when that fails."""
+    from dembark.validation.compare import compare
+
+    target = folder / "comparison.json"
+    target.unlink(missing_ok=True)
+    try:
+        write_json(target, compare(folder))
+    except DembarkError:
+        raise
+    except Exception as error:  # see measure_series
+        raise RunError(f"{folder} could not be compared", f"{type(error).__name__}: {error}") from error
+
+
+def build_report(results: Path) -> None:
+    """Write report.html and report.pdf into `results` (results/<profile>); RunError when that fails."""
+    from dembark.validation import report
+
+    try:
+        report.build(results)
+    except DembarkError:
+        raise
+    except Exception as error:  # see measure_series
+        raise RunError(f"the report of {results} could not be built", f"{type(error).__name__}: {error}") from error
+
+
+def variants(all_series: Iterable[Series]) -> dict[Path, list[Series]]:
+    """Series by the folder of their case and variant; those with more than one are compared."""
+    groups: dict[Path, list[Series]] = {}
+    for one in all_series:
+        groups.setdefault(one.place.parent, []).append(one)
+    return groups
+
+
+def failures(results: Path, all_series: Iterable[Series]) -> dict[str, str]:
+    """Reasons of the runs that failed in the workflow that ran last, by name of the run."""
+    names = [run.name for one in all_series for run in one.runs]
+    return {state.name: state.message for state in watched(progress_folder(results), names)() if state.state == "failed"}
+
+
+def write_summary(results: Path, profile: str, all_series: Sequence[Series], messages: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Write `runs.json`: which runs the report should have, and which of them are finished, failed or missing."""
+    entries = summary(all_series, results, messages)
+    write_json(results / "runs.json", {"profile": profile, "runs": entries})
+    return entries
+
+
+def salvage(results: Path, all_series: Sequence[Series]) -> list[str]:
+    """Measure and compare what can be after some runs failed, so that a report can be built; returns what went wrong."""
+    problems = []
+    for place, group in variants(all_series).items():
+        for one in group:
+            folder = results / one.place
+            content = read_json(folder / "metrics.json")
+            done = [run.inputs for run in one.runs if finished(folder / run.folder_name, run)]
+            if done and content and content.get("inputs") == done:
+                continue
+            try:
+                measure_series(folder, one.runs)
+            except DembarkError as error:
+                problems.append(str(error))
+        if len(group) > 1 and all((results / one.place / "metrics.json").is_file() for one in group):
+            try:
+                compare_engines(results / place)
+            except DembarkError as error:
+                problems.append(str(error))
+        else:
+            retire(results / place / "comparison.json")
+    return problems
+
+
+def _series_at(profile: str, place: str) -> Series:
+    case, _, engine = Path(place).parts
+    (one,) = [one for one in campaign(profile, [case], [engine]) if one.place == Path(place)]
+    return one
+
+
+def _simulate(options: argparse.Namespace, results: Path) -> None:
+    one = _series_at(options.profile, options.place)
+    (run,) = [run for run in one.runs if run.replica == options.replica]
+    cancel = cancelled_by_signal()
+    board = FileBoard(progress_folder(results))
+    resources = Resources(options.ranks, options.threads)
+
+    def states() -> list[State]:
+        # Whoever started the workflow shows the progress of all jobs; without it each job tells its own.
+        return [] if os.environ.get(PROGRESS_VARIABLE) else board.states()
+
+    with Monitor(states):
+        simulate(run, results / one.place, board, cancel, resources)
+    mark = Path(options.mark)
+    mark.parent.mkdir(parents=True, exist_ok=True)
+    mark.touch()
+
+
+def step_name(step: str, place: str | Path = "") -> str:
+    """Name under which a step other than a simulation tells its progress: `measure silo dry yade`."""
+    return " ".join((step, *Path(place).parts))
+
+
+@contextmanager
+def _told(name: str, board: FileBoard) -> Iterator[None]:
+    board.post(name, state="running", started=time.time())
+    try:
+        yield
+    except DembarkError as error:
+        board.post(name, state="failed", ended=time.time(), message=str(error))
+        raise
+    board.post(name, state="finished", ended=time.time())
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run one step; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m dembark.validation.jobs", description=__doc__)
+    parser.add_argument("step", choices=("simulate", "measure", "compare", "report"))
+    parser.add_argument("--profile", required=True)
+    parser.add_argument("--results", type=Path, required=True, help="results/<profile>")
+    parser.add_argument("--case", action="append")
+    parser.add_argument("--engine", action="append")
+    parser.add_argument("--place", help="<case>/<variant>/<engine>, or <case>/<variant> to compare")
+    parser.add_argument("--replica", type=int)
+    parser.add_argument("--mark", help="file to touch when the run is finished")
+    parser.add_argument("--ranks", type=int, default=1)
+    parser.add_argument("--threads", type=int, default=1)
+    options = parser.parse_args(words)
+    results: Path = options.results.resolve()
+    progress_folder(results).mkdir(parents=True, exist_ok=True)
+    try:
+        if options.step == "simulate":
+            _simulate(options, results)
+            return 0
+        with _told(step_name(options.step, options.place or ""), FileBoard(progress_folder(results))):
+            if options.step == "measure":
+                one = _series_at(options.profile, options.place)
+                measure_series(results / one.place, one.runs)
+            elif options.step == "compare":
+                compare_engines(results / options.place)
+            else:
+                chosen = campaign(options.profile, options.case or (), options.engine or ())
+                write_summary(results, options.profile, chosen, failures(results, chosen))
+                build_report(results)
+    except DembarkError as error:
+        print(f"dembark: {error}", file=sys.stderr)
+        return error.exit_code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,131 @@
+"""Which runs there are: one run = case, variant, profile, engine and replica with all its numbers, known by a hash of its inputs."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dembark.validation import engines
+from dembark.validation.cases import ENGINES, Case, discover
+from dembark.validation.engines import Engine
+from dembark.validation.errors import DembarkError
+from dembark.validation.files import read_json
+from dembark.validation.parameters import Value, pick
+from dembark.validation.resolve import for_replica, portable, resolve
+
+# YADE does about a tenth of the particle-steps per second of LIGGGHTS on one core.
+_RELATIVE_COST = {"liggghts": 1, "yade": 10}
+
+
+@dataclass(frozen=True)
+class Run:
+    """One simulation; `values` are the resolved parameters in SI units with this replica's own seed."""
+
+    case: Case
+    variant: str
+    profile: str
+    engine: Engine
+    replica: int
+    values: Mapping[str, Value]
+
+    @property
+    def name(self) -> str:
+        """Short name for people: `silo dry yade 1`."""
+        return f"{self.case.name} {self.variant} {self.engine.name} {self.replica}"
+
+    @property
+    def folder_name(self) -> str:
+        """Name of the folder with its results."""
+        return f"replica-{self.replica}"
+
+    @property
+    def inputs(self) -> str:
+        """Hash of everything that decides the outcome: parameters, deck and engine, but not where or with how many cores."""
+        facts = {"parameters": dict(self.values), "deck": deck_files(self.case, self.engine.name),
+                 "engine": [self.engine.name, self.engine.version, self.engine.identity]}
+        return hashlib.sha256(json.dumps(facts, sort_keys=True, allow_nan=False).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Series:
+    """The replicas of one case, variant and engine; they are measured together."""
+
+    runs: tuple[Run, ...]
+
+    @property
+    def place(self) -> Path:
+        """Folder below results/<profile>: <case>/<variant>/<engine>."""
+        run = self.runs[0]
+        return Path(run.case.name, run.variant, run.engine.name)
+
+    @property
+    def cost(self) -> float:
+        """Relative cost of one replica, to start the longest first."""
+        count = self.runs[0].values.get("grain_count")
+        return (count if isinstance(count, int) else 1) * _RELATIVE_COST[self.runs[0].engine.name]
+
+
+def deck_files(case: Case, engine: str) -> dict[str, str]:
+    """Checksums of the deck of `engine` and of all other files in the case folder that it might include.
+
+    Left out are the case file itself, for what counts of it is passed as parameters and a better sentence in it is no new input,
+    and the case's own checks, which look at results only.
+    """
+    others = {case.deck(name) for name in ENGINES if name != engine}
+    files = (path for path in case.folder.rglob("*") if path.is_file() and path not in others)
+    relative = {path.relative_to(case.folder): path for path in files}
+    return {str(name): hashlib.sha256(path.read_bytes()).hexdigest() for name, path in sorted(relative.items())
+            if name.suffix not in (".md", ".pyc") and str(name) not in ("case.toml", "checks.py") and name.parts[0] != "tests"
+            and not any(part.startswith(".") for part in name.parts)}
+
+
+def series(case: Case, variant: str, profile: str | None, engine: Engine, changes: Mapping[str, Value] | None = None) -> Series:
+    """The runs of one case, variant and engine; as many as the parameter `replicas` says (1 when the case has none)."""
+    pick(engine.name, case.engines, "engine", f"in case {case.name}")
+    if not case.deck(engine.name).is_file():
+        raise DembarkError(f"{case.deck(engine.name)} is missing", "", f"remove {engine.name} from engines in case.toml or add the deck")
+    values = portable(resolve(case, profile, variant, changes))
+    count = values.get("replicas")
+    numbers = range(1, (count if isinstance(count, int) else 1) + 1)
+    return Series(tuple(Run(case, variant, profile or "default", engine, k, for_replica(values, k)) for k in numbers))
+
+
+def campaign(profile: str, only_cases: Sequence[str] = (), only_engines: Sequence[str] = ()) -> list[Series]:
+    """All series that the cases list for `profile`, longest first; only the engines that are needed have to be there."""
+    cases = discover()
+    for name in only_cases:
+        pick(name, cases, "case", "in --case")
+    for name in only_engines:
+        pick(name, ENGINES, "engine", "in --engine")
+    pick(profile, {name for case in cases.values() for name in case.profiles}, "profile", "in the cases")
+    result = [series(case, planned.variant, profile, engines.find(engine))
+              for case in cases.values() if not only_cases or case.name in only_cases
+              for planned in case.runs.get(profile, ())
+              for engine in planned.engines if not only_engines or engine in only_engines]
+    if not result:
+        raise DembarkError(f"profile {profile} has no runs", "for the chosen cases and engines", "see 'dembark cases'")
+    return sorted(result, key=lambda one: -one.cost)
+
+
+def finished(folder: Path, run: Run) -> bool:
+    """Whether `folder` holds the finished result of exactly this run."""
+    record = read_json(folder / "run.json")
+    return record is not None and record.get("inputs") == run.inputs
+
+
+def summary(all_series: Iterable[Series], results: Path, messages: Mapping[str, str]) -> list[dict[str, Any]]:
+    """One entry a run: finished or not (`messages` = reasons by name of the run), and where; for the report."""
+    entries = []
+    for one in all_series:
+        for run in one.runs:
+            folder = results / one.place / run.folder_name
+            done = finished(folder, run)
+            entries.append({"case": run.case.name, "variant": run.variant, "engine": run.engine.name, "replica": run.replica,
+                            "folder": str(one.place / run.folder_name), "inputs": run.inputs,
+                            "state": "finished" if done else "failed" if run.name in messages else "missing",
+                            "message": "" if done else messages.get(run.name, "")})
+    return entries

@@ -1,0 +1,208 @@
+"""How far the runs are: a live table in a terminal, otherwise one plain line an event and every ten seconds a run."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from types import TracebackType
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from dembark.validation.files import read_json
+
+INTERVAL = 10.0
+_STEPS = re.compile(r"dembark: steps (\d+) time_step (\S+)")
+_STEP = re.compile(r"\s*(\d+)\s+[-+]?(?:\d|\.\d|nan|inf)")
+
+
+@dataclass(frozen=True)
+class State:
+    """State of a run: waiting, running, finished, kept (nothing to do) or failed; times in s, `started` as seconds since 1970."""
+
+    name: str
+    state: str = "waiting"
+    step: int = 0
+    steps: int = 0
+    time_step: float = 0.0
+    started: float = 0.0
+    ended: float = 0.0
+    message: str = ""
+
+    @property
+    def left(self) -> float | None:
+        """Expected remaining seconds; None before there is a rate to tell it from."""
+        if self.state != "running" or not self.step or not self.steps:
+            return None
+        return (time.time() - self.started) * (self.steps - self.step) / self.step
+
+
+class OutputParser:
+    """Reads an engine's output: the line `dembark: steps N time_step dt`, lines that begin with the step, `dembark: finished`."""
+
+    def __init__(self) -> None:
+        self.steps, self.step, self.time_step, self.finished = 0, 0, 0.0, False
+
+    def feed(self, line: str) -> bool:
+        """Take one line; True when it brought news."""
+        announced = _STEPS.match(line)
+        if announced:
+            self.steps, self.time_step = int(announced.group(1)), float(announced.group(2))
+            return True
+        if line.startswith("dembark: finished"):
+            self.finished = True
+            return True
+        step = _STEP.match(line)
+        if step and self.steps and self.step < int(step.group(1)) <= self.steps:
+            self.step = int(step.group(1))
+            return True
+        return False
+
+
+def duration(seconds: float) -> str:
+    """`45 s`, `3 min 20 s`, `2 h 5 min`."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"
+
+
+class Board:
+    """The states of runs in this process; safe to use from several threads."""
+
+    def __init__(self, names: Sequence[str] = ()) -> None:
+        self._states = {name: State(name) for name in names}
+        self._guard = threading.Lock()
+
+    def post(self, name: str, **news: str | int | float) -> None:
+        """Change the state of run `name`."""
+        with self._guard:
+            self._states[name] = replace(self._states.get(name, State(name)), **news)  # type: ignore[arg-type]
+
+    def states(self) -> list[State]:
+        """All states, in the order in which the runs became known."""
+        with self._guard:
+            return list(self._states.values())
+
+
+class FileBoard(Board):
+    """A board whose news also go to one small file a run in `folder`, for a process that watches the jobs of a workflow."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__()
+        self._folder = folder
+        self._written = 0.0
+
+    def post(self, name: str, **news: str | int | float) -> None:
+        super().post(name, **news)
+        if "state" not in news and time.monotonic() - self._written < 1.0:
+            return
+        self._written = time.monotonic()
+        try:
+            path = self._folder / (name.replace(" ", "-") + ".json")
+            part = path.with_suffix(".part")
+            part.write_text(json.dumps(asdict(self._states[name])), encoding="utf-8")
+            part.replace(path)
+        except OSError:
+            # Telling the progress is never worth a run: a full disk is reported by what needs the space.
+            pass
+
+
+def watched(folder: Path, names: Sequence[str]) -> Callable[[], list[State]]:
+    """A function that gives the states of the runs `names` as their jobs wrote them to `folder`."""
+    def states() -> list[State]:
+        result = []
+        for name in names:
+            content = read_json(folder / (name.replace(" ", "-") + ".json"))
+            result.append(State(**content) if content else State(name))
+        return result
+    return states
+
+
+def describe(state: State) -> str:
+    """One plain line about a run."""
+    took = duration(state.ended - state.started)
+    match state.state:
+        case "running" if state.steps:
+            eta = "" if state.left is None else f", about {duration(state.left)} left"
+            simulated = f"{state.step * state.time_step:.4g}/{state.steps * state.time_step:.4g} s simulated"
+            return f"{state.name}: step {state.step}/{state.steps} ({100 * state.step // state.steps} %), {simulated}{eta}"
+        case "running":
+            return f"{state.name}: started"
+        case "finished":
+            return f"{state.name}: finished in {took}"
+        case "kept":
+            return f"{state.name}: is finished already, kept"
+        case "failed":
+            return f"{state.name}: FAILED after {took}: {state.message}"
+    return f"{state.name}: {state.state}"
+
+
+class Monitor:
+    """Shows what `states` returns while the `with` block runs."""
+
+    def __init__(self, states: Callable[[], list[State]], console: Console | None = None, interval: float = INTERVAL) -> None:
+        self._states = states
+        self._console = console or Console(file=sys.stderr, highlight=False, soft_wrap=True)
+        self._interval = interval
+        self._end = threading.Event()
+        self._told: dict[str, tuple[str, float]] = {}
+        self._live: Live | None = None
+        self._thread = threading.Thread(target=self._watch, daemon=True)
+
+    def __enter__(self) -> Monitor:
+        if self._console.is_terminal:
+            self._live = Live(get_renderable=self._table, console=self._console, refresh_per_second=2)
+            self._live.start()
+        else:
+            self._thread.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._end.set()
+        if self._live:
+            self._live.stop()
+        else:
+            self._thread.join()
+            self._tell()
+
+    def _watch(self) -> None:
+        while not self._end.wait(min(0.5, self._interval)):
+            self._tell()
+
+    def _tell(self) -> None:
+        now = time.monotonic()
+        for state in self._states():
+            before, when = self._told.get(state.name, ("waiting", 0.0))
+            if state.state != before:
+                line = describe(replace(state, steps=0))
+            elif state.state == "running" and now - when >= self._interval:
+                line = describe(state)
+            else:
+                continue
+            self._console.print(f"dembark: {line}", markup=False)
+            self._told[state.name] = (state.state, now)
+
+    def _table(self) -> Table:
+        states = self._states()
+        done = sum(state.state in ("finished", "kept") for state in states)
+        failed = sum(state.state == "failed" for state in states)
+        waiting = sum(state.state == "waiting" for state in states)
+        title = f"{done} of {len(states)} done, {len(states) - done - failed - waiting} running, {waiting} waiting, {failed} failed"
+        table = Table("run", "state", "step", "simulated", "left or took", title=title, title_justify="left", box=None, pad_edge=False)
+        colours = {"running": "cyan", "finished": "green", "kept": "green", "failed": "bold red", "waiting": "dim"}
+        for state in states:
+            step = f"{100 * state.step // state.steps} % of {state.steps}" if state.steps else ""
+            simulated = f"{state.step * state.time_step:.3g} s of {state.steps * state.time_step:.3g} s" if state.steps else ""
+            left = duration(state.left) if state.left is not None else duration(state.ended - state.started) if state.ended else ""
+            table.add_row(state.name, f"[{colours[state.state]}]{state.state}[/]", step, simulated, left)
+        return table

@@ -1,0 +1,88 @@
+"""Tables for a terminal: cases, the keys of a case, findings of the doctor and quantities with their verdicts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from rich.markup import escape
+from rich.table import Table
+
+from dembark.validation.cases import Case
+from dembark.validation.doctor import Finding
+
+_COLOURS = {"pass": "green", "fail": "bold red", "info": "dim"}
+
+
+def _plain(*columns: str, title: str = "") -> Table:
+    table = Table(title=escape(title) or None, title_justify="left", box=None, pad_edge=False)
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    return table
+
+
+def number(value: Any) -> str:
+    """A number with the digits that matter; other things as they are, nothing for None."""
+    return "" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def interval(value: Any) -> str:
+    """`1.2 ... 1.4` for a pair, nothing for None or a pair without numbers."""
+    return f"{number(value[0])} ... {number(value[1])}" if value and None not in value else ""
+
+
+def case_table(cases: Iterable[Case]) -> Table:
+    """One row a case: name, title, engines, profiles, variants."""
+    table = _plain("case", "title", "engines", "profiles", "variants")
+    for case in cases:
+        table.add_row(*map(escape, (case.name, case.title, ", ".join(case.engines), ", ".join(case.profiles), ", ".join(case.variants))))
+    return table
+
+
+def key_table(case: Case) -> Table:
+    """One row a key: name, default, unit, what is allowed and what it means."""
+    table = _plain("key", "value", "unit", "allowed", "meaning")
+    for key in case.parameters.values():
+        value = "not set" if key.value is None else f"{key.value:g}" if isinstance(key.value, float) else str(key.value)
+        table.add_row(*map(escape, (key.name, value, key.unit, key.range, key.doc)))
+    return table
+
+
+def overrides_table(case: Case) -> Table:
+    """One row a profile or variant with what it changes; profiles also say what they run."""
+    table = _plain("profile or variant", "changes", "runs")
+    for name, changes in case.profiles.items():
+        runs = ", ".join(f"{run.variant} ({', '.join(run.engines)})" for run in case.runs.get(name, ()))
+        table.add_row(escape(f"profile {name}"), escape(_changes(changes)), escape(runs))
+    for name, changes in case.variants.items():
+        table.add_row(escape(f"variant {name}"), escape(_changes(changes)), "")
+    return table
+
+
+def _changes(changes: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key} = {number(value)}" for key, value in changes.items()) or "nothing"
+
+
+def finding_table(findings: Iterable[Finding]) -> Table:
+    """One row a finding: ok, MISSING (required) or absent (optional), and the version or the advice."""
+    table = _plain("what", "state", "found, or what to do")
+    for finding in findings:
+        state = "[green]ok[/]" if finding.found else "[bold red]MISSING[/]" if finding.required else "[yellow]absent[/]"
+        table.add_row(escape(finding.what), state, escape(finding.found or finding.advice))
+    return table
+
+
+def quantity_table(metrics: Mapping[str, Any]) -> Table:
+    """One row a quantity: value with interval, reference, deviation, tolerance and verdict."""
+    title = f"{metrics.get('case', '')} {metrics.get('variant', '')} {metrics.get('engine', '')} ({metrics.get('profile', '')})"
+    columns = ("quantity", "value", "95 % interval", "unit", "reference", "its interval", "deviation", "tolerance", "verdict")
+    table = _plain(*columns, title=title)
+    for quantity in metrics.get("quantities", []):
+        verdict = str(quantity.get("verdict", "info"))
+        shown = verdict.upper() if verdict == "fail" else escape(verdict)
+        name = str(quantity.get("label") or quantity.get("name", ""))
+        table.add_row(
+            escape(name), number(quantity.get("value")), interval(quantity.get("interval")), escape(str(quantity.get("unit", ""))),
+            number(quantity.get("reference")), interval(quantity.get("reference_interval")), number(quantity.get("deviation")),
+            number(quantity.get("tolerance")), f"[{_COLOURS[verdict]}]{shown}[/]" if verdict in _COLOURS else shown)
+    return table
