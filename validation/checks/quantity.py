@@ -1,0 +1,102 @@
+"""A measured quantity with its interval, its reference, and the verdict that follows from them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from dembark.validation.statistics import Estimate
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One line of the verdict table.
+
+    `deviation` from the reference is relative unless `absolute`; `deviation_half` is the half-width of its own interval (value and
+    reference of one run are correlated, so it is not that of the two values). `tolerance` None means: nothing to pass or fail;
+    `verdict` is one that was reached by another rule, told in `detail`. `reason` tells why a verdict is info, `detail` what the
+    number means. `compared`: the engines must agree in it.
+    """
+
+    name: str
+    label: str
+    unit: str
+    estimate: Estimate
+    detail: str = ""
+    reference: Estimate | None = None
+    tolerance: float | None = None
+    absolute: bool = False
+    deviation_half: float | None = None
+    source: str = ""
+    reason: str = ""
+    verdict: str = ""
+    compared: bool = True
+
+    @property
+    def deviation(self) -> float | None:
+        """Value minus reference, over the reference unless `absolute`."""
+        if self.reference is None:
+            return None
+        difference = self.estimate.value - self.reference.value
+        return difference if self.absolute else difference / self.reference.value
+
+    def judged(self) -> tuple[str, str]:
+        """Verdict and reason: pass or fail by the tolerance; info where there is none or where the run is too small for it."""
+        if self.verdict:
+            return self.verdict, self.reason
+        if self.reason or self.tolerance is None or self.deviation is None:
+            return "info", self.reason
+        if not math.isfinite(self.deviation):
+            return "fail", "no finite number"
+        half = self.deviation_half if self.deviation_half is not None else self._half()
+        return judge(self.deviation, half, self.tolerance)
+
+    def _half(self) -> float:
+        other = self.reference.half if self.reference else 0.0
+        joint = math.hypot(self.estimate.half, other)
+        return joint if self.absolute or self.reference is None else joint / abs(self.reference.value)
+
+    def as_json(self) -> dict[str, Any]:
+        """The entry of metrics.json; numbers that are not finite become None, for JSON has none."""
+        verdict, reason = self.judged()
+        reference = self.reference
+        entry = {
+            "name": self.name,
+            "label": self.label,
+            "value": _number(self.estimate.value),
+            "unit": self.unit,
+            "interval": _pair(self.estimate),
+            "basis": self.estimate.basis,
+            "reference": None if reference is None else _number(reference.value),
+            "reference_interval": None if reference is None else _pair(reference),
+            "deviation": None if self.deviation is None else _number(self.deviation),
+            "deviation_kind": "absolute" if self.absolute else "relative",
+            "tolerance": self.tolerance,
+            "verdict": verdict,
+            "reason": reason,
+            "detail": self.detail,
+            "source": self.source,
+            "compared": self.compared,
+        }
+        if self.deviation_half is not None:
+            entry["deviation_half_width"] = _number(self.deviation_half)
+        return entry
+
+
+def judge(deviation: float, half: float, tolerance: float) -> tuple[str, str]:
+    """pass or fail of a deviation with interval half-width `half`; info when the interval is wider than the tolerance, for then
+    neither verdict would mean anything."""
+    if not half <= tolerance:
+        wide = f"±{half:.2g}" if math.isfinite(half) else "unknown"
+        return "info", f"its interval ({wide}) is wider than what is allowed"
+    return ("pass", "") if abs(deviation) <= tolerance else ("fail", "")
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _pair(estimate: Estimate) -> list[float] | None:
+    low, high = estimate.interval
+    return [float(low), float(high)] if math.isfinite(low) and math.isfinite(high) else None

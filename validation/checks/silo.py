@@ -1,0 +1,270 @@
+"""Silo: stresses of a packing in a vertical cylinder whose wall creeps upward, against Janssen's law with nothing fitted.
+
+Janssen (Z. Ver. dtsch. Ing. 39 (1895) 1045; translation: Sperl, arXiv:cond-mat/0511618): sigma_zz = rho_b g lambda (1 - exp(-h / lambda)),
+lambda = R / (2 K mu_mob), h the depth below the surface. Everything is defined at the wall, r = R: the cross-section is pi R^2, the wall's
+area 2 pi R dz, the solid fraction counts the volume up to r = R, although the grains' centres reach R - d/2 only. K is the wall's normal
+stress over the mean sigma_zz of the cross-section, mu_mob the wall's shear over its normal stress: both measured in the lower half
+(from one diameter above the base to half the height), none taken from the material's friction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from dembark.validation.checks.column import Array, Column, Mask, janssen, overlap, read
+from dembark.validation.checks.quantity import Quantity
+from dembark.validation.checks.run import Replica, pooled, profile, resampled, time_blocks
+from dembark.validation.references import CAMBAU, JANSSEN, LANDRY, WALKER
+from dembark.validation.statistics import Estimate, block_mean
+
+REFERENCES = (JANSSEN, LANDRY, CAMBAU, WALKER)
+TOLERANCE = 0.10
+BALANCE_TOLERANCE = 1e-3
+
+
+def _scalars(column: Column) -> dict[str, Estimate]:
+    frames = time_blocks(column.shear.sum(axis=(1, 2)))
+    sectors = np.arange(column.shear.shape[2])
+    pairs: dict[bytes, tuple[float, float, float]] = {}
+
+    whole = np.ones(len(sectors), bool)
+    fits: dict[bytes, float] = {}
+
+    def fitted(keep: Mask) -> float:
+        if keep.tobytes() not in fits:
+            fits[keep.tobytes()] = column.fitted_length(keep, whole)
+        return fits[keep.tobytes()]
+
+    def pair(keep: Mask, places: Mask, part: int) -> float:
+        # Three quantities come from one fit, which is the slowest step here.
+        key = keep.tobytes() + places.tobytes()
+        if key not in pairs:
+            pairs[key] = column.fitted_pair(keep, places)
+        return pairs[key][part]
+
+    measures = {
+        "predicted": column.predicted_length,
+        "fitted": column.fitted_length,
+        "length_error": lambda keep, places: column.predicted_length(keep, places) / fitted(keep) - 1.0,
+        "worst": column.worst_deviation,
+        "k": column.stress_ratio,
+        "mobilisation": column.mobilisation,
+        "fraction": column.solid_fraction,
+        "base_predicted": column.predicted_base_share,
+        "base_error": lambda keep, places: column.base_share(keep) / column.predicted_base_share(keep, places) - 1.0,
+        "pair_length": lambda keep, places: pair(keep, places, 0),
+        "onset": lambda keep, places: pair(keep, places, 1),
+        "gain": lambda keep, places: pair(keep, places, 2),
+    }
+    result = {name: resampled(measure, frames, sectors, overlap(len(sectors))) for name, measure in measures.items()}
+    result["base"] = resampled(column.base_share, frames)
+    result["field_error"] = block_mean(column.field_errors())
+    result["force_error"] = column.force_error
+    return result
+
+
+def picture(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """How the report shows the packing."""
+    return {"colour_by": "force", "scale": parameters["gravity"], "cut": True}
+
+
+def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[str, Any]], list[str]]:
+    """Quantities, profiles and remarks for the report from all replicas of a series."""
+    columns = [read(replica) for replica in replicas]
+    scalars = [_scalars(column) for column in columns]
+    radius = columns[0].radius
+
+    def over(name: str, factor: float = 1.0) -> Estimate:
+        found = pooled(scalars, name)
+        return Estimate(found.value * factor, found.half * factor, found.basis)
+
+    zero = Estimate(0.0, 0.0)
+    field = over("field_error")
+    allowed = max(field.half, BALANCE_TOLERANCE)
+    field_verdict = "info" if not field.half <= TOLERANCE else "pass" if abs(field.value) <= allowed else "fail"
+    found = [
+        Quantity(
+            "janssen_profile_deviation",
+            "σ_zz(z) in the lower half: largest deviation from Janssen",
+            "1",
+            over("worst"),
+            reference=zero,
+            tolerance=TOLERANCE,
+            absolute=True,
+            source=JANSSEN.short,
+            detail="Janssen's law with measured K, μ_mob and ρ_b, nothing fitted",
+            compared=False,
+        ),
+        Quantity(
+            "janssen_length_predicted",
+            "λ = R / (2 K μ_mob), over R",
+            "R",
+            over("predicted", 1 / radius),
+            reference=over("fitted", 1 / radius),
+            tolerance=TOLERANCE,
+            deviation_half=over("length_error").half,
+            source=JANSSEN.short,
+            detail="reference: the λ fitted to the same run's apparent-mass curve",
+        ),
+        Quantity(
+            "janssen_length_measured",
+            "λ fitted to the apparent-mass curve, over R",
+            "R",
+            over("fitted", 1 / radius),
+            detail="one parameter; ρ_b and the surface are measured",
+        ),
+        Quantity(
+            "apparent_mass_ratio",
+            "force on the base over the weight",
+            "1",
+            over("base"),
+            reference=over("base_predicted"),
+            tolerance=TOLERANCE,
+            deviation_half=over("base_error").half,
+            source=JANSSEN.short,
+            detail="reference: Janssen's law with the predicted λ",
+        ),
+        Quantity(
+            "force_balance_error",
+            "(base + wall friction) / weight − 1",
+            "1",
+            over("force_error"),
+            reference=zero,
+            tolerance=BALANCE_TOLERANCE,
+            absolute=True,
+            source="Newton's second law",
+            detail="mean over the measuring window of time.csv",
+            compared=False,
+        ),
+        Quantity(
+            "field_balance_deviation",
+            "contact-stress field over balance stress − 1",
+            "1",
+            field,
+            reference=zero,
+            absolute=True,
+            tolerance=allowed,
+            verdict=field_verdict,
+            source="momentum balance",
+            compared=False,
+            detail="passes within its own interval, but not closer than the force balance itself (0.001)",
+        ),
+        Quantity(
+            "stress_ratio_k", "K = σ_rr / σ_zz", "1", over("k"), detail="wall's normal stress over the mean vertical stress, lower half"
+        ),
+        Quantity(
+            "wall_mobilisation",
+            "μ_mob = τ / σ_rr",
+            "1",
+            over("mobilisation"),
+            detail=f"lower half; the wall's static friction is {columns[0].wall_friction:g}",
+        ),
+        Quantity(
+            "solid_fraction",
+            "solid fraction",
+            "1",
+            over("fraction"),
+            detail="by exact sphere slices up to r = R, without one diameter at base and surface",
+        ),
+        Quantity(
+            "hydrostatic_height",
+            "depth of the hydrostatic zone (two-parameter form), over R",
+            "R",
+            over("onset", 1 / radius),
+            source=WALKER.short,
+            compared=False,
+        ),
+        Quantity(
+            "two_parameter_gain",
+            "share of Janssen's squared residuals that the second parameter removes",
+            "1",
+            over("gain"),
+            source=WALKER.short,
+            compared=False,
+            detail=f"with it λ is {over('pair_length').value / radius:.2f} R",
+        ),
+    ]
+    static, kinetic = columns[0].wall_friction, columns[0].kinetic_friction
+    mobilised = over("mobilisation").value
+    limits = f"{mobilised / static:.0%} of its static and {mobilised / kinetic:.0%} of its kinetic" if static > 0 and kinetic > 0 else "no"
+    remarks = [
+        (
+            f"The wall carries {limits} friction (τ / σ_rr = {mobilised:.3f}; static {static:g}, kinetic {kinetic:g}). Spheres can "
+            "roll along a smooth wall instead of sliding, which keeps the shear below Coulomb's limit. Janssen's law is therefore "
+            "checked with the measured mobilisation; with the static coefficient in its place λ would come out shorter by the first "
+            "of these shares."
+        ),
+        f"{LANDRY.short}: {LANDRY.statement}",
+        f"{CAMBAU.short}: {CAMBAU.statement}",
+    ]
+    if len(replicas) < 3:
+        remarks.append(
+            "With fewer than three packings the intervals come from time blocks and from sectors of the circumference within the packing; "
+            "what varies from packing to packing as a whole is not in them."
+        )
+    return found, _profiles(columns, over), remarks
+
+
+def _profiles(columns: Sequence[Column], over: Any) -> list[dict[str, Any]]:
+    first = columns[0]
+    place = np.linspace(0.02, 0.98, 40)
+
+    everything = [(np.ones(len(one.base), bool), np.ones(one.shear.shape[2], bool)) for one in columns]
+
+    def smooth(values: Array) -> Array:
+        kernel = np.ones(5)
+        return np.convolve(values, kernel, "same") / np.convolve(np.ones_like(values), kernel, "same")
+
+    height = float(np.mean([column.height for column in columns]))
+    weight = float(np.mean([column.weight for column in columns]))
+    law = janssen(height * (1.0 - place), over("predicted").value, weight)
+    k, friction = over("k").value, over("mobilisation").value
+
+    def entry(
+        name: str, title: str, across: str, get: Any, reference: Array | None = None, label: str = "", note: str = ""
+    ) -> dict[str, Any]:
+        rows = [
+            np.interp(place * column.height, column.middle, get(column, *whole)) for column, whole in zip(columns, everything, strict=True)
+        ]
+        return profile(
+            name,
+            title,
+            "height z / d",
+            across,
+            place * height / first.diameter,
+            rows,
+            vertical=True,
+            reference=reference,
+            reference_label=label,
+            note=note,
+        )
+
+    moving, nothing_fitted = "moving mean over 5 d", "Janssen, nothing fitted"
+    return [
+        entry("sigma_zz_balance", "Vertical stress, balance", "σ_zz (Pa)", lambda c, f, s: c.balance(f), law, nothing_fitted),
+        entry("sigma_zz_field", "Vertical stress, contacts", "σ_zz (Pa)", lambda c, f, s: c.field.mean(axis=0), law, nothing_fitted),
+        entry(
+            "sigma_rr", "Wall normal stress", "σ_rr (Pa)", lambda c, f, s: smooth(c.wall(c.normal, f, s)), k * law, "K × Janssen", moving
+        ),
+        entry(
+            "tau",
+            "Wall shear stress",
+            "τ (Pa)",
+            lambda c, f, s: smooth(c.wall(c.shear, f, s)),
+            friction * k * law,
+            "K μ_mob × Janssen",
+            moving,
+        ),
+        entry(
+            "mobilisation",
+            "Mobilised wall friction",
+            "τ / σ_rr",
+            lambda c, f, s: smooth(c.wall(c.shear, f, s)) / smooth(c.wall(c.normal, f, s)),
+            np.full_like(place, first.wall_friction),
+            "static friction of the wall",
+            moving,
+        ),
+        entry("solid_fraction", "Solid fraction", "φ", lambda c, f, s: c.volume.sum(axis=2).mean(axis=0) / (c.area * np.diff(c.edges))),
+    ]

@@ -1,0 +1,189 @@
+"""The cases' checks find what was put into synthetic runs, and do not pass what is wrong."""
+
+import json
+
+import numpy as np
+import pytest
+from dembark.validation.checks import find
+from dembark.validation.checks.column import janssen, two_parameter
+from dembark.validation.checks.quantity import Quantity, judge
+from dembark.validation.compare import compare, pair
+from dembark.validation.errors import RunError
+from dembark.validation.metrics import measure
+from dembark.validation.statistics import Estimate
+from synthetic import DIAMETER, plug_flow, silo
+
+
+def by_name(content):
+    return {quantity["name"]: quantity for quantity in content["quantities"]}
+
+
+def test_silo_that_follows_janssen_passes(tmp_path):
+    folder = silo(tmp_path, k=0.8, friction=0.25, noise=0.1)
+    content = measure(folder)
+    found = by_name(content)
+    assert found["stress_ratio_k"]["value"] == pytest.approx(0.8, rel=0.02)
+    assert found["wall_mobilisation"]["value"] == pytest.approx(0.25, rel=0.01)
+    assert found["janssen_length_predicted"]["value"] == pytest.approx(2.5, rel=0.02)
+    assert found["janssen_length_measured"]["value"] == pytest.approx(2.5, rel=0.03)
+    assert found["two_parameter_gain"]["value"] < 1.0
+    assert {
+        found[name]["verdict"]
+        for name in (
+            "janssen_profile_deviation",
+            "janssen_length_predicted",
+            "apparent_mass_ratio",
+            "force_balance_error",
+            "field_balance_deviation",
+        )
+    } == {"pass"}
+    assert abs(found["field_balance_deviation"]["value"]) < 1e-9
+    assert json.loads((folder / "metrics.json").read_text()) == content
+
+
+def test_solid_fraction_counts_up_to_the_wall(tmp_path):
+    found = by_name(measure(silo(tmp_path)))
+    assert found["solid_fraction"]["value"] == pytest.approx(24.0 * np.pi / 6.0 * DIAMETER**2 / (np.pi * 0.025**2), rel=2e-3)
+
+
+def test_missing_wall_force_is_a_failed_balance(tmp_path):
+    found = by_name(measure(silo(tmp_path, noise=0.01, lost_wall_force=0.01)))["force_balance_error"]
+    assert found["value"] == pytest.approx(-0.01 * 0.75, rel=0.3)
+    assert found["verdict"] == "fail"
+
+
+def test_three_replicas_give_an_interval_over_replicas(tmp_path):
+    for replica, k in ((1, 0.78), (2, 0.8), (3, 0.83)):
+        folder = silo(tmp_path, replica=replica, k=k, noise=0.1, seed=replica)
+    found = by_name(measure(folder))["stress_ratio_k"]
+    assert found["basis"] == "3 replicas"
+    low, high = found["interval"]
+    assert low < 0.8 < high
+    assert high - low == pytest.approx(2 * 4.303 * np.std([0.78, 0.8, 0.83], ddof=1) / np.sqrt(3), rel=0.1)
+
+
+def test_laws_of_the_silo():
+    depth = np.array([0.0, 1e-6, 0.1, 10.0])
+    np.testing.assert_allclose(janssen(depth, 0.05, 1000.0)[:2], [0.0, 1e-3], rtol=1e-4)
+    assert janssen(depth, 0.05, 1000.0)[-1] == pytest.approx(50.0)
+    np.testing.assert_allclose(two_parameter(depth, 0.05, 0.0, 1000.0), janssen(depth, 0.05, 1000.0))
+    assert two_parameter(np.array([0.02]), 0.05, 0.03, 1000.0)[0] == 20.0
+
+
+def test_plug_flow_with_a_known_profile(tmp_path):
+    found = by_name(measure(plug_flow(tmp_path, slip=0.4, decay=2.0)))
+    assert found["shear_zone_width"]["value"] == pytest.approx(2.0, rel=0.12)
+    assert found["shear_zone_width_90"]["value"] == pytest.approx(0.5 + 2.0 * np.log(10.0), rel=0.12)
+    assert found["wall_mobilisation"]["value"] == pytest.approx(0.3, rel=1e-6)
+    assert found["solid_fraction"]["value"] == pytest.approx(np.pi / 6.0, rel=0.02)
+    assert found["core_fluctuation"]["value"] == pytest.approx(0.02, rel=0.2)
+    assert abs(found["flux_error"]["value"]) < 0.02
+    assert found["flux_error"]["verdict"] == "pass"
+    assert found["force_balance_error"]["verdict"] == "pass"
+    assert found["inertial_number"]["verdict"] == "pass"
+
+
+def test_flat_core_passes_and_a_tilted_one_fails(tmp_path):
+    assert by_name(measure(plug_flow(tmp_path / "flat", slip=0.3, decay=0.8)))["core_flatness"]["verdict"] == "pass"
+    found = by_name(measure(plug_flow(tmp_path / "tilted", slip=0.3, decay=0.8, tilt=0.2)))["core_flatness"]
+    assert found["value"] == pytest.approx(0.2 * 0.225, rel=0.15)
+    assert found["verdict"] == "fail"
+
+
+def test_no_shear_zone_is_said_and_not_measured(tmp_path):
+    found = by_name(measure(plug_flow(tmp_path, slip=0.0)))["shear_zone_width"]
+    assert found["verdict"] == "info"
+    assert "no shear zone" in found["reason"]
+
+
+def test_engines_that_agree_and_engines_that_do_not(tmp_path):
+    for engine, k in (("liggghts", 0.8), ("yade", 0.8)):
+        measure(silo(tmp_path, engine=engine, k=k, noise=0.1, seed=len(engine)))
+    found = by_name(compare(tmp_path / "silo" / "dry"))
+    assert found["stress_ratio_k"]["verdict"] == "pass"
+    for engine, k in (("liggghts", 0.8), ("yade", 1.0)):
+        measure(silo(tmp_path, variant="wet", engine=engine, k=k, noise=0.1, seed=len(engine)))
+    found = by_name(compare(tmp_path / "silo" / "wet"))
+    assert found["stress_ratio_k"]["verdict"] == "fail"
+    assert found["stress_ratio_k"]["deviation"] == pytest.approx(0.25, rel=0.05)
+
+
+def entry(value, half, basis="5 replicas"):
+    return {
+        "basis": basis,
+        "name": "q",
+        "label": "q",
+        "unit": "1",
+        "value": value,
+        "interval": None if half is None else [value - half, value + half],
+    }
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "verdict"),
+    [
+        ((1.0, 0.04), (1.05, 0.04), "pass"),
+        ((1.0, 0.01), (1.05, 0.01), "fail"),
+        ((1.0, 0.2), (1.15, 0.2), "info"),
+        ((1.0, 0.05), (1.3, 0.05), "fail"),
+        ((1.0, None), (1.0, 0.1), "info"),
+        ((0.0, 0.1), (1.0, 0.1), "fail"),
+    ],
+)
+def test_verdict_of_a_pair(one, other, verdict):
+    assert pair(entry(*one), entry(*other), "liggghts", "yade")["verdict"] == verdict
+
+
+def test_intervals_within_single_packings_cannot_fail_a_small_difference():
+    single = "within 1 replica: jackknife over 8 sectors or bands"
+    assert pair(entry(1.0, 0.01, single), entry(1.05, 0.01, single), "liggghts", "yade")["verdict"] == "info"
+    assert pair(entry(1.0, 0.01, single), entry(1.15, 0.01, single), "liggghts", "yade")["verdict"] == "fail"
+
+
+@pytest.mark.parametrize(
+    ("deviation", "half", "verdict"),
+    [
+        (0.05, 0.02, "pass"),
+        (-0.1, 0.1, "pass"),
+        (0.11, 0.02, "fail"),
+        (0.0, 0.2, "info"),
+        (0.5, float("inf"), "info"),
+        (0.0, float("nan"), "info"),
+    ],
+)
+def test_verdict_needs_an_interval_narrower_than_the_tolerance(deviation, half, verdict):
+    assert judge(deviation, half, 0.1)[0] == verdict
+
+
+def test_nan_fails():
+    broken = Quantity("q", "q", "1", Estimate(float("nan"), 0.1), reference=Estimate(1.0, 0.0), tolerance=0.1)
+    assert broken.judged()[0] == "fail"
+    assert broken.as_json()["value"] is None
+
+
+def test_compare_needs_two_engines(tmp_path):
+    measure(silo(tmp_path))
+    with pytest.raises(RunError, match="liggghts only"):
+        compare(tmp_path / "silo" / "dry")
+
+
+def test_truncated_dump_is_one_clear_line(tmp_path):
+    folder = silo(tmp_path)
+    path = folder / "replica-1" / "contacts.dump"
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(RunError, match="truncated") as caught:
+        measure(folder)
+    assert "\n" not in str(caught.value)
+    assert not (folder / "metrics.json").exists()
+
+
+def test_no_replica_is_told(tmp_path):
+    with pytest.raises(RunError, match="nothing to measure"):
+        measure(tmp_path)
+
+
+def test_a_case_may_bring_its_own_checks(tmp_path):
+    (tmp_path / "checks.py").write_text("REFERENCES = ()\n")
+    assert find("drum", tmp_path).REFERENCES == ()
+    with pytest.raises(RunError, match="no checks"):
+        find("drum")

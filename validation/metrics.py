@@ -1,0 +1,79 @@
+"""From the finished replicas of one case, variant and engine to quantities with intervals and verdicts."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from dembark.postproc import DumpError
+from dembark.validation import checks
+from dembark.validation.cases import find as find_case
+from dembark.validation.checks.run import Replica
+from dembark.validation.errors import DembarkError, RunError
+from dembark.validation.files import read_json, write_json
+
+
+def replicas(folder: Path) -> list[Replica]:
+    """Finished replicas of `folder`, in the order of their numbers."""
+    found = [Replica(path.parent, record) for path in folder.glob("replica-*/run.json") if (record := read_json(path)) is not None]
+    return sorted(found, key=lambda one: int(one.record["replica"]))
+
+
+def measure(run_folder: Path) -> dict[str, Any]:
+    """Measure the replicas in `run_folder`, write its `metrics.json` and return what it holds.
+
+    RunError when there is no finished replica, or one of their files cannot be read: a result is whole or not there.
+    """
+    runs = replicas(run_folder)
+    if not runs:
+        raise RunError(f"nothing to measure in {run_folder}", "it has no finished replica-*/run.json")
+    first = runs[0].record
+    module = checks.find(first["case"], _case_folder(first["case"]))
+    try:
+        quantities, profiles, remarks = module.quantities(runs)
+    except DumpError as error:
+        raise RunError(f"{run_folder} could not be measured", str(error)) from None
+    content = {
+        "case": first["case"],
+        "variant": first["variant"],
+        "engine": first["engine"],
+        "profile": first["profile"],
+        "parameters": {key: value for key, value in first["parameters"].items() if key != "seed"},
+        "quantities": [quantity.as_json() for quantity in quantities],
+        "profiles": profiles,
+        "remarks": remarks,
+        "picture": module.picture(first["parameters"]),
+        "references": [asdict(one) for one in module.REFERENCES],
+        "provenance": _provenance(runs),
+    }
+    write_json(run_folder / "metrics.json", content)
+    return content
+
+
+def _case_folder(name: str) -> Path | None:
+    # Results stay measurable where the case files are no longer at hand.
+    try:
+        return find_case(name).folder
+    except DembarkError:
+        return None
+
+
+def _provenance(runs: list[Replica]) -> dict[str, Any]:
+    facts = dict(runs[0].record.get("provenance", {}))
+    wall = [float(one.record["provenance"]["wall_time"]) for one in runs if one.record.get("provenance", {}).get("wall_time")]
+    speed = [
+        float(one.record["provenance"]["particle_steps_per_second"])
+        for one in runs
+        if one.record.get("provenance", {}).get("particle_steps_per_second")
+    ]
+    facts |= {
+        "seeds": [one.record.get("seed") for one in runs],
+        "replicas": len(runs),
+        "wall_time": sum(wall) if wall else None,
+        "particle_steps_per_second": sum(speed) / len(speed) if speed else None,
+        "steps": runs[0].record["steps"],
+        "time_step": runs[0].record["time_step"],
+    }
+    facts.pop("seed", None)
+    return facts

@@ -1,0 +1,57 @@
+"""Numbers as people read them: a value with as many digits as its interval deserves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def plain(value: float | None, digits: int = 3) -> str:
+    """`value` with `digits` significant ones; `–` for none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value == 0:
+        return "0"
+    power = math.floor(math.log10(abs(value)))
+    if -3 <= power < 5:
+        return f"{value:.{max(0, digits - 1 - power)}f}".replace("-", "−")
+    return f"{value / 10**power:.{digits - 1}f}·10{str(power).translate(_SUPERSCRIPTS)}".replace("-", "−")
+
+
+def with_interval(value: float | None, interval: Sequence[float] | None) -> str:
+    """`value ± half`, both to two digits of the half-width."""
+    if value is None:
+        return "–"
+    half = 0.5 * (interval[1] - interval[0]) if interval else math.nan
+    if not math.isfinite(half) or half <= 1e-12 * max(1.0, abs(value)):
+        return plain(value if abs(value) > 1e-12 else 0.0)
+    power = math.floor(math.log10(max(abs(value), half)))
+    scale = 10.0**power if not -3 <= power < 5 else 1.0
+    places = max(0, 1 - math.floor(math.log10(half / scale)))
+    text = f"{value / scale:.{places}f} ± {half / scale:.{places}f}".replace("-", "−")
+    return text if scale == 1.0 else f"({text})·10{str(power).translate(_SUPERSCRIPTS)}"
+
+
+def compact(value: float) -> str:
+    """A parameter without needless zeros."""
+    text = f"{value:.6g}"
+    if "e" in text:
+        mantissa, power = text.split("e")
+        text = f"{mantissa}·10{str(int(power)).translate(_SUPERSCRIPTS)}"
+    return text.replace("-", "−")
+
+
+def percent(value: float | None) -> str:
+    """A relative deviation with sign."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    return f"{100.0 * value:+.{1 if abs(value) < 0.995 else 0}f} %".replace("-", "−")
+
+
+def duration(seconds: float | None) -> str:
+    """Seconds as s, min or h."""
+    if seconds is None:
+        return "–"
+    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.1f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

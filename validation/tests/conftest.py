@@ -1,0 +1,179 @@
+"""A small case with a stand-in engine, for tests of the harness itself."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from dembark.validation import cases, engines
+
+CASE = """
+[case]
+name = "box"
+title = "A box"
+description = "Grains in a box."
+source = ["nobody"]
+engines = ["liggghts", "yade"]
+
+[parameters.grain_count]
+value = 10
+type = "int"
+min = 1
+doc = "number of grains"
+
+[parameters.grain_diameter]
+value = 0.005
+unit = "m"
+type = "float"
+min = 0.0
+exclusive_min = true
+doc = "diameter"
+
+[parameters.contact_angle]
+value = 0.35
+unit = "rad"
+type = "float"
+min = 0.0
+max = 1.5707963267948966
+doc = "angle"
+
+[parameters.static_friction]
+type = "float"
+optional = true
+min = 0.0
+doc = "static friction; not set = that of the material"
+
+[parameters.kinetic_friction]
+type = "float"
+optional = true
+min = 0.0
+doc = "kinetic friction"
+
+[parameters.strength]
+value = inf
+unit = "Pa"
+type = "float"
+min = 0.0
+doc = "strength"
+
+[parameters.behaviour]
+value = "ok"
+type = "choice"
+values = ["ok", "exit", "kill", "hang", "full", "truncate", "short", "unstable", "silent"]
+doc = "what the stand-in engine does"
+
+[parameters.pause]
+value = 0.0
+unit = "s"
+type = "float"
+min = 0.0
+doc = "rest between steps"
+
+[parameters.frames]
+value = 3
+type = "int"
+min = 1
+doc = "number of frames"
+
+[parameters.seed]
+value = 7
+type = "int"
+doc = "seed"
+
+[parameters.replicas]
+value = 1
+type = "int"
+min = 1
+doc = "number of packings"
+
+[profiles.quick]
+[profiles.standard]
+replicas = 3
+grain_count = 20
+
+[variants.dry]
+[variants.wet]
+contact_angle = 0.1
+
+[runs]
+quick = [{variant = "dry"}, {variant = "wet", engines = ["liggghts"]}]
+standard = [{variant = "dry"}]
+
+[[constraints]]
+expression = "kinetic_friction <= static_friction"
+message = "the kinetic friction exceeds the static one"
+"""
+
+
+@pytest.fixture
+def decks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the case `box` for both engines; DEMBARK_DECKS points at it."""
+    root = tmp_path / "decks"
+    (root / "box").mkdir(parents=True)
+    (root / "box" / "case.toml").write_text(CASE)
+    (root / "box" / "liggghts.in").write_text("# deck\n")
+    (root / "box" / "yade.py").write_text("# deck\n")
+    monkeypatch.setenv("DEMBARK_DECKS", str(root))
+    cases.load.cache_clear()
+    return root
+
+
+@pytest.fixture
+def stand_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The stand-in as both engines; returns its file, which may be edited to be "another version"."""
+    program = tmp_path / "engine" / "bin" / "stand-in"
+    program.parent.mkdir(parents=True)
+    shutil.copy(Path(__file__).with_name("stand_in_engine.py"), program)
+    monkeypatch.setenv("DEMBARK_LIGGGHTS", str(program))
+    monkeypatch.setenv("DEMBARK_YADE", str(program))
+    engines.find.cache_clear()
+    yield program
+    engines.find.cache_clear()
+
+
+@pytest.fixture
+def environment(tmp_path: Path) -> dict[str, str]:
+    """Environment in which Python processes use the stand-ins for measurement, comparison and report."""
+    site = tmp_path / "site"
+    site.mkdir()
+    shutil.copy(Path(__file__).with_name("stand_in_analysis.py"), site / "sitecustomize.py")
+    paths = [str(site), os.environ.get("PYTHONPATH", "")]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths)), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+
+
+@pytest.fixture
+def wait_for() -> Callable[..., Any]:
+    """`wait_for(question, seconds=20)`: ask until the answer is true, and return it."""
+    def ask(question: Callable[[], Any], seconds: float = 20) -> Any:
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            answer = question()
+            if answer:
+                return answer
+            time.sleep(0.05)
+        raise AssertionError("waited in vain")
+    return ask
+
+
+@pytest.fixture
+def lives() -> Callable[[int], bool]:
+    """`lives(pid)`: whether the process runs (an ended one that nobody waited for does not)."""
+    def look(pid: int) -> bool:
+        try:
+            return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+        except OSError:
+            return False
+    return look
+
+
+@pytest.fixture
+def engine_pid(wait_for: Callable[..., Any]) -> Callable[[Path], int]:
+    """`engine_pid(folder)`: process of the stand-in that works on a first replica somewhere below `folder`."""
+    def look(folder: Path) -> int:
+        return int(wait_for(lambda: next((path.read_text() for path in folder.glob("**/.replica-1.part-*/pid")), None), 60))
+    return look

@@ -1,0 +1,34 @@
+"""Stands in for measurement, comparison and report where a test is about the order of jobs and about what is missing.
+
+Copied as `sitecustomize.py` to a folder on PYTHONPATH it gives every Python process these functions instead of the real ones.
+"""
+
+import json
+import sys
+import types
+
+
+def measure(folder):
+    replicas = sorted(folder.glob("replica-*/run.json"))
+    if (folder / "unmeasurable").exists():
+        raise ValueError("cannot be measured")
+    first = json.loads(replicas[0].read_text())
+    quantity = {"name": "replicas", "value": len(replicas), "unit": "1", "interval": [0.5, 1.5], "reference": 1.0, "deviation": 0.0,
+                "tolerance": 0.1, "verdict": "fail" if first["variant"] == "wet" else "pass"}
+    return {**{key: first[key] for key in ("case", "variant", "engine", "profile", "parameters")}, "quantities": [quantity]}
+
+
+def compare(folder):
+    return {"engines": sorted(path.parent.name for path in folder.glob("*/metrics.json")), "quantities": []}
+
+
+def build(folder):
+    found = sorted(str(path.relative_to(folder)) for path in folder.glob("*/*/*/metrics.json"))
+    (folder / "report.html").write_text("\n".join(found))
+    (folder / "report.pdf").write_text("pdf")
+
+
+for name, function in (("metrics", measure), ("compare", compare), ("report", build)):
+    module = types.ModuleType(f"dembark.validation.{name}")
+    setattr(module, function.__name__, function)
+    sys.modules[module.__name__] = module

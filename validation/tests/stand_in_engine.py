@@ -1,0 +1,61 @@
+#!/usr/bin/python3
+"""Stands in for both engines where a test is about the handling of processes and files, not about physics.
+
+Called like LIGGGHTS (`-in deck -log none -var key value ...`) or YADE (`-j1 -n -x deck key=value ...`); it obeys the deck contract
+unless the parameter `behaviour` asks for a fault. It writes its process id to `pid` in the working folder first.
+"""
+
+import os
+import signal
+import sys
+import time
+
+words = sys.argv[1:]
+if "--version" in words:
+    print("Yade version: 2025.2.0-stand-in")
+    sys.exit(0)
+print("LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0-stand-in, compiled 2022)")
+if "/dev/null" in words:
+    sys.exit(0)
+if "-in" in words:
+    values = {words[i + 1]: words[i + 2] for i, word in enumerate(words) if word == "-var"}
+else:
+    values = dict(word.split("=", 1) for word in words if "=" in word)
+behaviour, frames, grains = values["behaviour"], int(values["frames"]), int(values["grain_count"])
+with open("pid", "w") as file:
+    file.write(str(os.getpid()))
+with open("values", "w") as file:
+    file.write("\n".join(f"{key}={value}" for key, value in sorted(values.items())))
+print("dembark: steps 100 time_step 1e-5", flush=True)
+for step in range(0, 101, 10):
+    print(f"      {step}  {step * 1e-5}  0.5", flush=True)
+    time.sleep(float(values.get("pause", 0)))
+    if step == 50:
+        if behaviour == "exit":
+            print("ERROR: Lost atoms: original 10 current 9 (thermo.cpp:389)")
+            sys.exit(1)
+        if behaviour == "kill":
+            os.kill(os.getpid(), signal.SIGKILL)
+        if behaviour == "hang":
+            time.sleep(600)
+        if behaviour == "full":
+            print("OSError: [Errno 28] No space left on device: 'grains.dump'")
+            sys.exit(1)
+
+
+def dump(name, key, columns, entries):
+    box = "ITEM: BOX BOUNDS ff ff ff\n" + "0 1\n" * 3
+    text = "".join(f"ITEM: TIMESTEP\n{frame}\nITEM: NUMBER OF {key}\n{entries}\n{box}ITEM: {columns}\n" + "1 2 3\n" * entries
+                   for frame in range(frames))
+    with open(name, "w") as file:
+        file.write(text[: {"truncate": -len(text) // 2, "short": -len(text) // frames}.get(behaviour, len(text))])
+
+
+dump("grains.dump", "ATOMS", "ATOMS id x y", grains)
+dump("contacts.dump", "ENTRIES", "ENTRIES a b c", 0 if grains < 4 else 4)
+with open("time.csv", "w") as file:
+    energy = "nan" if behaviour == "unstable" else "0.5"
+    file.write("step,time,kinetic_energy\n0,0,1\n" + f"100,1e-3,{energy}\n")
+if behaviour == "silent":
+    sys.exit(0)
+print("dembark: finished")

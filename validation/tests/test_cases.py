@@ -1,0 +1,148 @@
+"""Case files: what is read, what is refused, and how the numbers of a run come about."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from dembark.validation import cases
+from dembark.validation.cases import discover, find, load
+from dembark.validation.errors import DembarkError
+from dembark.validation.expressions import Expression
+from dembark.validation.resolve import for_replica, portable, resolve, settings
+from dembark.validation.units import to_si
+from hypothesis import given
+from hypothesis import strategies as st
+
+
+def edited(decks: Path, old: str, new: str) -> Path:
+    path = decks / "box" / "case.toml"
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    cases.load.cache_clear()
+    return path
+
+
+def test_case_is_read(decks: Path) -> None:
+    case = discover()["box"]
+    assert case.parameters["grain_diameter"].value == 0.005
+    assert case.parameters["grain_diameter"].range == "> 0"
+    assert [(run.variant, run.engines) for run in case.runs["quick"]] == [("dry", ("liggghts", "yade")), ("wet", ("liggghts",))]
+
+
+def test_order_of_overrides(decks: Path) -> None:
+    case = find("box")
+    assert resolve(case)["grain_count"] == 10
+    assert resolve(case, "standard")["grain_count"] == 20
+    assert resolve(case, "standard", "wet")["contact_angle"] == 0.1
+    assert resolve(case, "standard", "wet", settings(["grain_count=30", "contact_angle=9 deg"])) | {} == {
+        **resolve(case), "grain_count": 30, "contact_angle": pytest.approx(math.pi / 20), "replicas": 3}
+
+
+@pytest.mark.parametrize(("pair", "words"), [
+    ("grain_diametre=1", ["unknown parameter 'grain_diametre'", "did you mean grain_diameter"]),
+    ("grain_diameter=3 s", ["grain_diameter", "'3 s'", "m"]),
+    ("grain_diameter=3 furlongz", ["furlongz"]),
+    ("grain_diameter=0", ["out of range", "> 0"]),
+    ("grain_diameter=-1 mm", ["out of range", "> 0"]),
+    ("grain_diameter=nan", ["not a number"]),
+    ("grain_diameter=auto", ["must have a value"]),
+    ("grain_count=2.5", ["whole number"]),
+    ("grain_count=inf", ["whole number"]),
+    ("contact_angle=95 deg", ["out of range"]),
+    ("static_friction=30 deg", ["angles"]),
+    ("behaviour=explode", ["allowed are", "truncate"]),
+    ("grain_diameter", ["key=value"]),
+    ("grain_diameter=", ["key=value"]),
+])
+def test_wrong_settings_are_refused_in_one_line(decks: Path, pair: str, words: list[str]) -> None:
+    with pytest.raises(DembarkError) as caught:
+        resolve(find("box"), None, None, settings([pair]))
+    assert "\n" not in str(caught.value)
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_a_key_twice_is_refused() -> None:
+    with pytest.raises(DembarkError, match="twice"):
+        settings(["a=1", "a=2"])
+
+
+def test_unknown_names_get_near_matches(decks: Path) -> None:
+    for call, word in ((lambda: find("bux"), "did you mean box"), (lambda: resolve(find("box"), "quik"), "did you mean quick"),
+                       (lambda: resolve(find("box"), None, "wett"), "did you mean wet")):
+        with pytest.raises(DembarkError, match=word):
+            call()
+
+
+def test_constraint_holds_between_parameters(decks: Path) -> None:
+    case = find("box")
+    assert resolve(case, changes={"static_friction": 0.5, "kinetic_friction": 0.5})["kinetic_friction"] == 0.5
+    assert resolve(case, changes={"kinetic_friction": 0.9})["static_friction"] is None
+    with pytest.raises(DembarkError, match="exceeds the static one"):
+        resolve(case, changes={"static_friction": 0.5, "kinetic_friction": 0.6})
+    assert resolve(case, changes={"static_friction": "auto", "kinetic_friction": 0.6})["static_friction"] is None
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ('type = "int"', 'type = "integer"', ["integer", "int"]),
+    ('unit = "m"', 'unit = "metrez"', ["metrez", "parameters.grain_diameter"]),
+    ("value = 0.005", "value = -0.005", ["out of range", "parameters.grain_diameter"]),
+    ("value = 0.005\n", "", ["value is missing"]),
+    ('doc = "diameter"', "", ["doc is missing"]),
+    ("exclusive_min", "exclusiv_min", ["exclusiv_min", "did you mean exclusive_m"]),
+    ("contact_angle = 0.1", "contact_angel = 0.1", ["contact_angel", "did you mean contact_angle"]),
+    ("contact_angle = 0.1", "contact_angle = 3", ["out of range", "variants.wet"]),
+    ('quick = [{variant = "dry"}', 'quick = [{variant = "dri"}', ["dri", "did you mean dry"]),
+    ('quick = [{variant = "dry"}', 'quick = [{variant = "wet"}', ["twice"]),
+    ('name = "box"', 'name = "bax"', ["bax", "box"]),
+    ('engines = ["liggghts", "yade"]', 'engines = ["ligghts"]', ["did you mean liggghts"]),
+    ("kinetic_friction <= static", "kinetic_frictio <= static", ["kinetic_frictio"]),
+    ("kinetic_friction <= static_friction", "__import__('os')", ["arithmetic"]),
+    ("[case]", "[case", ["cannot be read"]),
+    ('title = "A box"', "title = 3", ["title", "wrong type"]),
+])
+def test_mistakes_in_a_case_file_are_told(decks: Path, old: str, new: str, words: list[str]) -> None:
+    path = edited(decks, old, new)
+    with pytest.raises(DembarkError) as caught:
+        load(path)
+    for word in [*words, "case.toml"]:
+        assert word in str(caught.value)
+
+
+def test_seeds_of_replicas_differ_and_the_first_is_the_decks_own(decks: Path) -> None:
+    values = resolve(find("box"))
+    assert [for_replica(values, k)["seed"] for k in (1, 2, 3)] == [7, 8, 9]
+
+
+def test_infinity_becomes_a_number_that_json_and_the_engines_can_carry(decks: Path) -> None:
+    assert portable(resolve(find("box")))["strength"] == 1e300
+
+
+@pytest.mark.parametrize(("text", "unit", "value"), [
+    ("20 mm", "m", 0.02), ("72 mN/m", "N/m", 0.072), ("5 MPa", "Pa", 5e6), ("30 deg", "rad", math.pi / 6), ("5 %", "1", 0.05),
+    ("1/2", "1", 0.5), ("20 degC", "K", 293.15), ("0.3", "m", 0.3)])
+def test_units(text: str, unit: str, value: float) -> None:
+    assert to_si(text, unit) == pytest.approx(value, rel=1e-15)
+
+
+@given(st.floats(min_value=1e-9, max_value=1e9))
+def test_a_length_in_millimetres_is_a_thousandth(value: float) -> None:
+    assert to_si(f"{value!r} mm", "m") == pytest.approx(value / 1000, rel=1e-14)
+    assert to_si(repr(value), "m") == value
+
+
+@given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
+def test_expressions_agree_with_python(a: float, b: float) -> None:
+    values = {"a": a, "b": b}
+    assert Expression("a <= b or -a > 2*b")(values) == (a <= b or -a > 2 * b)
+    assert Expression("min(a, b) + abs(a) < max(a, b)/2 and not a == b")(values) == (min(a, b) + abs(a) < max(a, b) / 2 and not a == b)
+    assert Expression("0 < a < b")(values) == (0 < a < b)
+
+
+@pytest.mark.parametrize("text", ["a.b", "a[0]", "lambda: 1", "open('x')", "a := 1", "[1]", "a if b else 1", "f'{a}'", "a if", "min(*a)"])
+def test_expressions_refuse_everything_else(text: str) -> None:
+    with pytest.raises(DembarkError):
+        Expression(text)

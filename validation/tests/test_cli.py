@@ -1,0 +1,135 @@
+"""The commands as users type them: one line for a mistake, tables for results, exit codes that scripts can rely on."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from dembark.validation import cases, engines
+from dembark.validation.cli import main
+from dembark.validation.files import read_json
+
+Dembark = Callable[..., "subprocess.CompletedProcess[str]"]
+
+pytestmark = pytest.mark.usefixtures("decks", "stand_in")
+
+
+@pytest.fixture
+def dembark(tmp_path: Path, environment: dict[str, str]) -> Dembark:
+    """The command in a process of its own, in the test's folder."""
+    def call(*words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([sys.executable, "-m", "dembark.validation.cli", *words], cwd=tmp_path, env=environment,
+                              capture_output=True, text=True, timeout=60, check=False)
+    return call
+
+
+@pytest.mark.parametrize(("words", "expected"), [
+    (["rnu"], "Did you mean 'run'"),
+    (["run", "box"], "--engine"),
+    (["run", "bxo", "--engine", "yade"], "did you mean box"),
+    (["run", "box", "--engine", "ydae"], "did you mean yade"),
+    (["run", "box", "--engine", "yade", "--profile", "quikc"], "did you mean quick"),
+    (["run", "box", "--engine", "yade", "--variant", "wett"], "did you mean wet"),
+    (["run", "box", "--engine", "yade", "--set", "grain_cuont=5", "--out", "o"], "did you mean grain_count"),
+    (["run", "box", "--engine", "yade", "--set", "grain_count=5"], "--out is missing"),
+    (["run", "box", "--engine", "yade", "--ranks", "2"], "--threads"),
+    (["run", "box", "--engine", "yade", "--ranks", "0"], "--ranks"),
+    (["validate", "--case", "bxo"], "did you mean box"),
+    (["report", "--results", "nowhere"], "no results in"),
+    (["cases", "bxo"], "did you mean box"),
+])
+def test_a_mistake_gets_one_line_and_exit_code_2(words: list[str], expected: str, capsys: pytest.CaptureFixture[str], tmp_path: Path,
+                                                 monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == 2
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last.startswith("dembark: ") and expected in last
+
+
+def test_a_missing_engine_gets_the_command_that_makes_it(
+        monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    monkeypatch.setattr(engines, "checkout", lambda: tmp_path)
+    monkeypatch.setenv("PATH", "/usr/bin")
+    for engine, variable, advice in (("liggghts", "DEMBARK_LIGGGHTS", "make liggghts"), ("yade", "DEMBARK_YADE", "make yade-plugin")):
+        monkeypatch.delenv(variable)
+        engines.find.cache_clear()
+        assert main(["run", "box", "--engine", engine]) == 2
+        error = capsys.readouterr().err
+        assert advice in error and error.count("\n") == 1
+    assert main(["doctor"]) == 1
+    found = capsys.readouterr().out
+    assert found.count("MISSING") >= 2 and "make yade-plugin" in found
+
+
+def test_cases_shows_every_key(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["cases"]) == 0
+    assert "box" in capsys.readouterr().out
+    assert main(["cases", "box"]) == 0
+    shown = capsys.readouterr().out
+    for key in cases.find("box").parameters.values():
+        assert key.name in shown and key.doc in shown
+    assert "not set" in shown and "> 0" in shown and "dry (liggghts, yade)" in shown
+
+
+def test_run_measures_and_shows_verdicts(dembark: Dembark, tmp_path: Path) -> None:
+    done = dembark("run", "box", "--engine", "liggghts", "--variant", "wet", "--set", "grain_diameter=4 mm", "--out", "o")
+    assert done.returncode == 0, done.stderr
+    assert "FAIL" in done.stdout and "1 CHECK FAILED" in done.stdout and str(tmp_path / "o/metrics.json") in done.stdout
+    assert "box wet liggghts 1: finished" in done.stderr
+    assert read_json(tmp_path / "o/metrics.json")["parameters"]["grain_diameter"] == 0.004
+
+
+def test_run_makes_all_replicas_with_their_own_seeds(dembark: Dembark, tmp_path: Path) -> None:
+    done = dembark("run", "box", "--engine", "yade", "--profile", "standard")
+    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "results/standard/box/dry/yade"
+    assert [read_json(folder / f"replica-{k}/run.json")["seed"] for k in (1, 2, 3)] == [7, 8, 9]
+    assert "kept" in dembark("run", "box", "--engine", "yade", "--profile", "standard").stderr
+
+
+def test_results_of_other_inputs_are_replaced_only_when_asked(dembark: Dembark, tmp_path: Path) -> None:
+    words = ("run", "box", "--engine", "liggghts", "--out", "o")
+    assert dembark(*words).returncode == 0
+    before = (tmp_path / "o/replica-1/run.json").read_bytes()
+    done = dembark(*words, "--set", "grain_count=11")
+    assert done.returncode == 2 and "--force" in done.stderr
+    assert (tmp_path / "o/replica-1/run.json").read_bytes() == before
+    assert dembark(*words, "--set", "grain_count=11", "--force").returncode == 0
+    assert read_json(tmp_path / "o/metrics.json")["parameters"]["grain_count"] == 11
+
+
+def test_a_folder_with_other_things_is_refused(dembark: Dembark, tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/thesis.tex").touch()
+    done = dembark("run", "box", "--engine", "liggghts", "--out", "mine")
+    assert done.returncode == 2 and "not empty" in done.stderr
+    assert os.listdir(tmp_path / "mine") == ["thesis.tex"]
+
+
+def test_a_failed_run_gets_exit_code_1_and_no_metrics(dembark: Dembark, tmp_path: Path) -> None:
+    done = dembark("run", "box", "--engine", "liggghts", "--set", "behaviour=exit", "--out", "o")
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith("dembark: box dry liggghts 1 failed, the engine ended with exit code 1")
+    assert not (tmp_path / "o/metrics.json").exists() and (tmp_path / "o/failed/replica-1.log").is_file()
+    # Mended, the same folder can be used again.
+    assert dembark("run", "box", "--engine", "liggghts", "--out", "o").returncode == 0
+
+
+def test_report_is_built_again_from_results(dembark: Dembark, tmp_path: Path) -> None:
+    assert dembark("run", "box", "--engine", "liggghts").returncode == 0
+    done = dembark("report", "--profile", "quick")
+    assert done.returncode == 0 and str(tmp_path / "results/quick/report.html") in done.stdout
+
+
+def test_yade_gets_all_words(dembark: Dembark) -> None:
+    done = dembark("yade", "--version", "-x")
+    assert done.stdout.startswith("Yade version") and done.returncode == 0
+
+
+def test_help_and_no_words(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 0 and main(["run", "--help"]) == 0
+    assert "KEY=VALUE" in capsys.readouterr().out

@@ -1,0 +1,126 @@
+"""Output of engines is whole or refused; results are replaced whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+from pathlib import Path
+
+import pytest
+from dembark.validation.errors import DembarkError, RunError
+from dembark.validation.files import check_times, count_frames, lock, move_into_place, part_folder, read_json, retire, sweep, write_json
+from hypothesis import given
+from hypothesis import strategies as st
+
+
+def dump(frames: int, atoms: int) -> bytes:
+    head = "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n{}\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\nITEM: ATOMS id x\n"
+    return "".join(head.format(10 * k, atoms) + "".join(f"{i} 0.5\n" for i in range(atoms)) for k in range(frames)).encode()
+
+
+@given(frames=st.integers(1, 4), atoms=st.integers(0, 5), data=st.data())
+def test_a_dump_cut_anywhere_is_noticed(tmp_path_factory: pytest.TempPathFactory, frames: int, atoms: int, data: st.DataObject) -> None:
+    path = tmp_path_factory.mktemp("d") / "grains.dump"
+    whole = dump(frames, atoms)
+    path.write_bytes(whole)
+    assert count_frames(path, "ATOMS") == frames
+    cut = data.draw(st.integers(0, len(whole) - 1))
+    path.write_bytes(whole[:cut])
+    try:
+        # Cut exactly between two frames the file looks like a shorter one; how many frames there must be is not the file's to know.
+        assert count_frames(path, "ATOMS") * len(dump(1, atoms)) == pytest.approx(cut, abs=3 * frames)
+        assert whole[cut:].startswith(b"ITEM: TIMESTEP")
+    except RunError as error:
+        assert "grains.dump" in str(error)
+
+
+@given(data=st.data())
+def test_a_line_missing_in_the_middle_is_noticed(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
+    lines = dump(3, 4).splitlines(keepends=True)
+    gone = data.draw(st.integers(0, len(lines) - 1))
+    path = tmp_path_factory.mktemp("d") / "grains.dump"
+    path.write_bytes(b"".join(lines[:gone] + lines[gone + 1:]))
+    with pytest.raises(RunError):
+        count_frames(path, "ATOMS")
+
+
+def test_missing_and_empty_dumps_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(RunError, match="no grains.dump"):
+        count_frames(tmp_path / "grains.dump", "ATOMS")
+    (tmp_path / "grains.dump").touch()
+    with pytest.raises(RunError, match="no grains.dump"):
+        count_frames(tmp_path / "grains.dump", "ATOMS")
+
+
+@pytest.mark.parametrize(("text", "word"), [
+    ("", "no rows"), ("step,time,kinetic_energy\n", "no rows"), ("a,b,c\n1,2,3\n", "no header"),
+    ("step,time,kinetic_energy\n1,2,3\n2,3", "truncated"), ("step,time,kinetic_energy\n1,2,3", "truncated"),
+    ("step,time,kinetic_energy\n1,2,-nan\n", "unstable"), ("step,time,kinetic_energy\n1,2,inf\n", "unstable"),
+    ("step,time,kinetic_energy\n1,2,\0\n", "unstable")])
+def test_times_that_cannot_be_used_are_refused(tmp_path: Path, text: str, word: str) -> None:
+    (tmp_path / "time.csv").write_text(text)
+    with pytest.raises(RunError, match=word):
+        check_times(tmp_path / "time.csv")
+
+
+def test_json_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    path = tmp_path / "run.json"
+    write_json(path, {"a": 1})
+    with pytest.raises(ValueError):
+        write_json(path, {"a": float("nan")})
+    assert read_json(path) == {"a": 1}
+    assert os.listdir(tmp_path) == ["run.json"]
+
+
+def test_writing_to_a_full_disk_says_so() -> None:
+    from dembark.validation.files import disk_error
+
+    with Path("/dev/full").open("w") as full, pytest.raises(OSError) as caught:
+        full.write("x" * 100000)
+        full.flush()
+    assert "disk is full" in str(disk_error(caught.value, Path("there")))
+
+
+def test_folder_is_replaced_as_a_whole(tmp_path: Path) -> None:
+    target = tmp_path / "replica-1"
+    target.mkdir()
+    (target / "old").touch()
+    part = part_folder(target)
+    (part / "new").touch()
+    assert (target / "old").exists()
+    move_into_place(part, target)
+    assert os.listdir(target) == ["new"]
+    assert os.listdir(tmp_path) == ["replica-1"]
+
+
+def test_leftovers_of_dead_processes_go_and_those_of_live_ones_stay(tmp_path: Path) -> None:
+    target, host = tmp_path / "replica-1", socket.gethostname()
+    for pid in (os.getppid(), 2**22 + 1):
+        (tmp_path / f".replica-1.part-{host}-{pid}").mkdir()
+    (tmp_path / ".replica-1.part-elsewhere-5").mkdir()
+    sweep(target)
+    assert sorted(os.listdir(tmp_path)) == sorted([f".replica-1.part-{host}-{os.getppid()}", ".replica-1.part-elsewhere-5"])
+
+
+def test_a_result_set_aside_by_a_killed_process_comes_back(tmp_path: Path) -> None:
+    old = tmp_path / ".replica-1.old"
+    old.mkdir()
+    (old / "run.json").write_text(json.dumps({"inputs": "x"}))
+    sweep(tmp_path / "replica-1")
+    assert read_json(tmp_path / "replica-1" / "run.json") == {"inputs": "x"}
+
+
+def test_retired_results_are_kept_aside(tmp_path: Path) -> None:
+    for content in ("1", "2"):
+        (tmp_path / "metrics.json").write_text(content)
+        retire(tmp_path / "metrics.json")
+    assert (tmp_path / "superseded" / "metrics.json").read_text() == "2"
+    assert not (tmp_path / "metrics.json").exists()
+
+
+def test_a_lock_is_exclusive_and_ends_with_its_holder(tmp_path: Path) -> None:
+    with lock(tmp_path / "l", "busy"), pytest.raises(DembarkError, match="busy"), lock(tmp_path / "l", "busy"):
+        pass
+    with lock(tmp_path / "l", "busy"):
+        pass

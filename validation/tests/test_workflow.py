@@ -1,0 +1,134 @@
+"""The whole chain through Snakemake with stand-ins: nothing is repeated, nothing stale is reported, failures stop nothing else."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from dembark.validation.files import read_json
+
+pytestmark = pytest.mark.usefixtures("decks", "stand_in")
+
+
+def start(tmp_path: Path, environment: dict[str, str], *words: str) -> subprocess.Popen[str]:
+    return subprocess.Popen([sys.executable, "-m", "dembark.validation.cli", *words], cwd=tmp_path, env=environment,
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def dembark(tmp_path: Path, environment: dict[str, str], *words: str) -> tuple[int, str, str]:
+    process = start(tmp_path, environment, *words)
+    out, error = process.communicate(timeout=120)
+    assert "Traceback" not in error
+    return process.returncode, out, error
+
+
+def set_default(decks: Path, variant: str, line: str) -> None:
+    path = decks / "box" / "case.toml"
+    head, _, tail = path.read_text().partition(f"[variants.{variant}]\n")
+    path.write_text(f"{head}[variants.{variant}]\n{line}\n{tail}")
+
+
+def test_all_runs_then_none_again_then_only_what_changed(tmp_path: Path, environment: dict[str, str], decks: Path) -> None:
+    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    results = tmp_path / "results" / "quick"
+    assert code == 0, error + (results / "workflow.log").read_text()
+    assert "3 of 3 runs finished, 3 checks, 1 FAILED" in out and str(results / "report.html") in out
+    assert (results / "report.html").read_text().split() == [
+        "box/dry/liggghts/metrics.json", "box/dry/yade/metrics.json", "box/wet/liggghts/metrics.json"]
+    assert read_json(results / "box/dry/comparison.json")["engines"] == ["liggghts", "yade"]
+    assert not (results / "box/wet/comparison.json").exists()
+    assert error.count("finished in") == 3 + 3 + 1 + 1  # runs, measurements, a comparison and the report
+    made = {path: path.stat().st_mtime_ns for path in results.glob("*/*/*/replica-1/run.json")}
+
+    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    assert code == 0 and error.count("kept") == 3 and "started" not in error
+    assert {path: path.stat().st_mtime_ns for path in made} == made
+
+    set_default(decks, "wet", "grain_count = 12")
+    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    assert code == 0 and error.count("kept") == 2 and error.count("1: finished in") == 1
+    assert sum(path.stat().st_mtime_ns != before for path, before in made.items()) == 1
+    assert read_json(results / "box/wet/liggghts/metrics.json")["parameters"]["grain_count"] == 12
+
+
+def test_a_failed_run_is_missing_in_the_report_and_nothing_stale_takes_its_place(
+        tmp_path: Path, environment: dict[str, str], decks: Path) -> None:
+    assert dembark(tmp_path, environment, "validate")[0] == 0
+    results = tmp_path / "results" / "quick"
+    set_default(decks, "wet", 'behaviour = "kill"')
+    code, out, error = dembark(tmp_path, environment, "validate")
+    assert code == 1
+    assert "2 of 3 runs finished" in out and "not finished: box wet liggghts 1: " in out and "SIGKILL" in out
+    assert "dembark: the validation is incomplete" in error
+    assert (results / "report.html").read_text().split() == ["box/dry/liggghts/metrics.json", "box/dry/yade/metrics.json"]
+    states = {(run["variant"], run["engine"]): run["state"] for run in read_json(results / "runs.json")["runs"]}
+    assert states == {("dry", "liggghts"): "finished", ("dry", "yade"): "finished", ("wet", "liggghts"): "failed"}
+    assert (results / "box/wet/liggghts/superseded/replica-1/run.json").is_file()
+
+
+def test_replicas_that_are_no_longer_wanted_do_not_count(tmp_path: Path, environment: dict[str, str], decks: Path) -> None:
+    words = ("validate", "--profile", "standard", "--engine", "liggghts")
+    assert dembark(tmp_path, environment, *words)[0] == 0
+    metrics = tmp_path / "results/standard/box/dry/liggghts/metrics.json"
+    assert read_json(metrics)["quantities"][0]["value"] == 3
+    path = decks / "box" / "case.toml"
+    path.write_text(path.read_text().replace("replicas = 3", "replicas = 2"))
+    assert dembark(tmp_path, environment, *words)[0] == 0
+    assert read_json(metrics)["quantities"][0]["value"] == 2
+
+
+def test_a_measurement_that_fails_is_told(tmp_path: Path, environment: dict[str, str]) -> None:
+    folder = tmp_path / "results/quick/box/wet/liggghts"
+    folder.mkdir(parents=True)
+    (folder / "unmeasurable").touch()
+    code, out, _ = dembark(tmp_path, environment, "validate")
+    assert code == 1 and "problem: " in out and "ValueError: cannot be measured" in out and "report.html" in out
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
+def test_an_interrupted_workflow_goes_on_where_it_was(
+        tmp_path: Path, environment: dict[str, str], decks: Path, number: int, wait_for: Callable[..., object],
+        engine_pid: Callable[[Path], int], lives: Callable[[int], bool]) -> None:
+    set_default(decks, "wet", 'behaviour = "hang"')
+    process = start(tmp_path, environment, "validate", "--cores", "3")
+    results = tmp_path / "results" / "quick"
+    wait_for(lambda: len(list(results.glob("box/dry/*/replica-1/run.json"))) == 2, 60)
+    pid = engine_pid(results / "box/wet")
+    process.send_signal(number)
+    _, error = process.communicate(timeout=60)
+    assert process.returncode == (-9 if number == signal.SIGKILL else 130) and "Traceback" not in error
+    wait_for(lambda: not lives(pid))
+    time.sleep(0.5)
+    path = decks / "box" / "case.toml"
+    path.write_text(path.read_text().replace('behaviour = "hang"\n', ""))
+    code, _, error = dembark(tmp_path, environment, "validate")
+    assert code == 0 and error.count("kept") == 2 and error.count("1: finished in") == 1
+    assert not list(results.glob("**/.replica-1.part-*"))
+
+
+def test_two_validations_of_one_profile_do_not_mix(
+        tmp_path: Path, environment: dict[str, str], decks: Path, engine_pid: Callable[[Path], int]) -> None:
+    set_default(decks, "wet", 'behaviour = "hang"')
+    first = start(tmp_path, environment, "validate")
+    engine_pid(tmp_path / "results/quick/box/wet")
+    code, _, error = dembark(tmp_path, environment, "validate")
+    assert code == 2 and "another validation" in error
+    first.terminate()
+    first.communicate(timeout=60)
+
+
+def test_snakemake_alone_does_the_same(tmp_path: Path, environment: dict[str, str]) -> None:
+    from dembark.validation import workflow
+
+    file = Path(workflow.__file__).with_name("Snakefile")
+    words = ["--snakefile", str(file), "--cores", "2", "--config", "profile=quick", "cases=box"]
+    done = subprocess.run([sys.executable, "-m", "snakemake", *words],
+                          cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "dembark: box dry yade 1: finished" in done.stderr
+    assert (tmp_path / "results/quick/report.html").is_file()
