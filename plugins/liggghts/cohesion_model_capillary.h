@@ -94,7 +94,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
         pair.volume = read.per_pair("bridgeVolume", i, j);
         if (!(pair.volume >= 0.0)) read.fail("bridgeVolume (m^3) must be >= 0 (types " + std::to_string(i) + "-" + std::to_string(j) + ")");
         const double angle = 0.5 * (read.per_type("contactAngle", i) + read.per_type("contactAngle", j));
-        if (!(angle >= 0.0 && angle <= 0.5 * dembark::pi)) read.fail("contactAngle must lie in 0...pi/2 rad; the mean of types " + std::to_string(i) + " and " + std::to_string(j) + " is " + std::to_string(angle));
+        if (!(angle >= 0.0 && angle <= 0.5 * dembark::pi)) read.fail("contactAngle is in radians (stock models take degrees) and must lie in 0...pi/2; the mean of types " + std::to_string(i) + " and " + std::to_string(j) + " is " + std::to_string(angle));
         std::shared_ptr<const dembark::capillary::BridgeForce>& force = built_[angle];
         if (!force) force = std::make_shared<const dembark::capillary::BridgeForce>(model, angle);
         pair.force = force;

@@ -19,9 +19,6 @@
 #include "granular_wall.h"
 #include "pair_gran_base.h"
 #include "fix_wall_gran_base.h"
-#include "modify.h"
-
-#include "compute_pair_gran_local_bridges.h"
 
 namespace dembark_liggghts {
 namespace {
@@ -53,12 +50,6 @@ template <class Tag, typename Tag::type Member>
 struct Reach {
   friend typename Tag::type table(Tag) { return Member; }
 };
-using ComputeTable = std::map<std::string, LAMMPS_NS::Compute* (*)(LAMMPS*, int, int, char**)>*;
-struct ModifyComputes {
-  typedef ComputeTable LAMMPS_NS::Modify::*type;
-  friend type table(ModifyComputes);
-};
-template struct Reach<ModifyComputes, &LAMMPS_NS::Modify::compute_map>;
 template struct Reach<PairTable, &Utils::AbstractFactory<PairStyles::IGranularPairStyle>::styleTable>;
 template struct Reach<WallTable, &Utils::AbstractFactory<Walls::IGranularWall>::styleTable>;
 
@@ -105,12 +96,6 @@ void guard_fallback(Factory& factory) {
 }
 
 }  // namespace
-
-void register_computes(LAMMPS* lammps) {
-  (*(lammps->modify->*table(ModifyComputes())))["pair/gran/local"] = [](LAMMPS* host, int iarg, int narg, char** arg) -> LAMMPS_NS::Compute* {
-    return new LAMMPS_NS::ComputePairGranLocalBridges(host, iarg, narg, arg);
-  };
-}
 
 void register_contact_models() {
   ContactModels::Factory& models = ContactModels::Factory::instance();

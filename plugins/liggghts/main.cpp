@@ -25,7 +25,6 @@ int main(int argc, char** argv) {
   LAMMPS_NS::LAMMPS* lammps = new LAMMPS_NS::LAMMPS(argc, argv, MPI_COMM_WORLD);
   // The library enters its own combinations in this constructor; ours come after, where its fallback can be replaced.
   dembark_liggghts::register_contact_models();
-  dembark_liggghts::register_computes(lammps);
   lammps->input->file();
   delete lammps;
   MPI_Finalize();

@@ -27,7 +27,7 @@ struct Liquid {
 
 struct ContactParameters {
   NormalLaw normal_law = NormalLaw::hertz;
-  HertzParameters elasticity{};          ///< E*, G* (Hertz only) and restitution
+  HertzParameters elasticity{};          ///< E*, G* (Hertz only) and damping
   double characteristic_velocity = 1.0;  ///< m/s, Hooke only
   bool tangential_damping = true;
   bool limit_force = false;              ///< no attraction by damping: F >= 0
@@ -102,7 +102,7 @@ inline ContactForce contact_step(const ContactParameters& p, const ContactBodies
     NormalResponse<double> response =
         p.normal_law == NormalLaw::hertz
             ? hertz(p.elasticity, effective_radius, effective_mass, out.overlap, normal_velocity)
-            : hooke(HookeParameters{p.elasticity.effective_youngs_modulus, p.elasticity.restitution, p.characteristic_velocity},
+            : hooke(HookeParameters(p.elasticity, p.characteristic_velocity),
                     effective_radius, effective_mass, out.overlap, normal_velocity);
     if (p.limit_force && response.force < 0.0) response.force = 0.0;
     out.normal_force = response.force;

@@ -175,8 +175,8 @@ DEMBARK_COLD Vec3<Real> exponential_step(const FinnieRabinowicz& law, Real norma
     if (dot(mean, direction) > 0.0) state.slip += share * path;
   }
   const Real size = norm(force);
-  if (size > limit) {  // the load has fallen since the force was built up
-    state.dissipated_energy += limit * (size - limit) / stiffness;
+  if (size > limit) {  // load or friction have fallen since the force was built up: the spring lets go
+    state.dissipated_energy += 0.5 * (size * size - limit * limit) / stiffness;
     force *= limit / size;
   }
   state.displacement = force * (1.0 / stiffness);
@@ -185,8 +185,8 @@ DEMBARK_COLD Vec3<Real> exponential_step(const FinnieRabinowicz& law, Real norma
 
 /// The linear spring beyond static friction's first limit: slipping, or about to stick again.
 template <class Real>
-DEMBARK_COLD bool linear_slip(const FinnieRabinowicz& law, Real normal_force, Real stiffness, Real contact_area, Real dt,
-                              FrictionState<Real>& state) {
+DEMBARK_COLD bool linear_slip(const FinnieRabinowicz& law, Real normal_force, Real stiffness, Real contact_area,
+                              const Vec3<Real>& increment, Real dt, FrictionState<Real>& state) {
   const Real limit = shear_limit(law, friction_coefficient(law, state.slip), normal_force, contact_area);
   const Real trial = norm(state.displacement);
   if (!(stiffness * trial > limit)) {
@@ -195,8 +195,12 @@ DEMBARK_COLD bool linear_slip(const FinnieRabinowicz& law, Real normal_force, Re
   }
   const Real slip = slip_to_limit(law, stiffness, trial, state.slip, normal_force, contact_area);
   state.slip += slip;
-  state.displacement *= (trial - slip) / trial;
-  state.dissipated_energy += stiffness * (trial - slip) * slip;
+  // Lost is the work of the step less what the spring gained: the mean of its force before and after, along the slip. Where
+  // friction drops faster than the spring follows, that includes what the spring lets go.
+  const Vec3<Real> slid = state.displacement * (slip / trial), before = state.displacement - increment;
+  state.displacement -= slid;
+  const Real lost = 0.5 * stiffness * dot(before + state.displacement, slid);
+  if (lost > 0.0) state.dissipated_energy += lost;
   return true;
 }
 
@@ -227,7 +231,7 @@ DEMBARK_HOT Vec3<Real> friction_step(const FinnieRabinowicz& law, Real normal_fo
     bound = coulomb < strength ? coulomb - 0.5 * coulomb * coulomb / strength : Real(0.0);
   }
   const bool sticks = bound > 0.0 && stiffness * stiffness * dot(state.displacement, state.displacement) < bound * bound * (1.0 - 1e-8);
-  if (!sticks && detail::linear_slip(law, normal_force, stiffness, contact_area, dt, state)) return -stiffness * state.displacement;
+  if (!sticks && detail::linear_slip(law, normal_force, stiffness, contact_area, increment, dt, state)) return -stiffness * state.displacement;
   if (state.slip > 0.0) detail::heal(law, dt, state);
   state.dissipated_energy += damping * dot(velocity, velocity) * dt;
   return -(stiffness * state.displacement + damping * velocity);

@@ -4,7 +4,7 @@
 //   Hertz   F = 4/3 E* sqrt(R* delta) delta - gamma_n v_n,   gamma_n = -2 sqrt(5/6) beta sqrt(S_n m*),  S_n = 2 E* sqrt(R* delta)
 //           k_t = 8 G* sqrt(R* delta),                       gamma_t = -2 sqrt(5/6) beta sqrt(k_t m*)
 //   Hooke   F = k_n delta - gamma_n v_n,                     k_n = 16/15 sqrt(R*) E* (15 m* v_c^2 / (16 sqrt(R*) E*))^(1/5)
-//           k_t = k_n,                                       gamma_n = gamma_t = sqrt(4 m* k_n ln^2 e / (ln^2 e + pi^2))
+//           k_t = k_n,                                       gamma_n = gamma_t = -2 beta sqrt(m* k_n)
 //
 // with beta = ln e / sqrt(ln^2 e + pi^2). These are the formulas of LIGGGHTS-PUBLIC 3.8.0 (`normal hertz`, `normal hooke`), so that
 // the same contact has the same force in every engine. Damping of the Hertz contact: Tsuji, Tanaka & Ishida, Powder Technology
@@ -50,23 +50,34 @@ struct NormalResponse {
   Real contact_area;         ///< pi R* delta, m^2: the apparent area of the Hertz contact
 };
 
-struct HertzParameters {
-  double effective_youngs_modulus; ///< E*, Pa, > 0
-  double effective_shear_modulus;  ///< G*, Pa, > 0
-  double restitution;              ///< e, 0 < e <= 1
-};
-
-struct HookeParameters {
-  double effective_youngs_modulus; ///< E*, Pa, > 0
-  double restitution;              ///< e, 0 < e <= 1
-  double characteristic_velocity;  ///< v_c, m/s, > 0: impact speed at which the overlap equals that of Hertz
-};
-
 /// beta = ln e / sqrt(ln^2 e + pi^2), in (-1, 0].
 inline double damping_factor(double restitution) {
   const double log_e = std::log(restitution);
   return log_e / std::sqrt(log_e * log_e + pi * pi);
 }
+
+struct HertzParameters {
+  double effective_youngs_modulus;  ///< E*, Pa, > 0
+  double effective_shear_modulus;   ///< G*, Pa, > 0
+  double damping;                   ///< beta
+
+  HertzParameters() = default;
+  /// `restitution` e, 0 < e <= 1.
+  HertzParameters(double youngs, double shear, double restitution)
+      : effective_youngs_modulus(youngs), effective_shear_modulus(shear), damping(damping_factor(restitution)) {}
+};
+
+struct HookeParameters {
+  double effective_youngs_modulus;  ///< E*, Pa, > 0
+  double damping;                   ///< beta
+  double characteristic_velocity;   ///< v_c, m/s, > 0: impact speed at which the overlap equals that of Hertz
+
+  /// `restitution` e, 0 < e <= 1.
+  HookeParameters(double youngs, double restitution, double velocity)
+      : effective_youngs_modulus(youngs), damping(damping_factor(restitution)), characteristic_velocity(velocity) {}
+  HookeParameters(const HertzParameters& same, double velocity)
+      : effective_youngs_modulus(same.effective_youngs_modulus), damping(same.damping), characteristic_velocity(velocity) {}
+};
 
 template <class Real>
 inline NormalResponse<Real> hertz(const HertzParameters& p, Real effective_radius, Real effective_mass, Real overlap, Real normal_velocity) {
@@ -74,7 +85,7 @@ inline NormalResponse<Real> hertz(const HertzParameters& p, Real effective_radiu
   const Real root = sqrt(effective_radius * overlap);
   const Real stiffness = 2.0 * p.effective_youngs_modulus * root;
   const Real k_t = 8.0 * p.effective_shear_modulus * root;
-  const double damping = -2.0 * 0.91287092917527685576161630466800355658790782499663875 * damping_factor(p.restitution);
+  const double damping = -2.0 * 0.91287092917527685576161630466800355658790782499663875 * p.damping;  // sqrt(5/6)
   return {4.0 / 3.0 * p.effective_youngs_modulus * root * overlap - damping * sqrt(stiffness * effective_mass) * normal_velocity,
           k_t, damping * sqrt(k_t * effective_mass), pi * effective_radius * overlap};
 }
@@ -86,8 +97,7 @@ inline NormalResponse<Real> hooke(const HookeParameters& p, Real effective_radiu
   const Real rigidity = sqrt(effective_radius) * p.effective_youngs_modulus;
   const Real k_n = 16.0 / 15.0 * rigidity *
                    pow(15.0 * effective_mass * p.characteristic_velocity * p.characteristic_velocity / (16.0 * rigidity), Real(0.2));
-  const double log_e = std::log(p.restitution);
-  const Real damping = sqrt(4.0 * effective_mass * k_n * log_e * log_e / (log_e * log_e + pi * pi));
+  const Real damping = -2.0 * p.damping * sqrt(effective_mass * k_n);
   return {k_n * overlap - damping * normal_velocity, k_n, damping, pi * effective_radius * overlap};
 }
 

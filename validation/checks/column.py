@@ -122,7 +122,7 @@ class Column:
         fits = [
             least_squares(
                 lambda p: (two_parameter(depth, p[0], p[1], self.weight) - measured) / scale,
-                [2.0 * self.radius, start * self.radius],
+                [2.0 * self.radius, min(start * self.radius, 0.8 * self.height)],
                 bounds=(low, high),
                 x_scale=self.radius,
             )

@@ -18,7 +18,8 @@ def _bridge(model: str, contact_angle: float) -> _physics.BridgeForce:
     return _physics.BridgeForce(model, contact_angle)
 
 
-def _check_model(model: str) -> None:
+def check_model(model: str) -> None:
+    """ValueError, with the names there are, for a model that is not known."""
     if model not in CAPILLARY_MODELS:
         raise ValueError(f"capillary model {model!r} is unknown; it can be {', '.join(CAPILLARY_MODELS)}")
 
@@ -65,7 +66,7 @@ def capillary_force(radius_i: ArrayLike, radius_j: ArrayLike, gap: ArrayLike, vo
     >>> bool(f[0] > f[1] > f[2] == 0.0)
     True
     """
-    _check_model(model)
+    check_model(model)
     angle = numbers("contact_angle", contact_angle, "rad", low=0.0, high=np.pi / 2)
     return _by_angle(angle, model, _physics.BridgeForce.force, _bridge_radius(radius_i, radius_j), numbers("gap", gap, "m", infinite=True),
                      numbers("volume", volume, "m^3", low=0.0), numbers("surface_tension", surface_tension, "N/m", low=0.0))
@@ -78,7 +79,7 @@ def rupture_distance(volume: ArrayLike, contact_angle: ArrayLike, radius_i: Arra
     'exact': where the stable and the unstable branch of the Young-Laplace bridge meet. 'rabinovich' and 'constant':
     (1 + theta/2) V^(1/3) (Lian, Thornton & Adams, J. Colloid Interface Sci. 161 (1993) 138). Others: Willett et al. (2000).
     """
-    _check_model(model)
+    check_model(model)
     angle = numbers("contact_angle", contact_angle, "rad", low=0.0, high=np.pi / 2)
     return _by_angle(angle, model, _physics.BridgeForce.rupture_distance, _bridge_radius(radius_i, radius_j),
                      numbers("volume", volume, "m^3", low=0.0))

@@ -13,10 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark import _physics
+from dembark.physics._checks import numbers
+from dembark.physics.capillary import check_model
 from dembark.physics.friction import FinnieRabinowicz
 
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+def _vector(name: str, value: Sequence[float], unit: str) -> NDArray[np.float64]:
+    array = numbers(name, value, unit)
+    if array.shape != (3,):
+        raise ValueError(f"{name} must have three components ({unit}), not {value!r}")
+    return array
 
 
 @dataclass(frozen=True)
@@ -60,8 +69,15 @@ class Contact:
     def __post_init__(self) -> None:
         if not 0.0 < self.restitution <= 1.0:
             raise ValueError(f"restitution must be > 0 and <= 1, not {self.restitution:g}")
-        if not (self.effective_youngs_modulus > 0.0 and self.effective_shear_modulus > 0.0):
-            raise ValueError("effective elastic moduli must be > 0 Pa")
+        if not (0.0 < self.effective_youngs_modulus < np.inf and 0.0 < self.effective_shear_modulus < np.inf):
+            raise ValueError("effective elastic moduli must be > 0 Pa and finite")
+        if self.normal_law not in ("hertz", "hooke"):
+            raise ValueError(f"normal_law must be 'hertz' or 'hooke', not {self.normal_law!r}")
+        numbers("characteristic_velocity", self.characteristic_velocity, "m/s", low=0.0, low_open=True)
+        numbers("bridge_volume", self.bridge_volume, "m^3", low=0.0)
+        numbers("surface_tension", self.surface_tension, "N/m", low=0.0)
+        numbers("contact_angle", self.contact_angle, "rad", low=0.0, high=np.pi / 2)
+        check_model(self.capillary_model)
 
     def begin(self) -> _physics.Contact:
         """State of a contact that has not touched yet."""
@@ -79,6 +95,12 @@ class Body:
     position: Sequence[float] = ZERO
     velocity: Sequence[float] = ZERO
     angular_velocity: Sequence[float] = ZERO
+
+    def __post_init__(self) -> None:
+        numbers("radius", self.radius, "m", low=0.0, low_open=True)
+        numbers("mass", self.mass, "kg", low=0.0, low_open=True)
+        for name, unit in (("position", "m"), ("velocity", "m/s"), ("angular_velocity", "rad/s")):
+            _vector(name, getattr(self, name), unit)
 
 
 @dataclass
@@ -98,13 +120,25 @@ def _triple(vector: NDArray[np.float64]) -> Vector:
 
 def _integrate(contact: Contact, bodies: Sequence[Body], wall: tuple[Vector, Vector] | None, gravity: Sequence[float], time_step: float,
                steps: int) -> Trajectory:
+    numbers("time_step", time_step, "s", low=0.0, low_open=True)
+    if steps != int(steps) or steps < 0:
+        raise ValueError(f"steps must be an integer >= 0, not {steps!r}")
     n = len(bodies)
     x = np.array([b.position for b in bodies], dtype=float)
     v = np.array([b.velocity for b in bodies], dtype=float)
     w = np.array([b.angular_velocity for b in bodies], dtype=float)
     mass = np.array([b.mass for b in bodies])
     inertia = 0.4 * mass * np.array([b.radius for b in bodies]) ** 2
-    g = np.asarray(gravity, dtype=float)
+    g = _vector("gravity", gravity, "m/s^2")
+    if wall is None:
+        gap = np.linalg.norm(x[0] - x[1]) - bodies[0].radius - bodies[1].radius
+    else:
+        point, normal = _vector("wall_point", wall[0], "m"), _vector("wall_normal", wall[1], "1")
+        if abs(np.linalg.norm(normal) - 1.0) > 1e-9:
+            raise ValueError(f"wall_normal must be of length 1, not {np.linalg.norm(normal):g}")
+        gap = np.dot(x[0] - point, normal) - bodies[0].radius
+    if gap < 0.0:
+        raise ValueError(f"bodies must not touch at the start, but overlap by {-gap:g} m")
     state = contact.begin()
     out = Trajectory(time_step * np.arange(1, steps + 1), np.empty((steps, n, 3)), np.empty((steps, n, 3)), np.empty((steps, n, 3)), [])
     # The first half step: no contact yet, gravity only, as the engines' set-up finds it.
@@ -114,7 +148,6 @@ def _integrate(contact: Contact, bodies: Sequence[Body], wall: tuple[Vector, Vec
         if wall is None:
             separation, v2, w2, r2, m2 = x[0] - x[1], _triple(v[1]), _triple(w[1]), bodies[1].radius, bodies[1].mass
         else:
-            point, normal = np.asarray(wall[0]), np.asarray(wall[1])
             separation, v2, w2, r2, m2 = np.dot(x[0] - point, normal) * normal, ZERO, ZERO, np.inf, np.inf
         step = ContactForce(*state.step(_triple(separation), _triple(v[0]), v2, _triple(w[0]), w2, bodies[0].radius, r2, bodies[0].mass, m2,
                                         time_step, True))
@@ -137,11 +170,17 @@ def _integrate(contact: Contact, bodies: Sequence[Body], wall: tuple[Vector, Vec
 
 
 def collide(contact: Contact, body_1: Body, body_2: Body, *, time_step: float, steps: int, gravity: Sequence[float] = ZERO) -> Trajectory:
-    """Free motion of two spheres through a contact; they must not touch at the start. `time_step` in s, `gravity` in m/s^2."""
+    """Free motion of two spheres through a contact; they must not touch at the start. `time_step` in s, `gravity` in m/s^2.
+
+    Raises ValueError or TypeError for arguments out of range.
+    """
     return _integrate(contact, [body_1, body_2], None, gravity, time_step, steps)
 
 
 def drop(contact: Contact, body: Body, *, time_step: float, steps: int, gravity: Sequence[float] = (0.0, 0.0, -9.81),
          wall_point: Vector = ZERO, wall_normal: Vector = (0.0, 0.0, 1.0)) -> Trajectory:
-    """Motion of a sphere above a fixed plane wall given by a point (m) and a unit normal into the free side."""
+    """Motion of a sphere above a fixed plane wall given by a point (m) and a unit normal into the free side.
+
+    Arguments and errors as in `collide`.
+    """
     return _integrate(contact, [body], (wall_point, wall_normal), gravity, time_step, steps)

@@ -1,0 +1,131 @@
+"""Draws the figures of the documentation into figures/: friction curves, capillary force curves and the error map of the models.
+
+The error map shows figures/capillary_errors.csv, which capillary_errors.py computes.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import capillary_errors
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.colors import BoundaryNorm
+
+from dembark.physics import CAPILLARY_MODELS, FinnieRabinowicz, capillary_force, rupture_distance
+from dembark.physics.young_laplace import bridge, rupture_gap
+
+FOLDER = Path(__file__).with_name("figures")
+STYLE = {"font.size": 8, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False, "lines.linewidth": 1.2,
+         "savefig.dpi": 130, "figure.constrained_layout.use": True}
+STIFFNESS, AREA, STRENGTH = 1e5, 1e-8, 1e8  # N/m, m^2, Pa
+
+
+def law(**changes: object) -> FinnieRabinowicz:
+    """The law of the figures, with changes."""
+    values = {"static_friction": 0.6, "kinetic_friction": 0.4, "critical_slip_distance": 1e-5}
+    return FinnieRabinowicz(**{**values, **changes})
+
+
+def save(figure: plt.Figure, name: str) -> None:
+    """Write figures/<name>.png and forget the figure."""
+    figure.savefig(FOLDER / f"{name}.png", metadata={"Software": None})
+    plt.close(figure)
+
+
+def friction() -> None:
+    """Limit curve, slip weakening, pre-sliding curves and a cycle."""
+    figure, axes = plt.subplots(2, 2, figsize=(7.2, 5.0))
+    limit, weakening, loading, cycle = axes.ravel()
+
+    force = np.linspace(1e-3, 6.0, 200)
+    saturated = law(static_friction=0.5, kinetic_friction=0.5, interface_shear_strength=STRENGTH)
+    far = np.array([saturated.drive(n, STIFFNESS, AREA, [1.0])[0] for n in force])
+    limit.plot(force, far, label=r"$\tau_s A = 1$ N")
+    limit.plot(force, 0.5 * force, "--", color="0.5", label=r"Coulomb, $\mu N$")
+    limit.axhline(STRENGTH * AREA, color="0.5", linestyle=":", label=r"$\tau_s A$")
+    limit.set(xlabel="normal force N (N)", ylabel=r"$T_\mathrm{max}$ (N)", ylim=(0.0, 1.6), title="Finnie and Shaw: the limit saturates")
+
+    slip = np.linspace(0.0, 6e-5, 200)
+    for distance in (5e-6, 1e-5, 2e-5):
+        weakening.plot(1e6 * slip, law(critical_slip_distance=distance).friction_coefficient(slip), label=rf"$s_c$ = {1e6 * distance:.0f} µm")
+    weakening.set(xlabel="slip s (µm)", ylabel=r"$\mu(s)$", ylim=(0.35, 0.65), title="Rabinowicz: friction falls with slip")
+
+    path = np.linspace(0.0, 4e-5, 400)
+    for presliding in ("linear", "exponential"):
+        loading.plot(1e6 * path, law(presliding=presliding).drive(1.0, STIFFNESS, AREA, path), label=presliding)
+    loading.set(xlabel="displacement (µm)", ylabel="T (N), N = 1 N", title="Loading at constant normal force")
+
+    turns = [0.0, 2e-5, -2e-5, 2e-5]
+    there = np.concatenate([np.linspace(a, b, 400) for a, b in pairwise(turns)])
+    for presliding in ("linear", "exponential"):
+        cycle.plot(1e6 * there, law(presliding=presliding).drive(1.0, STIFFNESS, AREA, there), label=presliding)
+    cycle.set(xlabel="displacement (µm)", ylabel="T (N)", title="Cycle: static friction returns after each stick")
+    for axis in axes.ravel():
+        axis.legend(loc="lower left" if axis is cycle else "best")
+    save(figure, "friction")
+
+
+def capillary() -> None:
+    """Force against gap: all models at one volume, and `exact` for several volumes and angles."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(7.2, 3.0))
+    volume, theta = 1e-2, 0.0
+    for model in CAPILLARY_MODELS:
+        gaps = np.linspace(0.0, rupture_distance(volume, theta, 1.0, 1.0, model=model), 200)
+        left.plot(gaps, capillary_force(1.0, 1.0, gaps, volume, 1.0, theta, model=model), label=model, linewidth=2.0 if model == "exact" else 1.0)
+    points = np.linspace(0.0, rupture_gap(volume, theta), 9)
+    left.plot(points, [bridge(volume, gap, theta).force for gap in points], "k.", markersize=4, label="independent solution")
+    left.set(xlabel="gap S / R", ylabel=r"F / ($\gamma R$)", title=r"V = 0.01 R³, $\theta$ = 0")
+    for angle, line in ((0, "-"), (30, "--"), (60, ":")):
+        for colour, volume in enumerate((1e-4, 1e-3, 1e-2)):
+            radians = float(np.radians(angle))
+            gaps = np.linspace(0.0, rupture_distance(volume, radians, 1.0, 1.0), 300)
+            right.plot(gaps, capillary_force(1.0, 1.0, gaps, volume, 1.0, radians), line, color=f"C{colour}",
+                       label=f"V = {volume:g} R³, θ = {angle}°")
+    right.set(xlabel="gap S / R", ylabel=r"F / ($\gamma R$)", title="exact")
+    left.legend(fontsize=6.5)
+    right.legend(fontsize=6)
+    save(figure, "capillary_force")
+
+
+def error_map() -> None:
+    """Deviation of each model over volume and gap for three contact angles."""
+    columns = capillary_errors.read()
+    volumes = np.unique(columns["volume_over_R3"])
+    shares = np.unique(columns["gap_over_rupture"][columns["gap_over_rupture"] < 1.0])
+    bounds = [-50, -20, -10, -5, -2, -1, 1, 2, 5, 10, 20, 50]
+    norm = BoundaryNorm(bounds, 256, extend="both")
+    figure, axes = plt.subplots(len(CAPILLARY_MODELS), len(capillary_errors.ANGLES), figsize=(7.2, 9.0), sharex=True, sharey=True)
+    for model, row in zip(CAPILLARY_MODELS, axes, strict=True):
+        for angle, axis in zip(capillary_errors.ANGLES, row, strict=True):
+            chosen = (columns["contact_angle_deg"] == angle) & (columns["gap_over_rupture"] < 1.0)
+            percent = 100.0 * columns[model][chosen].reshape(len(volumes), len(shares))
+            drawn = axis.pcolormesh(volumes, shares, np.where(percent <= -100.0, np.nan, percent).T, cmap="RdBu_r", norm=norm, shading="nearest")
+            axis.set_facecolor("0.75")
+            axis.set_xscale("log")
+            worst = np.abs(percent[percent > -100.0]).max()
+            axis.set_title(f"{model}, θ = {angle}°, worst {worst:.{0 if worst > 1.0 else 3}f} %", fontsize=7)
+    for axis in axes[-1]:
+        axis.set_xlabel("V / R³")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("gap / rupture distance")
+    figure.colorbar(drawn, ax=axes, label="model / exact solution − 1 (%); grey: the model's bridge has ruptured", shrink=0.5, ticks=bounds)
+    save(figure, "capillary_errors")
+
+
+def main() -> None:
+    """Draw all figures."""
+    FOLDER.mkdir(exist_ok=True)
+    with plt.rc_context(STYLE):
+        friction()
+        capillary()
+        error_map()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,134 @@
+"""The documentation is true: its snippets run, its links exist, its table is that of the data."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "input_decks").glob("*/README.md")])
+FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
+
+
+def blocks(kind: str) -> list[object]:
+    """All fenced blocks of one kind, as test parameters named by page and number."""
+    found = []
+    for page in PAGES:
+        texts = [text for words, text in FENCE.findall(page.read_text(encoding="utf-8")) if words.strip() == kind]
+        found += [pytest.param(text, id=f"{page.relative_to(ROOT)}-{number}") for number, text in enumerate(texts, 1)]
+    return found
+
+
+def program(*places: Path | None) -> Path:
+    """The first of these programs that is there; the test is skipped when none is."""
+    for place in places:
+        if place is not None and os.access(place, os.X_OK):
+            return place
+    pytest.skip(f"not built: {', '.join(str(place) for place in places if place)}")
+
+
+def anchors(page: Path) -> set[str]:
+    """Link targets of the headings, as the usual viewers of Markdown name them."""
+    heads = re.findall(r"^#+ (.*)$", FENCE.sub("", page.read_text(encoding="utf-8")), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).strip().replace(" ", "-") for head in heads}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_exist(page: Path) -> None:
+    missing = []
+    for link in LINK.findall(FENCE.sub("", page.read_text(encoding="utf-8"))):
+        if re.match(r"[a-z]+:", link):
+            continue
+        path, _, anchor = link.partition("#")
+        target = page.parent / path if path else page
+        if not target.exists() or (anchor and anchor not in anchors(target)):
+            missing.append(link)
+    assert not missing
+
+
+@pytest.mark.parametrize("text", blocks("python"))
+def test_python_snippet(text: str, tmp_path: Path) -> None:
+    (tmp_path / "snippet.py").write_text(text, encoding="utf-8")
+    result = subprocess.run([sys.executable, "-W", "error", "snippet.py"], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
+    assert result.returncode == 0, result.stderr
+
+
+def run_lammps(text: str, folder: Path) -> list[list[float]]:
+    """Rows of numbers that liggghts-dembark prints for a deck."""
+    engine = program(Path(os.environ["DEMBARK_LIGGGHTS"]) if "DEMBARK_LIGGGHTS" in os.environ else None, ROOT / "build/bin/liggghts-dembark")
+    (folder / "deck.in").write_text(text, encoding="utf-8")
+    result = subprocess.run([engine, "-in", "deck.in", "-log", "none"], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    assert result.returncode == 0, result.stdout[-2000:] + result.stderr
+    return [[float(word) for word in line.split()] for line in result.stdout.splitlines() if re.fullmatch(r"[\s\d.e+-]+", line) and line.strip()]
+
+
+@pytest.mark.parametrize("text", blocks("lammps"))
+def test_complete_deck(text: str, tmp_path: Path) -> None:
+    assert text.startswith("# Complete deck")
+    assert run_lammps(text, tmp_path)
+
+
+def test_decks_show_what_their_pages_say(tmp_path: Path) -> None:
+    drag, pull = (next(text for words, text in FENCE.findall((ROOT / f"docs/{page}.md").read_text(encoding="utf-8")) if words == "lammps")
+                  for page in ("liggghts_tangential_finnie_rabinowicz", "liggghts_cohesion_capillary"))
+    ratios = [row[3] for row in run_lammps(drag, tmp_path)][1:]
+    assert 0.5 < ratios[0] < 0.6 and ratios == sorted(ratios, reverse=True)
+    assert ratios[-1] == pytest.approx(0.3, rel=1e-3)
+    rows = run_lammps(pull, tmp_path)
+    held = [gap for _, gap, force in rows if force > 0.0]
+    assert max(held) < 0.4968e-3 < max(gap for _, gap, _ in rows)
+
+
+@pytest.mark.parametrize("text", blocks("python yade"))
+def test_yade_script(text: str, tmp_path: Path) -> None:
+    engine = program(ROOT / "build/yade-overlay/bin/yade")
+    (tmp_path / "script.py").write_text(text, encoding="utf-8")
+    environment = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV", "DISPLAY", "YADE_PREFIX")}
+    environment["PATH"] = "/usr/bin:" + environment.get("PATH", "")
+    result = subprocess.run([engine, "-n", "-x", "script.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300, check=False)
+    assert result.returncode == 0, result.stderr
+    assert "bridges: 1" in result.stdout
+
+
+@pytest.mark.parametrize("text", blocks("cpp"))
+def test_cpp_snippet(text: str, tmp_path: Path) -> None:
+    compiler = shutil.which("c++")
+    if compiler is None:
+        pytest.skip("no C++ compiler")
+    (tmp_path / "main.cpp").write_text(text, encoding="utf-8")
+    (tmp_path / "dembark").symlink_to(ROOT / "plugins/physics")
+    subprocess.run([compiler, "-std=c++17", "-I.", "main.cpp", "-o", "main"], cwd=tmp_path, check=True, timeout=300)
+    assert float(subprocess.run(["./main"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout.split()[0]) > 0.0
+
+
+def load_errors() -> object:
+    import importlib.util
+
+    spec = importlib.util.spec_from_file_location("capillary_errors", ROOT / "docs/capillary_errors.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_table_of_capillary_errors_is_that_of_the_data() -> None:
+    errors = load_errors()
+    page = (ROOT / "docs/liggghts_cohesion_capillary.md").read_text(encoding="utf-8")
+    assert page.split("<!-- capillary_errors.py -->\n")[1].split("\n<!-- end -->")[0] == errors.markdown(errors.summary(errors.read()))
+
+
+@pytest.mark.parametrize(("angle", "volume", "share"), [(0, 1e-6, 0.0), (30, 1e-2, 0.5), (60, 0.1, 0.9)])
+def test_data_of_capillary_errors_are_those_of_the_code(angle: int, volume: float, share: float) -> None:
+    import numpy as np
+
+    errors = load_errors()
+    columns = errors.read()
+    stored = np.array([columns[name] for name in errors.HEADER]).T
+    at = np.argmin(np.abs(stored[:, :3] - (angle, volume, share)).sum(axis=1) + np.abs(np.log(stored[:, 1] / volume)))
+    assert stored[at, 3:] == pytest.approx(errors.row(angle, volume, share)[3:], rel=1e-3, abs=1e-5)

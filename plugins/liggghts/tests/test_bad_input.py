@@ -1,0 +1,71 @@
+"""A user's mistake ends the run with one line that says what is wrong, where, and what would be right."""
+
+import pytest
+from rig import liggghts_driver
+from rig.scenarios import Grain, Material, Scenario
+
+WET = Material(bridge_volume=2e-10)
+PAIR = "peratomtypepair 2 "
+
+
+def run(folder, change=lambda deck: deck, *, tangential="finnie_rabinowicz", **overrides):
+    case = Scenario(name="two grains", material=WET, steps=10,
+                    grains=(Grain(position=(0.0, 0.0, 5.1e-3)), Grain(position=(0.0, 0.0, -4.8e-3))))
+    deck = liggghts_driver.deck(case, tangential=tangential, material_lines=liggghts_driver.properties(WET, **overrides))
+    changed = change(deck)
+    return liggghts_driver.run_deck(folder, changed)
+
+
+def assert_one_line(done, *words):
+    assert done.code != 0
+    errors = [line for line in done.output.splitlines() if "ERROR" in line]
+    assert len(errors) == 1, done.output[-2000:]
+    for word in words:
+        assert word in errors[0], errors[0]
+
+
+@pytest.mark.parametrize("name", ["staticFriction", "kineticFriction", "criticalSlipDistance", "bridgeVolume", "contactAngle", "surfaceTension"])
+def test_missing_property(tmp_path, name):
+    assert_one_line(run(tmp_path, **{name: ""}), name, "property/global", "fix ID all")
+
+
+@pytest.mark.parametrize("name", ["interfaceShearStrength", "healingTime"])
+def test_optional_property(tmp_path, name):
+    done = run(tmp_path, **{name: ""})
+    assert done.code == 0, done.error
+
+
+@pytest.mark.parametrize(("name", "values", "words"), [
+    ("staticFriction", PAIR + "0.5 0.5 0.4 0.5", ("staticFriction", "symmetric")),
+    ("bridgeVolume", PAIR + "1e-10 1e-10 2e-10 1e-10", ("bridgeVolume", "symmetric")),
+    ("kineticFriction", PAIR + "0.7 0.5 0.5 0.5", ("kinetic friction must not exceed static friction", "types 1-1")),
+    ("kineticFriction", PAIR + "-0.1 -0.1 -0.1 -0.1", ("kinetic friction must be a number >= 0",)),
+    ("criticalSlipDistance", PAIR + "-1e-6 -1e-6 -1e-6 -1e-6", ("critical slip distance (m) must be >= 0",)),
+    ("interfaceShearStrength", PAIR + "0 0 0 0", ("interface shear strength (Pa) must be > 0", "1e30")),
+    ("healingTime", "scalar -1", ("healing time (s) must be >= 0",)),
+    ("bridgeVolume", PAIR + "-1e-10 -1e-10 -1e-10 -1e-10", ("bridgeVolume (m^3) must be >= 0", "types 1-1")),
+    ("surfaceTension", "scalar -0.07", ("surfaceTension (N/m) must be >= 0",)),
+    ("contactAngle", "peratomtype 1.7 1.7", ("contactAngle is in radians (stock models take degrees) and must lie in 0...pi/2", "1.7")),
+    ("contactAngle", "peratomtype -0.1 -0.1", ("contactAngle is in radians (stock models take degrees) and must lie in 0...pi/2",)),
+    ("contactAngle", "peratomtype 0.3", ("contactAngle",)),
+    ("staticFriction", "scalar 0.5", ("staticFriction",)),
+])
+def test_bad_value(tmp_path, name, values, words):
+    assert_one_line(run(tmp_path, **{name: values}), *words)
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("capillary_model exact", "capillary_model magic", ("capillary_model", "magic", "exact, willett, willett_full, rabinovich, bagheri, constant")),
+    ("presliding linear", "presliding curved", ("presliding", "curved", "linear, exponential")),
+    ("model hertz", "model hertz/stiffness", ("combination", "not compiled", "hertz|hooke")),
+    ("tangential finnie_rabinowicz", "tangential no_history", ("not compiled",)),
+    ("cohesion capillary", "cohesion capillary rolling_friction epsd", ("not compiled", "rolling_friction off|cdt|epsd2")),
+    ("cohesion capillary", "cohesion sjkr", ("not compiled",)),
+])
+def test_bad_models(tmp_path, old, new, words):
+    def change(deck):
+        assert old in deck
+        changed = deck.replace(old, new)
+        return changed.replace("presliding linear ", "") if "no_history" in new else changed.replace("capillary_model exact", "") if "sjkr" in new else changed
+
+    assert_one_line(run(tmp_path, change), *words)

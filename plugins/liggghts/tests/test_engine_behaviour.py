@@ -1,0 +1,181 @@
+"""What the engine does around the laws: neighbour lists, restarts, ranks, newton, meshes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rig import liggghts_driver
+from rig.liggghts_driver import deck, motion, read_dump, run, run_deck
+from rig.motion import deviation
+from rig.scenarios import ALL_OF_IT, SCENARIOS, STILL, Grain, Material, Path, Scenario, pressed
+
+DRY = Material(static_friction=0.5, kinetic_friction=0.4)
+WET = replace(DRY, bridge_volume=2e-10)
+
+
+def test_a_contact_that_ends_forgets(tmp_path):
+    """Two touches with a gap between them, too short for a new neighbour list: the second begins unloaded, in stock it does not.
+
+    The time step is coarse, so that the first touch ends under load.
+    """
+    slide = Path(displacement=("0.00001*(1-exp(-t/0.0003))", "0", "-0.00002*sin(2*PI*200*t)"),
+                 velocity=("0.00001*exp(-t/0.0003)/0.0003", "0", "-0.00002*2*PI*200*cos(2*PI*200*t)"))
+    case = Scenario(name="two touches", material=replace(DRY, restitution=1.0), time_step=1.27e-4, steps=45, stride=1,
+                    grains=(Grain(position=(0.0, 0.0, 5e-3), path=slide), Grain(position=(0.0, 0.0, -5e-3), path=STILL)))
+
+    def load_at_second_touch(found):
+        touching = found.normal_force > 0.0
+        begin = np.flatnonzero(touching[1:] & ~touching[:-1]) + 1
+        assert len(begin) == 1  # it begins in touch
+        return np.linalg.norm(found.tangential_force[begin[0]]) / found.normal_force[begin[0]]
+
+    assert load_at_second_touch(run(case, tmp_path / "ours")) < 0.01  # of this step, the normal is not quite z
+    assert load_at_second_touch(run(case, tmp_path / "stock", tangential="history")) > 0.1
+
+
+def test_contact_on_a_mesh_is_that_on_a_plane(tmp_path):
+    folder = tmp_path / "mesh"
+    folder.mkdir()
+    corners = [(-0.04, -0.04, 0.0), (0.05, -0.03, 0.0), (-0.01, 0.045, 0.0)]
+    vertices = "\n".join(f"   vertex {x:.17g} {y:.17g} {z:.17g}" for x, y, z in corners)
+    (folder / "floor.stl").write_text(f"solid floor\n facet normal 0 0 1\n  outer loop\n{vertices}\n  endloop\n endfacet\nendsolid floor\n")
+    for name in ("drop, wet", "drop, dry", "approach, bridge, wall", "cycles, exponential, wall"):
+        case = SCENARIOS[name]
+        plane = deck(case)
+        words = next(line for line in plane.splitlines() if line.startswith("fix floor"))
+        mesh = "fix stl all mesh/surface file floor.stl type 2\n" + words.replace("primitive type 2 zplane 0", "mesh n_meshes 1 meshes stl")
+        done = run_deck(folder, plane.replace(words, mesh))
+        assert done.code == 0, done.error
+        found = motion(case, folder)
+        assert max(deviation(run(case, tmp_path / "plane"), found).values()) < 1e-9, name
+
+
+SETUP = """\
+units si
+atom_style granular
+atom_modify map array
+boundary p p f
+newton {newton}
+communicate single vel yes
+processors 2 1 1
+{create}
+neighbor 0.002 bin
+neigh_modify delay 0
+timestep 1e-5
+{properties}
+pair_style gran {pair}
+pair_coeff * *
+{state}
+fix floor all wall/gran {wall}
+fix weight all gravity 9.81 vector 0 0 -1
+fix motion all nve/sphere
+dump grains all custom {every} {dump} id x y z vx vy vz omegax omegay omegaz fx fy fz tqx tqy tqz
+dump_modify grains sort id format "%d{numbers}"
+thermo 1000
+{run}
+"""
+# One by one, as on a lattice the numbers of grains depend on how the domain is divided.
+CREATE = "\n".join([
+    "region domain block 0 0.024 0 0.024 -0.001 0.06 units box", "create_box 2 domain",
+    *(f"create_atoms 1 single {0.003 + 0.006 * i} {0.003 + 0.006 * j} {0.003 + 0.006 * k} units box"
+      for i in range(4) for j in range(4) for k in range(4))])
+STATE = """\
+variable size atom 0.005*(1+0.1*sin(37*id))
+variable push_x atom 0.3*sin(91*id)
+variable push_y atom 0.3*sin(53*id)
+variable push_z atom 0.3*sin(17*id)-0.3
+set group all density 2500 diameter v_size density 2500
+set group all vx v_push_x vy v_push_y vz v_push_z"""
+
+
+def packing(material, run_command, *, newton="off", create=CREATE, state=STATE, dump="grains.dump", every=1500):
+    words = SETUP.format(newton=newton, create=create, state=state, properties=liggghts_driver.properties(material), every=every, dump=dump,
+                         pair=liggghts_driver.models(material), wall=liggghts_driver.models(material, wall="primitive type 2 zplane 0"),
+                         numbers=" %.17g" * 15, run=run_command)
+    return words
+
+
+def last_frame(folder, dump="grains.dump"):
+    return read_dump(folder / dump)[1][-1]
+
+
+def assert_same(a, b, tolerance):
+    """Two frames, each quantity (three columns) relative to its largest value."""
+    assert (a[:, 0] == b[:, 0]).all() and len(a) > 30
+    found = {name: np.abs(a[:, k : k + 3] - b[:, k : k + 3]).max() / np.abs(a[:, k : k + 3]).max()
+             for k, name in ((1, "position"), (4, "velocity"), (7, "spin"), (10, "force"), (13, "torque"))}
+    assert max(found.values()) < tolerance, found
+
+
+BED = replace(WET, interface_shear_strength=1e5)
+
+
+@pytest.mark.parametrize("material", [BED, replace(BED, presliding="exponential")])
+def test_ranks_agree(tmp_path, material):
+    """Grains collide and cross between the ranks; round-off grows tenfold in 500 steps of such a gas, so the run is short."""
+    text = packing(material, "run 3000")
+    for ranks in (1, 2):
+        done = run_deck(tmp_path / str(ranks), text if ranks == 2 else text.replace("processors 2 1 1\n", ""), ranks=ranks)
+        assert done.code == 0, done.output[-1000:]
+    assert_same(last_frame(tmp_path / "1"), last_frame(tmp_path / "2"), 1e-9)
+
+
+def test_newton_on_is_refused(tmp_path):
+    done = run_deck(tmp_path, packing(BED, "run 10", newton="on").replace("processors 2 1 1\n", ""))
+    assert done.code != 0 and "newton pair off" in done.error
+
+
+def held_by_bridges(frame):
+    """Number of grains that touch nothing and are pulled all the same."""
+    number, position, force = frame[:, 0], frame[:, 1:4], frame[:, 10:13]
+    radius = 0.0025 * (1.0 + 0.1 * np.sin(37.0 * number))
+    apart = position[:, None] - position[None]
+    apart[..., :2] -= 0.024 * np.round(apart[..., :2] / 0.024)
+    overlap = radius[:, None] + radius[None] - np.linalg.norm(apart, axis=2)
+    np.fill_diagonal(overlap, -1.0)
+    weight = 4.0 / 3.0 * np.pi * radius**3 * 2500.0 * 9.81
+    alone = (overlap.max(axis=1) < 0.0) & (position[:, 2] > radius)
+    return (alone & (np.linalg.norm(force + weight[:, None] * [0.0, 0.0, 1.0], axis=1) > 1e-6)).sum()
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_restart_keeps_displacements_and_bridges(tmp_path, ranks):
+    """The first forces after a restart are those of the run that wrote it, and so is what follows."""
+    edit = (lambda text: text) if ranks == 2 else (lambda text: text.replace("processors 2 1 1\n", ""))
+    first = packing(BED, "run 4500\nwrite_restart bed.restart\nrun 0\nundump grains\n"
+                    'dump again all custom 1 again.dump id x y z vx vy vz omegax omegay omegaz fx fy fz tqx tqy tqz\n'
+                    f'dump_modify again sort id format "%d{" %.17g" * 15}"\nrun 300')
+    done = run_deck(tmp_path, edit(first), ranks=ranks)
+    assert done.code == 0, done.error
+    second = packing(BED, "run 300", create="read_restart bed.restart", state="", dump="resumed.dump", every=1)
+    done = run_deck(tmp_path, edit(second), ranks=ranks, name="resume.in")
+    assert done.code == 0, done.error
+    steps, here = read_dump(tmp_path / "again.dump")
+    again, there = read_dump(tmp_path / "resumed.dump")
+    assert steps[0] == again[0] == 4500
+    assert held_by_bridges(here[0]) > 0
+    assert_same(here[0], there[0], 1e-12)
+    assert_same(here[-1], there[-1], 1e-8)
+
+
+def stopped_by(text, folder):
+    done = run_deck(folder, text)
+    assert done.code != 0
+    assert done.error, done.output
+    return done.error
+
+
+def test_bridge_to_a_wall_longer_than_the_skin(tmp_path):
+    text = deck(SCENARIOS["approach, bridge, wall"])
+    line = stopped_by(text.replace("neighbor 0.001 bin", "neighbor 0.0002 bin"), tmp_path)
+    assert "cohesion capillary" in line and "use neighbor 0.00" in line
+
+
+def test_bridge_longer_than_the_neighbour_lists(tmp_path):
+    """The reach follows the radii at the start of a run; grains that shrink after it may need more."""
+    case = Scenario(name="head on", material=WET, time_step=1e-5, steps=600,
+                    grains=(Grain(position=(0.0, 0.0, 5.2e-3), velocity=(0.0, 0.0, -2.0)), Grain(position=(0.0, 0.0, -5e-3))))
+    text = deck(case)
+    assert run_deck(tmp_path / "kept", text).code == 0
+    line = stopped_by(text.replace("run 600", 'run 600 pre no every 5 "set group all diameter 0.002"'), tmp_path)
+    assert "cohesion capillary" in line and "use neigh_modify contact_distance_factor 1." in line
