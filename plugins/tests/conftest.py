@@ -1,0 +1,47 @@
+"""Makes the rig importable, and runs every scenario once in every program."""
+
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from rig import liggghts_driver, python_driver, yade_driver
+from rig.motion import Motion
+from rig.scenarios import SCENARIOS
+
+from dembark.validation.errors import DembarkError
+
+
+class Motions:
+    """`motions(driver, scenario name)`; the first call for an engine runs all its scenarios."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.done: dict[tuple[str, str], Motion] = {}
+
+    def __call__(self, driver: str, name: str) -> Motion:
+        if (driver, name) not in self.done:
+            if driver == "python":
+                self.done[driver, name] = python_driver.run(SCENARIOS[name])
+                return self.done[driver, name]
+            try:
+                {"liggghts": liggghts_driver, "yade": yade_driver}[driver].engine()
+            except DembarkError as error:
+                pytest.skip(str(error))
+            if driver == "liggghts":
+                # A run takes longer to start than to compute.
+                with ThreadPoolExecutor(4) as pool:
+                    folders = [self.folder / f"liggghts-{k}" for k in range(len(SCENARIOS))]
+                    found = dict(zip(SCENARIOS, pool.map(liggghts_driver.run, SCENARIOS.values(), folders), strict=True))
+            else:
+                found = yade_driver.run_all(SCENARIOS.values(), self.folder / "yade")
+            self.done |= {(driver, each): motion for each, motion in found.items()}
+        return self.done[driver, name]
+
+
+@pytest.fixture(scope="session")
+def motions(tmp_path_factory: pytest.TempPathFactory) -> Motions:
+    return Motions(tmp_path_factory.mktemp("rig"))

@@ -1,0 +1,147 @@
+"""Runs LIGGGHTS decks, and scenarios as decks."""
+
+from __future__ import annotations
+
+import subprocess
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dembark.validation.engines import Engine, find
+from rig.motion import Motion
+from rig.scenarios import Material, Scenario, in_liggghts
+
+COLUMNS = "id x y z vx vy vz omegax omegay omegaz fx fy fz tqx tqy tqz"
+
+
+@cache
+def engine() -> Engine:
+    return find("liggghts")
+
+
+@dataclass
+class Run:
+    """What a run left behind."""
+
+    code: int
+    output: str
+    folder: Path
+
+    @property
+    def error(self) -> str:
+        """The line with which the engine stopped, '' for none."""
+        return next((line for line in self.output.splitlines() if line.startswith("ERROR")), "")
+
+
+def run_deck(folder: Path, deck: str, *, ranks: int = 1, name: str = "case.in") -> Run:
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / name).write_text(deck)
+    done = subprocess.run(engine().command(folder / name, {}, ranks), cwd=folder, env=engine().environment(), capture_output=True,
+                          text=True, errors="replace", stdin=subprocess.DEVNULL, timeout=60, check=False)
+    return Run(done.returncode, done.stdout + done.stderr, folder)
+
+
+def read_dump(path: Path) -> tuple[NDArray[np.int64], list[NDArray[np.float64]]]:
+    """Steps, and for each the table of its rows (as written, one line an item)."""
+    lines = path.read_text().splitlines()
+    steps, frames = [], []
+    at = 0
+    while at < len(lines):
+        assert lines[at] == "ITEM: TIMESTEP", lines[at]
+        count = int(lines[at + 3])
+        steps.append(int(lines[at + 1]))
+        frames.append(np.array([line.split() for line in lines[at + 9 : at + 9 + count]], dtype=float))
+        at += 9 + count
+    return np.array(steps), frames
+
+
+def properties(m: Material, **overrides: str) -> str:
+    """The `fix property/global` lines of a material for two atom types; an override replaces a property's values or, '', drops it."""
+    pair = "peratomtypepair 2 " + " ".join(["{0!r}"] * 4)
+    each = "peratomtype {0!r} {0!r}"
+    values = {
+        "youngsModulus": each.format(m.youngs_modulus),
+        "poissonsRatio": each.format(m.poisson_ratio),
+        "coefficientRestitution": pair.format(m.restitution),
+        "characteristicVelocity": f"scalar {m.characteristic_velocity!r}",
+        "coefficientFriction": pair.format(m.static_friction),  # of stock models
+        "staticFriction": pair.format(m.static_friction),
+        "kineticFriction": pair.format(m.kinetic_friction),
+        "criticalSlipDistance": pair.format(m.critical_slip_distance),
+        "interfaceShearStrength": pair.format(min(m.interface_shear_strength, 1e300)),
+        "healingTime": f"scalar {m.healing_time!r}",
+        "surfaceTension": f"scalar {m.surface_tension!r}",
+        "contactAngle": each.format(m.contact_angle),
+        "bridgeVolume": pair.format(m.bridge_volume),
+    }
+    assert not overrides.keys() - values.keys()
+    values |= overrides
+    return "\n".join(f"fix p_{name} all property/global {name} {value}" for name, value in values.items() if value)
+
+
+def models(m: Material, tangential: str = "finnie_rabinowicz", wall: str = "") -> str:
+    """The words of `pair_style gran` or `fix wall/gran` that choose the models; `wall` stands between models and settings."""
+    wet = m.bridge_volume > 0.0
+    settings = (f" presliding {m.presliding}" if tangential == "finnie_rabinowicz" else "") + (f" capillary_model {m.capillary_model}" if wet else "")
+    return f"model {m.normal_law} tangential {tangential}{' cohesion capillary' if wet else ''} {wall}{settings}"
+
+
+def deck(case: Scenario, *, tangential: str = "finnie_rabinowicz", newton: str = "off", material_lines: str | None = None,
+         finish: str = "", start: str = "") -> str:
+    m = case.material
+    prefix = f"""\
+units si
+atom_style granular
+atom_modify map array
+boundary f f f
+newton {newton}
+communicate single vel yes
+region domain block -0.05 0.05 -0.05 0.05 -0.05 0.05 units box
+create_box 2 domain
+neighbor 0.001 bin
+neigh_modify delay 0
+timestep {case.time_step!r}
+variable t equal step*{case.time_step!r}
+{properties(m) if material_lines is None else material_lines}
+pair_style gran {models(m, tangential)}
+pair_coeff * *
+"""
+    lines = [prefix]
+    for i, g in enumerate(case.grains, start=1):
+        x, y, z = g.position
+        lines.append(f"create_atoms 1 single {x!r} {y!r} {z!r} units box")
+        lines.append(f"group g{i} id {i}")
+        lines.append(f"set atom {i} diameter {2.0 * g.radius!r} density {g.density!r} vx {g.velocity[0]!r} vy {g.velocity[1]!r} vz {g.velocity[2]!r} "
+                     f"omegax {g.angular_velocity[0]!r} omegay {g.angular_velocity[1]!r} omegaz {g.angular_velocity[2]!r}")
+        if g.path:
+            for kind, parts in (("d", g.path.displacement), ("v", g.path.velocity)):
+                lines += [f'variable {kind}{axis}{i} equal "{in_liggghts(part)}"' for axis, part in zip("xyz", parts, strict=True)]
+            lines.append(f"fix move{i} g{i} move variable v_dx{i} v_dy{i} v_dz{i} v_vx{i} v_vy{i} v_vz{i} units box")
+    if case.wall:
+        lines.append(f"fix floor all wall/gran {models(m, tangential, 'primitive type 2 zplane 0')}")
+    strength = float(np.linalg.norm(case.gravity))
+    if strength > 0.0:
+        lines.append(f"fix weight all gravity {strength!r} vector " + " ".join(repr(c / strength) for c in case.gravity))
+    if not case.prescribed:
+        lines.append("fix motion all nve/sphere")
+    lines.append(f"dump grains all custom {case.stride} grains.dump {COLUMNS}\n"
+                 f'dump_modify grains sort id format "%d{" %.17g" * 15}"\n'
+                 f"{start}\nthermo {case.steps}\nrun {case.steps}\n{finish}\n")
+    return "\n".join(lines)
+
+
+def motion(case: Scenario, folder: Path) -> Motion:
+    steps, frames = read_dump(folder / "grains.dump")
+    later = steps > 0
+    steps, table = steps[later], np.array(frames)[later]
+    return Motion(case.time_step * steps, *(table[:, :, k : k + 3] for k in (1, 4, 7, 10, 13)))
+
+
+def run(case: Scenario, folder: Path, **options: str) -> Motion:
+    done = run_deck(folder, deck(case, **options))
+    if done.code != 0 or done.error:
+        raise RuntimeError(f"{case.name}: {done.error or done.output[-2000:]}")
+    return motion(case, folder)

@@ -1,0 +1,108 @@
+"""Runs inside YADE: `yade -n -x yade_script.py cases.json out.npz`. System Python; numpy only."""
+
+import builtins
+import json
+import sys
+
+import numpy as np
+from yade import utils
+
+
+class Prescribe:
+    """Puts the grains on their paths before the forces of a step."""
+
+    def __init__(self, ids, position, velocity, spin):
+        self.ids, self.position, self.velocity, self.spin = ids, position, velocity, spin
+        self.step = 1
+
+    def __call__(self):
+        for i, body in enumerate(self.ids):
+            state = O.bodies[body].state
+            state.pos = Vector3(*self.position[self.step, i])
+            state.vel = Vector3(*self.velocity[self.step, i])
+            state.angVel = Vector3(*self.spin[self.step, i])
+        self.step += 1
+
+
+class Record:
+    """Full-step velocities and forces between the force evaluation and the integrator."""
+
+    def __init__(self, ids, case, first):
+        self.ids, self.case, self.step = ids, case, first
+        self.rows = []
+
+    def __call__(self):
+        step = self.step
+        self.step += 1
+        if step == 0 or step % self.case["stride"]:
+            return
+        dt, free, g = self.case["time_step"], not self.case["prescribed"], np.array(self.case["gravity"])
+        row = [step * dt]
+        for body in self.ids:
+            state = O.bodies[body].state
+            velocity, spin = np.array(state.vel), np.array(state.angVel)
+            force, torque = np.array(O.forces.f(body)), np.array(O.forces.t(body))
+            if free:
+                force = force + state.mass * g
+                velocity = velocity + 0.5 * dt * force / state.mass
+                spin = spin + 0.5 * dt * torque / np.array(state.inertia)
+            row += [*state.pos, *velocity, *spin, *force, *torque]
+        self.rows.append(row)
+
+
+def run(case, arrays):
+    O.reset()
+    m = case["material"]
+    laws = dict(
+        restitution=m["restitution"], staticFriction=m["static_friction"], kineticFriction=m["kinetic_friction"],
+        criticalSlipDistance=m["critical_slip_distance"], interfaceShearStrength=min(m["interface_shear_strength"], 1e300),
+        healingTime=m["healing_time"])
+    wet = m["bridge_volume"] > 0.0
+    if wet:
+        laws.update(bridgeVolume=m["bridge_volume"], contactAngle=m["contact_angle"], surfaceTension=m["surface_tension"])
+    gravity = Vector3(*case["gravity"])
+    ids = []
+    for g in case["grains"]:
+        material = O.materials.append(FrictMat(young=m["youngs_modulus"], poisson=m["poisson_ratio"], density=g["density"], frictionAngle=0))
+        body = utils.sphere(Vector3(*g["position"]), g["radius"], material=material)
+        body.state.vel = Vector3(*g["velocity"]) - 0.5 * case["time_step"] * gravity
+        body.state.angVel = Vector3(*g["angular_velocity"])
+        ids.append(O.bodies.append(body))
+    if case["wall"]:
+        O.bodies.append(utils.wall(0.0, axis=2, sense=1, material=O.materials[-1]))
+    first = 1 if case["prescribed"] else 0
+    move, record = None, Record(ids, case, first)
+    engines = [
+        ForceResetter(),
+        # The grains are moved from outside, so the collider looks at each step.
+        InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()], verletDist=0),
+        InteractionLoop(
+            [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()], [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**laws)],
+            [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(
+                normalLaw=m["normal_law"], characteristicVelocity=m["characteristic_velocity"], presliding=m["presliding"],
+                capillaryModel=m["capillary_model"] if wet else "none")]),
+        NewtonIntegrator(damping=0, gravity=gravity),
+    ]
+    O.dt = case["time_step"]
+    if case["prescribed"]:
+        move = Prescribe(ids, *arrays)
+    # PyRunner finds its names in the builtins.
+    builtins.rig_move, builtins.rig_record = move, record
+    O.engines = ([PyRunner(iterPeriod=1, firstIterRun=0, initRun=True, command="rig_move()")] if move else []) + engines[:3] + [
+        PyRunner(iterPeriod=1, firstIterRun=0, initRun=True, command="rig_record()")] + engines[3:]
+    O.run(case["steps"] + 1 - first, True)
+    return np.array(record.rows)
+
+
+cases, out = sys.argv[1:3]
+with open(cases) as file:
+    cases = json.load(file)
+results = {}
+for number, case in enumerate(cases):
+    arrays = None
+    if case["prescribed"]:
+        with np.load(case["arrays"]) as stored:
+            arrays = [stored[name] for name in ("position", "velocity", "spin")]
+    results[case["name"]] = run(case, arrays)
+np.savez(out, **results)
+print("rig: finished", flush=True)

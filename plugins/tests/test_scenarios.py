@@ -1,0 +1,119 @@
+"""What the scenarios are for, asserted on the motion that each program returns."""
+
+import numpy as np
+import pytest
+from rig import python_driver
+from rig.scenarios import DRY, SCENARIOS, TURN, loaded, rotation_matrix
+
+from dembark.physics import rupture_distance
+
+DRIVERS = ["python", "liggghts", "yade"]
+BRIDGES = [name for name in SCENARIOS if name.startswith("approach, bridge")]
+drivers = pytest.mark.parametrize("driver", DRIVERS)
+
+
+@drivers
+@pytest.mark.parametrize("name", BRIDGES)
+def test_bridge_forms_at_touching_and_breaks_at_rupture(motions, driver, name):
+    """Two approaches and retreats: no force before touching, attraction over the gap on the way out, none beyond rupture."""
+    case, motion = SCENARIOS[name], motions(driver, name)
+    m = case.material
+    radius = np.inf if case.wall else case.grains[1].radius
+    distance = motion.position[:, 0, 2] if case.wall else np.linalg.norm(motion.position[:, 0] - motion.position[:, 1], axis=1)
+    gap = distance - case.grains[0].radius - (0.0 if case.wall else radius)
+    end = rupture_distance(m.bridge_volume, m.contact_angle, case.grains[0].radius, radius, model=m.capillary_model)
+    leaving = np.diff(gap, append=gap[-1]) > 0.0
+    apart = gap > 0.0
+    held = apart & leaving & (gap < end * (1.0 - 1e-9))
+    assert held.sum() > 50 and (apart & ~leaving).sum() > 100 and (gap > end).any()
+    first = int(np.argmax(~apart))
+    again = first + int(np.argmax(gap[first:] > end * (1.0 + 1e-9)))
+    second = again + int(np.argmax(~apart[again:]))
+    assert 0 < first < again < second
+    for quiet in (slice(0, first), slice(again, second)):
+        assert (motion.force[quiet] == 0.0).all()
+    pull = -motion.normal_force[first:again]
+    assert (pull[gap[first:again] > 0.0] > 0.0).all()
+
+
+@drivers
+@pytest.mark.parametrize(("name", "turned"), [("cycles, linear, limited strength", "cycles, rotated frame"),
+                                              ("collision, wet", "collision, wet, rotated frame")])
+def test_rotated_frame(motions, driver, name, turned):
+    still, other = motions(driver, name), motions(driver, turned)
+    for quantity in ("position", "velocity", "angular_velocity", "force", "torque"):
+        expected = getattr(still, quantity) @ TURN.T
+        assert np.abs(getattr(other, quantity) - expected).max() < 1e-9 * np.abs(expected).max(), quantity
+
+
+@drivers
+def test_rigidly_rotating_pair_keeps_its_force(motions, driver):
+    motion = motions(driver, "loaded, rigidly rotating")
+    late = motion.time > 0.015
+    size = np.linalg.norm(motion.tangential_force[late], axis=1)
+    assert size.min() > 0.1 * motion.normal_force[late].min()
+    assert np.ptp(size) < 1e-9 * size[0]
+    assert np.ptp(motion.normal_force[late]) < 1e-9 * motion.normal_force[late][0]
+
+
+@pytest.mark.parametrize(("axis", "order"), [((0.0, 0.0, 1.0), 2), ((1.0, 0.0, 0.0), 1), ((1.0, 2.0, 2.0), 1)])
+def test_direction_in_a_rotating_frame_converges(axis, order):
+    """A frame that turns by 4 rad: the force turns with it, to second order in the time step about the normal.
+
+    A load that lies askew to the axis of a turning normal comes out turned in its plane by at most (turned angle) (angle of one
+    step) / 4: first order, as no normal of the step before is stored.
+    """
+    rate, errors = 200.0, []
+    for time_step in (2e-5, 1e-5):
+        case = loaded(DRY, time_step)
+        still, turning = python_driver.run(case), python_driver.run(case.spinning(axis, rate, "turning"))
+        back = np.array([rotation_matrix(axis, -rate * t) @ f for t, f in zip(turning.time, turning.force[:, 0], strict=True)])
+        errors.append(np.abs(back - still.force[:, 0]).max() / np.linalg.norm(still.tangential_force, axis=1).max())
+        assert errors[-1] < 0.25 * (rate * 0.02) * rate * time_step
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.05)
+
+
+@drivers
+@pytest.mark.parametrize("name", [name for name in SCENARIOS if name.startswith("sliding")])
+def test_steady_sliding_has_no_saw_tooth(motions, driver, name):
+    """One peak of at most static friction, then down to kinetic friction for good."""
+    case, motion = SCENARIOS[name], motions(driver, name)
+    ratio = np.linalg.norm(motion.tangential_force, axis=1) / motion.normal_force
+    peak = int(ratio.argmax())
+    assert np.diff(ratio[peak:]).max() < 1e-12
+    assert len(ratio) - peak > 1500
+    assert ratio[-1] == pytest.approx(0.3, rel=1e-3)
+    static = case.material.static_friction
+    if case.material.presliding == "linear":
+        assert 0.97 * static < ratio[peak] < static * (1.0 + 1e-12)
+    else:
+        assert 0.3 < ratio[peak] < static
+
+
+@drivers
+def test_limited_strength_limits_the_force(motions, driver):
+    """No tangential force above strength times contact area; with the area of Hertz, pi R* overlap."""
+    case = SCENARIOS["cycles, wall"]
+    motion, m = motions(driver, "cycles, wall"), case.material
+    overlap = np.clip(case.grains[0].radius - motion.position[:, 0, 2], 0.0, None)
+    area = np.pi * case.grains[0].radius * overlap
+    size = np.linalg.norm(motion.tangential_force, axis=1)
+    sliding = size > 0.5 * m.interface_shear_strength * area
+    assert sliding.sum() > 50
+    repulsion = np.clip(motion.normal_force, 0.0, None)
+    strength = m.interface_shear_strength * area[sliding]
+    top = -strength * np.expm1(-m.static_friction * repulsion[sliding] / strength)
+    # The spring is below the limit; while it sticks, the dash-pot of the restitution may add to it.
+    assert np.mean(size[sliding] <= top * (1.0 + 1e-9)) > 0.9
+
+
+@drivers
+def test_grain_leaves_the_wall_with_less_energy(motions, driver):
+    for name in ("drop, dry", "drop, wet", "drop, hooke"):
+        case, motion = SCENARIOS[name], motions(driver, name)
+        grain = case.grains[0]
+        kinetic = 0.5 * grain.mass * ((motion.velocity**2).sum(axis=2) + 0.4 * grain.radius**2 * (motion.angular_velocity**2).sum(axis=2))[:, 0]
+        energy = kinetic + grain.mass * 9.81 * motion.position[:, 0, 2]
+        assert energy[-1] < 0.95 * energy[0]
+        # A grain that has left takes its spin about the normal along unchanged.
+        assert motion.angular_velocity[-1, 0, 2] == grain.angular_velocity[2]

@@ -1,0 +1,70 @@
+#include "CylinderWall.hpp"
+
+#include <core/Aabb.hpp>
+#include <core/Scene.hpp>
+#include <pkg/dem/ScGeom.hpp>
+
+#include "report.hpp"
+
+namespace yade {
+
+YADE_PLUGIN((CylinderWall)(Bo1_CylinderWall_Aabb)(Ig2_CylinderWall_Sphere_ScGeom));
+
+using dembark_yade::fail;
+
+void CylinderWall::postLoad(CylinderWall&) {
+	if (radius <= 0.0) fail("CylinderWall.radius must be > 0 m");
+	const Real length = axis.norm();
+	if (!(length > 0.0)) fail("CylinderWall.axis must be a vector that is not zero");
+	// Dividing a unit vector again would change its last digit with every load.
+	if (math::abs(length - 1.0) > 4e-16) axis /= length;
+}
+
+void Bo1_CylinderWall_Aabb::go(const shared_ptr<Shape>& shape, shared_ptr<Bound>& bound, const Se3r& se3, const Body*) {
+	if (scene->isPeriodic) fail("a CylinderWall has no end and does not fit a periodic cell; use an aperiodic scene");
+	const CylinderWall& wall = *static_cast<CylinderWall*>(shape.get());
+	if (!(wall.radius > 0.0)) fail("CylinderWall.radius is not set; give it in m");
+	if (!bound) bound = shared_ptr<Bound>(new Aabb);
+	for (int i = 0; i < 3; ++i) {
+		const Real across = wall.radius * math::sqrt(math::max(Real(0), 1.0 - wall.axis[i] * wall.axis[i]));
+		const Real half   = math::abs(wall.axis[i]) > 1e-12 ? std::numeric_limits<Real>::infinity() : across;
+		bound->min[i]     = se3.position[i] - half;
+		bound->max[i]     = se3.position[i] + half;
+	}
+}
+
+bool Ig2_CylinderWall_Sphere_ScGeom::go(
+        const shared_ptr<Shape>& shape1, const shared_ptr<Shape>& shape2, const State& state1, const State& state2, const Vector3r& shift2,
+        const bool& force, const shared_ptr<Interaction>& interaction) {
+	const CylinderWall& wall   = *static_cast<CylinderWall*>(shape1.get());
+	const Real          radius = static_cast<Sphere*>(shape2.get())->radius;
+	const Vector3r      centre = state2.pos + shift2;
+	Vector3r            across = centre - state1.pos;
+	across -= across.dot(wall.axis) * wall.axis;
+	const Real squared = across.squaredNorm();
+	if (!interaction->isReal() && !force) {
+		const Real room = wall.radius - radius;
+		if (room > 0.0 && squared < room * room) return false;
+	}
+	const Real     distance = math::sqrt(squared);
+	const Vector3r normal   = distance > 0.0 ? Vector3r(-across / distance) : Vector3r(wall.axis.unitOrthogonal());
+
+	const bool isNew = !interaction->geom;
+	if (isNew) interaction->geom = shared_ptr<ScGeom>(new ScGeom());
+	ScGeom& geom          = *static_cast<ScGeom*>(interaction->geom.get());
+	geom.penetrationDepth = distance + radius - wall.radius;
+	geom.contactPoint     = centre - (radius - 0.5 * geom.penetrationDepth) * normal;
+	geom.radius1          = 1e8 * radius;
+	geom.radius2          = radius;
+	geom.precompute(state1, state2, scene, interaction, normal, isNew, shift2, false);
+	return true;
+}
+
+bool Ig2_CylinderWall_Sphere_ScGeom::goReverse(
+        const shared_ptr<Shape>& shape1, const shared_ptr<Shape>& shape2, const State& state1, const State& state2, const Vector3r& shift2,
+        const bool& force, const shared_ptr<Interaction>& interaction) {
+	interaction->swapOrder();
+	return go(shape2, shape1, state2, state1, -shift2, force, interaction);
+}
+
+}  // namespace yade

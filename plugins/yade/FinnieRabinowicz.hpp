@@ -1,0 +1,110 @@
+// Hertz or Hooke contact with Finnie-Rabinowicz friction and a capillary bridge for YADE: data of a contact, its parameters from a
+// pair of materials, and the law. The formulas are those of dembark/contact.hpp; here only YADE's conventions are mapped to them.
+#pragma once
+
+#include <core/Dispatching.hpp>
+#include <lib/base/openmp-accu.hpp>
+#include <pkg/common/ElastMat.hpp>
+#include <pkg/common/MatchMaker.hpp>
+#include <pkg/common/NormShearPhys.hpp>
+#include <pkg/dem/ScGeom.hpp>
+
+#include "dembark/contact.hpp"
+
+namespace yade {
+
+class FinnieRabinowiczPhys : public NormShearPhys {
+public:
+	virtual ~FinnieRabinowiczPhys() = default;
+
+	// Built from the attributes by the law and valid as long as `preparedBy` is the law's revision.
+	::dembark::ContactParameters contact;
+	long                         preparedBy = -1;
+	int                          wallBody   = 0;  // 1 or 2: this body of the interaction is a wall; 0: two spheres
+	double                       linearStiffness = 0.0;
+
+	void postLoad(FinnieRabinowiczPhys&) { preparedBy = -1; }
+
+	// clang-format off
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR(FinnieRabinowiczPhys,NormShearPhys,"Contact of :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz`. :yref:`NormPhys.normalForce` holds the force along the normal with damping and bridge, so that it and :yref:`NormShearPhys.shearForce` are the whole force.",
+		((Vector3r,elasticDisplacement,Vector3r::Zero(),,"Elastic tangential displacement [m] of the sphere (of body 1, of two spheres), in the plane of contact"))
+		((Real,slip,0,,"Slip [m] since the contact last stuck"))
+		((Real,dissipatedEnergy,0,,"Energy [J] lost by slip and tangential damping since the contact began"))
+		((Real,bridgeVolume,0,,"Volume [m^3] of the liquid bridge that is there; 0 = no bridge"))
+		((Real,ruptureDistance,0,,"Gap [m] beyond which that bridge breaks"))
+		((Real,capillaryForce,0,,"Force [N] of the bridge, positive = attractive"))
+		((Real,effectiveYoungsModulus,0,Attr::triggerPostLoad,"E* [Pa], 1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2"))
+		((Real,effectiveShearModulus,0,Attr::triggerPostLoad,"G* [Pa], 1/G* = (2-nu1)/G1 + (2-nu2)/G2"))
+		((Real,restitution,1,Attr::triggerPostLoad,"Coefficient of restitution"))
+		((Real,staticFriction,0,Attr::triggerPostLoad,"Static friction coefficient"))
+		((Real,kineticFriction,0,Attr::triggerPostLoad,"Kinetic friction coefficient"))
+		((Real,criticalSlipDistance,0,Attr::triggerPostLoad,"Slip [m] over which friction falls from its static to its kinetic value"))
+		((Real,interfaceShearStrength,1e30,Attr::triggerPostLoad,"Shear strength [Pa] of the interface; 1e30 or more = unlimited"))
+		((Real,healingTime,0,Attr::triggerPostLoad,"Time constant [s] in which slip is forgotten while the contact sticks; 0 = at once"))
+		((Real,newBridgeVolume,0,Attr::triggerPostLoad,"Volume [m^3] of a bridge that forms when the bodies touch"))
+		((Real,surfaceTension,0,Attr::triggerPostLoad,"Surface tension [N/m]"))
+		((Real,contactAngle,0,Attr::triggerPostLoad,"Contact angle [rad]")),
+		createIndex();
+	);
+	// clang-format on
+	REGISTER_CLASS_INDEX(FinnieRabinowiczPhys, NormShearPhys);
+};
+REGISTER_SERIALIZABLE(FinnieRabinowiczPhys);
+
+class Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys : public IPhysFunctor {
+public:
+	void go(const shared_ptr<Material>&, const shared_ptr<Material>&, const shared_ptr<Interaction>&) override;
+	FUNCTOR2D(FrictMat, FrictMat);
+	// clang-format off
+	YADE_CLASS_BASE_DOC_ATTRS(Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys,IPhysFunctor,"Creates :yref:`FinnieRabinowiczPhys`. Elastic constants come from the materials; :yref:`FrictMat.frictionAngle` is not used. All pair parameters are :yref:`MatchMaker` objects by material id and may be given as plain numbers.",
+		((shared_ptr<MatchMaker>,restitution,,,"Coefficient of restitution, > 0 and <= 1. Required."))
+		((shared_ptr<MatchMaker>,staticFriction,,,"Static friction coefficient, >= 0. Required."))
+		((shared_ptr<MatchMaker>,kineticFriction,,,"Kinetic friction coefficient, >= 0 and not above the static one. Required."))
+		((shared_ptr<MatchMaker>,criticalSlipDistance,,,"Slip [m] over which friction falls from its static to its kinetic value, >= 0. Required."))
+		((shared_ptr<MatchMaker>,interfaceShearStrength,,,"Shear strength [Pa] of the interface, > 0; not given, or 1e30 and more = unlimited."))
+		((shared_ptr<MatchMaker>,bridgeVolume,,,"Volume [m^3] of each liquid bridge, formed when two bodies touch; not given or 0 = dry."))
+		((shared_ptr<MatchMaker>,contactAngle,,,"Contact angle [rad], 0...pi/2. Required with a bridge volume."))
+		((Real,surfaceTension,NaN,,"Surface tension [N/m], >= 0. Required with a bridge volume."))
+		((Real,healingTime,0,,"Time constant [s] in which slip is forgotten while a contact sticks; 0 = at once."))
+	);
+	// clang-format on
+};
+REGISTER_SERIALIZABLE(Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys);
+
+class Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz : public LawFunctor {
+public:
+	bool go(shared_ptr<IGeom>&, shared_ptr<IPhys>&, Interaction*) override;
+	void postLoad(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz&);
+	Real getDissipatedEnergy() const;
+	long bridgeCount() const;
+	long contactCount() const;
+	FUNCTOR2D(ScGeom, FinnieRabinowiczPhys);
+	// clang-format off
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz,LawFunctor,"Normal force of Hertz or Hooke with damping from a coefficient of restitution, tangential force of Finnie and Rabinowicz, and a capillary bridge. A body whose shape is not a :yref:`Sphere` is a wall of infinite radius and mass; a sphere that is not dynamic has infinite mass; two bodies of which neither is dynamic have no force. A bridge keeps its interaction until it ruptures, at any gap.",
+		((string,normalLaw,"hertz",Attr::triggerPostLoad,"'hertz' or 'hooke'"))
+		((Real,characteristicVelocity,NaN,Attr::triggerPostLoad,"Impact speed [m/s] at which the overlap of 'hooke' equals that of 'hertz'. Required for 'hooke'."))
+		((string,presliding,"linear",Attr::triggerPostLoad,"Tangential force before gross slip: 'linear' or 'exponential'"))
+		((string,capillaryModel,"none",Attr::triggerPostLoad,"'none', or the force law of a bridge: 'exact', 'willett', 'willett_full', 'rabinovich', 'bagheri', 'constant'"))
+		((bool,tangentialDamping,true,Attr::triggerPostLoad,"Viscous tangential force while a contact sticks"))
+		((bool,limitForce,false,Attr::triggerPostLoad,"No attraction by normal damping"))
+		((OpenMPAccumulator<Real>,endedDissipation,,Attr::hidden,"Energy [J] that contacts which have ended had lost"))
+		, /*ctor*/
+		, /*py*/
+		.def("dissipatedEnergy",&Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::getDissipatedEnergy,"Energy [J] lost by slip and tangential damping in all contacts since the start.")
+		.def("bridgeCount",&Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::bridgeCount,"Number of liquid bridges.")
+		.def("contactCount",&Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::contactCount,"Number of pairs of bodies that touch.")
+	);
+	// clang-format on
+
+private:
+	void prepare(FinnieRabinowiczPhys&, const ScGeom&, const Body&, const Body&) const;
+
+	::dembark::NormalLaw        normal     = ::dembark::NormalLaw::hertz;
+	::dembark::Presliding       path       = ::dembark::Presliding::linear;
+	bool                        wet        = false;
+	::dembark::capillary::Model model      = ::dembark::capillary::Model::exact;
+	long                        revision   = 0;
+};
+REGISTER_SERIALIZABLE(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz);
+
+}  // namespace yade

@@ -1,0 +1,153 @@
+#include "Snapshot.hpp"
+
+#include <cstdio>
+
+#include <core/Scene.hpp>
+#include <pkg/common/NormShearPhys.hpp>
+#include <pkg/common/Sphere.hpp>
+
+#include "report.hpp"
+
+namespace yade {
+
+YADE_PLUGIN((DembarkSnapshot));
+
+namespace {
+
+int at(const std::vector<int>& values, Body::id_t id, int otherwise) {
+	return id >= 0 && static_cast<std::size_t>(id) < values.size() ? values[id] : otherwise;
+}
+
+/// The numbers of one line; long enough for any double.
+struct Line {
+	std::string& text;
+	char         buffer[40];
+	void add(const char* format, double value) { text.append(buffer, std::snprintf(buffer, sizeof buffer, format, value)); }
+	void add(const char* format, const Vector3r& v) {
+		for (int i = 0; i < 3; ++i) add(format, v[i]);
+	}
+	void add(long value) { text.append(buffer, std::snprintf(buffer, sizeof buffer, "%ld ", value)); }
+	void end() { text.back() = '\n'; }
+};
+
+struct Motion {
+	Vector3r force, velocity, angularVelocity;
+};
+
+/// Force with weight, and velocities at the time of the positions.
+Motion motion(const Body& body, Scene& scene, const Vector3r& gravity) {
+	const State& state = *body.state;
+	Motion       now{scene.forces.getForce(body.getId()), state.vel, state.angVel};
+	if (!body.isDynamic() || !(state.mass > 0.0)) return now;
+	const Vector3r torque = scene.forces.getTorque(body.getId());
+	now.force += state.mass * gravity;
+	for (int i = 0; i < 3; ++i) {
+		if (!(state.blockedDOFs & State::axisDOF(i, false))) now.velocity[i] += 0.5 * scene.dt * now.force[i] / state.mass;
+		if (!(state.blockedDOFs & State::axisDOF(i, true)) && state.inertia[i] > 0.0)
+			now.angularVelocity[i] += 0.5 * scene.dt * torque[i] / state.inertia[i];
+	}
+	return now;
+}
+
+}  // namespace
+
+Vector3i DembarkSnapshot::image(const Vector3r& position) const {
+	Vector3i cell = Vector3i::Zero();
+	for (int i = 0; i < 3; ++i)
+		if (periodic[i] && high[i] > low[i]) cell[i] = static_cast<int>(math::floor((position[i] - low[i]) / (high[i] - low[i])));
+	return cell;
+}
+
+std::string DembarkSnapshot::grainRows() const {
+	Scene& scene = *Omega::instance().getScene();
+	scene.forces.sync();
+	std::vector<Vector3r> ofWalls(scene.bodies->size() * wallCount, Vector3r::Zero());
+	if (wallCount > 0)
+		for (const auto& interaction : *scene.interactions) {
+			if (!interaction->isReal()) continue;
+			const Body::id_t id1 = interaction->getId1(), id2 = interaction->getId2();
+			const int        wall1 = at(columns, id1, -1), wall2 = at(columns, id2, -1);
+			if (wall1 == wall2 || (wall1 >= 0 && wall2 >= 0)) continue;
+			const auto* phys = dynamic_cast<const NormShearPhys*>(interaction->phys.get());
+			if (!phys) continue;
+			const Vector3r onSecond = phys->normalForce + phys->shearForce;
+			if (wall1 >= 0) ofWalls[id2 * wallCount + wall1] += onSecond;
+			else ofWalls[id1 * wallCount + wall2] -= onSecond;
+		}
+
+	std::string text;
+	Line        line{text, {}};
+	for (const auto& body : *scene.bodies) {
+		if (!body) continue;
+		const int   type   = at(types, body->getId(), 0);
+		const auto* sphere = type > 0 ? dynamic_cast<const Sphere*>(body->shape.get()) : nullptr;
+		if (!sphere) continue;
+		const Vector3i cell = image(body->state->pos);
+		const Motion   now  = motion(*body, scene, gravity);
+		line.add(body->getId() + 1);
+		line.add(type);
+		line.add("%.10g ", Vector3r(body->state->pos - cell.cast<Real>().cwiseProduct(high - low)));
+		for (int i = 0; i < 3; ++i) line.add(cell[i]);
+		line.add("%.7g ", now.velocity);
+		line.add("%.7g ", now.angularVelocity);
+		line.add("%.7g ", now.force);
+		line.add("%.9g ", sphere->radius);
+		line.add("%.9g ", body->state->mass);
+		for (int k = 0; k < wallCount; ++k) line.add("%.7g ", ofWalls[body->getId() * wallCount + k]);
+		line.end();
+	}
+	return text;
+}
+
+std::string DembarkSnapshot::contactRows() const {
+	Scene&      scene = *Omega::instance().getScene();
+	std::string text;
+	Line        line{text, {}};
+	for (const auto& interaction : *scene.interactions) {
+		if (!interaction->isReal()) continue;
+		const Body::id_t id1 = interaction->getId1(), id2 = interaction->getId2();
+		if (at(types, id1, 0) <= 0 || at(types, id2, 0) <= 0) continue;
+		const auto* phys = dynamic_cast<const NormShearPhys*>(interaction->phys.get());
+		const auto &body1 = Body::byId(id1, &scene), &body2 = Body::byId(id2, &scene);
+		if (!phys || !body1 || !body2 || !(body1->isDynamic() || body2->isDynamic())) continue;
+		const Vector3i cell1 = image(body1->state->pos), cell2 = image(body2->state->pos);
+		const Vector3r size = high - low;
+		bool           across = false;
+		for (int i = 0; i < 3; ++i) across |= periodic[i] && interaction->cellDist[i] + cell2[i] - cell1[i] != 0;
+		line.add("%.10g ", Vector3r(body1->state->pos - cell1.cast<Real>().cwiseProduct(size)));
+		line.add("%.10g ", Vector3r(body2->state->pos - cell2.cast<Real>().cwiseProduct(size)));
+		line.add(id1 + 1);
+		line.add(id2 + 1);
+		line.add(across ? 1 : 0);
+		line.add("%.7g ", Vector3r(-(phys->normalForce + phys->shearForce)));
+		line.end();
+	}
+	return text;
+}
+
+std::vector<Vector3r> DembarkSnapshot::wallForces() const {
+	Scene& scene = *Omega::instance().getScene();
+	scene.forces.sync();
+	std::vector<Vector3r> sums(wallCount, Vector3r::Zero());
+	for (std::size_t id = 0; id < columns.size(); ++id)
+		if (columns[id] >= 0 && columns[id] < wallCount) sums[columns[id]] -= scene.forces.getForce(static_cast<Body::id_t>(id));
+	return sums;
+}
+
+Real DembarkSnapshot::kineticEnergy() const {
+	Scene& scene = *Omega::instance().getScene();
+	scene.forces.sync();
+	Real sum = 0.0;
+	for (const auto& body : *scene.bodies)
+		if (body && at(types, body->getId(), 0) == 1) sum += 0.5 * body->state->mass * motion(*body, scene, gravity).velocity.squaredNorm();
+	return sum;
+}
+
+long DembarkSnapshot::grainCount() const {
+	long count = 0;
+	for (const auto& body : *Omega::instance().getScene()->bodies)
+		count += body && at(types, body->getId(), 0) > 0 && dynamic_cast<const Sphere*>(body->shape.get());
+	return count;
+}
+
+}  // namespace yade

@@ -1,0 +1,64 @@
+# Make an overlay of YADE: cmake -DPREFIX= -DOVERLAY= -DSUBDIR=<of PREFIX, with libyade.so> -DPLUGIN= -DMODULES= -P overlay.cmake
+# OVERLAY becomes a link to a folder beside it. A new one is built under a name of its own and the link then replaced by one rename,
+# so that there is a whole overlay at any time; the one before stays for runs that still use it.
+file(REAL_PATH ${PREFIX} PREFIX)
+get_filename_component(parent ${OVERLAY} DIRECTORY)
+get_filename_component(name ${OVERLAY} NAME)
+file(MAKE_DIRECTORY ${parent})
+string(TIMESTAMP now "%Y%m%dT%H%M%S" UTC)
+string(RANDOM LENGTH 4 ALPHABET 0123456789abcdef salt)
+set(fresh ${parent}/.${name}-${now}-${salt})
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE failed ERROR_VARIABLE message)
+  if(failed)
+    list(JOIN ARGN " " line)
+    message(FATAL_ERROR "dembark: the overlay ${OVERLAY} could not be made: ${line}: ${message}")
+  endif()
+endfunction()
+# YADE's start script has its own prefix built in, twice, and listens to the variable YADE_PREFIX, which for us names the engine
+# below. In the overlay it must find itself.
+file(READ ${PREFIX}/bin/yade script)
+string(REGEX REPLACE "\nsys\\.path\\.insert\\(0,'[^'\n]*'\\)\n"
+       "\nos.environ['YADE_PREFIX']=os.path.dirname(os.path.dirname(os.path.realpath(__file__)))\nsys.path.insert(0,os.environ['YADE_PREFIX']+'/${SUBDIR}/py')\n"
+       patched "${script}")
+if(patched STREQUAL script)
+  message(FATAL_ERROR "dembark: ${PREFIX}/bin/yade does not look like YADE's start script (no sys.path.insert line); this YADE is not supported")
+endif()
+# A user's mistake is one line, not a trace.
+string(REPLACE "\t\t\t\texcept: # all other exceptions\n"
+"\t\t\t\texcept RuntimeError as error:
+\t\t\t\t\tif str(error).startswith('dembark: ') and yade.runtime.opts.exitAfter:
+\t\t\t\t\t\tprint(error,file=sys.stderr,flush=True)
+\t\t\t\t\t\tsys.exit(2)
+\t\t\t\t\timport traceback
+\t\t\t\t\ttraceback.print_exc()
+\t\t\t\t\tif yade.runtime.opts.exitAfter: sys.exit(1)
+\t\t\t\texcept: # all other exceptions\n" patched "${patched}")
+
+run(cp -rs ${PREFIX} ${fresh})
+run(cp ${PLUGIN} ${fresh}/${SUBDIR}/)
+# Copies, not links: an overlay keeps working, and keeps one version of library and module, while the checkout changes.
+file(GLOB modules ${MODULES}/*.py)
+foreach(module ${modules})
+  run(cp ${module} ${fresh}/${SUBDIR}/py/yade/)
+endforeach()
+
+file(REMOVE ${fresh}/bin/yade)
+file(WRITE ${fresh}/bin/yade "${patched}")
+file(CHMOD ${fresh}/bin/yade PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+
+set(previous "")
+if(IS_SYMLINK ${OVERLAY})
+  file(READ_SYMLINK ${OVERLAY} previous)
+  set(previous ${parent}/${previous})
+else()
+  file(REMOVE_RECURSE ${OVERLAY})
+endif()
+get_filename_component(target ${fresh} NAME)
+file(CREATE_LINK ${target} ${fresh}.link SYMBOLIC)
+file(RENAME ${fresh}.link ${OVERLAY})
+file(GLOB old ${parent}/.${name}-*)
+list(REMOVE_ITEM old ${fresh} ${previous})
+if(old)
+  file(REMOVE_RECURSE ${old})
+endif()

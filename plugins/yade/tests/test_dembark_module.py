@@ -1,0 +1,218 @@
+"""The Python side: dumps, histories, parameters and columns, and the lines for wrong input."""
+
+import json
+import textwrap
+
+import numpy as np
+import pytest
+
+LOW, HIGH = np.array([-0.05, 0.0, -0.01]), np.array([0.05, 0.02, 0.05])
+
+
+def frames(text):
+    """[(step, columns, rows)] of a LAMMPS text dump."""
+    result = []
+    for part in text.split("ITEM: TIMESTEP\n")[1:]:
+        lines = part.splitlines()
+        assert lines[3] == "ITEM: BOX BOUNDS ff pp ff"
+        assert [list(map(float, line.split())) for line in lines[4:7]] == [[a, b] for a, b in zip(LOW, HIGH, strict=True)]
+        columns = lines[7].split()[2:]
+        rows = np.array([[float(word) for word in line.split()] for line in lines[8:]])
+        assert int(lines[2]) == len(rows)
+        assert rows.shape[1] == len(columns)
+        result.append((int(lines[0]), columns, rows))
+    return result
+
+
+@pytest.fixture(scope="module")
+def dumps(yade):
+    return yade.scenes("dumps")["dumps"]
+
+
+def test_grains_dump_has_full_step_velocities_and_forces_with_weight(dumps):
+    found = frames(dumps["grains"])
+    assert [step for step, _, _ in found] == [50, 100]
+    expected = ("id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass f_force_base[1] f_force_base[2] f_force_base[3] "
+                "f_force_left[1] f_force_left[2] f_force_left[3]").split()
+    for (_, columns, rows), seen in zip(found, dumps["seen"], strict=True):
+        assert columns == expected
+        assert rows[:, 0].tolist() == [2, 3, 4, 5]
+        assert rows[:, 1].tolist() == [2, 1, 1, 1]
+        for row in rows:
+            force, velocity, position, mass = (np.array(v) for v in seen[int(row[0]) - 1])
+            if row[1] == 1:
+                force = force + mass * np.array([0, 0, -9.81])
+                velocity = velocity + 0.5 * 2e-6 * force / mass
+            assert row[14:17] == pytest.approx(force, rel=1e-6, abs=1e-12)
+            assert row[8:11] == pytest.approx(velocity, rel=1e-6, abs=1e-9)
+            # Wrapped along y only; the image flag leads back.
+            assert row[2:5] + row[5:8] * [0, 0.02, 0] == pytest.approx(position, rel=1e-9)
+            assert 0.0 <= row[3] < 0.02
+    assert found[0][2][3, 6] == 1
+
+
+def test_forces_of_walls_and_contacts_add_up_to_the_force_of_a_grain(dumps):
+    for (_, _, grains), (_, columns, contacts) in zip(frames(dumps["grains"]), frames(dumps["contacts"]), strict=True):
+        assert columns == [f"c_contacts[{i}]" for i in range(1, 13)]
+        total = {int(row[0]): row[14:17] - row[18] * np.array([0, 0, -9.81]) for row in grains if row[1] == 1}
+        sums = {int(row[0]): row[19:22].copy() for row in grains if row[1] == 1}
+        for row in contacts:
+            for number, sign in ((int(row[6]), 1.0), (int(row[7]), -1.0)):
+                if number in sums:
+                    sums[number] += sign * row[9:12]
+        for number, force in total.items():
+            assert sums[number] == pytest.approx(force, rel=1e-5, abs=1e-9)
+        across = {tuple(sorted(map(int, row[6:8]))): int(row[8]) for row in contacts}
+        assert across == {(2, 3): 0, (4, 5): 1}
+
+
+def test_glued_grain_counts_to_its_wall(dumps):
+    for (_, _, grains), (_, _, contacts) in zip(frames(dumps["grains"]), frames(dumps["contacts"]), strict=True):
+        pair = next(row for row in contacts if {int(row[6]), int(row[7])} == {2, 3})
+        on_grain = pair[9:12] * (1.0 if int(pair[6]) == 3 else -1.0)
+        assert grains[1, 22:25] == pytest.approx(on_grain, rel=1e-6)
+        assert np.all(grains[2:, 22:25] == 0.0)
+
+
+def test_history_sums_walls_and_energy(dumps):
+    header, *lines = dumps["time"].splitlines()
+    assert header == "step,time,kinetic_energy,base_fx,base_fy,base_fz,left_fx,left_fy,left_fz"
+    for line, (step, _, grains) in zip(lines, frames(dumps["grains"]), strict=True):
+        values = [float(word) for word in line.split(",")]
+        moving = grains[grains[:, 1] == 1]
+        assert values[0] == step
+        assert values[1] == pytest.approx(step * 2e-6)
+        assert values[2] == pytest.approx((0.5 * moving[:, 18] * (moving[:, 8:11] ** 2).sum(axis=1)).sum(), rel=1e-6)
+        assert values[3:6] == pytest.approx(moving[:, 19:22].sum(axis=0), rel=1e-5, abs=1e-9)
+        assert values[6:9] == pytest.approx(moving[:, 22:25].sum(axis=0), rel=1e-5, abs=1e-9)
+
+
+CASE = """
+[parameters.grain_count]
+value = 20
+type = "int"
+min = 1
+[parameters.diameter]
+value = 5e-3
+unit = "m"
+type = "float"
+min = 0.0
+exclusive_min = true
+[parameters.static_friction]
+optional = true
+type = "float"
+min = 0.0
+[parameters.shape]
+value = "round"
+type = "choice"
+values = ["round", "square"]
+"""
+
+
+def script(yade, name, body):
+    path = yade.folder / f"{name}.py"
+    path.write_text("from yade import dembark\n" + textwrap.dedent(body))
+    return path
+
+
+def test_parameters_and_column(yade):
+    (yade.folder / "case.toml").write_text(CASE)
+    path = script(yade, "column", """
+        import json
+        plain = dembark.parameters("case.toml", [])
+        given = dembark.parameters("case.toml", ["static_friction=0.4", "shape=square", "diameter=4e-3", "grain_count=7"])
+        unset = dembark.parameters("case.toml", ["static_friction=-1"])
+        sites = dembark.lattice((4, 3, 2), (0.0069, 0.0069, 0.0069), (0, 0, 0.01), lambda x, y, z: x < 0.024)
+        columns = [dembark.column(sites, 17, 0.005, 0.2, seed, 0.0003) for seed in (1, 1, 2)]
+        json.dump([vars(plain), vars(given), vars(unset), sites, columns], open("column.json", "w"))
+        print("done")
+        """)
+    done = yade(path)
+    assert "done" in done.stdout, done.stderr
+    plain, given, unset, sites, columns = json.loads((yade.folder / "column.json").read_text())
+    assert plain == {"grain_count": 20, "diameter": 0.005, "static_friction": None, "shape": "round"}
+    assert given == {"grain_count": 7, "diameter": 0.004, "static_friction": 0.4, "shape": "square"}
+    assert unset["static_friction"] is None
+    assert len(sites) == 3 * 3 * 2
+    assert sites[0] == pytest.approx([0.00345, 0.00345, 0.01345])
+    assert columns[0] == columns[1] != columns[2]
+    for grains in columns:
+        grains = np.array(grains)
+        assert len(grains) == 17
+        assert np.all(np.abs(grains[:, 3] / 0.0025 - 1.0) <= 0.2)
+        gaps = np.linalg.norm(grains[:, None, :3] - grains[None, :, :3], axis=2) - grains[:, None, 3] - grains[None, :, 3]
+        assert gaps[~np.eye(17, dtype=bool)].min() > 0.0
+
+
+@pytest.mark.parametrize("word, parts", [
+    ("diameter=-1", ("diameter=-1", "> 0 m")), ("diameter=wide", ("diameter=wide", "number (m)")), ("diameter=nan", ("must be a number",)),
+    ("grain_count=2.5", ("integer",)), ("shape=flat", ("round, square",)), ("size=3", ("size is unknown", "diameter")), ("diameter", ("key=value",))])
+def test_wrong_parameter_is_one_line_and_code_2(yade, word, parts):
+    (yade.folder / "case.toml").write_text(CASE)
+    done = yade(script(yade, "wrong", "dembark.parameters('case.toml')\nprint('went on')\n"), word)
+    assert_one_line(done, parts)
+
+
+def assert_one_line(done, parts, code=2):
+    lines = [line for line in done.stderr.splitlines() if line.startswith("dembark: ")]
+    assert len(lines) == 1, done.stderr
+    assert all(part in lines[0] for part in parts), lines[0]
+    assert done.returncode == code
+    assert "Traceback" not in done.stderr and "terminate" not in done.stderr
+    assert "went on" not in done.stdout
+
+
+DROP = """
+def drop(ip2, law={{}}, speed=0.0, friction_of=None, **rest):
+    g = O.materials.append(FrictMat(young=5e6, poisson=0.3, density=2500))
+    O.bodies.append([box((0, 0, -0.01), (1, 1, 0.01), fixed=True), sphere((0, 0, 0.0024), 0.0025)])
+    O.bodies[1].state.vel = (0, 0, -speed)
+    O.engines = [ForceResetter(), InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Box_Aabb()]),
+                 InteractionLoop([Ig2_Box_Sphere_ScGeom()], [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**ip2)],
+                                 [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(**law)]), NewtonIntegrator()]
+    O.dt = 1e-5
+    O.run(3000, True)
+    print('went on')
+
+full = dict(restitution=0.5, staticFriction=0.5, kineticFriction=0.4, criticalSlipDistance=1e-5)
+{call}
+"""
+
+
+def test_wrong_word_of_the_law_is_one_line_without_a_trace(yade):
+    path = script(yade, "word", "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding='bent')\nprint('went on')\n")
+    assert_one_line(yade(path), ("presliding", "'bent'", "linear or exponential"))
+
+
+def test_cylinder_in_a_periodic_cell_is_one_line(yade):
+    """Raised in YADE's own thread."""
+    path = script(yade, "cell", """
+        wall = Body()
+        wall.shape = CylinderWall(radius=0.02)
+        O.bodies.append([wall, sphere((0, 0, 0), 0.001)])
+        O.periodic = True
+        O.engines = [InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_CylinderWall_Aabb()])]
+        O.run(1, True)
+        print("went on")
+        """)
+    assert_one_line(yade(path), ("CylinderWall", "periodic"))
+
+
+def test_parameters_are_found_beside_the_script(yade):
+    (yade.folder / "case.toml").write_text(CASE)
+    done = yade(script(yade, "beside", "print('count', dembark.parameters().grain_count)\n"), "grain_count=3")
+    assert "count 3" in done.stdout, done.stderr
+
+
+@pytest.mark.parametrize("call, parts, code", [
+    ("del full['restitution']; drop(full)", ("restitution is not set",), 2),
+    ("drop(full | dict(staticFriction=MatchMaker(matches=((0, 1, 0.5),))))", ("staticFriction has no value", "materials 0 and 0", "matches"), 2),
+    ("drop(full | dict(kineticFriction=0.6))", ("kinetic friction must not exceed static friction", "materials 0 and 0"), 2),
+    ("drop(full | dict(restitution=1.5))", ("restitution", "1.5", "<= 1"), 2),
+    ("drop(full | dict(bridgeVolume=1e-10))", ("surfaceTension", "N/m"), 2),
+    ("drop(full | dict(bridgeVolume=1e-10, surfaceTension=0.07), dict(capillaryModel='exact'))", ("contactAngle is not set",), 2),
+    ("drop(full | dict(bridgeVolume=1e-10, surfaceTension=0.07, contactAngle=2.0), dict(capillaryModel='exact'))", ("contactAngle", "pi/2"), 2),
+    ("drop(full, dict(normalLaw='hooke'))", ("characteristicVelocity", "m/s"), 2),
+    ("drop(full, speed=300.0)", ("sphere 1 went through wall 0", "time step"), 1)])
+def test_wrong_property_is_one_line_even_from_the_loop(yade, call, parts, code):
+    assert_one_line(yade(script(yade, "property", DROP.format(call=call))), parts, code)
