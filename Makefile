@@ -16,7 +16,7 @@ sources := $(shell find plugins -name '*.hpp' -o -name '*.h' -o -name '*.cpp' -o
 yade_sources := $(shell find plugins/yade -type f -not -path '*/tests/*' -not -name '*.pyc') $(shell find plugins/physics -name '*.hpp')
 python_files := $(shell find plugins/python postproc validation input_decks -type f -not -name '*.pyc' -not -path '*/tests/*')
 
-.PHONY: all help system liggghts yade-engine yade-plugin yade test validate bench doctor install-liggghts clean
+.PHONY: all help system liggghts yade-engine yade-plugin yade test validate bench doctor figures install-liggghts clean
 
 all: $(BUILD)/.python $(BUILD)/.liggghts $(BUILD)/.yade ## set up and build everything
 
@@ -79,6 +79,10 @@ validate: all ## run the cases in both engines and write the report (PROFILE=qui
 
 bench: all ## measure the styles beside the stock ones
 	@$(BIN)/python -m benchmarks.run
+
+figures: $(BUILD)/.python ## draw the figures of the documentation anew
+	@$(BIN)/python docs/capillary_errors.py
+	@$(BIN)/python docs/figures.py
 
 install-liggghts: ## copy the styles into a LIGGGHTS source tree (LIGGGHTS_SRC=.../src)
 	@packaging/install_liggghts.sh "$(LIGGGHTS_SRC)"

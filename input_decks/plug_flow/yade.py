@@ -14,7 +14,8 @@ p = dembark.parameters(Path(sys.argv[0]).resolve().with_name("case.toml"))
 
 # --- derived quantities; liggghts.in has the same formulas -------------------------------------------------------------
 grain_static, wall_static = (p.grain_friction, p.wall_friction) if p.static_friction is None else (p.static_friction,) * 2
-grain_kinetic, wall_kinetic = (mu * p.kinetic_friction_ratio if p.kinetic_friction is None else p.kinetic_friction for mu in (grain_static, wall_static))
+grain_kinetic, wall_kinetic = (
+    mu * p.kinetic_friction_ratio if p.kinetic_friction is None else p.kinetic_friction for mu in (grain_static, wall_static))
 
 r_min = 0.5 * p.grain_diameter * (1 - p.grain_diameter_spread)
 d_max = p.grain_diameter * (1 + p.grain_diameter_spread)
@@ -36,7 +37,8 @@ margin = 0.15 * d_max + (0.6 * p.grain_diameter if rough else 0)
 n_x = math.floor((p.channel_width - 2 * margin) / (1.15 * d_max))
 n_y = math.floor(p.channel_depth / (1.15 * d_max))
 if min(p.channel_width, p.channel_depth) < 4 * p.grain_diameter:
-    dembark.fail(f"channel_width {p.channel_width} m or channel_depth {p.channel_depth} m is too small, plug_flow/yade.py, take at least 4 grain_diameter = {4 * p.grain_diameter} m")
+    dembark.fail(f"channel_width {p.channel_width} m or channel_depth {p.channel_depth} m is too small, plug_flow/yade.py, "
+                 f"take at least {4 * p.grain_diameter} m (4 grain_diameter)")
 cell = ((p.channel_width - 2 * margin) / n_x, p.channel_depth / n_y, 1.15 * d_max)
 layers = math.ceil(1.3 * p.grain_count / (n_x * n_y))
 z_high = layers * cell[2]
@@ -69,7 +71,8 @@ for number, index in enumerate(sites, start=1):
         continue
     diameter = p.grain_diameter * (1 + p.grain_diameter_spread * (2 * shake(number, 1) - 1))
     corner = (margin, 0, 0.15 * d_max)
-    place = [low + (i + 0.5) * width + jitter * (2 * shake(number, use) - 1) for use, (low, i, width) in enumerate(zip(corner, index, cell), start=2)]
+    place = [low + (i + 0.5) * width + jitter * (2 * shake(number, use) - 1)
+             for use, (low, i, width) in enumerate(zip(corner, index, cell), start=2)]
     body = utils.sphere(place, 0.5 * diameter, material=grain, mask=GRAINS)
     # Velocities are half a step behind positions: this is rest at the time zero.
     body.state.vel = (0, 0, 0.5 * p.gravity * O.dt)
@@ -105,7 +108,8 @@ if rough:
                 glued[name].append(O.bodies.append(utils.sphere(place, 0.5 * p.grain_diameter, fixed=True, material=wall, mask=GLUED)))
 
 weight = (0, 0, -p.gravity)
-dump = dembark.DumpWriter(walls=walls, bounds=((-d_max, p.channel_width + d_max), (0, p.channel_depth), (z_low, z_box)), boundary="ff pp ff", gravity=weight)
+box = ((-d_max, p.channel_width + d_max), (0, p.channel_depth), (z_low, z_box))
+dump = dembark.DumpWriter(walls=walls, bounds=box, boundary="ff pp ff", gravity=weight)
 history = dembark.HistoryWriter(walls=walls, glued=glued if rough else {}, gravity=weight, path="time.csv")
 
 
@@ -133,7 +137,8 @@ O.engines = [
             restitution=p.restitution, staticFriction=pairs(grain_static, wall_static), kineticFriction=pairs(grain_kinetic, wall_kinetic),
             criticalSlipDistance=p.critical_slip_distance, interfaceShearStrength=p.interface_shear_strength,
             bridgeVolume=p.bridge_volume, contactAngle=p.contact_angle, surfaceTension=p.surface_tension)],
-        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding=p.presliding, capillaryModel=p.capillary_model if p.bridge_volume > 0 else "none")],
+        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(
+            presliding=p.presliding, capillaryModel=p.capillary_model if p.bridge_volume > 0 else "none")],
     ),
     # Between forces and motion, where positions and forces belong to the same time.
     PyRunner(command="record()", iterPeriod=1),

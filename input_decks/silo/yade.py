@@ -14,7 +14,8 @@ p = dembark.parameters(Path(sys.argv[0]).resolve().with_name("case.toml"))
 
 # --- derived quantities; liggghts.in has the same formulas -------------------------------------------------------------
 grain_static, wall_static = (p.grain_friction, p.wall_friction) if p.static_friction is None else (p.static_friction,) * 2
-grain_kinetic, wall_kinetic = (mu * p.kinetic_friction_ratio if p.kinetic_friction is None else p.kinetic_friction for mu in (grain_static, wall_static))
+grain_kinetic, wall_kinetic = (
+    mu * p.kinetic_friction_ratio if p.kinetic_friction is None else p.kinetic_friction for mu in (grain_static, wall_static))
 
 r_min = 0.5 * p.grain_diameter * (1 - p.grain_diameter_spread)
 d_max = p.grain_diameter * (1 + p.grain_diameter_spread)
@@ -28,7 +29,8 @@ steps = settle_steps + stride * p.frames
 every = max(1, steps // 1000)
 
 if p.cylinder_radius < 3 * p.grain_diameter:
-    dembark.fail(f"cylinder_radius {p.cylinder_radius} m is too small, silo/yade.py, take at least 3 grain_diameter = {3 * p.grain_diameter} m")
+    dembark.fail(f"cylinder_radius {p.cylinder_radius} m is too small, silo/yade.py, "
+                 f"take at least {3 * p.grain_diameter} m (3 grain_diameter)")
 spacing = 1.15 * d_max
 jitter = 0.05 * d_max
 fill_radius = 1.000001 * (p.cylinder_radius - 0.65 * d_max - jitter)
@@ -50,7 +52,8 @@ def shake(site: int, use: int) -> float:
 
 # --- grains: a pseudo-random part of the sites of a cubic lattice, none touching (see liggghts.in) ----------------------------
 reach = math.ceil(p.cylinder_radius / spacing)
-plane = [(i * spacing, j * spacing) for j in range(-reach, reach + 1) for i in range(-reach, reach + 1) if math.hypot(i, j) * spacing <= fill_radius]
+plane = [(i * spacing, j * spacing) for j in range(-reach, reach + 1) for i in range(-reach, reach + 1)
+         if math.hypot(i, j) * spacing <= fill_radius]
 levels = [k * spacing for k in range(math.ceil(z_low / spacing), math.floor(z_high / spacing) + 1)]
 sites = [(x, y, z) for z in levels for x, y in plane]
 
@@ -78,7 +81,8 @@ base = O.bodies.append(utils.wall((0, 0, 0), axis=2, sense=1, material=wall))
 
 weight = (0, 0, -p.gravity)
 walls = {"side": side, "base": base}
-dump = dembark.DumpWriter(walls=walls, bounds=((-half, half), (-half, half), (-d_max, z_high + 4 * d_max)), boundary="ff ff ff", gravity=weight)
+box = ((-half, half), (-half, half), (-d_max, z_high + 4 * d_max))
+dump = dembark.DumpWriter(walls=walls, bounds=box, boundary="ff ff ff", gravity=weight)
 history = dembark.HistoryWriter(walls=walls, gravity=weight, path="time.csv")
 
 
@@ -104,7 +108,8 @@ O.engines = [
             restitution=p.restitution, staticFriction=pairs(grain_static, wall_static), kineticFriction=pairs(grain_kinetic, wall_kinetic),
             criticalSlipDistance=p.critical_slip_distance, interfaceShearStrength=p.interface_shear_strength,
             bridgeVolume=p.bridge_volume, contactAngle=p.contact_angle, surfaceTension=p.surface_tension)],
-        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding=p.presliding, capillaryModel=p.capillary_model if p.bridge_volume > 0 else "none")],
+        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(
+            presliding=p.presliding, capillaryModel=p.capillary_model if p.bridge_volume > 0 else "none")],
     ),
     # Between forces and motion, where positions and forces belong to the same time.
     PyRunner(command="record()", iterPeriod=1),

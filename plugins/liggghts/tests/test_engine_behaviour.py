@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rig import liggghts_driver
+from rig import liggghts_driver, python_driver
 from rig.liggghts_driver import deck, motion, read_dump, run, run_deck
 from rig.motion import deviation
-from rig.scenarios import ALL_OF_IT, SCENARIOS, STILL, Grain, Material, Path, Scenario, pressed
+from rig.scenarios import SCENARIOS, STILL, Grain, Material, Path, Scenario
 
 DRY = Material(static_friction=0.5, kinetic_friction=0.4)
 WET = replace(DRY, bridge_volume=2e-10)
@@ -29,25 +29,34 @@ def test_a_contact_that_ends_forgets(tmp_path):
         assert len(begin) == 1  # it begins in touch
         return np.linalg.norm(found.tangential_force[begin[0]]) / found.normal_force[begin[0]]
 
-    assert load_at_second_touch(run(case, tmp_path / "ours")) < 0.01  # of this step, the normal is not quite z
+    # What there is comes from the step itself: the normal is not quite z.
+    assert load_at_second_touch(run(case, tmp_path / "ours")) < 0.01
     assert load_at_second_touch(run(case, tmp_path / "stock", tangential="history")) > 0.1
 
 
-def test_contact_on_a_mesh_is_that_on_a_plane(tmp_path):
+# Down, along the floor in touch, up again with a bridge, and on over the floor with a gap.
+CARRIED = Scenario(
+    name="carried", material=WET, wall=True, time_step=1e-5, steps=3900,
+    grains=(Grain(position=(-2e-3, 0.0, 5.1003e-3), path=Path(
+        displacement=("0.1*t", "0", "-0.0001*(1-cos(2*PI*25*t))"), velocity=("0.1", "0", "-0.0001*2*PI*25*sin(2*PI*25*t)"))),))
+ON_MESH = [(SCENARIOS[name], edge) for name in ("drop, wet", "approach, bridge, wall", "cycles, exponential, wall") for edge in (1e-5, 2e-2)]
+
+
+@pytest.mark.parametrize(("case", "edge"), [*ON_MESH, (CARRIED, 0.0), (CARRIED, 1.4e-3)])
+def test_contact_on_a_mesh_is_that_on_a_plane(tmp_path, case, edge):
+    """A floor of two triangles; their common edge lies at x = `edge`, under the contact, under the path, or away from both."""
     folder = tmp_path / "mesh"
     folder.mkdir()
-    corners = [(-0.04, -0.04, 0.0), (0.05, -0.03, 0.0), (-0.01, 0.045, 0.0)]
-    vertices = "\n".join(f"   vertex {x:.17g} {y:.17g} {z:.17g}" for x, y, z in corners)
-    (folder / "floor.stl").write_text(f"solid floor\n facet normal 0 0 1\n  outer loop\n{vertices}\n  endloop\n endfacet\nendsolid floor\n")
-    for name in ("drop, wet", "drop, dry", "approach, bridge, wall", "cycles, exponential, wall"):
-        case = SCENARIOS[name]
-        plane = deck(case)
-        words = next(line for line in plane.splitlines() if line.startswith("fix floor"))
-        mesh = "fix stl all mesh/surface file floor.stl type 2\n" + words.replace("primitive type 2 zplane 0", "mesh n_meshes 1 meshes stl")
-        done = run_deck(folder, plane.replace(words, mesh))
-        assert done.code == 0, done.error
-        found = motion(case, folder)
-        assert max(deviation(run(case, tmp_path / "plane"), found).values()) < 1e-9, name
+    triangles = [[(edge, -0.04), (edge, 0.04), (-0.04, 0.0)], [(edge, -0.04), (0.045, 0.0), (edge, 0.04)]]
+    corners = ["\n".join(f"   vertex {x:.17g} {y:.17g} 0" for x, y in triangle) for triangle in triangles]
+    facets = "\n".join(f" facet normal 0 0 1\n  outer loop\n{three}\n  endloop\n endfacet" for three in corners)
+    (folder / "floor.stl").write_text(f"solid floor\n{facets}\nendsolid floor\n")
+    plane = deck(case)
+    words = next(line for line in plane.splitlines() if line.startswith("fix floor"))
+    mesh = "fix stl all mesh/surface file floor.stl type 2\n" + words.replace("primitive type 2 zplane 0", "mesh n_meshes 1 meshes stl")
+    done = run_deck(folder, plane.replace(words, mesh))
+    assert done.code == 0, done.error
+    assert max(deviation(python_driver.run(case), motion(case, folder)).values()) < 1e-9
 
 
 SETUP = """\
@@ -142,17 +151,17 @@ def held_by_bridges(frame):
 def test_restart_keeps_displacements_and_bridges(tmp_path, ranks):
     """The first forces after a restart are those of the run that wrote it, and so is what follows."""
     edit = (lambda text: text) if ranks == 2 else (lambda text: text.replace("processors 2 1 1\n", ""))
-    first = packing(BED, "run 4500\nwrite_restart bed.restart\nrun 0\nundump grains\n"
+    first = packing(BED, "run 2000\nwrite_restart bed.restart\nrun 0\nundump grains\n"
                     'dump again all custom 1 again.dump id x y z vx vy vz omegax omegay omegaz fx fy fz tqx tqy tqz\n'
-                    f'dump_modify again sort id format "%d{" %.17g" * 15}"\nrun 300')
+                    f'dump_modify again sort id format "%d{" %.17g" * 15}"\nrun 100')
     done = run_deck(tmp_path, edit(first), ranks=ranks)
     assert done.code == 0, done.error
-    second = packing(BED, "run 300", create="read_restart bed.restart", state="", dump="resumed.dump", every=1)
+    second = packing(BED, "run 100", create="read_restart bed.restart", state="", dump="resumed.dump", every=1)
     done = run_deck(tmp_path, edit(second), ranks=ranks, name="resume.in")
     assert done.code == 0, done.error
     steps, here = read_dump(tmp_path / "again.dump")
     again, there = read_dump(tmp_path / "resumed.dump")
-    assert steps[0] == again[0] == 4500
+    assert steps[0] == again[0] == 2000
     assert held_by_bridges(here[0]) > 0
     assert_same(here[0], there[0], 1e-12)
     assert_same(here[-1], there[-1], 1e-8)

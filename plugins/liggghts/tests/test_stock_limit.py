@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rig import liggghts_driver
 from rig.motion import deviation
-from rig.scenarios import Material, loaded, pressed, rotation_matrix
+from rig.scenarios import Material, Path, loaded, pressed, rotation_matrix
 
 COULOMB = Material(static_friction=0.4, kinetic_friction=0.4)
 
@@ -46,9 +46,9 @@ def test_turning_normal(tmp_path):
         time_step = 4e-5 / halving
         case = loaded(COULOMB, time_step)
         # Along x only: the load lies across the axis y.
-        upper = replace(case.grains[0], path=replace(case.grains[0].path, displacement=(case.grains[0].path.displacement[0], "0", case.grains[0].path.displacement[2]),
-                                                     velocity=(case.grains[0].path.velocity[0], "0", case.grains[0].path.velocity[2])))
-        case = replace(case, grains=(upper, case.grains[1])).spinning((0.0, 1.0, 0.0), rate, "turning")
+        path = case.grains[0].path
+        path = Path(displacement=(path.displacement[0], "0", path.displacement[2]), velocity=(path.velocity[0], "0", path.velocity[2]))
+        case = replace(case, grains=(replace(case.grains[0], path=path), case.grains[1])).spinning((0.0, 1.0, 0.0), rate, "turning")
         ours, stock = both(case, tmp_path / str(halving))
         late = ours.time > 0.01
         size, stock_size = (np.linalg.norm(m.tangential_force, axis=1)[late] for m in (ours, stock))

@@ -85,7 +85,8 @@ def properties(m: Material, **overrides: str) -> str:
 def models(m: Material, tangential: str = "finnie_rabinowicz", wall: str = "") -> str:
     """The words of `pair_style gran` or `fix wall/gran` that choose the models; `wall` stands between models and settings."""
     wet = m.bridge_volume > 0.0
-    settings = (f" presliding {m.presliding}" if tangential == "finnie_rabinowicz" else "") + (f" capillary_model {m.capillary_model}" if wet else "")
+    settings = f" presliding {m.presliding}" if tangential == "finnie_rabinowicz" else ""
+    settings += f" capillary_model {m.capillary_model}" if wet else ""
     return f"model {m.normal_law} tangential {tangential}{' cohesion capillary' if wet else ''} {wall}{settings}"
 
 
@@ -114,8 +115,9 @@ pair_coeff * *
         x, y, z = g.position
         lines.append(f"create_atoms 1 single {x!r} {y!r} {z!r} units box")
         lines.append(f"group g{i} id {i}")
-        lines.append(f"set atom {i} diameter {2.0 * g.radius!r} density {g.density!r} vx {g.velocity[0]!r} vy {g.velocity[1]!r} vz {g.velocity[2]!r} "
-                     f"omegax {g.angular_velocity[0]!r} omegay {g.angular_velocity[1]!r} omegaz {g.angular_velocity[2]!r}")
+        motion_words = [f"{key}{axis} {value!r}" for key, three in (("v", g.velocity), ("omega", g.angular_velocity))
+                        for axis, value in zip("xyz", three, strict=True)]
+        lines.append(f"set atom {i} diameter {2.0 * g.radius!r} density {g.density!r} {' '.join(motion_words)}")
         if g.path:
             for kind, parts in (("d", g.path.displacement), ("v", g.path.velocity)):
                 lines += [f'variable {kind}{axis}{i} equal "{in_liggghts(part)}"' for axis, part in zip("xyz", parts, strict=True)]

@@ -157,7 +157,8 @@ def _approach(name: str, material: Material, radius: float = 5e-3, wall: bool = 
     """Gap from 0.9 mm to an overlap of 0.1 mm and back, twice: the bridge forms, holds, breaks, and again."""
     path = Path(displacement=("0", "0", "-0.0005*(1-cos(2*PI*100*t))"), velocity=("0", "0", "-0.0005*2*PI*100*sin(2*PI*100*t)"))
     upper = Grain(position=(0.0, 0.0, 5.9e-3), path=path)
-    return Scenario(name=name, material=material, grains=(upper,) if wall else (upper, _lower(radius)), wall=wall, time_step=1e-5, steps=2000)
+    grains = (upper,) if wall else (upper, _lower(radius))
+    return Scenario(name=name, material=material, grains=grains, wall=wall, time_step=1e-5, steps=2000)
 
 
 def _cycles(name: str, material: Material, wall: bool = False) -> Scenario:
@@ -184,10 +185,12 @@ def pressed(material: Material, wall: bool = False) -> Scenario:
         velocity=("0.00003*2*PI*400*cos(2*PI*400*t)", "0.00002*2*PI*700*sin(2*PI*700*t)", "-0.000005*2*PI*300*sin(2*PI*300*t)"))
     start = (0.0, 0.0, 4.98e-3)
     if wall:
-        return Scenario(name="pressed on the wall", material=material, wall=True, time_step=5e-6, grains=(Grain(position=start, path=path),))
+        grains = (Grain(position=start, path=path),)
+        return Scenario(name="pressed on the wall", material=material, wall=True, time_step=5e-6, grains=grains)
     path = Path(displacement=("0", "0", path.displacement[2]), velocity=("0", "0", path.velocity[2]))
+    upper = Grain(position=start, angular_velocity=(1.0, 2.0, 0.0), path=path)
     return Scenario(name="pressed, spinning", material=material, time_step=5e-6,
-                    grains=(Grain(position=start, angular_velocity=(1.0, 2.0, 0.0), path=path), replace(_lower(), angular_velocity=(0.5, -0.7, 0.0))))
+                    grains=(upper, replace(_lower(), angular_velocity=(0.5, -0.7, 0.0))))
 
 
 def _sliding(name: str, material: Material) -> Scenario:

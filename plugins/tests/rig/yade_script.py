@@ -63,7 +63,7 @@ def run(case, arrays):
     gravity = Vector3(*case["gravity"])
     ids = []
     for g in case["grains"]:
-        material = O.materials.append(FrictMat(young=m["youngs_modulus"], poisson=m["poisson_ratio"], density=g["density"], frictionAngle=0))
+        material = O.materials.append(FrictMat(young=m["youngs_modulus"], poisson=m["poisson_ratio"], density=g["density"]))
         body = utils.sphere(Vector3(*g["position"]), g["radius"], material=material)
         body.state.vel = Vector3(*g["velocity"]) - 0.5 * case["time_step"] * gravity
         body.state.angVel = Vector3(*g["angular_velocity"])

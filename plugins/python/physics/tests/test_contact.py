@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dembark.physics import Body, Contact, FinnieRabinowicz, collide, drop, effective_shear_modulus, effective_youngs_modulus, rupture_distance
+from dembark.physics import (
+    Body, Contact, FinnieRabinowicz, collide, drop, effective_shear_modulus, effective_youngs_modulus, rupture_distance,
+)
 
 ELASTIC = (1e7, 0.3, 1e7, 0.3)
 ROUGH = FinnieRabinowicz(static_friction=0.5, kinetic_friction=0.5, critical_slip_distance=1e-5)
@@ -83,7 +85,8 @@ def test_sliding_grain_ends_up_rolling():
 
 def test_spin_about_the_normal_goes_on():
     """A contact in a point holds no torsion."""
-    motion = drop(CONTACT, Body(radius=RADIUS, mass=MASS, position=(0.0, 0.0, RADIUS + 1e-9), angular_velocity=(0.0, 0.0, 50.0)), time_step=1e-5, steps=2000)
+    top = Body(radius=RADIUS, mass=MASS, position=(0.0, 0.0, RADIUS + 1e-9), angular_velocity=(0.0, 0.0, 50.0))
+    motion = drop(CONTACT, top, time_step=1e-5, steps=2000)
     assert motion.angular_velocity[-1, 0].tolist() == [0.0, 0.0, 50.0]
 
 
@@ -109,7 +112,8 @@ def test_bridge_holds_a_grain_and_needs_energy_to_part():
 
 
 @pytest.mark.parametrize(("change", "words"), [
-    ({"restitution": 0.0}, "restitution must be > 0 and <= 1"), ({"restitution": 1.1}, "restitution"), ({"restitution": np.nan}, "restitution"),
+    ({"restitution": 0.0}, "restitution must be > 0 and <= 1"), ({"restitution": 1.1}, "restitution"),
+    ({"restitution": np.nan}, "restitution"),
     ({"effective_youngs_modulus": 0.0}, "moduli must be > 0 Pa"), ({"normal_law": "stiff"}, "'hertz' or 'hooke'"),
     ({"bridge_volume": -1e-12}, "bridge_volume"), ({"bridge_volume": 1e-12, "surface_tension": -1.0}, "surface_tension"),
     ({"bridge_volume": 1e-12, "contact_angle": 2.0}, "contact.angle"), ({"bridge_volume": 1e-12, "capillary_model": "magic"}, "magic"),
@@ -121,8 +125,8 @@ def test_bad_contacts(change, words):
 
 
 @pytest.mark.parametrize(("change", "words"), [
-    ({"radius": 0.0}, "radius"), ({"radius": np.nan}, "radius"), ({"mass": -1.0}, "mass"), ({"mass": np.inf}, "mass"), ({"position": (0.0, 1.0)}, "position"),
-    ({"velocity": (0.0, np.nan, 1.0)}, "velocity"), ({"angular_velocity": 3.0}, "angular_velocity"),
+    ({"radius": 0.0}, "radius"), ({"radius": np.nan}, "radius"), ({"mass": -1.0}, "mass"), ({"mass": np.inf}, "mass"),
+    ({"position": (0.0, 1.0)}, "position"), ({"velocity": (0.0, np.nan, 1.0)}, "velocity"), ({"angular_velocity": 3.0}, "angular_velocity"),
 ])
 def test_bad_bodies(change, words):
     with pytest.raises(ValueError, match=words):

@@ -14,7 +14,8 @@ N, K, AREA = 2.0, 1e5, 1e-6
 RAMP = np.linspace(0.0, 2e-4, 4001)[1:]
 COULOMB = FinnieRabinowicz(static_friction=0.4, kinetic_friction=0.4, critical_slip_distance=1e-5)
 WEAK = replace(COULOMB, static_friction=0.5, kinetic_friction=0.3)
-EVERY = [COULOMB, WEAK, replace(WEAK, critical_slip_distance=0.0), replace(WEAK, interface_shear_strength=1e6), replace(WEAK, healing_time=5.0)]
+EVERY = [COULOMB, WEAK, replace(WEAK, critical_slip_distance=0.0), replace(WEAK, interface_shear_strength=1e6)]
+EVERY += [replace(WEAK, healing_time=5.0)]
 EVERY += [replace(law, presliding="exponential") for law in EVERY]
 
 
@@ -129,7 +130,8 @@ LAWS = st.sampled_from(EVERY)
 def fine(corners):
     """Straight lines between the corners in steps of at most 2 % of the limit's displacement, back to the start."""
     corners = np.vstack([np.zeros(2), corners, np.zeros(2)])
-    pieces = [a + (b - a) * np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(b - a) / 1.2e-7))[1:, None] for a, b in zip(corners, corners[1:], strict=False)]
+    pieces = [a + (b - a) * np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(b - a) / 1.2e-7))[1:, None]
+              for a, b in zip(corners, corners[1:], strict=False)]
     return np.vstack(pieces)
 
 
