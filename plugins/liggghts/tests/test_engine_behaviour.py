@@ -29,7 +29,7 @@ def test_a_contact_that_ends_forgets(tmp_path):
         assert len(begin) == 1  # it begins in touch
         return np.linalg.norm(found.tangential_force[begin[0]]) / found.normal_force[begin[0]]
 
-    # What there is comes from the step itself: the normal is not quite z.
+    # What there is comes from this step: the normal is not quite z.
     assert load_at_second_touch(run(case, tmp_path / "ours")) < 0.01
     assert load_at_second_touch(run(case, tmp_path / "stock", tangential="history")) > 0.1
 
@@ -39,7 +39,8 @@ CARRIED = Scenario(
     name="carried", material=WET, wall=True, time_step=1e-5, steps=3900,
     grains=(Grain(position=(-2e-3, 0.0, 5.1003e-3), path=Path(
         displacement=("0.1*t", "0", "-0.0001*(1-cos(2*PI*25*t))"), velocity=("0.1", "0", "-0.0001*2*PI*25*sin(2*PI*25*t)"))),))
-ON_MESH = [(SCENARIOS[name], edge) for name in ("drop, wet", "approach, bridge, wall", "cycles, exponential, wall") for edge in (1e-5, 2e-2)]
+ON_MESH = [(SCENARIOS[name], edge) for edge in (1e-5, 2e-2)
+           for name in ("drop, wet", "approach, bridge, wall", "cycles, exponential, wall")]
 
 
 @pytest.mark.parametrize(("case", "edge"), [*ON_MESH, (CARRIED, 0.0), (CARRIED, 1.4e-3)])

@@ -39,8 +39,10 @@ class Run:
 def run_deck(folder: Path, deck: str, *, ranks: int = 1, name: str = "case.in") -> Run:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / name).write_text(deck)
-    done = subprocess.run(engine().command(folder / name, {}, ranks), cwd=folder, env=engine().environment(), capture_output=True,
-                          text=True, errors="replace", stdin=subprocess.DEVNULL, timeout=60, check=False)
+    # Ranks that wait must not keep the others from the processors of a machine that is busy.
+    environment = engine().environment() | {"OMPI_MCA_mpi_yield_when_idle": "1"}
+    done = subprocess.run(engine().command(folder / name, {}, ranks), cwd=folder, env=environment, capture_output=True, text=True,
+                          errors="replace", stdin=subprocess.DEVNULL, timeout=60, check=False)
     return Run(done.returncode, done.stdout + done.stderr, folder)
 
 

@@ -1,0 +1,164 @@
+"""Timed runs of the engines on the settled bed, one after the other in turn, and the statistics of their ratios."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import statistics
+import subprocess
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from dembark.validation.engines import Engine
+from dembark.validation.errors import DembarkError, RunError
+
+HERE = Path(__file__).parent
+DIAMETER = 0.005
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Seconds of one timed run: all of it, and the part in the pair forces (LIGGGHTS) or the interaction loop (YADE)."""
+
+    loop: float
+    pair: float
+
+
+@dataclass
+class Subject:
+    """One combination of models and how to take a sample of it; the first of a comparison is the reference."""
+
+    name: str
+    take: Callable[[], Sample]
+    samples: list[Sample] = field(default_factory=list)
+
+
+@dataclass
+class Comparison:
+    """Subjects that are sampled in turn, A B C A B C ...; `goal` is the largest ratio of pair times asked of the subject so named."""
+
+    title: str
+    subjects: list[Subject]
+    steps: int
+    goals: dict[str, float] = field(default_factory=dict)
+
+    def run(self, rounds: int, say: Callable[[str], None]) -> None:
+        for turn in range(rounds):
+            # Every second round runs backwards, so that a machine that slows down steadily favours nobody.
+            for subject in self.subjects if turn % 2 == 0 else reversed(self.subjects):
+                say(f"{self.title}: round {turn + 1} of {rounds}, {subject.name}")
+                subject.samples.append(subject.take())
+
+    def rows(self) -> list[dict[str, object]]:
+        """One entry a subject: times, and ratios to the reference's sample of the same round."""
+        reference = self.subjects[0].samples
+        result = []
+        for subject in self.subjects:
+            row: dict[str, object] = {"comparison": self.title, "subject": subject.name, "steps": self.steps}
+            for part in ("pair", "loop"):
+                times = [getattr(sample, part) for sample in subject.samples]
+                row[part] = spread(times)
+                row[f"{part}_ratio"] = spread([a / getattr(b, part) for a, b in zip(times, reference, strict=True)])
+            goal = self.goals.get(subject.name)
+            row["goal"] = goal
+            row["met"] = None if goal is None else row["pair_ratio"]["median"] <= goal
+            result.append(row)
+        return result
+
+
+def spread(values: Sequence[float]) -> dict[str, float]:
+    """Median, least and greatest of `values`, and how many they are."""
+    return {"median": statistics.median(values), "min": min(values), "max": max(values), "count": len(values)}
+
+
+def read_log(text: str) -> Sample:
+    """The last run in a LIGGGHTS log; RunError when there is none."""
+    loops = re.findall(r"^Loop time of (\S+) on ", text, re.M)
+    pairs = re.findall(r"^Pair  time \(%\) = (\S+) ", text, re.M)
+    if not loops or len(loops) != len(pairs):
+        errors = re.findall(r"^ERROR.*$", text, re.M)
+        raise RunError("LIGGGHTS did not finish a timed run", errors[-1] if errors else "its log holds no timings")
+    return Sample(float(loops[-1]), float(pairs[-1]))
+
+
+def stock_liggghts() -> Path:
+    found = os.environ.get("STOCK_LIGGGHTS") or shutil.which("liggghts")
+    if not found:
+        raise DembarkError("stock liggghts not found", "on PATH", "install Debian's package liggghts or set STOCK_LIGGGHTS")
+    return Path(found)
+
+
+def clock_library(cache: Path) -> Path:
+    """The shared object that makes MPI's timer a processor-time clock, compiled once."""
+    library, source = cache / "cpu_clock.so", HERE / "cpu_clock.c"
+    if not library.exists() or library.stat().st_mtime < source.stat().st_mtime:
+        subprocess.run(["cc", "-O2", "-shared", "-fPIC", str(source), "-o", str(library)], check=True)
+    return library
+
+
+def _call(words: Sequence[str], folder: Path, environment: dict[str, str]) -> subprocess.CompletedProcess[str]:
+    # On one core: the other one is for whatever else the machine does.
+    pinned = ["taskset", "--cpu-list", str(max(os.sched_getaffinity(0)))] if shutil.which("taskset") else []
+    return subprocess.run([*pinned, *words], cwd=folder, env=environment, capture_output=True, text=True, errors="replace",
+                          stdin=subprocess.DEVNULL, check=False)
+
+
+def liggghts_sample(program: Path, bed: Path, variables: dict[str, object], environment: dict[str, str]) -> Sample:
+    """Run replay.in with `variables` under `program` in a scratch folder."""
+    given = [word for key, value in {"bed": bed, **variables}.items() for word in ("-var", key, str(value))]
+    with tempfile.TemporaryDirectory(prefix="dembark-bench-") as name:
+        folder = Path(name)
+        done = _call([str(program), "-in", str(HERE / "replay.in"), "-log", "log", *given], folder, environment)
+        log = folder / "log"
+        text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else done.stdout + done.stderr
+        if done.returncode:
+            text = re.sub(r"^Loop time.*$", "", text, flags=re.M)
+        return read_log(text)
+
+
+def yade_sample(engine: Engine, bed: Path, law: str, relax: int, steps: int) -> Sample:
+    """One timed run of yade_bed.py with contact law `law` (`stock` or `dembark`)."""
+    words = [str(engine.executable), "-j1", "-n", "-x", str(HERE / "yade_bed.py")]
+    with tempfile.TemporaryDirectory(prefix="dembark-bench-") as name:
+        done = _call([*words, f"bed={bed}", f"law={law}", f"relax={relax}", f"steps={steps}", "samples=1"], Path(name), engine.environment())
+    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
+    if done.returncode or not lines:
+        last = (done.stderr or done.stdout).strip().splitlines()[-1:] or ["it says nothing"]
+        raise RunError(f"YADE ended with exit code {done.returncode} in the benchmark of law {law}", last[0])
+    found = json.loads(lines[-1])
+    if not found["contacts"]:
+        raise RunError(f"the bed in YADE has no contacts under law {law}", "the grains have left it")
+    return Sample(found["loop"], found["pair"])
+
+
+def settled_bed(cache: Path, count: int, say: Callable[[str], None]) -> Path:
+    """Data file of `count` settled spheres, made by stock LIGGGHTS once and kept in `cache`."""
+    deck = HERE / "settle.in"
+    key = hashlib.sha256(deck.read_bytes() + str(count).encode()).hexdigest()[:12]
+    target = cache / f"bed-{key}.data"
+    if target.exists():
+        return target
+    say(f"settling {count} spheres with stock LIGGGHTS, once (2-3 minutes)")
+    with tempfile.TemporaryDirectory(prefix="dembark-bench-") as name:
+        folder = Path(name)
+        words = [str(stock_liggghts()), "-in", str(deck), "-log", "log", "-var", "count", str(count)]
+        _call(words, folder, dict(os.environ))
+        dump = folder / "bed.dump"
+        if not dump.exists():
+            raise RunError("stock LIGGGHTS did not settle the bed", "see benchmarks/settle.in")
+        rows = dump.read_text(encoding="utf-8").splitlines()[9:]
+    if len(rows) != count:
+        raise RunError(f"only {len(rows)} of {count} spheres are in the settled bed")
+    lines = ["settled bed", "", f"{count} atoms", "1 atom types", "", "0 0.1 xlo xhi", "0 0.1 ylo yhi", "-0.005 0.5 zlo zhi", "", "Atoms", ""]
+    for row in rows:
+        number, *place = row.split()
+        lines.append(f"{number} 1 {DIAMETER} 2500 {' '.join(place)}")
+    part = target.with_suffix(".part")
+    part.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    part.replace(target)
+    return target

@@ -1,0 +1,141 @@
+"""Measure dembark's styles beside the stock ones: `python -m benchmarks.run` (what `make bench` calls)."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.measure import (
+    HERE, Comparison, Subject, clock_library, liggghts_sample, settled_bed, stock_liggghts, yade_sample,
+)
+from dembark.validation.engines import find
+from dembark.validation.errors import DembarkError
+from dembark.validation.files import write_json
+from dembark.validation.provenance import collect
+
+ROOT = HERE.parent
+
+
+def say(line: str) -> None:
+    print(f"dembark: {line}", file=sys.stderr, flush=True)
+
+
+def liggghts_comparisons(bed: Path, cache: Path, wall_clock: bool, relax: int, steps: int) -> list[Comparison]:
+    """Friction law and capillary law beside the stock ones."""
+    ours, stock = find("liggghts"), stock_liggghts()
+    environment = ours.environment()
+    if not wall_clock:
+        environment["LD_PRELOAD"] = str(clock_library(cache))
+
+    def subject(name: str, program: Path, tangential: str, cohesion: str = "") -> Subject:
+        variables: dict[str, object] = {"tangential": tangential, "relax": relax, "steps": steps}
+        if cohesion:
+            variables |= {"wet": 1, "cohesion": cohesion}
+        return Subject(name, lambda: liggghts_sample(program, bed, variables, environment))
+
+    law = ours.executable
+    return [
+        Comparison("LIGGGHTS, dry", [
+            subject("history (stock)", stock, "history"),
+            subject("finnie_rabinowicz", law, "finnie_rabinowicz"),
+        ], steps, {"finnie_rabinowicz": 1.05}),
+        Comparison("LIGGGHTS, wet", [
+            subject("history + washino (stock)", stock, "history", "washino/capillary/viscous"),
+            subject("history + capillary exact", law, "history", "capillary"),
+            subject("history + capillary willett", law, "history", "capillary capillary_model willett"),
+            subject("finnie_rabinowicz + capillary exact", law, "finnie_rabinowicz", "capillary"),
+        ], steps, {"history + capillary exact": 1.0, "history + capillary willett": 1.0}),
+    ]
+
+
+def yade_comparison(bed: Path, relax: int, steps: int) -> Comparison:
+    """The law beside YADE's own Mindlin law, one thread."""
+    engine = find("yade")
+    return Comparison("YADE, dry", [
+        Subject("Law2_ScGeom_MindlinPhys_Mindlin (stock)", lambda: yade_sample(engine, bed, "stock", relax, steps)),
+        Subject("Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz", lambda: yade_sample(engine, bed, "dembark", relax, steps)),
+    ], steps, {"Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz": 1.1})
+
+
+def texts(row: dict) -> list[str]:
+    """Cells of a row as a reader wants them."""
+    def times(part: str) -> str:
+        return f"{row[part]['median']:.3f} ({row[part]['min']:.3f}-{row[part]['max']:.3f})"
+
+    goal = "" if row["goal"] is None else f"<= {row['goal']:.2f} {'met' if row['met'] else 'MISSED'}"
+    return [row["comparison"], row["subject"], times("pair"), times("pair_ratio"), times("loop"), times("loop_ratio"), goal]
+
+
+HEADS = ["comparison", "models", "pair time / s", "pair ratio", "loop time / s", "loop ratio", "goal (pair)"]
+
+
+def markdown(rows: list[dict], facts: dict) -> str:
+    table = ["| " + " | ".join(HEADS) + " |", "|" + " --- |" * len(HEADS)]
+    table += ["| " + " | ".join(texts(row)) + " |" for row in rows]
+    return "\n".join([
+        "# Cost of dembark's styles beside the stock ones", "",
+        f"{facts['grains']} settled spheres of {facts['diameter']} m; {facts['clock']}; median (least-greatest) of {facts['rounds']} rounds in turn; "
+        "ratios to the reference of the same round.", "", *table, "",
+        f"{facts['date']}, {facts['cpu']}, {facts['cores']} cores, load {facts['load']:.1f} before and {facts['load_after']:.1f} after, "
+        f"commit {facts['commit'] or 'none'}{' with changes' if facts['dirty'] else ''}, " +
+        ", ".join(f"{name} {version}" for name, version in facts["versions"].items() if version) + ".", "",
+    ])
+
+
+def parsed(words: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.run", description=__doc__)
+    parser.add_argument("--rounds", type=int, default=5, help="samples of each combination (default %(default)s)")
+    parser.add_argument("--count", type=int, default=20000, help="spheres in the bed (default %(default)s)")
+    parser.add_argument("--steps", type=int, default=400, help="steps of a timed run of LIGGGHTS; a quarter of it in YADE (default %(default)s)")
+    parser.add_argument("--relax", type=int, default=1000, help="steps before it, in which histories build up (default %(default)s)")
+    parser.add_argument("--only", choices=["dry", "wet", "yade"], action="append", help="leave the other comparisons out")
+    parser.add_argument("--wall-clock", action="store_true", help="LIGGGHTS's timers as they are; default: processor time")
+    parser.add_argument("--out", type=Path, default=ROOT / "results/bench", help="folder of bench.json and bench.md")
+    given = parser.parse_args(words)
+    if min(given.rounds, given.count, given.steps, given.relax) < 1:
+        raise DembarkError("--rounds, --count, --steps and --relax", "", "give whole numbers from 1 on")
+    return given
+
+
+def main(words: list[str] | None = None) -> int:
+    """Run, print and write the table; the exit code is 1 when a run failed, 2 when something is missing."""
+    try:
+        given = parsed(words)
+        cache = ROOT / "build/bench"
+        cache.mkdir(parents=True, exist_ok=True)
+        wanted = given.only or ["dry", "wet", "yade"]
+        facts = {**collect(find("liggghts")), "date": datetime.now(UTC).isoformat(timespec="seconds"), "load": os.getloadavg()[0],
+                 "grains": given.count, "diameter": 0.005, "rounds": given.rounds, "relax": given.relax,
+                 "clock": "elapsed time" if given.wall_clock else "processor time"}
+        bed = settled_bed(cache, given.count, say)
+        dry, wet = liggghts_comparisons(bed, cache, given.wall_clock, given.relax, given.steps)
+        comparisons = [each for each, name in ((dry, "dry"), (wet, "wet")) if name in wanted]
+        if "yade" in wanted:
+            comparisons.append(yade_comparison(bed, max(1, given.relax // 5), max(1, given.steps // 4)))
+            facts["versions"] = {**facts["versions"], "yade": find("yade").version}
+        for comparison in comparisons:
+            comparison.run(given.rounds, say)
+        rows = [row for comparison in comparisons for row in comparison.rows()]
+        facts["load_after"] = os.getloadavg()[0]
+        given.out.mkdir(parents=True, exist_ok=True)
+        write_json(given.out / "bench.json", {"rows": rows, "provenance": facts})
+        (given.out / "bench.md").write_text(markdown(rows, facts), encoding="utf-8")
+    except DembarkError as error:
+        say(str(error))
+        return error.exit_code
+    table = Table(*HEADS, title="median (least-greatest)")
+    for row in rows:
+        table.add_row(*texts(row))
+    Console().print(table)
+    say(f"wrote {given.out / 'bench.md'} and bench.json")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

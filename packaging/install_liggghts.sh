@@ -1,0 +1,74 @@
+#!/usr/bin/env bash
+# Copy dembark's styles into a LIGGGHTS source tree, for groups that build their own engine.
+#
+#   packaging/install_liggghts.sh .../LIGGGHTS-PUBLIC/src
+#
+# The style headers go into src/ as they are, the headers of the laws into src/dembark/, and the combinations of contact models into
+# style_contact_model_user.whitelist, from which LIGGGHTS's own `make` generates its optimised pair loops. A second run changes
+# only what differs, so that nothing is compiled again without need.
+set -euo pipefail
+here=$(cd "$(dirname "$0")/.." && pwd)
+
+die() { printf 'dembark: %s\n' "$*" >&2; exit 2; }
+
+src=${1:-}
+[ -n "$src" ] || die "no LIGGGHTS source folder given; use make install-liggghts LIGGGHTS_SRC=.../src"
+[ -d "$src" ] || die "LIGGGHTS source folder $src does not exist; give the folder src of LIGGGHTS-PUBLIC 3.8.0"
+for file in pair_gran_base.h tangential_model_history.h Make.sh; do
+  [ -e "$src/$file" ] || die "$src is no LIGGGHTS source folder (it has no $file); give the folder src of LIGGGHTS-PUBLIC 3.8.0"
+done
+version=$(cat "$src/version_liggghts.txt" 2>/dev/null || true)
+[ "$version" = 3.8.0 ] || die "$src is LIGGGHTS ${version:-of an unknown version}; the styles are made for LIGGGHTS-PUBLIC 3.8.0"
+[ -w "$src" ] || die "$src is not writable; install as its owner"
+
+# Two models of one kind with one number, and LIGGGHTS's Make.sh stops without naming a file.
+for kind in tangential cohesion; do
+  macro=$(echo "$kind" | tr '[:lower:]' '[:upper:]')_MODEL
+  for ours in "$here"/plugins/liggghts/"${kind}"_model_*.h; do
+    number=$(sed -nE "s/^$macro\\(.*, *([0-9]+)\\).*/\\1/p" "$ours")
+    for other in "$src/${kind}"_model_*.h; do
+      [ "$(basename "$other")" = "$(basename "$ours")" ] && continue
+      ! grep -qE "^$macro\\(.*, *$number *\\)" "$other" ||
+        die "$other has the model number $number that $(basename "$ours") needs; give it another one (0-63)"
+    done
+  done
+done
+
+changed=0
+copy() {  # copy FILE TARGET
+  cmp -s "$1" "$2" && return
+  mkdir -p "$(dirname "$2")"
+  cp "$1" "$2"
+  changed=$((changed + 1))
+}
+# liggghts-dembark's own entry into the engine is what LIGGGHTS's Make.sh generates in a source tree.
+for file in "$here"/plugins/liggghts/*.h "$here"/plugins/liggghts/*.cpp; do
+  case $(basename "$file") in main.cpp|granular_combinations.*|'*'.*) ;; *) copy "$file" "$src/$(basename "$file")" ;; esac
+done
+while IFS= read -r file; do
+  copy "$here/plugins/physics/$file" "$src/dembark/$file"
+done < <(cd "$here/plugins/physics" && find . -name '*.hpp' -not -path './tests/*' -not -path './python/*' | sed 's|^\./||' | sort)
+
+# The combinations that liggghts-dembark holds (register_contact_models() in plugins/liggghts/granular_combinations.cpp).
+whitelist=$src/style_contact_model_user.whitelist
+for normal in HERTZ HOOKE; do
+  for laws in "TANGENTIAL_FINNIE_RABINOWICZ, COHESION_OFF" "TANGENTIAL_FINNIE_RABINOWICZ, COHESION_CAPILLARY" \
+              "TANGENTIAL_HISTORY, COHESION_CAPILLARY"; do
+    for rolling in ROLLING_OFF ROLLING_CDT ROLLING_EPSD2; do
+      line="GRAN_MODEL($normal, $laws, $rolling, SURFACE_DEFAULT)"
+      if ! grep -qxF "$line" "$whitelist" 2>/dev/null; then
+        # A last line without a newline would swallow ours.
+        if [ -s "$whitelist" ] && [ -n "$(tail -c 1 "$whitelist")" ]; then echo >>"$whitelist"; fi
+        echo "$line" >>"$whitelist"
+        changed=$((changed + 1))
+      fi
+    done
+  done
+done
+
+if [ "$changed" = 0 ]; then echo "dembark: $src is up to date"; else echo "dembark: installed into $src"; fi
+cat <<END
+Next, in that folder: build LIGGGHTS as you always do, with C++17 (g++ 8 or newer; a -std=c++11 in CCFLAGS has to become -std=c++17), e.g.
+  make auto
+and use  pair_style gran model hertz tangential finnie_rabinowicz [cohesion capillary]  in your input, as in liggghts-dembark.
+END
