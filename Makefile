@@ -29,7 +29,7 @@ system: ## install the system packages that are missing
 $(VENV)/.complete: packaging/requirements.lock | system
 	@echo "dembark: making the virtual environment $(VENV)" >&2
 	@$(SYSTEM_PYTHON) -m venv --clear $(VENV)
-	@$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes --requirement packaging/requirements.lock
+	@$(BIN)/pip install --quiet --disable-pip-version-check --use-pep517 --require-hashes --requirement packaging/requirements.lock
 	@touch $@
 
 # Everything is compiled once; the Python package is an editable install whose compiled part comes from the same headers.

@@ -45,7 +45,8 @@ class Engine:
     def environment(self, threads: int = 1) -> dict[str, str]:
         """Environment for the engine: one thread unless asked for more, and nothing of this Python's virtual environment."""
         result = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "DISPLAY")}
-        result |= {"OMP_NUM_THREADS": str(threads), "PYTHONUNBUFFERED": "1"}
+        # Ranks that wait for each other without yielding would halt a run with more ranks than free cores.
+        result |= {"OMP_NUM_THREADS": str(threads), "PYTHONUNBUFFERED": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
         if self.name == "yade" and self.prefix:
             result["YADE_PREFIX"] = str(self.prefix)
             result["PATH"] = "/usr/bin:" + result.get("PATH", "")

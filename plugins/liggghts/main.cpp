@@ -5,6 +5,7 @@
 #include <mpi.h>
 
 #include <csignal>
+#include <cstdio>
 
 #include "input.h"
 #include "lammps.h"
@@ -21,6 +22,8 @@ int main(int argc, char** argv) {
   sigaction(SIGTERM, &stop, nullptr);
   sigaction(SIGUSR1, &restart, nullptr);
 
+  // An error of one process ends all at once: what it says must be out before, also into a pipe.
+  std::setvbuf(stdout, nullptr, _IOLBF, BUFSIZ);
   MPI_Init(&argc, &argv);
   LAMMPS_NS::LAMMPS* lammps = new LAMMPS_NS::LAMMPS(argc, argv, MPI_COMM_WORLD);
   // The library enters its own combinations in this constructor; ours come after, where its fallback can be replaced.

@@ -61,6 +61,7 @@ struct Contact {
 }  // namespace
 
 NB_MODULE(_physics, m) {
+  nb::set_leak_warnings(false);  // cached laws live until the interpreter is gone, which is no leak
   m.attr("unlimited_strength") = unlimited_strength;
   m.def("capillary_models", &capillary::model_names);
 

@@ -189,11 +189,16 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
     static, kinetic = columns[0].wall_friction, columns[0].kinetic_friction
     mobilised = over("mobilisation").value
     limits = f"{mobilised / static:.0%} of its static and {mobilised / kinetic:.0%} of its kinetic" if static > 0 and kinetic > 0 else "no"
+    # Spheres that slide reach the kinetic limit; a clear shortfall means that they roll.
+    manner = (
+        "The grains at the wall slide, close to the kinetic limit."
+        if mobilised > 0.85 * kinetic
+        else "Spheres roll along a smooth wall instead of sliding, which keeps the shear below Coulomb's limit."
+    )
     remarks = [
         (
-            f"The wall carries {limits} friction (τ / σ_rr = {mobilised:.3f}; static {static:g}, kinetic {kinetic:g}). Spheres can "
-            "roll along a smooth wall instead of sliding, which keeps the shear below Coulomb's limit. Janssen's law is therefore "
-            "checked with the measured mobilisation; with the static coefficient in its place λ would come out shorter by the first "
+            f"The wall carries {limits} friction (τ / σ_rr = {mobilised:.3f}; static {static:g}, kinetic {kinetic:g}). {manner} Janssen's "
+            "law is therefore checked with the measured mobilisation; with the static coefficient in its place λ would come out shorter by the first "
             "of these shares."
         ),
         f"{LANDRY.short}: {LANDRY.statement}",
