@@ -183,16 +183,21 @@ DEMBARK_COLD Vec3<Real> exponential_step(const FinnieRabinowicz& law, Real norma
   return -force;
 }
 
+/// Whether a contact slid in its last step. Without a healing time every sticking step forgets the slip; with one, sliding shows in a
+/// spring at its limit, give or take what damping makes of the normal force.
+template <class Real>
+DEMBARK_COLD bool was_sliding(const FinnieRabinowicz& law, Real normal_force, Real stiffness, Real contact_area, const FrictionState<Real>& state) {
+  if (law.healing_time == 0.0) return true;
+  return stiffness * norm(state.displacement) > 0.99 * shear_limit(law, friction_coefficient(law, state.slip), normal_force, contact_area);
+}
+
 /// The linear spring beyond static friction's first limit: slipping, or about to stick again.
 template <class Real>
 DEMBARK_COLD bool linear_slip(const FinnieRabinowicz& law, Real normal_force, Real stiffness, Real contact_area,
-                              const Vec3<Real>& increment, Real dt, FrictionState<Real>& state) {
+                              const Vec3<Real>& increment, FrictionState<Real>& state) {
   const Real limit = shear_limit(law, friction_coefficient(law, state.slip), normal_force, contact_area);
   const Real trial = norm(state.displacement);
-  if (!(stiffness * trial > limit)) {
-    // An engine may ask for the force of a contact that slides, in a step of zero length: its spring is at the limit, not beyond.
-    return dt == 0.0 && state.slip > 0.0 && stiffness * trial > limit * (1.0 - 1e-9);
-  }
+  if (!(stiffness * trial > limit)) return false;
   const Real slip = slip_to_limit(law, stiffness, trial, state.slip, normal_force, contact_area);
   state.slip += slip;
   // Lost is the work of the step less what the spring gained: the mean of its force before and after, along the slip. Where
@@ -220,6 +225,13 @@ DEMBARK_HOT Vec3<Real> friction_step(const FinnieRabinowicz& law, Real normal_fo
   const Vec3<Real> increment = velocity * dt;
   if (law.presliding == Presliding::exponential)
     return detail::exponential_step(law, normal_force, stiffness, contact_area, increment, dt, state);
+
+  // An engine asks again, in a step of zero length, for the forces of a moment (set-up of a run, output of contacts). The dash-pot of
+  // a contact that slides stays out then as it did in the step.
+  if (dt == 0.0 && state.slip > 0.0) {
+    const FrictionState<Real> copy = state;
+    if (detail::was_sliding(law, normal_force, stiffness, contact_area, copy)) return -stiffness * state.displacement;
+  }
 
   state.displacement += increment;
   // Most contacts of a dense bed stick, far from their limit: they are told by a bound that needs neither root nor exponential,
