@@ -33,10 +33,10 @@ def liggghts_comparisons(bed: Path, cache: Path, wall_clock: bool, relax: int, s
     if not wall_clock:
         environment["LD_PRELOAD"] = str(clock_library(cache))
 
-    def subject(name: str, program: Path, tangential: str, cohesion: str = "") -> Subject:
+    def subject(name: str, program: Path, tangential: str, cohesion: str = "", settings: str = "limitForce off") -> Subject:
         variables: dict[str, object] = {"tangential": tangential, "relax": relax, "steps": steps}
         if cohesion:
-            variables |= {"wet": 1, "cohesion": cohesion}
+            variables |= {"wet": 1, "cohesion": cohesion, "settings": settings}
         return Subject(name, lambda: liggghts_sample(program, bed, variables, environment))
 
     law = ours.executable
@@ -48,7 +48,7 @@ def liggghts_comparisons(bed: Path, cache: Path, wall_clock: bool, relax: int, s
         Comparison("LIGGGHTS, wet", [
             subject("history + washino (stock)", stock, "history", "washino/capillary/viscous"),
             subject("history + capillary exact", law, "history", "capillary"),
-            subject("history + capillary willett", law, "history", "capillary capillary_model willett"),
+            subject("history + capillary willett", law, "history", "capillary", "capillary_model willett"),
             subject("finnie_rabinowicz + capillary exact", law, "finnie_rabinowicz", "capillary"),
         ], steps, {"history + capillary exact": 1.0, "history + capillary willett": 1.0}),
     ]
@@ -132,7 +132,7 @@ def main(words: list[str] | None = None) -> int:
     table = Table(*HEADS, title="median (least-greatest)")
     for row in rows:
         table.add_row(*texts(row))
-    Console().print(table)
+    Console(width=None if sys.stdout.isatty() else 160).print(table)
     say(f"wrote {given.out / 'bench.md'} and bench.json")
     return 0
 

@@ -41,9 +41,9 @@ copy() {  # copy FILE TARGET
   cp "$1" "$2"
   changed=$((changed + 1))
 }
-# liggghts-dembark's own entry into the engine is what LIGGGHTS's Make.sh generates in a source tree.
-for file in "$here"/plugins/liggghts/*.h "$here"/plugins/liggghts/*.cpp; do
-  case $(basename "$file") in main.cpp|granular_combinations.*|'*'.*) ;; *) copy "$file" "$src/$(basename "$file")" ;; esac
+# The models and what they include; the rest of that folder is liggghts-dembark's own way into a finished library.
+for file in "$here"/plugins/liggghts/*_model_*.h "$here"/plugins/liggghts/{model_properties,settings_choice}.h; do
+  copy "$file" "$src/$(basename "$file")"
 done
 while IFS= read -r file; do
   copy "$here/plugins/physics/$file" "$src/dembark/$file"
@@ -67,6 +67,9 @@ for normal in HERTZ HOOKE; do
 done
 
 if [ "$changed" = 0 ]; then echo "dembark: $src is up to date"; else echo "dembark: installed into $src"; fi
+if grep -q 'static_cast< std::ostringstream' "$src/utils.h"; then
+  echo "Note: as published, LIGGGHTS 3.8.0 does not compile as C++17; utils.h and finish.cpp need the mending that Debian and others apply."
+fi
 cat <<END
 Next, in that folder: build LIGGGHTS as you always do, with C++17 (g++ 8 or newer; a -std=c++11 in CCFLAGS has to become -std=c++17), e.g.
   make auto

@@ -52,18 +52,18 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     }
   }
 
-  // A bridge longer than the neighbour list looks would vanish without a word.
-  void check_reach(const SurfacesCloseData& d, double rupture_distance) {
+  // A bridge longer than the neighbour list looks would vanish without a word. `size`: r_i + r_j, r_i against a wall.
+  void check_reach(double rupture_distance, double size, bool primitive_wall) const {
     char line[256];
-    if (d.is_wall && !d.mesh && rupture_distance > neighbor->skin) {
+    if (primitive_wall && rupture_distance > neighbor->skin) {
       // The engine keeps the grains near a primitive wall within the skin only.
       snprintf(line, sizeof line, "cohesion capillary: a bridge to a primitive wall reaches %g m but the neighbour skin is %g m; use neighbor %.3g bin",
                rupture_distance, neighbor->skin, 1.01 * rupture_distance);
       error->one(FLERR, line);
     }
-    const double reach = (neighbor->contactDistanceFactor - 1.0) * (d.is_wall ? d.radi : d.radsum);
+    const double reach = (neighbor->contactDistanceFactor - 1.0) * size;
     if (rupture_distance <= reach) return;
-    const double needed = 1.0 + rupture_distance / (d.is_wall ? d.radi : d.radsum);
+    const double needed = 1.0 + rupture_distance / size;
     snprintf(line, sizeof line, "cohesion capillary: a bridge reaches %g m but neighbours are kept to %g m only; use neigh_modify contact_distance_factor %.3g",
              rupture_distance, reach, needed * 1.01);
     error->one(FLERR, line);
@@ -81,7 +81,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
 
   void connectToProperties(PropertyRegistry& registry) {
     dembark_liggghts::PropertyReader read(registry, modify, error, "cohesion capillary");
-    dembark::capillary::Model model;
+    dembark::capillary::Model model{};
     dembark::capillary::model_from_name(dembark::capillary::model_names()[model_].c_str(), model);
     types_ = read.types() + 1;
     pairs_.assign(types_ * types_, {});
@@ -106,44 +106,55 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     if (largest > 0.0) neighbor->register_contact_dist_factor(1.0 + 1.001 * largest);
   }
 
-  inline void surfacesIntersect(SurfacesIntersectData& sidata, ForceData& i_forces, ForceData& j_forces) {
-    if (sidata.contact_flags) *sidata.contact_flags |= CONTACT_COHESION_MODEL;
-    const PairLiquid& pair = pairs_[sidata.itype * types_ + sidata.jtype];
-    double* const history = &sidata.contact_history[offset_];
+  /// Attraction (N) of a touching pair; its bridge forms now if it has none, unless it must not be stored (`update_history`).
+  double touching_force(double* contact_history, int itype, int jtype, double radius, double size, bool update_history, bool primitive_wall = false) const {
+    const PairLiquid& pair = pairs_[itype * types_ + jtype];
+    double* const history = contact_history + offset_;
     double volume = history[0];
-    const double radius = bridge_radius(sidata);
     if (!(volume > 0.0)) {
-      if (!(pair.volume > 0.0)) return;
+      if (!(pair.volume > 0.0)) return 0.0;
       volume = pair.volume;
       const double rupture = pair.force->rupture_distance(radius, volume);
-      check_reach(sidata, rupture);
-      if (sidata.computeflag && sidata.shearupdate) {
+      check_reach(rupture, size, primitive_wall);
+      if (update_history) {
         history[0] = volume;
         history[1] = rupture;
       }
     }
-    pull(sidata, pair.force->force(radius, 0.0, volume, surface_tension_), sidata.en, i_forces, j_forces);
+    return pair.force->force(radius, 0.0, volume, surface_tension_);
+  }
+
+  /// Whether a bridge holds the pair over the gap, and its attraction (N); it ruptures here.
+  bool gap_force(double* contact_history, int itype, int jtype, double radius, double gap, double& attraction) const {
+    double* const history = contact_history + offset_;
+    if (!(history[0] > 0.0)) return false;
+    if (gap > history[1]) {
+      history[0] = history[1] = 0.0;
+      return false;
+    }
+    attraction = pairs_[itype * types_ + jtype].force->force(radius, gap, history[0], surface_tension_);
+    return true;
+  }
+
+  inline void surfacesIntersect(SurfacesIntersectData& sidata, ForceData& i_forces, ForceData& j_forces) {
+    if (sidata.contact_flags) *sidata.contact_flags |= CONTACT_COHESION_MODEL;
+    const double attraction = touching_force(sidata.contact_history, sidata.itype, sidata.jtype, bridge_radius(sidata), sidata.is_wall ? sidata.radi : sidata.radsum,
+                                             sidata.computeflag && sidata.shearupdate, sidata.is_wall && !sidata.mesh);
+    pull(sidata, attraction, sidata.en, i_forces, j_forces);
   }
 
   inline void surfacesClose(SurfacesCloseData& scdata, ForceData& i_forces, ForceData& j_forces) {
     if (!scdata.contact_history) return;
-    double* const history = &scdata.contact_history[offset_];
-    if (!(history[0] > 0.0)) {
-      if (scdata.contact_flags) *scdata.contact_flags &= ~CONTACT_COHESION_MODEL;
-      return;
-    }
     const double distance = sqrt(scdata.rsq);
-    const double gap = distance - (scdata.is_wall ? scdata.radi : scdata.radsum);
-    if (gap > history[1]) {
-      history[0] = history[1] = 0.0;
+    double attraction;
+    if (!gap_force(scdata.contact_history, scdata.itype, scdata.jtype, bridge_radius(scdata), distance - (scdata.is_wall ? scdata.radi : scdata.radsum), attraction)) {
       if (scdata.contact_flags) *scdata.contact_flags &= ~CONTACT_COHESION_MODEL;
       return;
     }
     if (scdata.contact_flags) *scdata.contact_flags |= CONTACT_COHESION_MODEL;
     scdata.has_force_update = true;
     const double normal[3] = {scdata.delta[0] / distance, scdata.delta[1] / distance, scdata.delta[2] / distance};
-    const PairLiquid& pair = pairs_[scdata.itype * types_ + scdata.jtype];
-    pull(scdata, pair.force->force(bridge_radius(scdata), gap, history[0], surface_tension_), normal, i_forces, j_forces);
+    pull(scdata, attraction, normal, i_forces, j_forces);
   }
 
   inline void endSurfacesIntersect(SurfacesIntersectData&, ForceData&, ForceData&) {}

@@ -20,6 +20,8 @@
 #include "pair_gran_base.h"
 #include "fix_wall_gran_base.h"
 
+#include "direct_pair_loop.h"
+
 namespace dembark_liggghts {
 namespace {
 
@@ -71,10 +73,20 @@ Host* create(LAMMPS* lammps, typename Host::ParentType* parent, std::int64_t has
   return new Type(lammps, parent, hash);
 }
 
+// The class that runs the pair loop of a style: the engine's, unless there is a faster one.
+template <class Style>
+struct PairLoop {
+  typedef PairStyles::Granular<ContactModel<Style>> type;
+};
+template <int Cohesion>
+struct PairLoop<GranStyle<HERTZ, TANGENTIAL_FINNIE_RABINOWICZ, Cohesion, ROLLING_OFF, SURFACE_DEFAULT>> {
+  typedef DirectPairLoop<Cohesion> type;
+};
+
 template <int Normal, int Tangential, int Cohesion, int Rolling>
 void add_combination() {
   typedef GranStyle<Normal, Tangential, Cohesion, Rolling, SURFACE_DEFAULT> Style;
-  PairStyles::Factory::instance().addStyle("gran", Style::HASHCODE, &create<PairStyles::IGranularPairStyle, PairStyles::Granular<ContactModel<Style>>>);
+  PairStyles::Factory::instance().addStyle("gran", Style::HASHCODE, &create<PairStyles::IGranularPairStyle, typename PairLoop<Style>::type>);
   Walls::Factory::instance().addStyle("gran", Style::HASHCODE, &create<Walls::IGranularWall, Walls::Granular<ContactModel<Style>>>);
 }
 

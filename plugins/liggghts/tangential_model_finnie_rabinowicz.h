@@ -78,26 +78,32 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     neighbor->register_contact_dist_factor(1.01);
   }
 
+  /// Tangential force on the first body of a touching pair. `spin`: sum of both bodies' angular velocities; `radius_overlap`: R* delta;
+  /// `dt` is 0 at the set-up of a run, where forces are those of the stored state: a step of zero length, which is not stored.
+  DEMBARK_HOT dembark::Vec3<double> step(double* contact_history, int itype, int jtype, const dembark::Vec3<double>& normal, const dembark::Vec3<double>& spin,
+                                         const dembark::Vec3<double>& velocity, double normal_force, double k_t, double gamma_t, double radius_overlap,
+                                         double dt, bool update_history) const {
+    double* const history = contact_history + offset_;
+    dembark::FrictionState<double> state = load(history);
+    state.displacement = dembark::rotate_to_plane(state.displacement, normal, 0.5 * dt * dot(spin, normal));
+    const dembark::Vec3<double> force = dembark::friction_step(laws_[itype * types_ + jtype], normal_force, k_t, gamma_t, dembark::pi * radius_overlap, velocity, dt, state);
+    if (update_history) store(history, state);
+    return force;
+  }
+
+  /// The contact has ended.
+  void forget(double* contact_history) const { store(contact_history + offset_, {}); }
+
   inline void surfacesIntersect(const SurfacesIntersectData& sidata, ForceData& i_forces, ForceData& j_forces) {
     if (sidata.contact_flags) *sidata.contact_flags |= CONTACT_TANGENTIAL_MODEL;
-    double* const history = &sidata.contact_history[offset_];
-    dembark::FrictionState<double> state = load(history);
-
-    // At the set-up of a run forces are those of the stored state; a step of zero length leaves it as it is.
     const bool update_history = sidata.computeflag && sidata.shearupdate;
-    const double dt = update_history ? update->dt : 0.0;
     const dembark::Vec3<double> normal{sidata.en[0], sidata.en[1], sidata.en[2]};
     dembark::Vec3<double> spin{sidata.omega_i[0], sidata.omega_i[1], sidata.omega_i[2]};
     if (!sidata.is_wall) spin += {sidata.omega_j[0], sidata.omega_j[1], sidata.omega_j[2]};
-    state.displacement = dembark::rotate_to_plane(state.displacement, normal, 0.5 * dt * dot(spin, normal));
-
-    const dembark::FinnieRabinowicz& law = laws_[sidata.itype * types_ + sidata.jtype];
-    double area = 0.0;  // only a limited strength asks for it
-    if (law.interface_shear_strength < dembark::unlimited_strength)
-      area = dembark::pi * (sidata.is_wall ? sidata.radi : sidata.radi * sidata.radj / sidata.radsum) * sidata.deltan;
-    const dembark::Vec3<double> force = dembark::friction_step(law, sidata.Fn, sidata.kt, sidata.gammat, area,
-                                                               dembark::Vec3<double>{sidata.vtr1, sidata.vtr2, sidata.vtr3}, dt, state);
-    if (update_history) store(history, state);
+    const double reduced_radius = sidata.is_wall ? sidata.radi : sidata.radi * sidata.radj / sidata.radsum;
+    const dembark::Vec3<double> force =
+        step(sidata.contact_history, sidata.itype, sidata.jtype, normal, spin, {sidata.vtr1, sidata.vtr2, sidata.vtr3}, sidata.Fn, sidata.kt, sidata.gammat,
+             reduced_radius * sidata.deltan, update_history ? update->dt : 0.0, update_history);
 
     const dembark::Vec3<double> moment = cross(normal, force);
     const double scale = sidata.is_wall ? sidata.area_ratio : 1.0;
@@ -107,7 +113,7 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
 
   inline void surfacesClose(SurfacesCloseData& scdata, ForceData&, ForceData&) {
     if (scdata.contact_flags) *scdata.contact_flags &= ~CONTACT_TANGENTIAL_MODEL;
-    if (scdata.contact_history) store(&scdata.contact_history[offset_], {});
+    if (scdata.contact_history) forget(scdata.contact_history);
   }
 
   inline void beginPass(SurfacesIntersectData&, ForceData&, ForceData&) {}

@@ -243,7 +243,7 @@ DEMBARK_HOT Vec3<Real> friction_step(const FinnieRabinowicz& law, Real normal_fo
     bound = coulomb < strength ? coulomb - 0.5 * coulomb * coulomb / strength : Real(0.0);
   }
   const bool sticks = bound > 0.0 && stiffness * stiffness * dot(state.displacement, state.displacement) < bound * bound * (1.0 - 1e-8);
-  if (!sticks && detail::linear_slip(law, normal_force, stiffness, contact_area, increment, dt, state)) return -stiffness * state.displacement;
+  if (!sticks && detail::linear_slip(law, normal_force, stiffness, contact_area, increment, state)) return -stiffness * state.displacement;
   if (state.slip > 0.0) detail::heal(law, dt, state);
   state.dissipated_energy += damping * dot(velocity, velocity) * dt;
   return -(stiffness * state.displacement + damping * velocity);

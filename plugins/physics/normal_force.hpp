@@ -20,6 +20,7 @@
 namespace dembark {
 
 constexpr double pi = 3.14159265358979323846;
+constexpr double sqrt_five_sixths = 0.91287092917527685576161630466800355658790782499663875;
 
 /// Effective Young's modulus (Pa) of two materials, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
 inline double effective_youngs_modulus(double youngs_1, double poisson_1, double youngs_2, double poisson_2) {
@@ -85,7 +86,7 @@ inline NormalResponse<Real> hertz(const HertzParameters& p, Real effective_radiu
   const Real root = sqrt(effective_radius * overlap);
   const Real stiffness = 2.0 * p.effective_youngs_modulus * root;
   const Real k_t = 8.0 * p.effective_shear_modulus * root;
-  const double damping = -2.0 * 0.91287092917527685576161630466800355658790782499663875 * p.damping;  // sqrt(5/6)
+  const double damping = -2.0 * sqrt_five_sixths * p.damping;  // sqrt(5/6)
   return {4.0 / 3.0 * p.effective_youngs_modulus * root * overlap - damping * sqrt(stiffness * effective_mass) * normal_velocity,
           k_t, damping * sqrt(k_t * effective_mass), pi * effective_radius * overlap};
 }

@@ -1,0 +1,148 @@
+"""packaging/install_liggghts.sh: the styles in a LIGGGHTS source tree."""
+
+import hashlib
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rig.cloud import DECK, cloud, deviation
+from rig.liggghts_driver import read_dump, run_deck
+
+ROOT = Path(__file__).parents[3]
+SCRIPT = ROOT / "packaging/install_liggghts.sh"
+TARBALL = "liggghts_3.8.0+repack1.orig.tar.xz"
+SHA256 = "c18721d9a870c5170f03b91e4f1ffe13335c66ed1f0ff2c64ebd3be91c37867a"
+
+
+def install(*words: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([str(SCRIPT), *map(str, words)], capture_output=True, text=True, check=False)
+
+
+def stand_in(folder: Path) -> Path:
+    """A folder that looks like a LIGGGHTS source tree."""
+    folder.mkdir(parents=True)
+    for name in ("pair_gran_base.h", "Make.sh", "utils.h"):
+        (folder / name).write_text("")
+    (folder / "tangential_model_history.h").write_text("TANGENTIAL_MODEL(TANGENTIAL_HISTORY,history,2)\n")
+    (folder / "cohesion_model_sjkr.h").write_text("COHESION_MODEL(COHESION_SJKR,sjkr,1)\n")
+    (folder / "version_liggghts.txt").write_text("3.8.0\n")
+    return folder
+
+
+def test_copies_once(tmp_path):
+    source = stand_in(tmp_path / "src")
+    (source / "style_contact_model_user.whitelist").write_text("GRAN_MODEL(HERTZ, MINE, COHESION_OFF, ROLLING_OFF, SURFACE_DEFAULT)")
+    assert install(source).returncode == 0
+    before = {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in source.rglob("*") if path.is_file()}
+    assert install(source).returncode == 0
+    assert {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in source.rglob("*") if path.is_file()} == before
+    for name in ("tangential_model_finnie_rabinowicz.h", "cohesion_model_capillary.h"):
+        assert (source / name).read_bytes() == (ROOT / "plugins/liggghts" / name).read_bytes()
+    assert (source / "dembark/capillary/bridge.hpp").exists() and not (source / "dembark/tests").exists()
+    lines = (source / "style_contact_model_user.whitelist").read_text().splitlines()
+    assert "MINE" in lines[0] and len(lines) == len(set(lines)) == 19
+
+
+def test_every_included_header_is_there(tmp_path):
+    source = stand_in(tmp_path / "src")
+    install(source)
+    for path in [*source.glob("*_model_*.h"), *(source / "dembark").rglob("*.hpp")]:
+        for name in re.findall(r'^#include "([^"]+)"', path.read_text(), re.M):
+            ours = name.startswith("dembark/") or path.suffix == ".hpp" or (ROOT / "plugins/liggghts" / name).exists()
+            assert not ours or (path.parent / name).exists() or (source / name).exists(), f"{path.name}: {name}"
+
+
+def test_whitelist_is_what_liggghts_dembark_compiles(tmp_path):
+    source = stand_in(tmp_path / "src")
+    install(source)
+    text = (ROOT / "plugins/liggghts/granular_combinations.cpp").read_text()
+    single = re.findall(r"add_combination<(\w+), Tangential, Cohesion, (\w+)>\(\);", text)
+    laws = re.findall(r"add_with_normal_and_rolling<(\w+), (\w+)>\(\);", text)
+    expected = {f"GRAN_MODEL({normal}, {tangential}, {cohesion}, {rolling}, SURFACE_DEFAULT)" for normal, rolling in single for tangential, cohesion in laws}
+    assert set((source / "style_contact_model_user.whitelist").read_text().splitlines()) == expected
+
+
+def test_wrong_folders(tmp_path):
+    old = stand_in(tmp_path / "old")
+    (old / "version_liggghts.txt").write_text("3.3.1\n")
+    taken = stand_in(tmp_path / "taken")
+    (taken / "cohesion_model_other.h").write_text("COHESION_MODEL(COHESION_OTHER,other,20)\n")
+    for words, what in (((), "no LIGGGHTS source folder given"), ((tmp_path / "none",), "does not exist"), ((tmp_path,), "has no pair_gran_base.h"),
+                        ((old,), "is LIGGGHTS 3.3.1"), ((taken,), "has the model number 20")):
+        done = install(*words)
+        assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
+        assert done.stderr.startswith("dembark: ") and what in done.stderr
+    assert not (taken / "dembark").exists()
+
+
+def fetch(folder: Path) -> Path:
+    """The published source, through apt with lists of its own; skips when this machine's apt has no Debian 12 mirror."""
+    tarball = folder / TARBALL
+    if not tarball.exists():
+        listed = subprocess.run(["apt-get", "indextargets", "--format", "$(CODENAME) $(COMPONENT) $(REPO_URI)", "Created-By: Packages"],
+                                capture_output=True, text=True, check=False).stdout
+        mirrors = [line.split()[2] for line in listed.splitlines() if line.startswith("bookworm main ")]
+        if not mirrors:
+            pytest.skip("apt lists no mirror of Debian 12")
+        state = folder / "apt"
+        for name in ("lists/partial", "cache/archives/partial"):
+            (state / name).mkdir(parents=True, exist_ok=True)
+        (state / "status").touch()
+        (state / "source.list").write_text(f"deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] {mirrors[0]} bookworm main\n")
+        options = [f"Dir::Etc::sourcelist={state}/source.list", "Dir::Etc::sourceparts=/dev/null", f"Dir::State={state}", f"Dir::State::lists={state}/lists",
+                   f"Dir::State::status={state}/status", f"Dir::Cache={state}/cache", "APT::Sandbox::User="]
+        apt = ["apt-get", "-qq", *(word for option in options for word in ("-o", option))]
+        subprocess.run([*apt, "update"], check=True)
+        # Only the upstream tarball is needed; its checksum is known.
+        subprocess.run([*apt, "source", "--download-only", "liggghts=3.8.0+repack1-9"], cwd=folder, check=False)
+    assert hashlib.sha256(tarball.read_bytes()).hexdigest() == SHA256
+    return tarball
+
+
+def mend(source: Path) -> None:
+    """What any build of the source of 2017 as C++17 without VTK needs."""
+    for name, old, new in (
+        ("utils.h", "static_cast< std::ostringstream & >(( std::ostringstream() << std::dec << a ) ).str()", "std::to_string(a)"),
+        ("finish.cpp", "neighbor->lists[m]->numneigh > 0", "neighbor->lists[m]->numneigh"),
+    ):
+        path = source / name
+        path.write_text(path.read_text().replace(old, new))
+    for path in source.glob("dump_mesh_vtk.*"):
+        path.unlink()
+
+
+@pytest.mark.slow
+def test_built_from_source_is_the_same_as_liggghts_dembark(tmp_path):
+    """Takes 10 minutes of one core for the first build; it is kept in build/test-install."""
+    place = ROOT / "build/test-install"
+    source = place / "LIGGGHTS-PUBLIC-3.8.0/src"
+    place.mkdir(parents=True, exist_ok=True)
+    if not (source / ".mended").exists():
+        subprocess.run(["tar", "-xJf", str(fetch(place))], cwd=place, check=True)
+        mend(source)
+        # Of the stock combinations one is enough.
+        (source / "style_contact_model.whitelist").write_text("GRAN_MODEL(HERTZ, TANGENTIAL_HISTORY, COHESION_OFF, ROLLING_OFF, SURFACE_DEFAULT)\n")
+        (source / ".mended").touch()
+    assert install(source).returncode == 0
+    made = subprocess.run(["make", f"-j{os.cpu_count()}", "mpi", "LMP_INC=", "VTK_INC=", "VTK_LIB=", "CCFLAGS=-O2 -fPIC -w -std=c++17", "DEPFLAGS=-MM"],
+                          cwd=source, capture_output=True, text=True, check=False)
+    assert made.returncode == 0, made.stderr[-2000:]
+
+    deck = DECK.format(cohesion="cohesion capillary", rolling="", settings="")
+    tables = []
+    for name in ("ours", "built"):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "cloud.data").write_text(cloud())
+        if name == "ours":
+            done = run_deck(folder, deck)
+            assert done.code == 0, done.error
+        else:
+            (folder / "case.in").write_text(deck)
+            environment = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+            subprocess.run([str(source / "lmp_mpi"), "-in", "case.in"], cwd=folder, env=environment, stdout=subprocess.DEVNULL, check=True)
+        tables.append(np.stack(read_dump(folder / "grains.dump")[1]))
+    assert deviation(*tables) < 1e-9
