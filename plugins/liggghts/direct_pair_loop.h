@@ -89,7 +89,7 @@ class DirectPairLoop : public StockLoop<Cohesion> {
     const LAMMPS_NS::Atom* atom = lmp_->atom;
     return plain_settings_ && !eflag && !vflag && !(pair->cpl() && addflag) && pair->computeflag() && pair->listgranhistory && !pair->storeContactForces() &&
            !pair->storeContactForcesStress() && !pair->storeSumDelta() && !pair->store_sum_normal_force() && !pair->fr_pair() && atom->rmass &&
-           atom->sphere_flag && !atom->shapetype_flag && lmp_->modify->n_fixes_style("insert/stream/predefined") == 0;
+           lmp_->force->nktv2p == 1.0 && atom->sphere_flag && !atom->shapetype_flag && lmp_->modify->n_fixes_style("insert/stream/predefined") == 0;
   }
 
   static Vec3 row(double* const* array, int i) { return {array[i][0], array[i][1], array[i][2]}; }
@@ -143,7 +143,7 @@ class DirectPairLoop : public StockLoop<Cohesion> {
     const int frozen = pair->freeze_group_bit();
     const int owned = lmp_->force->newton_pair ? atom->nlocal + atom->nghost : atom->nlocal;
     const bool update_history = pair->shearupdate();
-    const double dt = update_history ? lmp_->update->dt : 0.0, unit = 1.0 / lmp_->force->nktv2p;
+    const double dt = update_history ? lmp_->update->dt : 0.0;
     const double reach_squared = lmp_->neighbor->contactDistanceFactor * lmp_->neighbor->contactDistanceFactor;
     const int stride = pair->dnum();
 
@@ -205,20 +205,20 @@ class DirectPairLoop : public StockLoop<Cohesion> {
         const double normal_velocity = dot(relative, normal);
         const Vec3 tangential_velocity = relative - normal_velocity * normal - cross(arm_i * omega_i + arm_j * omega_j, normal);
 
-        // As `normal hertz`.
-        const double root = std::sqrt(reduced_radius * overlap), youngs = youngs_modulus_[type_i][type_j];
-        const double k_t = 8.0 * shear_modulus_[type_i][type_j] * root;
-        const double damping = -2.0 * dembark::sqrt_five_sixths * damping_factor_[type_i][type_j];
-        double normal_force = 4.0 / 3.0 * youngs * root * unit * overlap - damping * std::sqrt(2.0 * youngs * root * reduced_mass) * normal_velocity;
-        if (limit_force_ && normal_force < 0.0) normal_force = 0.0;
-        const double gamma_t = tangential_damping_ ? damping * std::sqrt(k_t * reduced_mass) : 0.0;
+        dembark::HertzParameters elasticity;
+        elasticity.effective_youngs_modulus = youngs_modulus_[type_i][type_j];
+        elasticity.effective_shear_modulus = shear_modulus_[type_i][type_j];
+        elasticity.damping = damping_factor_[type_i][type_j];
+        dembark::NormalResponse<double> response = dembark::hertz(elasticity, reduced_radius, reduced_mass, overlap, normal_velocity);
+        if (limit_force_ && response.force < 0.0) response.force = 0.0;
 
-        const Vec3 tangential = friction.step(history, type_i, type_j, normal, omega_i + omega_j, tangential_velocity, normal_force, k_t * unit, gamma_t,
+        const Vec3 tangential = friction.step(history, type_i, type_j, normal, omega_i + omega_j, tangential_velocity, response.force,
+                                              response.tangential_stiffness, tangential_damping_ ? response.tangential_damping : 0.0,
                                               reduced_radius * overlap, dt, update_history);
         double pull = 0.0;
         if constexpr (wet) pull = cohesion.touching_force(history, type_i, type_j, 2.0 * reduced_radius, radius_sum, update_history);
 
-        const Vec3 force = (normal_force - pull) * normal + tangential, moment = cross(normal, tangential);
+        const Vec3 force = (response.force - pull) * normal + tangential, moment = cross(normal, tangential);
         force_i += force;
         torque_i -= arm_i * moment;
         if (j < owned) {

@@ -17,6 +17,8 @@
 #include <cmath>
 #include <limits>
 
+#include "vec3.hpp"  // DEMBARK_HOT
+
 namespace dembark {
 
 constexpr double pi = 3.14159265358979323846;
@@ -81,12 +83,12 @@ struct HookeParameters {
 };
 
 template <class Real>
-inline NormalResponse<Real> hertz(const HertzParameters& p, Real effective_radius, Real effective_mass, Real overlap, Real normal_velocity) {
+DEMBARK_HOT NormalResponse<Real> hertz(const HertzParameters& p, Real effective_radius, Real effective_mass, Real overlap, Real normal_velocity) {
   using std::sqrt;
   const Real root = sqrt(effective_radius * overlap);
   const Real stiffness = 2.0 * p.effective_youngs_modulus * root;
   const Real k_t = 8.0 * p.effective_shear_modulus * root;
-  const double damping = -2.0 * sqrt_five_sixths * p.damping;  // sqrt(5/6)
+  const double damping = -2.0 * sqrt_five_sixths * p.damping;
   return {4.0 / 3.0 * p.effective_youngs_modulus * root * overlap - damping * sqrt(stiffness * effective_mass) * normal_velocity,
           k_t, damping * sqrt(k_t * effective_mass), pi * effective_radius * overlap};
 }
