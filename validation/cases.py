@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from dembark.validation.parameters import Parameter, Value, checked, nearest, pi
 from dembark.validation.units import known_unit
 
 ENGINES = ("liggghts", "yade")
+STUDY_PREFIX = "study-"
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,22 @@ class PlannedRun:
 
 
 @dataclass(frozen=True)
+class Study:
+    """Variants that differ in one parameter, `along`, and are looked at together, in this order."""
+
+    name: str
+    title: str
+    description: str
+    along: str
+    variants: tuple[str, ...]
+
+    @property
+    def folder_name(self) -> str:
+        """Its place beside the variants in the results."""
+        return STUDY_PREFIX + self.name
+
+
+@dataclass(frozen=True)
 class Case:
     """A case folder: its parameters, profiles and variants (overrides of parameters by name), and what a profile runs."""
 
@@ -49,6 +66,7 @@ class Case:
     variants: Mapping[str, Mapping[str, Value]]
     runs: Mapping[str, tuple[PlannedRun, ...]]
     constraints: tuple[Constraint, ...] = ()
+    studies: Mapping[str, Study] = field(default_factory=dict)
 
     def deck(self, engine: str) -> Path:
         """Deck of `engine` in this folder."""
@@ -122,7 +140,7 @@ class _Reader:
                 raise self.fail(name, f"{key} is missing")
 
     def case(self, data: Mapping[str, Any]) -> Case:
-        tables = {"case": dict, "parameters": dict, "profiles": dict, "variants": dict, "runs": dict, "constraints": list}
+        tables = {"case": dict, "parameters": dict, "profiles": dict, "variants": dict, "runs": dict, "constraints": list, "studies": dict}
         self.table(data, "top level", tables, ("case", "parameters"))
         head = data["case"]
         keys = {"name": str, "title": str, "description": str, "source": list, "engines": list}
@@ -138,7 +156,8 @@ class _Reader:
             name=head["name"], title=head["title"], description=head.get("description", "").strip(), source=tuple(head.get("source", ())),
             engines=tuple(head["engines"]), folder=self.path.parent, parameters=parameters, profiles=profiles, variants=variants,
             runs=self.runs(data.get("runs", {}), profiles, variants, tuple(head["engines"])),
-            constraints=tuple(self.constraint(entry, parameters) for entry in data.get("constraints", ())))
+            constraints=tuple(self.constraint(entry, parameters) for entry in data.get("constraints", ())),
+            studies={name: self.study(name, entry, parameters, variants) for name, entry in data.get("studies", {}).items()})
 
     def parameter(self, name: str, entry: Mapping[str, Any]) -> Parameter:
         table, number = f"parameters.{name}", (int, float)
@@ -193,6 +212,18 @@ class _Reader:
                 raise self.fail("runs", f"{profile} names a variant twice for the same engine")
             result[profile] = tuple(planned)
         return result
+
+    def study(self, name: str, entry: Any, parameters: Mapping[str, Parameter], variants: Mapping[str, Any]) -> Study:
+        table = f"studies.{name}"
+        if not isinstance(entry, dict):
+            raise self.fail(table, "a study is a table with title, along and variants")
+        self.table(entry, table, {"title": str, "description": str, "along": str, "variants": list}, ("title", "along", "variants"))
+        pick(entry["along"], parameters, "parameter", f"[{table}] of {self.path}")
+        for variant in entry["variants"]:
+            pick(variant, variants, "variant", f"[{table}] of {self.path}")
+        if len(set(entry["variants"])) < max(3, len(entry["variants"])):
+            raise self.fail(table, "a study needs at least three variants, each once")
+        return Study(name, entry["title"], entry.get("description", "").strip(), entry["along"], tuple(entry["variants"]))
 
     def constraint(self, entry: Any, parameters: Mapping[str, Parameter]) -> Constraint:
         if not isinstance(entry, dict):

@@ -17,7 +17,7 @@ from typing import Any
 
 from dembark.validation.errors import DembarkError, RunError
 from dembark.validation.files import read_json, retire, write_json
-from dembark.validation.plan import Run, Series, campaign, finished, summary
+from dembark.validation.plan import PlannedStudy, Run, Series, campaign, finished, studies, summary
 from dembark.validation.progress import FileBoard, Monitor, State, watched
 from dembark.validation.simulate import Resources, simulate
 
@@ -70,6 +70,21 @@ def measure_series(folder: Path, runs: Iterable[Run]) -> dict[str, Any]:
     return content
 
 
+def measure_study(results: Path, planned: PlannedStudy) -> None:
+    """Write `metrics.json` of a study from those of its variants; RunError when one of them is missing or the study fails."""
+    from dembark.validation.metrics import study
+
+    target = results / planned.place / "metrics.json"
+    target.unlink(missing_ok=True)
+    try:
+        content = study(planned.study, [results / one.place for one in planned.series])
+    except DembarkError:
+        raise
+    except Exception as error:  # see measure_series
+        raise RunError(f"{results / planned.place} could not be measured", f"{type(error).__name__}: {error}") from error
+    write_json(target, content)
+
+
 def compare_engines(folder: Path) -> None:
     """Write `folder/comparison.json` (folder = results/<profile>/<case>/<variant>); RunError when that fails."""
     from dembark.validation.compare import compare
@@ -96,10 +111,10 @@ def build_report(results: Path) -> None:
         raise RunError(f"the report of {results} could not be built", f"{type(error).__name__}: {error}") from error
 
 
-def variants(all_series: Iterable[Series]) -> dict[Path, list[Series]]:
-    """Series by the folder of their case and variant; those with more than one are compared."""
-    groups: dict[Path, list[Series]] = {}
-    for one in all_series:
+def variants(all_series: Sequence[Series]) -> dict[Path, list[Series | PlannedStudy]]:
+    """Series, and studies, by the folder of their case and variant; those with more than one are compared."""
+    groups: dict[Path, list[Series | PlannedStudy]] = {}
+    for one in (*all_series, *studies(all_series)):
         groups.setdefault(one.place.parent, []).append(one)
     return groups
 
@@ -120,17 +135,22 @@ def write_summary(results: Path, profile: str, all_series: Sequence[Series], mes
 def salvage(results: Path, all_series: Sequence[Series]) -> list[str]:
     """Measure and compare what can be after some runs failed, so that a report can be built; returns what went wrong."""
     problems = []
+    for one in all_series:
+        folder = results / one.place
+        content = read_json(folder / "metrics.json")
+        done = [run.inputs for run in one.runs if finished(folder / run.folder_name, run)]
+        if done and content and content.get("inputs") == done:
+            continue
+        try:
+            measure_series(folder, one.runs)
+        except DembarkError as error:
+            problems.append(str(error))
+    for planned in studies(all_series):
+        try:
+            measure_study(results, planned)
+        except DembarkError as error:
+            problems.append(str(error))
     for place, group in variants(all_series).items():
-        for one in group:
-            folder = results / one.place
-            content = read_json(folder / "metrics.json")
-            done = [run.inputs for run in one.runs if finished(folder / run.folder_name, run)]
-            if done and content and content.get("inputs") == done:
-                continue
-            try:
-                measure_series(folder, one.runs)
-            except DembarkError as error:
-                problems.append(str(error))
         if len(group) > 1 and all((results / one.place / "metrics.json").is_file() for one in group):
             try:
                 compare_engines(results / place)
@@ -165,6 +185,12 @@ def _simulate(options: argparse.Namespace, results: Path) -> None:
     mark.touch()
 
 
+def _study_at(profile: str, place: str) -> PlannedStudy:
+    case, _, engine = Path(place).parts
+    (one,) = [one for one in studies(campaign(profile, [case], [engine])) if one.place == Path(place)]
+    return one
+
+
 def step_name(step: str, place: str | Path = "") -> str:
     """Name under which a step other than a simulation tells its progress: `measure silo dry yade`."""
     return " ".join((step, *Path(place).parts))
@@ -184,7 +210,7 @@ def _told(name: str, board: FileBoard) -> Iterator[None]:
 def main(words: Sequence[str] | None = None) -> int:
     """Run one step; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m dembark.validation.jobs", description=__doc__)
-    parser.add_argument("step", choices=("simulate", "measure", "compare", "report"))
+    parser.add_argument("step", choices=("simulate", "measure", "study", "compare", "report"))
     parser.add_argument("--profile", required=True)
     parser.add_argument("--results", type=Path, required=True, help="results/<profile>")
     parser.add_argument("--case", action="append")
@@ -205,6 +231,8 @@ def main(words: Sequence[str] | None = None) -> int:
             if options.step == "measure":
                 one = _series_at(options.profile, options.place)
                 measure_series(results / one.place, one.runs)
+            elif options.step == "study":
+                measure_study(results, _study_at(options.profile, options.place))
             elif options.step == "compare":
                 compare_engines(results / options.place)
             else:

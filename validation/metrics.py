@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from dembark.postproc import DumpError
 from dembark.validation import checks
+from dembark.validation.cases import Study
 from dembark.validation.cases import find as find_case
 from dembark.validation.checks.run import Replica
 from dembark.validation.errors import DembarkError, RunError
@@ -49,6 +51,39 @@ def measure(run_folder: Path) -> dict[str, Any]:
     }
     write_json(run_folder / "metrics.json", content)
     return content
+
+
+def study(planned: Study, folders: Sequence[Path]) -> dict[str, Any]:
+    """A study of one engine from the measured variants in `folders`: content of a `metrics.json`.
+
+    RunError when one of them has no measurement or the case has no `study` among its checks.
+    """
+    points = []
+    for folder in folders:
+        content = read_json(folder / "metrics.json")
+        if content is None:
+            raise RunError(f"study {planned.name} is incomplete", f"{folder} has no metrics.json", "every variant of a study is needed")
+        points.append(content)
+    first = points[0]
+    module = checks.find(first["case"], _case_folder(first["case"]))
+    if not hasattr(module, "study"):
+        raise RunError(f"case {first['case']} has no studies", "its checks have no function study", "add study(name, points, along)")
+    quantities, profiles, remarks = module.study(planned.name, points, planned.along)
+    return {
+        "case": first["case"],
+        "variant": planned.folder_name,
+        "engine": first["engine"],
+        "profile": first["profile"],
+        "title": planned.title,
+        "description": planned.description,
+        "parameters": {},
+        "quantities": [quantity.as_json() for quantity in quantities],
+        "profiles": profiles,
+        "remarks": remarks,
+        "picture": None,
+        "references": [asdict(one) for one in module.REFERENCES],
+        "provenance": {"variants": list(planned.variants)},
+    }
 
 
 def _case_folder(name: str) -> Path | None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from dembark.validation import engines
-from dembark.validation.cases import ENGINES, Case, discover
+from dembark.validation.cases import ENGINES, Case, Study, discover
 from dembark.validation.engines import Engine
 from dembark.validation.errors import DembarkError
 from dembark.validation.files import read_json
@@ -67,6 +67,34 @@ class Series:
         """Relative cost of one replica, to start the longest first."""
         count = self.runs[0].values.get("grain_count")
         return (count if isinstance(count, int) else 1) * _RELATIVE_COST[self.runs[0].engine.name]
+
+
+@dataclass(frozen=True)
+class PlannedStudy:
+    """A study of one engine: the series of its variants, in the study's order."""
+
+    study: Study
+    series: tuple[Series, ...]
+
+    @property
+    def place(self) -> Path:
+        """Folder below results/<profile>: <case>/study-<name>/<engine>."""
+        first = self.series[0].place
+        return first.parent.parent / self.study.folder_name / first.name
+
+
+def studies(all_series: Iterable[Series]) -> list[PlannedStudy]:
+    """The studies that `all_series` hold all variants of, engine by engine."""
+    by_place = {one.place: one for one in all_series}
+    cases = {one.runs[0].case.name: one.runs[0].case for one in by_place.values()}
+    found = []
+    for case in cases.values():
+        for study in case.studies.values():
+            for engine in case.engines:
+                places = [Path(case.name, variant, engine) for variant in study.variants]
+                if all(place in by_place for place in places):
+                    found.append(PlannedStudy(study, tuple(by_place[place] for place in places)))
+    return found
 
 
 def deck_files(case: Case, engine: str) -> dict[str, str]:

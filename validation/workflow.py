@@ -24,7 +24,7 @@ from dembark.validation.jobs import (
     variants,
     write_summary,
 )
-from dembark.validation.plan import Series, campaign, finished
+from dembark.validation.plan import Series, campaign, finished, studies
 from dembark.validation.progress import FileBoard, Monitor, State, watched
 
 _GRACE = 30.0
@@ -59,7 +59,8 @@ def _states(results: Path, all_series: Sequence[Series]) -> Callable[[], list[St
     """All runs, and of the steps after them those that have begun (many need not be done again)."""
     runs = watched(progress_folder(results), [run.name for one in all_series for run in one.runs])
     measured = [step_name("measure", one.place) for one in all_series]
-    steps = [*measured, *(step_name("compare", place) for place in variants(all_series)), step_name("report")]
+    looked_at = [step_name("study", one.place) for one in studies(all_series)]
+    steps = [*measured, *looked_at, *(step_name("compare", place) for place in variants(all_series)), step_name("report")]
     later = watched(progress_folder(results), steps)
     return lambda: [*runs(), *(state for state in later() if state.state != "waiting")]
 

@@ -5,6 +5,11 @@ lambda = R / (2 K mu_mob), h the depth below the surface. Everything is defined 
 area 2 pi R dz, the solid fraction counts the volume up to r = R, although the grains' centres reach R - d/2 only. K is the wall's normal
 stress over the mean sigma_zz of the cross-section, mu_mob the wall's shear over its normal stress: both measured in the lower half
 (from one diameter above the base to half the height), none taken from the material's friction.
+
+Wet grains are also pulled to the wall by their liquid bridges, with a stress a that adds to the pressure in the contacts but not to the
+wall's net normal stress. Janssen's balance d sigma / dh = rho_b g - 2 tau / R with tau = mu_mob (K sigma + a) then gives the same law with
+the specific weight rho_b g - 2 mu_mob a / R, and mu_mob = tau / (sigma_rr + a). The stress a is measured too: each grain at the wall
+contributes the force of its bridge. Dry grains have a = 0.
 """
 
 from __future__ import annotations
@@ -13,9 +18,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from dembark.validation.checks.column import Array, Column, Mask, janssen, overlap, read
+from dembark.validation.checks.column import Array, Column, Mask, janssen, read
+from dembark.validation.checks.filling import filling_study
 from dembark.validation.checks.quantity import Quantity
 from dembark.validation.checks.run import Replica, pooled, profile, resampled, time_blocks
+from dembark.validation.checks.vessel import overlap
 from dembark.validation.references import CAMBAU, JANSSEN, LANDRY, WALKER
 from dembark.validation.statistics import Estimate, block_mean
 
@@ -51,6 +58,8 @@ def _scalars(column: Column) -> dict[str, Estimate]:
         "worst": column.worst_deviation,
         "k": column.stress_ratio,
         "mobilisation": column.mobilisation,
+        "adhesion": column.adhesive_stress,
+        "hanging": column.hanging_weight,
         "fraction": column.solid_fraction,
         "base_predicted": column.predicted_base_share,
         "base_error": lambda keep, places: column.base_share(keep) / column.predicted_base_share(keep, places) - 1.0,
@@ -74,13 +83,17 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
     """Quantities, profiles and remarks for the report from all replicas of a series."""
     columns = [read(replica) for replica in replicas]
     scalars = [_scalars(column) for column in columns]
-    radius = columns[0].radius
+    radius = columns[0].size
 
     def over(name: str, factor: float = 1.0) -> Estimate:
         found = pooled(scalars, name)
         return Estimate(found.value * factor, found.half * factor, found.basis)
 
-    zero = Estimate(0.0, 0.0)
+    def known(values: list[float]) -> Estimate:
+        mean = float(np.mean(values))
+        return Estimate(mean, float(np.ptp(values)) / 2.0, "range of the packings")
+
+    zero, wet = Estimate(0.0, 0.0), bool(columns[0].adhesion.any())
     field = over("field_error")
     allowed = max(field.half, BALANCE_TOLERANCE)
     field_verdict = "info" if not field.half <= TOLERANCE else "pass" if abs(field.value) <= allowed else "fail"
@@ -94,7 +107,7 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
             tolerance=TOLERANCE,
             absolute=True,
             source=JANSSEN.short,
-            detail="Janssen's law with measured K, μ_mob and ρ_b, nothing fitted",
+            detail="Janssen's law with measured K, μ_mob, ρ_b" + (" and adhesion a" if wet else "") + ", nothing fitted",
             compared=False,
         ),
         Quantity(
@@ -156,10 +169,23 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
         ),
         Quantity(
             "wall_mobilisation",
-            "μ_mob = τ / σ_rr",
+            "μ_mob = τ / (σ_rr + a)" if wet else "μ_mob = τ / σ_rr",
             "1",
             over("mobilisation"),
             detail=f"lower half; the wall's static friction is {columns[0].wall_friction:g}",
+        ),
+        *(
+            [
+                Quantity(
+                    "wall_adhesion",
+                    "a: pull of the liquid bridges on the wall",
+                    "Pa",
+                    over("adhesion"),
+                    detail="lower half; force of the bridges of all grains at the wall over its area",
+                )
+            ]
+            if wet
+            else []
         ),
         Quantity(
             "solid_fraction",
@@ -168,6 +194,8 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
             over("fraction"),
             detail="by exact sphere slices up to r = R, without one diameter at base and surface",
         ),
+        Quantity("filled_mass", "mass of the grains", "kg", known([column.mass for column in columns]), compared=False),
+        Quantity("filling_height", "filling height over R", "R", known([column.height / radius for column in columns])),
         Quantity(
             "hydrostatic_height",
             "depth of the hydrostatic zone (two-parameter form), over R",
@@ -195,9 +223,15 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
         if mobilised > 0.85 * kinetic
         else "Spheres roll along a smooth wall instead of sliding, which keeps the shear below Coulomb's limit."
     )
+    if wet:
+        share = 1.0 - over("hanging").value / float(np.mean([column.weight for column in columns]))
+        manner += (
+            f" Liquid bridges pull the grains to the wall with {over('adhesion').value:.3g} Pa; the friction of that pull alone carries "
+            f"{share:.0%} of the weight, and Janssen's law is taken with what is left of it."
+        )
     remarks = [
         (
-            f"The wall carries {limits} friction (τ / σ_rr = {mobilised:.3f}; static {static:g}, kinetic {kinetic:g}). {manner} Janssen's "
+            f"The wall carries {limits} friction (μ_mob = {mobilised:.3f}; static {static:g}, kinetic {kinetic:g}). {manner} Janssen's "
             "law is therefore checked with the measured mobilisation; with the static coefficient in its place λ would come out shorter by the first "
             "of these shares."
         ),
@@ -212,6 +246,12 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
     return found, _profiles(columns, over), remarks
 
 
+def study(name: str, points: Sequence[dict[str, Any]], along: str) -> tuple[list[Quantity], list[dict[str, Any]], list[str]]:
+    """The study `filling`: apparent mass against filled mass."""
+    del name, along
+    return filling_study(points, TOLERANCE)
+
+
 def _profiles(columns: Sequence[Column], over: Any) -> list[dict[str, Any]]:
     first = columns[0]
     place = np.linspace(0.02, 0.98, 40)
@@ -223,9 +263,8 @@ def _profiles(columns: Sequence[Column], over: Any) -> list[dict[str, Any]]:
         return np.convolve(values, kernel, "same") / np.convolve(np.ones_like(values), kernel, "same")
 
     height = float(np.mean([column.height for column in columns]))
-    weight = float(np.mean([column.weight for column in columns]))
-    law = janssen(height * (1.0 - place), over("predicted").value, weight)
-    k, friction = over("k").value, over("mobilisation").value
+    law = janssen(height * (1.0 - place), over("predicted").value, over("hanging").value)
+    k, friction, adhesion = over("k").value, over("mobilisation").value, over("adhesion").value
 
     def entry(
         name: str, title: str, across: str, get: Any, reference: Array | None = None, label: str = "", note: str = ""
@@ -258,15 +297,15 @@ def _profiles(columns: Sequence[Column], over: Any) -> list[dict[str, Any]]:
             "Wall shear stress",
             "τ (Pa)",
             lambda c, f, s: smooth(c.wall(c.shear, f, s)),
-            friction * k * law,
-            "K μ_mob × Janssen",
+            friction * (k * law + adhesion),
+            "μ_mob (K × Janssen + a)" if adhesion else "K μ_mob × Janssen",
             moving,
         ),
         entry(
             "mobilisation",
             "Mobilised wall friction",
-            "τ / σ_rr",
-            lambda c, f, s: smooth(c.wall(c.shear, f, s)) / smooth(c.wall(c.normal, f, s)),
+            "τ / (σ_rr + a)" if adhesion else "τ / σ_rr",
+            lambda c, f, s: smooth(c.wall(c.shear, f, s)) / smooth(c.wall(c.normal, f, s) + c.wall(c.adhesion, f, s)),
             np.full_like(place, first.wall_friction),
             "static friction of the wall",
             moving,

@@ -180,7 +180,9 @@ def _context(results: Path, pages: list[Page], folder: Path) -> dict[str, Any]:
         "references": list(
             {one["short"]: one for page in pages for metrics in page.metrics.values() for one in metrics.get("references", [])}.values()
         ),
-        "provenance": [(page, engine, metrics["provenance"]) for page in pages for engine, metrics in sorted(page.metrics.items())],
+        "provenance": [
+            (page, engine, metrics["provenance"]) for page in pages if not page.is_study for engine, metrics in sorted(page.metrics.items())
+        ],
     }
 
 
@@ -200,7 +202,8 @@ def summary(counts: dict[str, int], pages: list[Page]) -> str:
 
 def _page(page: Page, pages: list[Page], folder: Path) -> dict[str, Any]:
     numerical, physical = studies(page, pages)
-    image, reasons = pictures.picture({engine: _scene(page, engine) for engine in sorted(page.metrics)})
+    scenes = {engine: _scene(page, engine) for engine in sorted(page.metrics) if page.metrics[engine].get("picture")}
+    image, reasons = pictures.picture(scenes) if scenes else (None, [])
     profiles = {engine: metrics["profiles"] for engine, metrics in sorted(page.metrics.items())}
     names = list(dict.fromkeys(one["name"] for of_engine in profiles.values() for one in of_engine))
     for name in names:

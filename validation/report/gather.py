@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from dembark.validation.cases import Case, discover
+from dembark.validation.cases import STUDY_PREFIX, Case, discover
 from dembark.validation.errors import DembarkError
 from dembark.validation.files import read_json
 
@@ -36,9 +36,19 @@ class Page:
         return f"{self.case}-{self.variant}"
 
     @property
+    def is_study(self) -> bool:
+        """Whether it looks at several variants together."""
+        return self.variant.startswith(STUDY_PREFIX)
+
+    @property
+    def heading(self) -> str:
+        """Title of the page."""
+        return self.title if self.is_study else f"{self.title}: {self.variant.replace('_', ' ')}"
+
+    @property
     def name(self) -> str:
         """For people."""
-        return f"{self.case.replace('_', ' ')} / {self.variant.replace('_', ' ')}"
+        return f"{self.case.replace('_', ' ')} / {self.variant.replace('_', ' ').replace('-', ' ')}"
 
 
 def gather(results: Path) -> list[Page]:
@@ -72,6 +82,8 @@ def gather(results: Path) -> list[Page]:
             continue
         one = page(path.parts[-4], path.parts[-3])
         one.metrics[path.parts[-2]] = content
+        if one.is_study:
+            one.title, one.description = content.get("title", one.title), content.get("description", "")
         if path.parts[-2] not in one.engines:
             one.engines.append(path.parts[-2])
     for one in pages.values():
@@ -81,7 +93,7 @@ def gather(results: Path) -> list[Page]:
         one.missing += [
             (engine, None, "it could not be measured") for engine in one.engines if engine not in one.metrics and engine not in told
         ]
-    return sorted(pages.values(), key=lambda one: (one.case != "silo", one.case, "wet" in one.variant, one.variant))
+    return sorted(pages.values(), key=lambda one: (one.case != "silo", one.case, one.is_study, "wet" in one.variant, one.variant))
 
 
 def _cases() -> Mapping[str, Case]:
@@ -127,7 +139,7 @@ def studies(page: Page, pages: list[Page]) -> tuple[list[dict[str, Any]], list[d
     """
     numerical, physical = [], []
     for other in pages:
-        if other.case != page.case or other is page:
+        if other.case != page.case or other is page or page.is_study or other.is_study:
             continue
         for engine in sorted(page.metrics.keys() & other.metrics.keys()):
             one, two = page.metrics[engine], other.metrics[engine]

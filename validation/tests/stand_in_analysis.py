@@ -18,6 +18,12 @@ def measure(folder):
     return {**{key: first[key] for key in ("case", "variant", "engine", "profile", "parameters")}, "quantities": [quantity]}
 
 
+def study(planned, folders):
+    points = [json.loads((folder / "metrics.json").read_text()) for folder in folders]
+    numbers = [point["parameters"][planned.along] for point in points]
+    return {"case": points[0]["case"], "variant": planned.folder_name, "engine": points[0]["engine"], "quantities": [], "numbers": numbers}
+
+
 def compare(folder):
     return {"engines": sorted(path.parent.name for path in folder.glob("*/metrics.json")), "quantities": []}
 
@@ -28,7 +34,6 @@ def build(folder):
     (folder / "report.pdf").write_text("pdf")
 
 
-for name, function in (("metrics", measure), ("compare", compare), ("report", build)):
-    module = types.ModuleType(f"dembark.validation.{name}")
+for name, function in (("metrics", measure), ("metrics", study), ("compare", compare), ("report", build)):
+    module = sys.modules.setdefault(f"dembark.validation.{name}", types.ModuleType(f"dembark.validation.{name}"))
     setattr(module, function.__name__, function)
-    sys.modules[module.__name__] = module

@@ -86,6 +86,18 @@ def test_constraint_holds_between_parameters(decks: Path) -> None:
     assert resolve(case, changes={"static_friction": "auto", "kinetic_friction": 0.6})["static_friction"] is None
 
 
+STUDY = """
+[variants.large]
+grain_count = 30
+
+[studies.size]
+title = "Sizes"
+along = "grain_count"
+variants = ["dry", "wet", "large"]
+
+"""
+
+
 @pytest.mark.parametrize(("old", "new", "words"), [
     ('type = "int"', 'type = "integer"', ["integer", "int"]),
     ('unit = "m"', 'unit = "metrez"', ["metrez", "parameters.grain_diameter"]),
@@ -103,6 +115,10 @@ def test_constraint_holds_between_parameters(decks: Path) -> None:
     ("kinetic_friction <= static_friction", "__import__('os')", ["arithmetic"]),
     ("[case]", "[case", ["cannot be read"]),
     ('title = "A box"', "title = 3", ["title", "wrong type"]),
+    ("[runs]", STUDY.replace('along = "grain_count"', 'along = "grain_cont"') + "[runs]", ["studies.size", "did you mean grain_count"]),
+    ("[runs]", STUDY.replace('"wet"', '"wett"') + "[runs]", ["studies.size", "did you mean wet"]),
+    ("[runs]", STUDY.replace(', "wet"', "") + "[runs]", ["studies.size", "at least three variants"]),
+    ("[runs]", STUDY.replace("along", "alone") + "[runs]", ["studies.size", "alone"]),
 ])
 def test_mistakes_in_a_case_file_are_told(decks: Path, old: str, new: str, words: list[str]) -> None:
     path = edited(decks, old, new)

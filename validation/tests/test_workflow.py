@@ -10,7 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from dembark.validation import cases
 from dembark.validation.files import read_json
+from dembark.validation.jobs import variants
+from dembark.validation.plan import campaign, studies
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
@@ -22,7 +25,7 @@ def start(tmp_path: Path, environment: dict[str, str], *words: str) -> subproces
 
 def dembark(tmp_path: Path, environment: dict[str, str], *words: str) -> tuple[int, str, str]:
     process = start(tmp_path, environment, *words)
-    out, error = process.communicate(timeout=120)
+    out, error = process.communicate(timeout=300)
     assert "Traceback" not in error
     return process.returncode, out, error
 
@@ -54,6 +57,45 @@ def test_all_runs_then_none_again_then_only_what_changed(tmp_path: Path, environ
     assert code == 0 and error.count("kept") == 2 and error.count("1: finished in") == 1
     assert sum(path.stat().st_mtime_ns != before for path, before in made.items()) == 1
     assert read_json(results / "box/wet/liggghts/metrics.json")["parameters"]["grain_count"] == 12
+
+
+STUDY = """[variants.large]
+grain_count = 30
+[variants.huge]
+grain_count = 40
+[studies.size]
+title = "Sizes"
+along = "grain_count"
+variants = ["dry", "large", "huge"]
+[runs]
+"""
+
+
+def test_studies_are_planned_for_engines_that_run_all_their_variants(decks: Path) -> None:
+    path = decks / "box" / "case.toml"
+    path.write_text(path.read_text().replace("[runs]\n", STUDY).replace(
+        '{variant = "wet", engines = ["liggghts"]}', '{variant = "large"}, {variant = "huge", engines = ["yade"]}'))
+    planned = campaign("quick")
+    assert [str(one.place) for one in studies(planned)] == ["box/study-size/yade"]
+    assert len(variants(planned)[Path("box/large")]) == 2 and len(variants(planned)[Path("box/study-size")]) == 1
+    path.write_text(path.read_text().replace(', engines = ["yade"]', ""))
+    cases.load.cache_clear()
+    assert len(variants(campaign("quick"))[Path("box/study-size")]) == 2
+
+
+def test_a_study_is_made_of_its_variants_and_again_when_one_of_them_changes(tmp_path: Path, environment: dict[str, str], decks: Path) -> None:
+    path = decks / "box" / "case.toml"
+    path.write_text(path.read_text().replace("[runs]\n", STUDY).replace('{variant = "dry"}, {variant = "wet", engines = ["liggghts"]}', '{variant = "dry", engines = ["liggghts"]}, '
+                    '{variant = "large", engines = ["liggghts"]}, {variant = "huge", engines = ["liggghts"]}'))
+    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    results = tmp_path / "results" / "quick"
+    assert code == 0, error + (results / "workflow.log").read_text()
+    assert read_json(results / "box/study-size/liggghts/metrics.json")["numbers"] == [10, 30, 40]
+    assert "box/study-size/liggghts/metrics.json" in (results / "report.html").read_text()
+
+    path.write_text(path.read_text().replace("grain_count = 40", "grain_count = 50"))
+    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    assert code == 0 and read_json(results / "box/study-size/liggghts/metrics.json")["numbers"] == [10, 30, 50]
 
 
 def test_a_failed_run_is_missing_in_the_report_and_nothing_stale_takes_its_place(

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from dembark.physics import capillary_force
 from dumps import contacts_text, grains_text, write_times
 
 GRAVITY, DIAMETER, DENSITY = 9.81, 0.005, 2500.0
@@ -54,19 +55,25 @@ def silo(
     noise: float = 0.0,
     seed: int = 0,
     lost_wall_force: float = 0.0,
+    bridge_volume: float = 0.0,
 ) -> Path:
     """Write a replica whose wall and base forces follow Janssen's law; returns the engine's folder.
 
-    `noise`: relative scatter of the wall forces among grains and frames; `lost_wall_force`: share that is missing in time.csv.
+    `noise`: relative scatter of the wall forces among grains and frames; `lost_wall_force`: share that is missing in time.csv;
+    `bridge_volume` (m3): every grain hangs on the wall by a liquid bridge too, whose pull is rubbed like the rest of the pressure.
     """
     random = np.random.default_rng(seed)
     radius, levels, ring = 0.025, 30, 24
     angle = 2.0 * np.pi * np.arange(ring) / ring
     height = DIAMETER * (np.arange(levels) + 0.5)
-    place = np.array([[(radius - 0.5 * DIAMETER) * np.cos(a), (radius - 0.5 * DIAMETER) * np.sin(a), z] for z in height for a in angle])
+    off = radius - 0.4999 * DIAMETER
+    place = np.array([[off * np.cos(a), off * np.sin(a), z] for z in height for a in angle])
+    liquid = {"bridge_volume": bridge_volume, "surface_tension": 0.072, "contact_angle": 0.35, "capillary_model": "exact"}
+    pull = float(capillary_force(0.5 * DIAMETER, np.inf, 0.0, bridge_volume, 0.072, 0.35)) if bridge_volume else 0.0
     mass = np.full(len(place), 0.6 * DENSITY * np.pi * radius**2 * DIAMETER / ring)
     length, top = radius / (2.0 * k * friction), levels * DIAMETER
     weight = mass.sum() * GRAVITY / (np.pi * radius**2 * top)
+    weight -= 2.0 * friction * (ring * pull / (2.0 * np.pi * radius * DIAMETER)) / radius
     stress = weight * length * -np.expm1(-(top - place[:, 2]) / length)
     push = k * stress * 2.0 * np.pi * radius * DIAMETER / ring
     outward = place[:, :2] / np.hypot(place[:, 0], place[:, 1])[:, None]
@@ -76,7 +83,7 @@ def silo(
     below, above = np.arange(len(place) - ring), np.arange(ring, len(place))
     for step in steps:
         own = push * (1.0 + noise * random.standard_normal(len(push)))
-        side = np.column_stack([-own[:, None] * outward, friction * own])
+        side = np.column_stack([-own[:, None] * outward, friction * (own + pull)])
         carried = np.cumsum((mass * GRAVITY - side[:, 2]).reshape(levels, ring)[::-1], axis=0)[::-1].ravel()
         base = np.zeros_like(side)
         base[:ring, 2] = carried[:ring]
@@ -108,6 +115,7 @@ def silo(
         "grain_density": DENSITY,
         "seed": replica,
         "grain_count": len(place),
+        **liquid,
     }
     _finish(folder, engine, replica, "silo", variant, parameters, grains, contacts)
     return folder.parent

@@ -1,11 +1,14 @@
 """The cases' checks find what was put into synthetic runs, and do not pass what is wrong."""
 
 import json
+import types
 
 import numpy as np
 import pytest
+from dembark.physics import capillary_force
 from dembark.validation.checks import find
-from dembark.validation.checks.column import janssen, two_parameter
+from dembark.validation.checks.column import _wall_pull, janssen, two_parameter
+from dembark.validation.checks.filling import apparent_mass_with_onset
 from dembark.validation.checks.quantity import Quantity, judge
 from dembark.validation.compare import compare, pair
 from dembark.validation.errors import RunError
@@ -39,6 +42,55 @@ def test_silo_that_follows_janssen_passes(tmp_path):
     } == {"pass"}
     assert abs(found["field_balance_deviation"]["value"]) < 1e-9
     assert json.loads((folder / "metrics.json").read_text()) == content
+
+
+def test_wet_silo_follows_janssen_with_the_adhesion_that_hangs_on_the_wall(tmp_path):
+    found = by_name(measure(silo(tmp_path, k=0.8, friction=0.25, noise=0.02, bridge_volume=8e-11)))
+    bridge = float(capillary_force(0.5 * DIAMETER, np.inf, 0.0, 8e-11, 0.072, 0.35))
+    assert found["wall_adhesion"]["value"] == pytest.approx(24 * bridge / (2 * np.pi * 0.025 * DIAMETER), rel=5e-3)  # bands of the measured height
+    assert found["stress_ratio_k"]["value"] == pytest.approx(0.8, rel=0.02)
+    assert found["wall_mobilisation"]["value"] == pytest.approx(0.25, rel=0.01)
+    assert found["janssen_length_predicted"]["value"] == pytest.approx(2.5, rel=0.02)
+    assert found["janssen_length_measured"]["value"] == pytest.approx(2.5, rel=0.03)
+    assert {found[name]["verdict"] for name in ("janssen_profile_deviation", "janssen_length_predicted", "apparent_mass_ratio")} == {"pass"}
+
+
+def test_a_grain_off_the_wall_counts_with_the_bridge_it_has(tmp_path):
+    radii, radius = np.array([0.0025, 0.0025, 0.0025]), 0.025
+    place = np.array([[0.0226, 0.0, 0.0], [0.0, 0.0224, 0.0], [0.0, -0.0224, 0.0]])  # touching; off with a bridge; off without
+    side = np.array([[-0.1, 0.0, 0.0], [0.0, 3e-4, 1e-5], [0.0, 0.0, 0.0]])
+    grains = types.SimpleNamespace(positions=place, radii=radii)
+    pull = _wall_pull(grains, side, radius, lambda found: np.full(len(found), 7e-4))
+    np.testing.assert_allclose(pull, [[7e-4, 0.0, 0.0], [0.0, 3e-4, 0.0], [0.0, 0.0, 0.0]], atol=1e-18)
+    assert not _wall_pull(grains, side, radius, None).any()
+
+
+def filling_points(length, per_radius=0.07, radii=(1.0, 2.0, 4.0), hydrostatic=0.0, half=0.0):
+    saturation = length * per_radius
+    for height in radii:
+        mass = per_radius * height
+        apparent = float(apparent_mass_with_onset(np.array([mass]), saturation, hydrostatic)[0])
+        values = {"filled_mass": mass, "filling_height": height, "apparent_mass_ratio": apparent / mass, "janssen_length_predicted": length}
+        yield {"quantities": [{"name": name, "value": value, "interval": [value - half, value + half]} for name, value in values.items()]}
+
+
+def test_filling_curve_gives_back_its_length():
+    found, (curve,), _ = find("silo").study("filling", list(filling_points(2.1, half=0.01)), "grain_count")
+    quantity = {one.name: one for one in found}
+    assert quantity["filling_length"].estimate.value == pytest.approx(2.1, rel=1e-6)
+    assert 0.0 < quantity["filling_length"].estimate.half < 0.2
+    assert quantity["filling_length"].judged()[0] == quantity["largest_apparent_mass"].judged()[0] == "pass"
+    np.testing.assert_allclose(curve["value"], curve["reference"], rtol=1e-6)
+
+
+def test_filling_curve_with_another_length_than_the_walls_fails_and_a_hydrostatic_zone_is_found():
+    points = list(filling_points(2.1, half=0.001))
+    for point in points:
+        point["quantities"][-1] |= {"value": 3.0, "interval": [2.99, 3.01]}
+    found, _, _ = find("silo").study("filling", points, "grain_count")
+    assert found[0].judged()[0] == "fail"
+    found, _, _ = find("silo").study("filling", list(filling_points(1.5, radii=(0.5, 1.0, 2.0, 3.0, 5.0), hydrostatic=0.07)), "grain_count")
+    assert found[2].estimate.value > 0.95
 
 
 def test_solid_fraction_counts_up_to_the_wall(tmp_path):
