@@ -3,7 +3,7 @@
 #
 #   packaging/install_liggghts.sh .../LIGGGHTS-PUBLIC/src
 #
-# The style headers go into src/ as they are, the headers of the laws into src/dembark/, and the combinations of contact models into
+# The styles go into src/ as they are, the headers of the laws into src/dembark/, and the combinations of contact models into
 # style_contact_model_user.whitelist, from which LIGGGHTS's own `make` generates its optimised pair loops. A second run changes
 # only what differs, so that nothing is compiled again without need.
 set -euo pipefail
@@ -45,6 +45,16 @@ copy() {  # copy FILE TARGET
 for file in "$here"/plugins/liggghts/*_model_*.h "$here"/plugins/liggghts/{model_properties,settings_choice}.h; do
   copy "$file" "$src/$(basename "$file")"
 done
+# The fix for impacts of logs solves its equations with Eigen, a library of headers; without it LIGGGHTS would not compile any more.
+eigen=$(pkg-config --cflags eigen3 2>/dev/null || true)
+[ -n "$eigen" ] || { [ -d /usr/include/eigen3/Eigen ] && eigen=-I/usr/include/eigen3; }
+if [ -n "$eigen" ]; then
+  for file in "$here"/plugins/liggghts/fix_*.h "$here"/plugins/liggghts/fix_*.cpp; do
+    copy "$file" "$src/$(basename "$file")"
+  done
+else
+  echo "dembark: Eigen 3.4 (libeigen3-dev) is not there, so fix lcp/impact is left out; install it and run this again" >&2
+fi
 while IFS= read -r file; do
   copy "$here/plugins/physics/$file" "$src/dembark/$file"
 done < <(cd "$here/plugins/physics" && find . -name '*.hpp' -not -path './tests/*' -not -path './python/*' | sed 's|^\./||' | sort)
@@ -71,7 +81,9 @@ if grep -q 'static_cast< std::ostringstream' "$src/utils.h"; then
   echo "Note: as published, LIGGGHTS 3.8.0 does not compile as C++17; utils.h and finish.cpp need the mending that Debian and others apply."
 fi
 cat <<END
-Next, in that folder: build LIGGGHTS as you always do, with C++17 (g++ 8 or newer; a -std=c++11 in CCFLAGS has to become -std=c++17), e.g.
+Next, in that folder: build LIGGGHTS as you always do, with C++17 (g++ 8 or newer; a -std=c++11 in CCFLAGS has to become -std=c++17)${eigen:+
+and $eigen in CCFLAGS}, e.g.
   make auto
-and use  pair_style gran model hertz tangential finnie_rabinowicz [cohesion capillary]  in your input, as in liggghts-dembark.
+and use  pair_style gran model hertz tangential finnie_rabinowicz [cohesion capillary]  or  fix ... lcp/impact  in your input, as in
+liggghts-dembark.
 END

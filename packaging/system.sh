@@ -7,11 +7,13 @@ set -euo pipefail
 
 packages=(
   # compilers and build tools
-  g++ cmake ninja-build make git catch2 pkg-config
+  g++ cmake ninja-build make git catch2 pkg-config libeigen3-dev
   # LIGGGHTS: the stock engine, its headers, MPI
   liggghts libliggghts-dev openmpi-bin libopenmpi-dev
   # Python: the project's virtual environment is made with the system's
   python3 python3-dev python3-venv
+  # Siconos: the peer of the LCP solver in tests and benchmarks
+  python3-siconos python3-scipy
   # the report: text layout for the PDF, off-screen rendering for the pictures
   libpango-1.0-0 libpangoft2-1.0-0 libharfbuzz-subset0 fonts-dejavu-core
   libegl1 libgl1 libosmesa6 libxrender1 libxcursor1 libxft2 libxinerama1
@@ -19,7 +21,7 @@ packages=(
 # YADE: what its build and its Python need; a group's own YADE brings its own.
 if [ -z "${YADE_PREFIX:-}" ]; then
   packages+=(
-    libboost-all-dev libeigen3-dev libgts-dev libloki-dev libbz2-dev zlib1g-dev libxi-dev freeglut3-dev libxmu-dev bzip2
+    libboost-all-dev libgts-dev libloki-dev libbz2-dev zlib1g-dev libxi-dev freeglut3-dev libxmu-dev bzip2
     python3-numpy python3-matplotlib python3-ipython python3-pygraphviz python3-tk python3-mpmath python3-pil python3-xlib
     python3-future python3-sphinx
   )

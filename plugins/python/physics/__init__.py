@@ -6,15 +6,27 @@ All quantities are in SI units.
 from dembark.physics.capillary import CAPILLARY_MODELS, capillary_force, rupture_distance
 from dembark.physics.contact import Body, Contact, ContactForce, Trajectory, collide, drop
 from dembark.physics.friction import FinnieRabinowicz, FrictionPath
+from dembark.physics.impact import Drum, Impact, ImpactChain, ImpactMotion, ImpactSystem, Plane
+from dembark.physics.lcp import LCP_METHODS, LcpCertificate, LcpResult, LcpSolver, solve_lcp
 from dembark.physics.normal import effective_shear_modulus, effective_youngs_modulus
 
 __all__ = [
     "CAPILLARY_MODELS",
+    "LCP_METHODS",
     "Body",
     "Contact",
     "ContactForce",
+    "Drum",
     "FinnieRabinowicz",
     "FrictionPath",
+    "Impact",
+    "ImpactChain",
+    "ImpactMotion",
+    "ImpactSystem",
+    "LcpCertificate",
+    "LcpResult",
+    "LcpSolver",
+    "Plane",
     "Trajectory",
     "capillary_force",
     "collide",
@@ -22,4 +34,5 @@ __all__ = [
     "effective_shear_modulus",
     "effective_youngs_modulus",
     "rupture_distance",
+    "solve_lcp",
 ]

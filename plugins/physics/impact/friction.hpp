@@ -1,0 +1,52 @@
+// Friction on top of the normal forces: the Finnie-Rabinowicz law with a trial force that stays stable at any stiffness.
+//
+// The spring xi ends the step where the bodies are after it, xi' = xi + tau v', and v' depends on the force itself,
+// v' = v + kick tau w T, w the response of the contact to a tangential force (1/kg). Spring and dash-pot in parallel, as in the normal
+// direction, T = -k xi' - c (xi' - xi) / tau, give while the contact sticks
+//     T = T_0 - k' (tau v - kick tau^2 w (T* - T_0)),   k' = K / (1 + K kick tau^2 w),   K = k + c / tau,   T_0 = -k xi,
+// where v already holds the forces T* of the last sweep. k' stays below 1/(kick tau^2 w) however stiff the contact is. Several contacts on
+// a body share its mass: w counts it as many times as the body has contacts, so that sweeps over all contacts at once converge for any
+// number of them (the split response exceeds the coupled one), and a single sweep is stable. Slip takes T back to the limit of the
+// law; what is left in the spring is xi' = (c xi / tau - T) / K.
+#pragma once
+
+#include "../finnie_rabinowicz.hpp"
+#include "assembly.hpp"
+#include "types.hpp"
+
+namespace dembark {
+namespace impact {
+
+/// Area (m^2) that the interface's shear strength counts on: as given, or the circle pi R* N / s of the springs' approach N / s.
+inline double friction_area(const Row& row, double normal_force) {
+  if (row.law->contact_area > 0.0) return row.law->contact_area;
+  return 3.14159265358979323846 * row.radius * normal_force / row.stiffness;
+}
+
+/// One sweep of one contact.
+///
+/// normal_force  N, N               response   w, 1/kg, split among the contacts of each body
+/// velocity      tangential velocity of a relative to b at the contact, m/s, with the forces of the last sweep
+/// last          T*, N, of the last sweep     start   T_0 = -k xi, N, at the begin of the step, in the contact plane
+/// state         slip at the begin of the step; gets slip and elastic displacement at its end
+///
+/// Returns the force on a (N).
+inline Vec3<double> friction_sweep(const Row& row, double normal_force, double response, const Vec3<double>& velocity,
+                                   const Vec3<double>& last, const Vec3<double>& start, double dt, double kick,
+                                   FrictionState<double>& state) {
+  if (!(normal_force > 0.0) || row.law->friction.static_friction == 0.0) {
+    state = {};
+    return {};
+  }
+  const double ratio = row.law->tangential_stiffness_ratio, k = ratio * row.stiffness, viscous = ratio * row.law->contact_damping / dt;
+  const double inertia = kick * dt * dt * response, soft = (k + viscous) / (1.0 + (k + viscous) * inertia);
+  state.displacement = start * (-1.0 / soft);
+  const Vec3<double> effective = velocity - (inertia / dt) * (last - start);
+  const Vec3<double> force =
+      friction_step(row.law->friction, normal_force, soft, 0.0, friction_area(row, normal_force), effective, dt, state);
+  state.displacement = (force + (viscous / k) * start) * (-1.0 / (k + viscous));
+  return force;
+}
+
+}  // namespace impact
+}  // namespace dembark

@@ -1,0 +1,155 @@
+// A few bodies, walls and constant forces on their own, without an engine: the leapfrog that engines run, around impact::System.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "geometry.hpp"
+#include "system.hpp"
+
+namespace dembark {
+namespace impact {
+
+/// Velocities given are those at time 0; the first step has half a kick, as the set-up of velocity Verlet. The `force` and `torque` of the
+/// bodies stay as they are (weight).
+class Scene {
+ public:
+  std::vector<Plane> planes;
+  std::vector<Drum> drums;
+  double reach = 0.0;  ///< m, of the search for candidates; 0 = default_reach
+  bool row = false;    ///< bodies along x that never change places: contacts between neighbours by number, and with the planes only
+
+  Scene(Settings settings, std::vector<Body> bodies) : system_(std::move(settings)), bodies_(std::move(bodies)) {
+    force_.resize(bodies_.size());
+    torque_.resize(bodies_.size());
+    velocity_.resize(bodies_.size());
+    spin_.resize(bodies_.size());
+  }
+
+  System& system() { return system_; }
+  const System& system() const { return system_; }
+  /// Positions at the moment, velocities half a step before it (at it before the first step).
+  const std::vector<Body>& bodies() const { return bodies_; }
+  /// s
+  double time() const { return double(count_) * system_.settings().dt; }
+  /// Of the moment; need forces().
+  const std::vector<Vec3<double>>& velocity() const { return velocity_; }
+  const std::vector<Vec3<double>>& spin() const { return spin_; }
+
+  /// Contact forces of the moment. Asking twice changes nothing.
+  const StepReport& forces() {
+    contacts_.clear();
+    if (row) row_contacts();
+    else find_contacts();
+    force_.assign(bodies_.size(), {});
+    torque_.assign(bodies_.size(), {});
+    const double kick = count_ == 0 ? 0.5 : 1.0, dt = system_.settings().dt;
+    const StepReport& report = system_.step(bodies_, contacts_, time(), kick, force_, torque_);
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      const Body& b = bodies_[i];
+      velocity_[i] = b.velocity;
+      spin_[i] = b.spin;
+      if (count_ == 0) continue;
+      velocity_[i] += (0.5 * dt / b.mass) * (b.force + force_[i]);
+      spin_[i] += (0.5 * dt / b.inertia) * (b.torque + torque_[i]);
+    }
+    return report;
+  }
+
+  /// One step on with the forces of the moment, which must have been asked for.
+  void advance() {
+    const double dt = system_.settings().dt, kick = (count_ == 0 ? 0.5 : 1.0) * dt;
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      Body& b = bodies_[i];
+      b.velocity += (kick / b.mass) * (b.force + force_[i]);
+      b.spin += (kick / b.inertia) * (b.torque + torque_[i]);
+      b.position += dt * b.velocity;
+    }
+    for (Plane& p : planes) p.point += dt * p.velocity;
+    for (Drum& d : drums) d.point += dt * d.velocity;
+    ++count_;
+  }
+
+  void run(std::int64_t steps) {
+    for (std::int64_t i = 0; i < steps; ++i) {
+      forces();
+      advance();
+    }
+    forces();
+  }
+
+  /// J, of the velocities half a step before the moment (with the elastic and the dissipated energy it balances the work of the forces).
+  double kinetic_energy_of_half_step() const {
+    double sum = 0.0;
+    for (const Body& b : bodies_) {
+      if (!std::isinf(b.mass)) sum += 0.5 * b.mass * dot(b.velocity, b.velocity);
+      if (!std::isinf(b.inertia)) sum += 0.5 * b.inertia * dot(b.spin, b.spin);
+    }
+    return sum;
+  }
+
+  /// Everything needed to go on bit for bit.
+  std::vector<double> state() const {
+    std::vector<double> out = system_.state();
+    out.push_back(double(count_));
+    const auto put = [&](const Vec3<double>& v) { out.insert(out.end(), {v.x, v.y, v.z}); };
+    for (const Body& b : bodies_) put(b.position), put(b.velocity), put(b.spin);
+    for (const Plane& p : planes) put(p.point);
+    for (const Drum& d : drums) put(d.point);
+    return out;
+  }
+  void restore(const std::vector<double>& state) {
+    const std::size_t own = 1 + 9 * bodies_.size() + 3 * (planes.size() + drums.size());
+    if (state.size() < own) throw std::invalid_argument("state of " + std::to_string(state.size()) + " numbers belongs to another system");
+    system_.restore(std::vector<double>(state.begin(), state.end() - std::ptrdiff_t(own)));
+    const double* at = state.data() + (state.size() - own);
+    count_ = std::int64_t(*at++);
+    const auto get = [&](Vec3<double>& v) { v = {at[0], at[1], at[2]}, at += 3; };
+    for (Body& b : bodies_) get(b.position), get(b.velocity), get(b.spin);
+    for (Plane& p : planes) get(p.point);
+    for (Drum& d : drums) get(d.point);
+  }
+
+ private:
+  void find_contacts() {
+    double speed = 0.0;
+    for (const Plane& p : planes) speed = std::max(speed, norm(p.velocity));
+    for (const Drum& d : drums) speed = std::max(speed, norm(d.velocity) + std::abs(d.omega) * d.radius);
+    const double far = reach > 0.0 ? reach : default_reach(bodies_, system_.settings().dt, speed);
+    pairs_.find(bodies_, far, contacts_);
+    for (const Plane& p : planes) plane_contacts(bodies_, p, far, contacts_);
+    for (const Drum& d : drums) cylinder_contacts(bodies_, d, far, contacts_);
+  }
+
+  void row_contacts() {
+    for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
+      Contact c;
+      c.a = int(i);
+      c.b = int(i + 1);
+      c.key_a = bodies_[i].id;
+      c.key_b = bodies_[i + 1].id;
+      c.gap = bodies_[i + 1].position.x - bodies_[i].position.x - bodies_[i].radius - bodies_[i + 1].radius;
+      c.normal = {-1.0, 0.0, 0.0};
+      contacts_.push_back(c);
+    }
+    for (const Plane& p : planes) {
+      const std::size_t end = p.normal.x > 0.0 ? 0 : bodies_.size() - 1;
+      const double gap = (bodies_[end].position.x - p.point.x) * p.normal.x - bodies_[end].radius;
+      detail::wall_contact(p, int(end), bodies_[end], p.id, gap, p.normal, p.velocity, contacts_);
+    }
+  }
+
+  System system_;
+  std::vector<Body> bodies_;
+  std::vector<Contact> contacts_;
+  std::vector<Vec3<double>> force_, torque_, velocity_, spin_;
+  PairFinder pairs_;
+  std::int64_t count_ = 0;
+};
+
+}  // namespace impact
+}  // namespace dembark

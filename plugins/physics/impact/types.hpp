@@ -1,0 +1,176 @@
+// Impacts of logs by a linear complementarity problem: what goes in and what comes out.
+//
+// A body (a log, in cross-section a disc) has its mass at the centre and a massless boundary on a spring of stiffness s (N/m). In a
+// contact the gap between the boundaries and the normal force obey D >= 0, N >= 0, D N = 0; every time step solves all contacts
+// together. The scheme is in system.hpp. The model is that of G. N. Kolesnikov (2013), in the form of leapfrog.
+//
+// Units SI. Normals point from b (or the wall) to a: the direction of the force on a.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "../energy_lcp.hpp"
+#include "../finnie_rabinowicz.hpp"
+#include "../vec3.hpp"
+
+namespace dembark {
+namespace impact {
+
+/// A body at the moment the engine computes forces: positions at step n, velocities at step n - 1/2, the forces of everything else.
+struct Body {
+  std::int64_t id = 0;      ///< >= 0, unique
+  double mass = 1.0;        ///< kg, > 0; +inf = held fast or moved by the engine
+  double inertia = 1.0;     ///< kg m^2 about the axis of the spin, > 0; +inf = does not turn. Log: m r^2 / 2
+  double radius = 1.0;      ///< m, >= 0
+  int material = 0;         ///< index into Settings::materials
+  Vec3<double> position{};  ///< m
+  Vec3<double> velocity{};  ///< m/s
+  Vec3<double> spin{};      ///< rad/s
+  Vec3<double> force{};     ///< N, everything but these contacts (weight, ...)
+  Vec3<double> torque{};    ///< N m
+};
+
+/// Inertia (kg m^2) of a solid cylinder about its axis, m r^2 / 2.
+inline double cylinder_inertia(double mass, double radius) { return 0.5 * mass * radius * radius; }
+/// Inertia (kg m^2) of a solid sphere, 2 m r^2 / 5.
+inline double sphere_inertia(double mass, double radius) { return 0.4 * mass * radius * radius; }
+
+/// What all walls have in common. The wall has infinite mass and a local stiffness of its own.
+struct Wall {
+  std::int64_t id = -1;                                           ///< < 0, unique, stable: wall_key(number)
+  int material = 0;                                               ///< index into Settings::materials: friction and damping with the bodies
+  double stiffness = std::numeric_limits<double>::infinity();     ///< s_w, N/m, > 0; +inf = rigid
+};
+
+/// The key of feature `feature` (triangle, ...) of wall `number` (both >= 0, below 2^20 and 2^32): always < 0, and exact as a double.
+/// Contacts of one body with features of the same wall hand their history on to one another.
+inline std::int64_t wall_key(std::int64_t number, std::int64_t feature = 0) {
+  return -1 - (number * (std::int64_t(1) << 32) + feature);
+}
+/// The number of the wall that a key belongs to.
+inline std::int64_t wall_number(std::int64_t key) { return (-1 - key) / (std::int64_t(1) << 32); }
+
+/// A candidate: a pair that touches or may touch within the step. Geometry is that of step n.
+struct Contact {
+  int a = 0;                       ///< index into the bodies
+  int b = -1;                      ///< index into the bodies, or -1: a wall
+  std::int64_t key_a = 0;          ///< id of body a
+  std::int64_t key_b = -1;         ///< id of body b, or the wall's key (< 0); contacts keep their history by these two
+  double gap = 0.0;                ///< m, < 0 = overlap of the undeformed bodies
+  Vec3<double> normal{};           ///< unit, from b (or the wall) to a
+  Vec3<double> point_velocity{};   ///< m/s, walls: velocity of their surface at the contact
+  int wall_material = 0;           ///< walls: index into Settings::materials
+  double wall_stiffness = std::numeric_limits<double>::infinity();  ///< walls: s_w, N/m
+};
+
+struct Material {
+  double stiffness = 1e7;  ///< s, N/m, > 0, of one body at its boundary (a wall brings its own with each contact)
+  double damping = 0.0;    ///< lambda, N s/m, >= 0: body damping, on the absolute velocity while the body is in contact
+};
+
+/// Of a pair of materials. The default is without friction.
+struct PairLaw {
+  FinnieRabinowicz friction = frictionless();
+  double tangential_stiffness_ratio = 2.0 / 7.0;  ///< tangential stiffness over the normal stiffness of the contact, > 0
+  double contact_damping = 0.0;  ///< c, N s/m, >= 0, on the deformation of the contact: Galilean invariant; the ratio's share along it
+  double contact_area = 0.0;  ///< m^2, for the shear strength of the interface; 0 = pi R* N / s, the circle of R*, N and s
+
+  static FinnieRabinowicz frictionless() {
+    FinnieRabinowicz law;
+    law.static_friction = law.kinetic_friction = 0.0;
+    return law;
+  }
+};
+
+struct Settings {
+  double dt = 1e-5;         ///< tau, s, > 0
+  double theta = 1.0;       ///< 1/2 ... 1; 1 = the published scheme, 1/2 = without its numerical loss
+  int friction_sweeps = 2;  ///< >= 1: friction and normal forces are computed in turn so many times a step
+  LcpOptions lcp{};
+  std::vector<Material> materials = std::vector<Material>(1);
+  std::vector<PairLaw> pairs = std::vector<PairLaw>(1);  ///< n x n, row by row, symmetric, n = number of materials
+};
+
+/// Of the last step, and totals since the system began (marked).
+struct StepReport {
+  int contacts = 0;               ///< candidates
+  int active = 0;                 ///< contacts with N > 0
+  int pivots = 0;                 ///< of all solves of the step
+  int block_steps = 0;            ///< likewise
+  std::int64_t impacts_begun = 0;     ///< total
+  std::int64_t pivots_total = 0;      ///< total
+  double impulse_sum = 0.0;           ///< total, N s: sum of N tau over contacts and steps
+  double peak_force = 0.0;            ///< N, largest N of the step
+  double peak_force_so_far = 0.0;     ///< N, total
+  double dissipated_energy = 0.0;     ///< total, J: friction, both dampings and the loss of the scheme
+  double elastic_energy = 0.0;        ///< J, in the springs now, normal and tangential
+  double certificate = 0.0;           ///< worst entry of the solver's certificate in the step, scaled
+  double worst_certificate = 0.0;     ///< total
+};
+
+/// One contact of the last step, for output.
+struct ContactResult {
+  int a = 0, b = -1;              ///< as in Contact, key_a < key_b for pairs
+  std::int64_t key_a = 0, key_b = -1;
+  double gap = 0.0;               ///< m, at step n, of the undeformed bodies
+  double normal_force = 0.0;      ///< N, on a along the normal
+  double opening = 0.0;           ///< D, m
+  Vec3<double> tangential{};      ///< N, on a
+  Vec3<double> normal{};
+  Vec3<double> place{};           ///< m
+};
+
+/// One impact: a contact from the first step with N > 0 to the last.
+struct Impact {
+  std::int64_t a = 0, b = -1;   ///< ids; b < 0: wall
+  double time = 0.0;            ///< s, of its first step
+  double duration = 0.0;        ///< s, steps times tau
+  double peak_force = 0.0;      ///< N
+  double impulse = 0.0;         ///< N s, sum of N tau
+  double relative_speed = 0.0;  ///< m/s, approach along the normal at the beginning, positive = closing
+  Vec3<double> place{};         ///< m, of the contact at the beginning
+  double dissipated = 0.0;      ///< J, in this contact
+};
+
+/// The one clear line about what is wrong with the settings, or an empty string.
+inline std::string settings_error(const Settings& s) {
+  if (!(s.dt > 0.0) || std::isinf(s.dt)) return "time step must be > 0 s and finite, not " + std::to_string(s.dt);
+  if (!(s.theta >= 0.5 && s.theta <= 1.0)) return "theta must lie between 0.5 and 1, not " + std::to_string(s.theta);
+  if (s.friction_sweeps < 1) return "friction sweeps must be >= 1, not " + std::to_string(s.friction_sweeps);
+  const std::size_t n = s.materials.size();
+  if (n == 0) return "at least one material is needed";
+  if (s.pairs.size() != n * n)
+    return std::to_string(n) + " materials need " + std::to_string(n * n) + " pair laws, not " + std::to_string(s.pairs.size());
+  for (std::size_t i = 0; i < n; ++i) {
+    const Material& m = s.materials[i];
+    const std::string which = "material " + std::to_string(i) + ": ";
+    if (!(m.stiffness > 0.0) || std::isinf(m.stiffness))
+      return which + "stiffness must be > 0 N/m and finite, not " + std::to_string(m.stiffness);
+    if (!(m.damping >= 0.0) || std::isinf(m.damping))
+      return which + "damping must be >= 0 N s/m and finite, not " + std::to_string(m.damping);
+  }
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j) {
+      const PairLaw &p = s.pairs[i * n + j], &q = s.pairs[j * n + i];
+      const std::string which = "materials " + std::to_string(i) + " and " + std::to_string(j) + ": ";
+      if (p.friction.error()) return which + p.friction.error();
+      if (!(p.tangential_stiffness_ratio > 0.0) || std::isinf(p.tangential_stiffness_ratio))
+        return which + "tangential stiffness ratio must be > 0, not " + std::to_string(p.tangential_stiffness_ratio);
+      if (!(p.contact_damping >= 0.0) || std::isinf(p.contact_damping))
+        return which + "contact damping must be >= 0 N s/m and finite, not " + std::to_string(p.contact_damping);
+      if (!(p.contact_area >= 0.0)) return which + "contact area must be >= 0 m^2, not " + std::to_string(p.contact_area);
+      if (p.contact_damping != q.contact_damping || p.tangential_stiffness_ratio != q.tangential_stiffness_ratio ||
+          p.contact_area != q.contact_area || p.friction.static_friction != q.friction.static_friction ||
+          p.friction.kinetic_friction != q.friction.kinetic_friction)
+        return which + "the pair laws must be the same in both orders";
+    }
+  return {};
+}
+
+}  // namespace impact
+}  // namespace dembark
