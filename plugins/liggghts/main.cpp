@@ -6,12 +6,37 @@
 
 #include <csignal>
 #include <cstdio>
+#include <map>
+#include <string>
 
 #include "input.h"
 #include "lammps.h"
+#include "modify.h"
 #include "signal_handling.h"
 
+#include "fix_lcp_impact.h"
 #include "granular_combinations.h"
+
+namespace {
+
+// The table of fix styles is private; an explicit instantiation may name a private member.
+typedef LAMMPS_NS::Fix* (*FixCreator)(LAMMPS_NS::LAMMPS*, int, char**);
+struct FixTable {
+  typedef std::map<std::string, FixCreator>* LAMMPS_NS::Modify::*type;
+  friend type table(FixTable);
+};
+template <class Tag, typename Tag::type Member>
+struct Reach {
+  friend typename Tag::type table(Tag) { return Member; }
+};
+template struct Reach<FixTable, &LAMMPS_NS::Modify::fix_map>;
+
+template <class Style>
+LAMMPS_NS::Fix* create_fix(LAMMPS_NS::LAMMPS* lammps, int narg, char** arg) {
+  return new Style(lammps, narg, arg);
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   // The library expects its host to route signals, so that a run that is told to stop still writes what it has.
@@ -28,6 +53,7 @@ int main(int argc, char** argv) {
   LAMMPS_NS::LAMMPS* lammps = new LAMMPS_NS::LAMMPS(argc, argv, MPI_COMM_WORLD);
   // The library enters its own combinations in this constructor; ours come after, where its fallback can be replaced.
   dembark_liggghts::register_contact_models();
+  (*(lammps->modify->*table(FixTable())))["lcp/impact"] = &create_fix<LAMMPS_NS::FixLcpImpact>;
   lammps->input->file();
   delete lammps;
   MPI_Finalize();

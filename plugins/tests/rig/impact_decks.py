@@ -1,0 +1,129 @@
+"""Decks of a few logs for fix lcp/impact, and what their runs left behind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from rig import liggghts_driver
+from rig.liggghts_driver import Run, read_dump
+
+# Names of what the fix returns as a vector, in its order.
+VECTOR = ("contacts", "active", "impacts", "peak", "impulse", "dissipated", "elastic", "pivots", "block_steps", "pivots_total",
+          "certificate", "worst_certificate", "peak_so_far")
+STATE = "id x y z vx vy vz omegax omegay omegaz fx fy fz tqx tqy tqz"
+LOCAL = ("id_a", "id_b", "nx", "ny", "nz", "gap", "normal_force", "tx", "ty", "tz", "x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Log:
+    """A log in cross-section: m, m/s, kg, rad/s."""
+
+    position: tuple[float, float]
+    velocity: tuple[float, float] = (0.0, 0.0)
+    radius: float = 0.1
+    mass: float = 50.0
+    spin: float = 0.0
+    type: int = 1
+    z: float = 0.0
+
+
+@dataclass
+class Case:
+    """A deck: logs, the words of the fix, and what runs."""
+
+    logs: list[Log]
+    words: str
+    time_step: float
+    run: str
+    gravity: float = 0.0
+    types: int = 1
+    box: tuple[float, float, float, float, float, float] = (-3.0, 3.0, -3.0, 3.0, -0.5, 0.5)
+    boundary: str = "f f f"
+    dimension: int = 3
+    before: str = ""  # further fixes, before the impacts
+    after: str = ""
+    every: int = 1000
+    extra: list[str] = field(default_factory=list)
+
+    def head(self) -> str:
+        """The part of the deck that a run from a restart file does not need."""
+        lines = [f"region domain block {' '.join(repr(b) for b in self.box)} units box", f"create_box {self.types} domain"]
+        lines += [f"create_atoms {log.type} single {log.position[0]!r} {log.position[1]!r} {log.z!r} units box" for log in self.logs]
+        for number, log in enumerate(self.logs, 1):
+            lines.append(f"set atom {number} diameter {2.0 * log.radius!r} vx {log.velocity[0]!r} vy {log.velocity[1]!r}")
+            lines.append(f"set atom {number} mass {log.mass!r}")
+            if log.spin:
+                lines.append(f"set atom {number} omegaz {log.spin!r}")
+        return "\n".join(lines)
+
+    def text(self, *, head: str | None = None, run: str | None = None, ranks: int = 1, dump: str = "logs.dump") -> str:
+        gravity = f"fix weight all gravity {self.gravity!r} vector 0 -1 0" if self.gravity else ""
+        return "\n".join([
+            "units si", f"dimension {self.dimension}", "atom_style granular", "atom_modify map array sort 0 0.0", f"boundary {self.boundary}", "newton off",
+            "communicate single vel yes", f"processors {ranks} 1 1", self.head() if head is None else head, "neighbor 0.05 bin",
+            "neigh_modify delay 0", self.before, gravity, f"fix hits all lcp/impact {self.words}", self.after, "fix motion all nve/sphere",
+            f"timestep {self.time_step!r}", *self.extra,
+            f"dump logs all custom {self.every} {dump} {STATE}", f'dump_modify logs sort id format "%d{" %.17g" * 15}"',
+            "thermo_style custom step atoms " + " ".join(f"f_hits[{i}]" for i in range(1, 14)),
+            'thermo_modify norm no lost error format float "%.17g"', f"thermo {self.every}", self.run if run is None else run, ""])
+
+
+def start(folder: Path, case: Case, *, ranks: int = 1, **words: str | None) -> Run:
+    return liggghts_driver.run_deck(folder, case.text(ranks=ranks, **words), ranks=ranks)
+
+
+def run(folder: Path, case: Case, *, ranks: int = 1, **words: str | None) -> Result:
+    done = start(folder, case, ranks=ranks, **words)
+    assert done.code == 0, done.output[-3000:]
+    return Result(case, done, words.get("dump") or "logs.dump")
+
+
+class Result:
+    """Frames of the logs (columns as in STATE) and the vectors of the fix."""
+
+    def __init__(self, case: Case, done: Run, dump: str) -> None:
+        self.case, self.folder, self.output = case, done.folder, done.output
+        self.steps, self.frames = read_dump(done.folder / dump)
+        self.vectors = thermo(done.output)
+
+    @property
+    def last(self) -> NDArray[np.float64]:
+        return self.frames[-1]
+
+    @property
+    def mass(self) -> NDArray[np.float64]:
+        return np.array([log.mass for log in self.case.logs])
+
+    def velocity(self, frame: int = -1) -> NDArray[np.float64]:
+        return self.frames[frame][:, 4:7]
+
+    def spin(self, frame: int = -1) -> NDArray[np.float64]:
+        return self.frames[frame][:, 7:10]
+
+    def energy(self, frame: int = -1) -> float:
+        """Of the motion, without spin."""
+        return float(0.5 * self.mass @ (self.velocity(frame) ** 2).sum(axis=1))
+
+    def vector(self, name: str, row: int = -1) -> float:
+        return float(self.vectors[row, VECTOR.index(name)])
+
+    def impacts(self, file: str = "impacts.txt") -> NDArray[np.float64]:
+        return np.loadtxt(self.folder / file, ndmin=2)
+
+
+def thermo(output: str) -> NDArray[np.float64]:
+    """The vectors of the fix of every line of thermo output."""
+    rows = []
+    reading = False
+    for line in output.splitlines():
+        words = line.split()
+        if words[:2] == ["Step", "Atoms"]:
+            reading = True
+        elif reading and len(words) == 2 + len(VECTOR):
+            rows.append([float(word) for word in words[2:]])
+        else:
+            reading = False
+    return np.array(rows)
