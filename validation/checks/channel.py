@@ -22,6 +22,12 @@ def _ratio(above: Array, below: Array) -> Array:
     return np.divide(above, below, out=np.full(len(above), np.nan), where=below > 0.0)
 
 
+def fitted_decay(place: Array, deficit: Array, start: float) -> float:
+    """Length of the exponential that fits `deficit` at the distances `place` best, in their unit; `start`: a guess."""
+    fit = least_squares(lambda p: p[0] * np.exp(-place / np.exp(p[1])) - deficit, [max(deficit[0], 1e-3), np.log(start)])
+    return float(np.exp(min(fit.x[1], 300.0)))
+
+
 @dataclass(frozen=True)
 class Channel:
     """One replica, steady part: arrays over frames, cells across (x) and bands of height (z), in SI units.
@@ -98,9 +104,7 @@ class Channel:
 
     def decay_length(self, frames: Mask, bands: Mask) -> float:
         """Length in d of the exponential that fits the deficit."""
-        place, deficit = self.deficit(frames, bands)
-        fit = least_squares(lambda p: p[0] * np.exp(-place / np.exp(p[1])) - deficit, [max(deficit[0], 1e-3), np.log(2.0 * self.diameter)])
-        return float(np.clip(np.exp(fit.x[1]), 0.0, self.width)) / self.diameter
+        return min(fitted_decay(*self.deficit(frames, bands), 2.0 * self.diameter), self.width) / self.diameter
 
     def ninety_width(self, frames: Mask, bands: Mask) -> float:
         """Distance from the wall in d at which the deficit has fallen to a tenth of its greatest value."""
@@ -168,7 +172,7 @@ def read(replica: Replica) -> Channel:
     for (grains, contacts), keep in zip(replica.paired_frames(), used, strict=True):
         if keep:
             paths.append(grains.select(grains.types == 1).positions)
-            for name, row in _frame_rows(grains, contacts, edges, levels, depth).items():
+            for name, row in frame_rows(grains, contacts, edges, levels, depth).items():
                 rows.setdefault(name, []).append(row)
     track = np.array(paths)
     stays = (track[0, :, 2] > bottom[0] + 2.0 * diameter) & (track[-1, :, 2] < top[-1] - 2.0 * diameter)
@@ -204,26 +208,34 @@ def _outline(grains: GrainFrame, area: float) -> tuple[int, float, float, float]
 
 
 def _steady(times: dict[str, Array], steps: NDArray[np.int64], settle_time: float) -> tuple[int, str]:
-    """First step of the steady part of the measuring window, and '' or the reason why there is none (then its second half is used)."""
+    """`steady_part` by the friction of the walls, once the plate moves."""
     moving = times["time"] > settle_time
-    friction, when = (times["left_fz"] + times["right_fz"])[moving], times["step"][moving]
-    # Rows are far closer in time than the friction's memory: with about 200 of them MSER's batches are long against it.
-    thin = max(1, len(friction) // 200)
-    thinned = friction[: len(friction) // thin * thin].reshape(-1, thin).mean(axis=1)
+    return steady_part((times["left_fz"] + times["right_fz"])[moving], times["step"][moving], steps)
+
+
+def steady_part(series: Array, when: Array, steps: NDArray[np.int64]) -> tuple[int, str]:
+    """First step of the steady part of the measuring window, whose frames are at `steps`, by a series with values at the steps `when`; and
+    '' or the reason why there is none (then the window's second half is used)."""
+    # Rows are far closer in time than the memory of what they show: with about 200 of them MSER's batches are long against it.
+    thin = max(1, len(series) // 200)
+    thinned = series[: len(series) // thin * thin].reshape(-1, thin).mean(axis=1)
     start = steady_start(thinned)
     if start >= len(thinned) or when[start * thin] > steps[len(steps) // 2]:
         return int(steps[len(steps) // 2]), "no steady part was found in the measuring window, its second half was used"
     return int(when[start * thin]), ""
 
 
-def _frame_rows(grains: GrainFrame, contacts: ContactFrame, edges: Array, levels: Array, depth: float) -> dict[str, Any]:
+def frame_rows(
+    grains: GrainFrame, contacts: ContactFrame, edges: Array, levels: Array, depth: float, periodic: bool = False
+) -> dict[str, Any]:
+    """One frame's rows of the arrays of `Channel`; `periodic`: `levels` are the two ends of a period, which hold every grain whole."""
     free = grains.select(grains.types == 1)
     heights, speed = free.positions[:, 2], -free.velocities[:, 2]
-    shares = slice_volumes(heights, free.radii, levels) / volume(free.radii)[:, None]
+    shares = np.ones((len(heights), 1)) if periodic else slice_volumes(heights, free.radii, levels) / volume(free.radii)[:, None]
     parts = slice_volumes(free.positions[:, 0], free.radii, edges)
     # Only contacts centred in the window: with its whole height as cross-section they make the mean stress of each cell.
     centre = contacts.first[:, 2] + 0.5 * contacts.branch[:, 2]
-    inside = (centre >= levels[0]) & (centre < levels[-1])
+    inside = np.full(len(centre), True) if periodic else (centre >= levels[0]) & (centre < levels[-1])
     tensor = stress.pair_stress(
         contacts.first[inside], contacts.branch[inside], contacts.forces[inside], 0, edges, depth * (levels[-1] - levels[0])
     )

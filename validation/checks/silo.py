@@ -81,9 +81,15 @@ def picture(parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[str, Any]], list[str]]:
     """Quantities, profiles and remarks for the report from all replicas of a series."""
-    columns = [read(replica) for replica in replicas]
+    remarks = [f"{one.short}: {one.statement}" for one in (LANDRY, CAMBAU)]
+    found, drawn, said = results([read(replica) for replica in replicas], "R", "r")
+    return found, drawn, [said[0], *remarks, *said[1:]]
+
+
+def results(columns: Sequence[Column], length: str, across: str) -> tuple[list[Quantity], list[dict[str, Any]], list[str]]:
+    """The same from the measured columns of any vessel, whose size has the symbol `length` and whose direction across is `across`."""
     scalars = [_scalars(column) for column in columns]
-    radius = columns[0].size
+    size, normal = columns[0].size, f"σ_{across}{across}"
 
     def over(name: str, factor: float = 1.0) -> Estimate:
         found = pooled(scalars, name)
@@ -112,10 +118,10 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
         ),
         Quantity(
             "janssen_length_predicted",
-            "λ = R / (2 K μ_mob), over R",
-            "R",
-            over("predicted", 1 / radius),
-            reference=over("fitted", 1 / radius),
+            f"λ = {length} / (2 K μ_mob), over {length}",
+            length,
+            over("predicted", 1 / size),
+            reference=over("fitted", 1 / size),
             tolerance=TOLERANCE,
             deviation_half=over("length_error").half,
             source=JANSSEN.short,
@@ -123,9 +129,9 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
         ),
         Quantity(
             "janssen_length_measured",
-            "λ fitted to the apparent-mass curve, over R",
-            "R",
-            over("fitted", 1 / radius),
+            f"λ fitted to the apparent-mass curve, over {length}",
+            length,
+            over("fitted", 1 / size),
             detail="one parameter; ρ_b and the surface are measured",
         ),
         Quantity(
@@ -165,11 +171,15 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
             detail="passes within its own interval, but not closer than the force balance itself (0.001)",
         ),
         Quantity(
-            "stress_ratio_k", "K = σ_rr / σ_zz", "1", over("k"), detail="wall's normal stress over the mean vertical stress, lower half"
+            "stress_ratio_k",
+            f"K = {normal} / σ_zz",
+            "1",
+            over("k"),
+            detail="wall's normal stress over the mean vertical stress, lower half",
         ),
         Quantity(
             "wall_mobilisation",
-            "μ_mob = τ / (σ_rr + a)" if wet else "μ_mob = τ / σ_rr",
+            f"μ_mob = τ / ({normal} + a)" if wet else f"μ_mob = τ / {normal}",
             "1",
             over("mobilisation"),
             detail=f"lower half; the wall's static friction is {columns[0].wall_friction:g}",
@@ -192,15 +202,15 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
             "solid fraction",
             "1",
             over("fraction"),
-            detail="by exact sphere slices up to r = R, without one diameter at base and surface",
+            detail="by exact sphere slices up to the wall, without one diameter at base and surface",
         ),
         Quantity("filled_mass", "mass of the grains", "kg", known([column.mass for column in columns]), compared=False),
-        Quantity("filling_height", "filling height over R", "R", known([column.height / radius for column in columns])),
+        Quantity("filling_height", f"filling height over {length}", length, known([column.height / size for column in columns])),
         Quantity(
             "hydrostatic_height",
-            "depth of the hydrostatic zone (two-parameter form), over R",
-            "R",
-            over("onset", 1 / radius),
+            f"depth of the hydrostatic zone (two-parameter form), over {length}",
+            length,
+            over("onset", 1 / size),
             source=WALKER.short,
             compared=False,
         ),
@@ -211,7 +221,7 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
             over("gain"),
             source=WALKER.short,
             compared=False,
-            detail=f"with it λ is {over('pair_length').value / radius:.2f} R",
+            detail=f"with it λ is {over('pair_length').value / size:.2f} {length}",
         ),
     ]
     static, kinetic = columns[0].wall_friction, columns[0].kinetic_friction
@@ -235,15 +245,13 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
             "law is therefore checked with the measured mobilisation; with the static coefficient in its place λ would come out shorter by the first "
             "of these shares."
         ),
-        f"{LANDRY.short}: {LANDRY.statement}",
-        f"{CAMBAU.short}: {CAMBAU.statement}",
     ]
-    if len(replicas) < 3:
+    if len(columns) < 3:
         remarks.append(
-            "With fewer than three packings the intervals come from time blocks and from sectors of the circumference within the packing; "
+            "With fewer than three packings the intervals come from time blocks and from sectors of the walls within the packing; "
             "what varies from packing to packing as a whole is not in them."
         )
-    return found, _profiles(columns, over), remarks
+    return found, _profiles(columns, over, normal), remarks
 
 
 def study(name: str, points: Sequence[dict[str, Any]], along: str) -> tuple[list[Quantity], list[dict[str, Any]], list[str]]:
@@ -252,7 +260,7 @@ def study(name: str, points: Sequence[dict[str, Any]], along: str) -> tuple[list
     return filling_study(points, TOLERANCE)
 
 
-def _profiles(columns: Sequence[Column], over: Any) -> list[dict[str, Any]]:
+def _profiles(columns: Sequence[Column], over: Any, stress: str) -> list[dict[str, Any]]:
     first = columns[0]
     place = np.linspace(0.02, 0.98, 40)
 
@@ -290,7 +298,13 @@ def _profiles(columns: Sequence[Column], over: Any) -> list[dict[str, Any]]:
         entry("sigma_zz_balance", "Vertical stress, balance", "σ_zz (Pa)", lambda c, f, s: c.balance(f), law, nothing_fitted),
         entry("sigma_zz_field", "Vertical stress, contacts", "σ_zz (Pa)", lambda c, f, s: c.field.mean(axis=0), law, nothing_fitted),
         entry(
-            "sigma_rr", "Wall normal stress", "σ_rr (Pa)", lambda c, f, s: smooth(c.wall(c.normal, f, s)), k * law, "K × Janssen", moving
+            stress.replace("σ", "sigma"),
+            "Wall normal stress",
+            f"{stress} (Pa)",
+            lambda c, f, s: smooth(c.wall(c.normal, f, s)),
+            k * law,
+            "K × Janssen",
+            moving,
         ),
         entry(
             "tau",
@@ -304,7 +318,7 @@ def _profiles(columns: Sequence[Column], over: Any) -> list[dict[str, Any]]:
         entry(
             "mobilisation",
             "Mobilised wall friction",
-            "τ / (σ_rr + a)" if adhesion else "τ / σ_rr",
+            f"τ / ({stress} + a)" if adhesion else f"τ / {stress}",
             lambda c, f, s: smooth(c.wall(c.shear, f, s)) / smooth(c.wall(c.normal, f, s) + c.wall(c.adhesion, f, s)),
             np.full_like(place, first.wall_friction),
             "static friction of the wall",

@@ -10,6 +10,7 @@ from dembark.validation.checks import find
 from dembark.validation.checks.column import _wall_pull, janssen, two_parameter
 from dembark.validation.checks.filling import apparent_mass_with_onset
 from dembark.validation.checks.quantity import Quantity, judge
+from dembark.validation.checks.vessel import Cylinder
 from dembark.validation.compare import compare, pair
 from dembark.validation.errors import RunError
 from dembark.validation.metrics import measure
@@ -56,13 +57,13 @@ def test_wet_silo_follows_janssen_with_the_adhesion_that_hangs_on_the_wall(tmp_p
 
 
 def test_a_grain_off_the_wall_counts_with_the_bridge_it_has(tmp_path):
-    radii, radius = np.array([0.0025, 0.0025, 0.0025]), 0.025
+    radii, vessel = np.array([0.0025, 0.0025, 0.0025]), Cylinder(0.025)
     place = np.array([[0.0226, 0.0, 0.0], [0.0, 0.0224, 0.0], [0.0, -0.0224, 0.0]])  # touching; off with a bridge; off without
     side = np.array([[-0.1, 0.0, 0.0], [0.0, 3e-4, 1e-5], [0.0, 0.0, 0.0]])
     grains = types.SimpleNamespace(positions=place, radii=radii)
-    pull = _wall_pull(grains, side, radius, lambda found: np.full(len(found), 7e-4))
-    np.testing.assert_allclose(pull, [[7e-4, 0.0, 0.0], [0.0, 3e-4, 0.0], [0.0, 0.0, 0.0]], atol=1e-18)
-    assert not _wall_pull(grains, side, radius, None).any()
+    pull = _wall_pull(grains, side, vessel, lambda found: np.full(len(found), 7e-4))
+    np.testing.assert_allclose(pull, [7e-4, 3e-4, 0.0], atol=1e-18)
+    assert not _wall_pull(grains, side, vessel, None).any()
 
 
 def filling_points(length, per_radius=0.07, radii=(1.0, 2.0, 4.0), hydrostatic=0.0, half=0.0):
