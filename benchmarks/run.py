@@ -11,6 +11,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks import lcp
 from benchmarks.measure import (
     HERE, Comparison, Subject, clock_library, liggghts_sample, settled_bed, stock_liggghts, yade_sample,
 )
@@ -94,7 +95,7 @@ def parsed(words: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--count", type=int, default=20000, help="spheres in the bed (default %(default)s)")
     parser.add_argument("--steps", type=int, default=400, help="steps of a timed run of LIGGGHTS; a quarter of it in YADE (default %(default)s)")
     parser.add_argument("--relax", type=int, default=1000, help="steps before it, in which histories build up (default %(default)s)")
-    parser.add_argument("--only", choices=["dry", "wet", "yade"], action="append", help="leave the other comparisons out")
+    parser.add_argument("--only", choices=["dry", "wet", "yade", "lcp"], action="append", help="leave the other comparisons out")
     parser.add_argument("--wall-clock", action="store_true", help="LIGGGHTS's timers as they are; default: processor time")
     parser.add_argument("--out", type=Path, default=ROOT / "results/bench", help="folder of bench.json and bench.md")
     given = parser.parse_args(words)
@@ -107,9 +108,11 @@ def main(words: list[str] | None = None) -> int:
     """Run, print and write the table; the exit code is 1 when a run failed, 2 when something is missing."""
     try:
         given = parsed(words)
+        if given.only and set(given.only) == {"lcp"}:
+            return lcp.report(lcp.measure(given.out, given.rounds, given.wall_clock, say))
         cache = ROOT / "build/bench"
         cache.mkdir(parents=True, exist_ok=True)
-        wanted = given.only or ["dry", "wet", "yade"]
+        wanted = given.only or ["dry", "wet", "yade", "lcp"]
         facts = {**collect(find("liggghts")), "date": datetime.now(UTC).isoformat(timespec="seconds"), "load": os.getloadavg()[0],
                  "grains": given.count, "diameter": 0.005, "rounds": given.rounds, "relax": given.relax,
                  "clock": "elapsed time" if given.wall_clock else "processor time"}
@@ -134,7 +137,13 @@ def main(words: list[str] | None = None) -> int:
         table.add_row(*texts(row))
     Console(width=None if sys.stdout.isatty() else 160).print(table)
     say(f"wrote {given.out / 'bench.md'} and bench.json")
-    return 0
+    if "lcp" not in wanted:
+        return 0
+    try:
+        return lcp.report(lcp.measure(given.out, given.rounds, given.wall_clock, say))
+    except DembarkError as error:
+        say(str(error))
+        return error.exit_code
 
 
 if __name__ == "__main__":

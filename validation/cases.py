@@ -17,6 +17,9 @@ from dembark.validation.units import known_unit
 
 ENGINES = ("liggghts", "yade")
 STUDY_PREFIX = "study-"
+# What a deck may be asked to write, and the file that it goes to; a case asks for the first three unless it says otherwise.
+OUTPUTS = {"grains": "grains.dump", "contacts": "contacts.dump", "times": "time.csv", "impacts": "impacts.txt"}
+STANDARD_OUTPUTS = ("grains", "contacts", "times")
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,7 @@ class Case:
     runs: Mapping[str, tuple[PlannedRun, ...]]
     constraints: tuple[Constraint, ...] = ()
     studies: Mapping[str, Study] = field(default_factory=dict)
+    outputs: tuple[str, ...] = STANDARD_OUTPUTS
 
     def deck(self, engine: str) -> Path:
         """Deck of `engine` in this folder."""
@@ -143,12 +147,17 @@ class _Reader:
         tables = {"case": dict, "parameters": dict, "profiles": dict, "variants": dict, "runs": dict, "constraints": list, "studies": dict}
         self.table(data, "top level", tables, ("case", "parameters"))
         head = data["case"]
-        keys = {"name": str, "title": str, "description": str, "source": list, "engines": list}
+        keys = {"name": str, "title": str, "description": str, "source": list, "engines": list, "outputs": list}
         self.table(head, "case", keys, ("name", "title", "engines"))
         if head["name"] != self.path.parent.name:
             raise self.fail("case", f"name = {head['name']!r}", f"the name of its folder, {self.path.parent.name!r}")
         for engine in head["engines"]:
             pick(engine, ENGINES, "engine", f"[case] of {self.path}")
+        outputs = tuple(head.get("outputs", STANDARD_OUTPUTS))
+        for output in outputs:
+            pick(output, OUTPUTS, "output", f"[case] of {self.path}")
+        if not outputs or len(set(outputs)) < len(outputs):
+            raise self.fail("case", f"outputs = {list(outputs)}", f"one or more of {', '.join(OUTPUTS)}, each once")
         parameters = {name: self.parameter(name, entry) for name, entry in data["parameters"].items()}
         variants = self.changes("variants", data.get("variants", {"default": {}}), parameters)
         profiles = self.changes("profiles", data.get("profiles", {}), parameters)
@@ -157,7 +166,8 @@ class _Reader:
             engines=tuple(head["engines"]), folder=self.path.parent, parameters=parameters, profiles=profiles, variants=variants,
             runs=self.runs(data.get("runs", {}), profiles, variants, tuple(head["engines"])),
             constraints=tuple(self.constraint(entry, parameters) for entry in data.get("constraints", ())),
-            studies={name: self.study(name, entry, parameters, variants) for name, entry in data.get("studies", {}).items()})
+            studies={name: self.study(name, entry, parameters, variants) for name, entry in data.get("studies", {}).items()},
+            outputs=outputs)
 
     def parameter(self, name: str, entry: Mapping[str, Any]) -> Parameter:
         table, number = f"parameters.{name}", (int, float)

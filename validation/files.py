@@ -20,6 +20,7 @@ from typing import Any
 from dembark.validation.errors import DembarkError, RunError
 
 _TIMESTEP = b"ITEM: TIMESTEP\n"
+_IMPACT_COLUMNS = 11
 
 
 def _sync(path: Path) -> None:
@@ -134,6 +135,26 @@ def count_frames(path: Path, count_key: str) -> int:
                 raise RunError(f"{path.name} is truncated in frame {frames + 1}")
             frames, start = frames + 1, end
     return frames
+
+
+def check_impacts(path: Path) -> int:
+    """Number of impacts in an `impacts.txt`; RunError when it is missing, cut off or holds a line that is not eleven finite numbers."""
+    if not path.is_file():
+        raise RunError(f"the engine wrote no {path.name}")
+    text = path.read_text(encoding="utf-8", errors="replace")
+    if not text.startswith("#"):
+        raise RunError(f"{path.name} does not begin with a header")
+    rows = [line.split() for line in text.splitlines() if not line.startswith("#")]
+    for number, row in enumerate(rows, start=1):
+        try:
+            whole = len(row) == _IMPACT_COLUMNS and all(math.isfinite(float(word)) for word in row)
+        except ValueError:
+            whole = False
+        if not whole:
+            raise RunError(f"{path.name} is truncated, or holds no finite number, in line {number} of its {len(rows)} impacts")
+    if not text.endswith("\n"):
+        raise RunError(f"{path.name} is truncated after {len(rows)} impacts")
+    return len(rows)
 
 
 def check_times(path: Path) -> int:

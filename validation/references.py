@@ -59,5 +59,15 @@ DEBNATH = Reference(
     "abstract",
     "between flat frictional walls and periodic along the flow the scaled velocity profile is one exponential function for all "
     "widths, the ratio of greatest and slip velocity depends neither on the width nor on the mean solid fraction, and there is no "
-    "shear in the plug at the centre; for wide channels the shear zones' thickness grows as the width.",
+    "shear in the plug at the centre; for sufficiently wide channels the greatest and the slip velocity grow as the square root of the "
+    "width and the shear zones' thickness as the width.",
+)
+
+KOLESNIKOV = Reference(
+    "Kolesnikov 2013",
+    "G. N. Kolesnikov, Decomposition algorithm of linear complementarity problem and its application for simulation of pulpwood "
+    "collisions in debarking drum, Resources and Technology (2013), published 16 November 2013.",
+    "full text (in Russian)",
+    "each step of the motion of logs on springs, by backward differences, is a linear complementarity problem with a positive definite "
+    "matrix, solved by exchanges chosen by their energy.",
 )

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,8 +17,19 @@ from select import select
 from typing import Any
 
 from dembark.validation import provenance
+from dembark.validation.cases import OUTPUTS
 from dembark.validation.errors import DembarkError, Interrupted, RunError
-from dembark.validation.files import check_times, count_frames, disk_error, lock, move_into_place, part_folder, sweep, write_json
+from dembark.validation.files import (
+    check_impacts,
+    check_times,
+    count_frames,
+    disk_error,
+    lock,
+    move_into_place,
+    part_folder,
+    sweep,
+    write_json,
+)
 from dembark.validation.parameters import Value
 from dembark.validation.plan import Run, deck_files, finished
 from dembark.validation.progress import Board, OutputParser
@@ -26,6 +37,7 @@ from dembark.validation.progress import Board, OutputParser
 # A line of grains.dump and two to three of contacts.dump for each grain and frame.
 _BYTES_PER_GRAIN_AND_FRAME = 800
 _RESERVE = 4 << 20
+_DUMPS = {"grains": "ATOMS", "contacts": "ENTRIES"}
 _GRACE = 5.0
 
 
@@ -134,8 +146,8 @@ def _execute(run: Run, part: Path, board: Board, cancel: threading.Event, used: 
         end_group(process)
     wall = time.monotonic() - clock
     _judge(code, parser, part)
-    frames = _check_output(part, run.values.get("frames"))
-    grains = run.values.get("grain_count")
+    frames = _check_output(part, run.case.outputs, run.values.get("frames"))
+    grains = run.values.get("grain_count", run.values.get("log_count"))
     speed = grains * parser.steps / wall if isinstance(grains, int) else None
     return {
         "case": run.case.name, "variant": run.variant, "profile": run.profile, "engine": run.engine.name, "replica": run.replica,
@@ -228,16 +240,21 @@ def _judge(code: int, parser: OutputParser, part: Path) -> None:
         raise RunError("the engine never said 'dembark: steps <N> time_step <dt>'", "the deck must print this line")
 
 
-def _check_output(part: Path, wanted: Value) -> int:
+def _check_output(part: Path, outputs: Sequence[str], wanted: Value) -> int:
+    """Frames in the dumps (0 without any) of a run that wrote all of `outputs` whole; RunError otherwise."""
     try:
-        frames = count_frames(part / "grains.dump", "ATOMS")
-        if count_frames(part / "contacts.dump", "ENTRIES") != frames:
+        counts = {kind: count_frames(part / OUTPUTS[kind], key) for kind, key in _DUMPS.items() if kind in outputs}
+        if len(set(counts.values())) > 1:
             raise RunError("grains.dump and contacts.dump have different numbers of frames")
-        if isinstance(wanted, int) and frames != wanted:
-            raise RunError(f"grains.dump holds {frames} frames instead of {wanted}")
-        check_times(part / "time.csv")
+        for kind, frames in counts.items():
+            if isinstance(wanted, int) and frames != wanted:
+                raise RunError(f"{OUTPUTS[kind]} holds {frames} frames instead of {wanted}")
+        if "times" in outputs:
+            check_times(part / OUTPUTS["times"])
+        if "impacts" in outputs:
+            check_impacts(part / OUTPUTS["impacts"])
     except RunError as error:
         # The engines do not notice a full disk: what tells is a file that was cut off and no room left.
         full = shutil.disk_usage(part).free < _RESERVE
         raise RunError("the disk is full" if full else "", str(error)) from None
-    return frames
+    return next(iter(counts.values()), 0)

@@ -16,7 +16,8 @@ class Quantity:
     `deviation` from the reference is relative unless `absolute`; `deviation_half` is the half-width of its own interval (value and
     reference of one run are correlated, so it is not that of the two values). `tolerance` None means: nothing to pass or fail;
     `verdict` is one that was reached by another rule, told in `detail`. `reason` tells why a verdict is info, `detail` what the
-    number means. `compared`: the engines must agree in it.
+    number means. `compared`: the engines must agree in it; within `agreement`, in the unit of the value, where nothing is random and
+    there is no interval to compare.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Quantity:
     reason: str = ""
     verdict: str = ""
     compared: bool = True
+    agreement: float | None = None
 
     @property
     def deviation(self) -> float | None:
@@ -81,6 +83,8 @@ class Quantity:
         }
         if self.deviation_half is not None:
             entry["deviation_half_width"] = _number(self.deviation_half)
+        if self.agreement is not None:
+            entry["agreement"] = self.agreement
         return entry
 
 

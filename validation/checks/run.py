@@ -45,6 +45,23 @@ class Replica:
         """The whole run, a row an output interval."""
         return read_times(self.folder / "time.csv")
 
+    def impacts(self) -> Array:
+        """Impacts that have ended, (n, 11): id_a id_b time duration peak_force impulse relative_speed dissipated x y z; SI units.
+
+        Bodies are counted from 1 in either engine; id_b < 0 is a wall. DumpError when the file cannot be read.
+        """
+        path = self.folder / "impacts.txt"
+        try:
+            rows = [line.split() for line in path.read_text(encoding="ascii").splitlines() if not line.startswith("#")]
+            table = np.array(rows, float).reshape(len(rows), 11)
+        except OSError:
+            raise DumpError(f"{path} does not exist") from None
+        except ValueError:
+            raise DumpError(f"{path}: a line does not hold 11 numbers") from None
+        if self.record["engine"] == "yade":
+            table[:, :2] += table[:, :2] >= 0
+        return table
+
     def paired_frames(self) -> Any:
         """(grains, contacts) of every frame; DumpError when the two files do not hold the same steps."""
         grains, contacts = self.grains(), self.contacts()

@@ -13,7 +13,7 @@ from typing import Any
 from dembark.postproc import DumpError
 from dembark.validation.errors import RunError
 from dembark.validation.files import disk_error
-from dembark.validation.report import figures, numbers, pictures
+from dembark.validation.report import cross_section, figures, numbers, pictures
 from dembark.validation.report.gather import Page, gather, studies
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup, escape
@@ -203,7 +203,10 @@ def summary(counts: dict[str, int], pages: list[Page]) -> str:
 def _page(page: Page, pages: list[Page], folder: Path) -> dict[str, Any]:
     numerical, physical = studies(page, pages)
     scenes = {engine: _scene(page, engine) for engine in sorted(page.metrics) if page.metrics[engine].get("picture")}
-    image, reasons = pictures.picture(scenes) if scenes else (None, [])
+    image, reasons = _picture(scenes) if scenes else (None, [])
+    for engine, one in scenes.items():
+        if isinstance(one, cross_section.Section) and len(one.times) > 2:
+            cross_section.animate(one, folder / f"{page.anchor}-{engine}.gif")
     profiles = {engine: metrics["profiles"] for engine, metrics in sorted(page.metrics.items())}
     names = list(dict.fromkeys(one["name"] for of_engine in profiles.values() for one in of_engine))
     for name in names:
@@ -255,13 +258,19 @@ def _shared(page: Page, text: str) -> bool:
     return all(text in metrics.get("remarks", []) for metrics in page.metrics.values())
 
 
-def _scene(page: Page, engine: str) -> pictures.Scene | str:
+def _picture(scenes: dict[str, Any]) -> tuple[Figure | None, list[str]]:
+    if any(isinstance(one, cross_section.Section) for one in scenes.values()):
+        return cross_section.picture(scenes)
+    return pictures.picture(scenes)
+
+
+def _scene(page: Page, engine: str) -> pictures.Scene | cross_section.Section | str:
     wanted = page.metrics[engine]["picture"]
     replica = next(iter(sorted((page.folder / engine).glob("replica-*/grains.dump"))), None)
     if replica is None:
         return "the run's grains.dump is no longer there"
     try:
-        return pictures.scene(replica.parent, **wanted)
+        return (cross_section if "cross_section" in wanted else pictures).scene(replica.parent, **wanted)
     except DumpError as error:
         return str(error)
 

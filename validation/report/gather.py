@@ -12,7 +12,7 @@ from dembark.validation.errors import DembarkError
 from dembark.validation.files import read_json
 
 # Parameters of the method, not of the physics: results that depend on them do so by numerical error.
-NUMERICAL = {"time_step_fraction": "time step", "youngs_modulus": "stiffness"}
+NUMERICAL = {"time_step_fraction": "time step", "time_step": "time step", "youngs_modulus": "stiffness"}
 
 
 @dataclass

@@ -1,0 +1,129 @@
+"""Kills a run of the debarking drum a little after half-way, lets it go on from its last saved state, and compares it with a run that was left alone.
+
+    python -m benchmarks.drum_resume [--engine liggghts|yade] [--out result.json] [key=value ...]
+
+The default is 200 logs for five revolutions. The engine gets SIGKILL, so nothing it has in memory survives. Compared are, byte for byte,
+`time.csv` (energies, forces and totals over the whole run), `impacts.txt` (one line per impact) and `grains.dump` (the last revolution).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from dembark.validation import engines
+from dembark.validation.cases import deck_root
+
+FILES = ("time.csv", "impacts.txt", "grains.dump")
+DEFAULTS: dict[str, Any] = {"run_in": 0, "restart_every": 100}
+CERTIFICATE = 1e-10
+
+
+class Started:
+    """A run of the deck in `folder`, in a process of its own; its output goes to engine.log."""
+
+    def __init__(self, engine_name: str, folder: Path, values: Mapping[str, Any]) -> None:
+        engine = engines.find(engine_name)
+        deck = deck_root() / "debarking_drum" / {"liggghts": "liggghts.in", "yade": "yade.py"}[engine_name]
+        self.folder = folder
+        self.log = (folder / "engine.log").open("ab")
+        self.process = subprocess.Popen(engine.command(deck, values), cwd=folder, env=engine.environment(), stdin=subprocess.DEVNULL,
+                                        stdout=self.log, stderr=subprocess.STDOUT)
+
+    def wait(self) -> None:
+        """Until it ends; RuntimeError with its last lines if it failed."""
+        code = self.process.wait()
+        self.log.close()
+        said = (self.folder / "engine.log").read_text(errors="replace")
+        if code or not said.rstrip().endswith("dembark: finished"):
+            raise RuntimeError(f"the engine ended with code {code} in {self.folder}:\n{said[-1500:]}")
+
+    def kill_at(self, step: int) -> int:
+        """SIGKILL as soon as `time.csv` has a row of `step` or later; the step of its last row, 0 if the run was over before."""
+        while self.process.poll() is None:
+            if (reached := last_step(self.folder)) >= step:
+                self.process.kill()
+                self.process.wait()
+                self.log.close()
+                return reached
+            time.sleep(0.01)
+        self.log.close()
+        return 0
+
+
+def last_step(folder: Path) -> int:
+    """Step of the last whole row of `time.csv`; 0 when there is none."""
+    try:
+        rows = (folder / "time.csv").read_text().split("\n")[1:-1]
+    except OSError:
+        return 0
+    return int(rows[-1].split(",", 1)[0]) if rows else 0
+
+
+def steps_of(folder: Path) -> int:
+    """Number of steps that the deck announced."""
+    found = re.search(r"dembark: steps (\d+)", (folder / "engine.log").read_text(errors="replace"))
+    if not found:
+        raise RuntimeError(f"the deck in {folder} announced no steps")
+    return int(found.group(1))
+
+
+def compare(engine: str, values: Mapping[str, Any], base: Path) -> dict[str, Any]:
+    """Both runs in folders below `base`; what was found, with `same` telling for each file whether it is the same to the byte."""
+    whole, broken = base / "whole", base / "broken"
+    for folder in (whole, broken):
+        folder.mkdir(parents=True)
+    began = time.monotonic()
+    Started(engine, whole, values).wait()
+    seconds = time.monotonic() - began
+    steps = steps_of(whole)
+    # Not at a saved state: what came after the last one is lost and has to come again.
+    killed = Started(engine, broken, values).kill_at(steps * 11 // 20)
+    if not killed:
+        raise RuntimeError("the run ended before it could be killed; take a longer one")
+    saved = {path.name for path in broken.glob("drum.*")}
+    (broken / "engine.log").unlink()
+    Started(engine, broken, {**values, "resume": 1}).wait()
+    table = np.genfromtxt(whole / "time.csv", delimiter=",", names=True)
+    return {
+        "engine": engine,
+        "values": dict(values),
+        "steps": steps,
+        "killed_at_step": killed,
+        "went_on_from": max(int(name.split(".")[1]) for name in saved),
+        "wall_time": seconds,
+        "certificate_max": float(table["certificate"][-1]),
+        "impacts": int(table["begun"][-1]),
+        "same": {name: (whole / name).read_bytes() == (broken / name).read_bytes() for name in FILES},
+    }
+
+
+def main(words: list[str]) -> int:
+    """Exit code 0 when every file is the same and the certificate holds in every step."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--engine", action="append", choices=("liggghts", "yade"), help="default: both")
+    parser.add_argument("--out", type=Path, help="file for the findings as JSON")
+    parser.add_argument("values", nargs="*", help="key=value of the case, as in case.toml")
+    options = parser.parse_args(words)
+    given = dict(word.split("=", 1) for word in options.values)
+    found = []
+    for engine in options.engine or ("liggghts", "yade"):
+        with tempfile.TemporaryDirectory(prefix="dembark-resume-") as folder:
+            found.append(compare(engine, DEFAULTS | given, Path(folder)))
+        print(json.dumps(found[-1], indent=1), flush=True)
+    if options.out:
+        options.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    return int(not all(all(one["same"].values()) and one["certificate_max"] <= CERTIFICATE for one in found))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,139 @@
+"""The drum's decks: the same logs in both engines, the balance of energy, friction and nothing else drives them, and a run that was killed
+goes on as if it had not been."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from benchmarks.drum_resume import FILES, Started, compare
+from dembark.postproc import GrainsDump, read_times
+from dembark.validation.checks import debarking_drum
+from dembark.validation.errors import DembarkError
+
+CASE = Path(__file__).resolve().parents[1] / "debarking_drum"
+ENGINES = ("liggghts", "yade")
+TINY: dict[str, Any] = {"log_count": 10, "filling": 0.2, "run_in": 0, "revolutions": 1, "drum_speed": 2.0, "time_step_fraction": 0.4,
+                        "frames": 4}
+
+
+def defaults() -> dict[str, Any]:
+    tables = tomllib.loads((CASE / "case.toml").read_text(encoding="utf-8"))["parameters"]
+    return {name: table.get("value") for name, table in tables.items()}
+
+
+def test_decks_and_case_file_know_the_same_keys() -> None:
+    declared = defaults()
+    text = (CASE / "liggghts.in").read_text(encoding="utf-8")
+    in_deck = dict(re.findall(r"^variable\s+(\w+)\s+index\s+(\S+)\s*$", text, re.MULTILINE))
+    # A deck makes one load; a negative number is a key that is not set.
+    assert in_deck.keys() == declared.keys() - {"replicas"}
+    for key, value in in_deck.items():
+        assert float(value) == (-1.0 if declared[key] is None else declared[key]), key
+        assert "${%s}" % key in text, key
+        assert re.search(rf"\bp\.{key}\b", (CASE / "yade.py").read_text(encoding="utf-8")), key
+
+
+def run(engine: str, folder: Path, **values: Any) -> Path:
+    """A finished run of the deck in `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        Started(engine, folder, TINY | values).wait()
+    except DembarkError as error:
+        pytest.skip(str(error))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    return {engine: run(engine, tmp_path_factory.mktemp(engine)) for engine in ENGINES}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_logs_are_those_that_the_case_asks_for(engine: str, finished: dict[str, Path]) -> None:
+    values = defaults() | TINY
+    logs, radius = debarking_drum.geometry(values)
+    assert logs == TINY["log_count"]
+    frames = GrainsDump(finished[engine] / "grains.dump")
+    assert len(frames) == TINY["frames"]
+    frame = frames[-1]
+    diameters = np.sort(2.0 * frame.radii)
+    np.testing.assert_allclose(diameters, 0.10 + 0.15 * (np.arange(logs) + 0.5) / logs, rtol=1e-7)
+    np.testing.assert_allclose(frame.masses, 850.0 * np.pi * frame.radii**2, rtol=1e-7)
+    np.testing.assert_allclose((diameters**2).sum() / (2.0 * radius) ** 2, TINY["filling"], rtol=1e-6)
+    assert (np.hypot(*frame.positions[:, [0, 2]].T) + frame.radii < 1.01 * radius).all()
+    assert (frame.positions[:, 1] == 0.0).all()
+    said = re.search(r"# logs (\d+), drum radius (\S+) m", (finished[engine] / "engine.log").read_text())
+    assert said and int(said[1]) == logs
+    assert float(said[2]) == pytest.approx(radius, rel=1e-8)
+
+
+def test_engines_go_the_same_way_until_chaos_takes_over(finished: dict[str, Path]) -> None:
+    """Rows with up to forty impacts; round-off grows with each of them."""
+    tables = [read_times(finished[engine] / "time.csv") for engine in ENGINES]
+    early = (tables[0]["begun"] <= 40) & (tables[1]["begun"] <= 40)
+    assert tables[0]["begun"][early].max() > 20
+    for name in ("kinetic_energy", "potential_energy", "shell_fz", "torque", "impulse_sum", "dissipated_energy", "begun"):
+        one, other = (table[name][early] for table in tables)
+        np.testing.assert_allclose(one, other, rtol=1e-8, atol=1e-8 * np.abs(one).max(), err_msg=name)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_energy_and_certificate(engine: str, finished: dict[str, Path]) -> None:
+    times = read_times(finished[engine] / "time.csv")
+    assert len(times["step"]) == 200
+    assert times["certificate"][-1] <= 1e-10
+    work = np.cumsum(times["torque"]) * TINY["drum_speed"] * np.diff(times["time"])[0]
+    held = times["kinetic_energy"] + times["potential_energy"] + times["elastic_energy"] + times["dissipated_energy"]
+    gap = np.abs(held - held[0] - (work - work[0]))
+    assert gap.max() < 5e-3 * work[-1]
+    assert times["dissipated_energy"][-1] > 0.5 * work[-1] > 0.0
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_only_friction_drives_the_logs(engine: str, tmp_path: Path) -> None:
+    folder = run(engine, tmp_path, shell_friction=0.0, friction=0.0)
+    times = read_times(folder / "time.csv")
+    values = defaults() | TINY
+    _, radius = debarking_drum.geometry(values)
+    scale = debarking_drum.total_weight(values) * radius
+    assert np.abs(times["torque"]).max() < 1e-9 * scale
+    assert times["kinetic_energy"][-20:].mean() < 0.05 * times["kinetic_energy"].max()
+    assert times["shell_fz"][-50:].mean() == pytest.approx(scale / radius, rel=0.02)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_radius_given_decides_how_many_logs(engine: str, tmp_path: Path) -> None:
+    given = {"drum_radius": 0.9, "filling": 0.15, "drum_speed": 20.0, "frames": 2}
+    folder = run(engine, tmp_path, **given)
+    logs, radius = debarking_drum.geometry(defaults() | TINY | given)
+    assert (logs, radius) == (15, 0.9)
+    assert len(GrainsDump(folder / "grains.dump")[0].ids) == logs
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_too_many_logs_are_refused_in_one_line(engine: str, tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match="dembark: filling is too high"):
+        run(engine, tmp_path, filling=0.5, log_diameter_min=0.24)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_killed_run_goes_on_to_the_same_end(engine: str, tmp_path: Path) -> None:
+    values = TINY | {"time_step_fraction": 0.1, "restart_every": 30}
+    try:
+        found = compare(engine, values, tmp_path)
+    except DembarkError as error:
+        pytest.skip(str(error))
+    assert 0 < found["went_on_from"] <= found["killed_at_step"] < found["steps"]
+    assert found["same"] == dict.fromkeys(FILES, True)
+    assert found["impacts"] > 100
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_resume_without_a_state_says_so(engine: str, tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match="drum"):
+        run(engine, tmp_path, resume=1)

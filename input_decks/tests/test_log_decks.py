@@ -1,0 +1,180 @@
+"""The decks of log_pair, log_cradle and log_pile agree with their case files, start alike in both engines and write what readers expect."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from dembark.validation import engines
+from dembark.validation.cases import find
+from dembark.validation.checks.logs import LogRun, read
+from dembark.validation.checks.run import Replica
+from dembark.validation.errors import DembarkError
+from dembark.validation.files import check_impacts, check_times, count_frames
+
+ROOT = Path(__file__).resolve().parents[1]
+CASES = ("log_pair", "log_cradle", "log_pile")
+ENGINES = ("liggghts", "yade")
+TINY: dict[str, dict[str, Any]] = {
+    "log_pair": {"time_step": 1e-5},
+    "off_centre": {
+        "time_step": 1e-5,
+        "offset": 0.1,
+        "mass_2": 80.0,
+        "radius_2": 0.14,
+        "velocity_2": -0.5,
+        "theta": 0.75,
+        "damping": 50.0,
+        "contact_damping": 500.0,
+    },
+    "wall": {"time_step": 1e-5, "target": "wall", "velocity_1": 2.0, "stiffness_2": 5e7},
+    "log_cradle": {"time_step": 1e-5, "log_count": 3, "gap": 1e-4},
+    "log_pile": {"time_step": 1e-4, "log_count": 9, "width": 0.9, "duration": 0.4, "friction": 0.3, "stake_friction": 0.2},
+}
+CASE_OF = {name: name if name in CASES else "log_pair" for name in TINY}
+
+
+def table(case: str) -> dict[str, dict[str, Any]]:
+    return tomllib.loads((ROOT / case / "case.toml").read_text(encoding="utf-8"))["parameters"]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_liggghts_defaults_are_those_of_the_case_file(case: str) -> None:
+    text = (ROOT / case / "liggghts.in").read_text(encoding="utf-8")
+    defaults = dict(re.findall(r"^variable\s+(\w+)\s+index\s+(\S+)\s*$", text, re.MULTILINE))
+    declared = table(case)
+    assert defaults.keys() == declared.keys()
+    for key, word in defaults.items():
+        assert (word if declared[key]["type"] == "choice" else float(word)) == declared[key]["value"], key
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_both_decks_use_every_key(case: str) -> None:
+    for deck, pattern in (("liggghts.in", r"\$\{%s\}"), ("yade.py", r"\bp\.%s\b")):
+        text = (ROOT / case / deck).read_text(encoding="utf-8")
+        assert not [key for key in table(case) if not re.search(pattern % key, text)], deck
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_case_file_asks_for_all_that_is_written(case: str) -> None:
+    assert find(case, ROOT).outputs == ("grains", "contacts", "times", "impacts")
+
+
+def start(case: str, name: str, folder: Path, values: dict[str, Any]) -> subprocess.CompletedProcess[str]:
+    """The deck run by hand, as the README says."""
+    try:
+        engine = engines.find(name)
+    except DembarkError as error:
+        pytest.skip(str(error))
+    if name == "liggghts":
+        given = (word for key, value in values.items() for word in ("-var", key, str(value)))
+        words = [str(engine.executable), "-in", str(ROOT / case / "liggghts.in"), *given]
+    else:
+        words = [str(engine.executable), "-n", "-x", str(ROOT / case / "yade.py"), *(f"{key}={value}" for key, value in values.items())]
+    return subprocess.run(
+        words, cwd=folder, env=engine.environment(), capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=120, check=False
+    )
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Tiny runs by (scene, engine), each done once: (folder, steps, the run)."""
+    done: dict[tuple[str, str], tuple[Path, int, LogRun]] = {}
+
+    def get(scene: str, engine: str) -> tuple[Path, int, LogRun]:
+        if (scene, engine) not in done:
+            folder = tmp_path_factory.mktemp(f"{scene}-{engine}")
+            ended = start(CASE_OF[scene], engine, folder, TINY[scene])
+            assert ended.returncode == 0, ended.stdout[-2000:] + ended.stderr[-2000:]
+            lines = [line.strip() for line in ended.stdout.splitlines() if line.strip()]
+            assert "dembark: finished" in lines
+            said = next(re.fullmatch(r"dembark: steps (\d+) time_step (\S+)", line) for line in lines if line.startswith("dembark:"))
+            assert said and float(said[2]) == TINY[scene]["time_step"]
+            values = {key: entry["value"] for key, entry in table(CASE_OF[scene]).items()} | TINY[scene]
+            run = read(Replica(folder, {"engine": engine, "parameters": values, "time_step": float(said[2])}))
+            done[scene, engine] = folder, int(said[1]), run
+        return done[scene, engine]
+
+    return get
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("scene", TINY)
+def test_files_are_whole_and_belong_together(scene: str, engine: str, finished: Any) -> None:
+    folder, steps, run = finished(scene, engine)
+    frames = table(CASE_OF[scene])["frames"]["value"]
+    assert count_frames(folder / "grains.dump", "ATOMS") == count_frames(folder / "contacts.dump", "ENTRIES") == frames
+    assert check_times(folder / "time.csv") == frames - 1 >= 200
+    assert check_impacts(folder / "impacts.txt") == len(run.impacts) > 0
+    assert run.times[0] == 0.0 and run.history["step"][-1] == steps
+    np.testing.assert_allclose(run.history["kinetic_energy"], run.kinetic[1:], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("scene", TINY)
+def test_forces_on_each_log_add_up(scene: str, engine: str, finished: Any) -> None:
+    """Contacts, walls and weight, counted contact by contact, make up the engine's own total."""
+    run = finished(scene, engine)[2]
+    for frame, touch in enumerate(run.touches):
+        total = np.zeros_like(run.forces[frame])
+        total[:, 1] -= run.masses * run.parameters.get("gravity", 0.0)
+        on_first = touch.normals * touch.forces[:, None] + touch.friction
+        np.add.at(total, touch.ids[:, 0] - 1, on_first)
+        pairs = touch.ids[:, 1] > 0
+        np.add.at(total, touch.ids[pairs, 1] - 1, -on_first[pairs])
+        # The damping of the bodies is no force of a contact.
+        loose = run.parameters.get("damping", 0.0) * np.linalg.norm(run.velocities[frame], axis=1).max()
+        np.testing.assert_allclose(total, run.forces[frame], rtol=0.0, atol=1e-9 * max(1.0, np.abs(run.forces).max()) + 1.5 * loose)
+
+
+@pytest.mark.parametrize("scene", TINY)
+def test_both_engines_do_the_same(scene: str, finished: Any) -> None:
+    one, other = (finished(scene, engine)[2] for engine in ENGINES)
+    np.testing.assert_array_equal(one.masses, other.masses)
+    np.testing.assert_array_equal(one.radii, other.radii)
+    speed = np.abs(one.velocities).max()
+    # A pile makes ever more of its round-off; the first impacts are what has to be the same.
+    until = len(one.times) if scene != "log_pile" else np.searchsorted(one.times, np.sort(one.impacts[:, 2])[:10][-1])
+    np.testing.assert_allclose(one.positions[:until], other.positions[:until], rtol=0.0, atol=1e-11)
+    np.testing.assert_allclose(one.velocities[:until], other.velocities[:until], rtol=0.0, atol=1e-9 * speed)
+    np.testing.assert_allclose(one.spins[:until], other.spins[:until], rtol=0.0, atol=1e-9 * max(1.0, np.abs(one.spins).max()))
+    if scene != "log_pile":
+        np.testing.assert_allclose(one.impacts, other.impacts, rtol=2e-8, atol=1e-12)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_logs_start_as_the_case_says(engine: str, finished: Any) -> None:
+    head_on, aside = finished("log_pair", engine)[2], finished("off_centre", engine)[2]
+    p = aside.parameters
+    for run in (head_on, aside):
+        q = run.parameters
+        np.testing.assert_allclose(run.velocities[0, :, 0], [q["velocity_1"], q["velocity_2"]])
+        apart = run.positions[0, 1] - run.positions[0, 0] - (q["velocity_1"] - q["velocity_2"]) * q["lead_time"] * np.array([1.0, 0.0, 0.0])
+        np.testing.assert_allclose(np.linalg.norm(apart), q["radius_1"] + q["radius_2"], rtol=1e-12)
+    np.testing.assert_allclose(aside.positions[0, 0, 1] - aside.positions[0, 1, 1], p["offset"])
+    pile = finished("log_pile", engine)[2]
+    assert np.ptp(pile.radii) > 0.0 and not pile.velocities[0].any()
+    np.testing.assert_allclose(pile.masses, 800.0 * np.pi * pile.radii**2 * 2.0, rtol=1e-12)
+    apart = np.linalg.norm(pile.positions[0, :, None] - pile.positions[0, None, :], axis=2) + 10.0 * np.eye(9)
+    assert (apart > pile.radii[:, None] + pile.radii[None, :]).all()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    ("case", "values", "word"),
+    [
+        ("log_pair", {"velocity_1": -1.0}, "velocity_1"),
+        ("log_pair", {"offset": 0.2}, "offset"),
+        ("log_pair", {"target": "wall", "velocity_1": -1.0}, "velocity_1"),
+        ("log_pile", {"width": 0.3}, "width"),
+    ],
+)
+def test_impossible_set_ups_are_refused(case: str, engine: str, values: dict[str, Any], word: str, tmp_path: Path) -> None:
+    ended = start(case, engine, tmp_path, values)
+    assert ended.returncode != 0
+    assert re.search(rf"dembark: {word}", ended.stdout + ended.stderr)

@@ -1,0 +1,148 @@
+"""What the drum's checks measure is what was put into the files, and what is wrong in them fails."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from dembark.postproc import DumpError
+from dembark.validation import cases
+from dembark.validation.checks import debarking_drum as checks
+from dembark.validation.checks.run import Replica
+from dumps import write_times
+
+LOGS, TURNS, RUN_IN, SPEED = 40, 4, 1, 1.2
+POWER, LOST_SHARE = 1000.0, 1.0
+PERIOD = 2.0 * np.pi / SPEED
+
+
+def parameters(**changes: Any) -> dict[str, Any]:
+    declared = cases.load(cases.checkout() / "input_decks/debarking_drum/case.toml").parameters
+    return {name: one.value for name, one in declared.items()} | {
+        "log_count": LOGS, "revolutions": TURNS, "run_in": RUN_IN, "drum_speed": SPEED, **changes}
+
+
+def replica(folder: Path, *, engine: str = "liggghts", seed: int = 0, certificate: float = 1e-15, leak: float = 0.0, lift: float = 1.0,
+            stored: float = 0.0, hits: int = 300, speed: float = 0.5, scale: float = 1.0) -> Replica:
+    """A drum that takes POWER and loses it, but for a share `leak` that vanishes; in every quarter `hits` impacts of at least 0.1 m/s.
+
+    `stored` (J): growth of the kinetic energy over the run; a third as many slow contacts stand beside the impacts, with huge forces.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    random = np.random.default_rng(seed)
+    given = parameters()
+    rows = checks.ROWS * (TURNS + RUN_IN)
+    row, count = PERIOD / checks.ROWS, np.arange(1, rows + 1)
+    lost = POWER * (1.0 - leak) * row * count
+    kinetic = 50.0 + stored * count / rows
+    weight = checks.total_weight(given)
+    write_times(folder / "time.csv", {
+        "step": count * 10, "time": count * row, "kinetic_energy": kinetic, "shell_fx": 0.0 * count, "shell_fy": 0.0 * count,
+        "shell_fz": lift * weight + random.normal(0.0, 0.001 * weight, rows), "potential_energy": 0.0 * count,
+        "elastic_energy": 0.0 * count,
+        "dissipated_energy": lost - (kinetic - 50.0), "torque": np.full(rows, POWER / SPEED), "contacts": 60 + 0 * count,
+        "active": 50 + 0 * count,
+        "begun": 5 * count, "impulse_sum": 7.0 * count, "pivots": 20 * count, "certificate": np.full(rows, certificate),
+        "peak_force": 1e4 + 0.0 * count})
+    quarters = 4 * (TURNS + RUN_IN)
+    begin = (np.arange(quarters).repeat(hits) + random.random(quarters * hits)) * PERIOD / 4.0
+    slow = begin[::3]
+    time = np.concatenate([begin, slow])
+    approach = np.concatenate([np.full(len(begin), speed), np.full(len(slow), 0.05)])
+    peak = np.concatenate([scale * 1000.0 * np.exp(random.normal(0.0, 1.0, len(begin))), np.full(len(slow), 1e6)])
+    _, radius = checks.geometry(given)
+    angle = np.radians(random.uniform(0.0, 90.0, len(time)))
+    partner = np.where(random.random(len(time)) < 0.25, -1, 3)
+    table = np.column_stack([np.ones(len(time)), partner, time, np.full(len(time), 0.005), peak, np.ones(len(time)), approach,
+                             np.ones(len(time)), -radius * np.sin(angle), 0.0 * time, -radius * np.cos(angle)])
+    np.savetxt(folder / "impacts.txt", table, fmt=["%d", "%d", *["%.12g"] * 9],
+               header="id_a id_b time duration peak_force impulse relative_speed dissipated x y z")
+    return Replica(folder, {"engine": engine, "parameters": given, "time_step": PERIOD / (10 * checks.ROWS), "case": "debarking_drum"})
+
+
+def measured(*replicas: Replica) -> dict[str, dict[str, Any]]:
+    found, _, _ = checks.quantities(replicas)
+    return {one.name: one.as_json() for one in found}
+
+
+def test_what_was_put_in_is_measured(tmp_path: Path) -> None:
+    found = measured(replica(tmp_path))
+    assert found["impacts_per_revolution"]["value"] == pytest.approx(4 * 300)
+    assert found["impacts_per_log"]["value"] == pytest.approx(4 * 300 / LOGS)
+    assert found["peak_force_mean"]["value"] == pytest.approx(1000.0 * np.exp(0.5), rel=0.05)
+    assert found["peak_force_p99"]["value"] == pytest.approx(1000.0 * np.exp(2.326), rel=0.15)
+    low, high = found["peak_force_mean"]["interval"]
+    assert low < 1000.0 * np.exp(0.5) < high and high - low < 300.0
+    assert found["impulse_sum"]["value"] == pytest.approx(7.0 * 200)
+    assert found["dissipated_energy"]["value"] == pytest.approx(POWER * PERIOD)
+    assert found["pivots_per_step"]["value"] == pytest.approx(2.0)
+    assert found["shell_share"]["value"] == pytest.approx(0.25, abs=0.03)
+    _, radius = checks.geometry(parameters())
+    assert found["torque_arm"]["value"] == pytest.approx(POWER / SPEED / (checks.total_weight(parameters()) * radius))
+    assert {name for name, one in found.items() if one["verdict"] == "pass"} == {
+        "certificate_max", "energy_balance_error", "power_ratio", "lift_over_weight"}
+
+
+@pytest.mark.parametrize(("change", "name"), [
+    ({"certificate": 2e-10}, "certificate_max"), ({"leak": 0.01}, "energy_balance_error"), ({"leak": 0.08}, "power_ratio"),
+    ({"lift": 1.03}, "lift_over_weight")])
+def test_what_is_wrong_fails(tmp_path: Path, change: dict[str, float], name: str) -> None:
+    assert measured(replica(tmp_path, **change))[name]["verdict"] == "fail"
+
+
+def test_energy_that_is_stored_is_not_missing(tmp_path: Path) -> None:
+    found = measured(replica(tmp_path, stored=2000.0))
+    assert found["energy_balance_error"]["value"] < 1e-9
+    assert found["power_ratio"]["value"] > 1.05
+
+
+def test_worst_replica_counts(tmp_path: Path) -> None:
+    found = measured(*(replica(tmp_path / str(k), seed=k, certificate=value) for k, value in enumerate((1e-15, 3e-9, 1e-15))))
+    assert found["certificate_max"]["value"] == 3e-9
+    assert found["certificate_max"]["verdict"] == "fail"
+    assert "3 replicas" in found["peak_force_mean"]["basis"]
+
+
+def test_histogram_holds_every_impact(tmp_path: Path) -> None:
+    _, profiles, _ = checks.quantities([replica(tmp_path)])
+    by_name = {one["name"]: one for one in profiles}
+    forces, angles = by_name["peak_forces"], by_name["impacts_at_angle"]
+    assert np.sum(forces["value"]) * np.diff(forces["place"])[0] == pytest.approx(4 * 300 / LOGS, rel=0.01)
+    assert np.sum(angles["value"]) == pytest.approx(4 * 300 / LOGS)
+    inside = [value for place, value in zip(angles["place"], angles["value"], strict=True) if 0.0 < place < 90.0]
+    assert np.sum(inside) == pytest.approx(np.sum(angles["value"]))
+    exceeded = [value for value in by_name["peak_forces_exceeded"]["value"] if value is not None]
+    assert np.all(np.diff(exceeded) <= 0.0)
+    assert 10.0 ** exceeded[0] == pytest.approx(4 * 300 / LOGS, rel=0.02)
+
+
+def test_time_that_is_missing_is_refused(tmp_path: Path) -> None:
+    one = replica(tmp_path)
+    lines = (tmp_path / "time.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "time.csv").write_text("".join(lines[:-7]))
+    with pytest.raises(DumpError, match="993 rows instead of 1000"):
+        checks.quantities([one])
+
+
+@pytest.mark.parametrize(("changes", "logs", "radius"), [
+    ({"log_count": 100, "log_diameter_min": 0.2, "log_diameter_max": 0.2, "filling": 0.25}, 100, 2.0),
+    ({"drum_radius": 2.0, "log_diameter_min": 0.2, "log_diameter_max": 0.2, "filling": 0.25}, 100, 2.0),
+    ({"drum_radius": 2.0, "log_diameter_min": 0.2, "log_diameter_max": 0.2, "filling": 0.125}, 50, 2.0)])
+def test_geometry(changes: dict[str, float], logs: int, radius: float) -> None:
+    assert checks.geometry(parameters(**changes)) == (logs, pytest.approx(radius))
+
+
+def test_study_finds_the_exponent(tmp_path: Path) -> None:
+    points = []
+    for k, speed in enumerate((2.0, 0.5, 1.0)):
+        found, _, _ = checks.quantities([replica(tmp_path / str(k), seed=7, scale=speed**1.5)])
+        points.append({"parameters": {"drum_speed": speed}, "quantities": [one.as_json() for one in found]})
+    found, curves, _ = checks.study("speed", points, "drum_speed")
+    by_name = {one.name: one.as_json() for one in found}
+    assert by_name["peak_force_mean_exponent"]["value"] == pytest.approx(1.5)
+    assert by_name["impacts_per_log_exponent"]["value"] == pytest.approx(0.0, abs=1e-9)
+    low, high = by_name["peak_force_mean_exponent"]["interval"]
+    assert low < 1.5 < high
+    assert curves[0]["place"] == [0.5, 1.0, 2.0]
