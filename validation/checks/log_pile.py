@@ -246,13 +246,12 @@ def _beginning(run: LogRun) -> list[Quantity]:
         )
         for name, (label, unit, value) in values.items()
     ]
-    # The record has nine digits.
     for name, label, unit, column in (
         ("first_impulse", "mean impulse of the first impacts", "N*s", 5),
         ("first_peak", "mean peak force of the first impacts", "N", 4),
     ):
         value = float(first[:, column].mean())
-        found.append(Quantity(name, label, unit, exact(value), agreement=10.0 * SAME * value))
+        found.append(Quantity(name, label, unit, exact(value), agreement=SAME * value))
     return found
 
 

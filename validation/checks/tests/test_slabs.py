@@ -96,7 +96,7 @@ def test_widths_that_grow_as_published(tmp_path):
     assert value["exponent_slip_velocity"].estimate.value == pytest.approx(0.5, abs=0.05)
     assert value["exponent_thickness"].estimate.value == pytest.approx(1.0, abs=0.15)
     assert value["ratio_spread"].judged()[0] == "pass"
-    assert value["profile_collapse"].judged()[0] == "pass"
+    assert value["profile_collapse"].estimate.value < 0.1 and value["profile_collapse"].judged()[0] == "info"
     assert value["exponent_thickness"].judged()[0] == "info"
     assert [one["place"] for one in drawn[:3]] == [pytest.approx([20.0, 30.0, 40.0])] * 3
 
