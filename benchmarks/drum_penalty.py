@@ -64,14 +64,14 @@ def restitution(turn: float, law: str, phases: int = 64) -> tuple[float, float]:
     return float(np.mean(found)), 0.5 * float(np.ptp(found))
 
 
-def logs() -> tuple[Array, Array, float]:
+def logs(count: int = LOGS) -> tuple[Array, Array, float]:
     """Places (n, 2), diameters (n,) and the drum's radius, in m."""
-    diameters = LOW + (HIGH - LOW) * (np.random.default_rng(1).permutation(LOGS) + 0.5) / LOGS
+    diameters = LOW + (HIGH - LOW) * (np.random.default_rng(1).permutation(count) + 0.5) / count
     radius = 0.5 * math.sqrt(float((diameters**2).sum()) / FILLING)
     spacing, reach = 1.02 * HIGH, math.ceil(radius / HIGH)
     rise = 0.5 * math.sqrt(3.0) * spacing
     sites = [((i + 0.5 * (k % 2)) * spacing, k * rise) for k in range(-2 * reach, 2 * reach) for i in range(-reach, reach)]
-    inside = [site for site in sites if math.hypot(*site) <= radius - 0.52 * HIGH][:LOGS]
+    inside = [site for site in sites if math.hypot(*site) <= radius - 0.52 * HIGH][:count]
     return np.array(inside), diameters, radius
 
 
@@ -80,12 +80,12 @@ def highest_frequency() -> float:
     return math.sqrt(STIFFNESS / (0.25 * math.pi * DENSITY * LOW**2))
 
 
-def deck(law: str, step: float, seconds: float, rows: int, *, turning: bool) -> str:
+def deck(law: str, step: float, seconds: float, rows: int, *, turning: bool, count: int = LOGS) -> str:
     """The deck of one run that writes `rows` rows: time, kinetic, potential and elastic energy, moment of the shell, largest force.
 
     The drum's axis is z: the engine's own cylinders do not turn about y.
     """
-    places, diameters, radius = logs()
+    places, diameters, radius = logs(count)
     every = max(1, math.ceil(seconds / step / rows))
     friction, damping, speed = (0.4, DAMPING, SPEED) if turning else (0.0, 0.0, 0.0)
     lines = ["units si", "atom_style granular", "atom_modify map array sort 0 0.0", "boundary f f f", "newton off",
@@ -130,9 +130,9 @@ def deck(law: str, step: float, seconds: float, rows: int, *, turning: bool) -> 
     return "\n".join(lines) + "\n"
 
 
-def overlap_energy(folder: Path) -> Array:
+def overlap_energy(folder: Path, count: int = LOGS) -> Array:
     """Energy (J) in the contacts of each frame after the first, from the overlaps of the undeformed logs and the penalty stiffness."""
-    _, _, radius = logs()
+    _, _, radius = logs(count)
     pair, wall = 0.5 * STIFFNESS, STIFFNESS * SHELL / (STIFFNESS + SHELL)
     found = []
     for frame in (folder / "logs.dump").read_text().split("ITEM: TIMESTEP\n")[2:]:
@@ -143,13 +143,13 @@ def overlap_energy(folder: Path) -> Array:
     return np.array(found)
 
 
-def run(law: str, turn: float, seconds: float, rows: int, *, turning: bool) -> dict[str, Any]:
+def run(law: str, turn: float, seconds: float, rows: int, *, turning: bool, count: int = LOGS) -> dict[str, Any]:
     """One run: its rows, and the processor time of a simulated second; `failed` holds the engine's last word when it did not end."""
     engine = engines.find("liggghts")
     step = turn / highest_frequency()
     with tempfile.TemporaryDirectory(prefix="dembark-penalty-") as name:
         folder = Path(name)
-        (folder / "drum.in").write_text(deck(law, step, seconds, rows, turning=turning))
+        (folder / "drum.in").write_text(deck(law, step, seconds, rows, turning=turning, count=count))
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         done = subprocess.run([str(engine.executable), "-in", "drum.in", "-log", "none"], cwd=folder, env=engine.environment(), text=True,
                               errors="replace", capture_output=True, stdin=subprocess.DEVNULL, check=False)
@@ -158,7 +158,7 @@ def run(law: str, turn: float, seconds: float, rows: int, *, turning: bool) -> d
             return {"failed": [line for line in (done.stdout + done.stderr).splitlines() if "ERROR" in line][-1:]}
         time, kinetic, potential, elastic, moment, force = np.loadtxt(folder / "rows.txt").T
         if law == "penalty":
-            elastic = overlap_energy(folder)
+            elastic = overlap_energy(folder, count)
     return {"time": time, "kinetic": kinetic, "potential": potential, "elastic": elastic, "moment": moment, "force": force,
             "cost": spent / float(time[-1]), "cost_of_a_step": spent / float(time[-1]) * step}
 
@@ -186,6 +186,17 @@ def turning(law: str, turn: float) -> dict[str, Any]:
         blocks = found[name][100:].reshape(2 * (REVOLUTIONS - 1), -1).mean(axis=1)
         entry[name] = [float(blocks.mean()), student(len(blocks) - 1) * float(blocks.std(ddof=1)) / math.sqrt(len(blocks))]
     return entry
+
+
+def cost(count: int, turn: float = 0.2, seconds: float = 1.5, rounds: int = 3) -> list[dict[str, Any]]:
+    """Processor time of a step with `count` logs that fall into a turning drum and settle, medians over rounds in turn; `ratio` to the penalty law."""
+    spent: dict[str, list[float]] = {law: [] for law in LAWS}
+    for _ in range(rounds):
+        for law in LAWS:
+            spent[law].append(run(law, turn, seconds, 10, turning=True, count=count)["cost_of_a_step"])
+    middle = {law: float(np.median(values)) for law, values in spent.items()}
+    return [{"law": law, "logs": count, "turn": turn, "cost_of_a_step": middle[law], "ratio": middle[law] / middle["penalty"],
+             "range": [min(values), max(values)]} for law, values in spent.items()]
 
 
 def reference_of(entries: Sequence[dict[str, Any]], name: str) -> tuple[float, float]:
@@ -257,7 +268,7 @@ def draw(found: dict[str, Any], path: Path) -> None:
     one.plot(turn, np.exp(-0.5 * math.pi * turn), "k:", linewidth=1.0, label="exp(−πωτ/2)")
     one.set(xlabel="ωτ", ylabel="restitution", title="Two logs, no damping", ylim=(0.0, 1.6), xlim=(0.0, 2.0))
     two.set(xlabel="ωτ", ylabel="energy error of 1 s", title="60 logs, nothing lost")
-    three.set(xlabel="processor time per simulated second (s)", ylabel="energy error of 1 s", title="The same against cost")
+    three.set(xlabel="processor time (s) per second", ylabel="energy error of 1 s", title="The same against cost")
     one.legend(fontsize=7, frameon=False)
     for axes in (one, two, three):
         axes.grid(alpha=0.3)
@@ -271,7 +282,12 @@ def main(words: list[str]) -> int:
     parser.add_argument("--out", type=Path, default=Path("docs/figures/drum_penalty.json"))
     parser.add_argument("--figure", type=Path, default=Path("docs/figures/drum_penalty.png"))
     parser.add_argument("--redraw", action="store_true", help="only judge and draw what --out holds")
+    parser.add_argument("--cost", type=int, metavar="LOGS", help="only measure what a step costs with so many logs, and print it")
     options = parser.parse_args(words)
+    if options.cost:
+        for entry in cost(options.cost):
+            print(json.dumps(entry))
+        return 0
     if not options.redraw:
         fine = (*np.geomspace(0.01, 0.2, 8), *np.linspace(0.3, 2.0, 18))
         found: dict[str, Any] = {"logs": LOGS, "omega": highest_frequency(), "pair": [], "closed": [], "turning": []}
