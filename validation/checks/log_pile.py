@@ -174,6 +174,7 @@ def _contacts(run: LogRun, stack: Stack, rest: slice) -> list[Quantity]:
             "1",
             per_log,
             reference=exact(least),
+            absolute=True,
             source="as many equations as unknowns",
             verdict="pass" if per_log.value >= least - 0.5 / logs else "fail",
             tolerance=None,

@@ -115,6 +115,15 @@ def checks(pages: list[Page]) -> Iterator[dict[str, Any]]:
             yield quantity | {"page": page, "engine": both}
 
 
+def overview(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """One row a page of the verdict table: numbers of its verdicts, each engine's and those of the engines against each other."""
+    table: dict[str, dict[str, Any]] = {}
+    for row in rows:
+        entry = table.setdefault(row["page"].anchor, {"page": row["page"], "counts": {}})
+        entry["counts"].setdefault(row["engine"], dict.fromkeys(_SIGNS, 0))[row["verdict"]] += 1
+    return list(table.values())
+
+
 def _context(results: Path, pages: list[Page], folder: Path) -> dict[str, Any]:
     rows = list(checks(pages))
     counts = {verdict: sum(row["verdict"] == verdict for row in rows) for verdict in _SIGNS}
@@ -169,6 +178,7 @@ def _context(results: Path, pages: list[Page], folder: Path) -> dict[str, Any]:
     return {
         "profile": results.name,
         "rows": rows,
+        "overview": overview(rows),
         "counts": counts,
         "summary": summary(counts, pages),
         "verdict": "fail" if counts["fail"] or counts["missing"] else "pass",

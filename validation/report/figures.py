@@ -226,7 +226,7 @@ def scatter_figure(groups: Mapping[str, Sequence[tuple[str, float, float, float,
         if everything:
             spread = max(0.3, 1.4 * max(abs(one[1] / one[2] - 1.0) for one in everything))
             ratio.set_ylim(max(0.0, 1.0 - spread), 1.0 + spread)
-            figure.legend(loc="outside lower center", ncols=1 if len(groups) > 3 else 3, fontsize=6.5, handlelength=1.2, columnspacing=1.2)
+            figure.legend(loc="outside lower center", ncols=1 if len(groups) > 3 else 2, fontsize=6.5, handlelength=1.2, columnspacing=1.2)
         else:
             ratio.text(0.5, 0.5, "no pairs to show", transform=ratio.transAxes, ha="center", color="#666c75")
     return figure

@@ -4,6 +4,7 @@ import csv
 import json
 import re
 import sys
+import types
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from dembark.validation.compare import compare
 from dembark.validation.errors import RunError
 from dembark.validation.metrics import measure
 from dembark.validation.report import figures, numbers, pictures
+from dembark.validation.report.build import overview
 from synthetic import plug_flow, silo
 
 
@@ -56,6 +58,17 @@ def test_failed_check_is_shown_as_failed(results):
     failed = {(row["engine"], row["quantity"]) for row in rows if row["verdict"] == "fail"}
     assert ("YADE", "force_balance_error") in failed
     assert ("LIGGGHTS", "force_balance_error") not in failed
+
+
+def test_overview_counts_the_verdicts_of_each_engine():
+    page, other = (types.SimpleNamespace(anchor=name) for name in ("silo-dry", "silo-wet"))
+    rows = [
+        {"page": one, "engine": engine, "verdict": verdict}
+        for one, engine, verdict in ((page, "YADE", "pass"), (page, "YADE", "pass"), (page, "LIGGGHTS", "fail"), (other, "YADE", "missing"))
+    ]
+    first, second = overview(rows)
+    assert first["counts"]["YADE"] == {"pass": 2, "fail": 0, "info": 0, "missing": 0} and first["counts"]["LIGGGHTS"]["fail"] == 1
+    assert second["page"] is other and second["counts"]["YADE"]["missing"] == 1
 
 
 def test_missing_run_is_shown_with_its_reason(results):
