@@ -21,7 +21,7 @@ from benchmarks.lcp_cases import Problem, certificate, coupled, network, sequenc
 from dembark.physics import LcpResult, LcpSolver, solve_lcp
 from dembark.validation.errors import DembarkError, RunError
 from dembark.validation.files import write_json
-from dembark.validation.provenance import _cpu, commit, package_version
+from dembark.validation.provenance import cpu, commit, package_version
 
 HERE = Path(__file__).parent
 SYSTEM_PYTHON = "/usr/bin/python3"
@@ -213,7 +213,7 @@ def measure(out: Path, rounds: int, wall: bool, say: Callable[[str], None], quic
     version = siconos_version()
     if version is None:
         say(f"{SYSTEM_PYTHON} has no Siconos (Debian: python3-siconos): its columns stay out")
-    facts = {**commit(), "date": datetime.now(UTC).isoformat(timespec="seconds"), "load": os.getloadavg()[0], "cpu": _cpu(),
+    facts = {**commit(), "date": datetime.now(UTC).isoformat(timespec="seconds"), "load": os.getloadavg()[0], "cpu": cpu(),
              "cores": os.cpu_count(), "clock": "elapsed time" if wall else "processor time", "rounds": rounds,
              "versions": {"dembark": package_version("dembark"), "siconos": version, "numpy": package_version("numpy")}}
     rows = []

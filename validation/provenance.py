@@ -41,7 +41,8 @@ def package_version(name: str) -> str | None:
         return None
 
 
-def _cpu() -> str:
+def cpu() -> str:
+    """Name of the processor."""
     try:
         found = re.search(r"^model name\s*:\s*(.+)$", Path("/proc/cpuinfo").read_text(encoding="utf-8"), re.M)
     except OSError:
@@ -68,5 +69,5 @@ def collect(engine: Engine) -> dict[str, Any]:
         "versions": {"dembark": package_version("dembark"), engine.name: engine.version, "python": platform.python_version(),
                      **{name: package_version(name) for name in ("numpy", "scipy", "MDAnalysis", "snakemake")}},
         "engine": str(engine.executable), "engine_identity": engine.identity, "flags": build_flags(engine),
-        "host": socket.gethostname(), "os": platform.platform(), "cpu": _cpu(), "cores": os.cpu_count(),
+        "host": socket.gethostname(), "os": platform.platform(), "cpu": cpu(), "cores": os.cpu_count(),
     }

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from dembark.postproc import DumpError
-from dembark.validation.checks.quantity import Quantity
+from dembark.validation.checks.quantity import Quantity, measured
 from dembark.validation.checks.filling import propagated
 from dembark.validation.checks.run import Array, Replica, pooled, profile, resampled, time_blocks
 from dembark.validation.references import KOLESNIKOV
@@ -272,9 +272,8 @@ def study(name: str, points: Sequence[dict[str, Any]], along: str) -> tuple[list
         ("impacts_per_log", "Impacts per log and revolution", "1", 1.0), ("peak_force_mean", "Mean peak force", "kN", 1e-3),
         ("peak_force_p99", "Peak force that 1 % exceed", "kN", 1e-3), ("dissipated_energy", "Energy lost per revolution", "kJ", 1e-3),
         ("torque_arm", "Moment over weight × radius", "1", 1.0)):
-        entries = [next(one for one in point["quantities"] if one["name"] == quantity) for point in points]
-        values = np.array([factor * one["value"] for one in entries])
-        halves = np.array([0.5 * factor * (one["interval"][1] - one["interval"][0]) if one["interval"] else np.inf for one in entries])
+        entries = [measured(point, quantity, factor) for point in points]
+        values, halves = np.array([one.value for one in entries]), np.array([one.half for one in entries])
         found.append(Quantity(f"{quantity}_exponent", f"{title.lower()}: exponent of {along.replace('_', ' ')}", "1",
                               propagated(lambda y: float(np.polyfit(np.log(place), np.log(y), 1)[0]), values, halves),
                               detail=f"slope of a line through {len(points)} points on logarithmic axes"))

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from dembark.validation.checks.quantity import Quantity
+from dembark.validation.checks.quantity import Quantity, measured
 from dembark.validation.references import JANSSEN, WALKER
 from dembark.validation.statistics import Estimate, combined
 from numpy.typing import NDArray
@@ -63,23 +63,17 @@ def propagated(measure: Callable[[Array], float], values: Array, halves: Array) 
     return Estimate(middle, combined(parts), "propagated from the apparent masses")
 
 
-def _estimate(point: dict[str, Any], name: str) -> Estimate:
-    one = next(quantity for quantity in point["quantities"] if quantity["name"] == name)
-    half = 0.5 * (one["interval"][1] - one["interval"][0]) if one["interval"] else float("inf")
-    return Estimate(one["value"], half)
-
-
 def filling_study(points: Sequence[dict[str, Any]], tolerance: float) -> tuple[list[Quantity], list[dict[str, Any]], list[str]]:
     """Quantities, profiles and remarks from the measured fillings `points` (contents of metrics.json, any order)."""
-    points = sorted(points, key=lambda point: _estimate(point, "filled_mass").value)
-    mass = np.array([_estimate(point, "filled_mass").value for point in points])
-    shares = [_estimate(point, "apparent_mass_ratio") for point in points]
+    points = sorted(points, key=lambda point: measured(point, "filled_mass").value)
+    mass = np.array([measured(point, "filled_mass").value for point in points])
+    shares = [measured(point, "apparent_mass_ratio") for point in points]
     apparent = mass * [one.value for one in shares]
     halves = mass * [one.half for one in shares]
     deepest = points[-1]
     # Mass of a piece of the column as high as the radius.
-    per_radius = mass[-1] / _estimate(deepest, "filling_height").value
-    predicted = _estimate(deepest, "janssen_length_predicted")
+    per_radius = mass[-1] / measured(deepest, "filling_height").value
+    predicted = measured(deepest, "janssen_length_predicted")
     fitted = propagated(lambda values: fitted_saturation(mass, values) / per_radius, apparent, halves)
     saturation, onset = fitted_pair(mass, apparent)
     one = float(np.sum((apparent_mass(mass, fitted.value * per_radius) - apparent) ** 2))

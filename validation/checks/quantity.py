@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -86,6 +87,13 @@ class Quantity:
         if self.agreement is not None:
             entry["agreement"] = self.agreement
         return entry
+
+
+def measured(point: Mapping[str, Any], name: str, factor: float = 1.0) -> Estimate:
+    """The quantity `name` of a metrics.json's content, times `factor`; half-width inf where it has no interval."""
+    one = next(quantity for quantity in point["quantities"] if quantity["name"] == name)
+    half = 0.5 * (one["interval"][1] - one["interval"][0]) if one["interval"] else math.inf
+    return Estimate(one["value"] * factor, half * factor, one.get("basis", ""))
 
 
 def judge(deviation: float, half: float, tolerance: float) -> tuple[str, str]:

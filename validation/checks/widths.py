@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from dembark.validation.checks.quantity import Quantity
+from dembark.validation.checks.quantity import Quantity, measured
 from dembark.validation.references import DEBNATH
 from dembark.validation.statistics import Estimate
 from numpy.typing import NDArray
@@ -25,12 +24,6 @@ def exponent(widths: Array, values: Sequence[Estimate]) -> Estimate:
     slope = float(weights @ np.log([one.value for one in values]))
     half = float(np.sqrt(np.sum((weights * [one.half / one.value for one in values]) ** 2)))
     return Estimate(slope, half, f"propagated from {len(widths)} widths")
-
-
-def _estimate(point: dict[str, Any], name: str, factor: float = 1.0) -> Estimate:
-    one = next(quantity for quantity in point["quantities"] if quantity["name"] == name)
-    half = 0.5 * (one["interval"][1] - one["interval"][0]) if one["interval"] else math.inf
-    return Estimate(one["value"] * factor, half * factor, one["basis"])
 
 
 def _curve(point: dict[str, Any]) -> tuple[Array, Array]:
@@ -51,10 +44,10 @@ def width_study(points: Sequence[dict[str, Any]], name: str) -> tuple[list[Quant
     widths = np.array([float(point["parameters"]["channel_width"]) for point in points])
     diameter = float(points[0]["parameters"]["grain_diameter"])
     scale = np.sqrt(widths * float(points[0]["parameters"]["gravity"]))
-    greatest = [_estimate(point, "greatest_velocity", factor) for point, factor in zip(points, scale, strict=True)]
-    slip = [_estimate(point, "slip_velocity", factor) for point, factor in zip(points, scale, strict=True)]
-    thickness, ratio = ([_estimate(point, key) for point in points] for key in ("shear_zone_thickness", "velocity_ratio"))
-    fractions = [[_estimate(point, key).value for point in points] for key in ("solid_fraction", "wall_solid_fraction")]
+    greatest = [measured(point, "greatest_velocity", factor) for point, factor in zip(points, scale, strict=True)]
+    slip = [measured(point, "slip_velocity", factor) for point, factor in zip(points, scale, strict=True)]
+    thickness, ratio = ([measured(point, key) for point in points] for key in ("shear_zone_thickness", "velocity_ratio"))
+    fractions = [[measured(point, key).value for point in points] for key in ("solid_fraction", "wall_solid_fraction")]
     broken = next(
         (
             f"W = {width / diameter:.0f} d: {quantity['reason']}"
