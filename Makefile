@@ -12,6 +12,8 @@ BIN := $(VENV)/bin
 SYSTEM_PYTHON ?= /usr/bin/python3
 JOBS ?= $(shell n=$$(nproc); m=$$(awk '/MemAvailable/ {print int($$2/1048576/2)}' /proc/meminfo); echo $$(( m < 1 ? 1 : m < n ? m : n )))
 
+TEST_JOBS ?= $(shell nproc)
+
 sources := $(shell find plugins -name '*.hpp' -o -name '*.h' -o -name '*.cpp' -o -name 'CMakeLists.txt' | grep -v '^plugins/yade')
 yade_sources := $(shell find plugins/yade -type f -not -path '*/tests/*' -not -name '*.pyc') $(shell find plugins/physics -name '*.hpp')
 python_files := $(shell find plugins/python postproc validation input_decks -type f -not -name '*.pyc' -not -path '*/tests/*')
@@ -46,7 +48,7 @@ $(BUILD)/.liggghts: $(BUILD)/.configured $(sources)
 
 liggghts: $(BUILD)/.liggghts ## build liggghts-dembark (build/bin/liggghts-dembark)
 
-$(BUILD)/.python: pyproject.toml $(python_files) $(filter plugins/physics/% plugins/python/%,$(sources)) | $(VENV)/.complete
+$(BUILD)/.python: pyproject.toml CMakeLists.txt $(python_files) $(filter plugins/physics/% plugins/python/%,$(sources)) $(VENV)/.complete
 	@echo "dembark: installing the Python package into $(VENV)" >&2
 	@mkdir -p $(BUILD)
 	@PATH=$(CURDIR)/$(BIN):$$PATH $(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
@@ -72,7 +74,7 @@ doctor: $(BUILD)/.python ## say what is found, what is missing and what to do
 
 test: all ## run all tests
 	@$(BUILD)/bin/physics-tests
-	@$(BIN)/python -m pytest $(PYTEST_ARGS)
+	@$(BIN)/python -m pytest --numprocesses $(TEST_JOBS) --dist loadscope $(PYTEST_ARGS)
 
 validate: all ## run the cases in both engines and write the report (PROFILE=quick|standard|full)
 	@$(BIN)/dembark validate --profile $(PROFILE)

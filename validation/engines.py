@@ -8,7 +8,7 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -90,6 +90,16 @@ def _find_yade() -> tuple[Path, Path]:
                        "build it with 'make yade-plugin' or set DEMBARK_YADE to its folder or executable")
 
 
+def call(words: Sequence[str | Path], folder: Path, environment: Mapping[str, str] | None = None,
+         timeout: float = 120.0) -> subprocess.CompletedProcess[str]:
+    """Run an engine in `folder` to its end, at most `timeout` (s); its output is text whatever it wrote.
+
+    Stock LIGGGHTS prints bytes of freed memory after some errors: they need not be text.
+    """
+    return subprocess.run([str(word) for word in words], cwd=folder, env=environment, capture_output=True, text=True, errors="replace",
+                          stdin=subprocess.DEVNULL, timeout=timeout, check=False)
+
+
 def _digest(files: Iterable[Path]) -> str:
     total = hashlib.sha256()
     for path in sorted(files):
@@ -107,8 +117,7 @@ def _own_files(prefix: Path) -> list[Path]:
 def _first_match(pattern: str, command: list[str], environment: Mapping[str, str] | None = None) -> str:
     try:
         with tempfile.TemporaryDirectory(prefix="dembark-") as folder:
-            done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, errors="replace",
-                                  stdin=subprocess.DEVNULL, timeout=120, check=False)
+            done = call(command, Path(folder), environment)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise DembarkError(f"{command[0]} does not start", "", str(error)) from None
     found = re.search(pattern, done.stdout + done.stderr)

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from dembark.validation.engines import call
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "input_decks").glob("*/README.md")])
@@ -65,7 +66,7 @@ def run_lammps(text: str, folder: Path) -> list[list[float]]:
     """Rows of numbers that liggghts-dembark prints for a deck."""
     engine = program(Path(os.environ["DEMBARK_LIGGGHTS"]) if "DEMBARK_LIGGGHTS" in os.environ else None, ROOT / "build/bin/liggghts-dembark")
     (folder / "deck.in").write_text(text, encoding="utf-8")
-    result = subprocess.run([engine, "-in", "deck.in", "-log", "none"], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    result = call([engine, "-in", "deck.in", "-log", "none"], folder, timeout=300)
     assert result.returncode == 0, result.stdout[-2000:] + result.stderr
     return [[float(word) for word in line.split()] for line in result.stdout.splitlines() if re.fullmatch(r"[\s\d.e+-]+", line) and line.strip()]
 
@@ -93,7 +94,7 @@ def test_yade_script(text: str, tmp_path: Path) -> None:
     (tmp_path / "script.py").write_text(text, encoding="utf-8")
     environment = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV", "DISPLAY", "YADE_PREFIX")}
     environment["PATH"] = "/usr/bin:" + environment.get("PATH", "")
-    result = subprocess.run([engine, "-n", "-x", "script.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300, check=False)
+    result = call([engine, "-n", "-x", "script.py"], tmp_path, environment, timeout=300)
     assert result.returncode == 0, result.stderr
     said = "impacts: " if "LogImpact" in text else "bridges: 1"
     assert said in result.stdout

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from dembark.validation.engines import call
 
 STOCK = shutil.which("liggghts")
 pytestmark = pytest.mark.skipif(STOCK is None, reason="the stock LIGGGHTS (package liggghts) is not installed")
@@ -29,7 +30,7 @@ fix m4 all property/global coefficientFriction peratomtypepair 2 0.5 0.5 0.5 0.5
 def run(folder: Path, deck: str, *words: str) -> subprocess.CompletedProcess[str]:
     """The stock program on `deck` in `folder`."""
     (folder / "deck.in").write_text(deck)
-    return subprocess.run([STOCK, "-in", "deck.in", "-log", "none", *words], cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    return call([STOCK, "-in", "deck.in", "-log", "none", *words], folder)
 
 
 def scene(radius: float, boundary: str = "f f f", skin: float | None = None) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -76,8 +75,7 @@ def run_by_hand(case: str, engine_name: str, folder: Path, values: dict[str, Any
         words = [str(engine.executable), "-in", str(ROOT / case / "liggghts.in"), *given]
     else:
         words = [str(engine.executable), "-n", "-x", str(ROOT / case / "yade.py"), *(f"{key}={value}" for key, value in values.items())]
-    done = subprocess.run(words, cwd=folder, env=engine.environment(), capture_output=True, text=True, stdin=subprocess.DEVNULL,
-                          timeout=120, check=False)
+    done = engines.call(words, folder, engine.environment())
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     lines = [line.strip() for line in done.stdout.splitlines() if line.strip()]
     assert "dembark: finished" in lines

@@ -76,9 +76,7 @@ def start(case: str, name: str, folder: Path, values: dict[str, Any]) -> subproc
         words = [str(engine.executable), "-in", str(ROOT / case / "liggghts.in"), *given]
     else:
         words = [str(engine.executable), "-n", "-x", str(ROOT / case / "yade.py"), *(f"{key}={value}" for key, value in values.items())]
-    return subprocess.run(
-        words, cwd=folder, env=engine.environment(), capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=120, check=False
-    )
+    return engines.call(words, folder, engine.environment())
 
 
 @pytest.fixture(scope="module")

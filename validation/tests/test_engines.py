@@ -120,6 +120,14 @@ def decks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     engines.find.cache_clear()
 
 
+def test_output_that_is_no_text_is_kept(tmp_path: Path) -> None:
+    """Stock LIGGGHTS follows some error lines with bytes of freed memory."""
+    done = engines.call(["printf", r"ERROR: too small\ntl\307\312\207U (input.cpp:327)\n"], tmp_path)
+    assert done.returncode == 0
+    assert done.stdout.splitlines()[0] == "ERROR: too small"
+
+
+
 def plan(engine: str, **changes: object) -> Run:
     return series(find("fall"), "default", None, engines.find(engine), changes).runs[0]
 

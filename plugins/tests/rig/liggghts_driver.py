@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.validation.engines import Engine, find
+from dembark.validation.engines import Engine, call, find
 from rig.motion import Motion
 from rig.scenarios import Material, Scenario, in_liggghts
 
@@ -41,8 +40,7 @@ def run_deck(folder: Path, deck: str, *, ranks: int = 1, name: str = "case.in") 
     (folder / name).write_text(deck)
     # Ranks that wait must not keep the others from the processors of a machine that is busy.
     environment = engine().environment() | {"OMPI_MCA_mpi_yield_when_idle": "1"}
-    done = subprocess.run(engine().command(folder / name, {}, ranks), cwd=folder, env=environment, capture_output=True, text=True,
-                          errors="replace", stdin=subprocess.DEVNULL, timeout=60, check=False)
+    done = call(engine().command(folder / name, {}, ranks), folder, environment)
     return Run(done.returncode, done.stdout + done.stderr, folder)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.validation.engines import Engine, find
+from dembark.validation.engines import Engine, call, find
 from rig.motion import Motion
 from rig.python_driver import prescribed
 from rig.scenarios import Scenario
@@ -27,8 +27,7 @@ def engine() -> Engine:
 def run_script(folder: Path, script: Path, *words: str) -> subprocess.CompletedProcess[str]:
     folder.mkdir(parents=True, exist_ok=True)
     command = [*engine().command(script, {}), *words]
-    return subprocess.run(command, cwd=folder, env=engine().environment(), capture_output=True, text=True, stdin=subprocess.DEVNULL,
-                          timeout=120, check=False)
+    return call(command, folder, engine().environment())
 
 
 def run_all(cases: Iterable[Scenario], folder: Path) -> dict[str, Motion]:

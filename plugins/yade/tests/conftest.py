@@ -23,8 +23,7 @@ class Yade:
         self.folder = folder
 
     def __call__(self, script: Path, *words: str, threads: int = 1) -> subprocess.CompletedProcess[str]:
-        return subprocess.run([*self.engine.command(script, {}, threads=threads), *words], cwd=self.folder, text=True, capture_output=True,
-                              env=self.engine.environment(threads), stdin=subprocess.DEVNULL, timeout=120, check=False)
+        return engines.call([*self.engine.command(script, {}, threads=threads), *words], self.folder, self.engine.environment(threads))
 
     def scenes(self, *names: str, threads: int = 1) -> dict:
         out = self.folder / f"scenes-{threads}.json"

@@ -1,0 +1,3 @@
+#include <nanobind/nanobind.h>
+
+NB_MODULE(_fields, module) { module.doc() = "Grains and contacts on a grid."; }
