@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import os
 import statistics
@@ -187,23 +188,46 @@ def markdown(rows: list[dict[str, Any]], asked: list[dict[str, Any]], facts: dic
     return "\n".join(lines)
 
 
+def table(rows: list[dict[str, Any]], path: Path) -> None:
+    """What the figure shows, as CSV: a row for each problem and solver; seconds, and how many steps of its own kind the solver took."""
+    keys = ("case", "contacts", "solver", "median", "min", "max", "samples", "pivots", "block_steps", "iterations", "certificate", "status")
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, keys, extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(row for row in rows if row["case"] != "network, warm")
+
+
+def steps_of(row: dict[str, Any]) -> float:
+    """Steps of a solver: pivots and block steps of dembark's (sweeps of pgs), iterations of the others."""
+    return float(row.get("iterations", row.get("pivots", 0)) + row.get("block_steps", 0))
+
+
 def plot(rows: list[dict[str, Any]], path: Path) -> None:
-    """Time against the number of contacts."""
+    """Time, and below it the steps that it took, against the number of contacts."""
     import matplotlib  # noqa: PLC0415
 
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt  # noqa: PLC0415
 
     cases = [case for case in ("coupled", "network, stored dense", "network, sparse") if any(row["case"] == case for row in rows)]
-    figure, axes = plt.subplots(1, len(cases), figsize=(4.2 * len(cases), 3.6), squeeze=False, layout="constrained")
-    for axis, case in zip(axes[0], cases, strict=True):
-        for solver in dict.fromkeys(row["solver"] for row in rows if row["case"] == case):
-            points = sorted((row["contacts"], row["median"]) for row in rows if row["case"] == case and row["solver"] == solver)
-            style = "--x" if solver.startswith("Siconos") else "-o"
-            axis.loglog(*zip(*points, strict=True), style, markersize=4, linewidth=1.2, label=solver)
-        axis.set(title=case, xlabel="contacts", ylabel="time / s")
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=7, frameon=False)
+    solvers = list(dict.fromkeys(row["solver"] for row in rows if row["case"] in cases))
+    colours = {solver: f"C{k}" for k, solver in enumerate(solvers)}
+    figure, axes = plt.subplots(2, len(cases), figsize=(4.2 * len(cases), 6.4), squeeze=False, sharex="col", layout="constrained")
+    for upper, lower, case in zip(axes[0], axes[1], cases, strict=True):
+        for solver in solvers:
+            own_rows = sorted((row for row in rows if row["case"] == case and row["solver"] == solver), key=lambda row: row["contacts"])
+            if not own_rows:
+                continue
+            style: dict[str, Any] = {"color": colours[solver], "marker": "x" if solver.startswith("Siconos") else "o", "markersize": 4,
+                                     "linestyle": "--" if solver.startswith("Siconos") else "-", "linewidth": 1.2, "label": solver}
+            contacts = [row["contacts"] for row in own_rows]
+            upper.loglog(contacts, [row["median"] for row in own_rows], **style)
+            lower.loglog(contacts, [max(1.0, steps_of(row)) for row in own_rows], **style)
+        upper.set(title=case, ylabel="processor time / s")
+        lower.set(xlabel="contacts", ylabel="pivots, block steps, sweeps or iterations")
+        upper.legend(fontsize=7, frameon=False)
+        for axis in (upper, lower):
+            axis.grid(alpha=0.3)
     figure.savefig(path, dpi=130, metadata={"Software": None})
     plt.close(figure)
 
@@ -228,9 +252,21 @@ def measure(out: Path, rounds: int, wall: bool, say: Callable[[str], None], quic
     out.mkdir(parents=True, exist_ok=True)
     write_json(out / "lcp.json", {"rows": rows, "goals": asked, "provenance": facts})
     (out / "lcp.md").write_text(markdown(rows, asked, facts), encoding="utf-8")
+    table(rows, out / "lcp.csv")
     plot(rows, out / "lcp.png")
-    say(f"wrote {out / 'lcp.md'}, lcp.json and lcp.png")
+    say(f"wrote {out / 'lcp.md'}, lcp.json, lcp.csv and lcp.png")
     return asked
+
+
+def redraw(found: Path, figure: Path) -> None:
+    """Draw the lcp.json in the folder `found` again, as `figure` and a CSV file beside it."""
+    path = found / "lcp.json"
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))["rows"]
+    except (OSError, ValueError, KeyError):
+        raise DembarkError("no measurement to draw", str(path), "run python -m benchmarks.run --only lcp first") from None
+    table(rows, figure.with_suffix(".csv"))
+    plot(rows, figure)
 
 
 def report(asked: list[dict[str, Any]]) -> int:
@@ -246,7 +282,7 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--rounds", type=int, default=5, help="samples of each solver (default %(default)s)")
     parser.add_argument("--wall-clock", action="store_true", help="elapsed time; default: processor time")
     parser.add_argument("--quick", action="store_true", help="small problems only")
-    parser.add_argument("--out", type=Path, default=HERE.parent / "results/bench", help="folder of lcp.json, lcp.md and lcp.png")
+    parser.add_argument("--out", type=Path, default=HERE.parent / "results/bench", help="folder of lcp.json, lcp.md, lcp.csv and lcp.png")
     given = parser.parse_args(words)
 
     def say(line: str) -> None:

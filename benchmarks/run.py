@@ -96,9 +96,12 @@ def parsed(words: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--steps", type=int, default=400, help="steps of a timed run of LIGGGHTS; a quarter of it in YADE (default %(default)s)")
     parser.add_argument("--relax", type=int, default=1000, help="steps before it, in which histories build up (default %(default)s)")
     parser.add_argument("--only", choices=["dry", "wet", "yade", "lcp"], action="append", help="leave the other comparisons out")
+    parser.add_argument("--redraw", action="store_true", help="with --only lcp: measure nothing, draw docs/figures/lcp_scaling from --out")
     parser.add_argument("--wall-clock", action="store_true", help="LIGGGHTS's timers as they are; default: processor time")
     parser.add_argument("--out", type=Path, default=ROOT / "results/bench", help="folder of bench.json and bench.md")
     given = parser.parse_args(words)
+    if given.redraw and set(given.only or ()) != {"lcp"}:
+        raise DembarkError("--redraw", "", "draws the figure of the LCP solver alone: add --only lcp")
     if min(given.rounds, given.count, given.steps, given.relax) < 1:
         raise DembarkError("--rounds, --count, --steps and --relax", "", "give whole numbers from 1 on")
     return given
@@ -109,6 +112,9 @@ def main(words: list[str] | None = None) -> int:
     try:
         given = parsed(words)
         if given.only and set(given.only) == {"lcp"}:
+            if given.redraw:
+                lcp.redraw(given.out, ROOT / "docs/figures/lcp_scaling.png")
+                return 0
             return lcp.report(lcp.measure(given.out, given.rounds, given.wall_clock, say))
         cache = ROOT / "build/bench"
         cache.mkdir(parents=True, exist_ok=True)

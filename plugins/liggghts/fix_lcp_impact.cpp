@@ -25,14 +25,6 @@ namespace {
 
 constexpr int local_columns = 13;
 
-dembark::LcpMethod method(const std::string &name) {
-  if (name == "energy") return dembark::LcpMethod::energy;
-  if (name == "block") return dembark::LcpMethod::block;
-  if (name == "murty") return dembark::LcpMethod::murty;
-  if (name == "pgs") return dembark::LcpMethod::pgs;
-  return dembark::LcpMethod::automatic;
-}
-
 std::vector<std::string> words(int narg, char **arg) { return std::vector<std::string>(arg + std::min(3, narg), arg + narg); }
 
 }  // namespace
@@ -75,7 +67,7 @@ dembark::impact::Settings FixLcpImpact::settings() const {
   s.dt = update->dt;
   s.theta = options_.theta;
   s.friction_sweeps = options_.sweeps;
-  s.lcp.method = method(options_.method);
+  s.lcp.method = options_.method;
   // Walls follow the atom types, so that each has a friction of its own.
   const std::size_t types = options_.stiffness.size(), n = types + options_.walls.size();
   s.materials.resize(n);

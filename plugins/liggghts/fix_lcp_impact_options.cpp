@@ -166,8 +166,8 @@ ImpactOptions read_impact_options(const std::vector<std::string>& list, int atom
     else if (keyword == "inertia") o.solid_cylinder = words.choice(keyword, "the shape", {"cylinder", "sphere"}) == 0;
     else if (keyword == "impacts") o.impacts_file = words.word(keyword, "the name of the file");
     else if (keyword == "method") {
-      const std::vector<std::string> methods = {"auto", "energy", "block", "murty", "pgs"};
-      o.method = methods[std::size_t(words.choice(keyword, "the solver", methods))];
+      const std::vector<std::string> methods(std::begin(dembark::lcp_method_names), std::end(dembark::lcp_method_names));
+      o.method = dembark::lcp_method(methods[std::size_t(words.choice(keyword, "the solver", methods))]);
     } else if (keyword == "sweeps") {
       const double value = words.at_least(1.0, keyword, "the number");
       if (value != std::floor(value) || value > 100.0) refuse("sweeps: a whole number from 1 to 100, not " + text(value));

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "dembark/lcp/types.hpp"
+
 namespace dembark_liggghts {
 
 /// Friction of one kind of contact: Coulomb if both coefficients are equal.
@@ -37,7 +39,7 @@ struct ImpactOptions {
   double tangential_ratio = 2.0 / 7.0;
   bool solid_cylinder = true;  ///< moment of inertia m r^2 / 2, else 2/5 m r^2
   std::string impacts_file;    ///< empty: none
-  std::string method = "auto";
+  dembark::LcpMethod method = dembark::LcpMethod::automatic;
   int sweeps = 2;
   std::vector<ImpactWall> walls;
 };

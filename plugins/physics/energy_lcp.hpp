@@ -23,7 +23,9 @@
 
 #include "lcp/block_pivots.hpp"
 #include "lcp/checks.hpp"
+#include "lcp/definite.hpp"
 #include "lcp/islands.hpp"
+#include "lcp/sparse_proof.hpp"
 #include "lcp/types.hpp"
 
 namespace dembark {
@@ -83,9 +85,7 @@ class LcpSolver {
         lcp::fail_definite(what.row, what);
       }
     }
-    finish(options, [&](Index j, auto&& entry) {
-      for (Index i = 0; i < n; ++i) entry(i, m[j * n + i]);
-    }, q);
+    finish(options, q, lcp::DenseBlock{m, n, n});
     return result_;
   }
 
@@ -103,22 +103,24 @@ class LcpSolver {
                                  const LcpOptions& options, const std::vector<char>* start) {
     const Index n = q.size();
     const bool fill_reducing = options.method == LcpMethod::automatic || options.method == LcpMethod::block;
-    if (!islands_.fits(outer, inner, n, fill_reducing)) islands_.analyse(outer, inner, n, fill_reducing, small_island);
+    if (!islands_.fits(outer, inner, n, fill_reducing)) {
+      islands_.analyse(outer, inner, n, fill_reducing, small_island);
+      definite_.forget(islands_.count(), n, std::size_t(outer[n]));
+    }
     islands_.gather(value);
     result_.islands = islands_.count();
     for (int t = 0; t < islands_.count(); ++t) {
-      const lcp::SparseBlock block = islands_.block(t);
       const int* order = islands_.order(t);
       try {
-        if (block.n == 1) solve_single(order[0], block.diagonals[0], q, start);
-        else solve_island(block, islands_.entries(t), order, q, options, start);
+        if (islands_.size(t) == 1) solve_single(order[0], islands_.block(t).diagonals[0], q, start);
+        else solve_island(t, q, options, start);
       } catch (const lcp::NotDefinite& what) {
         lcp::fail_definite(order[what.row], what);
       }
     }
-    finish(options, [&](Index j, auto&& entry) {
-      for (int p = outer[j]; p < outer[j + 1]; ++p) entry(Index(inner[p]), value[p]);
-    }, q);
+    diagonal_.resize(n);
+    islands_.scatter_diagonal(diagonal_.data());
+    finish(options, q, lcp::SparseBlock{n, outer, inner, value, diagonal_.data()});
     return result_;
   }
 
@@ -136,9 +138,12 @@ class LcpSolver {
   /// Whether a dense matrix is best left dense: one island and not mostly zeros.
   bool compact(const double* m, Index n) {
     if (n <= 1) return n == 0;  // a single unknown needs no factor
-    Index entries = 0;
-    for (Index p = 0; p < n * n; ++p) entries += m[p] != 0.0;
-    if (n > small_island && double(entries) < dense_share * double(n) * double(n)) return false;
+    if (n > small_island) {
+      const double enough = dense_share * double(n) * double(n);
+      Index entries = 0;
+      for (Index j = 0; j < n && double(entries) < enough; ++j) entries += (Eigen::Map<const Eigen::ArrayXd>(m + j * n, n) != 0.0).count();
+      if (double(entries) < enough) return false;
+    }
     std::vector<Index> queue{0}, left;
     for (Index i = n; --i > 0;) left.push_back(i);
     while (!queue.empty() && !left.empty()) {
@@ -162,9 +167,10 @@ class LcpSolver {
     result_.pivots += active != (start && (*start)[std::size_t(i)]);
   }
 
-  void solve_island(const lcp::SparseBlock& block, Index entries, const int* order, const Eigen::VectorXd& q, const LcpOptions& options,
-                    const std::vector<char>* start) {
-    const Index n = block.n;
+  void solve_island(int island, const Eigen::VectorXd& q, const LcpOptions& options, const std::vector<char>* start) {
+    const lcp::SparseBlock block = islands_.block(island);
+    const Index n = block.n, entries = islands_.entries(island);
+    const int* order = islands_.order(island);
     load(block, order, q, start);
     const bool single = options.method == LcpMethod::energy || options.method == LcpMethod::murty;
     const bool dense = n <= small_island || (n <= dense_limit && double(entries) >= dense_share * double(n) * double(n));
@@ -175,10 +181,7 @@ class LcpSolver {
       if (options.check_input && !lcp::dominant(block)) all_definite(m);
       run_dense(m, options, start != nullptr);
     } else {
-      if (options.check_input && !lcp::dominant(block)) {
-        const std::vector<char> all(std::size_t(n), 1);
-        definite_.compute(block, all);
-      }
+      if (options.check_input) definite_.check(island, islands_.first(island), block);
       if (single) {
         if (n > dense_limit)
           lcp::fail("methods energy and murty keep n^2 numbers and take islands up to ", dense_limit, " unknowns, not ", n, "; use auto or block");
@@ -216,6 +219,7 @@ class LcpSolver {
   }
 
   void all_definite(const lcp::DenseBlock& m) {
+    if (proof_.holds(m)) return;
     const std::vector<char> all(std::size_t(m.n), 1);
     whole_.compute(m, all);
   }
@@ -248,20 +252,13 @@ class LcpSolver {
   }
 
   /// w and the certificate, from the M and q that were given: independent of whatever the methods kept.
-  template <class Columns>
-  void finish(const LcpOptions& options, const Columns& column, const Eigen::VectorXd& q) {
+  template <class Matrix>
+  void finish(const LcpOptions& options, const Eigen::VectorXd& q, const Matrix& m) {
     const Index n = q.size();
-    scale_ = q.cwiseAbs();
+    scale_.resize(n);
     root_.resize(n);
-    for (Index j = 0; j < n; ++j) {
-      const double z = result_.z[j];
-      column(j, [&](Index i, double m) {
-        if (i == j) root_[j] = std::sqrt(m);
-        const double t = m * z;
-        result_.w[i] += t;
-        scale_[i] += std::fabs(t);
-      });
-    }
+    for (Index i = 0; i < n; ++i) root_[i] = std::sqrt(m.diagonal(i));
+    m.multiply(q.data(), result_.z.data(), result_.w.data(), scale_.data());
     double low = 0.0, most = 0.0, product = 0.0;
     for (Index i = 0; i < n; ++i) {
       low = std::max(low, -result_.w[i] / root_[i]);
@@ -285,10 +282,11 @@ class LcpSolver {
   lcp::SinglePivots singles_;
   lcp::BlockPivots<lcp::DenseBlock, lcp::DenseFactor> steps_;
   lcp::BlockPivots<lcp::SparseBlock, lcp::SparseFactor> sparse_;
+  lcp::DefiniteProof proof_;
   lcp::DenseFactor whole_;
-  lcp::SparseFactor definite_;
+  lcp::SparseProof definite_;
   Eigen::SparseMatrix<double> copy_;
-  Eigen::VectorXd scale_, root_;
+  Eigen::VectorXd scale_, root_, diagonal_;
   std::vector<double> dense_;
   std::vector<char> active_;
 };

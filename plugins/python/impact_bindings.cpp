@@ -37,15 +37,6 @@ void append(std::vector<double>& out, const Vec3<double>& v) { out.insert(out.en
 /// Number of a body, or -1, -2, ... of the first, second, ... wall.
 double shown(std::int64_t key) { return key < 0 ? -1.0 - double(wall_number(key)) : double(key); }
 
-LcpMethod method_of(const std::string& name) {
-  if (name == "auto") return LcpMethod::automatic;
-  if (name == "energy") return LcpMethod::energy;
-  if (name == "block") return LcpMethod::block;
-  if (name == "murty") return LcpMethod::murty;
-  if (name == "pgs") return LcpMethod::pgs;
-  throw std::invalid_argument("method must be 'auto', 'energy', 'block', 'murty' or 'pgs', not '" + name + "'");
-}
-
 /// bodies, a row each: mass, inertia, radius, material, then position, velocity, spin, force, torque.
 std::vector<Body> bodies_of(const Table& t) {
   std::vector<Body> bodies(t.shape(0));
@@ -66,7 +57,7 @@ Settings settings_of(double dt, double theta, int sweeps, const std::string& met
   s.dt = dt;
   s.theta = theta;
   s.friction_sweeps = sweeps;
-  s.lcp.method = method_of(method);
+  s.lcp.method = lcp_method(method);
   s.materials.resize(materials.shape(0));
   for (std::size_t i = 0; i < s.materials.size(); ++i) s.materials[i] = {materials(i, 0), materials(i, 1)};
   s.pairs.resize(pairs.shape(0));

@@ -23,18 +23,9 @@ using Matrix = nb::ndarray<const double, nb::ndim<2>, nb::f_contig, nb::device::
 using Indices = nb::ndarray<const int, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Flags = nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
-LcpMethod method_of(const std::string& name) {
-  if (name == "auto") return LcpMethod::automatic;
-  if (name == "energy") return LcpMethod::energy;
-  if (name == "block") return LcpMethod::block;
-  if (name == "murty") return LcpMethod::murty;
-  if (name == "pgs") return LcpMethod::pgs;
-  throw std::invalid_argument("method must be 'auto', 'energy', 'block', 'murty' or 'pgs', not '" + name + "'");
-}
-
 LcpOptions options_of(const std::string& method, double tolerance, int max_iterations, bool check_input) {
   LcpOptions options;
-  options.method = method_of(method);
+  options.method = lcp_method(method);
   options.tolerance = tolerance;
   options.max_iterations = max_iterations;
   options.check_input = check_input;

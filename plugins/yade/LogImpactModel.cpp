@@ -90,9 +90,11 @@ void LogImpact::postLoad(LogImpact&) {
 	least("tangentialRatio", tangentialRatio, 0.0, true, "> 0");
 	least("tolerance", tolerance, 0.0, true, "> 0");
 	if (sweeps < 1) fail("LogImpact.sweeps is " + std::to_string(sweeps) + "; it must be >= 1");
-	const char* const known[] = {"auto", "energy", "block", "murty", "pgs"};
-	if (std::find(std::begin(known), std::end(known), method) == std::end(known))
+	try {
+		::dembark::lcp_method(method);
+	} catch (const std::invalid_argument&) {
 		fail("LogImpact.method is '" + method + "'; it must be auto, energy, block, murty or pgs");
+	}
 }
 
 void LogImpact::preSave(LogImpact&) {
@@ -220,11 +222,7 @@ impact::Settings LogImpact::settings(const std::vector<int>& materials) const {
 	result.theta           = theta;
 	result.friction_sweeps = sweeps;
 	result.lcp.tolerance   = tolerance;
-	result.lcp.method      = method == "energy" ? ::dembark::LcpMethod::energy
-	             : method == "block"            ? ::dembark::LcpMethod::block
-	             : method == "murty"            ? ::dembark::LcpMethod::murty
-	             : method == "pgs"              ? ::dembark::LcpMethod::pgs
-	                                            : ::dembark::LcpMethod::automatic;
+	result.lcp.method      = ::dembark::lcp_method(method);
 	result.materials.resize(n);
 	result.pairs.resize(n * n);
 	for (std::size_t i = 0; i < n; ++i) {

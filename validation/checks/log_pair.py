@@ -90,7 +90,7 @@ def measured(run: LogRun) -> tuple[list[Quantity], list[dict[str, Any]], list[st
             "s",
             exact(records[0, 3] if len(records) else math.nan),
             reference=exact(motion.end - motion.begin),
-            tolerance=None if damped else 1.001 * run.time_step,
+            tolerance=None if damped else run.time_step,
             absolute=True,
             agreement=1e-6 * (motion.end - motion.begin),
             source="exact solution of the two bodies",

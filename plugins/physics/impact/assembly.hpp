@@ -53,7 +53,9 @@ class Assembly {
       fill(bodies, c, settings, r);
       same_pattern = same_pattern && a == r.a && b == r.b;
     }
-    if (!same_pattern) build_pattern(bodies.size());
+    if (same_pattern) return;
+    bodies_ = bodies.size();
+    stale_ = true;
   }
 
   /// Forgets the order and the pattern.
@@ -66,6 +68,7 @@ class Assembly {
   /// Values of A. bodies: with 1/m' as `inverse` (1/kg); scale: h tau^2 (s^2); compliance: 1 / (s + c/tau) of each row, m/N.
   template <class Sums>
   void assemble(const std::vector<Sums>& bodies, double scale, const std::vector<double>& compliance) {
+    if (stale_) build_pattern(bodies_);
     double* value = matrix_.valuePtr();
     const int *outer = matrix_.outerIndexPtr(), *inner = matrix_.innerIndexPtr();
     for (std::size_t i = 0; i < rows_.size(); ++i) {
@@ -83,6 +86,7 @@ class Assembly {
 
  private:
   using Key = std::pair<std::int64_t, std::int64_t>;
+  static constexpr int most_runs = 16;
   static bool turned(const Contact& c) { return c.b >= 0 && c.key_b < c.key_a; }
   static Key key(const Contact& c) { return turned(c) ? Key(c.key_b, c.key_a) : Key(c.key_a, c.key_b); }
 
@@ -95,12 +99,17 @@ class Assembly {
 
   void sort(const std::vector<Contact>& contacts) {
     keyed_.resize(contacts.size());
-    bool sorted = true;
-    for (std::size_t i = 0; i < keyed_.size(); ++i) {
-      keyed_[i] = {key(contacts[i]), int(i)};
-      sorted = sorted && (i == 0 || keyed_[i - 1].first < keyed_[i].first);
+    for (std::size_t i = 0; i < keyed_.size(); ++i) keyed_[i] = {key(contacts[i]), int(i)};
+    // Pairs come sorted, and so do the contacts of each wall: a few ascending runs are merged.
+    int runs = 0;
+    for (auto from = keyed_.begin(), end = from; from != keyed_.end(); from = end) {
+      if (++runs > most_runs) {
+        std::sort(keyed_.begin(), keyed_.end());
+        break;
+      }
+      end = std::is_sorted_until(from, keyed_.end());
+      if (from != keyed_.begin()) std::inplace_merge(keyed_.begin(), from, end);
     }
-    if (!sorted) std::sort(keyed_.begin(), keyed_.end());
     order_.resize(keyed_.size());
     for (std::size_t i = 0; i < keyed_.size(); ++i) {
       order_[i] = keyed_[i].second;
@@ -151,7 +160,7 @@ class Assembly {
   }
 
   void build_pattern(std::size_t bodies) {
-    bodies_ = bodies;
+    stale_ = false;
     const int n = int(rows_.size());
     start_.assign(bodies + 1, 0);
     for (const Row& r : rows_) {
@@ -200,6 +209,7 @@ class Assembly {
   std::vector<std::pair<Key, int>> keyed_;
   std::vector<int> order_, start_, fill_, list_, inner_, shared_;
   std::size_t bodies_ = std::numeric_limits<std::size_t>::max();
+  bool stale_ = true;  ///< the pattern is made when it is needed
   Eigen::SparseMatrix<double> matrix_;
 };
 

@@ -25,7 +25,7 @@ inline double friction_area(const Row& row, double normal_force) {
 
 /// One sweep of one contact.
 ///
-/// normal_force  N, N               response   w, 1/kg, split among the contacts of each body
+/// normal_force  N > 0, N           response   w, 1/kg, split among the contacts of each body
 /// velocity      tangential velocity of a relative to b at the contact, m/s, with the forces of the last sweep
 /// last          T*, N, of the last sweep     start   T_0 = -k xi, N, at the begin of the step, in the contact plane
 /// state         slip at the begin of the step; gets slip and elastic displacement at its end
@@ -34,10 +34,6 @@ inline double friction_area(const Row& row, double normal_force) {
 inline Vec3<double> friction_sweep(const Row& row, double normal_force, double response, const Vec3<double>& velocity,
                                    const Vec3<double>& last, const Vec3<double>& start, double dt, double kick,
                                    FrictionState<double>& state) {
-  if (!(normal_force > 0.0) || row.law->friction.static_friction == 0.0) {
-    state = {};
-    return {};
-  }
   const double ratio = row.law->tangential_stiffness_ratio, k = ratio * row.stiffness, viscous = ratio * row.law->contact_damping / dt;
   const double inertia = kick * dt * dt * response, soft = (k + viscous) / (1.0 + (k + viscous) * inertia);
   state.displacement = start * (-1.0 / soft);

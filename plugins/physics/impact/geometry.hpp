@@ -146,10 +146,16 @@ class PairFinder {
         if (dot(d, d) <= far * far) pairs_.emplace_back(int(i), j);
       });
     }
-    std::sort(pairs_.begin(), pairs_.end(), [&](const auto& p, const auto& q) {
+    const auto before = [&](const auto& p, const auto& q) {
       const auto pa = bodies[p.first].id, qa = bodies[q.first].id;
       return pa != qa ? pa < qa : bodies[p.second].id < bodies[q.second].id;
-    });
+    };
+    // Of bodies in the order of their ids only the partners of each are out of order.
+    for (auto from = pairs_.begin(), end = from; from != pairs_.end(); from = end) {
+      end = std::find_if(from, pairs_.end(), [&](const auto& p) { return p.first != from->first; });
+      std::sort(from, end, before);
+    }
+    if (!std::is_sorted(pairs_.begin(), pairs_.end(), before)) std::sort(pairs_.begin(), pairs_.end(), before);
     reference_ = bodies;
   }
   BodyGrid grid_;

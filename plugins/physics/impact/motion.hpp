@@ -1,6 +1,7 @@
 // What a step does to the bodies: sums of forces, and the velocities they lead to.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <stdexcept>
@@ -13,103 +14,119 @@
 namespace dembark {
 namespace impact {
 
-/// Sums over the contacts of a body, and what its motion answers with.
-struct BodySums {
+/// What the motion of a body answers with.
+struct BodyResponse {
   double inverse = 0.0;       ///< 1/m', 1/kg
   double spin_inverse = 0.0;  ///< 1/I, 1/(kg m^2)
   double damping = 0.0;       ///< lambda if it acts in this step, N s/m
-  int active = 0;             ///< contacts with N > 0
   Vec3<double> free{};        ///< f - lambda v, N
-  Vec3<double> normal{}, tangential{}, torque{};
+};
+
+/// Sums over the contacts of a body, in parts that are cleared and read together: the loops over them cost what their memory does.
+struct NormalSum {
+  Vec3<double> force{};  ///< N
+  int active = 0;        ///< contacts with N > 0
+};
+struct TangentialSum {
+  Vec3<double> force{}, torque{};  ///< N, N m
+};
+/// v' - v (m/s) and omega' - omega (rad/s), all forces as they are.
+struct Change {
+  Vec3<double> velocity{}, spin{};
 };
 
 class Motion {
  public:
-  std::vector<BodySums> sums;
+  std::vector<BodyResponse> response;
+  std::vector<NormalSum> normal;
+  std::vector<TangentialSum> tangential;
+  std::vector<Change> change;  ///< see move()
   std::vector<int> damped;  ///< bodies with lambda > 0, in the order of the contacts
 
   /// Begins a step; `bodies` must outlive it. Throws std::invalid_argument with one line about the body that is wrong.
   void begin(const std::vector<Body>& bodies, double dt, double kick) {
     bodies_ = &bodies;
     interval_ = kick * dt;
-    sums.resize(bodies.size());
+    response.resize(bodies.size());
+    normal.assign(bodies.size(), NormalSum());
+    tangential.assign(bodies.size(), TangentialSum());
+    change.resize(bodies.size());
+    acceleration_.resize(bodies.size());
     damped.clear();
     for (std::size_t b = 0; b < bodies.size(); ++b) {
       check(bodies[b]);
-      sums[b] = BodySums();
-      sums[b].inverse = 1.0 / bodies[b].mass;
-      sums[b].spin_inverse = 1.0 / bodies[b].inertia;
-      sums[b].free = bodies[b].force;
+      response[b] = {1.0 / bodies[b].mass, 1.0 / bodies[b].inertia, 0.0, bodies[b].force};
     }
   }
 
-  /// Body damping lambda (N s/m) acts on body b; response: g tau (s).
-  void damp(int b, double lambda, double response) {
-    BodySums& s = sums[b];
+  /// Body damping lambda (N s/m) acts on body b; stretch: g tau (s).
+  void damp(int b, double lambda, double stretch) {
+    BodyResponse& s = response[b];
     if (lambda == 0.0 || s.damping > 0.0 || s.inverse == 0.0) return;
     s.damping = lambda;
-    s.inverse = 1.0 / ((*bodies_)[b].mass + response * lambda);
+    s.inverse = 1.0 / ((*bodies_)[b].mass + stretch * lambda);
     s.free -= lambda * (*bodies_)[b].velocity;
     damped.push_back(b);
   }
 
-  void clear_normal() {
-    for (BodySums& s : sums) s.normal = {}, s.active = 0;
-  }
+  void clear_normal() { std::fill(normal.begin(), normal.end(), NormalSum()); }
   void add_normal(const Row& r, double force) {
-    sums[r.a].normal += force * r.normal;
-    ++sums[r.a].active;
+    normal[r.a].force += force * r.normal;
+    ++normal[r.a].active;
     if (r.b < 0) return;
-    sums[r.b].normal -= force * r.normal;
-    ++sums[r.b].active;
+    normal[r.b].force -= force * r.normal;
+    ++normal[r.b].active;
   }
-  void clear_tangential() {
-    for (BodySums& s : sums) s.tangential = s.torque = {};
-  }
+  void clear_tangential() { std::fill(tangential.begin(), tangential.end(), TangentialSum()); }
   void add_tangential(const Row& r, const Vec3<double>& t) {
     const Vec3<double> moment = cross(r.normal, t);
-    sums[r.a].tangential += t;
-    sums[r.a].torque -= r.arm_a * moment;
+    tangential[r.a].force += t;
+    tangential[r.a].torque -= r.arm_a * moment;
     if (r.b < 0) return;
-    sums[r.b].tangential -= t;
-    sums[r.b].torque -= r.arm_b * moment;
+    tangential[r.b].force -= t;
+    tangential[r.b].torque -= r.arm_b * moment;
   }
 
   /// Rate of the gap (m/s) with the velocities v.
   double gap_rate(const Row& r) const {
     return dot(r.normal, (*bodies_)[r.a].velocity - (r.b >= 0 ? (*bodies_)[r.b].velocity : r.point_velocity));
   }
+  /// Takes the forces but the normal ones over, for gap_acceleration.
+  void accelerate() {
+    for (std::size_t b = 0; b < response.size(); ++b)
+      acceleration_[b] = response[b].inverse * (response[b].free + tangential[b].force);
+  }
   /// Acceleration of the gap (m/s^2) by all forces but the normal ones.
   double gap_acceleration(const Row& r) const {
-    Vec3<double> a = sums[r.a].inverse * (sums[r.a].free + sums[r.a].tangential);
-    if (r.b >= 0) a -= sums[r.b].inverse * (sums[r.b].free + sums[r.b].tangential);
-    return dot(r.normal, a);
+    return dot(r.normal, r.b >= 0 ? acceleration_[r.a] - acceleration_[r.b] : acceleration_[r.a]);
   }
   /// Response (1/kg) of the contact to a tangential force, the bodies shared out among their active contacts.
   double tangential_response(const Row& r) const {
-    const BodySums& a = sums[r.a];
-    double w = a.active * (a.inverse + r.arm_a * r.arm_a * a.spin_inverse);
+    const BodyResponse& a = response[r.a];
+    const double w = normal[r.a].active * (a.inverse + r.arm_a * r.arm_a * a.spin_inverse);
     if (r.b < 0) return w;
-    const BodySums& b = sums[r.b];
-    return w + b.active * (b.inverse + r.arm_b * r.arm_b * b.spin_inverse);
+    const BodyResponse& b = response[r.b];
+    return w + normal[r.b].active * (b.inverse + r.arm_b * r.arm_b * b.spin_inverse);
   }
 
-  /// v' - v and omega' - omega of a body, all forces as they are.
-  Vec3<double> velocity_change(int b) const {
-    const BodySums& s = sums[b];
-    return (interval_ * s.inverse) * (s.free + s.tangential + s.normal);
+  /// Takes all forces over, for surface_velocity.
+  void move() {
+    for (std::size_t b = 0; b < response.size(); ++b) {
+      const BodyResponse& s = response[b];
+      change[b].velocity = (interval_ * s.inverse) * (s.free + tangential[b].force + normal[b].force);
+      change[b].spin = (interval_ * s.spin_inverse) * ((*bodies_)[b].torque + tangential[b].torque);
+    }
   }
-  Vec3<double> spin_change(int b) const { return (interval_ * sums[b].spin_inverse) * ((*bodies_)[b].torque + sums[b].torque); }
 
   /// Velocity of the surface of a relative to that of b (m/s), `part` of the way from v to v'.
   Vec3<double> surface_velocity(const Row& r, double part) const {
     const Body& a = (*bodies_)[r.a];
-    Vec3<double> v = a.velocity + part * velocity_change(r.a);
-    Vec3<double> spin = r.arm_a * (a.spin + part * spin_change(r.a));
+    Vec3<double> v = a.velocity + part * change[r.a].velocity;
+    Vec3<double> spin = r.arm_a * (a.spin + part * change[r.a].spin);
     if (r.b >= 0) {
       const Body& b = (*bodies_)[r.b];
-      v -= b.velocity + part * velocity_change(r.b);
-      spin += r.arm_b * (b.spin + part * spin_change(r.b));
+      v -= b.velocity + part * change[r.b].velocity;
+      spin += r.arm_b * (b.spin + part * change[r.b].spin);
     } else {
       v -= r.point_velocity;
     }
@@ -137,6 +154,7 @@ class Motion {
   }
 
   const std::vector<Body>* bodies_ = nullptr;
+  std::vector<Vec3<double>> acceleration_;  ///< m/s^2, by all forces but the normal ones; see accelerate()
   double interval_ = 0.0;
 };
 

@@ -18,7 +18,8 @@
 // becomes 1/(s + c/tau), and B gets the deformation delta_last c / (s tau + c) that is still there.
 //
 // Friction is solved in turn with N: N with the last friction forces in f; friction from N; N again with the friction forces in f,
-// and so on. The last solve is that of N, so D is that of the motion that happens.
+// and so on. The last solve is that of N, so D is that of the motion that happens. With LcpMethod::automatic each solve is tried by
+// relaxation first (relaxation.hpp) and made by LcpSolver where that does not reach rounding fast.
 //
 // Results do not depend on the order in which bodies and contacts are given.
 #pragma once
@@ -35,6 +36,7 @@
 #include "friction.hpp"
 #include "motion.hpp"
 #include "records.hpp"
+#include "relaxation.hpp"
 #include "types.hpp"
 
 namespace dembark {
@@ -130,6 +132,9 @@ class System {
   }
 
  private:
+  /// So many contacts cost nothing to solve exactly.
+  static constexpr std::size_t few = 12;
+
   void set_bodies(const std::vector<Body>& bodies) {
     motion_.begin(bodies, settings_.dt, kick_);
     const double response = g_ * settings_.dt;
@@ -180,7 +185,11 @@ class System {
       }
       tangential_[i] = start_[i];
     }
-    if (n) assembly_.assemble(motion_.sums, h_ * settings_.dt * settings_.dt, compliance_);
+    assembled_ = false;
+    relaxes_ = settings_.lcp.method == LcpMethod::automatic && n > few;
+    if (relaxes_) relaxation_.prepare(rows, motion_.response, h_ * settings_.dt * settings_.dt, compliance_);
+    normal_.setZero(Eigen::Index(n));
+    opening_.resize(Eigen::Index(n));
   }
 
   static double tangential_stiffness(const Row& r) { return r.law->tangential_stiffness_ratio * r.stiffness; }
@@ -191,8 +200,31 @@ class System {
     motion_.clear_normal();
     if (rows.empty()) return;
     const double scale = h_ * settings_.dt * settings_.dt;
+    motion_.accelerate();
     for (std::size_t i = 0; i < rows.size(); ++i)
       q_[Eigen::Index(i)] = offset_[Eigen::Index(i)] + scale * motion_.gap_acceleration(rows[i]);
+    relaxes_ = relaxes_ && relax();
+    if (!relaxes_) solve_exactly();
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      double& force = normal_[Eigen::Index(i)];
+      active_[i] = force > 0.0;
+      if (active_[i]) motion_.add_normal(rows[i], force);
+      else force = 0.0;
+    }
+  }
+
+  /// False where it does not converge fast; the other solves of the step are not tried then.
+  bool relax() {
+    double certificate = 0.0;
+    if (!relaxation_.solve(q_, settings_.lcp.tolerance, normal_, opening_, certificate)) return false;
+    report_.certificate = std::max(report_.certificate, certificate);
+    for (std::size_t i = 0; i < active_.size(); ++i) report_.pivots += (normal_[Eigen::Index(i)] > 0.0) != (active_[i] != 0);
+    return true;
+  }
+
+  void solve_exactly() {
+    if (!assembled_) assembly_.assemble(motion_.response, h_ * settings_.dt * settings_.dt, compliance_);
+    assembled_ = true;
     LcpOptions options = settings_.lcp;
     options.check_input = false;  // symmetric by construction, positive definite for finite stiffness
     const LcpResult& result = solver_.solve(assembly_.matrix(), q_, options, &active_);
@@ -201,12 +233,6 @@ class System {
     report_.pivots += result.pivots;
     report_.block_steps += result.block_steps;
     report_.certificate = std::max(report_.certificate, result.certificate.worst());
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      double& force = normal_[Eigen::Index(i)];
-      active_[i] = force > 0.0;
-      if (active_[i]) motion_.add_normal(rows[i], force);
-      else force = 0.0;
-    }
   }
 
   bool friction_acts() const {
@@ -222,16 +248,18 @@ class System {
     trial_.resize(rows.size());
     friction_.resize(rows.size());
     bool changed = false;
+    motion_.move();
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const Row& r = rows[i];
-      friction_[i] = records_.before[i].friction;
-      Vec3<double> velocity{};
-      if (active_[i]) {
-        velocity = motion_.surface_velocity(r, 1.0);
+      trial_[i] = {};
+      friction_[i] = {};
+      if (active_[i] && r.law->friction.static_friction > 0.0) {
+        friction_[i] = records_.before[i].friction;
+        Vec3<double> velocity = motion_.surface_velocity(r, 1.0);
         velocity -= dot(velocity, r.normal) * r.normal;
+        trial_[i] = friction_sweep(r, normal_[Eigen::Index(i)], motion_.tangential_response(r), velocity, tangential_[i], start_[i],
+                                   settings_.dt, kick_, friction_[i]);
       }
-      trial_[i] = friction_sweep(r, normal_[Eigen::Index(i)], motion_.tangential_response(r), velocity, tangential_[i], start_[i],
-                                 settings_.dt, kick_, friction_[i]);
       changed = changed || trial_[i].x != tangential_[i].x || trial_[i].y != tangential_[i].y || trial_[i].z != tangential_[i].z;
     }
     if (!changed) return false;
@@ -247,6 +275,7 @@ class System {
     const double length = weight_ * settings_.dt;       // s, the stretch of time this step stands for
     const double middle = 1.0 - 0.5 * weight_ / kick_;  // where its mean velocity lies between v (0) and v' (1)
     Totals& totals = records_.totals;
+    motion_.move();
     report_.contacts = int(rows.size());
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const Memory& before = records_.before[i];
@@ -292,15 +321,15 @@ class System {
       if (now.idle()) now = Memory();
     }
     for (const int b : motion_.damped) {
-      const Vec3<double> change = motion_.velocity_change(b);
+      const Vec3<double> change = motion_.change[b].velocity;
       // lambda on theta v' + (1 - theta) v_{n-1/2}
-      const Vec3<double> on = -motion_.sums[b].damping * (bodies[b].velocity + (g_ / kick_) * change);
+      const Vec3<double> on = -motion_.response[b].damping * (bodies[b].velocity + (g_ / kick_) * change);
       force[b] += on;
       totals.dissipated -= length * dot(on, bodies[b].velocity + middle * change);
     }
     for (std::size_t b = 0; b < bodies.size(); ++b) {
-      force[b] += motion_.sums[b].normal + motion_.sums[b].tangential;
-      torque[b] += motion_.sums[b].torque;
+      force[b] += motion_.normal[b].force + motion_.tangential[b].force;
+      torque[b] += motion_.tangential[b].torque;
     }
     totals.pivots += report_.pivots;
     totals.peak_force = std::max(totals.peak_force, report_.peak_force);
@@ -322,10 +351,12 @@ class System {
   Assembly assembly_;
   Records records_;
   Motion motion_;
+  Relaxation relaxation_;
   LcpSolver solver_;
   StepReport report_;
   double time_ = 0.0, kick_ = 1.0, weight_ = 1.0, h_ = 1.0, g_ = 1.0;
   bool stepped_ = false;
+  bool relaxes_ = false, assembled_ = false;  ///< in this step
   std::vector<char> active_;
   std::vector<double> compliance_;
   std::vector<Vec3<double>> start_, tangential_, trial_;

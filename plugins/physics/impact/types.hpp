@@ -100,7 +100,7 @@ struct Settings {
 struct StepReport {
   int contacts = 0;               ///< candidates
   int active = 0;                 ///< contacts with N > 0
-  int pivots = 0;                 ///< of all solves of the step
+  int pivots = 0;                 ///< of all solves of the step; of relaxed ones the contacts that changed sides
   int block_steps = 0;            ///< likewise
   std::int64_t impacts_begun = 0;     ///< total
   std::int64_t pivots_total = 0;      ///< total

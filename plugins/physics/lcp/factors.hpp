@@ -53,8 +53,10 @@ class DenseFactor {
 /// of the active block (T. A. Davis, Direct Methods for Sparse Linear Systems, SIAM 2006, chapter 4).
 class SparseFactor {
  public:
-  void compute(const SparseBlock& m, const std::vector<char>& active) {
+  /// shift: of the matrix less this share of its diagonal.
+  void compute(const SparseBlock& m, const std::vector<char>& active, double shift = 0.0) {
     n_ = int(m.n);
+    least_pivot_ = 1.0;
     resize(m.n);
     active_ = active.data();
     symbolic(m);
@@ -76,7 +78,7 @@ class SparseFactor {
         }
         while (length > 0) pattern_[std::size_t(--top)] = pattern_[std::size_t(--length)];
       }
-      d = y_[std::size_t(k)];
+      d = (1.0 - shift) * y_[std::size_t(k)];
       y_[std::size_t(k)] = 0.0;
       for (; top < n_; ++top) {
         const int i = pattern_[std::size_t(top)];
@@ -91,9 +93,13 @@ class SparseFactor {
         ++filled_[std::size_t(i)];
       }
       if (!(d > least * m.diagonal(k))) throw NotDefinite{k, d, m.diagonal(k)};
+      least_pivot_ = std::min(least_pivot_, d / m.diagonal(k));
       inverse_[std::size_t(k)] = 1.0 / d;
     }
   }
+
+  /// Of the last factor, in units of the diagonal.
+  double least_pivot() const { return least_pivot_; }
 
   void add_solution(const double* right, double* z) {
     for (int i = 0; i < n_; ++i) y_[std::size_t(i)] = active_[i] ? right[i] : 0.0;
@@ -113,8 +119,6 @@ class SparseFactor {
     }
     std::fill(y_.begin(), y_.end(), 0.0);
   }
-
-  std::size_t entries() const { return l_.size(); }
 
  private:
   void resize(Index n) {
@@ -153,6 +157,7 @@ class SparseFactor {
   }
 
   int n_ = 0;
+  double least_pivot_ = 1.0;
   const char* active_ = nullptr;
   std::vector<int> parent_, flag_, filled_, pattern_, begin_, row_;
   std::vector<double> inverse_, y_, l_;

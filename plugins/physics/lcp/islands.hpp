@@ -61,7 +61,7 @@ class Islands {
       }
     }
     value_.resize(inner_.size());
-    diagonal_.resize(std::size_t(n));
+    diagonal_.assign(std::size_t(n), 0.0);
     valid_ = true;
   }
 
@@ -74,7 +74,14 @@ class Islands {
           if (row_[std::size_t(p)] == k - first_[std::size_t(t)]) diagonal_[std::size_t(k)] = value_[std::size_t(p)];
   }
 
+  /// The diagonal of the whole matrix, in the order of its unknowns.
+  void scatter_diagonal(double* out) const {
+    for (std::size_t k = 0; k < order_.size(); ++k) out[order_[k]] = diagonal_[k];
+  }
+
   int count() const { return count_; }
+  /// Where the unknowns of an island begin among those of all islands.
+  Index first(int t) const { return first_[std::size_t(t)]; }
   Index size(int t) const { return first_[std::size_t(t) + 1] - first_[std::size_t(t)]; }
   Index entries(int t) const { return start_[std::size_t(first_[std::size_t(t) + 1])] - start_[std::size_t(first_[std::size_t(t)])]; }
   /// The unknowns of an island in its own order.

@@ -4,6 +4,9 @@
 #include <Eigen/Dense>
 #include <Eigen/SparseCore>
 #include <algorithm>
+#include <iterator>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 namespace dembark {
@@ -14,6 +17,17 @@ namespace dembark {
 /// murty: the violated index that comes first, one at a time; always ends, slow.
 /// pgs: projected Gauss-Seidel, for comparison; never exact.
 enum class LcpMethod { automatic, energy, block, murty, pgs };
+
+/// What users call them, in that order.
+constexpr const char* lcp_method_names[] = {"auto", "energy", "block", "murty", "pgs"};
+
+/// Throws std::invalid_argument with one line about a name that is none of these.
+inline LcpMethod lcp_method(const std::string& name) {
+  const auto found = std::find(std::begin(lcp_method_names), std::end(lcp_method_names), name);
+  if (found == std::end(lcp_method_names))
+    throw std::invalid_argument("method must be 'auto', 'energy', 'block', 'murty' or 'pgs', not '" + name + "'");
+  return static_cast<LcpMethod>(found - std::begin(lcp_method_names));
+}
 
 enum class LcpStatus { solved, iteration_limit };
 

@@ -285,3 +285,45 @@ TEST_CASE("bad input: one line that says what is wrong") {
   CHECK_THROWS_WITH(system.step(bodies, {c}, 0, 1, force, torque), Catch::Contains("unit vector"));
   CHECK_THROWS_WITH(system.step(bodies, {}, 0, 0, force, torque), Catch::Contains("kick"));
 }
+
+TEST_CASE("relaxation and the exact solver find the same forces, in the plane and out of it") {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  for (const bool tilted : {false, true}) {
+    std::vector<Body> bodies;
+    for (int i = 0; i < 8; ++i)
+      for (int j = 0; j < 8; ++j) {  // a lattice of triangles whose neighbours overlap or miss each other by a little
+        Body b;
+        b.id = std::int64_t(bodies.size());
+        b.radius = 0.05;
+        b.mass = 20.0 + 10.0 * unit(random);
+        b.inertia = cylinder_inertia(b.mass, b.radius);
+        const double x = 0.1 * (i + 0.5 * (j % 2)) + 2e-4 * unit(random), y = 0.0866 * j + 2e-4 * unit(random);
+        b.position = {tilted ? 0.8 * x : x, y, tilted ? 0.6 * x : 0.0};
+        b.velocity = {0.5 * unit(random), 0.5 * unit(random), tilted ? 0.5 * unit(random) : 0.0};
+        b.force = {0.0, -b.mass * g, 0.0};
+        bodies.push_back(b);
+      }
+    std::vector<Contact> contacts;
+    find_pairs(bodies, 1e-3, contacts);
+    Settings settings = three_materials(2e-4, 0.5, 0.4, 0.0, 300.0);
+    System relaxing(settings);
+    settings.lcp.method = LcpMethod::block;
+    System exact(settings);
+    std::vector<Vec3<double>> force[2], torque[2];
+    for (int k = 0; k < 2; ++k) force[k].resize(bodies.size()), torque[k].resize(bodies.size());
+    const StepReport a = relaxing.step(bodies, contacts, 0.0, 1.0, force[0], torque[0]);
+    const StepReport b = exact.step(bodies, contacts, 0.0, 1.0, force[1], torque[1]);
+    CHECK(a.contacts > 100);
+    CHECK(a.active > 30);
+    CHECK(a.active == b.active);
+    CHECK(a.block_steps == 0);  // so it was relaxed
+    CHECK(b.block_steps > 0);
+    CHECK(a.certificate < 1e-14);
+    for (std::size_t i = 0; i < contacts.size(); ++i) {
+      CHECK(std::fabs(relaxing.contacts()[i].normal_force - exact.contacts()[i].normal_force) < 1e-11 * b.peak_force);
+      CHECK(std::fabs(relaxing.contacts()[i].opening - exact.contacts()[i].opening) < 1e-15);
+    }
+    for (std::size_t i = 0; i < bodies.size(); ++i) CHECK(norm(force[0][i] - force[1][i]) < 1e-11 * b.peak_force);
+  }
+}

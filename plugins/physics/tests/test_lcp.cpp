@@ -315,3 +315,46 @@ TEST_CASE("no unknowns and one") {
     CHECK(solver.solve(Matrix::Constant(1, 1, 2.0), Vector::Constant(1, 3.0), options).w[0] == 3.0);
   }
 }
+
+TEST_CASE("the cheap proof of definiteness never holds for a matrix that is not, and holds for a well conditioned one") {
+  Problems p;
+  lcp::DefiniteProof proof;
+  for (const int n : {32, 45, 64, 130}) {
+    const Matrix M = p.definite(n, 1.0);
+    const lcp::DenseBlock block{M.data(), n, n};
+#ifdef DEMBARK_LCP_AVX2
+    if (lcp::has_avx2()) CHECK(proof.holds(block));
+#endif
+    // Less than nothing in one direction, on top of a spectrum from 1 up.
+    for (const double least : {-1.0, -1e-3, -1e-6, -1e-12, 0.0}) {
+      Eigen::SelfAdjointEigenSolver<Matrix> eigen(M);
+      Vector values = eigen.eigenvalues();
+      values[0] = least;
+      Matrix bad = eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose();
+      bad = 0.5 * (bad + bad.transpose()).eval();
+      CHECK_FALSE(proof.holds(lcp::DenseBlock{bad.data(), n, n}));
+    }
+  }
+}
+
+TEST_CASE("a sequence of sparse matrices: what is near to a proven one is taken, what is not definite is refused at any place of it") {
+  Problems p;
+  const int n = 120;
+  Matrix M = Matrix::Zero(n, n);  // definite, but not dominant
+  for (int i = 0; i < n; ++i) {
+    M(i, i) = 1.0;
+    for (int j : {i - 2, i - 1})
+      if (j >= 0) M(i, j) = M(j, i) = 0.3;
+  }
+  const Vector q = p.vector(n);
+  LcpSolver solver;
+  for (int step = 0; step < 6; ++step) {
+    const Matrix near = M * (1.0 + 1e-4 * step);
+    CHECK(violation(near, q, solver.solve(sparse(near), q)) < 1e-14);
+    Matrix bad = near;
+    bad(60, 61) = bad(61, 60) = 1.0;
+    CHECK_THROWS_AS(solver.solve(sparse(bad), q), std::invalid_argument);
+    bad(60, 61) = bad(61, 60) = std::nan("");
+    CHECK_THROWS_AS(solver.solve(sparse(bad), q), std::invalid_argument);
+  }
+}
