@@ -1,18 +1,31 @@
-"""Contacts of a run: `contacts.dump` of either engine as numpy arrays."""
+"""Contacts of a run: `contacts.dump` of either engine, or any local dump, as numpy arrays."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from dembark.postproc.dumptext import DumpError, TextDump
+from dembark.postproc.dumps.frames import Array, Dump, DumpError, RawFrame, integers, less_edges, numbered, take
+from dembark.postproc.dumps.opening import Trajectory, open_dump
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Column = int | str | Sequence[int | str]
 
-_COLUMNS = 12
+_WIDTHS = {"first": 3, "second": 3, "branch": 3, "ids": 2, "forces": 3}
+# What dembark's decks write: x1 y1 z1 x2 y2 z2 id1 id2 periodic fx fy fz, whatever the header calls them.
+_DECK: Mapping[str, Column] = {"first": (1, 2, 3), "second": (4, 5, 6), "ids": (7, 8), "forces": (10, 11, 12)}
+_DECK_COLUMNS = 12
+# What local/gran/vtk writes.
+_LINES: Mapping[str, Column] = {
+    "first": ("x1", "y1", "z1"),
+    "second": ("x2", "y2", "z2"),
+    "ids": ("id1", "id2"),
+    "forces": ("force[1]", "force[2]", "force[3]"),
+}
+# The flag `periodic`, counted from 0: the nearest image says the same.
+_DECK_LEFT_OUT = {8}
 
 
 @dataclass(frozen=True)
@@ -20,7 +33,7 @@ class ContactFrame:
     """The m contacts and liquid bridges between grains at one step; SI units.
 
     `first` (m, 3) is the position of grain 1, `branch` (m, 3) points from it to grain 2 (nearest image on periodic axes),
-    `forces` (m, 3) is the force on grain 1 (N), `ids` (m, 2).
+    `forces` (m, 3) is the force on grain 1 (N), `ids` (m, 2). `extra` holds every other column (m,) by its name.
     """
 
     step: int
@@ -28,32 +41,95 @@ class ContactFrame:
     branch: Array
     forces: Array
     ids: NDArray[np.int64]
+    extra: Mapping[str, Array] = field(default_factory=dict)
 
 
 class ContactsDump:
-    """`contacts.dump` as a sequence of ContactFrame, read one at a time.
+    """Contacts as a sequence of ContactFrame, read one at a time."""
 
-    The twelve columns are x1 y1 z1 x2 y2 z2 id1 id2 periodic fx fy fz, whatever the header calls them.
-    """
+    def __init__(
+        self, path: Trajectory, *, skip_truncated: bool = False, stream: bool = False, columns: Mapping[str, Column] | None = None
+    ) -> None:
+        """Open; DumpError for a missing, foreign or truncated file (see open_dump).
 
-    def __init__(self, path: str | Path, *, skip_truncated: bool = False) -> None:
-        """Open; DumpError for a missing, foreign or truncated file (see TextDump for `skip_truncated`)."""
-        self._dump = TextDump(path, skip_truncated=skip_truncated)
+        Without `columns` the file must be one of dembark's decks, with twelve columns, or of the style local/gran/vtk. Else `columns`
+        says which column, by its number from 1 or its name, is what: `first`, `second` (position of grain 2; or `branch`), `forces`,
+        `ids`, and under any other name what is to be in `extra`, (m,) or (m, k). For `compute ... pair/gran/local pos id force`, all
+        dumped in order, that is {"first": (1, 2, 3), "second": (4, 5, 6), "ids": (7, 8), "forces": (10, 11, 12)}. Columns without a
+        name given are in `extra` under that of the dump.
+        """
+        self._dump: Dump = open_dump(path, skip_truncated, stream=stream)
+        self._columns = columns
+        if columns is not None:
+            lacking = [name for name in ("first", "forces", "ids") if name not in columns]
+            if lacking or ("second" in columns) == ("branch" in columns):
+                raise DumpError(f"{self.path}: columns= must name {', '.join(lacking) or 'either second or branch'}")
+
+    @property
+    def path(self) -> Path:
+        """The file, or the first of them."""
+        return self._dump.path
+
+    @property
+    def truncated(self) -> str:
+        """One line about a cut-off last frame that was left out, or ''."""
+        return self._dump.truncated
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Lines about what was left out or put in order."""
+        return self._dump.remarks
+
+    @property
+    def steps(self) -> NDArray[np.int64]:
+        """The step of every frame."""
+        return self._dump.steps
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """The number of contacts of every frame."""
+        return self._dump.counts
+
+    def refresh(self) -> None:
+        """Look at the file anew: an engine may have written more."""
+        self._dump.refresh()
 
     def __len__(self) -> int:
         return len(self._dump)
 
     def __iter__(self) -> Iterator[ContactFrame]:
-        return (self[number] for number in range(len(self)))
+        return map(self._frame, self._dump)
 
     def __getitem__(self, number: int) -> ContactFrame:
-        if not 0 <= number < len(self):
-            raise IndexError(number)
-        raw = self._dump.frame(number)
-        values = raw.values
-        if values.shape[1] != _COLUMNS:
-            raise DumpError(f"{self._dump.path}, frame {number + 1}: has {values.shape[1]} columns instead of {_COLUMNS}")
-        length = np.where(raw.periodic, raw.high - raw.low, np.inf)
-        branch = values[:, 3:6] - values[:, 0:3]
-        branch -= np.where(raw.periodic, length, 0.0) * np.round(branch / length)
-        return ContactFrame(raw.step, values[:, 0:3], branch, values[:, 9:12], values[:, 6:8].astype(np.int64))
+        return self._frame(self._dump.frame(number))
+
+    def _frame(self, raw: RawFrame) -> ContactFrame:
+        where = f"{self.path}, step {raw.step}"
+        given = _schema(raw, where) if self._columns is None else self._columns
+        index = {name: _indices(raw, name, column, where) for name, column in given.items()}
+        parts = {name: take(raw.values, columns) for name, columns in index.items()}
+        used = {column for columns in index.values() for column in columns} | (_DECK_LEFT_OUT if given is _DECK else set())
+        extra = {name: take(raw.values, [column]) for column, name in enumerate(raw.columns) if column not in used}
+        branch = parts["branch"] if "branch" in parts else less_edges(parts["second"] - parts["first"], raw, np.round)
+        extra |= {name: values for name, values in parts.items() if name not in _WIDTHS}
+        return ContactFrame(raw.step, parts["first"], branch, parts["forces"], integers(parts["ids"], f"{where}: ids"), extra)
+
+
+def _schema(raw: RawFrame, where: str) -> Mapping[str, Column]:
+    if {"id1", "id2", "x1", "x2", "force[1]"} <= set(raw.columns):
+        return _LINES
+    if len(raw.columns) != _DECK_COLUMNS:
+        advice = "say by columns= which are first, second, ids, forces"
+        raise DumpError(f"{where}: has {len(raw.columns)} columns instead of {_DECK_COLUMNS}; {advice}")
+    return _DECK
+
+
+def _indices(raw: RawFrame, name: str, column: Column, where: str) -> list[int]:
+    words = [column] if isinstance(column, int | str) else list(column)
+    width = _WIDTHS.get(name, len(words))
+    if len(words) != width or not words:
+        raise DumpError(f"{where}: columns= gives {len(words)} columns for {name}, not {width or 1}")
+    outside = [word for word in words if isinstance(word, int) and not 1 <= word <= len(raw.columns)]
+    if outside:
+        raise DumpError(f"{where}: columns= gives column {outside[0]} for {name}, but there are columns 1 to {len(raw.columns)}")
+    return [word - 1 if isinstance(word, int) else numbered(raw.columns, [word], where)[0] for word in words]

@@ -1,41 +1,43 @@
-"""Grains of a run: one schema for the dumps of every engine, as a stream of frames or as an MDAnalysis Universe."""
+"""Grains of a run: one schema for the dumps of every engine, as a stream of frames (MDAnalysis's view of them: trajectory.py)."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
 
-import MDAnalysis
 import numpy as np
-from dembark.postproc.dumptext import DumpError, RawFrame, TextDump
-from MDAnalysis.coordinates.base import ReaderBase
-from MDAnalysis.core import topologyattrs
-from MDAnalysis.core.topology import Topology
-from MDAnalysis.topology.base import TopologyReaderBase
+from dembark.postproc.dumps.frames import Array, Dump, DumpError, RawFrame, cell, integers, less_edges, numbered, take
+from dembark.postproc.dumps.opening import Trajectory, open_dump
+from dembark.postproc.spheres import volume
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-
-_SCALARS = ("id", "type", "radius", "mass")
 _VECTORS = {
-    "positions": ("x", "y", "z"),
     "velocities": ("vx", "vy", "vz"),
     "omegas": ("omegax", "omegay", "omegaz"),
     "forces": ("fx", "fy", "fz"),
 }
-_WALL = re.compile(r"f_force_(\w+)\[1\]")
+_OPTIONAL = {**{name: " ".join(columns) for name, columns in _VECTORS.items()}, "types": "type"}
+_WRAPPED, _UNWRAPPED, _IMAGES = ("x", "y", "z"), ("xu", "yu", "zu"), ("ix", "iy", "iz")
+_SCALED, _SCALED_UNWRAPPED = ("xs", "ys", "zs"), ("xsu", "ysu", "zsu")
+_WALL = re.compile(r"f_force_(\w+)\[([123])\]")
 
 
-@dataclass(frozen=True)
+class AbsentColumnError(DumpError, AttributeError):
+    """A quantity was asked for that the dump does not hold."""
+
+
+@dataclass(frozen=True, repr=False)
 class GrainFrame:
     """All n grains at one step, sorted by id; SI units.
 
     `positions` (m) are unwrapped where the dump has image flags, `wrapped` are those inside the box; `velocities` (m/s),
     `omegas` (rad/s), `forces` (N, all contacts and gravity) are (n, 3); `radii` (m), `masses` (kg), `ids`, `types` are (n,);
-    `wall_forces[name]` (n, 3) is the force of that wall on each grain (N). `low`, `high` (m) and `periodic` describe the box.
+    `wall_forces[name]` (n, 3) is the force of that wall on each grain (N). `low`, `high` (m) and `periodic` describe the box, which
+    `tilt` = (xy, xz, yz) (m) shears: its edges are (Lx, 0, 0), (xy, Ly, 0), (xz, yz, Lz). `extra` holds every other column (n,) by
+    its name in the dump. What the dump does not hold of velocities, omegas, forces and types is given as None, and asking for it
+    raises DumpError. `where` names file and step in messages.
     """
 
     step: int
@@ -52,62 +54,167 @@ class GrainFrame:
     radii: Array
     masses: Array
     wall_forces: Mapping[str, Array]
+    tilt: Array = field(default_factory=lambda: np.zeros(3))
+    extra: Mapping[str, Array] = field(default_factory=dict)
+    where: str = ""
+
+    def __post_init__(self) -> None:
+        for name in _OPTIONAL:
+            if getattr(self, name) is None:
+                object.__delattr__(self, name)
+
+    def __getattr__(self, name: str) -> Array:
+        # Only called for what is not there.
+        if name in _OPTIONAL:
+            raise AbsentColumnError(f"{self.where or f'step {self.step}'}: {name} are not known, the dump has no {_OPTIONAL[name]}")
+        raise AttributeError(name)
+
+    def __repr__(self) -> str:
+        return f"GrainFrame(step={self.step}, {len(self.ids)} grains)"
+
+    def has(self, name: str) -> bool:
+        """Whether the dump held `name`: velocities, omegas, forces or types."""
+        return name in self.__dict__
 
     def select(self, mask: NDArray[np.bool_]) -> GrainFrame:
         """The same frame with only the grains where `mask` (n,) is true."""
-        names = ("ids", "types", "positions", "wrapped", "velocities", "omegas", "forces", "radii", "masses")
+        each = ("ids", "types", "positions", "wrapped", "velocities", "omegas", "forces", "radii", "masses")
         return GrainFrame(
             step=self.step,
             low=self.low,
             high=self.high,
             periodic=self.periodic,
             wall_forces={name: force[mask] for name, force in self.wall_forces.items()},
-            **{name: getattr(self, name)[mask] for name in names},
+            tilt=self.tilt,
+            extra={name: values[mask] for name, values in self.extra.items()},
+            where=self.where,
+            **{name: getattr(self, name)[mask] if self.has(name) else None for name in each},
         )
 
 
-def _frame(raw: RawFrame, path: Path) -> GrainFrame:
-    column = {name: index for index, name in enumerate(raw.columns)}
-    wanted = [*_SCALARS, *(name for names in _VECTORS.values() for name in names)]
-    missing = [name for name in wanted if name not in column]
-    if missing:
-        raise DumpError(f"{path}: column {', '.join(missing)} is missing; there are {' '.join(raw.columns)}")
-    values = raw.values[np.argsort(raw.values[:, column["id"]], kind="stable")]
+class _Table:
+    """Columns of a raw frame by name, rows in the order of the ids; it remembers which were taken."""
 
-    def vector(names: tuple[str, ...]) -> Array:
-        return values[:, [column[name] for name in names]]
+    def __init__(self, raw: RawFrame, where: str) -> None:
+        self.raw, self.where = raw, where
+        self.index = {name: number for number, name in enumerate(raw.columns)}
+        self._order: NDArray[np.intp] | None = None
+        self.taken: set[str] = set()
+        self.ids = self.integers("id")
+        if len(self.ids) > 1 and not (self.ids[1:] > self.ids[:-1]).all():
+            self._order = np.argsort(self.ids, kind="stable")
+            self.ids = self.ids[self._order]
+            twice = np.flatnonzero(self.ids[1:] == self.ids[:-1])
+            if len(twice):
+                raise DumpError(f"{where}: grain {self.ids[twice[0]]} is there twice")
 
-    walls = [match.group(1) for name in raw.columns if (match := _WALL.fullmatch(name))]
-    wrapped = vector(_VECTORS["positions"])
-    images = vector(("ix", "iy", "iz")) if {"ix", "iy", "iz"} <= column.keys() else np.zeros_like(wrapped)
+    def has(self, names: Sequence[str]) -> bool:
+        return self.index.keys() >= set(names)
+
+    def __call__(self, *names: str) -> Array:
+        """A copy of columns: (n,) of one, (n, k) of several."""
+        columns = numbered(self.raw.columns, names, self.where)
+        self.taken.update(names)
+        values = take(self.raw.values, columns)
+        return values if self._order is None else values[self._order]
+
+    def integers(self, name: str) -> NDArray[np.int64]:
+        return integers(self(name), f"{self.where}: column {name}")
+
+
+def _positions(table: _Table) -> tuple[Array, Array]:
+    """Unwrapped positions, and those inside the box."""
+    raw = table.raw
+    edges = cell(raw.low, raw.high, raw.tilt)
+    wrapped = unwrapped = None
+    if table.has(_WRAPPED):
+        wrapped = table(*_WRAPPED)
+    elif table.has(_SCALED):
+        wrapped = raw.low + table(*_SCALED) @ edges
+    if table.has(_UNWRAPPED):
+        unwrapped = table(*_UNWRAPPED)
+    elif table.has(_SCALED_UNWRAPPED):
+        unwrapped = raw.low + table(*_SCALED_UNWRAPPED) @ edges
+    if wrapped is None and unwrapped is None:
+        raise DumpError(f"{table.where}: column x, y, z is missing, and so are xu, xs and xsu; there are {' '.join(raw.columns)}")
+    if unwrapped is None:
+        unwrapped = wrapped + table(*_IMAGES) @ np.where(raw.periodic[:, None], edges, 0.0) if table.has(_IMAGES) else wrapped.copy()
+    elif wrapped is None:
+        wrapped = raw.low + less_edges(unwrapped - raw.low, raw, np.floor)
+    table.taken.update(_IMAGES)
+    return unwrapped, wrapped
+
+
+def _masses(table: _Table, radii: Array, density: float | None) -> Array:
+    if density is not None:
+        table.taken.add("mass")
+        return density * volume(radii)
+    if table.has(["mass"]):
+        return table("mass")
+    if table.has(["density"]):
+        return table("density") * volume(radii)
+    raise DumpError(f"{table.where}: column mass is missing; give density= (kg/m^3), or dump mass")
+
+
+def grain_frame(raw: RawFrame, where: str, density: float | None = None) -> GrainFrame:
+    """The grains of a raw frame; `density` (kg/m^3) makes the masses of solid spheres. `where` begins the messages of DumpError."""
+    if raw.units not in ("", "si"):
+        raise DumpError(f"{where}: its units are {raw.units}, but they must be si")
+    table = _Table(raw, where)
+    if not table.has(["radius"]) and table.has(["diameter"]):
+        radii = 0.5 * table("diameter")
+    else:
+        radii = table("radius")
+    walls = dict.fromkeys(match.group(1) for name in raw.columns if (match := _WALL.fullmatch(name)) and table.has(_wall(match.group(1))))
+    positions, wrapped = _positions(table)
+    parts = {
+        "ids": table.ids,
+        "types": table.integers("type") if table.has(["type"]) else None,
+        "radii": radii,
+        "masses": _masses(table, radii, density),
+        "wall_forces": {wall: table(*_wall(wall)) for wall in walls},
+        **{name: table(*columns) if table.has(columns) else None for name, columns in _VECTORS.items()},
+    }
     return GrainFrame(
         step=raw.step,
         low=raw.low,
         high=raw.high,
         periodic=raw.periodic,
-        ids=values[:, column["id"]].astype(np.int64),
-        types=values[:, column["type"]].astype(np.int64),
-        positions=wrapped + images * np.where(raw.periodic, raw.high - raw.low, 0.0),
+        positions=positions,
         wrapped=wrapped,
-        velocities=vector(_VECTORS["velocities"]),
-        omegas=vector(_VECTORS["omegas"]),
-        forces=vector(_VECTORS["forces"]),
-        radii=values[:, column["radius"]],
-        masses=values[:, column["mass"]],
-        wall_forces={wall: vector(tuple(f"f_force_{wall}[{axis}]" for axis in (1, 2, 3))) for wall in walls},
+        tilt=raw.tilt,
+        extra={name: table(name) for name in raw.columns if name not in table.taken},
+        where=where,
+        **parts,
     )
 
 
-class GrainsDump:
-    """`grains.dump` of either engine as a sequence of GrainFrame, read one at a time."""
+def _wall(name: str) -> tuple[str, ...]:
+    return tuple(f"f_force_{name}[{axis}]" for axis in (1, 2, 3))
 
-    def __init__(self, path: str | Path, *, skip_truncated: bool = False) -> None:
-        """Open; DumpError for a missing, foreign or truncated file (see TextDump for `skip_truncated`)."""
-        self._dump = TextDump(path, skip_truncated=skip_truncated)
+
+class GrainsDump:
+    """Grains of either engine as a sequence of GrainFrame, read one at a time: any file that open_dump reads."""
+
+    def __init__(
+        self,
+        path: Trajectory,
+        *,
+        skip_truncated: bool = False,
+        stream: bool = False,
+        columns: Sequence[str] | None = None,
+        density: float | None = None,
+    ) -> None:
+        """Open; DumpError for a missing, foreign or truncated file (see open_dump).
+
+        `density` (kg/m^3) is that of solid grains where the dump has no masses, `columns` are those of a binary dump.
+        """
+        self._dump: Dump = open_dump(path, skip_truncated, stream=stream, columns=columns)
+        self._density = density
 
     @property
     def path(self) -> Path:
-        """The file."""
+        """The file, or the first of them."""
         return self._dump.path
 
     @property
@@ -115,92 +222,39 @@ class GrainsDump:
         """One line about a cut-off last frame that was left out, or ''."""
         return self._dump.truncated
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Lines about what was left out or put in order."""
+        return self._dump.remarks
+
+    @property
+    def steps(self) -> NDArray[np.int64]:
+        """The step of every frame."""
+        return self._dump.steps
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """The number of grains of every frame."""
+        return self._dump.counts
+
+    def raw(self, number: int, columns: Sequence[str]) -> RawFrame:
+        """Only some columns of a frame, as they stand in the file."""
+        return self._dump.frame(number, columns)
+
+    def refresh(self) -> None:
+        """Look at the file anew: an engine may have written more."""
+        self._dump.refresh()
+
     def __len__(self) -> int:
         return len(self._dump)
 
     def __iter__(self) -> Iterator[GrainFrame]:
-        return (self[number] for number in range(len(self)))
+        return map(self._frame, self._dump)
 
     def __getitem__(self, number: int) -> GrainFrame:
         if number < 0:
             number += len(self)
-        if not 0 <= number < len(self):
-            raise IndexError(number)
-        return _frame(self._dump.frame(number), self.path)
+        return self._frame(self._dump.frame(number))
 
-
-class GrainsParser(TopologyReaderBase):
-    """MDAnalysis topology of a `grains.dump`: ids, types, radii and masses of its first frame."""
-
-    format = "DEMGRAINS"
-
-    def parse(self, **kwargs: Any) -> Topology:
-        """Topology with one residue and one segment."""
-        frame = GrainsDump(self.filename)[0]
-        attributes = [
-            topologyattrs.Atomids(frame.ids),
-            topologyattrs.Atomtypes(frame.types.astype(str).astype(object)),
-            topologyattrs.Radii(frame.radii),
-            topologyattrs.Masses(frame.masses),
-            topologyattrs.Resids(np.array([1])),
-            topologyattrs.Resnums(np.array([1])),
-            topologyattrs.Segids(np.array(["DEM"], dtype=object)),
-        ]
-        return Topology(len(frame.ids), 1, 1, attrs=attributes)
-
-
-class GrainsReader(ReaderBase):
-    """MDAnalysis trajectory of a `grains.dump`, in the file's own SI units and coordinates (MDAnalysis's LAMMPSDUMP moves the box to
-    the origin and keeps single precision, too little for overlaps).
-
-    `ts.positions`, `ts.velocities`, `ts.forces` are what MDAnalysis works with; the double-precision originals and everything else
-    (`omegas`, `wall_forces`, `radii`, ...) are in `ts.data["frame"]`, a GrainFrame.
-    """
-
-    format = "DEMGRAINS"
-    units: ClassVar = {"time": None, "length": None, "velocity": None, "force": None}
-
-    def __init__(self, filename: str | Path, time_step: float = 1.0, **kwargs: Any) -> None:
-        """`time_step` (s) of the simulation turns steps into `ts.time`."""
-        super().__init__(filename, **kwargs)
-        self._grains = GrainsDump(filename)
-        self._time_step = time_step
-        self.n_atoms = len(self._grains[0].ids)
-        self.n_frames = len(self._grains)
-        self.ts = self._Timestep(self.n_atoms, **self._ts_kwargs)
-        self._read_frame(0)
-
-    def _read_frame(self, frame: int) -> Any:
-        if not 0 <= frame < self.n_frames:
-            raise OSError(f"there is no frame {frame}")
-        grains = self._grains[frame]
-        if len(grains.ids) != self.n_atoms:
-            raise DumpError(f"{self._grains.path}, frame {frame + 1}: has {len(grains.ids)} grains, the first had {self.n_atoms}")
-        ts = self.ts
-        ts.frame = frame
-        ts.positions, ts.velocities, ts.forces = grains.positions, grains.velocities, grains.forces
-        ts.dimensions = [*(grains.high - grains.low), 90.0, 90.0, 90.0]
-        ts.data["step"] = grains.step
-        ts.data["time"] = grains.step * self._time_step
-        ts.data["frame"] = grains
-        return ts
-
-    def _read_next_timestep(self, ts: Any = None) -> Any:
-        if self.ts.frame + 1 >= self.n_frames:
-            raise EOFError
-        return self._read_frame(self.ts.frame + 1)
-
-    def _reopen(self) -> None:
-        self.ts.frame = -1
-
-    def close(self) -> None:
-        """Nothing stays open between frames."""
-
-
-def universe(path: str | Path, time_step: float = 1.0) -> MDAnalysis.Universe:
-    """MDAnalysis Universe of a `grains.dump`, for its selections and analysis classes.
-
-    For example `universe(path).select_atoms("type 1 and prop z > 0.05")`.
-    """
-    name = str(path)
-    return MDAnalysis.Universe(name, name, topology_format="DEMGRAINS", format="DEMGRAINS", time_step=time_step)
+    def _frame(self, raw: RawFrame) -> GrainFrame:
+        return grain_frame(raw, f"{self.path}, step {raw.step}", self._density)

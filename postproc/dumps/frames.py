@@ -1,0 +1,228 @@
+"""What every kind of dump gives: raw frames, in the order of their steps, and errors of one line."""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+HINT = "skip_truncated=True leaves it out"
+
+
+class DumpError(ValueError):
+    """A dump that cannot be read; the message is one line naming file and frame."""
+
+
+class CutOffError(DumpError):
+    """A frame that ends too early."""
+
+
+class UnknownLengthError(DumpError, TypeError):
+    """The length of a dump that is streamed; as a TypeError it does not keep list() from reading."""
+
+
+class DumpWarning(UserWarning):
+    """A dump that was read, but not as it stands; the message is one line."""
+
+
+@dataclass(frozen=True)
+class RawFrame:
+    """One frame: `step`, the box in the file's length unit, column names and `values` (rows, columns).
+
+    `low`, `high` (3,) are the corners of the box before it is tilted by `tilt` = (xy, xz, yz): its edges are (Lx, 0, 0), (xy, Ly, 0)
+    and (xz, yz, Lz) with L = high - low. `periodic` (3,) holds the flags of its axes. `time` and `units` are what the file says, or
+    None and "". Columns named `element` hold words that say what `type` says; they are left out.
+    """
+
+    step: int
+    low: Array
+    high: Array
+    periodic: NDArray[np.bool_]
+    columns: tuple[str, ...]
+    values: Array
+    tilt: Array = field(default_factory=lambda: np.zeros(3))
+    time: float | None = None
+    units: str = ""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A frame in the index: its first byte and line, its length in bytes, which it is in the file (from 1), its step and rows.
+
+    `fault` says what is wrong with it, or "". `file` counts the files of a series.
+    """
+
+    place: int
+    line: int
+    size: int
+    number: int
+    step: int
+    count: int
+    fault: str = ""
+    file: int = 0
+
+
+def kept_entries(entries: Sequence[Entry]) -> tuple[list[Entry], str]:
+    """The frames in the order of their steps, of equal steps the one later in the file; and one line about what that changed, or ""."""
+    back = [other for one, other in itertools.pairwise(entries) if other.step <= one.step]
+    if not back:
+        return list(entries), ""
+    kept = {entry.step: entry for entry in sorted(entries, key=lambda entry: (entry.step, entry.number))}
+    dropped = len(entries) - len(kept)
+    said = f"steps go back in frame {back[0].number}; frames were put in the order of their steps"
+    if dropped:
+        said += f", {dropped} of them written again later in the file {'were' if dropped > 1 else 'was'} left out"
+    return list(kept.values()), said
+
+
+class Dump(ABC):
+    """The frames of a trajectory in the order of their steps, found once and read one at a time.
+
+    A restarted run may write steps again: of frames with equal steps the one later in the file is kept, which DumpWarning says. A last
+    frame that was cut off is refused, or left out with `skip_truncated=True`; `truncated` then says so in one line. `remarks` holds all
+    such lines. With `stream=True` nothing is searched beforehand: iterating yields the first frame at once and refuses steps that go
+    back; whatever else is asked for makes the index then.
+    """
+
+    def __init__(self, path: Path, *, skip_truncated: bool, stream: bool) -> None:
+        """Make the index unless `stream`."""
+        self.path = path
+        self.skip_truncated = skip_truncated
+        self.truncated = ""
+        self.remarks: tuple[str, ...] = ()
+        self._index: list[Entry] | None = None
+        if not stream:
+            self.refresh()
+
+    def refresh(self) -> None:
+        """Look at the file anew: it may have grown while an engine writes it."""
+        found = list(self._find())
+        again = {entry.step for entry in found if not entry.fault}
+        faulty = [entry for entry in found if entry.fault and entry.step not in again]
+        self.truncated, self.remarks = "", ()
+        for entry in faulty:
+            self._cut_off(f"{self._where(entry)}: {entry.fault}")
+        self._index, said = kept_entries([entry for entry in found if not entry.fault])
+        if said:
+            self.remarks += (f"{self.path}: {said}",)
+            warnings.warn(self.remarks[-1], DumpWarning, stacklevel=2)
+
+    def _where(self, entry: Entry) -> str:
+        return f"{self.path}, frame {entry.number}"
+
+    def _cut_off(self, said: str) -> None:
+        """A frame is not whole: refuse it, or note that it is left out."""
+        if not self.skip_truncated:
+            raise CutOffError(said)
+        said = said.replace(f" ({HINT})", "") + "; it was left out"
+        self.truncated = f"{self.truncated}; {said}" if self.truncated else said
+        self.remarks = (self.truncated,)
+
+    @property
+    def _entries(self) -> list[Entry]:
+        if self._index is None:
+            self.refresh()
+        return self._index
+
+    @property
+    def steps(self) -> NDArray[np.int64]:
+        """The step of every frame."""
+        return np.array([entry.step for entry in self._entries], np.int64)
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """The number of rows of every frame; only VTK files are read for it."""
+        return np.array([entry.count if entry.count >= 0 else len(self._read(entry, None).values) for entry in self._entries], np.int64)
+
+    def __len__(self) -> int:
+        if self._index is None:
+            raise UnknownLengthError(f"{self.path}: how many frames there are is not known with stream=True; call refresh() first")
+        return len(self._index)
+
+    def __iter__(self) -> Iterator[RawFrame]:
+        if self._index is None:
+            return self._forward()
+        return (self.frame(number) for number in range(len(self)))
+
+    def frame(self, number: int, columns: Sequence[str] | None = None) -> RawFrame:
+        """Frame `number` (from 0) with all columns, or only with these; DumpError when it is not whole, IndexError when there is none."""
+        if not 0 <= number < len(self._entries):
+            raise IndexError(number)
+        return self._read(self._entries[number], columns)
+
+    def _forward(self) -> Iterator[RawFrame]:
+        last: RawFrame | None = None
+        for number, frame in enumerate(self._stream(), 1):
+            if last is not None and frame.step <= last.step:
+                raise DumpError(f"{self.path}, frame {number}: step {frame.step} comes after step {last.step}; open it without stream=True")
+            yield frame
+            last = frame
+
+    @abstractmethod
+    def _find(self) -> Iterator[Entry]:
+        """All frames as they stand in the file."""
+
+    @abstractmethod
+    def _read(self, entry: Entry, columns: Sequence[str] | None) -> RawFrame:
+        """The frame of an entry."""
+
+    @abstractmethod
+    def _stream(self) -> Iterator[RawFrame]:
+        """All frames as they stand in the file, without an index."""
+
+
+def numbered(columns: Sequence[str], wanted: Sequence[str] | None, where: str) -> list[int]:
+    """Indices of the wanted columns, or of all; DumpError when one is missing."""
+    if wanted is None:
+        return list(range(len(columns)))
+    missing = [name for name in wanted if name not in columns]
+    if missing:
+        raise DumpError(f"{where}: column {', '.join(missing)} is missing; there are {' '.join(columns)}")
+    return [columns.index(name) for name in wanted]
+
+
+def take(values: Array, columns: Sequence[int]) -> Array:
+    """A copy of columns: (rows,) of one, (rows, k) of several, rows contiguous."""
+    start, count = columns[0], len(columns)
+    if count == 1:
+        return values[:, start].copy()
+    together = list(columns) == list(range(start, start + count))
+    return np.array(values[:, start : start + count] if together else values[:, columns], order="C")
+
+
+def integers(values: Array, where: str) -> NDArray[np.int64]:
+    """Whole numbers that were read as doubles; DumpError, begun by `where`, beyond 2^53, where doubles do not tell all of them apart."""
+    if values.size and np.abs(values).max() > 2.0**53:
+        raise DumpError(f"{where} holds numbers beyond 2^53, which double precision does not tell apart")
+    return values.astype(np.int64)
+
+
+def cell(low: Array, high: Array, tilt: Array) -> Array:
+    """Edges (3, 3) of a box, one a row: (Lx, 0, 0), (xy, Ly, 0), (xz, yz, Lz)."""
+    edges = np.diag(high - low)
+    edges[[1, 2, 2], [0, 0, 1]] = tilt
+    return edges
+
+
+def before_tilt(low: Array, high: Array, tilt: Array) -> tuple[Array, Array]:
+    """Corners of a box before it is tilted, of those of the box with right angles around it, which dumps hold."""
+    xy, xz, yz = tilt
+    least, most = ((*pick, 0.0) for pick in ((min(0.0, xy, xz, xy + xz), min(0.0, yz)), (max(0.0, xy, xz, xy + xz), max(0.0, yz))))
+    return low - np.array(least), high - np.array(most)
+
+
+def less_edges(vectors: Array, raw: RawFrame, whole: np.ufunc) -> Array:
+    """The vectors (m, 3) less whole edges of the box along its periodic axes: as many as `whole` makes of their components along them."""
+    edges, result = cell(raw.low, raw.high, raw.tilt), vectors.copy()
+    for axis in (2, 1, 0):
+        if raw.periodic[axis]:
+            result -= whole(result[:, axis] / edges[axis, axis])[:, None] * edges[axis]
+    return result

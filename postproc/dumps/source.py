@@ -1,0 +1,170 @@
+"""Bytes of a dump, plain or gzipped, and a window that moves over them."""
+
+from __future__ import annotations
+
+import gzip
+import os
+import sys
+import weakref
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from dembark.postproc.dumps.frames import DumpError
+
+_WINDOW = 1 << 22
+# So much text is kept behind the place of reading, to find in it the start of a frame that a restarted run wrote into a cut-off line.
+_BEHIND = 512
+_FRAME = b"ITEM: TIMESTEP"
+
+
+class Source:
+    """A file of bytes that may be gzipped. A gzipped one stays open: going back in it means reading it from its beginning."""
+
+    def __init__(self, path: Path) -> None:
+        """DumpError unless there is something in the file."""
+        self.path = path
+        try:
+            with path.open("rb") as handle:
+                start = handle.read(2)
+        except OSError as error:
+            raise DumpError(f"{path} does not exist or is empty" if isinstance(error, FileNotFoundError) else
+                            f"{path} cannot be read: {error.strerror}") from None
+        if not start:
+            raise DumpError(f"{path} does not exist or is empty")
+        self.compressed = start == b"\x1f\x8b"
+        self._gzip: BinaryIO | None = None
+        self._spare: list[bytearray] = []
+
+    def begins_with(self, start: bytes) -> bool:
+        """Whether these are its first bytes."""
+        with self.at(0) as handle:
+            return Window(self, handle, bytearray(len(start) + 1)).peek(len(start)) == start
+
+    @contextmanager
+    def window(self, place: int = 0, line: int = 1, size: int | None = None) -> Iterator[Window]:
+        """A window at `place`, where line `line` begins, that ends after `size` bytes."""
+        # Memory that was used before costs no page faults.
+        room = self._spare.pop() if self._spare else bytearray(_WINDOW)
+        with self.at(place) as handle:
+            yield Window(self, handle, room, place, line, size)
+        self._spare[:] = [room]
+
+    def __getstate__(self) -> dict[str, object]:
+        return {**self.__dict__, "_gzip": None, "_spare": []}
+
+    @contextmanager
+    def at(self, place: int) -> Iterator[BinaryIO]:
+        """The bytes from `place` on."""
+        if not self.compressed:
+            with self.path.open("rb", buffering=0) as handle:
+                handle.seek(place)
+                yield handle
+            return
+        if self._gzip is None:
+            self._gzip = gzip.open(self.path, "rb")
+            weakref.finalize(self, self._gzip.close)
+        with self._damage():
+            self._gzip.seek(place)
+        yield self._gzip
+
+    @contextmanager
+    def _damage(self) -> Iterator[None]:
+        try:
+            yield
+        except (zlib.error, gzip.BadGzipFile) as error:
+            raise DumpError(f"{self.path}: its compression is damaged ({error})") from None
+
+    def fill(self, handle: BinaryIO, room: memoryview) -> int:
+        """Read into `room`; how many bytes came, 0 at the end. A gzipped file that was cut off just ends."""
+        if not self.compressed:
+            return handle.readinto(room)
+        filled = 0
+        with self._damage():
+            try:
+                while filled < len(room) and (read := handle.readinto1(room[filled:])):
+                    filled += read
+            except EOFError:
+                pass
+        return filled
+
+    def reach(self, handle: BinaryIO, place: int) -> bool:
+        """Go on to `place`; whether the file is so long."""
+        if not self.compressed:
+            return handle.seek(place) <= os.fstat(handle.fileno()).st_size
+        with self._damage():
+            try:
+                return handle.seek(place) == place
+            except EOFError:
+                return False
+
+
+class Window:
+    """The text of a source from a place on, a part at a time: bytes `begin` to `end` of `data` are in memory and unread.
+
+    `line_number` is that of the line at `begin`.
+    """
+
+    def __init__(self, source: Source, handle: BinaryIO, room: bytearray, place: int = 0, line: int = 1, size: int | None = None) -> None:
+        """At `place`, where line `line` begins; `room` is memory to use, `size` (bytes) how much to read at most."""
+        self._source, self._handle = source, handle
+        self._offset, self.line_number = place, line
+        self._stop = sys.maxsize if size is None else place + size
+        self.begin = self.end = 0
+        self._hold(room)
+
+    def _hold(self, text: bytearray) -> None:
+        self._text = text
+        self.data = np.frombuffer(text, np.uint8)
+
+    @property
+    def place(self) -> int:
+        """Where in the source `begin` is."""
+        return self._offset + self.begin
+
+    def more(self) -> bool:
+        """Read on, keeping what is unread; False at the end of the source."""
+        held = self.end - self.begin
+        if self.begin + held == len(self._text) and self.begin <= _BEHIND:
+            self._hold(self._text + bytes(len(self._text)))
+        elif self.begin > _BEHIND:
+            gone = self.begin - _BEHIND
+            self.data[: _BEHIND + held] = self.data[gone : self.end].copy()
+            self._offset += gone
+            self.begin, self.end = _BEHIND, _BEHIND + held
+        read = self._source.fill(self._handle, memoryview(self._text)[self.end : max(self.end, self._stop - self._offset)])
+        self.end += read
+        return read > 0
+
+    def line(self) -> bytes | None:
+        """The next whole line without its end, or None when there is none any more."""
+        looked = 0
+        while (found := self._text.find(b"\n", self.begin + looked, self.end)) < 0:
+            looked = self.end - self.begin
+            if not self.more():
+                return None
+        text = bytes(self._text[self.begin : found])
+        self.pass_over(found + 1, 1)
+        return text.rstrip(b"\r")
+
+    def pass_over(self, begin: int, lines: int) -> None:
+        """Go on to `begin` in `data`, so many lines further."""
+        self.begin = begin
+        self.line_number += lines
+
+    def back_to_frame(self, floor: int) -> bool:
+        """Where a cut-off line ran into the header of the next frame, go back to that header unless it lies before `floor`."""
+        found = self._text.rfind(_FRAME, max(0, self.begin - _BEHIND, floor - self._offset), self.begin)
+        if found < 0:
+            return False
+        self.pass_over(found, -self._text.count(b"\n", found, self.begin))
+        return True
+
+    def peek(self, length: int) -> bytes:
+        """The next `length` bytes, fewer at the end."""
+        while self.end - self.begin < length and self.more():
+            pass
+        return bytes(self._text[self.begin : min(self.begin + length, self.end)])

@@ -1,0 +1,197 @@
+"""LAMMPS text dumps: `ITEM: ATOMS` (grains) and `ITEM: ENTRIES` (contacts), as numpy arrays in double precision."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from dembark._dumps import parse, skip
+from dembark.postproc.dumps.frames import HINT, Array, CutOffError, Dump, DumpError, Entry, RawFrame, before_tilt, numbered
+from dembark.postproc.dumps.source import Source, Window
+from numpy.typing import NDArray
+
+_ITEM = b"ITEM: "
+# Faults of a line, as the parser numbers them; the last begins the next frame.
+_FEW, _MANY, _WORD, _HEADER = 1, 2, 3, 5
+_STARTS = (b"ITEM: TIME", b"ITEM: UNIT")
+_SKIPPED = ("element",)
+
+
+class _HeaderError(DumpError):
+    """A header that is none."""
+
+
+@dataclass
+class _Header:
+    """What stands before the rows of a frame."""
+
+    step: int = -1
+    count: int = -1
+    label: bytes = b""
+    bounds: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    periodic: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(3, bool))
+    columns: tuple[str, ...] = ()
+    time: float | None = None
+    units: str = ""
+
+
+def _read_box(head: _Header, words: list[bytes], lines: list[list[bytes]]) -> None:
+    tilted = words[:3] == [b"xy", b"xz", b"yz"]
+    head.periodic = np.array([word == b"pp" for word in words[-3:]]) if len(words) >= 3 else np.zeros(3, bool)
+    for axis, line in enumerate(lines):
+        if len(line) != 2 + tilted:
+            raise ValueError
+        head.bounds[axis, : 2 + tilted] = [float(word) for word in line]
+    if not np.isfinite(head.bounds).all():
+        raise ValueError
+
+
+def _read_header(window: Window) -> _Header:
+    """The header at the window's place; ValueError when it is none."""
+    head = _Header()
+
+    def line() -> bytes:
+        text = window.line()
+        if text is None:
+            raise CutOffError
+        return text
+
+    while True:
+        text = line()
+        name = text[len(_ITEM) :].split()
+        if not text.startswith(_ITEM) or not name:
+            raise ValueError
+        if name == [b"UNITS"]:
+            head.units = line().decode("ascii").strip()
+        elif name == [b"TIME"]:
+            head.time = float(line())
+        elif name == [b"TIMESTEP"]:
+            head.step = int(line())
+        elif name[:2] == [b"NUMBER", b"OF"]:
+            head.label, head.count = b" ".join(name[2:]), int(line())
+        elif name[:2] == [b"BOX", b"BOUNDS"]:
+            _read_box(head, name[2:], [line().split() for _ in range(3)])
+        elif head.label and text[len(_ITEM) :].startswith(head.label):
+            head.columns = tuple(word.decode() for word in text[len(_ITEM) + len(head.label) :].split())
+            break
+        else:
+            raise ValueError
+    if head.step < 0 or head.count < 0 or not head.columns or "ITEM:" in " ".join(head.columns):
+        raise ValueError
+    return head
+
+
+class TextDump(Dump):
+    """The frames of a text dump, gzipped or not; see Dump. A file may be larger than memory: one frame at a time is in it."""
+
+    def __init__(self, path: str | Path, *, skip_truncated: bool = False, stream: bool = False) -> None:
+        """Open; DumpError for a missing, foreign or truncated file."""
+        self._source = Source(Path(path))
+        if not self._source.begins_with(_ITEM):
+            raise DumpError(f"{path} does not begin with 'ITEM: TIMESTEP'")
+        super().__init__(Path(path), skip_truncated=skip_truncated, stream=stream)
+
+    def _header(self, window: Window, number: int) -> _Header:
+        where = f"{self.path}, frame {number}"
+        try:
+            return _read_header(window)
+        except CutOffError:
+            raise CutOffError(f"{where}: truncated in its header ({HINT})") from None
+        except ValueError:
+            raise _HeaderError(f"{where}: header cannot be read") from None
+
+    def _find(self) -> Iterator[Entry]:
+        with self._source.window() as window:
+            number = 1
+            while window.peek(1):
+                entry = self._pass(window, number)
+                yield entry
+                if entry.fault and window.peek(len(_ITEM)) != _ITEM:
+                    return
+                number += 1
+
+    def _pass(self, window: Window, number: int) -> Entry:
+        """Pass over a frame. A run that was killed and restarted may have left a part of one before the next."""
+        place, line, step, count = window.place, window.line_number, -1, 0
+        fault = f"truncated in its header ({HINT})"
+        try:
+            head = self._header(window, number)
+            step, count, body = head.step, head.count, window.line_number
+            floor = window.place
+            self._skip(window, count)
+            if window.peek(1) and not window.peek(len(_ITEM) + 4).startswith(_STARTS):
+                window.back_to_frame(floor)
+            rows = window.line_number - body
+            if rows == count and window.peek(len(_ITEM)) not in (b"", _ITEM[: len(window.peek(len(_ITEM)))]):
+                raise DumpError(f"{self.path}, line {window.line_number}: frame {number} has more than its {count} lines")
+            fault = "" if rows == count else f"truncated, {rows} of {count} lines are there ({HINT})"
+        except CutOffError:
+            window.begin = window.end
+        except _HeaderError:
+            if not window.back_to_frame(place + 1):
+                raise
+        return Entry(place, line, window.place - place, number, step, count, fault)
+
+    def _skip(self, window: Window, count: int) -> None:
+        """Pass over `count` lines, fewer where a header or the end comes."""
+        while count:
+            begin, rows, fault, _ = skip(window.data, window.begin, window.end, count)
+            window.pass_over(begin, rows)
+            count -= rows
+            if fault == _HEADER or (count and not window.more()):
+                return
+
+    def _read(self, entry: Entry, columns: Sequence[str] | None) -> RawFrame:
+        with self._source.window(entry.place, entry.line, entry.size) as window:
+            head = self._header(window, entry.number)
+            if head.step != entry.step or head.count != entry.count:
+                raise DumpError(f"{self.path}, frame {entry.number}: the file was changed since it was opened")
+            return self._rows(window, head, entry.number, columns)
+
+    def _rows(self, window: Window, head: _Header, number: int, columns: Sequence[str] | None = None) -> RawFrame:
+        where = f"{self.path}, frame {number}"
+        numeric = [index for index, name in enumerate(head.columns) if name not in _SKIPPED]
+        names = tuple(head.columns[index] for index in numeric) if columns is None else tuple(dict.fromkeys(columns))
+        chosen = numeric if columns is None else numbered(head.columns, names, where)
+        place = [chosen.index(index) if index in chosen else -1 for index in range(len(head.columns))]
+        try:
+            values = np.empty((head.count, len(names)))
+        except (MemoryError, ValueError):
+            raise DumpError(f"{where}: its {head.count} lines do not fit into memory") from None
+        rows = 0
+        while rows < head.count:
+            begin, more, fault, column = parse(window.data, window.begin, window.end, place, values, rows)
+            window.pass_over(begin, more)
+            rows += more
+            if fault == _HEADER or (not fault and rows < head.count and not window.more()):
+                raise CutOffError(f"{where}: truncated, {rows} of {head.count} lines are there ({HINT})")
+            if fault:
+                raise DumpError(self._message(window, where, fault, column, head.columns))
+        tilt = head.bounds[:, 2]
+        low, high = before_tilt(head.bounds[:, 0], head.bounds[:, 1], tilt)
+        return RawFrame(head.step, low, high, head.periodic, names, values, tilt, head.time, head.units)
+
+    def _message(self, window: Window, where: str, fault: int, column: int, columns: tuple[str, ...]) -> str:
+        where = f"{where}, line {window.line_number}"
+        words = (window.line() or b"").decode("ascii", "replace").split()
+        if fault in (_FEW, _MANY):
+            return f"{where}: a line does not hold {len(columns)} numbers but {len(words)}"
+        what = "no number" if fault == _WORD else "a number that is not finite"
+        return f"{where}: column {columns[column]} holds {what}, '{words[column]}'"
+
+    def _stream(self) -> Iterator[RawFrame]:
+        with self._source.window() as window:
+            number = 1
+            while window.peek(1):
+                try:
+                    frame = self._rows(window, self._header(window, number), number)
+                except CutOffError as error:
+                    if window.line() is not None:
+                        said = str(error).replace(f" ({HINT})", "")
+                        raise DumpError(f"{said}, but the file goes on; open it without stream=True") from None
+                    self._cut_off(str(error))
+                    return
+                yield frame
+                number += 1

@@ -1,0 +1,133 @@
+"""VTK files of LIGGGHTS, one a step, through VTK's own readers: `dump custom/vtk` and `atom/vtk` (grains), `local/gran/vtk` (contacts)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from dembark.postproc.dumps.frames import HINT, Array, CutOffError, Dump, DumpError, Entry, RawFrame, numbered
+from dembark.postproc.dumps.source import Source
+
+BOX = "boundingBox_"
+_AXES = ("x", "y", "z")
+# Vectors that custom/vtk makes of columns of the text dump.
+_VECTORS = {"v", "f", "omega", "i", "tq", "mu", "angmom"}
+# What atom/vtk calls them.
+_OTHER_NAMES = {"radii": "radius", "velocity_lin": "v", "velocity_ang": "omega", "force": "f"}
+
+
+def read_vtk(path: Path) -> Any:
+    """The vtkDataSet in a file, legacy or XML whatever it is called; DumpError when VTK reports an error."""
+    from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
+    from vtkmodules.vtkIOLegacy import vtkGenericDataObjectReader
+    from vtkmodules.vtkIOXML import vtkXMLGenericDataObjectReader
+
+    reader = vtkGenericDataObjectReader() if Source(path).begins_with(b"# vtk") else vtkXMLGenericDataObjectReader()
+    reader.SetFileName(str(path))
+    said, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
+    loud = vtkLogger.GetCurrentVerbosityCutoff()
+    vtkOutputWindow.SetInstance(said)
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    try:
+        reader.Update()
+        found = reader.GetOutput()
+    finally:
+        vtkOutputWindow.SetInstance(before)
+        vtkLogger.SetStderrVerbosity(loud)
+    if found is None or not found.IsA("vtkDataSet") or reader.GetErrorCode() or "ERROR" in said.GetOutput():
+        raise CutOffError(f"{path}: truncated, VTK's reader cannot read it ({HINT})")
+    return found
+
+
+def _table(data: Any, where: str) -> dict[str, Array]:
+    """Columns of a dataset, named as those of a text dump."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    def arrays(part: Any) -> dict[str, Array]:
+        numeric = [part.GetArray(number) for number in range(part.GetNumberOfArrays()) if part.GetArray(number)]
+        return {array.GetName(): vtk_to_numpy(array).astype(float) for array in numeric}
+
+    points = vtk_to_numpy(data.GetPoints().GetData()).astype(float) if data.GetNumberOfPoints() else np.empty((0, 3))
+    columns: dict[str, Array] = {}
+    if data.GetCellData().GetArray("id1") is not None or data.GetPointData().GetNumberOfArrays() == 0:
+        ends = points.reshape(-1, 6) if len(points) else np.empty((0, 6))
+        held = arrays(data.GetCellData())
+        if any(len(values) != len(ends) for values in held.values()):
+            raise DumpError(f"{where}: its lines do not have two ends each")
+        columns |= {f"{axis}{end + 1}": ends[:, 3 * end + n] for end in (0, 1) for n, axis in enumerate(_AXES)}
+    else:
+        held = arrays(data.GetPointData())
+        held = {_OTHER_NAMES.get(name, name): values for name, values in held.items()}
+        columns |= {axis: points[:, n] for n, axis in enumerate(_AXES)}
+    for name, values in held.items():
+        base = re.sub(r"\[1-\d+\]$", "", name)
+        parts = values.reshape(len(values), -1).T if values.ndim > 1 else None
+        if parts is None:
+            columns[name] = values
+        elif name in _VECTORS:
+            columns |= {f"{name}{axis}": part for axis, part in zip(_AXES, parts, strict=True)}
+        else:
+            columns |= {f"{base}[{n}]": part for n, part in enumerate(parts, 1)}
+    return columns
+
+
+def _box(path: Path, columns: dict[str, Array]) -> tuple[Array, Array, Array]:
+    """Corners and tilt of the box from the file that the engine writes beside, else the grains' extent."""
+    head, step, _ = _split(path)
+    # The box of a .vtp lies in a .vtu.
+    for beside in (path.with_name(f"{head}{BOX}{step}{suffix}") for suffix in (path.suffix, ".vtu")):
+        if not beside.is_file():
+            continue
+        data = read_vtk(beside)
+        if data.GetNumberOfPoints() == 8 and data.IsA("vtkUnstructuredGrid"):
+            corner = np.array([data.GetPoint(n) for n in range(8)])
+            a, b, c = corner[1] - corner[0], corner[3] - corner[0], corner[4] - corner[0]
+            return corner[0], corner[0] + (a[0], b[1], c[2]), np.array([b[0], c[0], c[1]])
+        bounds = np.array(data.GetBounds()).reshape(3, 2)
+        return bounds[:, 0], bounds[:, 1], np.zeros(3)
+    places = [columns[axis if axis in columns else f"{axis}1"] for axis in _AXES]
+    reach = columns.get("radius", np.zeros(1)).max(initial=0.0)
+    if not len(places[0]):
+        return np.zeros(3), np.zeros(3), np.zeros(3)
+    return np.array([place.min() - reach for place in places]), np.array([place.max() + reach for place in places]), np.zeros(3)
+
+
+def _split(path: Path) -> tuple[str, str, str]:
+    """Name before its last number, that number, the rest."""
+    found = re.fullmatch(r"(.*?)(\d+)(\D*)", path.name[: -len(path.suffix)])
+    if not found:
+        raise DumpError(f"{path}: its name holds no number, which would be the step")
+    return found.group(1), found.group(2), found.group(3)
+
+
+class VtkFile(Dump):
+    """One VTK file as a dump with one frame. The step is the last number in its name, coordinates are single precision as VTK has them.
+
+    The box is read from the file ...boundingBox_... that the engine writes beside; no axis is called periodic, for no file says it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """The step; the file is read when its frame is."""
+        self._step = int(_split(path)[1])
+        super().__init__(path, skip_truncated=False, stream=True)
+
+    def _find(self) -> Iterator[Entry]:
+        yield Entry(0, 0, 0, 1, self._step, -1)
+
+    def _read(self, entry: Entry, columns: Sequence[str] | None) -> RawFrame:
+        table = _table(read_vtk(self.path), str(self.path))
+        names = tuple(table) if columns is None else tuple(columns)
+        numbered(tuple(table), names, str(self.path))
+        values = np.column_stack([table[name] for name in names]) if names else np.empty((0, 0))
+        bad = np.argwhere(~np.isfinite(values))
+        if len(bad):
+            row, column = bad[0]
+            raise DumpError(f"{self.path}, row {row + 1}: array {names[column]} holds a number that is not finite, '{values[row, column]}'")
+        low, high, tilt = _box(self.path, table)
+        return RawFrame(self._step, low, high, np.zeros(3, bool), names, values, tilt)
+
+    def _stream(self) -> Iterator[RawFrame]:
+        yield self._read(Entry(0, 0, 0, 1, self._step, -1), None)

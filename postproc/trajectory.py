@@ -1,0 +1,178 @@
+"""Grains in MDAnalysis: any dump of grains as a Universe, in double precision underneath."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import MDAnalysis
+import numpy as np
+from dembark.postproc.dumps.frames import Array, DumpError, cell
+from dembark.postproc.grains import GrainFrame, GrainsDump
+from MDAnalysis.coordinates.base import ReaderBase
+from MDAnalysis.core import topologyattrs
+from MDAnalysis.core.topology import Topology
+from MDAnalysis.lib.mdamath import triclinic_box
+from MDAnalysis.lib.util import store_init_arguments
+from MDAnalysis.topology.base import TopologyReaderBase
+from numpy.typing import NDArray
+
+_KEPT = ("columns", "density", "skip_truncated", "varying")
+
+
+class _Grains:
+    """A dump with the grains that ever occur in it, and the frame that was read last: topology and trajectory ask for the same."""
+
+    def __init__(self, filename: str | Path, options: dict[str, Any]) -> None:
+        self.dump = GrainsDump(filename, **{name: value for name, value in options.items() if name in _KEPT and name != "varying"})
+        if len(self.dump) == 0:
+            raise DumpError(f"{filename} has no whole frame")
+        self._held: tuple[int, GrainFrame] = (0, self.dump[0])
+        self.roster = _roster(self.dump, self._held[1], options.get("varying"))
+
+    def frame(self, number: int) -> GrainFrame:
+        if self._held[0] != number:
+            self._held = (number, self.dump[number])
+        return self._held[1]
+
+
+# The reader of a file comes right after the parser of its topology, which leaves here what it has found.
+_left: list[tuple[object, _Grains]] = []
+
+
+def _key(filename: str | Path, options: dict[str, Any]) -> object:
+    stat = Path(filename).stat() if Path(filename).is_file() else None
+    return str(filename), stat and (stat.st_size, stat.st_mtime_ns), repr([(name, options[name]) for name in _KEPT if name in options])
+
+
+def _leave(filename: str | Path, options: dict[str, Any]) -> _Grains:
+    _left[:] = [(_key(filename, options), _Grains(filename, options))]
+    return _left[0][1]
+
+
+def _take(filename: str | Path, options: dict[str, Any]) -> _Grains:
+    key, found = _left.pop() if _left else (None, None)
+    return found if found is not None and key == _key(filename, options) else _Grains(filename, options)
+
+
+def _roster(dump: GrainsDump, first: GrainFrame, varying: bool | None) -> dict[str, NDArray[Any]]:
+    """Ids, types, radii and masses of all grains that ever occur, as they are when they first do."""
+    if varying is None:
+        counts = dump.counts
+        varying = bool((counts != counts[0]).any())
+    parts, known = [_static(first)], first.ids
+    for number in range(1, len(dump) if varying else 1):
+        new = np.setdiff1d(dump.raw(number, ("id",)).values.astype(np.int64), known)
+        if len(new):
+            frame = dump[number]
+            parts.append(_static(frame.select(np.isin(frame.ids, new))))
+            known = np.union1d(known, new)
+    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    order = np.argsort(joined["ids"], kind="stable")
+    return {name: values[order] for name, values in joined.items()}
+
+
+def _static(frame: GrainFrame) -> dict[str, NDArray[Any]]:
+    types = frame.types if frame.has("types") else np.ones(len(frame.ids), np.int64)
+    return {"ids": frame.ids, "types": types, "radii": frame.radii, "masses": frame.masses}
+
+
+class GrainsParser(TopologyReaderBase):
+    """MDAnalysis topology of a dump of grains: ids, types, radii and masses of all grains that ever occur in it."""
+
+    format = "DEMGRAINS"
+
+    def parse(self, **kwargs: Any) -> Topology:
+        """Topology with one residue and one segment."""
+        grains = _leave(self.filename, kwargs).roster
+        attributes = [
+            topologyattrs.Atomids(grains["ids"]),
+            topologyattrs.Atomtypes(grains["types"].astype(str).astype(object)),
+            topologyattrs.Radii(grains["radii"]),
+            topologyattrs.Masses(grains["masses"]),
+            topologyattrs.Resids(np.array([1])),
+            topologyattrs.Resnums(np.array([1])),
+            topologyattrs.Segids(np.array(["DEM"], dtype=object)),
+        ]
+        return Topology(len(grains["ids"]), 1, 1, attrs=attributes)
+
+
+class GrainsReader(ReaderBase):
+    """MDAnalysis trajectory of a dump of grains, in the file's own SI units and coordinates (MDAnalysis's LAMMPSDUMP moves the box to
+    the origin and keeps single precision, too little for overlaps).
+
+    `ts.positions`, `ts.velocities`, `ts.forces` are what MDAnalysis works with; the double-precision originals and everything else
+    (`omegas`, `wall_forces`, `radii`, `extra`, ...) are in `ts.data["frame"]`, a GrainFrame. Where grains come and go, the atoms are all
+    that ever occur; `ts.data["present"]` (n,) tells which are there, the others have NaN for positions, velocities and forces.
+    """
+
+    format = "DEMGRAINS"
+    units: ClassVar = {"time": None, "length": None, "velocity": None, "force": None}
+
+    @store_init_arguments
+    def __init__(self, filename: str | Path, time_step: float = 1.0, wrapped: bool = False, **kwargs: Any) -> None:
+        """`time_step` (s) of the simulation turns steps into `ts.time`; `wrapped` asks for the positions inside the box.
+
+        Further: `columns`, `density`, `skip_truncated` of GrainsDump; `varying` says that grains come and go though their number stays.
+        """
+        self._grains = _take(filename, kwargs)
+        steps = self._grains.dump.steps
+        kwargs.setdefault("dt", float(steps[1] - steps[0]) * time_step if len(steps) > 1 else time_step)
+        super().__init__(filename, **{name: value for name, value in kwargs.items() if name not in _KEPT})
+        self._time_step, self._wrapped = time_step, wrapped
+        self._ids = self._grains.roster["ids"]
+        self.n_atoms = len(self._ids)
+        self.n_frames = len(steps)
+        self.ts = self._Timestep(self.n_atoms, **self._ts_kwargs)
+        self._read_frame(0)
+
+    def _read_frame(self, frame: int) -> Any:
+        if not 0 <= frame < self.n_frames:
+            raise OSError(f"there is no frame {frame}")
+        grains = self._grains.frame(frame)
+        same = np.array_equal(self._ids, grains.ids)
+        present = np.ones(self.n_atoms, bool) if same else np.isin(self._ids, grains.ids)
+        if present.sum() != len(grains.ids):
+            raise DumpError(f"{grains.where}: holds grains that the first frame does not; open it with varying=True")
+        ts = self.ts
+        ts.frame = frame
+        ts.positions = self._spread(grains.wrapped if self._wrapped else grains.positions, present)
+        if grains.has("velocities"):
+            ts.velocities = self._spread(grains.velocities, present)
+        if grains.has("forces"):
+            ts.forces = self._spread(grains.forces, present)
+        edges = cell(grains.low, grains.high, grains.tilt)
+        ts.dimensions = triclinic_box(*edges) if grains.tilt.any() else [*np.diag(edges), 90.0, 90.0, 90.0]
+        ts.data["step"] = grains.step
+        ts.data["time"] = grains.step * self._time_step
+        ts.data["frame"] = grains
+        ts.data["present"] = present
+        return ts
+
+    def _spread(self, values: Array, present: NDArray[np.bool_]) -> Array:
+        if present.all():
+            return values
+        spread = np.full((self.n_atoms, 3), np.nan)
+        spread[present] = values
+        return spread
+
+    def _read_next_timestep(self, ts: Any = None) -> Any:
+        if self.ts.frame + 1 >= self.n_frames:
+            raise EOFError
+        return self._read_frame(self.ts.frame + 1)
+
+    def _reopen(self) -> None:
+        self.ts.frame = -1
+
+    def close(self) -> None:
+        """Nothing stays open between frames."""
+
+
+def universe(path: str | Path, time_step: float = 1.0, **kwargs: Any) -> MDAnalysis.Universe:
+    """MDAnalysis Universe of a dump of grains, for its selections and analysis classes; keywords are those of GrainsReader.
+
+    For example `universe(path).select_atoms("type 1 and prop z > 0.05")`. The same as
+    `MDAnalysis.Universe(path, format="DEMGRAINS", time_step=time_step)`, once dembark.postproc is imported.
+    """
+    name = str(path)
+    return MDAnalysis.Universe(name, name, topology_format="DEMGRAINS", format="DEMGRAINS", time_step=time_step, **kwargs)
