@@ -5,8 +5,9 @@ hold the fields.
 """
 
 from dembark.postproc.contacts import ContactFrame, ContactsDump
-from dembark.postproc.dumptext import DumpError, TextDump
-from dembark.postproc.grains import GrainFrame, GrainsDump, universe
+from dembark.postproc.dumptext import DumpError, DumpWarning, TextDump, open_dump
+from dembark.postproc.grains import GrainFrame, GrainsDump
 from dembark.postproc.history import read_times
+from dembark.postproc.trajectory import universe
 
-__all__ = ["ContactFrame", "ContactsDump", "DumpError", "GrainFrame", "GrainsDump", "TextDump", "read_times", "universe"]
+__all__ = ["ContactFrame", "ContactsDump", "DumpError", "DumpWarning", "GrainFrame", "GrainsDump", "TextDump", "open_dump", "read_times", "universe"]

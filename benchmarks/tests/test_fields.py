@@ -1,0 +1,33 @@
+"""The benchmark of coarse graining on a small packing."""
+
+import json
+
+import numpy as np
+
+from benchmarks import fields
+from benchmarks.fields import main, packing, share
+
+
+def test_packing_has_three_short_contacts_a_grain():
+    grains, contacts = packing(5)
+    assert len(grains.ids) == 125 and len(contacts.ids) == 375
+    length = np.linalg.norm(contacts.branch, axis=1) / 0.005
+    assert 0.3 < length.min() and length.max() < 1.8
+    few_grains, few = share(grains, contacts, 0.1)
+    assert len(few.ids) == 37 and np.isin(few.ids, few_grains.ids).all()
+
+
+def test_all_rows_are_measured(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(fields, "CASES", (("gaussian", 1.5), ("heaviside", 2.0)))
+    assert main(["--edge", "4", "--cells", "8", "--rounds", "1", "--part", "0.2", "--out", str(tmp_path / "a.json")]) == 0
+    found = json.loads((tmp_path / "a.json").read_text())
+    assert {(one["backend"], one["kernel"]) for one in found["rows"]} == {
+        (backend, kernel) for backend in ("native", "numpy") for kernel in ("gaussian", "heaviside")
+    }
+    assert all(one["wall"] > 0.0 for one in found["rows"]) and found["facts"]["grains"] == 64
+    assert "| gaussian | 1.5 | native | 1 | 192 |" in capsys.readouterr().out
+
+
+def test_wrong_option(capsys):
+    assert main(["--edge", "1"]) == 2
+    assert capsys.readouterr().err.startswith("dembark: --edge")

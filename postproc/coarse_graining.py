@@ -1,0 +1,170 @@
+"""Fields on a grid from grains and contacts by coarse graining; definitions and sources: docs/fields_theory.md."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from dembark.postproc import field_sums as column
+from dembark.postproc.carried import Contacts, Grains
+from dembark.postproc.contacts import ContactFrame
+from dembark.postproc.deposit import Spreader, zeros
+from dembark.postproc.field_sums import FieldSums
+from dembark.postproc.grains import GrainFrame
+from dembark.postproc.grid import Grid, check_periods
+from dembark.postproc.kernels import Kernel
+from dembark.validation.errors import DembarkError
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_TOUCHING = 1e-6  # gap over the sum of the radii up to which spheres touch: what six digits of a dump leave
+
+
+@dataclass(frozen=True, eq=False)
+class WallContacts:
+    """The k contacts of grains with walls: contact `points` (k, 3) on the wall and `positions` (k, 3) of the grains' centres in m,
+    `forces` (k, 3) of the wall on the grain in N."""
+
+    points: Array
+    positions: Array
+    forces: Array
+
+
+def coarse_grain(
+    grains: GrainFrame,
+    contacts: ContactFrame | None,
+    grid: Grid,
+    *,
+    kernel: str = "gaussian",
+    width: float,
+    walls: Sequence[WallContacts] = (),
+    mean_velocity: Array | None = None,
+    threads: int | None = None,
+    closed: bool = False,
+    liquid: str = "liquid_volume",
+    power: str = "dissipated_power",
+    backend: str = "native",
+) -> FieldSums:
+    """Sums of one frame over the cells of `grid`, with a `kernel` (gaussian, lucy, heaviside) of `width` (m).
+
+    Frames are added (`+`) and give their mean by `.fields()`. What lies beyond the grid is lost; with `closed`, the kernel of a grain
+    inside the grid is scaled so that all of it stays within, as is apt where the grid's faces are walls. Periodic images follow the
+    box of `grains`, which may be triclinic.
+
+    `mean_velocity` (nx, ny, nz, 3) in m/s, for example of a first pass over all frames: velocity fluctuations are then those about it,
+    interpolated to each grain. `liquid` names the column of grains and contacts with volumes of liquid (m3), `power` that of contacts
+    with dissipated powers (W); without it the power is that of the contact forces on the relative velocity at the contact. `threads`:
+    all cores by default; the result is the same to the last bit for any number. `backend`: "native" (compiled) or "numpy" (slow, the
+    same to round-off). DembarkError says what of the input is wrong.
+    """
+    phi = Kernel(kernel, float(width))
+    check_periods(grid, grains)
+    _check_finite(grains.wrapped, "positions", grains.step)
+    touching, pairs = _touching(grains, contacts)
+    sums = FieldSums(
+        grid,
+        phi,
+        1,
+        zeros(grid, column.GRAIN_COLUMNS),
+        None if contacts is None else zeros(grid, column.CONTACT_COLUMNS),
+        zeros(grid, 3),
+        peculiar=mean_velocity is not None,
+        liquid=liquid in grains.extra or (contacts is not None and liquid in contacts.extra),
+        power=contacts is not None and (power in contacts.extra or grains.has("omegas")),
+    )
+    touches = np.bincount(pairs[touching].ravel(), minlength=len(grains.ids)).astype(float)
+    spreader = Spreader(grid, phi, grains, closed, threads, backend)
+    _check_finite(grains.velocities, "velocities", grains.step)
+    peculiar = grains.velocities if mean_velocity is None else grains.velocities - interpolate(mean_velocity, grid, grains.wrapped)
+    touches = np.bincount(pairs[touching].ravel(), minlength=len(grains.ids)).astype(float)
+    spreader.grains(
+        Grains(grains.wrapped, grains.masses, grains.radii, grains.velocities, peculiar, touches, grains.extra.get(liquid)), sums.grains
+    )
+    if contacts is not None:
+        for name in ("first", "branch", "forces"):
+            _check_finite(getattr(contacts, name), name, contacts.step)
+        omegas = grains.omegas if grains.has("omegas") else None
+        spreader.contacts(
+            Contacts(
+                contacts.first, contacts.branch, contacts.forces, pairs, touching, grains.radii, grains.velocities, omegas,
+                contacts.extra.get(liquid), contacts.extra.get(power),
+            ),
+            sums.contacts,
+        )  # fmt: skip
+    for wall in walls:
+        _add_wall(wall, sums, spreader)
+    return sums
+
+
+def _add_wall(wall: WallContacts, sums: FieldSums, spreader: Spreader) -> None:
+    for name in ("points", "positions", "forces"):
+        _check_finite(getattr(wall, name), f"wall {name}", spreader.frame.step)
+    if sums.contacts is not None:
+        branch = wall.points - wall.positions
+        values = np.zeros((len(branch), column.CONTACT_COLUMNS))
+        values[:, column.STRESS] = -(wall.forces[:, :, None] * branch[:, None, :]).reshape(-1, 9)
+        spreader.lines(wall.positions, branch, values, sums.contacts)
+    spreader.points(wall.points, wall.forces, sums.boundary)
+
+
+def _touching(grains: GrainFrame, contacts: ContactFrame | None) -> tuple[NDArray[np.bool_], Index]:
+    """Which of m contacts touch (m,), and the rows (m, 2) of their grains."""
+    if contacts is None or len(contacts.ids) == 0:
+        return np.zeros(0, bool), np.zeros((0, 2), np.int64)
+    pairs = rows_of(grains.ids, contacts.ids, contacts.step)
+    radii = grains.radii[pairs].sum(axis=1)
+    return (contacts.branch**2).sum(axis=1) <= (radii * (1.0 + _TOUCHING)) ** 2, pairs
+
+
+def rows_of(ids: Index, wanted: Index, step: int) -> Index:
+    """Rows of `ids` (n,), rising, at which `wanted` (any shape) stand; DembarkError when one is not there."""
+    if len(ids) == 0:
+        found, rows = np.zeros(wanted.shape, bool), np.zeros(wanted.shape, np.int64)
+    elif ids[-1] - ids[0] < 8 * len(ids) + 1000:
+        table = np.zeros(ids[-1] - ids[0] + 1, np.int64)
+        table[ids - ids[0]] = np.arange(len(ids))
+        rows = table[np.clip(wanted - ids[0], 0, len(table) - 1)]
+        found = ids[rows] == wanted
+    else:
+        rows = np.minimum(np.searchsorted(ids, wanted), len(ids) - 1)
+        found = ids[rows] == wanted
+    if not found.all():
+        raise DembarkError(f"a contact of grain {wanted[~found][0]}", f"step {step}", "no such grain is in the grains of that step")
+    return rows
+
+
+def interpolate(field: Array, grid: Grid, places: Array) -> Array:
+    """`field` (nx, ny, nz, k) at `places` (n, 3) in m, linear between cell centres, constant beyond the outermost (periodic axes go on).
+
+    NaN of empty cells counts as 0.
+    """
+    if field.shape[:3] != grid.shape:
+        raise DembarkError(f"a mean velocity on {field.shape[:3]} cells", f"the grid has {grid.shape}", "give it on the grid of the fields")
+    known = np.nan_to_num(field)
+    lower, upper, share = [], [], []
+    for axis in range(3):
+        at = (places[:, axis] - grid.low[axis]) / grid.spacing[axis] - 0.5
+        count = grid.shape[axis]
+        if not grid.periodic[axis]:
+            at = np.clip(at, 0.0, count - 1)
+        below = np.floor(at).astype(int)
+        lower.append(below % count)
+        upper.append((below + 1) % count if grid.periodic[axis] else np.minimum(below + 1, count - 1))
+        share.append((at - below)[:, None])
+    result = np.zeros((len(places), field.shape[3]))
+    for corner in range(8):
+        sides = [(corner >> axis) & 1 for axis in range(3)]
+        cell = tuple((upper if side else lower)[axis] for axis, side in enumerate(sides))
+        weight = np.ones((len(places), 1))
+        for axis, side in enumerate(sides):
+            weight = weight * (share[axis] if side else 1.0 - share[axis])
+        result += weight * known[cell]
+    return result
+
+
+def _check_finite(values: Array, name: str, step: int) -> None:
+    if not np.isfinite(values).all():
+        raise DembarkError(f"{name} with numbers that are not finite", f"step {step}", "every number must be finite")

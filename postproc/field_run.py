@@ -1,0 +1,249 @@
+"""What `dembark fields` does: frames to fields to files, with memory for one frame and one set of sums."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from dembark.postproc.cells import CellAverage, CellTotals, cell_grid, cell_totals
+from dembark.postproc.coarse_graining import coarse_grain
+from dembark.postproc.contacts import ContactFrame
+from dembark.postproc.field_sums import MASS, MOMENTUM, Fields, FieldSums
+from dembark.postproc.grains import GrainFrame
+from dembark.postproc.grid import Grid
+from dembark.postproc.kernels import Kernel
+from dembark.postproc.output.netcdf import FieldsNetcdf
+from dembark.postproc.output.vtkhdf import FieldsVtkhdf, GrainsVtkhdf
+from dembark.postproc.output.whole import Selection
+from dembark.postproc.sources import Reading, Source
+from dembark.postproc.wall_run import begin, check_inclusions, check_outputs, choose_walls, recorders_of, source_lines, wall_lines
+from dembark.postproc.wall_stress import WallStress
+from dembark.postproc.walls import Inclusion, wall_contacts
+from dembark.postproc.words import WallWord, counts, length, near, span
+from dembark.validation.errors import DembarkError
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Attributes = Mapping[str, str | float | int]
+
+_PATCH = 2.0  # size of a wall's patches in mean diameters
+_MOST_CELLS = 5e7
+
+
+@dataclass(frozen=True)
+class Words:
+    """What the user wrote; the texts are those of the options of these names."""
+
+    source: Path
+    reading: Reading
+    contacts: Path | None
+    kernel: str
+    width: str
+    grid: str | None
+    spacing: str | None
+    box: str | None
+    frames: str
+    average: str
+    walls: Sequence[str]
+    cells: bool
+    least_contacts: int
+    fields: str | None
+    out: Path | None
+    vtkhdf: Path | None
+    grains: Path | None
+    plot: Path | None
+    threads: int | None
+
+
+@dataclass
+class FieldJob:
+    """Fields that were planned and can be computed: frames in groups to be averaged, grid, kernel (None: averages by cell), walls.
+
+    `unplaced` are walls of the dump whose place is not known; `only` are the fields to write, [] for all. What `run` leaves: loads of
+    walls, files, mass in the fields and of the grains in each group (kg), largest error of the momentum over the sum of m |v|, and the
+    share of cells that are not masked.
+    """
+
+    words: Words
+    source: Source
+    groups: list[list[int]]
+    left_over: int
+    diameter: float
+    grid: Grid
+    kernel: Kernel | None
+    walls: list[WallWord]
+    unplaced: list[str]
+    only: list[str]
+    loads: list[WallStress] = field(default_factory=list)
+    written: list[Path] = field(default_factory=list)
+    masses: list[tuple[float, float]] = field(default_factory=list)
+    momentum_error: float = 0.0
+    seen: float = 1.0
+
+    @property
+    def numbers(self) -> list[int]:
+        """All frames that are used."""
+        return [number for group in self.groups for number in group]
+
+    @classmethod
+    def plan(cls, words: Words) -> FieldJob:
+        """Check everything the user wrote; DembarkError or DumpError before any work is done."""
+        files = (words.out, words.vtkhdf, words.grains)
+        if not any((*files, words.plot)):
+            raise DembarkError("there is nothing to write", "", "name a file with --out or --vtkhdf, or a folder with --plot")
+        check_outputs(*files, plot=words.plot)
+        if words.grid is not None and words.spacing is not None:
+            raise DembarkError("--grid and --spacing are both given", "", "give one of them")
+        only = _names(words.fields, (CellAverage if words.cells else Fields).units)
+        source, numbers, first, diameter = begin(words.source, words.contacts, words.frames, words.reading)
+        groups, rest = _groups(numbers, words.average)
+        kernel = None if words.cells else Kernel(words.kernel, length(words.width, diameter, "--width"))
+        walls = choose_walls(words.walls, source, first, diameter)
+        check_inclusions(walls, source)
+        if words.cells and source.contacts is None:
+            raise DembarkError("cell averages need contacts", f"{words.source} has none", "name their dump with --contacts")
+        grid = _grid([first, source.grains[numbers[-1]]], words, diameter, kernel.reach if kernel else 0.0)
+        placed = [one.wall.name for one in walls]
+        unplaced = [name for name in first.wall_forces if name not in placed]
+        return cls(words, source, groups, rest, diameter, grid, kernel, walls, unplaced, only)
+
+    def run(self, advance: Callable[[], None], provenance: Attributes) -> None:
+        """Compute and write; `advance` is called after each frame."""
+        attributes = {**provenance, **self._method()}
+        recorders = recorders_of(self.walls, self.source, self.numbers, _PATCH * self.diameter)
+        stream = self.source.frames(self.numbers)
+        last: Fields | CellAverage | None = None
+        with ExitStack() as stack:
+            netcdf, vtkhdf, points = (stack.enter_context(kind(path, attributes)) if path else None for kind, path in (
+                (FieldsNetcdf, self.words.out), (FieldsVtkhdf, self.words.vtkhdf), (GrainsVtkhdf, self.words.grains)))
+            for group in self.groups:
+                sums: FieldSums | CellTotals | None = None
+                times, totals = [], []
+                for _ in group:
+                    grains, contacts = next(stream)
+                    times.append(self.source.time(grains.step))
+                    totals.append(_totals(grains))
+                    one = self._sums(grains, contacts, times[-1])
+                    sums = one if sums is None else sums + one
+                    for recorder in recorders:
+                        recorder.add(grains, contacts, times[-1])
+                    if points:
+                        points.add(grains, times[-1])
+                    advance()
+                self._check(sums, np.mean(totals, axis=0))
+                last = sums.average(self.words.least_contacts) if isinstance(sums, CellTotals) else sums.fields()
+                if isinstance(last, CellAverage):
+                    self.seen = min(self.seen, float(1.0 - last.mask.mean()))
+                chosen, middle = Selection(last, self.only) if self.only else last, 0.5 * (times[0] + times[-1])
+                if netcdf:
+                    netcdf.add(chosen, middle, (times[0], times[-1]))
+                if vtkhdf:
+                    vtkhdf.add(chosen, middle)
+            self.loads = [recorder.result() for recorder in recorders]
+            if netcdf:
+                netcdf.add_walls(self.loads)
+        self.written = [path for path in (self.words.out, self.words.vtkhdf, self.words.grains) if path]
+        if self.words.plot:
+            from dembark.postproc.plots import field_figures, save, wall_figures
+            figures = field_figures(last) | {name: figure for one in self.loads for name, figure in wall_figures(one).items()}
+            self.written += save(self.words.plot, figures)
+
+    def _sums(self, grains: GrainFrame, contacts: ContactFrame | None, time: float) -> FieldSums | CellTotals:
+        touched = [wall_contacts(grains, one.wall, time) for one in self.walls if not isinstance(one.wall, Inclusion)]
+        if self.kernel is None:
+            return cell_totals(grains, contacts, self.grid, touched)
+        return coarse_grain(grains, contacts, self.grid, kernel=self.kernel.name, width=self.kernel.width, walls=touched,
+                            threads=self.words.threads)
+
+    def _check(self, sums: FieldSums | CellTotals, expected: Array) -> None:
+        """Keep mass and error of the momentum in all cells, masked or not; `expected` as from `_totals`."""
+        mass, momentum = (sums.grains[..., MASS], sums.grains[..., MOMENTUM]) if isinstance(sums, FieldSums) else (sums.mass, sums.momentum)
+        self.masses.append((float(mass.sum()) / sums.frames, float(expected[0])))
+        if expected[4] > 0.0:
+            error = np.abs(momentum.sum(axis=(0, 1, 2)) / sums.frames - expected[1:4]).max() / expected[4]
+            self.momentum_error = max(self.momentum_error, float(error))
+
+    def _method(self) -> Attributes:
+        method = {"method": "cell averages", "least_contacts": self.words.least_contacts} if self.kernel is None else {
+            "method": "coarse graining", "kernel": self.kernel.name, "kernel_width": self.kernel.width}
+        known = {"mean_diameter": self.diameter, "frames": len(self.numbers),
+                 "walls": ", ".join(one.wall.name for one in self.walls) or "none",
+                 "case": str(self.source.record.get("case", "")), "engine": str(self.source.record.get("engine", ""))}
+        return {**method, **{name: value for name, value in known.items() if value != ""}}
+
+    def summary(self) -> list[str]:
+        """What was computed, checked and written, in lines."""
+        lines = source_lines(self.source, self.numbers, self.diameter)
+        if self.left_over:
+            lines.append(f"note: the last {self.left_over} frames fill no group of their own and were left out")
+        size = " × ".join(f"{1e3 * one:.4g}" for one in self.grid.spacing)
+        how = f"{100.0 * self.seen:.3g} % of them saw at least {self.words.least_contacts} contacts, the others are masked"
+        if self.kernel is not None:
+            how = f"{self.kernel.name} kernel of width {1e3 * self.kernel.width:.4g} mm ({self.kernel.width / self.diameter:.3g} d)"
+        many = f"{len(self.groups)} times" if len(self.groups) > 1 else "1 time"
+        lines.append(f"{' × '.join(map(str, self.grid.shape))} cells of {size} mm, {how}; {many}")
+        if self.source.contacts is None:
+            lines.append("note: without contacts there is no contact stress; name their dump with --contacts")
+        if self.unplaced:
+            lines.append(f"note: where the wall {', '.join(self.unplaced)} is, is not known; its part of the stress is missing, add --wall")
+        inside, there = max(self.masses, key=lambda one: abs(one[0] - one[1]))
+        lines.append(f"mass: {inside:.9g} kg in the fields, {there:.9g} kg of grains, difference {abs(inside / there - 1.0):.1e}; "
+                     f"momentum: difference {self.momentum_error:.1e} of the sum of m |v|")
+        for one in self.loads:
+            lines += wall_lines(one, self.source)
+        return [*lines, *(f"written: {path}" for path in self.written)]
+
+
+def _totals(grains: GrainFrame) -> Array:
+    """Mass, momentum along x, y, z, and sum of m |v| of all grains (5,)."""
+    momenta = grains.masses[:, None] * grains.velocities
+    return np.array([grains.masses.sum(), *momenta.sum(axis=0), np.linalg.norm(momenta, axis=1).sum()])
+
+
+def _names(text: str | None, known: Mapping[str, str]) -> list[str]:
+    """Names of fields, separated by commas; DembarkError for one that does not exist."""
+    names = [name.strip() for name in text.split(",")] if text else []
+    for name in names:
+        if name not in known:
+            raise DembarkError(f"{name!r} is no field", "in --fields", f"there are {', '.join(known)}{near(name, known)}")
+    return names
+
+
+def _groups(numbers: list[int], average: str) -> tuple[list[list[int]], int]:
+    """Frames to be averaged together, and how many are left over."""
+    if average == "all":
+        return [numbers], 0
+    if not average.isdecimal() or not 1 <= int(average) <= len(numbers):
+        raise DembarkError(f"{average!r} frames", "in --average", f"give 'all' or 1 to {len(numbers)}, the number of the chosen frames")
+    size = int(average)
+    whole = len(numbers) // size * size
+    return [numbers[start : start + size] for start in range(0, whole, size)], len(numbers) - whole
+
+
+def _grid(frames: Sequence[GrainFrame], words: Words, diameter: float, margin: float) -> Grid:
+    """Cells over the region the user wrote, or around the grains of all `frames` and as far as the kernel reaches, `margin` (m)."""
+    size = diameter
+    if words.spacing:
+        size = length(words.spacing, diameter, "--spacing")
+    elif words.cells:
+        size = float(cell_grid(frames[0]).spacing.max())
+    around = [Grid.around(frame, size, margin) for frame in frames if len(frame.radii)]
+    low, high = np.min([one.low for one in around], axis=0), np.max([one.high for one in around], axis=0)
+    periodic = around[0].periodic
+    if words.box is not None:
+        parts = words.box.split(",")
+        if len(parts) != 6:
+            raise DembarkError(f"{words.box!r} is no region", "in --box", "give x0,x1,y0,y1,z0,z1")
+        spans = np.array([span(",".join(parts[2 * axis : 2 * axis + 2]), diameter, "--box") for axis in range(3)])
+        # Only a grid over the whole period goes on at its other side.
+        whole = np.abs(spans - np.column_stack([low, high])).max(axis=1) <= 1e-9 * (high - low)
+        periodic = tuple(bool(flag and all_of_it) for flag, all_of_it in zip(periodic, whole, strict=True))
+        low, high = spans.T
+    shape = counts(words.grid) if words.grid else tuple(np.maximum(1.0, np.ceil((high - low) / size * (1.0 - 1e-9))).tolist())
+    if np.prod(np.array(shape, float)) > _MOST_CELLS:
+        raise DembarkError(f"{' × '.join(f'{one:.0f}' for one in shape)} cells are too many", "",
+                           "take fewer with --grid, or larger ones with --spacing")
+    return Grid(low, high, (int(shape[0]), int(shape[1]), int(shape[2])), periodic)

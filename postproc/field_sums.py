@@ -1,0 +1,228 @@
+"""What coarse graining sums up per cell, additive over frames, and the fields that follow from it."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import reduce
+from operator import add
+from typing import ClassVar
+
+import numpy as np
+from dembark.postproc.grid import Grid
+from dembark.postproc.kernels import Kernel
+from dembark.validation.errors import DembarkError
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Columns of FieldSums.grains; symmetric tensors are stored as xx yy zz xy xz yz.
+MASS, MOMENTUM, ENERGY, PLACE, SPREAD, SHEAR = 0, slice(1, 4), slice(4, 10), slice(10, 13), slice(13, 19), slice(19, 28)
+NUMBER, VOLUME, TOUCHES, LIQUID, GRAIN_COLUMNS = 28, 29, 30, 31, 32
+# Columns of FieldSums.contacts.
+STRESS, FABRIC, TOUCHING, POWER, FRICTION, BRIDGED, COUNT, CONTACT_COLUMNS = slice(0, 9), slice(9, 15), 15, 16, 17, 18, 19, 20
+
+_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+def symmetric_parts(first: Array, second: Array) -> Array:
+    """Components xx yy zz xy xz yz (n, 6) of the products of `first` (n, 3) and `second` (n, 3)."""
+    return np.stack([first[:, a] * second[:, b] for a, b in _PAIRS], axis=1)
+
+
+def full_tensor(parts: Array) -> Array:
+    """Tensors (..., 3, 3) of components xx yy zz xy xz yz (..., 6)."""
+    return parts[..., [[0, 3, 4], [3, 1, 5], [4, 5, 2]]]
+
+
+@dataclass(frozen=True, eq=False)
+class Fields:
+    """Coarse-grained fields, averages over each cell of `grid` and over `frames`; SI units, compression positive.
+
+    Arrays are (nx, ny, nz), vectors (nx, ny, nz, 3), tensors (nx, ny, nz, 3, 3); NaN where a mean has nothing to average over; None
+    what the frames did not hold. `units` and `long_names` have an entry for each. Definitions: docs/fields_theory.md.
+    """
+
+    grid: Grid
+    frames: int
+    density: Array
+    momentum: Array
+    velocity: Array
+    solid_fraction: Array
+    kinetic_stress: Array
+    temperature: Array
+    velocity_gradient: Array
+    strain_rate: Array
+    vorticity: Array
+    boundary_force: Array
+    contact_stress: Array | None
+    stress: Array | None
+    coordination: Array | None
+    fabric: Array | None
+    dissipated_power: Array | None
+    friction_power: Array | None
+    liquid_content: Array | None
+    grain_count: Array
+    contact_count: Array | None
+
+    units: ClassVar[dict[str, str]] = {
+        "density": "kg m-3", "momentum": "kg m-2 s-1", "velocity": "m s-1", "solid_fraction": "1", "kinetic_stress": "Pa",
+        "temperature": "m2 s-2", "velocity_gradient": "s-1", "strain_rate": "s-1", "vorticity": "s-1", "boundary_force": "N m-3",
+        "contact_stress": "Pa", "stress": "Pa", "coordination": "1", "fabric": "1", "dissipated_power": "W m-3",
+        "friction_power": "W m-3", "liquid_content": "1", "grain_count": "1", "contact_count": "1",
+    }  # fmt: skip
+    long_names: ClassVar[dict[str, str]] = {
+        "density": "bulk density",
+        "momentum": "momentum density",
+        "velocity": "mean velocity by mass",
+        "solid_fraction": "volume of grains per volume",
+        "kinetic_stress": "kinetic stress, compression positive",
+        "temperature": "granular temperature",
+        "velocity_gradient": "velocity gradient, component [a, b] = d v_a / d x_b",
+        "strain_rate": "strain rate",
+        "vorticity": "curl of the velocity",
+        "boundary_force": "force density of walls on grains",
+        "contact_stress": "contact stress, compression positive",
+        "stress": "total stress, compression positive",
+        "coordination": "mean number of contacts of a grain with others",
+        "fabric": "fabric tensor of contact normals, of trace 1",
+        "dissipated_power": "power of contact forces lost by the grains",
+        "friction_power": "tangential part of the power of contact forces",
+        "liquid_content": "volume of liquid per volume",
+        "grain_count": "grains sampled, summed over frames",
+        "contact_count": "contacts sampled, summed over frames",
+    }
+
+    def arrays(self) -> dict[str, Array]:
+        """The fields that are there, by name."""
+        return {name: value for name in self.units if (value := getattr(self, name)) is not None}
+
+
+@dataclass(frozen=True, eq=False)
+class FieldSums:
+    """Sums over `frames` frames per cell of `grid`; `+` adds frames. `coarse_grain` makes one of one frame.
+
+    `grains` (nx, ny, nz, 32), `contacts` (nx, ny, nz, 20; None without contacts) and `boundary` (nx, ny, nz, 3) hold what is carried
+    times its share in the cell: summed over the cells of a grid that holds everything they are the sums over grains and contacts.
+    `peculiar` tells that kinetic energies are about a given mean velocity; `liquid`, `power` what the frames hold.
+    """
+
+    grid: Grid
+    kernel: Kernel
+    frames: int
+    grains: Array
+    contacts: Array | None
+    boundary: Array
+    peculiar: bool = False
+    liquid: bool = False
+    power: bool = False
+
+    def __add__(self, other: FieldSums) -> FieldSums:
+        """The sums of both; DembarkError when they differ in grid, kernel or in what they hold."""
+        alike = ("kernel", "peculiar", "liquid", "power")
+        different = [name for name in alike if getattr(self, name) != getattr(other, name)]
+        if not self.grid.same(other.grid):
+            different.append("grid")
+        if (self.contacts is None) != (other.contacts is None):
+            different.append("contacts")
+        if different:
+            raise DembarkError(f"sums that differ in {', '.join(different)}", "averaging fields over frames", "use the same for all frames")
+        return FieldSums(
+            self.grid,
+            self.kernel,
+            self.frames + other.frames,
+            self.grains + other.grains,
+            None if self.contacts is None else self.contacts + other.contacts,
+            self.boundary + other.boundary,
+            self.peculiar,
+            self.liquid,
+            self.power,
+        )
+
+    def fields(self, *, shear_corrected: bool = False) -> Fields:
+        """The fields, averaged over the frames.
+
+        Kinetic stress and temperature are of v' about the mean velocity of the cell (Goldhirsch 2010), in which a gradient of the mean
+        velocity counts as fluctuation. With `shear_corrected`, v' is about the affine velocity field fitted to the grains that the
+        kernel sees, and the stress no longer grows with the square of the width. Where `mean_velocity` was given, v' is about that.
+        """
+        volume = self.frames * self.grid.cell_volume
+        grains = self.grains
+        mass, momentum = grains[..., MASS], grains[..., MOMENTUM]
+        mean, centre = ratio(momentum, mass), ratio(grains[..., PLACE], mass)
+        gradient = self._velocity_gradient(mean, centre)
+        kinetic = full_tensor(grains[..., ENERGY])
+        if not self.peculiar:
+            kinetic = kinetic - np.nan_to_num(momentum[..., :, None] * mean[..., None, :])
+            if shear_corrected:
+                spread = full_tensor(grains[..., SPREAD]) - grains[..., PLACE][..., :, None] * centre[..., None, :]
+                kinetic = kinetic - gradient @ spread @ np.swapaxes(gradient, -1, -2)
+        kinetic = kinetic / volume
+        density = mass / volume
+        contacts = self.contacts
+        contact_stress = None if contacts is None else contacts[..., STRESS].reshape(*self.grid.shape, 3, 3) / volume
+        liquid = grains[..., LIQUID] + (0.0 if contacts is None else contacts[..., BRIDGED])
+        return Fields(
+            grid=self.grid,
+            frames=self.frames,
+            density=density,
+            momentum=momentum / volume,
+            velocity=mean,
+            solid_fraction=grains[..., VOLUME] / volume,
+            kinetic_stress=kinetic,
+            temperature=ratio(np.maximum(np.trace(kinetic, axis1=-2, axis2=-1), 0.0), 3.0 * density),
+            velocity_gradient=gradient,
+            strain_rate=0.5 * (gradient + np.swapaxes(gradient, -1, -2)),
+            vorticity=np.stack([gradient[..., c, b] - gradient[..., b, c] for b, c in ((1, 2), (2, 0), (0, 1))], axis=-1),
+            boundary_force=self.boundary / volume,
+            contact_stress=contact_stress,
+            stress=None if contact_stress is None else contact_stress + kinetic,
+            coordination=None if contacts is None else ratio(grains[..., TOUCHES], grains[..., NUMBER]),
+            fabric=None if contacts is None else ratio(full_tensor(contacts[..., FABRIC]), contacts[..., TOUCHING]),
+            dissipated_power=contacts[..., POWER] / volume if self.power else None,
+            friction_power=contacts[..., FRICTION] / volume if self.power else None,
+            liquid_content=liquid / volume if self.liquid else None,
+            grain_count=grains[..., NUMBER],
+            contact_count=None if contacts is None else contacts[..., COUNT],
+        )
+
+    def _velocity_gradient(self, mean: Array, centre: Array) -> Array:
+        """Gradient (nx, ny, nz, 3, 3) of the affine velocity field fitted by least squares, weighted by mass and kernel; 1/s.
+
+        NaN where the grains do not span the directions in which the grid has more than one cell.
+        """
+        grains = self.grains
+        axes = [axis for axis in range(3) if self.grid.shape[axis] > 1]
+        result = np.zeros((*self.grid.shape, 3, 3))
+        if not axes:
+            return result
+        mass = grains[..., MASS, None, None]
+        spread = ratio(full_tensor(grains[..., SPREAD]), mass[..., 0, 0]) - centre[..., :, None] * centre[..., None, :]
+        shear = ratio(grains[..., SHEAR].reshape(*self.grid.shape, 3, 3), mass[..., 0, 0]) - mean[..., :, None] * centre[..., None, :]
+        spread, shear = spread[..., axes, :][..., axes], shear[..., axes]
+        seen = np.isfinite(spread).all(axis=(-2, -1))
+        # In a dense packing the spread is at least the kernel's variance; a millionth of it is what round-off leaves.
+        seen[seen] = np.linalg.eigvalsh(spread[seen])[:, 0] > 1e-6 * self.kernel.variance
+        result[...] = np.nan
+        found = np.zeros((int(seen.sum()), 3, 3))
+        found[..., axes] = np.swapaxes(np.linalg.solve(spread[seen], np.swapaxes(shear[seen], -1, -2)), -1, -2)
+        result[seen] = found
+        return result
+
+
+def moving_average(frames: Iterable[FieldSums], window: int) -> Iterator[FieldSums]:
+    """Sums over each run of `window` consecutive frames, one a frame from the window-th on; only `window` frames are held."""
+    if window < 1:
+        raise DembarkError(f"a window of {window} frames", "averaging fields over frames", "give at least 1")
+    held: deque[FieldSums] = deque(maxlen=window)
+    for frame in frames:
+        held.append(frame)
+        if len(held) == window:
+            yield reduce(add, held)
+
+
+def ratio(sums: Array, weights: Array) -> Array:
+    """`sums` (..., *more) over `weights` (...), NaN where nothing was weighed."""
+    weights = weights.reshape(*weights.shape, *(1,) * (sums.ndim - weights.ndim))
+    return np.divide(sums, weights, out=np.full(sums.shape, np.nan), where=weights > 0.0)

@@ -1,0 +1,120 @@
+"""What the commands read: a dump, or the folder of a run with its time step and walls."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dembark.postproc.contacts import ContactFrame, ContactsDump
+from dembark.postproc.dumptext import DumpError
+from dembark.postproc.grains import GrainFrame, GrainsDump
+from dembark.postproc.walls import CylinderWall, Motion, PlaneWall, Wall
+from dembark.validation.errors import DembarkError
+from dembark.validation.files import read_json
+
+
+@dataclass(frozen=True)
+class Source:
+    """Frames to be averaged: `grains`, `contacts` (None: there are none), `time_step` (s; NaN: unknown), `record` of the run or {}."""
+
+    path: Path
+    grains: GrainsDump
+    contacts: ContactsDump | None
+    time_step: float
+    record: Mapping[str, Any]
+
+    @property
+    def notes(self) -> list[str]:
+        """Lines about what of the files was left out or put in order."""
+        return [line for one in (self.grains, self.contacts) if one is not None for line in one.remarks]
+
+    def time(self, step: int) -> float:
+        """Simulated time (s) of a step; the step itself where the time step is unknown."""
+        return step if math.isnan(self.time_step) else step * self.time_step
+
+    def frames(self, numbers: Sequence[int]) -> Iterator[tuple[GrainFrame, ContactFrame | None]]:
+        """Frames by their numbers, one at a time, each with the contacts of its step; DumpError when those are not there."""
+        beside = _ByStep(self.contacts) if self.contacts is not None else None
+        for number in numbers:
+            grains = self.grains[number]
+            yield grains, beside.of(number, grains.step) if beside else None
+
+    def walls(self, names: Sequence[str]) -> list[Wall]:
+        """The walls of a case of dembark that carry one of `names`, told from its parameters; [] for other files."""
+        return _walls_of(self.record.get("parameters", {}), self.time_step, names)
+
+
+class _ByStep:
+    """Contacts of given steps."""
+
+    def __init__(self, dump: ContactsDump) -> None:
+        self._dump = dump
+        self._numbers = {int(step): number for number, step in enumerate(dump.steps)}
+
+    def of(self, number: int, step: int) -> ContactFrame:
+        if step not in self._numbers:
+            raise DumpError(f"{self._dump.path} has no frame of step {step}, which is frame {number} of the grains; "
+                            "write both at the same steps")
+        return self._dump[self._numbers[step]]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How files are to be read that do not say it themselves: `time_step` (s), `density` (kg/m3) of grains without masses, names of the
+    `columns` of a binary dump, and what the columns of a foreign dump of contacts are (see ContactsDump)."""
+
+    time_step: float | None = None
+    density: float | None = None
+    columns: Sequence[str] | None = None
+    contact_columns: Mapping[str, Sequence[int | str]] | None = None
+
+
+def open_source(path: Path, contacts: Path | None = None, reading: Reading | None = None) -> Source:
+    """Open a dump of grains, or a run folder with grains.dump; DembarkError or DumpError in one line when it is not there.
+
+    A last frame that was cut off is left out and told in `notes`.
+    """
+    how = reading or Reading()
+    folder = _run_folder(path)
+    record = (read_json(folder / "run.json") or {}) if folder else {}
+    file = folder / "grains.dump" if folder else path
+    if contacts is None and folder and (folder / "contacts.dump").is_file():
+        contacts = folder / "contacts.dump"
+    time_step = how.time_step if how.time_step is not None else float(record.get("time_step", math.nan))
+    grains = GrainsDump(file, skip_truncated=True, columns=how.columns, density=how.density)
+    if not len(grains):
+        raise DumpError(f"{file} has no whole frame")
+    beside = ContactsDump(contacts, skip_truncated=True, columns=how.contact_columns) if contacts else None
+    return Source(path, grains, beside, time_step, record)
+
+
+def _run_folder(path: Path) -> Path | None:
+    if not path.is_dir():
+        return None
+    if (path / "grains.dump").is_file():
+        return path
+    inside = sorted(path.glob("replica-*/grains.dump"))
+    if len(inside) == 1:
+        return inside[0].parent
+    advice = f"name one of its replicas, such as {inside[0].parent}" if inside else "name a dump file or the folder of a run"
+    raise DembarkError(f"{path} has no grains.dump", "", advice)
+
+
+def _walls_of(parameters: Mapping[str, Any], time_step: float, names: Sequence[str]) -> list[Wall]:
+    """dembark's cases have their walls where these parameters say: side, left and right stand, base lies at z = 0."""
+    found: dict[str, Wall] = {}
+    if "cylinder_radius" in parameters:
+        found["side"] = CylinderWall("side", float(parameters["cylinder_radius"]))
+    width = parameters.get("silo_width", parameters.get("channel_width"))
+    if width is not None:
+        found["left"] = PlaneWall("left", normal=(1.0, 0.0, 0.0))
+        found["right"] = PlaneWall("right", (float(width), 0.0, 0.0), (-1.0, 0.0, 0.0))
+    if parameters:
+        speed = float(parameters.get("base_speed", 0.0))
+        # A base that sinks begins to when the grains have settled.
+        since = math.ceil(float(parameters.get("settle_time", 0.0)) / time_step) * time_step if time_step > 0.0 else 0.0
+        found["base"] = PlaneWall("base", motion=Motion((0.0, 0.0, -speed), since))
+    return [wall for name, wall in found.items() if name in names]

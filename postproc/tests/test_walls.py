@@ -1,0 +1,419 @@
+"""Walls: where contacts fall, stresses from known loads, peaks; and the engines' own wall forces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from dembark.postproc import ContactsDump, DumpError, GrainsDump, read_times
+from dembark.postproc.wall_mesh import TriangleTree, nearest_on_triangles, read_stl
+from dembark.postproc.wall_patches import box_patches, cylinder_patches, inclusion_patches, mesh_patches, plane_patches
+from dembark.postproc.wall_peaks import Blocks, Histogram, PeakFinder
+from dembark.postproc.wall_stress import wall_stress
+from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, Motion, PlaneWall, into_box, wall_contacts
+from dembark.validation import cases, engines
+from dembark.validation.errors import DembarkError
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from scenes import contacts_of, frame_of
+
+RANDOM = np.random.default_rng(7)
+
+
+def rotation(seed):
+    """A random proper rotation (3, 3)."""
+    q, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    return q * np.linalg.det(q)
+
+
+def sphere_mesh(radius=1.0, rings=12):
+    """Triangles of a sphere."""
+    polar, angle = np.linspace(0.0, np.pi, rings + 1), np.linspace(0.0, 2.0 * np.pi, 2 * rings + 1)
+    grid = radius * np.stack([np.outer(np.sin(polar), np.cos(angle)), np.outer(np.sin(polar), np.sin(angle)),
+                              np.outer(np.cos(polar), np.ones_like(angle))], axis=-1)
+    corners = [grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]]
+    triangles = np.concatenate([np.stack([corners[i] for i in pick], axis=-2).reshape(-1, 3, 3) for pick in ((0, 1, 2), (0, 2, 3))])
+    sides = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
+    return triangles[sides > 1e-12]
+
+
+def write_stl(path, triangles, binary):
+    """An STL file of one solid."""
+    if binary:
+        rows = np.zeros(len(triangles), np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")]))
+        rows["v"] = triangles
+        path.write_bytes(b"solid in name only".ljust(80, b" ") + np.uint32(len(triangles)).tobytes() + rows.tobytes())
+    else:
+        facets = "".join("facet normal 0 0 0\n outer loop\n" + "".join(f"  vertex {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in one) +
+                         " endloop\nendfacet\n" for one in triangles)
+        path.write_text(f"solid part one\n{facets}endsolid part one\n")
+
+
+# --- triangles -----------------------------------------------------------------------------------------------------------
+
+@settings(max_examples=60)
+@given(st.integers(0, 10**6))
+def test_nearest_point_of_a_triangle_is_on_it_and_no_sampled_point_is_nearer(seed):
+    random = np.random.default_rng(seed)
+    triangle, point = random.normal(size=(1, 3, 3)), 2.0 * random.normal(size=(1, 3))
+    found = nearest_on_triangles(point, triangle)
+    shares = random.dirichlet(np.full(3, 0.5), 4000)
+    distances = np.linalg.norm(shares @ triangle[0] - point, axis=1)
+    assert np.linalg.norm(found - point) <= distances.min() + 1e-12
+    weights, *_ = np.linalg.lstsq(np.vstack([triangle[0].T, np.ones(3)]), np.append(found[0], 1.0), rcond=None)
+    np.testing.assert_allclose(np.vstack([triangle[0].T, np.ones(3)]) @ weights, np.append(found[0], 1.0), atol=1e-9)
+    assert (weights > -1e-9).all()
+
+
+@settings(max_examples=15)
+@given(st.integers(0, 10**6), st.integers(1, 300))
+def test_tree_finds_what_comparing_all_triangles_finds(seed, count):
+    random = np.random.default_rng(seed)
+    sizes = 10.0 ** random.uniform(-3, 0.5, (count, 1, 1))
+    triangles = random.uniform(-1.0, 1.0, (count, 1, 3)) + sizes * random.normal(size=(count, 3, 3))
+    points = random.uniform(-2.0, 2.0, (40, 3))
+    found, which = TriangleTree(triangles).nearest(points)
+    all_pairs = nearest_on_triangles(np.repeat(points, count, axis=0), np.tile(triangles, (40, 1, 1))).reshape(40, count, 3)
+    distances = np.linalg.norm(all_pairs - points[:, None], axis=2)
+    np.testing.assert_array_equal(np.linalg.norm(found - points, axis=1), distances.min(axis=1))
+    assert (which == distances.argmin(axis=1)).all()
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_stl_comes_back_as_it_was_written(tmp_path, binary):
+    triangles = np.round(RANDOM.normal(size=(7, 3, 3)), 3)
+    flat = np.zeros((1, 3, 3))
+    write_stl(tmp_path / "part.stl", np.concatenate([triangles, flat]), binary)
+    surface = read_stl(tmp_path / "part.stl")
+    np.testing.assert_allclose(surface.triangles, triangles, atol=1e-6)
+    wall = MeshWall.from_stl("side", tmp_path / "part.stl", scale=1e-3)
+    np.testing.assert_allclose(wall.triangles, 1e-3 * triangles, atol=1e-9)
+
+
+def test_solids_of_a_text_file_are_groups(tmp_path):
+    for name, shift in (("one", 0.0), ("two", 4.0)):
+        write_stl(tmp_path / name, sphere_mesh(rings=3) + shift, binary=False)
+    (tmp_path / "both.stl").write_text((tmp_path / "one").read_text() + (tmp_path / "two").read_text().replace("part one", "part two"))
+    patches = mesh_patches(MeshWall.from_stl("side", tmp_path / "both.stl"), "group")
+    assert patches.labels == ("part one", "part two")
+    np.testing.assert_allclose(patches.areas[0], patches.areas[1])
+    np.testing.assert_allclose(patches.centres, [[0.0] * 3, [4.0] * 3], atol=1e-7)
+
+
+@pytest.mark.parametrize("binary", [False, True])
+@pytest.mark.parametrize("cut", [1, 20, 500])
+def test_cut_off_stl_is_refused_in_one_line(tmp_path, binary, cut):
+    path = tmp_path / "part.stl"
+    write_stl(path, sphere_mesh(rings=4), binary)
+    path.write_bytes(path.read_bytes()[:-cut] if binary or cut > 1 else path.read_bytes()[:-12])
+    with pytest.raises(DumpError, match=r"part\.stl") as caught:
+        read_stl(path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b"solid x\nendsolid x\n"])
+def test_other_files_are_no_stl(tmp_path, content):
+    (tmp_path / "part.stl").write_bytes(content)
+    with pytest.raises(DumpError, match="STL"):
+        read_stl(tmp_path / "part.stl")
+    with pytest.raises(DumpError, match="cannot be read"):
+        read_stl(tmp_path / "nowhere.stl")
+
+
+# --- walls ---------------------------------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_uniform_stress_on_a_plane_of_any_orientation(seed):
+    turn, origin = rotation(seed), RANDOM.normal(size=3)
+    wall = PlaneWall("floor", tuple(origin), tuple(turn[2]))
+    patches = plane_patches(wall, np.linspace(-2.0, 2.0, 5), np.linspace(-1.0, 1.0, 3))
+    u, v = (grid.ravel() for grid in np.meshgrid(np.arange(-2.0, 2.0, 0.1) + 0.05, np.arange(-1.0, 1.0, 0.1) + 0.05, indexing="ij"))
+    foot = wall.points(u, v)
+    normal, along, across = wall.axes
+    np.testing.assert_allclose(wall.axes @ wall.axes.T, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(np.cross(across, along), normal, atol=1e-12)
+    forces = np.tile(0.01 * (7.0 * normal - 2.0 * along + 3.0 * across), (len(u), 1))
+    frame = frame_of(foot + 0.08 * normal, walls={"floor": forces}, low=(-9,) * 3, high=(9,) * 3)
+    np.testing.assert_allclose(wall_contacts(frame, wall).points, foot, atol=1e-12)
+    found = wall_stress([frame], wall, patches)
+    np.testing.assert_allclose(found.mean, np.tile([7.0, -2.0, 3.0], (8, 1)), rtol=1e-9)
+    np.testing.assert_allclose(found.shear, np.hypot(2.0, 3.0))
+    assert found.reach == pytest.approx((0.8, 0.8))
+    assert found.contacts.tolist() == [100] * 8
+    assert len(box_patches(wall, frame, 1.0)) > 8
+
+
+@pytest.mark.parametrize("inward", [True, False])
+@pytest.mark.parametrize("seed", [3, 4])
+def test_pressure_on_a_cylinder_of_any_orientation(seed, inward):
+    turn, origin = rotation(seed), RANDOM.normal(size=3)
+    wall = CylinderWall("side", 2.0, tuple(turn[0]), tuple(origin), inward)
+    angle, height = (grid.ravel() for grid in np.meshgrid((np.arange(48) + 0.5) * np.pi / 24.0, np.arange(-2.9, 3.0, 0.2)))
+    axis, outward = wall.axes[0], wall.outward(angle)
+    each = 2.0 * np.pi / 24.0 * 0.2 / 1.0
+    sign = -1.0 if inward else 1.0
+    forces = each * (sign * 5.0 * outward + 2.0 * axis - 1.0 * np.cross(axis, outward))
+    centres = wall.points(angle, height) + sign * 0.1 * outward
+    found = wall_stress([frame_of(centres, walls={"side": forces})], wall, cylinder_patches(wall, 8, np.linspace(-3.0, 3.0, 4)))
+    np.testing.assert_allclose(found.mean, np.tile([5.0, 2.0, -1.0], (24, 1)), rtol=1e-9)
+    assert found.imbalance() < 1e-12
+    np.testing.assert_allclose(found.patches.areas.sum(), 2.0 * np.pi * 2.0 * 6.0)
+    np.testing.assert_allclose(wall_contacts(frame_of(centres, walls={"side": forces}), wall).points, wall.points(angle, height), atol=1e-9)
+
+
+def test_pressure_on_a_mesh_is_that_of_each_triangle_and_of_the_whole():
+    triangles = sphere_mesh(2.0, 8)
+    wall = MeshWall("drop", triangles, np.arange(len(triangles)) % 2, ("even", "odd"))
+    middle, normal = triangles.mean(axis=1), wall.axes[:, 0]
+    area = mesh_patches(wall).areas
+    for side in (1.0, -1.0):
+        frame = frame_of(middle + side * 0.05 * normal, walls={"drop": 4.0 * side * area[:, None] * normal})
+        found = wall_stress([frame], wall, mesh_patches(wall))
+        np.testing.assert_allclose(found.mean, np.tile([4.0, 0.0, 0.0], (len(area), 1)), atol=1e-9)
+        assert found.patches.locate(np.array([[3.0, 0.0]])).tolist() == [3]
+        groups = wall_stress([frame], wall, mesh_patches(wall, "group"))
+        np.testing.assert_allclose(groups.mean[:, 0], 4.0)
+
+
+def test_mesh_cylinder_and_plane_agree_where_they_are_the_same():
+    corner = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+    mesh, plane = MeshWall("floor", corner[[[0, 1, 2], [0, 2, 3]]]), PlaneWall("floor")
+    centres = np.column_stack([RANDOM.uniform(-0.99, 0.99, (50, 2)), np.full(50, 0.09)])
+    frame = frame_of(centres, walls={"floor": RANDOM.normal(size=(50, 3))})
+    one = wall_stress([frame], mesh, mesh_patches(mesh))
+    other = wall_stress([frame], plane, plane_patches(plane, np.array([-1.0, 1.0]), np.array([-1.0, 1.0])))
+    np.testing.assert_allclose((one.mean * one.patches.areas[:, None]).sum(axis=0), (other.mean * other.patches.areas[:, None]).sum(axis=0))
+    np.testing.assert_array_equal(one.force, other.force)
+
+
+def test_forces_outside_the_patches_are_kept_and_told():
+    wall = PlaneWall("floor")
+    frame = frame_of([[0.5, 0.5, 0.1], [3.0, 0.5, 0.1]], walls={"floor": [[0.0, 0.0, 2.0], [0.0, 1.0, 5.0]]})
+    found = wall_stress([frame], wall, plane_patches(wall, np.array([0.0, 1.0]), np.array([0.0, 1.0])))
+    assert found.outside.tolist() == [[0.0, 1.0, 5.0]] and found.force.tolist() == [[0.0, 1.0, 7.0]]
+    assert found.mean[0, 0] == pytest.approx(2.0) and found.imbalance() == 0.0
+
+
+def test_moving_wall_takes_its_patches_along():
+    edges, force = np.array([0.0, 1.0, 2.0]), {"floor": [[0.0, 0.0, 1.0]]}
+    wall = PlaneWall("floor", (0.0, 0.0, 1.0), motion=Motion((1.0, 0.0, -0.5), since=2.0))
+    frames = [frame_of([[0.5, 0.5, 1.1]], walls=force, step=0), frame_of([[3.5, 0.5, 0.1]], walls=force, step=4)]
+    found = wall_stress(frames, wall, plane_patches(wall, edges, edges), time_step=1.0)
+    assert found.displacements.tolist() == [[0.0, 0.0, 0.0], [2.0, 0.0, -1.0]]
+    np.testing.assert_allclose(wall_contacts(frames[1], wall, 4.0).points, [[3.5, 0.5, 0.0]])
+    assert found.reach == pytest.approx((1.0, 1.0))
+    mesh = MeshWall("floor", np.array([[[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]]]), motion=Motion((0.0, 0.0, 3.0)))
+    np.testing.assert_allclose(wall_contacts(frame_of([[0.5, 0.5, 6.1]], walls=force), mesh, 2.0).points, [[0.5, 0.5, 6.0]])
+
+
+def test_grain_beyond_a_periodic_border_counts_on_the_other_side():
+    wall = PlaneWall("floor")
+    frame = frame_of([[5.5, 0.5, 0.1]], walls={"floor": [[0.0, 0.0, 1.0]]}, periodic=(True, False, False))
+    np.testing.assert_allclose(into_box(frame), [[-4.5, 0.5, 0.1]])
+    found = wall_stress([frame], wall, box_patches(wall, frame, 10.0))
+    assert not found.outside.any()
+
+
+def test_wall_that_nothing_touches_and_frames_without_grains():
+    wall = CylinderWall("side", 1.0)
+    frames = [frame_of(np.zeros((0, 3)), walls={"side": np.zeros((0, 3))}, step=k) for k in range(9)]
+    found = wall_stress(frames, wall, cylinder_patches(wall, 4, np.array([0.0, 1.0])))
+    assert not found.mean.any() and not found.half.any() and found.peak_stress.number == 0 and len(found.peak_forces) == 0
+    assert np.isnan(found.contact_force.mean)
+
+
+@pytest.mark.parametrize(("make", "words"), [
+    (lambda: PlaneWall("w", normal=(0.0, 0.0, 0.0)).axes, "no direction"),
+    (lambda: CylinderWall("w", -1.0), "radius"),
+    (lambda: CylinderWall("w", float("nan")), "radius"),
+    (lambda: MeshWall("w", np.zeros((0, 3, 3))), "triangles"),
+    (lambda: Inclusion("w", ()), "at least one"),
+    (lambda: Inclusion("w", (1,), "cube"), "cube"),
+    (lambda: plane_patches(PlaneWall("w"), np.array([1.0, 0.0]), np.array([0.0, 1.0])), "rising"),
+    (lambda: cylinder_patches(CylinderWall("w", 1.0), 0, np.array([0.0, 1.0])), "at least one"),
+    (lambda: wall_stress([], PlaneWall("w"), plane_patches(PlaneWall("w"), np.arange(2), np.arange(2))), "no frame"),
+])
+def test_mistakes_get_one_line(make, words):
+    with pytest.raises(DembarkError, match=words) as caught:
+        make()
+    assert "\n" not in str(caught.value)
+
+
+def test_unknown_wall_names_those_that_are_there():
+    with pytest.raises(DumpError, match="side"):
+        wall_contacts(frame_of([[0.0, 0.0, 0.0]], walls={"side": np.zeros((1, 3))}), PlaneWall("base"))
+
+
+# --- inclusions ----------------------------------------------------------------------------------------------------------
+
+def loaded_sphere(count=4000, radius=1.0, small=0.02):
+    """A large grain (id 1) with `count` small ones around it, and the directions to those."""
+    k = np.arange(count) + 0.5
+    polar, angle = np.arccos(1.0 - 2.0 * k / count), np.pi * (1.0 + np.sqrt(5.0)) * k
+    away = np.column_stack([np.cos(angle) * np.sin(polar), np.sin(angle) * np.sin(polar), np.cos(polar)])
+    positions = np.concatenate([np.zeros((1, 3)), (radius + small) * away])
+    return frame_of(positions, np.r_[radius, np.full(count, small)]), away
+
+
+@pytest.mark.parametrize("swap", [False, True])
+def test_hydrostatic_pressure_on_a_grain(swap):
+    frame, away = loaded_sphere()
+    count = len(away)
+    on_inclusion = -3.0 * 4.0 * np.pi / count * away
+    big, others = np.ones(count, int), np.arange(2, count + 2)
+    contacts = contacts_of(frame, others, big, -on_inclusion) if swap else contacts_of(frame, big, others, on_inclusion)
+    inclusion = Inclusion("stone", (1,))
+    patches = inclusion_patches(inclusion, inclusion.size(frame), 4, 4)
+    np.testing.assert_allclose(patches.areas, 4.0 * np.pi / 16.0)
+    found = wall_stress([frame], inclusion, patches, contacts=[contacts])
+    np.testing.assert_allclose(found.mean[:, 0], 3.0, rtol=0.01)
+    np.testing.assert_allclose(found.mean[:, 1:], 0.0, atol=1e-9)
+    assert found.normal_force[0] == pytest.approx(12.0 * np.pi)
+
+
+def test_force_on_an_inclusion_by_height_and_its_sign():
+    # Two glued grains; one neighbour beside the upper one pushes it along -x, one below pushes it up.
+    positions = [[0.0, 0.0, 0.5], [0.0, 0.0, -0.5], [1.0, 0.0, 0.5], [0.0, 0.0, -1.5]]
+    frame = frame_of(positions, 0.5, ids=[3, 5, 8, 9])
+    contacts = contacts_of(frame, [3, 9, 3], [8, 5, 5], np.array([[-4.0, 0.0, 1.0], [0.0, 0.0, -2.0], [9.0, 9.0, 9.0]]))
+    body = Inclusion("body", (3, 5), "cylinder")
+    assert body.size(frame) == pytest.approx(0.5)
+    places, forces = body.loads(frame, contacts)
+    np.testing.assert_allclose(places.points, [[0.5, 0.0, 0.5], [0.0, 0.0, -1.0]], atol=1e-12)
+    np.testing.assert_allclose(forces, [[4.0, 0.0, -1.0], [0.0, 0.0, -2.0]])
+    found = wall_stress([frame], body, inclusion_patches(body, 0.5, 1, np.array([-1.0, 0.0, 1.0])), contacts=[contacts])
+    np.testing.assert_allclose(found.mean[1] * np.pi, [4.0, -1.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(found.force, [[4.0, 0.0, -3.0]])
+
+
+def test_inclusion_without_its_contacts_or_grains_is_refused():
+    frame, _ = loaded_sphere(5)
+    inclusion = Inclusion("stone", (1,))
+    patches = box_patches(inclusion, frame, 0.5)
+    with pytest.raises(DumpError, match="contacts"):
+        wall_stress([frame], inclusion, patches)
+    with pytest.raises(DumpError, match="grain 77"):
+        Inclusion("stone", (1, 77)).members(frame)
+
+
+# --- statistics ----------------------------------------------------------------------------------------------------------
+
+@given(st.lists(st.integers(0, 4), min_size=1, max_size=40))
+def test_peaks_are_the_local_maxima(values):
+    finder, found = PeakFinder((1,)), []
+    for value in values:
+        before, peak = finder.feed(np.array([float(value)]))
+        found += before[peak].tolist()
+    runs = [value for number, value in enumerate(values) if number == 0 or value != values[number - 1]]
+    assert found == [float(b) for a, b, c in zip(runs, runs[1:], runs[2:], strict=False) if a < b > c]
+
+
+@settings(max_examples=40)
+@example([[5e-324], [1e6]])
+@given(st.lists(st.lists(st.floats(-1e3, 1e6), max_size=20), max_size=6))
+def test_histogram_counts_like_one_that_knows_the_range(parts):
+    histogram = Histogram(8)
+    for part in parts:
+        histogram.add(np.array(part))
+    values = np.array([value for part in parts for value in part])
+    assert histogram.number == len(values) and histogram.below == (values <= 0.0).sum()
+    if (values > 0.0).any():
+        np.testing.assert_array_equal(histogram.counts, np.histogram(values[values > 0.0], histogram.edges)[0])
+        assert (histogram.density() * histogram.width).sum() == pytest.approx(1.0)
+        assert histogram.quantile(1.0) == pytest.approx(values.max())
+        assert histogram.mean == pytest.approx(values.mean(), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 16, 100])
+def test_blocks_have_the_interval_of_their_means(count):
+    values = np.random.default_rng(count).normal(size=(count, 2))
+    blocks = Blocks()
+    for value in values:
+        blocks.add(value)
+    length = max(1, 2 ** int(np.log2(max(1, count // 8))))
+    whole = count // length
+    assert blocks.count == whole
+    half = blocks.half((2,))
+    if whole < 8:
+        assert np.isinf(half).all()
+    else:
+        means = values[: whole * length].reshape(whole, length, 2).mean(axis=1)
+        np.testing.assert_allclose(half / means.std(axis=0, ddof=1) * np.sqrt(whole), half[0] / means[:, 0].std(ddof=1) * np.sqrt(whole))
+        assert 2.0 < half[0] / means[:, 0].std(ddof=1) * np.sqrt(whole) < 2.4
+
+
+def test_series_gives_the_mean_the_deviation_and_the_peaks():
+    load = np.abs(np.random.default_rng(5).normal(size=(40, 6)))
+    wall, place = PlaneWall("floor"), np.column_stack([np.arange(6) + 0.5, np.full(6, 0.5), np.full(6, 0.1)])
+    frames = [frame_of(place, walls={"floor": row[:, None] * [0.0, 0.5, 2.0]}, step=10 * k) for k, row in enumerate(load)]
+    found = wall_stress(frames, wall, plane_patches(wall, np.arange(7.0), np.array([0.0, 1.0])), time_step=0.1)
+    np.testing.assert_allclose(found.series[:, :, 0], 2.0 * load)
+    np.testing.assert_allclose(found.mean[:, 0], 2.0 * load.mean(axis=0))
+    np.testing.assert_allclose(found.deviation[:, 1], 0.5 * load.std(axis=0))
+    total = 2.0 * load.sum(axis=1)
+    tops = [k for k in range(1, 39) if total[k - 1] < total[k] > total[k + 1]]
+    np.testing.assert_allclose(found.peak_forces, total[tops])
+    np.testing.assert_allclose(found.peak_times, np.array(tops))
+    assert found.peak_stress.number == sum(
+        load[k - 1, p] < load[k, p] > load[k + 1, p] for k in range(1, 39) for p in range(6))
+    bare = wall_stress(iter(frames), wall, found.patches, keep_series=False)
+    assert bare.series is None
+    np.testing.assert_array_equal(bare.mean, found.mean)
+
+
+# --- engines -------------------------------------------------------------------------------------------------------------
+
+SMALL = {"grain_count": 150, "grain_diameter": 0.006, "gravity": 200.0, "settle_time": 0.03, "measure_time": 0.02, "frames": 4,
+         "cylinder_radius": 0.02}
+
+
+@pytest.mark.parametrize("name", ["liggghts", "yade"])
+def test_integrated_stress_is_the_engines_own_wall_force(name, tmp_path):
+    engine = engines.find(name)
+    done = engines.call(engine.command(cases.find("silo").deck(name), SMALL), tmp_path, engine.environment())
+    assert done.returncode == 0, done.stdout[-1000:] + done.stderr[-1000:]
+    grains, history = GrainsDump(tmp_path / "grains.dump"), read_times(tmp_path / "time.csv")
+    walls = [CylinderWall("side", SMALL["cylinder_radius"]), PlaneWall("base")]
+    for wall in walls:
+        found = wall_stress(grains, wall, box_patches(wall, grains[0], 0.004))
+        local = found.series * found.patches.areas[:, None]
+        rows = np.searchsorted(history["step"], found.steps)
+        assert (history["step"][rows] == found.steps).all()
+        own = np.column_stack([history[f"{wall.name}_f{axis}"] for axis in "xyz"])[rows]
+        size = np.abs(own).max()
+        assert size > 0.0 and not found.outside.any()
+        # Dumps hold seven digits of each grain's force.
+        np.testing.assert_allclose(found.force, own, atol=3e-6 * size, rtol=0.0)
+        along = local[:, :, 1].sum(axis=1) if wall.name == "side" else local[:, :, 0].sum(axis=1)
+        np.testing.assert_allclose(along, own[:, 2], atol=3e-6 * size, rtol=0.0)
+        assert found.imbalance() < 1e-12
+        assert 0.8 < found.reach[0] <= found.reach[1] <= 1.0 + 1e-6
+    if name == "liggghts":
+        return  # its contact forces are evaluated anew with the velocities at the end of the step, and so are not quite those that acted
+    # What presses on a group of grains is all that acts on it, less its weight and the walls.
+    contacts, frame = ContactsDump(tmp_path / "contacts.dump"), grains[-1]
+    group = tuple(frame.ids[frame.positions[:, 2] < 0.012].tolist())
+    members, _ = Inclusion("group", group).members(frame)
+    body = Inclusion("group", group)
+    found = wall_stress([frame], body, box_patches(body, frame, 0.01), contacts=[contacts[len(contacts) - 1]])
+    rest = members.forces - members.masses[:, None] * [0.0, 0.0, -SMALL["gravity"]] - sum(members.wall_forces.values())
+    assert len(group) > 5 and np.linalg.norm(rest.sum(axis=0)) > 0.1
+    np.testing.assert_allclose(found.force[0], -rest.sum(axis=0), atol=1e-6 * np.abs(rest).sum())
+
+
+def test_moving_mesh_has_the_engines_own_force_and_is_where_the_grains_touch_it(tmp_path):
+    engine = engines.find("liggghts")
+    values = {"grain_count": 120, "channel_width": 0.04, "channel_depth": 0.02, "settle_time": 0.03, "run_in": 0.02, "travel": 0.1,
+              "frames": 4, "gravity": 200.0, "base_speed": 0.02}
+    done = engines.call(engine.command(cases.find("plug_flow").deck("liggghts"), values), tmp_path, engine.environment())
+    assert done.returncode == 0, done.stdout[-1000:] + done.stderr[-1000:]
+    steps, time_step = (float(word) for word in done.stdout.split("dembark: steps ")[1].split()[0:3:2])
+    history = read_times(tmp_path / "time.csv")
+    since = np.ceil(values["settle_time"] / time_step) * time_step
+    plate = MeshWall.from_stl("base", tmp_path / "plate.stl", motion=Motion((0.0, 0.0, -values["base_speed"]), since))
+    found = wall_stress(GrainsDump(tmp_path / "grains.dump"), plate, mesh_patches(plate), time_step=time_step)
+    assert found.steps[-1] == steps and found.displacements[-1, 2] < -0.4e-3
+    own = np.column_stack([history[f"base_f{axis}"] for axis in "xyz"])[np.searchsorted(history["step"], found.steps)]
+    np.testing.assert_allclose((found.series[:, :, 0] * found.patches.areas).sum(axis=1), own[:, 2], rtol=3e-6)
+    np.testing.assert_allclose(found.force, own, atol=3e-6 * own.max(), rtol=0.0)
+    # Overlaps are a few hundredths of a radius, less than the way of the plate.
+    assert 0.9 < found.reach[0] <= found.reach[1] <= 1.0 + 1e-5

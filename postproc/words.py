@@ -1,0 +1,228 @@
+"""What users write on the command line: lengths in mean diameters or with units, frames, grids and walls."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from dembark.postproc.grains import GrainFrame
+from dembark.postproc.sources import Reading
+from dembark.postproc.wall_patches import Patches, box_patches, cylinder_patches, inclusion_patches, mesh_patches, plane_patches
+from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, Motion, PlaneWall, Wall
+from dembark.validation.errors import DembarkError
+from dembark.validation.units import to_si
+
+_DIAMETERS = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*d\s*")
+_KINDS: Mapping[str, tuple[str, ...]] = {
+    "plane": ("origin", "normal", "velocity", "since", "u", "v", "patch"),
+    "cylinder": ("radius", "axis", "origin", "outside", "velocity", "since", "height", "around", "patch"),
+    "mesh": ("file", "unit", "velocity", "since", "by"),
+    "inclusion": ("ids", "surface", "radius", "axis", "around", "along", "patch"),
+}
+
+
+def number(text: str, unit: str, what: str) -> float:
+    """`text` in `unit` (SI), with or without a unit of its own; DembarkError naming `what`."""
+    try:
+        value = to_si(text, unit)
+    except DembarkError as error:
+        raise DembarkError(str(error), f"in {what}") from None
+    if not np.isfinite(value):
+        raise DembarkError(f"{text!r} is not finite", f"in {what}")
+    return value
+
+
+def length(text: str, diameter: float, what: str) -> float:
+    """A positive length (m): `1.5d` is in mean diameters, `7 mm` has a unit, a plain number is in m."""
+    value = _place(text, diameter, what)
+    if not value > 0.0:
+        raise DembarkError(f"{text!r} is no length", f"in {what}", "give a positive one, such as 1.5d (mean diameters) or '7 mm'")
+    return value
+
+
+def _place(text: str, diameter: float, what: str) -> float:
+    match = _DIAMETERS.fullmatch(text)
+    return float(match.group(1)) * diameter if match else number(text, "m", what)
+
+
+def counts(text: str) -> tuple[int, int, int]:
+    """Cells along x, y and z: `64,64,64`, or one number for all three."""
+    parts = text.split(",")
+    if not all(re.fullmatch(r"\s*\d+\s*", part) for part in parts) or len(parts) not in (1, 3) or not all(int(part) for part in parts):
+        raise DembarkError(f"{text!r} is no grid", "in --grid", "give the numbers of cells, such as 64,64,64")
+    cells = [int(part) for part in parts] * (3 // len(parts))
+    return cells[0], cells[1], cells[2]
+
+
+def span(text: str, diameter: float, what: str) -> tuple[float, float]:
+    """Two rising places (m), `0,50mm`."""
+    ends = [_place(part, diameter, what) for part in text.split(",")]
+    if len(ends) != 2 or not ends[0] < ends[1]:
+        raise DembarkError(f"{text!r} is no range", f"in {what}", "give two rising numbers, such as 0,50mm")
+    return ends[0], ends[1]
+
+
+def frame_numbers(text: str, count: int) -> list[int]:
+    """Numbers of frames, from 0, as in Python: `10:50`, `::5`, `-10:`, `3`; DembarkError when there is none."""
+    parts = text.split(":")
+    try:
+        words = [int(part) if part.strip() else None for part in parts]
+    except ValueError:
+        words = []
+    if not 1 <= len(words) <= 3 or words == [None] or (len(words) == 3 and words[2] == 0):
+        raise DembarkError(f"{text!r} names no frames", "in --frames", "give first:end or first:end:step, counted from 0")
+    if len(words) == 1:
+        found = words if -count <= words[0] < count else []
+    else:
+        found = list(range(count))[slice(*words)]
+    if not found:
+        raise DembarkError(f"no frame in {text!r}", "in --frames", f"the dump has {count} frames, 0 to {count - 1}")
+    return sorted(one % count for one in found)
+
+
+def reading(time_step: str | None, density: str | None, columns: str | None, contact_columns: str | None) -> Reading:
+    """How the files are to be read, from the options of these names."""
+    values = {}
+    for key, text, unit in (("time_step", time_step, "s"), ("density", density, "kg/m^3")):
+        option = f"--{key.replace('_', '-')}"
+        values[key] = None if text is None else number(text, unit, option)
+        if values[key] is not None and values[key] <= 0.0:
+            raise DembarkError(f"{text!r} is not positive", f"in {option}")
+    of_contacts: dict[str, list[int | str]] = {}
+    for part in (contact_columns or "").split():
+        name, sign, words = part.partition("=")
+        if not sign or not words:
+            raise DembarkError(f"{part!r} names no columns", "in --contact-columns",
+                               "write first=1,2,3 second=4,5,6 ids=7,8 forces=10,11,12")
+        of_contacts[name] = [int(word) if word.isdecimal() else word for word in words.split(",")]
+    return Reading(values["time_step"], values["density"], columns.split() if columns else None, of_contacts or None)
+
+
+@dataclass(frozen=True)
+class WallWord:
+    """A wall as the user wrote it, and how its patches are made for a frame."""
+
+    wall: Wall | Inclusion
+    patches: Callable[[GrainFrame, float], Patches]
+
+
+def plain(wall: Wall) -> WallWord:
+    """A wall with patches all over the box."""
+    return WallWord(wall, lambda frame, size: box_patches(wall, frame, size))
+
+
+def parse_wall(text: str, diameter: float) -> WallWord:
+    """`name:kind:key=value:...`, kind plane, cylinder, mesh or inclusion; `diameter` (m) is the unit d of lengths."""
+    name, *rest = text.split(":")
+    where = f"--wall {name}"
+    if not re.fullmatch(r"\w+", name) or not rest:
+        raise DembarkError(f"{text!r} is no wall", "in --wall", "write name:kind:key=value, such as side:cylinder:radius=25mm")
+    kind, options = rest[0], {}
+    if kind not in _KINDS:
+        raise DembarkError(f"{kind!r} is no kind of wall", f"in {where}", f"it must be {', '.join(_KINDS)}{near(kind, _KINDS)}")
+    for part in rest[1:]:
+        key, sign, value = part.partition("=")
+        if key not in _KINDS[kind]:
+            known = _KINDS[kind]
+            raise DembarkError(f"{key!r} is no key of a {kind}", f"in {where}", f"there are {', '.join(known)}{near(key, known)}")
+        if not sign and key != "outside":
+            raise DembarkError(f"{key!r} has no value", f"in {where}", f"write {key}=value")
+        options[key] = value
+    return _Builder(name, kind, options, diameter, where).word()
+
+
+def near(word: str, known: Sequence[str] | Mapping[str, Any]) -> str:
+    """A guess of what was meant, or ''."""
+    close = difflib.get_close_matches(word, list(known), 1)
+    return f"; did you mean {close[0]}?" if close else ""
+
+
+@dataclass(frozen=True)
+class _Builder:
+    name: str
+    kind: str
+    options: Mapping[str, str]
+    diameter: float
+    where: str
+
+    def word(self) -> WallWord:
+        wall = getattr(self, f"_{self.kind}")()
+        # Mistakes in the sizes of patches are told before any frame is read.
+        sizes = {key: length(self.options[key], self.diameter, self.where) for key in ("patch",) if key in self.options}
+        spans = {key: span(self.options[key], self.diameter, self.where) for key in ("u", "v", "height") if key in self.options}
+        numbers = {key: self._count(key) for key in ("around", "along") if key in self.options}
+
+        def patches(frame: GrainFrame, size: float) -> Patches:
+            return _patches(wall, frame, sizes.get("patch", size), spans, numbers, self.options.get("by", "triangle"))
+        return WallWord(wall, patches)
+
+    def _vector(self, key: str, unit: str, default: tuple[float, float, float]) -> tuple[float, float, float]:
+        text = self.options.get(key)
+        if text is None:
+            return default
+        if unit == "1" and text in ("x", "y", "z", "-x", "-y", "-z"):
+            values = [float(axis == text[-1]) * (-1.0 if text[0] == "-" else 1.0) for axis in "xyz"]
+        else:
+            values = [number(part, unit, f"{self.where}, {key}") for part in text.split(",")]
+        if len(values) != 3:
+            raise DembarkError(f"{text!r} is no vector", f"in {self.where}, {key}", "give three numbers, such as 0,0,1")
+        return values[0], values[1], values[2]
+
+    def _count(self, key: str) -> int:
+        if not re.fullmatch(r"[1-9]\d*", self.options[key]):
+            raise DembarkError(f"{self.options[key]!r} is no number of patches", f"in {self.where}, {key}", "give a whole one from 1 on")
+        return int(self.options[key])
+
+    def _motion(self) -> Motion:
+        since = number(self.options["since"], "s", f"{self.where}, since") if "since" in self.options else 0.0
+        return Motion(self._vector("velocity", "m/s", (0.0, 0.0, 0.0)), since)
+
+    def _needed(self, key: str) -> str:
+        if not self.options.get(key):
+            raise DembarkError(f"{key} is missing", f"in {self.where}", f"add :{key}=...")
+        return self.options[key]
+
+    def _plane(self) -> PlaneWall:
+        return PlaneWall(self.name, self._vector("origin", "m", (0.0,) * 3), self._vector("normal", "1", (0.0, 0.0, 1.0)), self._motion())
+
+    def _cylinder(self) -> CylinderWall:
+        radius = length(self._needed("radius"), self.diameter, f"{self.where}, radius")
+        return CylinderWall(self.name, radius, self._vector("axis", "1", (0.0, 0.0, 1.0)), self._vector("origin", "m", (0.0,) * 3),
+                            "outside" not in self.options, self._motion())
+
+    def _mesh(self) -> MeshWall:
+        if self.options.get("by", "triangle") not in ("triangle", "group"):
+            raise DembarkError(f"patches by {self.options['by']!r}", f"in {self.where}", "they are by triangle or by group")
+        unit = self.options.get("unit", "m")
+        scale = length(f"1 {unit}", self.diameter, f"{self.where}, unit")
+        return MeshWall.from_stl(self.name, Path(self._needed("file")), scale=scale, motion=self._motion())
+
+    def _inclusion(self) -> Inclusion:
+        ids: list[int] = []
+        for part in self._needed("ids").split(","):
+            match = re.fullmatch(r"(\d+)(?:-(\d+))?", part.strip())
+            if not match or (match.group(2) and int(match.group(2)) < int(match.group(1))):
+                raise DembarkError(f"{part!r} names no grains", f"in {self.where}, ids", "give numbers and ranges, such as 1,5-9")
+            ids += range(int(match.group(1)), int(match.group(2) or match.group(1)) + 1)
+        radius = length(self.options["radius"], self.diameter, f"{self.where}, radius") if "radius" in self.options else None
+        return Inclusion(self.name, tuple(ids), self.options.get("surface", "sphere"), radius, self._vector("axis", "1", (0.0, 0.0, 1.0)))
+
+
+def _patches(wall: Wall | Inclusion, frame: GrainFrame, size: float, spans: Mapping[str, tuple[float, float]], numbers: Mapping[str, int],
+             by: str) -> Patches:
+    if isinstance(wall, MeshWall):
+        return mesh_patches(wall, by)
+    usual = box_patches(wall, frame, size)
+    if isinstance(wall, Inclusion):
+        return inclusion_patches(wall, wall.size(frame), numbers.get("around", usual.shape[0]), numbers.get("along", usual.shape[1]))
+    edges = [np.linspace(*spans[name], max(1, round((spans[name][1] - spans[name][0]) / size)) + 1) if name in spans else usual.edges[axis]
+             for axis, name in enumerate(usual.names)]
+    if isinstance(wall, PlaneWall):
+        return plane_patches(wall, *edges)
+    assert isinstance(wall, CylinderWall)
+    return cylinder_patches(wall, numbers.get("around", usual.shape[0]), edges[1])
