@@ -22,9 +22,10 @@ from typing import Any
 import numpy as np
 from dembark.validation import engines
 from dembark.validation.cases import deck_root
+from dembark.validation.restarts import newest
 
 FILES = ("time.csv", "impacts.txt", "grains.dump")
-DEFAULTS: dict[str, Any] = {"run_in": 0, "restart_every": 100}
+DEFAULTS: dict[str, Any] = {"run_in": 0, "restart_every": 16100}
 CERTIFICATE = 1e-10
 
 
@@ -90,16 +91,16 @@ def compare(engine: str, values: Mapping[str, Any], base: Path) -> dict[str, Any
     killed = Started(engine, broken, values).kill_at(steps * 11 // 20)
     if not killed:
         raise RuntimeError("the run ended before it could be killed; take a longer one")
-    saved = {path.name for path in broken.glob("drum.*")}
+    went_on_from = newest(broken, engine)
     (broken / "engine.log").unlink()
-    Started(engine, broken, {**values, "resume": 1}).wait()
+    Started(engine, broken, {**values, "resume": "yes"}).wait()
     table = np.genfromtxt(whole / "time.csv", delimiter=",", names=True)
     return {
         "engine": engine,
         "values": dict(values),
         "steps": steps,
         "killed_at_step": killed,
-        "went_on_from": max(int(name.split(".")[1]) for name in saved),
+        "went_on_from": went_on_from,
         "wall_time": seconds,
         "certificate_max": float(table["certificate"][-1]),
         "impacts": int(table["begun"][-1]),

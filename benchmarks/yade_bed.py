@@ -9,7 +9,8 @@ import sys
 import time
 
 options = dict(word.partition("=")[::2] for word in sys.argv[1:])
-diameter, width, friction, kinetic, restitution = 0.005, 0.1, 0.5, 0.4, 0.5
+diameter, friction, kinetic, restitution = 0.005, 0.5, 0.4, 0.5
+width = float(options.get("width", 0.1))  # of the square base (m)
 relax, steps, samples = (int(options[key]) for key in ("relax", "steps", "samples"))
 
 positions = []

@@ -45,11 +45,15 @@ copy() {  # copy FILE TARGET
 for file in "$here"/plugins/liggghts/*_model_*.h "$here"/plugins/liggghts/{model_properties,settings_choice}.h; do
   copy "$file" "$src/$(basename "$file")"
 done
+# States to resume from.
+for file in "$here"/plugins/liggghts/{fix_resume_exact,resume_state,state_files}.{h,cpp}; do
+  copy "$file" "$src/$(basename "$file")"
+done
 # The fix for impacts of logs solves its equations with Eigen, a library of headers; without it LIGGGHTS would not compile any more.
 eigen=$(pkg-config --cflags eigen3 2>/dev/null || true)
 [ -n "$eigen" ] || { [ -d /usr/include/eigen3/Eigen ] && eigen=-I/usr/include/eigen3; }
 if [ -n "$eigen" ]; then
-  for file in "$here"/plugins/liggghts/fix_*.h "$here"/plugins/liggghts/fix_*.cpp; do
+  for file in "$here"/plugins/liggghts/fix_lcp_*.h "$here"/plugins/liggghts/fix_lcp_*.cpp; do
     copy "$file" "$src/$(basename "$file")"
   done
 else

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -37,14 +38,15 @@ class Engine:
             if ranks > 1:
                 raise DembarkError(f"--ranks {ranks} with YADE", "", "use --threads: YADE runs in one process")
             return [str(self.executable), f"-j{threads}", "-n", "-x", str(deck), *(f"{key}={value}" for key, value in given.items())]
-        # Without binding, two runs that go on at the same time do not end up on the same core.
-        launcher = ["mpirun", "-np", str(ranks), "--bind-to", "none", "--oversubscribe"] if ranks > 1 else []
+        # Ranks would outlive a launcher that is killed, and go on writing.
+        launcher = [*mpi_launcher(ranks), *end_with_parent("KILL")] if ranks > 1 else []
         variables = (word for key, value in given.items() for word in ("-var", key, value))
         return [*launcher, str(self.executable), "-in", str(deck), "-log", "none", *variables]
 
     def environment(self, threads: int = 1) -> dict[str, str]:
-        """Environment for the engine: one thread unless asked for more, and nothing of this Python's virtual environment."""
-        result = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "DISPLAY")}
+        """Environment for the engine: one thread unless asked for more, nothing of this Python's virtual environment or of a job step."""
+        hidden = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "DISPLAY")
+        result = {key: value for key, value in os.environ.items() if key not in hidden and not _of_job_step(key)}
         # Ranks that wait for each other without yielding would halt a run with more ranks than free cores.
         result |= {"OMP_NUM_THREADS": str(threads), "PYTHONUNBUFFERED": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
         if self.name == "yade" and self.prefix:
@@ -53,6 +55,25 @@ class Engine:
         if os.geteuid() == 0:
             result |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
         return result
+
+
+def end_with_parent(signal: str) -> list[str]:
+    """Words before a command that let the system send it `signal` (`TERM`, `KILL`) when the process that started it has ended."""
+    return ["setpriv", "--pdeathsig", signal, "--"] if shutil.which("setpriv") else []
+
+
+def mpi_launcher(ranks: int) -> list[str]:
+    """Words that start `ranks` processes: those of DEMBARK_MPIRUN (`srun --mpi=pmix`, `mpiexec`, ...) and -n, else Open MPI's mpirun."""
+    named = shlex.split(os.environ.get("DEMBARK_MPIRUN", ""))
+    # Without binding, two runs that go on at the same time do not end up on the same core.
+    return [*named, "-n", str(ranks)] if named else ["mpirun", "-np", str(ranks), "--bind-to", "none", "--oversubscribe"]
+
+
+def _of_job_step(variable: str) -> bool:
+    # An MPI program that finds the variables of the job step it runs in takes itself for one of the step's ranks and ends when Slurm
+    # started no PMI for it; mpirun would start its daemons through srun. Only srun has to know the job, for its own step.
+    kept = {"SLURM_CONF"} | ({"SLURM_JOB_ID"} if Path(mpi_launcher(1)[0]).name == "srun" else set())
+    return variable.startswith(("SLURM_", "PMI_", "PMIX_")) and variable not in kept
 
 
 def _executable(path: Path, variable: str) -> Path:
@@ -132,7 +153,9 @@ def find(name: str) -> Engine:
     """The engine called `name` (`liggghts` or `yade`), asked for its version; DembarkError telling what to do if there is none."""
     if name == "liggghts":
         program = _find_liggghts()
-        version = _first_match(r"\(Version (?:LIGGGHTS-PUBLIC )?([^\s,)]+)", [str(program), "-in", "/dev/null", "-log", "none"])
+        bare = Engine(name, program, "", "")
+        version = _first_match(r"\(Version (?:LIGGGHTS-PUBLIC )?([^\s,)]+)", [str(program), "-in", "/dev/null", "-log", "none"],
+                               bare.environment())
         return Engine(name, program, version, _digest([program]))
     program, prefix = _find_yade()
     bare = Engine(name, program, "", "", prefix)

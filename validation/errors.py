@@ -17,6 +17,10 @@ class RunError(DembarkError):
     exit_code = 1
 
 
+class Killed(RunError):
+    """The engine was ended from outside (a signal, a time limit, a lost node): another attempt may go on where this one was."""
+
+
 class Interrupted(RunError):
     """The user or the machine ended the work (SIGINT, SIGTERM)."""
 

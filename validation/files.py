@@ -11,7 +11,6 @@ import mmap
 import os
 import re
 import shutil
-import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +18,7 @@ from typing import Any
 
 from dembark.validation.errors import DembarkError, RunError
 
+DISK_FULL = "the disk is full"
 _TIMESTEP = b"ITEM: TIMESTEP\n"
 _IMPACT_COLUMNS = 11
 
@@ -57,7 +57,7 @@ def read_json(path: Path) -> dict[str, Any] | None:
 def disk_error(error: OSError, path: Path) -> RunError:
     """One line for an operating system error while writing to `path`."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return RunError("the disk is full", f"writing {path}", "free some space and start again; finished runs are kept")
+        return RunError(DISK_FULL, f"writing {path}", "free some space and start again; finished runs are kept")
     return RunError(f"cannot write {path}", error.strerror or str(error))
 
 
@@ -73,24 +73,16 @@ def lock(path: Path, message: str) -> Iterator[None]:
         yield
 
 
-def part_folder(target: Path) -> Path:
-    """Fresh hidden folder beside `target` to work in; it names host and process so that leftovers can be told from live ones."""
-    part = target.with_name(f".{target.name}.part-{socket.gethostname()}-{os.getpid()}")
-    shutil.rmtree(part, ignore_errors=True)
-    part.mkdir(parents=True)
-    return part
-
-
-def move_into_place(part: Path, target: Path) -> None:
-    """Make the finished folder `part` to `target`; what was there goes only when the new one stands."""
-    for path in part.rglob("*"):
+def move_into_place(work: Path, target: Path) -> None:
+    """Make the finished folder `work` to `target`; what was there goes only when the new one stands."""
+    for path in work.rglob("*"):
         if path.is_file():
             _sync(path)
     old = target.with_name(f".{target.name}.old")
     shutil.rmtree(old, ignore_errors=True)
     if target.exists():
         target.rename(old)
-    part.rename(target)
+    work.rename(target)
     _sync(target.parent)
     shutil.rmtree(old, ignore_errors=True)
 
@@ -106,14 +98,11 @@ def retire(path: Path) -> None:
 
 
 def sweep(target: Path) -> None:
-    """Clear what processes that were killed left beside `target`, and bring back a result that one had just set aside."""
+    """Bring back a result that a process was about to replace when it was killed, or clear it away when it had been replaced."""
     old = target.with_name(f".{target.name}.old")
     if old.is_dir() and not target.exists():
         old.rename(target)
     shutil.rmtree(old, ignore_errors=True)
-    for part in target.parent.glob(f".{target.name}.part-{socket.gethostname()}-*"):
-        if not Path(f"/proc/{part.name.rpartition('-')[2]}").exists():
-            shutil.rmtree(part, ignore_errors=True)
 
 
 def count_frames(path: Path, count_key: str) -> int:

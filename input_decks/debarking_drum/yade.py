@@ -4,7 +4,6 @@ By hand, in an empty folder: yade -n -x yade.py [key=value ...]
 Keys, defaults and units (SI) are those of case.toml beside this file.
 """
 
-import glob
 import math
 import os
 import sys
@@ -21,6 +20,8 @@ range_d = p.log_diameter_max - p.log_diameter_min
 n = p.log_count if p.drum_radius is None else math.floor(4 * p.filling * p.drum_radius**2 / (mean_d**2 + range_d**2 / 12) + 0.5)
 square_d = mean_d**2 + range_d**2 / 12 * (1 - 1 / (n * n))
 radius = 0.5 * math.sqrt(n * square_d / p.filling) if p.drum_radius is None else p.drum_radius
+if p.drum_radius is not None:
+    print("NOTE: drum_radius is given: the number of logs follows from it and filling; log_count is not used")
 
 # Rows of output: 200 a revolution, each a whole number of steps.
 m_min = 0.25 * math.pi * p.log_density * p.log_length * p.log_diameter_min**2
@@ -69,36 +70,19 @@ def new_scene() -> None:
         PyRunner(command="record()", iterPeriod=1),
         NewtonIntegrator(damping=0, gravity=weight),
     ]
-    O.tags["sums"] = "0 0 0"
 
 
-def forget_after(step: int) -> str:
-    """Cut from the files of this folder what the run wrote at or after `step`, for it will come again; the frames that stay."""
-    lines = Path("time.csv").read_text().splitlines(keepends=True)
-    Path("time.csv").write_text("".join([lines[0], *(line for line in lines[1:] if int(line.split(",", 1)[0]) < step)]))
-    frames = Path("grains.dump").read_text().split("ITEM: TIMESTEP\n")[1:] if Path("grains.dump").is_file() else []
-    return "".join("ITEM: TIMESTEP\n" + frame for frame in frames if int(frame.split("\n", 1)[0]) < step)
-
-
-kept = ""
-if p.resume:
-    states = sorted(glob.glob("drum.*.yade.gz"), key=lambda name: int(name.split(".")[1]))
-    if not states:
-        dembark.fail("resume=1, but there is no drum.*.yade.gz in this folder; start with restart_every > 0 first")
-    O.load(states[-1])
-    kept = forget_after(O.iter)
-else:
-    new_scene()
+new_scene()
+if not p.resume:
     Path("time.csv").write_text(HEADER)
 
 drum = O.engines[1].walls[0].bodies[0]
-logs = [body for body in O.bodies if body.id != drum]
+log_ids = [body.id for body in O.bodies if body.id != drum]
 snapshot = DembarkSnapshot(wallCount=0, gravity=weight, columns=[-1] * len(O.bodies), types=[int(body.id != drum) for body in O.bodies])
 dump = dembark.DumpWriter(walls={}, bounds=((-half, half), (-0.5 * spacing, 0.5 * spacing), (-half, half)), gravity=weight,
                           contacts=os.devnull)
-Path("grains.dump").write_text(kept)
-sums = [float.fromhex(word) for word in O.tags["sums"].split()]
-total_weight = p.gravity * sum(body.state.mass for body in logs)
+sums = [0.0, 0.0, 0.0]
+total_weight = p.gravity * sum(O.bodies[log].state.mass for log in log_ids)
 
 
 def record() -> None:
@@ -112,6 +96,7 @@ def record() -> None:
     if O.iter % every == 0:
         torque, sideways, upward = (value / every for value in sums)
         sums[:] = [0.0, 0.0, 0.0]
+        logs = [O.bodies[log] for log in log_ids]
         height = p.gravity * sum(body.state.mass * body.state.pos[2] for body in logs)
         # Spins are half a step behind, as all velocities here; the snapshot knows the translations only.
         spin = sum(0.5 * body.state.inertia[1] * (body.state.angVel[1] + 0.5 * O.dt * O.forces.t(body.id)[1] / body.state.inertia[1])**2
@@ -126,13 +111,16 @@ def record() -> None:
         dump.write()
 
 
+def save_sums() -> None:
+    """The means that have begun belong to the saved scene."""
+    O.tags["sums"] = " ".join(value.hex() for value in sums)
+
+
+def load_sums() -> None:
+    """The means as they had begun in the scene that was loaded."""
+    sums[:] = [float.fromhex(word) for word in O.tags["sums"].split()]
+
+
 dembark.announce(steps)
 print(f"# logs {n}, drum radius {radius:.9g} m, weight {total_weight:.9g} N, limit of an impact {p.impact_speed} m/s", flush=True)
-# The last row and frame are written in the step that starts from their state.
-while O.iter < steps + 1:
-    due = every * p.restart_every
-    O.run(min(steps + 1, (O.iter // due + 1) * due if due else steps + 1) - O.iter, True)
-    if due and O.iter % due == 0:
-        O.tags["sums"] = " ".join(value.hex() for value in sums)
-        O.save(f"drum.{O.iter}.yade.gz")
-dembark.finish()
+dembark.run(steps, p.restart_every, p.resume, saving=save_sums, loaded=load_sums)

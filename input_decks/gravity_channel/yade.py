@@ -106,7 +106,8 @@ history = dembark.HistoryWriter(walls=walls, gravity=weight, path="time.csv", pr
 def release() -> None:
     """End of the compression: friction, gravity, and a push along it."""
     O.cell.velGrad = Matrix3.Zero
-    newton.gravity = weight
+    O.engines[-1].gravity = weight
+    pairing = O.engines[2].physDispatcher.functors[0]
     pairing.staticFriction, pairing.kineticFriction = pairs(grain_static, wall_static), pairs(grain_kinetic, wall_kinetic)
     for contact in O.interactions:
         at_wall = contact.id1 in walls.values() or contact.id2 in walls.values()
@@ -136,26 +137,22 @@ def pairs(between_grains: float, at_wall: float) -> MatchMaker:
 
 
 # Compressed with friction the grains would jam at a solid fraction at which they flow later; friction comes with gravity.
-pairing = Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
-    restitution=p.restitution, staticFriction=0, kineticFriction=0, criticalSlipDistance=p.critical_slip_distance,
-    interfaceShearStrength=p.interface_shear_strength, bridgeVolume=p.bridge_volume, contactAngle=p.contact_angle,
-    surfaceTension=p.surface_tension)
-newton = NewtonIntegrator(damping=0, gravity=(0, 0, 0))
 O.engines = [
     ForceResetter(),
     InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Box_Aabb()], allowBiggerThanPeriod=True, verletDist=0.3 * p.grain_diameter),
     InteractionLoop(
         [Ig2_Sphere_Sphere_ScGeom(), Ig2_Box_Sphere_ScGeom()],
-        [pairing],
+        [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
+            restitution=p.restitution, staticFriction=0, kineticFriction=0, criticalSlipDistance=p.critical_slip_distance,
+            interfaceShearStrength=p.interface_shear_strength, bridgeVolume=p.bridge_volume, contactAngle=p.contact_angle,
+            surfaceTension=p.surface_tension)],
         [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(
             presliding=p.presliding, capillaryModel=p.capillary_model if p.bridge_volume > 0 else "none")],
     ),
     # Between forces and motion, where positions and forces belong to the same time.
     PyRunner(command="record()", iterPeriod=1),
-    newton,
+    NewtonIntegrator(damping=0, gravity=(0, 0, 0)),
 ]
 
 dembark.announce(steps)
-# The last frame is written in the step that starts from its state.
-O.run(steps + 1, True)
-dembark.finish()
+dembark.run(steps, p.restart_every, p.resume)

@@ -68,6 +68,4 @@ O.engines = [
 ]
 
 dembark.announce(steps)
-# The last frame is written in the step that starts from its state.
-O.run(steps + 1, True)
-dembark.finish()
+dembark.run(steps, p.restart_every, p.resume)

@@ -30,9 +30,10 @@ def test_decks_and_case_file_know_the_same_keys() -> None:
     declared = defaults()
     text = (CASE / "liggghts.in").read_text(encoding="utf-8")
     in_deck = dict(re.findall(r"^variable\s+(\w+)\s+index\s+(\S+)\s*$", text, re.MULTILINE))
-    # A deck makes one load; a negative number is a key that is not set.
-    assert in_deck.keys() == declared.keys() - {"replicas"}
-    for key, value in in_deck.items():
+    # A deck makes one load; how it is saved and resumed is no input; a negative number is a key that is not set.
+    assert in_deck.keys() - {"restart_every", "resume"} == declared.keys() - {"replicas"}
+    for key in declared.keys() - {"replicas"}:
+        value = in_deck[key]
         assert float(value) == (-1.0 if declared[key] is None else declared[key]), key
         assert "${%s}" % key in text, key
         assert re.search(rf"\bp\.{key}\b", (CASE / "yade.py").read_text(encoding="utf-8")), key
@@ -123,7 +124,7 @@ def test_too_many_logs_are_refused_in_one_line(engine: str, tmp_path: Path) -> N
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_killed_run_goes_on_to_the_same_end(engine: str, tmp_path: Path) -> None:
-    values = TINY | {"time_step_fraction": 0.1, "restart_every": 30}
+    values = TINY | {"time_step_fraction": 0.1, "restart_every": 5000}
     try:
         found = compare(engine, values, tmp_path)
     except DembarkError as error:
@@ -135,5 +136,5 @@ def test_killed_run_goes_on_to_the_same_end(engine: str, tmp_path: Path) -> None
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_resume_without_a_state_says_so(engine: str, tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError, match="drum"):
-        run(engine, tmp_path, resume=1)
+    with pytest.raises(RuntimeError, match="no whole state"):
+        run(engine, tmp_path, resume="yes")

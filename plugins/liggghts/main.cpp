@@ -15,21 +15,29 @@
 #include "signal_handling.h"
 
 #include "fix_lcp_impact.h"
+#include "fix_resume_exact.h"
 #include "granular_combinations.h"
+#include "resume_state.h"
 
 namespace {
 
-// The table of fix styles is private; an explicit instantiation may name a private member.
+// The tables of fix styles and of commands are private; an explicit instantiation may name a private member.
 typedef LAMMPS_NS::Fix* (*FixCreator)(LAMMPS_NS::LAMMPS*, int, char**);
 struct FixTable {
   typedef std::map<std::string, FixCreator>* LAMMPS_NS::Modify::*type;
   friend type table(FixTable);
+};
+typedef void (*CommandCreator)(LAMMPS_NS::LAMMPS*, int, char**);
+struct CommandTable {
+  typedef std::map<std::string, CommandCreator>* LAMMPS_NS::Input::*type;
+  friend type table(CommandTable);
 };
 template <class Tag, typename Tag::type Member>
 struct Reach {
   friend typename Tag::type table(Tag) { return Member; }
 };
 template struct Reach<FixTable, &LAMMPS_NS::Modify::fix_map>;
+template struct Reach<CommandTable, &LAMMPS_NS::Input::command_map>;
 
 template <class Style>
 LAMMPS_NS::Fix* create_fix(LAMMPS_NS::LAMMPS* lammps, int narg, char** arg) {
@@ -53,7 +61,12 @@ int main(int argc, char** argv) {
   LAMMPS_NS::LAMMPS* lammps = new LAMMPS_NS::LAMMPS(argc, argv, MPI_COMM_WORLD);
   // The library enters its own combinations in this constructor; ours come after, where its fallback can be replaced.
   dembark_liggghts::register_contact_models();
-  (*(lammps->modify->*table(FixTable())))["lcp/impact"] = &create_fix<LAMMPS_NS::FixLcpImpact>;
+  std::map<std::string, FixCreator>& fixes = *(lammps->modify->*table(FixTable()));
+  fixes["lcp/impact"] = &create_fix<LAMMPS_NS::FixLcpImpact>;
+  fixes["resume/exact"] = &create_fix<LAMMPS_NS::FixResumeExact>;
+  (*(lammps->input->*table(CommandTable())))["resume_state"] = [](LAMMPS_NS::LAMMPS* host, int narg, char** arg) {
+    LAMMPS_NS::ResumeState(host).command(narg, arg);
+  };
   lammps->input->file();
   delete lammps;
   MPI_Finalize();

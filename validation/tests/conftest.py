@@ -64,7 +64,7 @@ doc = "strength"
 [parameters.behaviour]
 value = "ok"
 type = "choice"
-values = ["ok", "exit", "kill", "hang", "full", "truncate", "short", "unstable", "silent"]
+values = ["ok", "exit", "kill", "kill approximate", "hang", "full", "truncate", "short", "unstable", "silent"]
 doc = "what the stand-in engine does"
 
 [parameters.pause]
@@ -116,8 +116,8 @@ def decks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     root = tmp_path / "decks"
     (root / "box").mkdir(parents=True)
     (root / "box" / "case.toml").write_text(CASE)
-    (root / "box" / "liggghts.in").write_text("# deck\n")
-    (root / "box" / "yade.py").write_text("# deck\n")
+    for name in ("liggghts.in", "yade.py"):
+        (root / "box" / name).write_text("# deck that knows restart_every and resume\n")
     monkeypatch.setenv("DEMBARK_DECKS", str(root))
     cases.load.cache_clear()
     return root
@@ -175,5 +175,5 @@ def lives() -> Callable[[int], bool]:
 def engine_pid(wait_for: Callable[..., Any]) -> Callable[[Path], int]:
     """`engine_pid(folder)`: process of the stand-in that works on a first replica somewhere below `folder`."""
     def look(folder: Path) -> int:
-        return int(wait_for(lambda: next((path.read_text() for path in folder.glob("**/.replica-1.part-*/pid")), None), 60))
+        return int(wait_for(lambda: next((path.read_text() for path in folder.glob("**/.replica-1.work-*/pid")), None), 60))
     return look

@@ -5,10 +5,12 @@ Called like LIGGGHTS (`-in deck -log none -var key value ...`) or YADE (`-j1 -n 
 unless the parameter `behaviour` asks for a fault. It writes its process id to `pid` in the working folder first.
 """
 
+import glob
 import os
 import signal
 import sys
 import time
+import zlib
 
 words = sys.argv[1:]
 if "--version" in words:
@@ -26,15 +28,28 @@ with open("pid", "w") as file:
     file.write(str(os.getpid()))
 with open("values", "w") as file:
     file.write("\n".join(f"{key}={value}" for key, value in sorted(values.items())))
+every, begin = int(values.get("restart_every", 0)), 0
+suffix = "restart" if "-in" in words else "yade.gz"
+if values.get("resume") == "yes":
+    begin = max(int(name.split(".")[1]) for name in glob.glob(f"state.*.{suffix}") if os.path.exists(name + ".crc"))
 print("dembark: steps 100 time_step 1e-5", flush=True)
-for step in range(0, 101, 10):
+if begin:
+    print(f"dembark: resumed at step {begin} {behaviour.removeprefix('kill ') if behaviour.startswith('kill ') else 'exact'}ly", flush=True)
+    behaviour = {"kill": "ok", "kill approximate": "ok", "hang": "ok", "full": "ok"}.get(behaviour, behaviour)
+for step in range(begin, 101, 10):
+    if every and step > begin and step % every == 0:
+        name = f"state.{step}.{suffix}"
+        with open(name, "wb") as file:
+            file.write(b"state" * step)
+        with open(name + ".crc", "w") as file:
+            file.write(f"{5 * step} {zlib.crc32(b'state' * step):08x} 1 1 1\n")
     print(f"      {step}  {step * 1e-5}  0.5", flush=True)
     time.sleep(float(values.get("pause", 0)))
     if step == 50:
         if behaviour == "exit":
             print("ERROR: Lost atoms: original 10 current 9 (thermo.cpp:389)")
             sys.exit(1)
-        if behaviour == "kill":
+        if behaviour in ("kill", "kill approximate"):
             os.kill(os.getpid(), signal.SIGKILL)
         if behaviour == "hang":
             time.sleep(600)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-import socket
 from pathlib import Path
 
 import pytest
 from dembark.validation.errors import DembarkError, RunError
-from dembark.validation.files import check_times, count_frames, lock, move_into_place, part_folder, read_json, retire, sweep, write_json
+from dembark.validation.files import check_times, count_frames, lock, move_into_place, read_json, retire, sweep, write_json
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -86,21 +85,13 @@ def test_folder_is_replaced_as_a_whole(tmp_path: Path) -> None:
     target = tmp_path / "replica-1"
     target.mkdir()
     (target / "old").touch()
-    part = part_folder(target)
-    (part / "new").touch()
+    work = tmp_path / ".replica-1.work"
+    work.mkdir()
+    (work / "new").touch()
     assert (target / "old").exists()
-    move_into_place(part, target)
+    move_into_place(work, target)
     assert os.listdir(target) == ["new"]
     assert os.listdir(tmp_path) == ["replica-1"]
-
-
-def test_leftovers_of_dead_processes_go_and_those_of_live_ones_stay(tmp_path: Path) -> None:
-    target, host = tmp_path / "replica-1", socket.gethostname()
-    for pid in (os.getppid(), 2**22 + 1):
-        (tmp_path / f".replica-1.part-{host}-{pid}").mkdir()
-    (tmp_path / ".replica-1.part-elsewhere-5").mkdir()
-    sweep(target)
-    assert sorted(os.listdir(tmp_path)) == sorted([f".replica-1.part-{host}-{os.getppid()}", ".replica-1.part-elsewhere-5"])
 
 
 def test_a_result_set_aside_by_a_killed_process_comes_back(tmp_path: Path) -> None:

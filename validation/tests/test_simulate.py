@@ -93,7 +93,7 @@ def test_failures_are_told_in_one_line_and_leave_earlier_results(tmp_path: Path,
         assert word in message
     assert "dembark: steps 100" in log.read_text()
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
-    assert not list(out.glob(".*part*"))
+    assert not list(out.glob(".*work*"))
     run(out, pause=0.001)
     assert not (out / "failed").exists()
 
@@ -135,7 +135,7 @@ def test_a_signal_to_the_command_ends_the_engine(command: Command, number: int, 
     process.send_signal(number)
     _, error = process.communicate(timeout=20)
     assert process.returncode == 130 and "interrupted" in error and "Traceback" not in error
-    assert not lives(pid) and not list(out.glob(".*part*"))
+    assert not lives(pid) and not list(out.glob(".*work*"))
 
 
 def test_a_killed_command_leaves_no_engine_and_the_next_start_clears_up(
@@ -145,9 +145,9 @@ def test_a_killed_command_leaves_no_engine_and_the_next_start_clears_up(
     process.kill()
     process.wait()
     wait_for(lambda: not lives(pid))
-    assert list(out.glob(".replica-1.part-*"))
+    assert list(out.glob(".replica-1.work-*"))
     assert run(out)[1] == "finished"
-    assert not list(out.glob(".replica-1.part-*"))
+    assert not list(out.glob(".replica-1.work-*"))
 
 
 def test_two_processes_do_not_compute_the_same_run(command: Command, engine_pid: FindPid) -> None:
@@ -173,7 +173,7 @@ def test_a_disk_that_fills_up_is_named_as_the_cause(tmp_path: Path) -> None:
         (out / "filler").write_bytes(bytes(7 << 20))
         with pytest.raises(RunError, match="disk is full|disk is too full"):
             run(out, pause=0.5)
-        assert not list(out.glob("replica-*")) and not list(out.glob(".*part*"))
+        assert not list(out.glob("replica-*")) and not list(out.glob(".*work*"))
     finally:
         subprocess.run(["umount", str(out)], check=True)
 

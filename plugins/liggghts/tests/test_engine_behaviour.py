@@ -7,6 +7,7 @@ import pytest
 from rig import liggghts_driver, python_driver
 from rig.liggghts_driver import deck, motion, read_dump, run, run_deck
 from rig.motion import deviation
+from rig.packing import packing
 from rig.scenarios import SCENARIOS, STILL, Grain, Material, Path, Scenario
 
 DRY = Material(static_friction=0.5, kinetic_friction=0.4)
@@ -58,51 +59,6 @@ def test_contact_on_a_mesh_is_that_on_a_plane(tmp_path, case, edge):
     done = run_deck(folder, plane.replace(words, mesh))
     assert done.code == 0, done.error
     assert max(deviation(python_driver.run(case), motion(case, folder)).values()) < 1e-9
-
-
-SETUP = """\
-units si
-atom_style granular
-atom_modify map array
-boundary p p f
-newton {newton}
-communicate single vel yes
-processors 2 1 1
-{create}
-neighbor 0.002 bin
-neigh_modify delay 0
-timestep 1e-5
-{properties}
-pair_style gran {pair}
-pair_coeff * *
-{state}
-fix floor all wall/gran {wall}
-fix weight all gravity 9.81 vector 0 0 -1
-fix motion all nve/sphere
-dump grains all custom {every} {dump} id x y z vx vy vz omegax omegay omegaz fx fy fz tqx tqy tqz
-dump_modify grains sort id format "%d{numbers}"
-thermo 1000
-{run}
-"""
-# One by one, as on a lattice the numbers of grains depend on how the domain is divided.
-CREATE = "\n".join([
-    "region domain block 0 0.024 0 0.024 -0.001 0.06 units box", "create_box 2 domain",
-    *(f"create_atoms 1 single {0.003 + 0.006 * i} {0.003 + 0.006 * j} {0.003 + 0.006 * k} units box"
-      for i in range(4) for j in range(4) for k in range(4))])
-STATE = """\
-variable size atom 0.005*(1+0.1*sin(37*id))
-variable push_x atom 0.3*sin(91*id)
-variable push_y atom 0.3*sin(53*id)
-variable push_z atom 0.3*sin(17*id)-0.3
-set group all density 2500 diameter v_size density 2500
-set group all vx v_push_x vy v_push_y vz v_push_z"""
-
-
-def packing(material, run_command, *, newton="off", create=CREATE, state=STATE, dump="grains.dump", every=1500):
-    words = SETUP.format(newton=newton, create=create, state=state, properties=liggghts_driver.properties(material), every=every, dump=dump,
-                         pair=liggghts_driver.models(material), wall=liggghts_driver.models(material, wall="primitive type 2 zplane 0"),
-                         numbers=" %.17g" * 15, run=run_command)
-    return words
 
 
 def last_frame(folder, dump="grains.dump"):

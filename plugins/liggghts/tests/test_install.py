@@ -39,7 +39,7 @@ def test_copies_once(tmp_path):
     before = {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in source.rglob("*") if path.is_file()}
     assert install(source).returncode == 0
     assert {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in source.rglob("*") if path.is_file()} == before
-    for name in ("tangential_model_finnie_rabinowicz.h", "cohesion_model_capillary.h", "fix_lcp_impact.cpp"):
+    for name in ("tangential_model_finnie_rabinowicz.h", "cohesion_model_capillary.h", "fix_lcp_impact.cpp", "fix_resume_exact.cpp", "resume_state.h"):
         assert (source / name).read_bytes() == (ROOT / "plugins/liggghts" / name).read_bytes()
     assert (source / "dembark/capillary/bridge.hpp").exists() and not (source / "dembark/tests").exists()
     lines = (source / "style_contact_model_user.whitelist").read_text().splitlines()
@@ -49,7 +49,7 @@ def test_copies_once(tmp_path):
 def test_every_included_header_is_there(tmp_path):
     source = stand_in(tmp_path / "src")
     install(source)
-    for path in [*source.glob("*_model_*.h"), *source.glob("fix_*"), *(source / "dembark").rglob("*.hpp")]:
+    for path in [*source.glob("*_model_*.h"), *source.glob("fix_*"), *source.glob("*state*"), *(source / "dembark").rglob("*.hpp")]:
         for name in re.findall(r'^#include "([^"]+)"', path.read_text(), re.M):
             ours = name.startswith("dembark/") or path.suffix == ".hpp" or (ROOT / "plugins/liggghts" / name).exists()
             assert not ours or (path.parent / name).exists() or (source / name).exists(), f"{path.name}: {name}"

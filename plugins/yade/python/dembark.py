@@ -1,20 +1,29 @@
-"""What dembark's decks need inside YADE: parameters of a case, columns of grains, dumps and histories.
+"""What dembark's decks need inside YADE: parameters of a case, columns of grains, dumps and histories, states to resume from.
 
 The files have the schema of the LIGGGHTS decks: LAMMPS text dumps and one CSV file. Standard library only; SI units.
 
 A writer must run between InteractionLoop and NewtonIntegrator, where positions and forces are of the same time.
 """
 
+import glob
+import gzip
 import math
 import os
+import re
+import shutil
 import sys
 import tomllib
+import zlib
 from types import SimpleNamespace
 
 from yade import CylinderWall, DembarkSnapshot, Omega, Sphere, utils
 from yade.minieigenHP import Vector3, Vector3i
 
 O = Omega()
+# How often the state is saved (steps, 0 never), and whether to go on from it: words that every deck understands beside its case's keys.
+RUN_WORDS = {"restart_every": {"type": "int", "unit": "steps", "min": 0}, "resume": {"type": "choice", "values": ["no", "yes"]}}
+_KEPT_STATES = 2
+_resuming = False
 
 
 def fail(line, code=2):
@@ -51,7 +60,8 @@ def parameters(path=None, argv=None):
     """Parameters of the case file `path` (default: case.toml beside the script) with `key=value` words of `argv` (default: the
     script's) in place of its values.
 
-    Returns a namespace of numbers and words. Optional parameters that are not set, or set to a negative number, are None.
+    Returns a namespace of numbers and words. Optional parameters that are not set, or set to a negative number, are None. It also has
+    `restart_every` (steps between saved states; 0, the default, for none) and `resume` (True: go on from the newest one), for `run`.
     """
     if path is None:
         path = os.path.join(os.path.dirname(os.path.realpath(sys.argv[0])), "case.toml")
@@ -61,10 +71,14 @@ def parameters(path=None, argv=None):
     except (OSError, tomllib.TOMLDecodeError, KeyError) as error:
         fail(f"case file {path}: {error}; it must be TOML with tables [parameters.<name>]")
     values = {key: table.get("value") for key, table in tables.items()}
+    states = {"restart_every": 0, "resume": "no"}
     for word in sys.argv[1:] if argv is None else argv:
         key, equals, text = word.partition("=")
         if not equals:
             fail(f"argument '{word}': it must have the form key=value")
+        if key in RUN_WORDS:
+            states[key] = _convert(key, RUN_WORDS[key], text)
+            continue
         if key not in tables:
             fail(f"parameter {key} is unknown in {path}; known are {', '.join(sorted(tables))}")
         values[key] = _convert(key, tables[key], text)
@@ -77,7 +91,9 @@ def parameters(path=None, argv=None):
             values[key] = None
         elif table.get("type", "float") == "float":
             values[key] = float(value)
-    return SimpleNamespace(**values)
+    global _resuming
+    _resuming = states["resume"] == "yes"
+    return SimpleNamespace(**(values | {"restart_every": states["restart_every"], "resume": _resuming}))
 
 
 def uniform(number, seed, use):
@@ -165,6 +181,147 @@ def finish():
     print("dembark: finished", flush=True)
 
 
+def _sync(path):
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _check_sum(path):
+    crc, size = 0, 0
+    with open(path, "rb") as file:
+        while block := file.read(1 << 20):
+            crc, size = zlib.crc32(block, crc), size + len(block)
+    return f"{size} {crc:08x}"
+
+
+def _states(base):
+    """Steps and files of all saved states `base`.<step>.yade.gz, the newest first."""
+    found = ((re.fullmatch(re.escape(base) + r"\.(\d+)\.yade\.gz", path), path) for path in glob.glob(glob.escape(base) + ".*.yade.gz"))
+    return sorted(((int(match.group(1)), path) for match, path in found if match), reverse=True)
+
+
+def _is_whole(path):
+    try:
+        with open(path + ".crc", encoding="ascii") as mark:
+            return mark.read().strip() == _check_sum(path)
+    except (OSError, ValueError):
+        return False
+
+
+def _can_be_read(path):
+    """Whether a packed file ends as it should."""
+    try:
+        with gzip.open(path) as file:
+            while file.read(1 << 20):
+                pass
+    except (EOFError, OSError, zlib.error):
+        return False
+    return True
+
+
+def _number(line):
+    """The integer that a line begins with; infinity when it begins with something else."""
+    found = re.match(rb"\d+", line)
+    return int(found.group()) if found else math.inf
+
+
+def _save(base, outputs):
+    """Save the scene as `base`.<step>.yade.gz: whole or not at all, and marked with its check sum when it is; keep the last two."""
+    path = f"{base}.{O.iter}.yade.gz"
+    part = f"{base}.part.yade.gz"
+    # YADE would try for ever to write on a full disk. A packed body with its contacts takes about 150 bytes.
+    if shutil.disk_usage(os.path.dirname(path) or ".").free < 1000 * len(O.bodies) + (1 << 20):
+        fail(f"file {path} cannot be written: No space left on the disk")
+    O.save(part, quiet=True)
+    if not _can_be_read(part):
+        fail(f"file {part} could not be written whole. No space left on the disk?")
+    for name in (*filter(os.path.isfile, outputs), part):
+        _sync(name)
+    if os.path.exists(path + ".crc"):
+        os.unlink(path + ".crc")
+    os.replace(part, path)
+    with open(path + ".crc.part", "w", encoding="ascii") as mark:
+        mark.write(_check_sum(path) + "\n")
+    _sync(path + ".crc.part")
+    os.replace(path + ".crc.part", path + ".crc")
+    _sync(os.path.dirname(path) or ".")
+    _forget(_states(base)[_KEPT_STATES:])
+
+
+def _forget(states):
+    for _, path in states:
+        for name in (path + ".crc", path):
+            if os.path.exists(name):
+                os.unlink(name)
+
+
+def _cut(path, step):
+    """Cut a table or a dump before the first row or frame at or after `step`, or the first that is not whole."""
+    if not os.path.isfile(path):
+        return
+    end = 0
+    with open(path, "rb") as file:
+        first = file.readline()
+        if first == b"ITEM: TIMESTEP\n":
+            line = first
+            while line == b"ITEM: TIMESTEP\n" and _number(file.readline()) < step:
+                file.readline()
+                rows = _number(file.readline()) + 5  # and the box, and the names of the columns
+                if rows == math.inf or sum(file.readline().endswith(b"\n") for _ in range(rows)) < rows:
+                    break
+                end, line = file.tell(), file.readline()
+        elif first.endswith(b"\n"):
+            end = file.tell()
+            while (line := file.readline()).endswith(b"\n") and _number(line) < step:
+                end = file.tell()
+    os.truncate(path, end)
+
+
+def run(steps, restart_every=0, resume=False, outputs=("time.csv", "grains.dump", "contacts.dump"), base="state", saving=None, loaded=None):
+    """Run the scene until step `steps` is written, and say that it is finished.
+
+    Every `restart_every` steps (0: never) the scene is saved as `base`.<step>.yade.gz. With `resume` the newest of these that is whole
+    takes the scene's place, and what `outputs` (tables that begin with the step, and dumps) got after it is cut off, for it comes again.
+    Call it when the scene is complete. A scene goes on from the saved copy of itself, so that a run that was killed and resumed
+    is the same to the bit as one that was not, on one thread. `saving()` is called before the scene is saved, `loaded()` after it was
+    resumed.
+    """
+    if resume:
+        whole = [path for _, path in _states(base) if _is_whole(path)]
+        if not whole:
+            fail(f"resume=yes: there is no whole state {base}.<step>.yade.gz in this folder; start with restart_every > 0 first")
+        O.load(whole[0], quiet=True)
+        for path in outputs:
+            _cut(path, O.iter)
+        print(f"dembark: resumed at step {O.iter} exactly", flush=True)
+        if loaded:
+            loaded()
+    else:
+        _forget(_states(base))
+    # The last row and frame are written in the step that starts from their state.
+    end = steps + 1
+    while O.iter < end:
+        O.run(min(end, (O.iter // restart_every + 1) * restart_every if restart_every else end) - O.iter, True)
+        if restart_every and O.iter < end:
+            if saving:
+                saving()
+            _save(base, outputs)
+            O.load(f"{base}.{O.iter}.yade.gz", quiet=True)
+    finish()
+
+
+def _table(path, header):
+    """A file to append rows to: with a header, or as a run left it that is resumed."""
+    file = open(path, "a" if _resuming else "w", encoding="ascii")
+    if not _resuming:
+        file.write(header + "\n")
+        file.flush()
+    return file
+
+
 class _Snapshot:
     """The bodies of a scene sorted into grains and walls, for both writers."""
 
@@ -215,7 +372,7 @@ class DumpWriter:
         self._snapshot = _Snapshot(walls, glued, gravity, types)
         self._paths = grains, contacts
         for path in self._paths:
-            open(path, "w").close()
+            open(path, "a" if _resuming else "w").close()
 
     def _frame(self, path, kind, rows, count, columns):
         box = "".join(f"{low:.10g} {high:.10g}\n" for low, high in self.bounds)
@@ -247,9 +404,9 @@ class HistoryWriter:
 
     def __init__(self, walls, glued=None, gravity=(0.0, 0.0, -9.81), path="time.csv", progress=True, types=None):
         self._snapshot = _Snapshot(walls, glued, gravity, types)
-        self._file = open(path, "w", encoding="ascii")
+        header = ",".join(["step", "time", "kinetic_energy", *(f"{name}_f{axis}" for name in walls for axis in "xyz")])
+        self._file = _table(path, header)
         self.progress = progress
-        self._file.write(",".join(["step", "time", "kinetic_energy", *(f"{name}_f{axis}" for name in walls for axis in "xyz")]) + "\n")
 
     def write(self):
         """Append the present state, and print `<step> <time> <kinetic energy>` for whoever watches."""
@@ -267,7 +424,7 @@ class LogWriter:
 
     Numbers have all their digits, so that runs can be compared to round-off; velocities are those of the time of the positions.
 
-    engine : the LogImpact of the scene. The logs must be the first bodies: their number is the body's id + 1.
+    engine : the LogImpact that the scene has or will have. The logs must be the first bodies: their number is the body's id + 1.
     bounds : ((xlo, xhi), (ylo, yhi), (zlo, zhi)), m
     gravity : m/s^2
     """
@@ -279,12 +436,11 @@ class LogWriter:
                "worst_certificate": "worstCertificate"}
 
     def __init__(self, engine, bounds, gravity=(0.0, 0.0, 0.0)):
-        self.engine, self.gravity = engine, Vector3(*gravity)
+        self.kind, self.gravity = type(engine), Vector3(*gravity)
         self._box = "".join(f"{low:.17g} {high:.17g}\n" for low, high in bounds)
         for path in ("grains.dump", "contacts.dump"):
-            open(path, "w").close()
-        self._history = open("time.csv", "w", encoding="ascii")
-        self._history.write(",".join(["step", "time", "kinetic_energy", *self.NUMBERS, *self.COUNTS]) + "\n")
+            open(path, "a" if _resuming else "w").close()
+        self._history = _table("time.csv", ",".join(["step", "time", "kinetic_energy", *self.NUMBERS, *self.COUNTS]))
 
     def _frame(self, path, kind, rows, columns):
         with open(path, "a", encoding="ascii") as file:
@@ -294,6 +450,8 @@ class LogWriter:
 
     def write(self):
         """Append the present state; to be called between LogImpact and NewtonIntegrator."""
+        # A scene that was loaded has engines of its own.
+        engine = next(one for one in O.engines if isinstance(one, self.kind))
         rows, energy = [], 0.0
         for body in O.bodies:
             if not isinstance(body.shape, Sphere) or not body.dynamic:
@@ -308,12 +466,12 @@ class LogWriter:
             rows.append((body.id + 1, 1, *state.pos, 0, 0, 0, *velocity, *spin, *force, body.shape.radius, state.mass))
         self._frame("grains.dump", "ATOMS", rows, "id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass")
         touching = [(a + 1, b + 1 if b >= 0 else b, *normal, gap, force, *friction, *place)
-                    for a, b, normal, gap, force, friction, place in self.engine.contacts() if force > 0.0]
+                    for a, b, normal, gap, force, friction, place in engine.contacts() if force > 0.0]
         self._frame("contacts.dump", "ENTRIES", touching, " ".join(f"f_impacts[{i}]" for i in range(1, 14)))
         if O.iter == 0:
             return
-        values = [f"{O.time:.17g}", f"{energy:.17g}", *(f"{getattr(self.engine, name):.17g}" for name in self.NUMBERS.values()),
-                  *(str(getattr(self.engine, name)) for name in self.COUNTS.values())]
+        values = [f"{O.time:.17g}", f"{energy:.17g}", *(f"{getattr(engine, name):.17g}" for name in self.NUMBERS.values()),
+                  *(str(getattr(engine, name)) for name in self.COUNTS.values())]
         self._history.write(",".join([str(O.iter), *values]) + "\n")
         self._history.flush()
         print(O.iter, f"{O.time:.6g}", f"{energy:.6g}", flush=True)

@@ -1,0 +1,95 @@
+"""fix resume/exact and resume_state: a resumed run is the same to the bit, whatever the models; mistakes are told in one line."""
+
+import shutil
+
+import pytest
+from rig import liggghts_driver
+from rig.liggghts_driver import run_deck
+from rig.packing import CREATE, STATE, packing
+from rig.scenarios import Material
+
+BED = Material(static_friction=0.5, kinetic_friction=0.4, interface_shear_strength=1e5, bridge_volume=2e-10)
+STOCK = """\
+fix roll all property/global coefficientRollingFriction peratomtypepair 2 0.1 0.1 0.1 0.1
+fix loss all property/global coefficientRollingViscousDamping peratomtypepair 2 0.1 0.1 0.1 0.1
+"""
+STATES = "fix state all resume/exact {every} bed cut grains.dump\n"
+
+
+def bed(stock, run_command, *, ranks, resume=False):
+    """A packing of 64 grains with our models, or with those of stock LIGGGHTS that keep histories."""
+    text = packing(BED, run_command, create="resume_state bed" if resume else CREATE, state="" if resume else STATE, every=500)
+    if stock:
+        ours = {word: liggghts_driver.models(BED, **kind) for word, kind in (("pair", {}), ("wall", {"wall": "primitive type 2 zplane 0"}))}
+        models = "model hertz tangential history rolling_friction epsd2"
+        text = text.replace(ours["wall"], f"{models} primitive type 2 zplane 0").replace(ours["pair"], models)
+        text = text.replace("pair_style", STOCK + "pair_style")
+    if resume:
+        text = text.replace("dump_modify grains sort id", "dump_modify grains append yes sort id")
+    return text if ranks == 2 else text.replace("processors 2 1 1\n", "")
+
+
+@pytest.mark.parametrize("stock", [False, True])
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_resumed_run_is_the_same_to_the_bit(tmp_path, stock, ranks):
+    """States every 700 steps, frames every 500: state 1400 is resumed where frame 1500 was written already."""
+    states = STATES.format(every=700)
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    for folder, steps in ((whole, 3000), (broken, 1600)):
+        done = run_deck(folder, bed(stock, f"{states}run {steps}", ranks=ranks), ranks=ranks)
+        assert done.code == 0, done.error
+    done = run_deck(broken, bed(stock, f"{states}run 3000 upto", ranks=ranks, resume=True), ranks=ranks)
+    assert done.code == 0, done.error
+    assert "dembark: resumed at step 1400 exactly" in done.output
+    for name in ("grains.dump", "bed.2800.restart"):
+        assert (whole / name).read_bytes() == (broken / name).read_bytes(), name
+    left = sorted(path.name for path in broken.glob("bed.*"))
+    assert left == [f"bed.{step}.restart{end}" for step in (2100, 2800) for end in ("", ".crc")]
+
+
+def test_state_at_a_frame_does_not_write_it_twice(tmp_path):
+    states = STATES.format(every=500)
+    done = run_deck(tmp_path, bed(False, f"{states}run 1200", ranks=1))
+    assert done.code == 0, done.error
+    done = run_deck(tmp_path, bed(False, f"{states}run 2000 upto", ranks=1, resume=True))
+    assert done.code == 0, done.error
+    assert liggghts_driver.read_dump(tmp_path / "grains.dump")[0].tolist() == [0, 500, 1000, 1500, 2000]
+
+
+def test_stock_restart_is_not_exact(tmp_path):
+    """What the fix is for: the same with stock commands differs, by the forces of the set-up."""
+    for name, run_command in (("whole", "run 200"), ("broken", "run 100\nwrite_restart bed.restart")):
+        assert run_deck(tmp_path / name, bed(False, run_command, ranks=1).replace("all custom 500", "all custom 200")).code == 0
+    text = bed(False, "run 200 upto", ranks=1, resume=True).replace("resume_state bed", "read_restart bed.restart")
+    assert run_deck(tmp_path / "broken", text.replace("all custom 500", "all custom 200")).code == 0
+    one, other = (liggghts_driver.read_dump(tmp_path / name / "grains.dump")[1][-1] for name in ("whole", "broken"))
+    assert (one != other).any()
+
+
+@pytest.mark.parametrize(("words", "told"), [
+    ("resume/exact", "must have the form"), ("resume/exact ten bed", "must have the form"), ("resume/exact -1 bed", "must have the form"),
+    ("resume/exact 5 bed keep x", "must have the form"), ("resume/exact 5 bed*", "must not hold"),
+    ("resume/exact 5 bed\nfix late all gravity 1 vector 1 0 0", "must come after fix late"),
+    ("resume/exact 5 nowhere/bed", "nowhere/bed"),
+])
+def test_mistakes_of_the_fix(tmp_path, words, told):
+    done = run_deck(tmp_path, bed(False, f"fix state all {words}\nrun 10", ranks=1))
+    assert done.code != 0
+    assert told in done.error, done.output[-1000:]
+
+
+@pytest.mark.parametrize(("words", "told"), [("resume_state", "must have the form"),
+                                             ("resume_state bed", "there is no whole state bed.<step>")])
+def test_mistakes_of_the_command(tmp_path, words, told):
+    done = run_deck(tmp_path, bed(False, "run 10", ranks=1, resume=True).replace("resume_state bed", words))
+    assert done.code != 0
+    assert told in done.error, done.output[-1000:]
+
+
+def test_other_models_than_those_of_the_state_are_refused_or_approximate(tmp_path):
+    done = run_deck(tmp_path, bed(False, STATES.format(every=100) + "run 250", ranks=1))
+    assert done.code == 0, done.error
+    other = bed(False, STATES.format(every=100) + "run 300 upto", ranks=1, resume=True)
+    shutil.copytree(tmp_path, tmp_path / "other")
+    done = run_deck(tmp_path / "other", other.replace("neighbor 0.002 bin", "neighbor 0.0025 bin"))
+    assert done.code == 0 and "dembark: resumed at step 200 approximately: the atoms or their candidates" in done.output
