@@ -3,7 +3,10 @@
 #
 #   packaging/system.sh          install what is missing
 #   packaging/system.sh --list   print what is missing, one a line
+#
+# With DEMBARK_NO_SYSTEM=1 nothing is looked for: on machines where modules or a group's own builds take the packages' place.
 set -euo pipefail
+[ -z "${DEMBARK_NO_SYSTEM:-}" ] || exit 0
 
 packages=(
   # compilers and build tools
@@ -14,6 +17,8 @@ packages=(
   python3 python3-dev python3-venv
   # Siconos: the peer of the LCP solver in tests and benchmarks
   python3-siconos python3-scipy
+  # a private Slurm, in which the tests of campaigns on a cluster run
+  slurm-wlm munge
   # the report: text layout for the PDF, off-screen rendering for the pictures
   libpango-1.0-0 libpangoft2-1.0-0 libharfbuzz-subset0 fonts-dejavu-core
   libegl1 libgl1 libosmesa6 libxrender1 libxcursor1 libxft2 libxinerama1

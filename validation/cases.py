@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 from dembark.validation.errors import DembarkError
 from dembark.validation.expressions import Expression
 from dembark.validation.parameters import Parameter, Value, checked, nearest, pick
+from dembark.validation.tables import TableReader, load_toml
 from dembark.validation.units import known_unit
 
 ENGINES = ("liggghts", "yade")
@@ -71,10 +71,18 @@ class Case:
     constraints: tuple[Constraint, ...] = ()
     studies: Mapping[str, Study] = field(default_factory=dict)
     outputs: tuple[str, ...] = STANDARD_OUTPUTS
+    particles: Expression | None = None
 
     def deck(self, engine: str) -> Path:
         """Deck of `engine` in this folder."""
         return self.folder / {"liggghts": "liggghts.in", "yade": "yade.py"}[engine]
+
+    def particle_count(self, values: Mapping[str, Value]) -> int | None:
+        """Number of bodies in a run with these parameters; None when the case does not say."""
+        found = self.particles(values) if self.particles else None
+        if found is None:
+            found = values.get("grain_count", values.get("log_count"))
+        return round(found) if isinstance(found, int | float) else None
 
 
 def checkout() -> Path | None:
@@ -117,37 +125,17 @@ def find(name: str, root: Path | None = None) -> Case:
 @cache
 def load(path: Path) -> Case:
     """Read and check one case.toml; raises DembarkError saying what is wrong in which table."""
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DembarkError(f"{path} cannot be read", str(error)) from None
-    return _Reader(path).case(data)
+    return _Reader(path).case(load_toml(path))
 
 
-class _Reader:
+class _Reader(TableReader):
     """Turns the tables of one case.toml into a Case; each mistake names the table it is in."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def fail(self, table: str, what: str, right: str = "") -> DembarkError:
-        return DembarkError(what, f"[{table}] of {self.path}", right)
-
-    def table(self, data: Mapping[str, Any], name: str, keys: Mapping[str, type | tuple[type, ...]], required: Iterable[str] = ()) -> None:
-        for key, value in data.items():
-            if key not in keys:
-                raise self.fail(name, f"unknown key {key!r}", nearest(key, keys))
-            if not isinstance(value, keys[key]) or (isinstance(value, bool) and keys[key] is not bool):
-                raise self.fail(name, f"{key} = {value!r} has the wrong type")
-        for key in required:
-            if key not in data:
-                raise self.fail(name, f"{key} is missing")
 
     def case(self, data: Mapping[str, Any]) -> Case:
         tables = {"case": dict, "parameters": dict, "profiles": dict, "variants": dict, "runs": dict, "constraints": list, "studies": dict}
         self.table(data, "top level", tables, ("case", "parameters"))
         head = data["case"]
-        keys = {"name": str, "title": str, "description": str, "source": list, "engines": list, "outputs": list}
+        keys = {"name": str, "title": str, "description": str, "source": list, "engines": list, "outputs": list, "particles": str}
         self.table(head, "case", keys, ("name", "title", "engines"))
         if head["name"] != self.path.parent.name:
             raise self.fail("case", f"name = {head['name']!r}", f"the name of its folder, {self.path.parent.name!r}")
@@ -167,7 +155,7 @@ class _Reader:
             runs=self.runs(data.get("runs", {}), profiles, variants, tuple(head["engines"])),
             constraints=tuple(self.constraint(entry, parameters) for entry in data.get("constraints", ())),
             studies={name: self.study(name, entry, parameters, variants) for name, entry in data.get("studies", {}).items()},
-            outputs=outputs)
+            outputs=outputs, particles=self.expression("case", head["particles"], parameters) if "particles" in head else None)
 
     def parameter(self, name: str, entry: Mapping[str, Any]) -> Parameter:
         table, number = f"parameters.{name}", (int, float)
@@ -239,10 +227,13 @@ class _Reader:
         if not isinstance(entry, dict):
             raise self.fail("constraints", "a constraint is a table with expression and message")
         self.table(entry, "constraints", {"expression": str, "message": str}, ("expression", "message"))
+        return Constraint(self.expression("constraints", entry["expression"], parameters), entry["message"])
+
+    def expression(self, table: str, text: str, parameters: Mapping[str, Parameter]) -> Expression:
         try:
-            expression = Expression(entry["expression"])
+            expression = Expression(text)
         except DembarkError as error:
-            raise self.fail("constraints", str(error)) from None
+            raise self.fail(table, str(error)) from None
         for name in expression.names - parameters.keys():
-            raise self.fail("constraints", f"unknown parameter {name!r}", nearest(name, parameters))
-        return Constraint(expression, entry["message"])
+            raise self.fail(table, f"unknown parameter {name!r}", nearest(name, parameters))
+        return expression

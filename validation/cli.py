@@ -5,12 +5,16 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
+from dembark.validation.campaigns import cli as campaigns
 from dembark.validation.errors import DembarkError, RunError
+
+if TYPE_CHECKING:
+    from dembark.validation.workflow import Outcome
 
 app = typer.Typer(name="dembark", help="Granular contact laws and their validation, in LIGGGHTS and YADE.",
                   pretty_exceptions_enable=False, rich_markup_mode=None, context_settings={"help_option_names": ["-h", "--help"]})
@@ -101,6 +105,11 @@ def validate(
     from dembark.validation.workflow import validate as workflow
 
     outcome = workflow(profile, cancelled_by_signal(), cores, results, tuple(case or ()), tuple(engine or ()))
+    show_outcome(outcome, "the validation", "start again: what is finished is kept")
+
+
+def show_outcome(outcome: Outcome, what: str, advice: str) -> None:
+    """What a workflow came to, for people; RunError with `advice` when something of it is missing."""
     console = _console()
     for line in outcome.unfinished:
         console.print(f"not finished: {line}", markup=False, style="red", soft_wrap=True)
@@ -113,19 +122,28 @@ def validate(
         console.print(str(outcome.report), markup=False, soft_wrap=True)
     if not outcome.complete:
         count = len(outcome.unfinished) + len(outcome.problems) + (outcome.report is None)
-        raise RunError("the validation is incomplete", f"{count} things went wrong (above)", "start again: what is finished is kept")
+        raise RunError(f"{what} is incomplete", f"{count} things went wrong (above)", advice)
 
 
 @app.command("report")
-def make_report(profile: Profile = "quick", results: Results = Path("results")) -> None:
-    """Build the report again from the results that are there."""
+def make_report(
+    directory: Annotated[Path | None, typer.Argument(metavar="[FOLDER]", help="Folder of a campaign, in the place of a profile.")] = None,
+    profile: Profile = "quick",
+    results: Results = Path("results"),
+) -> None:
+    """Build the report of a profile or a campaign again from the results that are there."""
     from dembark.validation.jobs import build_report
 
-    folder = results.resolve() / profile
+    folder = directory.resolve() if directory else results.resolve() / profile
+    if directory and not any(folder.glob("*/*/*/metrics.json")):
+        raise DembarkError(f"no results in {folder}", "", "give the folder of a campaign that has measured something")
     if not any(folder.glob("*/*/*/metrics.json")):
         raise DembarkError(f"no results in {folder}", "", f"run 'dembark validate --profile {profile}' first, or give --results")
     build_report(folder)
     _console().print(f"{folder / 'report.html'}\n{folder / 'report.pdf'}", markup=False, soft_wrap=True)
+
+
+campaigns.register(app)
 
 
 @app.command()
@@ -140,7 +158,26 @@ def doctor() -> None:
         raise typer.Exit(1)
 
 
-@app.command(add_help_option=False, context_settings={"ignore_unknown_options": True, "allow_extra_args": True, "help_option_names": []})
+_PASSED_ON = {"ignore_unknown_options": True, "allow_extra_args": True, "help_option_names": []}
+
+
+@app.command(add_help_option=False, context_settings=_PASSED_ON)
+def fields(context: typer.Context) -> None:
+    """Stress, velocity and more on a grid, from dumps of either engine."""
+    from dembark.postproc import cli
+
+    raise typer.Exit(cli.run(["fields", *context.args]))
+
+
+@app.command(add_help_option=False, context_settings=_PASSED_ON)
+def walls(context: typer.Context) -> None:
+    """Stress on walls and inclusions, from dumps of either engine."""
+    from dembark.postproc import cli
+
+    raise typer.Exit(cli.run(["walls", *context.args]))
+
+
+@app.command(add_help_option=False, context_settings=_PASSED_ON)
 def yade(context: typer.Context) -> None:
     """Start YADE with dembark's laws; all that follows is passed on to it."""
     from dembark.validation import engines

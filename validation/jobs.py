@@ -9,15 +9,20 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from dembark.validation.errors import DembarkError, RunError
+from dembark.validation import provenance
+from dembark.validation.campaigns import store
+from dembark.validation.campaigns.folder import FILE as CAMPAIGN_FILE
+from dembark.validation.campaigns.source import Source
+from dembark.validation.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.validation.files import read_json, retire, write_json
-from dembark.validation.plan import PlannedStudy, Run, Series, campaign, finished, studies, summary
+from dembark.validation.plan import PlannedStudy, Run, Series, finished, studies, summary
 from dembark.validation.progress import FileBoard, Monitor, State, watched
 from dembark.validation.simulate import Resources, simulate
 
@@ -39,6 +44,11 @@ def cancelled_by_signal() -> threading.Event:
 def progress_folder(results: Path) -> Path:
     """Where the jobs of results/<profile> tell how far they are."""
     return results / ".progress"
+
+
+def _now() -> dict[str, Any]:
+    """When, and by which version of the code, something is measured; the runs themselves may be older."""
+    return {**provenance.commit(), "at": datetime.now(UTC).isoformat(timespec="seconds")}
 
 
 def measure_series(folder: Path, runs: Iterable[Run]) -> dict[str, Any]:
@@ -64,6 +74,7 @@ def measure_series(folder: Path, runs: Iterable[Run]) -> dict[str, Any]:
         raise
     except Exception as error:  # whatever goes wrong in the analysis is a failed measurement, to be told in one line
         raise RunError(f"{folder} could not be measured", f"{type(error).__name__}: {error}") from error
+    content["measured"] = _now()
     content["inputs"] = [run.inputs for run in done]
     content["replicas_missing"] = sorted(run.replica for run in wanted.values() if run not in done)
     write_json(target, content)
@@ -75,9 +86,10 @@ def measure_study(results: Path, planned: PlannedStudy) -> None:
     from dembark.validation.metrics import study
 
     target = results / planned.place / "metrics.json"
+    target.parent.mkdir(parents=True, exist_ok=True)
     target.unlink(missing_ok=True)
     try:
-        content = study(planned.study, [results / one.place for one in planned.series])
+        content = study(planned.study, [results / one.place for one in planned.series]) | {"measured": _now()}
     except DembarkError:
         raise
     except Exception as error:  # see measure_series
@@ -92,7 +104,7 @@ def compare_engines(folder: Path) -> None:
     target = folder / "comparison.json"
     target.unlink(missing_ok=True)
     try:
-        write_json(target, compare(folder))
+        write_json(target, compare(folder) | {"measured": _now()})
     except DembarkError:
         raise
     except Exception as error:  # see measure_series
@@ -100,15 +112,23 @@ def compare_engines(folder: Path) -> None:
 
 
 def build_report(results: Path) -> None:
-    """Write report.html and report.pdf into `results` (results/<profile>); RunError when that fails."""
-    from dembark.validation import report
-
+    """Write report.html and report.pdf into `results` (results/<profile> or a campaign's folder); RunError when that fails."""
     try:
-        report.build(results)
+        _builder(results)(results)
     except DembarkError:
         raise
     except Exception as error:  # see measure_series
         raise RunError(f"the report of {results} could not be built", f"{type(error).__name__}: {error}") from error
+
+
+def _builder(results: Path) -> Callable[[Path], object]:
+    if (results / CAMPAIGN_FILE).is_file():
+        from dembark.validation.campaigns import report as of_campaign
+
+        return of_campaign.build
+    from dembark.validation import report
+
+    return report.build
 
 
 def variants(all_series: Sequence[Series]) -> dict[Path, list[Series | PlannedStudy]]:
@@ -120,16 +140,22 @@ def variants(all_series: Sequence[Series]) -> dict[Path, list[Series | PlannedSt
 
 
 def failures(results: Path, all_series: Iterable[Series]) -> dict[str, str]:
-    """Reasons of the runs that failed in the workflow that ran last, by name of the run."""
+    """Reasons of the runs that failed or were stopped in the workflow that ran last, by name of the run."""
     names = [run.name for one in all_series for run in one.runs]
-    return {state.name: state.message for state in watched(progress_folder(results), names)() if state.state == "failed"}
+    return {state.name: state.message for state in watched(progress_folder(results), names)()
+            if state.state in ("failed", "stopped")}
 
 
-def write_summary(results: Path, profile: str, all_series: Sequence[Series], messages: Mapping[str, str]) -> list[dict[str, Any]]:
-    """Write `runs.json`: which runs the report should have, and which of them are finished, failed or missing."""
+def write_summary(results: Path, source: Source, all_series: Sequence[Series], messages: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Write `runs.json`: which runs the report should have, which of them are finished, failed or missing, and a campaign's sweeps."""
     entries = summary(all_series, results, messages)
-    write_json(results / "runs.json", {"profile": profile, "runs": entries})
+    write_json(results / "runs.json", {**source.facts(), "runs": entries})
     return entries
+
+
+def collect_all(results: Path, source: Source, all_series: Sequence[Series], messages: Mapping[str, str], whole: bool = True) -> None:
+    """Bring the store up to what `results` holds; `whole`: these are all series that there are to be."""
+    store.collect(results, source.label, all_series, messages, whole, source.facts().get("sweeps", ()))
 
 
 def salvage(results: Path, all_series: Sequence[Series]) -> list[str]:
@@ -161,33 +187,51 @@ def salvage(results: Path, all_series: Sequence[Series]) -> list[str]:
     return problems
 
 
-def _series_at(profile: str, place: str) -> Series:
+def _series_at(source: Source, place: str) -> Series:
     case, _, engine = Path(place).parts
-    (one,) = [one for one in campaign(profile, [case], [engine]) if one.place == Path(place)]
+    (one,) = [one for one in source.series([case], [engine]) if one.place == Path(place)]
     return one
 
 
-def _simulate(options: argparse.Namespace, results: Path) -> None:
-    one = _series_at(options.profile, options.place)
+def _simulate(options: argparse.Namespace, source: Source, results: Path) -> None:
+    one = _series_at(source, options.place)
     (run,) = [run for run in one.runs if run.replica == options.replica]
     cancel = cancelled_by_signal()
     board = FileBoard(progress_folder(results))
-    resources = Resources(options.ranks, options.threads)
+    resources = Resources(options.ranks, options.threads, options.restart_interval)
 
     def states() -> list[State]:
         # Whoever started the workflow shows the progress of all jobs; without it each job tells its own.
         return [] if os.environ.get(PROGRESS_VARIABLE) else board.states()
 
-    with Monitor(states):
+    with Monitor(states), _failing_once(run, results):
         simulate(run, results / one.place, board, cancel, resources)
     mark = Path(options.mark)
     mark.parent.mkdir(parents=True, exist_ok=True)
     mark.touch()
 
 
-def _study_at(profile: str, place: str) -> PlannedStudy:
+@contextmanager
+def _failing_once(run: Run, results: Path) -> Iterator[None]:
+    """Attempts of a run that failed by its own fault are not repeated by the workflow that is going on; those of a killed one are."""
+    submission = os.environ.get(PROGRESS_VARIABLE)
+    told = progress_folder(results) / f"{run.inputs[:16]}.final"
+    before = read_json(told) if submission else None
+    if before and before.get("submission") == submission:
+        raise RunError(str(before.get("message")))
+    try:
+        yield
+    except (Killed, Interrupted):
+        raise
+    except RunError as error:
+        if submission:
+            write_json(told, {"submission": submission, "message": str(error)})
+        raise
+
+
+def _study_at(source: Source, place: str) -> PlannedStudy:
     case, _, engine = Path(place).parts
-    (one,) = [one for one in studies(campaign(profile, [case], [engine])) if one.place == Path(place)]
+    (one,) = [one for one in studies(source.series([case], [engine])) if one.place == Path(place)]
     return one
 
 
@@ -207,12 +251,12 @@ def _told(name: str, board: FileBoard) -> Iterator[None]:
     board.post(name, state="finished", ended=time.time())
 
 
-def main(words: Sequence[str] | None = None) -> int:
-    """Run one step; returns the exit code."""
+def _arguments(words: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m dembark.validation.jobs", description=__doc__)
     parser.add_argument("step", choices=("simulate", "measure", "study", "compare", "report"))
-    parser.add_argument("--profile", required=True)
-    parser.add_argument("--results", type=Path, required=True, help="results/<profile>")
+    parser.add_argument("--profile")
+    parser.add_argument("--campaign", type=Path, help="file of a campaign, in the place of a profile")
+    parser.add_argument("--results", type=Path, required=True, help="results/<profile>, or the campaign's folder")
     parser.add_argument("--case", action="append")
     parser.add_argument("--engine", action="append")
     parser.add_argument("--place", help="<case>/<variant>/<engine>, or <case>/<variant> to compare")
@@ -220,25 +264,42 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--mark", help="file to touch when the run is finished")
     parser.add_argument("--ranks", type=int, default=1)
     parser.add_argument("--threads", type=int, default=1)
-    options = parser.parse_args(words)
+    parser.add_argument("--restart-interval", type=float, default=Resources.restart_interval, help="wall time between restart files (s)")
+    parser.add_argument("--elsewhere", action="store_true", help="this is not the submitting host, which alone writes the store")
+    return parser.parse_args(words)
+
+
+def _step(options: argparse.Namespace, source: Source, results: Path) -> None:
+    """A step other than a simulation."""
+    chosen = source.series(options.case or (), options.engine or ()) if options.step == "report" else []
+    if options.step == "measure":
+        one = _series_at(source, options.place)
+        measure_series(results / one.place, one.runs)
+        if not options.elsewhere:
+            store.collect(results, source.label, [one])
+    elif options.step == "study":
+        measure_study(results, _study_at(source, options.place))
+    elif options.step == "compare":
+        compare_engines(results / options.place)
+    else:
+        messages = failures(results, chosen)
+        write_summary(results, source, chosen, messages)
+        collect_all(results, source, chosen, messages, whole=not (options.case or options.engine))
+        build_report(results)
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run one step; returns the exit code."""
+    options = _arguments(words)
     results: Path = options.results.resolve()
     progress_folder(results).mkdir(parents=True, exist_ok=True)
     try:
+        source = Source(options.profile, options.campaign)
         if options.step == "simulate":
-            _simulate(options, results)
+            _simulate(options, source, results)
             return 0
         with _told(step_name(options.step, options.place or ""), FileBoard(progress_folder(results))):
-            if options.step == "measure":
-                one = _series_at(options.profile, options.place)
-                measure_series(results / one.place, one.runs)
-            elif options.step == "study":
-                measure_study(results, _study_at(options.profile, options.place))
-            elif options.step == "compare":
-                compare_engines(results / options.place)
-            else:
-                chosen = campaign(options.profile, options.case or (), options.engine or ())
-                write_summary(results, options.profile, chosen, failures(results, chosen))
-                build_report(results)
+            _step(options, source, results)
     except DembarkError as error:
         print(f"dembark: {error}", file=sys.stderr)
         return error.exit_code

@@ -34,8 +34,15 @@ def measure(run_folder: Path) -> dict[str, Any]:
     module = checks.find(first["case"], _case_folder(first["case"]))
     try:
         quantities, profiles, remarks = module.quantities(runs)
+        fields = module.fields(runs, quantities) if hasattr(module, "fields") else None
     except DumpError as error:
         raise RunError(f"{run_folder} could not be measured", str(error)) from None
+    if fields is not None:
+        # Labelled arrays take a second to import, which commands that measure nothing need not wait for.
+        from dembark.validation.checks import fields_result
+
+        quantities, remarks = [*quantities, *fields.quantities], [*remarks, *fields.remarks]
+        fields_result.write(run_folder, fields.dataset)
     content = {
         "case": first["case"],
         "variant": first["variant"],

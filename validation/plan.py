@@ -19,6 +19,8 @@ from dembark.validation.resolve import for_replica, portable, resolve
 
 # YADE does about a tenth of the particle-steps per second of LIGGGHTS on one core.
 _RELATIVE_COST = {"liggghts": 1, "yade": 10}
+# A line of grains.dump and two to three of contacts.dump for each grain and frame.
+_BYTES_PER_GRAIN_AND_FRAME = 800
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,17 @@ class Run:
         return f"replica-{self.replica}"
 
     @property
+    def particles(self) -> int | None:
+        """Number of grains or logs; None when the case does not say."""
+        return self.case.particle_count(self.values)
+
+    @property
+    def output_size(self) -> int | None:
+        """About how many bytes the run writes; None when the case does not say how many particles or frames there are."""
+        frames = self.values.get("frames")
+        return self.particles * frames * _BYTES_PER_GRAIN_AND_FRAME if self.particles and isinstance(frames, int) else None
+
+    @property
     def inputs(self) -> str:
         """Hash of everything that decides the outcome: parameters, deck and engine, but not where or with how many cores."""
         facts = {"parameters": dict(self.values), "deck": deck_files(self.case, self.engine.name),
@@ -65,8 +78,7 @@ class Series:
     @property
     def cost(self) -> float:
         """Relative cost of one replica, to start the longest first."""
-        count = self.runs[0].values.get("grain_count")
-        return (count if isinstance(count, int) else 1) * _RELATIVE_COST[self.runs[0].engine.name]
+        return (self.runs[0].particles or 1) * _RELATIVE_COST[self.runs[0].engine.name]
 
 
 @dataclass(frozen=True)
@@ -101,25 +113,29 @@ def deck_files(case: Case, engine: str) -> dict[str, str]:
     """Checksums of the deck of `engine` and of all other files in the case folder that it might include.
 
     Left out are the case file itself, for what counts of it is passed as parameters and a better sentence in it is no new input,
-    and the case's own checks, which look at results only.
+    the case's own checks, which look at results only, and its campaigns.
     """
     others = {case.deck(name) for name in ENGINES if name != engine}
     files = (path for path in case.folder.rglob("*") if path.is_file() and path not in others)
     relative = {path.relative_to(case.folder): path for path in files}
     return {str(name): hashlib.sha256(path.read_bytes()).hexdigest() for name, path in sorted(relative.items())
-            if name.suffix not in (".md", ".pyc") and str(name) not in ("case.toml", "checks.py") and name.parts[0] != "tests"
-            and not any(part.startswith(".") for part in name.parts)}
+            if name.suffix not in (".md", ".pyc") and str(name) not in ("case.toml", "checks.py")
+            and name.parts[0] not in ("tests", "campaigns") and not any(part.startswith(".") for part in name.parts)}
 
 
-def series(case: Case, variant: str, profile: str | None, engine: Engine, changes: Mapping[str, Value] | None = None) -> Series:
-    """The runs of one case, variant and engine; as many as the parameter `replicas` says (1 when the case has none)."""
+def series(case: Case, variant: str, profile: str | None, engine: Engine, changes: Mapping[str, Value] | None = None,
+           name: str | None = None) -> Series:
+    """The runs of one case, variant and engine; as many as the parameter `replicas` says (1 when the case has none).
+
+    With `changes` to the variant, `name` tells it from the variant itself; it has no part in the hash of the inputs.
+    """
     pick(engine.name, case.engines, "engine", f"in case {case.name}")
     if not case.deck(engine.name).is_file():
         raise DembarkError(f"{case.deck(engine.name)} is missing", "", f"remove {engine.name} from engines in case.toml or add the deck")
     values = portable(resolve(case, profile, variant, changes))
     count = values.get("replicas")
     numbers = range(1, (count if isinstance(count, int) else 1) + 1)
-    return Series(tuple(Run(case, variant, profile or "default", engine, k, for_replica(values, k)) for k in numbers))
+    return Series(tuple(Run(case, name or variant, profile or "default", engine, k, for_replica(values, k)) for k in numbers))
 
 
 def campaign(profile: str, only_cases: Sequence[str] = (), only_engines: Sequence[str] = ()) -> list[Series]:
@@ -152,8 +168,10 @@ def summary(all_series: Iterable[Series], results: Path, messages: Mapping[str, 
         for run in one.runs:
             folder = results / one.place / run.folder_name
             done = finished(folder, run)
+            other = (folder / "run.json").is_file()
+            changed = "its result is of other inputs: a parameter, the deck or the engine changed" if other else ""
             entries.append({"case": run.case.name, "variant": run.variant, "engine": run.engine.name, "replica": run.replica,
                             "folder": str(one.place / run.folder_name), "inputs": run.inputs,
                             "state": "finished" if done else "failed" if run.name in messages else "missing",
-                            "message": "" if done else messages.get(run.name, "")})
+                            "message": "" if done else messages.get(run.name, changed)})
     return entries

@@ -7,8 +7,10 @@ import re
 import sys
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from datetime import datetime
 from pathlib import Path
 from types import TracebackType
 
@@ -19,13 +21,18 @@ from rich.table import Table
 from dembark.validation.files import read_json
 
 INTERVAL = 10.0
+_COLOURS = {"running": "cyan", "finished": "green", "kept": "green", "failed": "bold red", "stopped": "yellow", "waiting": "dim"}
 _STEPS = re.compile(r"dembark: steps (\d+) time_step (\S+)")
 _STEP = re.compile(r"\s*(\d+)\s+[-+]?(?:\d|\.\d|nan|inf)")
 
 
 @dataclass(frozen=True)
 class State:
-    """State of a run: waiting, running, finished, kept (nothing to do) or failed; times in s, `started` as seconds since 1970."""
+    """State of a run: waiting, running, finished, kept (nothing to do), failed, or stopped from outside, to be started again; times in s,
+    `started` as seconds since 1970.
+
+    `attempt` counts the starts of a run that was ended from outside, `resumed_from` is the step where the present one went on.
+    """
 
     name: str
     state: str = "waiting"
@@ -35,13 +42,16 @@ class State:
     started: float = 0.0
     ended: float = 0.0
     message: str = ""
+    attempt: int = 1
+    resumed_from: int = 0
 
     @property
     def left(self) -> float | None:
         """Expected remaining seconds; None before there is a rate to tell it from."""
-        if self.state != "running" or not self.step or not self.steps:
+        done = self.step - self.resumed_from
+        if self.state != "running" or done <= 0 or not self.steps:
             return None
-        return (time.time() - self.started) * (self.steps - self.step) / self.step
+        return (time.time() - self.started) * (self.steps - self.step) / done
 
 
 class OutputParser:
@@ -104,7 +114,7 @@ class FileBoard(Board):
 
     def post(self, name: str, **news: str | int | float) -> None:
         super().post(name, **news)
-        if "state" not in news and time.monotonic() - self._written < 1.0:
+        if not news.keys() & {"state", "attempt"} and time.monotonic() - self._written < 1.0:
             return
         self._written = time.monotonic()
         try:
@@ -118,14 +128,21 @@ class FileBoard(Board):
 
 
 def watched(folder: Path, names: Sequence[str]) -> Callable[[], list[State]]:
-    """A function that gives the states of the runs `names` as their jobs wrote them to `folder`."""
-    def states() -> list[State]:
-        result = []
-        for name in names:
-            content = read_json(folder / (name.replace(" ", "-") + ".json"))
-            result.append(State(**content) if content else State(name))
-        return result
-    return states
+    """A function that gives the states of the runs `names` as their jobs wrote them to `folder`; what did not change is not read again."""
+    paths = {name: folder / (name.replace(" ", "-") + ".json") for name in names}
+    known: dict[str, tuple[int, State]] = {}
+
+    def state(name: str) -> State:
+        try:
+            changed = paths[name].stat().st_mtime_ns
+        except OSError:
+            return State(name)
+        if name not in known or known[name][0] != changed:
+            content = read_json(paths[name])
+            known[name] = (changed, State(**content) if content else State(name))
+        return known[name][1]
+
+    return lambda: [state(name) for name in names]
 
 
 def describe(state: State) -> str:
@@ -136,26 +153,64 @@ def describe(state: State) -> str:
             eta = "" if state.left is None else f", about {duration(state.left)} left"
             simulated = f"{state.step * state.time_step:.4g}/{state.steps * state.time_step:.4g} s simulated"
             return f"{state.name}: step {state.step}/{state.steps} ({100 * state.step // state.steps} %), {simulated}{eta}"
+        case "running" if state.attempt > 1:
+            return f"{state.name}: attempt {state.attempt}, goes on at step {state.resumed_from}"
         case "running":
             return f"{state.name}: started"
         case "finished":
-            return f"{state.name}: finished in {took}"
+            return f"{state.name}: finished in {took}{f' in attempt {state.attempt}' if state.attempt > 1 else ''}"
         case "kept":
             return f"{state.name}: is finished already, kept"
+        case "stopped":
+            return f"{state.name}: stopped after {took}: {state.message}"
         case "failed":
             return f"{state.name}: FAILED after {took}: {state.message}"
     return f"{state.name}: {state.state}"
 
 
-class Monitor:
-    """Shows what `states` returns while the `with` block runs."""
+def headline(states: Sequence[State]) -> str:
+    """`3 of 12 done, 2 running, 6 waiting, 1 failed`; a stopped run waits to be started again."""
+    same = {"kept": "finished", "stopped": "waiting"}
+    count = Counter(same.get(state.state, state.state) for state in states)
+    return f"{count['finished']} of {len(states)} done, {count['running']} running, {count['waiting']} waiting, {count['failed']} failed"
 
-    def __init__(self, states: Callable[[], list[State]], console: Console | None = None, interval: float = INTERVAL) -> None:
+
+def state_table(states: Sequence[State], rows: int | None = None) -> Table:
+    """One row a run: state, share of its steps, simulated time, and the time left or taken; at most `rows` of them.
+
+    When there are more, those are left out first that say least: finished, then waiting ones.
+    """
+    table = Table("run", "state", "step", "simulated", "left or took", title=headline(states), title_justify="left", box=None,
+                  pad_edge=False)
+    shown = list(states)
+    if rows is not None and len(states) > rows:
+        order = ("running", "failed", "stopped", "waiting", "finished", "kept")
+        first = sorted(range(len(states)), key=lambda index: (order.index(states[index].state), -states[index].ended, index))
+        shown = [states[index] for index in sorted(first[:max(1, rows - 1)])]
+    for state in shown:
+        # The last step that an engine prints need not be the last one that it does.
+        done = state.steps if state.state == "finished" else state.step
+        step = f"{100 * done // state.steps} % of {state.steps}" if state.steps else ""
+        simulated = f"{done * state.time_step:.3g} s of {state.steps * state.time_step:.3g} s" if state.steps else ""
+        left = duration(state.left) if state.left is not None else duration(state.ended - state.started) if state.ended else ""
+        word = f"{state.state}, attempt {state.attempt}" if state.attempt > 1 else state.state
+        table.add_row(state.name, f"[{_COLOURS[state.state]}]{word}[/]", step, simulated, left)
+    if len(shown) < len(states):
+        table.add_row(f"... and {len(states) - len(shown)} more")
+    return table
+
+
+class Monitor:
+    """Shows what `states` returns while the `with` block runs: a live table in a terminal, else lines; `log` gets the lines always."""
+
+    def __init__(self, states: Callable[[], list[State]], console: Console | None = None, interval: float = INTERVAL,
+                 log: Path | None = None) -> None:
         self._states = states
         self._console = console or Console(file=sys.stderr, highlight=False, soft_wrap=True)
         self._interval = interval
+        self._log = log
         self._end = threading.Event()
-        self._told: dict[str, tuple[str, float]] = {}
+        self._told: dict[str, tuple[State, float]] = {}
         self._live: Live | None = None
         self._thread = threading.Thread(target=self._watch, daemon=True)
 
@@ -163,17 +218,15 @@ class Monitor:
         if self._console.is_terminal:
             self._live = Live(get_renderable=self._table, console=self._console, refresh_per_second=2)
             self._live.start()
-        else:
-            self._thread.start()
+        self._thread.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._end.set()
+        self._thread.join()
         if self._live:
             self._live.stop()
-        else:
-            self._thread.join()
-            self._tell()
+        self._tell()
 
     def _watch(self) -> None:
         while not self._end.wait(min(0.5, self._interval)):
@@ -182,27 +235,26 @@ class Monitor:
     def _tell(self) -> None:
         now = time.monotonic()
         for state in self._states():
-            before, when = self._told.get(state.name, ("waiting", 0.0))
-            if state.state != before:
-                line = describe(replace(state, steps=0))
-            elif state.state == "running" and now - when >= self._interval:
-                line = describe(state)
+            before, when = self._told.get(state.name, (State(state.name), 0.0))
+            if (state.state, state.attempt, state.message) != (before.state, before.attempt, before.message):
+                event, line = True, describe(replace(state, steps=0))
+            elif state.state == "running" and state.steps and now - when >= self._interval:
+                event, line = False, describe(state)
             else:
                 continue
-            self._console.print(f"dembark: {line}", markup=False)
-            self._told[state.name] = (state.state, now)
+            if not self._live:
+                self._console.print(f"dembark: {line}", markup=False)
+            if event:
+                self._note(line)
+            self._told[state.name] = (state, now)
+
+    def _note(self, line: str) -> None:
+        if self._log:
+            try:
+                with self._log.open("a", encoding="utf-8") as file:
+                    file.write(f"{datetime.now().astimezone().isoformat(timespec='seconds')} {line}\n")
+            except OSError:
+                self._log = None  # as for the board: a full disk is reported by what needs the space
 
     def _table(self) -> Table:
-        states = self._states()
-        done = sum(state.state in ("finished", "kept") for state in states)
-        failed = sum(state.state == "failed" for state in states)
-        waiting = sum(state.state == "waiting" for state in states)
-        title = f"{done} of {len(states)} done, {len(states) - done - failed - waiting} running, {waiting} waiting, {failed} failed"
-        table = Table("run", "state", "step", "simulated", "left or took", title=title, title_justify="left", box=None, pad_edge=False)
-        colours = {"running": "cyan", "finished": "green", "kept": "green", "failed": "bold red", "waiting": "dim"}
-        for state in states:
-            step = f"{100 * state.step // state.steps} % of {state.steps}" if state.steps else ""
-            simulated = f"{state.step * state.time_step:.3g} s of {state.steps * state.time_step:.3g} s" if state.steps else ""
-            left = duration(state.left) if state.left is not None else duration(state.ended - state.started) if state.ended else ""
-            table.add_row(state.name, f"[{colours[state.state]}]{state.state}[/]", step, simulated, left)
-        return table
+        return state_table(self._states(), max(3, self._console.height - 4))

@@ -26,13 +26,9 @@ def settings(pairs: Iterable[str]) -> dict[str, str]:
     return result
 
 
-def resolve(case: Case, profile: str | None = None, variant: str | None = None,
-            changes: Mapping[str, Value] | None = None) -> dict[str, Value]:
-    """All parameters of a run in SI units (None = optional and not set), in the order of the case file.
-
-    Raises DembarkError for an unknown profile, variant or key (naming near matches), a value of wrong type, unit or range,
-    and for a combination that a constraint of the case forbids.
-    """
+def merged(case: Case, profile: str | None = None, variant: str | None = None,
+           changes: Mapping[str, Value] | None = None) -> dict[str, Value]:
+    """As `resolve`, without a look at the constraints of the case."""
     where = f"in case {case.name}"
     values: dict[str, Value] = {name: checked(p, p.value) for name, p in case.parameters.items()}
     if profile is not None:
@@ -43,6 +39,18 @@ def resolve(case: Case, profile: str | None = None, variant: str | None = None,
         if key not in case.parameters:
             raise DembarkError(f"unknown parameter {key!r}", where, nearest(key, case.parameters))
         values[key] = checked(case.parameters[key], value)
+    return values
+
+
+def resolve(case: Case, profile: str | None = None, variant: str | None = None,
+            changes: Mapping[str, Value] | None = None) -> dict[str, Value]:
+    """All parameters of a run in SI units (None = optional and not set), in the order of the case file.
+
+    Raises DembarkError for an unknown profile, variant or key (naming near matches), a value of wrong type, unit or range,
+    and for a combination that a constraint of the case forbids.
+    """
+    values = merged(case, profile, variant, changes)
+    where = f"in case {case.name}"
     for constraint in case.constraints:
         try:
             holds = constraint.expression(values)

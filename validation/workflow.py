@@ -1,22 +1,27 @@
-"""Runs the Snakefile for a profile, shows how far its runs are, and sees to it that there is a report in the end."""
+"""Runs the Snakefile for a profile or a campaign, shows how far its runs are, and sees to it that there is a report in the end."""
 
 from __future__ import annotations
 
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from dembark.validation.campaigns.source import Source
 from dembark.validation.errors import DembarkError, Interrupted
 from dembark.validation.files import lock, read_json
 from dembark.validation.jobs import (
     PROGRESS_VARIABLE,
     build_report,
+    collect_all,
     failures,
     progress_folder,
     salvage,
@@ -24,10 +29,11 @@ from dembark.validation.jobs import (
     variants,
     write_summary,
 )
-from dembark.validation.plan import Series, campaign, finished, studies
+from dembark.validation.plan import Series, finished, studies
 from dembark.validation.progress import FileBoard, Monitor, State, watched
 
 _GRACE = 30.0
+_LOOK = 60.0
 
 
 @dataclass(frozen=True)
@@ -47,11 +53,29 @@ class Outcome:
         return not self.unfinished and not self.problems and self.report is not None
 
 
-def _snakemake(results: Path, profile: str, cores: int, cases: Sequence[str], engines: Sequence[str]) -> list[str]:
-    config = [f"profile={profile}", f"results={results.parent}", f"cases={' '.join(cases)}", f"engines={' '.join(engines)}"]
+@dataclass(frozen=True)
+class Way:
+    """How Snakemake is to run the jobs: words for its command line, whether they are jobs of a cluster, and who looks after it."""
+
+    words: tuple[str, ...]
+    cluster: bool = False
+    # Asked now and then with Snakemake's process id: whether it waits for nothing any more and has to be started again.
+    stalled: Callable[[int], bool] | None = None
+
+
+def here(cores: int | None = None) -> Way:
+    """On this machine, with as many runs at a time as fit `cores` (default: all)."""
+    return Way(("--cores", str(cores or os.cpu_count() or 1)))
+
+
+def _snakemake(source: Source, results: Path, way: Way, cases: Sequence[str], engines: Sequence[str]) -> list[str]:
+    chosen = [f"profile={source.profile}", f"results={results.parent}"]
+    if source.file:
+        chosen = [f"campaign={source.file}", f"results={results}"]
+    config = [*chosen, f"cases={' '.join(cases)}", f"engines={' '.join(engines)}"]
     guard = ["setpriv", "--pdeathsig", "KILL", "--"] if shutil.which("setpriv") else []
-    return [*guard, sys.executable, "-m", "snakemake", "--snakefile", str(Path(__file__).with_name("Snakefile")),
-            "--cores", str(cores), "--keep-going", "--nolock", "--rerun-incomplete", "--rerun-triggers", "mtime",
+    return [*guard, sys.executable, "-m", "snakemake", "--snakefile", str(Path(__file__).with_name("Snakefile")), *way.words,
+            "--keep-going", "--nolock", "--rerun-incomplete", "--rerun-triggers", "mtime",
             "--scheduler", "greedy", "--nocolor", "--directory", str(results / ".workflow"), "--config", *config]
 
 
@@ -65,64 +89,92 @@ def _states(results: Path, all_series: Sequence[Series]) -> Callable[[], list[St
     return lambda: [*runs(), *(state for state in later() if state.state != "waiting")]
 
 
-def _wait(process: subprocess.Popen[bytes], cancel: threading.Event) -> int:
+def _wait(process: subprocess.Popen[bytes], cancel: threading.Event, way: Way) -> int | None:
+    """Exit code of the workflow; None when it had to be ended because it waited for nothing."""
+    looked = time.monotonic()
     while process.poll() is None:
-        if not cancel.wait(0.2):
-            continue
-        # Every job ends its engine and clears up; then Snakemake, which starts no more jobs, ends by itself.
-        os.killpg(process.pid, signal.SIGTERM)
-        try:
-            process.wait(_GRACE)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
-        raise Interrupted("interrupted", "finished runs are kept and will not be repeated")
+        if cancel.wait(0.2):
+            _stop(process, way.cluster)
+            raise Interrupted("interrupted", "finished runs are kept and will not be repeated")
+        if way.stalled and time.monotonic() - looked > _LOOK:
+            looked = time.monotonic()
+            if way.stalled(process.pid):
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+                return None
     return process.returncode
 
 
+def _stop(process: subprocess.Popen[bytes], cluster: bool) -> None:
+    """End the workflow: on this machine every job ends its engine and clears up, on a cluster Snakemake takes its jobs back."""
+    if cluster:
+        process.send_signal(signal.SIGINT)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(_GRACE)
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        with suppress(subprocess.TimeoutExpired, ProcessLookupError):
+            if process.poll() is None:
+                os.killpg(process.pid, number)
+                process.wait(_GRACE)
+
+
 def count_checks(results: Path) -> tuple[int, int]:
-    """Numbers of quantities with a verdict pass or fail, and of those that fail, in all results below `results`."""
-    verdicts = [quantity.get("verdict") for name in ("metrics.json", "comparison.json") for path in sorted(results.glob(f"*/*/**/{name}"))
-                if "superseded" not in path.parts for quantity in (read_json(path) or {}).get("quantities", [])]
+    """Numbers of quantities with a verdict pass or fail, and of those that fail, in `results` and in the report's own verification."""
+    files = [path for name in ("metrics.json", "comparison.json") for path in sorted(results.glob(f"*/*/**/{name}")) if "superseded" not in path.parts]
+    files.append(results / "verification.json")
+    verdicts = [quantity.get("verdict") for path in files for quantity in (read_json(path) or {}).get("quantities", [])]
     return sum(verdict in ("pass", "fail") for verdict in verdicts), verdicts.count("fail")
 
 
 def validate(profile: str, cancel: threading.Event, cores: int | None = None, results_root: Path = Path("results"),
              cases: Sequence[str] = (), engines: Sequence[str] = ()) -> Outcome:
-    """Run everything that the cases list for `profile` and build the report in results_root/<profile>.
+    """Run everything that the cases list for `profile` and build the report in results_root/<profile>, see `perform`."""
+    source, results = Source(profile), results_root.resolve() / profile
+    source.series(cases, engines)
+    with lock(results / ".lock", f"another validation works in {results}"):
+        return perform(source, results, cancel, here(cores), cases, engines)
+
+
+def perform(source: Source, results: Path, cancel: threading.Event, way: Way, cases: Sequence[str] = (), engines: Sequence[str] = (),
+            log: Path | None = None) -> Outcome:
+    """Make all runs of `source` in the folder `results`, measure them and build the report; events also go to the file `log`.
 
     Runs that finished earlier with the same inputs are kept. A run that fails stops nothing else: the report is built from what
     there is and names it as missing. Raises DembarkError for a plan that cannot be made, Interrupted when `cancel` is set.
+    The caller holds the lock of the folder.
     """
-    all_series = campaign(profile, cases, engines)
-    results = results_root.resolve() / profile
-    with lock(results / ".lock", f"another validation works in {results}"):
-        shutil.rmtree(progress_folder(results), ignore_errors=True)
-        progress_folder(results).mkdir(parents=True)
-        board = FileBoard(progress_folder(results))
-        for run, folder in ((run, results / one.place / run.folder_name) for one in all_series for run in one.runs):
-            if finished(folder, run):
-                board.post(run.name, state="kept")
-        environment = {**os.environ, PROGRESS_VARIABLE: "1"}
-        with (results / "workflow.log").open("wb") as log, Monitor(_states(results, all_series)):
-            process = subprocess.Popen(_snakemake(results, profile, cores or os.cpu_count() or 1, cases, engines), env=environment,
-                                       stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
-            code = _wait(process, cancel)
-        return _conclude(profile, results, all_series, code)
+    all_series = source.series(cases, engines)
+    shutil.rmtree(progress_folder(results), ignore_errors=True)
+    progress_folder(results).mkdir(parents=True)
+    board = FileBoard(progress_folder(results))
+    for run, folder in ((run, results / one.place / run.folder_name) for one in all_series for run in one.runs):
+        if finished(folder, run):
+            board.post(run.name, state="kept")
+    write_summary(results, source, all_series, {})
+    environment = {**os.environ, PROGRESS_VARIABLE: f"{socket.gethostname()}-{os.getpid()}-{time.time():.0f}"}
+    with (results / "workflow.log").open("ab" if log else "wb") as output, Monitor(_states(results, all_series), log=log):
+        code = None
+        while code is None:
+            process = subprocess.Popen(_snakemake(source, results, way, cases, engines), env=environment,
+                                       stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT, start_new_session=True)
+            code = _wait(process, cancel, way)
+    return _conclude(source, results, all_series, code, whole=not (cases or engines))
 
 
-def _conclude(profile: str, results: Path, all_series: Sequence[Series], code: int) -> Outcome:
+def _conclude(source: Source, results: Path, all_series: Sequence[Series], code: int, whole: bool) -> Outcome:
     problems = salvage(results, all_series) if code else []
-    entries = write_summary(results, profile, all_series, failures(results, all_series))
+    messages = failures(results, all_series)
+    entries = write_summary(results, source, all_series, messages)
     unfinished = [f"{entry['case']} {entry['variant']} {entry['engine']} {entry['replica']}: {entry['message'] or 'missing'}"
                   for entry in entries if entry["state"] != "finished"]
     report = results / "report.html"
-    if code:
-        report.unlink(missing_ok=True)
-        try:
+    try:
+        collect_all(results, source, all_series, messages, whole)
+        if code:
+            report.unlink(missing_ok=True)
             build_report(results)
-        except DembarkError as error:
-            problems.append(str(error))
+    except DembarkError as error:
+        problems.append(str(error))
     if code and (not (unfinished or problems) or any(entry["state"] == "missing" for entry in entries)):
         # Not a run but the workflow itself failed, or a run's job died before it could say why; the log may tell.
         problems.append(f"the workflow ended with exit code {code}, see {results / 'workflow.log'}")

@@ -1,0 +1,169 @@
+"""From a campaign to its runs: each point of a sweep is a variant with changes, with a folder name of its own."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from dembark.validation import engines
+from dembark.validation.campaigns.spec import CampaignSpec, RunResources, SweepSpec
+from dembark.validation.cases import ENGINES
+from dembark.validation.errors import DembarkError
+from dembark.validation.parameters import Value, checked, pick
+from dembark.validation.plan import Series, series
+from dembark.validation.resolve import merged, resolve
+
+LONGEST_NAME = 100
+MOST_RUNS = 20000
+_DIGEST = 8
+
+
+@dataclass(frozen=True)
+class Point:
+    """One point of a sweep: the folder name `variant` of its runs, the case's variant and profile that it changes, and what varies.
+
+    `values` has the swept axes only, `changes` all differences from the variant; both in SI units, None = not set.
+    """
+
+    sweep: SweepSpec
+    variant: str
+    base: str
+    values: Mapping[str, Value]
+    changes: Mapping[str, Value]
+    resolved: Mapping[str, Value]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that a campaign runs: points in the order of the file, series with the longest first, resources by a series' place."""
+
+    spec: CampaignSpec
+    points: tuple[Point, ...]
+    series: tuple[Series, ...]
+    resources: Mapping[Path, RunResources]
+
+    def sweeps(self) -> list[dict[str, Any]]:
+        """The sweeps for a JSON file: case, name, title, axes, and their points with folder names and values in SI units."""
+        return [{"case": sweep.case.name, "name": sweep.name or f"sweep {sweep.number}", "title": sweep.title, "axes": list(sweep.axes),
+                 "engines": list(sweep.engines), "profile": sweep.profile,
+                 "points": [{"variant": point.variant, "base": point.base, "values": dict(point.values), "changes": dict(point.changes)}
+                            for point in self.points if point.sweep is sweep]}
+                for sweep in self.spec.sweeps]
+
+
+def _word(value: Value) -> str:
+    if value is None:
+        return "auto"
+    if isinstance(value, float):
+        short = f"{value:g}"
+        return short if float(short) == value else repr(value)
+    return re.sub(r"[^A-Za-z0-9.+-]", "-", str(value))
+
+
+def variant_name(base: str, values: Mapping[str, Value], prefix: str = "") -> str:
+    """Name of a folder for the variant `base` with `values`: `dry_wall_friction=0.2_cylinder_radius=0.04`, at most 100 letters.
+
+    A longer one is cut and ends in a checksum of the whole, so that different points have different names.
+    """
+    name = "_".join([*([prefix] if prefix else []), base, *(f"{key}={_word(value)}" for key, value in values.items())])
+    if len(name) <= LONGEST_NAME:
+        return name
+    digest = hashlib.sha256(name.encode()).hexdigest()[:_DIGEST]
+    return f"{name[:LONGEST_NAME - _DIGEST - 1]}_{digest}"
+
+
+def _changes(sweep: SweepSpec, base: str, row: Mapping[str, Value]) -> dict[str, Value]:
+    """All differences of a point from the variant `base`, in SI units; an expression may use those before it."""
+    changes: dict[str, Value] = {**sweep.fixed, **row}
+    if sweep.replicas is not None:
+        changes["replicas"] = sweep.replicas
+    for key, expression in sweep.derived.items():
+        parameter = sweep.case.parameters[key]
+        try:
+            value = expression(merged(sweep.case, sweep.profile, base, changes))
+        except (ArithmeticError, ValueError, TypeError) as error:
+            raise DembarkError(f"{key} = {expression.text!r} cannot be evaluated", str(error)) from None
+        if isinstance(value, bool | complex):
+            raise DembarkError(f"{key} = {expression.text!r} is no number")
+        # Grains are counted: what comes out is the next whole number.
+        whole = parameter.type == "int" and isinstance(value, float) and math.isfinite(value)
+        changes[key] = checked(parameter, round(value) if whole else value)
+    return changes
+
+
+def _points(sweep: SweepSpec, where: str) -> Iterator[Point]:
+    """Points of one sweep; two that come to the same numbers are a mistake."""
+    seen: dict[tuple[Value, ...], str] = {}
+    for base in sweep.variants:
+        for row in sweep.rows:
+            name = variant_name(base, row, sweep.name)
+            try:
+                changes = _changes(sweep, base, row)
+                resolved = resolve(sweep.case, sweep.profile, base, changes)
+            except DembarkError as error:
+                raise DembarkError(f"point {name} of {where}", str(error)) from None
+            twin = seen.setdefault(tuple(resolved.values()), name)
+            if twin != name:
+                raise DembarkError(f"points {twin} and {name} are the same run", where, "remove one of them")
+            axes = {"variant": base, **row} if len(sweep.variants) > 1 else dict(row)
+            yield Point(sweep, name, base, axes, changes, resolved)
+
+
+def points(spec: CampaignSpec) -> list[Point]:
+    """All points of a campaign, every condition of the cases checked at each; no engine is needed for it.
+
+    A point that an earlier sweep of the campaign has already takes over that one's folder name: it is run once. DembarkError for a
+    point that breaks a condition, for two of a sweep that are the same, and for two that would share a folder although they differ.
+    """
+    found: list[Point] = []
+    folders: dict[tuple[Value, ...], str] = {}
+    for sweep in spec.sweeps:
+        for point in _points(sweep, f"[{sweep.label}] of {spec.path}"):
+            folder = folders.setdefault((sweep.case.name, *point.resolved.values()), point.variant)
+            found.append(replace(point, variant=folder))
+    _distinct(spec, found)
+    runs = sum(len(point.sweep.engines) * _replicas(point) for point in found)
+    if runs > MOST_RUNS:
+        raise DembarkError(f"{spec.path} has {runs} runs", "", f"a campaign may have {MOST_RUNS}: make several")
+    return found
+
+
+def _replicas(point: Point) -> int:
+    count = point.resolved.get("replicas")
+    return count if isinstance(count, int) else 1
+
+
+def _distinct(spec: CampaignSpec, found: Sequence[Point]) -> None:
+    """DembarkError when two points that differ have one folder, or one case of letters apart, which some file systems do not tell."""
+    named: dict[tuple[str, str], Point] = {}
+    for point in found:
+        other = named.setdefault((point.sweep.case.name, point.variant.lower()), point)
+        if other.resolved != point.resolved:
+            raise DembarkError(f"[{other.sweep.label}] and [{point.sweep.label}] of {spec.path} both have a point {point.variant}",
+                               "with other values elsewhere (profile, fixed, replicas)", 'give one of them a name, name = "..."')
+
+
+def plan(spec: CampaignSpec, only_cases: Sequence[str] = (), only_engines: Sequence[str] = ()) -> Plan:
+    """The runs of a campaign, of all its cases and engines or only some; the engines that are needed have to be there."""
+    for name in only_cases:
+        pick(name, {sweep.case.name for sweep in spec.sweeps}, "case", f"in {spec.path}")
+    for name in only_engines:
+        pick(name, ENGINES, "engine", "in --engine")
+    all_points = points(spec)
+    found: dict[Path, Series] = {}
+    resources: dict[Path, RunResources] = {}
+    for point in all_points:
+        if only_cases and point.sweep.case.name not in only_cases:
+            continue
+        for engine in point.sweep.engines:
+            place = Path(point.sweep.case.name, point.variant, engine)
+            if place in found or (only_engines and engine not in only_engines):
+                continue
+            found[place] = series(point.sweep.case, point.base, point.sweep.profile, engines.find(engine), point.changes, point.variant)
+            resources[place] = point.sweep.resources[engine]
+    return Plan(spec, tuple(all_points), tuple(sorted(found.values(), key=lambda one: -one.cost)), resources)

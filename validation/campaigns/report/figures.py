@@ -1,0 +1,137 @@
+"""Figures of a campaign: quantities along the swept parameters, maps over two of them, and two campaigns against each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib
+import numpy as np
+from dembark.postproc.style import STYLE
+from dembark.validation.campaigns.report.sweeps import Sweep, words
+from dembark.validation.report.figures import colour, engine_name, symbols
+from matplotlib.figure import Figure
+
+_INK = "#4a4f57"
+_DASHES = ["-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (8, 3))]
+_MARKS = ["o", "s", "D", "^", "v", "P", "X"]
+COLUMNS = 3
+
+
+def _panels(count: int, height: float = 2.3) -> tuple[Figure, list[Any]]:
+    rows = max(1, math.ceil(count / COLUMNS))
+    tall = height * rows + 0.5
+    figure = Figure(figsize=(7.2, tall))
+    figure.subplots_adjust(left=0.075, right=0.985, bottom=0.85 / tall, top=1.0 - 0.3 / tall, wspace=0.38, hspace=0.55)
+    return figure, [figure.add_subplot(rows, COLUMNS, number + 1) for number in range(count)]
+
+
+def study_figure(sweep: Sweep, quantities: Sequence[Mapping[str, Any]]) -> Figure | None:
+    """Each quantity along the sweep's main axis with 95 % intervals, a line for each combination of the others, both engines; its
+    reference dashed in grey. None for a sweep without a numeric axis."""
+    along = sweep.along
+    if along is None or not quantities:
+        return None
+    with matplotlib.rc_context(STYLE):
+        figure, panels = _panels(len(quantities))
+        handles: dict[str, Any] = {}
+        for axes, quantity in zip(panels, quantities, strict=True):
+            _study_panel(axes, sweep, along, quantity, handles)
+        figure.legend(handles.values(), handles.keys(), loc="lower center", ncols=min(4, max(1, len(handles))), fontsize=6.8)
+    return figure
+
+
+def _study_panel(axes: Any, sweep: Sweep, along: str, quantity: Mapping[str, Any], handles: dict[str, Any]) -> None:
+    for engine in sweep.engines:
+        for number, (others, line) in enumerate(sweep.lines(along, engine, quantity["name"])):
+            place = np.array([at for at, _ in line])
+            value = np.array([one["value"] for _, one in line])
+            style = {"color": colour(engine), "linestyle": _DASHES[number % len(_DASHES)], "marker": _MARKS[number % len(_MARKS)]}
+            handle = axes.errorbar(place, value, yerr=_bars(line), markersize=3.2, elinewidth=0.7, linewidth=1.1, **style)
+            label = engine_name(engine) + (f", {words(others)}" if others else "")
+            handles.setdefault(label, handle)
+            known = [(at, one["reference"]) for at, one in line if one.get("reference") is not None]
+            if known:
+                (reference,) = axes.plot(*zip(*known, strict=True), color=_INK, linewidth=0.8, linestyle=_DASHES[1], alpha=0.8, zorder=1)
+                handles.setdefault("reference", reference)
+    axes.set_xlabel(along.replace("_", " "))
+    axes.set_title(_title(quantity), fontsize=7.0)
+    low, high = sweep.levels(along)[0], sweep.levels(along)[-1]
+    if low > 0 and high / low > 20:
+        axes.set_xscale("log")
+
+
+def _bars(line: Sequence[tuple[float, Mapping[str, Any]]]) -> np.ndarray[Any, Any]:
+    ends = [one["interval"] or (one["value"], one["value"]) for _, one in line]
+    return np.array([[one["value"] - low for (_, one), (low, _) in zip(line, ends, strict=True)],
+                     [high - one["value"] for (_, one), (_, high) in zip(line, ends, strict=True)]]).clip(min=0.0)
+
+
+def _title(quantity: Mapping[str, Any]) -> str:
+    unit = "" if quantity["unit"] == "1" else f" ({quantity['unit']})"
+    text = quantity["label"]
+    return symbols((text if len(text) <= 46 else quantity["name"].replace("_", " ")) + unit)
+
+
+def map_axes(sweep: Sweep) -> tuple[str, str] | None:
+    """The two axes of a map: of a sweep that is a full grid over exactly two axes with at least two values each."""
+    wide = [axis for axis in sweep.axes if len(sweep.levels(axis)) > 1]
+    if len(wide) != 2:
+        return None
+    down, across = sorted(wide, key=lambda axis: len(sweep.levels(axis)))
+    return across, down
+
+
+def map_figure(sweep: Sweep, engine: str, quantities: Sequence[Mapping[str, Any]]) -> Figure | None:
+    """Maps of quantities over the two axes of a sweep; a frame marks points that failed their check. None when there are not two."""
+    axes_names = map_axes(sweep)
+    if axes_names is None or not quantities:
+        return None
+    across, down = axes_names
+    columns, rows = sweep.levels(across), sweep.levels(down)
+    with matplotlib.rc_context(STYLE | {"axes.grid": False}):
+        figure, panels = _panels(len(quantities), 0.95 + 0.32 * len(rows) if len(rows) > 3 else 2.1)
+        for axes, quantity in zip(panels, quantities, strict=True):
+            values = np.full((len(rows), len(columns)), np.nan)
+            failed = []
+            for point in sweep.points:
+                one = point.quantity(engine, quantity["name"])
+                cell = rows.index(point.values[down]), columns.index(point.values[across])
+                if one is not None:
+                    values[cell] = one["value"]
+                    failed += [cell] if one.get("verdict") == "fail" else []
+            image = axes.imshow(values, origin="lower", aspect="auto", cmap="cividis")
+            for (row, column), value in np.ndenumerate(values):
+                text = "–" if np.isnan(value) else f"{value:.3g}"
+                bright = not np.isnan(value) and image.norm(value) < 0.55
+                axes.text(column, row, text, ha="center", va="center", fontsize=6.0, color="white" if bright else "black")
+            for row, column in failed:
+                axes.add_patch(matplotlib.patches.Rectangle((column - 0.47, row - 0.47), 0.94, 0.94, fill=False, edgecolor="#b0321e", linewidth=1.4))
+            axes.set_xticks(range(len(columns)), [_short(one) for one in columns])
+            axes.set_yticks(range(len(rows)), [_short(one) for one in rows])
+            axes.set(xlabel=across.replace("_", " "), ylabel=down.replace("_", " "))
+            axes.set_title(_title(quantity), fontsize=7.0)
+        figure.text(0.5, 0.02, engine_name(engine), ha="center", color=colour(engine), fontsize=7.5, weight="bold")
+    return figure
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def against_figure(rows: Sequence[Mapping[str, Any]]) -> Figure:
+    """Two campaigns: the change of each quantity over its joint 95 % half-width; beyond the grey band it changed."""
+    known = [row for row in rows if row["significance"] is not None]
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(7.2, 2.4), layout="constrained")
+        axes = figure.subplots()
+        axes.axhspan(-1.0, 1.0, color=_INK, alpha=0.12, linewidth=0)
+        for engine in sorted({row["engine"] for row in known}):
+            points = [(number, row["significance"]) for number, row in enumerate(known) if row["engine"] == engine]
+            axes.plot(*zip(*points, strict=True), ".", color=colour(engine), label=engine_name(engine), markersize=4)
+        axes.set(xlabel="quantity, in the order of the table", ylabel="change / joint half-width")
+        if known:
+            axes.legend(loc="best", fontsize=7)
+            axes.set_yscale("symlog", linthresh=2.0)
+    return figure

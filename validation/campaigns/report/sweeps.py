@@ -1,0 +1,116 @@
+"""A campaign's results by sweep: which parameters vary, and what was measured at each point."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from dembark.validation.convergence import REFINEMENT, Convergence, convergence, refinement
+
+
+@dataclass(frozen=True)
+class Point:
+    """One point of a sweep: the swept `values` (None = the parameter is not set), the folder name `variant`, `metrics` by engine."""
+
+    values: Mapping[str, Any]
+    variant: str
+    metrics: Mapping[str, Mapping[str, Any]]
+
+    def quantity(self, engine: str, name: str) -> Mapping[str, Any] | None:
+        """The measured quantity of that name; None where it was not measured or has no number."""
+        found = next((one for one in self.metrics.get(engine, {}).get("quantities", []) if one["name"] == name), None)
+        return found if found and found["value"] is not None and math.isfinite(found["value"]) else None
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The points of one sweep of a campaign, and the names of the parameters that vary along it, the slowest first."""
+
+    case: str
+    title: str
+    axes: tuple[str, ...]
+    points: tuple[Point, ...]
+    name: str = field(default="")
+
+    @property
+    def engines(self) -> list[str]:
+        """Engines with at least one measured point."""
+        return sorted({engine for point in self.points for engine in point.metrics})
+
+    def levels(self, axis: str) -> list[Any]:
+        """The values along one axis in their order: numbers by size, words as they come."""
+        found = list(dict.fromkeys(point.values[axis] for point in self.points))
+        return sorted(found) if all(isinstance(one, int | float) for one in found) else found
+
+    def numeric(self, axis: str) -> bool:
+        """Whether an axis holds numbers only."""
+        return all(isinstance(one, int | float) and not isinstance(one, bool) for one in self.levels(axis))
+
+    @property
+    def along(self) -> str | None:
+        """The axis that figures run along: the numeric one with most values; None when there is none with two."""
+        found = [axis for axis in self.axes if self.numeric(axis) and len(self.levels(axis)) > 1]
+        return max(found, key=lambda axis: (len(self.levels(axis)), -self.axes.index(axis)), default=None)
+
+    def quantities(self) -> list[Mapping[str, Any]]:
+        """The quantities worth a picture, once each: those that are checked or that the engines must agree in."""
+        found: dict[str, Mapping[str, Any]] = {}
+        for point in self.points:
+            for metrics in point.metrics.values():
+                for one in metrics.get("quantities", []):
+                    if one["value"] is not None and (one.get("compared") or one.get("tolerance") is not None):
+                        found.setdefault(one["name"], one)
+        return list(found.values())
+
+    def lines(self, along: str, engine: str, name: str) -> list[tuple[dict[str, Any], list[tuple[float, Mapping[str, Any]]]]]:
+        """Measured values against `along`, one line for each combination of the other axes: (those values, [(place, quantity)])."""
+        lines: dict[tuple[Any, ...], list[tuple[float, Mapping[str, Any]]]] = {}
+        others = [axis for axis in self.axes if axis != along]
+        for point in self.points:
+            found = point.quantity(engine, name)
+            if found is not None:
+                lines.setdefault(tuple(point.values[axis] for axis in others), []).append((float(point.values[along]), found))
+        return [(dict(zip(others, key, strict=True)), sorted(line, key=lambda one: one[0])) for key, line in lines.items()]
+
+
+def words(values: Mapping[str, Any]) -> str:
+    """Parameters for people: `wall friction 0.2, cylinder radius 0.04`."""
+    return ", ".join(f"{key.replace('_', ' ')} {value:.6g}" if isinstance(value, float) else f"{key.replace('_', ' ')} {value}"
+                     for key, value in values.items())
+
+
+@dataclass(frozen=True)
+class NumericalError:
+    """The numerical uncertainty of one quantity at the finest setting of `parameter`, other parameters being `at`."""
+
+    sweep: Sweep
+    engine: str
+    quantity: Mapping[str, Any]
+    parameter: str
+    at: str
+    finest: float
+    found: Convergence
+
+
+def numerical_errors(sweeps: Iterable[Sweep]) -> list[NumericalError]:
+    """What the sweeps along the time step or the stiffness say, for every quantity that is checked or compared."""
+    result = []
+    for sweep in sweeps:
+        for parameter in (axis for axis in sweep.axes if axis in REFINEMENT and len(sweep.levels(axis)) > 1):
+            for one in sweep.quantities():
+                for engine in sweep.engines:
+                    for others, line in sweep.lines(parameter, engine, one["name"]):
+                        if len(line) > 1:
+                            result.append(_judged(sweep, engine, parameter, others, line))
+    return result
+
+
+def _judged(sweep: Sweep, engine: str, parameter: str, others: Mapping[str, Any],
+            line: Sequence[tuple[float, Mapping[str, Any]]]) -> NumericalError:
+    h = [refinement(parameter, place) for place, _ in line]
+    halves = [0.5 * (one["interval"][1] - one["interval"][0]) if one.get("interval") else math.inf for _, one in line]
+    finest = min(range(len(h)), key=h.__getitem__)
+    found = convergence(h, [one["value"] for _, one in line], halves)
+    return NumericalError(sweep, engine, line[finest][1], parameter, words(others), line[finest][0], found)

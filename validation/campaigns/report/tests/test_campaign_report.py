@@ -1,0 +1,106 @@
+"""The campaign report on results with a known answer: a law that is exact, with the error of the time step added."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from dembark.validation.campaigns.report import against, figures, tables
+from dembark.validation.campaigns.report.gather import by_point, sweep
+from dembark.validation.campaigns.report.sweeps import Sweep, numerical_errors
+
+
+def quantity(name: str, value: float | None, half: float | None = 0.01, **more: Any) -> dict[str, Any]:
+    interval = None if half is None or value is None else [value - half, value + half]
+    return {"name": name, "label": name, "unit": "1", "value": value, "interval": interval, "basis": "", "reference": None, "deviation": None,
+            "reference_interval": None, "deviation_kind": "relative", "tolerance": None, "verdict": "info", "compared": True, **more}
+
+
+def content(variant: str, engine: str, *quantities: dict[str, Any]) -> dict[str, Any]:
+    return {"case": "silo", "variant": variant, "engine": engine, "quantities": list(quantities), "provenance": {"commit": "a" * 40}}
+
+
+def grid(frictions: tuple[float, ...] = (0.2, 0.4, 0.8), radii: tuple[float, ...] = (0.02, 0.04)) -> Sweep:
+    points = {f"f{one}-r{two}": {"wall_friction": one, "cylinder_radius": two} for one in frictions for two in radii}
+    contents = tuple(
+        content(name, engine, quantity("k", values["wall_friction"] * values["cylinder_radius"], reference=1.0, tolerance=0.1,
+                                       verdict="fail" if values["wall_friction"] == 0.8 else "pass"))
+        for name, values in points.items() for engine in ("liggghts", "yade"))
+    return sweep("silo", 1, ("wall_friction", "cylinder_radius"), points, by_point(contents))
+
+
+def steps(engine_error: float, half: float) -> Sweep:
+    points = {f"h{h}": {"time_step_fraction": h} for h in (0.05, 0.1, 0.2)}
+    contents = tuple(content(name, "yade", quantity("k", 1.0 + engine_error * values["time_step_fraction"] ** 2, half))
+                     for name, values in points.items())
+    return sweep("silo", 2, ("time_step_fraction",), points, by_point(contents))
+
+
+def test_a_grid_gives_lines_and_maps() -> None:
+    one = grid()
+    assert one.along == "wall_friction"
+    lines = one.lines("wall_friction", "yade", "k")
+    assert [others for others, _ in lines] == [{"cylinder_radius": 0.02}, {"cylinder_radius": 0.04}]
+    assert [place for place, _ in lines[0][1]] == [0.2, 0.4, 0.8]
+    assert figures.map_axes(one) == ("wall_friction", "cylinder_radius")
+    assert figures.study_figure(one, one.quantities()) is not None
+    drawn = figures.map_figure(one, "yade", one.quantities())
+    assert drawn is not None
+    texts = {text.get_text() for text in drawn.axes[0].texts}
+    assert texts == {f"{friction * radius:.3g}" for friction in (0.2, 0.4, 0.8) for radius in (0.02, 0.04)}
+    assert len(drawn.axes[0].patches) == 2
+
+
+def test_points_that_were_not_measured_leave_gaps() -> None:
+    points = {"a": {"wall_friction": 0.2, "wall": "smooth"}, "b": {"wall_friction": 0.4, "wall": "rough"}}
+    one = sweep("silo", 1, ("wall_friction", "wall"), points, by_point((content("a", "yade", quantity("k", math.nan), quantity("l", 1.0)),)))
+    assert one.lines("wall_friction", "yade", "k") == []
+    assert not one.numeric("wall") and one.levels("wall") == ["smooth", "rough"]
+    assert figures.study_figure(one, one.quantities()) is not None
+    assert figures.map_figure(one, "yade", one.quantities()) is not None
+
+
+def test_numerical_error_is_told_from_scatter() -> None:
+    (exact,) = numerical_errors([steps(2.0, 1e-6)])
+    assert exact.found.kind == "monotone" and exact.found.order == pytest.approx(2.0) and exact.found.extrapolated == pytest.approx(1.0)
+    assert exact.finest == 0.05
+    (noisy,) = numerical_errors([steps(2.0, 0.1)])
+    assert noisy.found.kind == "scatter" and noisy.found.order is None and noisy.found.uncertainty > 0.1
+
+
+def test_table_holds_every_quantity_once(tmp_path: Path) -> None:
+    one = grid()
+    tables.write_table_csv(tmp_path / "t.csv", one)
+    lines = (tmp_path / "t.csv").read_text().splitlines()
+    assert lines[0].startswith("case,variant,engine,wall_friction,cylinder_radius,quantity")
+    assert len(lines) == 1 + 6 * 2
+
+
+def test_latex_escapes_what_latex_would_read() -> None:
+    one = sweep("silo", 1, ("grain_count",), {"a": {"grain_count": 3}},
+                by_point((content("a", "yade", quantity("k", 1.5e-7, 1e-9, label="σ_zz & 50 % of #1", unit="m^2")),)))
+    text = tables.latex(one, one.quantities())
+    row = next(line for line in text.splitlines() if "YADE" in line)
+    assert row.count(" & ") == 6 and r"$\sigma$\_zz \& 50 \% of \#1" in row and r"$\cdot10^{-7}$" in row
+
+
+def test_two_campaigns_differ_where_intervals_say_so() -> None:
+    before = [content("dry", "yade", quantity("k", 1.0), quantity("l", 1.0), quantity("m", 1.0, None), quantity("gone", 1.0),
+                      quantity("exact", 2.0, 0.0))]
+    after = [content("dry", "yade", quantity("k", 1.1), quantity("l", 1.005), quantity("m", 1.2, None), quantity("new", 1.0),
+                     quantity("exact", 2.0, 0.0))]
+    rows = {row["name"]: row for row in against.differences(before, after)}
+    assert {name: row["state"] for name, row in rows.items()} == {
+        "k": "changed", "l": "same", "m": "unknown", "gone": "gone", "new": "new", "exact": "same"}
+    assert rows["k"]["change"] == pytest.approx(0.1)
+    assert next(iter(rows)) == "k"
+
+
+def test_a_deterministic_quantity_changes_with_its_last_digits() -> None:
+    (row,) = against.differences([content("dry", "yade", quantity("k", 1.0, 0.0))], [content("dry", "yade", quantity("k", 1.0 + 1e-9, 0.0))])
+    assert row["state"] == "changed"
+    (row,) = against.differences([content("dry", "yade", quantity("k", 1.0, 0.0, agreement=1e-6))],
+                                 [content("dry", "yade", quantity("k", 1.0 + 1e-9, 0.0, agreement=1e-6))])
+    assert row["state"] == "same"

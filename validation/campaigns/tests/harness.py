@@ -1,0 +1,16 @@
+"""The fixtures of the harness's own tests, for those of campaigns: a small case and a stand-in for both engines."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+
+_FILE = Path(__file__).resolve().parents[2] / "tests" / "conftest.py"
+_SPEC = importlib.util.spec_from_file_location("harness_fixtures", _FILE)
+_MODULE = importlib.util.module_from_spec(_SPEC)
+sys.modules[_SPEC.name] = _MODULE
+_SPEC.loader.exec_module(_MODULE)
+
+decks, stand_in, environment, wait_for, lives = (getattr(_MODULE, name) for name in ("decks", "stand_in", "environment", "wait_for", "lives"))
+engine_pid = _MODULE.engine_pid

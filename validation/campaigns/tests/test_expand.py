@@ -1,0 +1,148 @@
+"""From a campaign to its runs: names of folders, the hash of the inputs, points that several sweeps share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from dembark.validation.campaigns.expand import LONGEST_NAME, plan, points, variant_name
+from dembark.validation.campaigns.source import Source
+from dembark.validation.campaigns.spec import read
+from dembark.validation.errors import DembarkError
+from dembark.validation.plan import campaign
+from harness import decks, stand_in  # noqa: F401
+from hypothesis import given
+from hypothesis import strategies as st
+
+pytestmark = pytest.mark.usefixtures("decks", "stand_in")
+
+HEAD = '[campaign]\nname = "boxes"\nprofile = "quick"\n'
+
+
+def spec_of(tmp_path: Path, text: str):
+    path = tmp_path / "campaign.toml"
+    path.write_text(HEAD + text)
+    return read(path)
+
+
+values = st.one_of(st.none(), st.integers(-10**9, 10**9), st.floats(allow_nan=False), st.text(max_size=30))
+
+
+@given(st.dictionaries(st.from_regex(r"[a-z_]{1,12}", fullmatch=True), values, max_size=12))
+def test_any_point_has_a_name_that_is_safe_as_a_folder(point: dict[str, object]) -> None:
+    name = variant_name("dry", point)
+    assert len(name) <= LONGEST_NAME and "/" not in name and name.isprintable() and not set(name) & set(" '\"$`\\*?[]{}()<>|;&\n")
+
+
+@given(st.floats(allow_nan=False), st.floats(allow_nan=False), st.integers(0, 12))
+def test_different_numbers_have_different_names(one: float, other: float, length: int) -> None:
+    padding = {f"a_long_parameter_{k}": k for k in range(length)}
+    same = variant_name("dry", padding | {"x": one}) == variant_name("dry", padding | {"x": other})
+    assert same == (one == other and str(one) == str(other))
+
+
+def test_names_are_readable(tmp_path: Path) -> None:
+    spec = spec_of(tmp_path, """
+[[sweeps]]
+case = "box"
+variants = ["dry", "wet"]
+grid = { grain_diameter = ["4 mm", 0.0125], strength = ["2 MPa"] }
+""")
+    found = points(spec)
+    assert [point.variant for point in found] == [
+        "dry_grain_diameter=0.004_strength=2e+06", "dry_grain_diameter=0.0125_strength=2e+06",
+        "wet_grain_diameter=0.004_strength=2e+06", "wet_grain_diameter=0.0125_strength=2e+06"]
+    assert found[2].values == {"variant": "wet", "grain_diameter": 0.004, "strength": 2e6}
+    assert found[2].resolved["contact_angle"] == 0.1 and found[0].resolved["contact_angle"] == 0.35
+
+
+def test_a_point_that_a_profile_runs_has_the_same_inputs(tmp_path: Path) -> None:
+    ordinary = {run.inputs: run for one in campaign("standard") for run in one.runs}
+    spec = spec_of(tmp_path, """
+[[sweeps]]
+case = "box"
+profile = "standard"
+replicas = 3
+grid = { grain_count = [10, 20] }
+""")
+    mine = {run.inputs: run for one in plan(spec).series for run in one.runs}
+    shared = ordinary.keys() & mine.keys()
+    assert len(mine) == 2 * len(ordinary) and shared == ordinary.keys()
+    assert {mine[key].variant for key in shared} == {"dry_grain_count=20"}
+    assert all(mine[key].values == ordinary[key].values for key in shared)
+
+
+def test_a_point_of_two_sweeps_is_run_once(tmp_path: Path) -> None:
+    spec = spec_of(tmp_path, """
+[[sweeps]]
+case = "box"
+engines = ["liggghts"]
+grid = { grain_count = [10, 20] }
+[[sweeps]]
+case = "box"
+grid = { grain_diameter = [0.005, 0.004] }
+""")
+    whole = plan(spec)
+    assert sorted(str(one.place) for one in whole.series) == [
+        "box/dry_grain_count=10/liggghts", "box/dry_grain_count=10/yade", "box/dry_grain_count=20/liggghts",
+        "box/dry_grain_diameter=0.004/liggghts", "box/dry_grain_diameter=0.004/yade"]
+    assert [[point["variant"] for point in sweep["points"]] for sweep in whole.sweeps()] == [
+        ["dry_grain_count=10", "dry_grain_count=20"], ["dry_grain_count=10", "dry_grain_diameter=0.004"]]
+    inputs = [run.inputs for one in whole.series for run in one.runs]
+    assert len(set(inputs)) == len(inputs)
+
+
+def test_sweeps_of_the_same_points_with_different_numbers_take_a_name(tmp_path: Path) -> None:
+    text = '[[sweeps]]\ncase = "box"\ngrid = {{ grain_count = [10] }}\nfixed = {{ contact_angle = {} }}\n{}\n'
+    with pytest.raises(DembarkError, match="give one of them a name"):
+        points(spec_of(tmp_path, text.format(0.1, "") + text.format(0.2, "")))
+    found = points(spec_of(tmp_path, text.format(0.1, "") + text.format(0.2, 'name = "flat"')))
+    assert [point.variant for point in found] == ["dry_grain_count=10", "flat_dry_grain_count=10"]
+
+
+def test_derived_parameters_follow_from_the_others(tmp_path: Path) -> None:
+    spec = spec_of(tmp_path, """
+[[sweeps]]
+case = "box"
+grid = { grain_diameter = [0.005, 0.01] }
+fixed = { contact_angle = 0.5 }
+[sweeps.derived]
+grain_count = "10 * (0.01 / grain_diameter)**3 + 0.3"
+static_friction = "contact_angle / 2"
+kinetic_friction = "static_friction"
+""")
+    assert [(point.resolved["grain_count"], point.resolved["kinetic_friction"]) for point in points(spec)] == [(80, 0.25), (10, 0.25)]
+    assert points(spec)[0].variant == "dry_grain_diameter=0.005" and points(spec)[0].values == {"grain_diameter": 0.005}
+
+
+@pytest.mark.parametrize(("derived", "expected"), [
+    ('{ contact_angle = 3 }', "wanted is an expression in a text"),
+    ('{ contact_angle = "import os" }', "is no expression"),
+    ('{ contact_angle = "grain_cuont" }', "did you mean grain_count or grain_diameter"),
+    ('{ grain_count = "5" }', "grain_count is derived and given"),
+    ('{ contact_angle = "1 / (20 - grain_count)" }', "point dry_grain_count=20"),
+    ('{ contact_angle = "grain_count" }', "point dry_grain_count=10"),
+    ('{ contact_angle = "grain_count > 3" }', "is no number"),
+    ('{ replicas = "2" }', "replicas is no parameter of a sweep"),
+])
+def test_mistakes_in_derived_parameters(derived: str, expected: str, tmp_path: Path) -> None:
+    with pytest.raises(DembarkError) as error:
+        points(spec_of(tmp_path, f'[[sweeps]]\ncase = "box"\ngrid = {{ grain_count = [10, 20] }}\nderived = {derived}\n'))
+    assert expected in str(error.value) and "sweeps 1" in str(error.value) and "campaign.toml" in str(error.value)
+
+
+def test_only_what_is_chosen(tmp_path: Path) -> None:
+    spec = spec_of(tmp_path, '[[sweeps]]\ncase = "box"\ngrid = { grain_count = [10, 20] }\n[resources.yade]\nthreads = 2\n')
+    source = Source(file=spec.path)
+    assert {one.place.name for one in source.series((), ["yade"])} == {"yade"} and len(source.series(["box"])) == 4
+    assert {place.name: used.threads for place, used in source.resources().items()} == {"liggghts": 1, "yade": 2}
+    assert [one.place.name for one in source.series()] == ["yade", "yade", "liggghts", "liggghts"]  # the longest first
+    assert source.facts()["sweeps"][0]["axes"] == ["grain_count"] and source.label == "boxes"
+    with pytest.raises(DembarkError, match="did you mean box"):
+        source.series(["bxo"])
+
+
+def test_a_source_is_a_profile_or_a_campaign() -> None:
+    with pytest.raises(DembarkError, match="--profile or --campaign"):
+        Source()
+    assert Source("quick").facts() == {"profile": "quick"} and Source("quick").plan() is None

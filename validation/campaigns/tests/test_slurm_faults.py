@@ -1,0 +1,198 @@
+"""Both engines in a sweep on a real Slurm that loses a run, a node's patience, the scheduler and the submitter; then without faults."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from slurm_cluster import Cluster
+
+from dembark.validation import cases, engines, restarts
+from dembark.validation.campaigns import profiles, slurm
+from dembark.validation.errors import DembarkError
+from dembark.validation.files import read_json
+
+pytestmark = pytest.mark.slow
+
+# Frozen, a run of seconds reaches its time limit of a minute.
+CAMPAIGN = """
+[campaign]
+name = "friction"
+engines = ["liggghts", "yade"]
+replicas = 3
+
+[[sweeps]]
+case = "silo"
+profile = "quick"
+variant = "dry"
+grid = { wall_friction = [0.3, 0.5] }
+fixed = { grain_count = 400, grain_diameter = "6 mm", settle_time = 0.3, measure_time = 0.2, frames = 10 }
+
+[resources]
+memory = "400 MB"
+time = "1 min"
+
+[resources.liggghts]
+restart_interval = "0.2 s"
+
+[resources.yade]
+restart_interval = "1 s"
+"""
+RUNS = 12
+_STARTERS = ("setpriv", "stdbuf", "mpirun", "srun")
+
+
+def dembark(folder: Path, *words: str) -> subprocess.Popen[str]:
+    log = (folder / "dembark.log").open("a")
+    with log:
+        return subprocess.Popen([sys.executable, "-m", "dembark.validation.cli", *words], cwd=folder, stdout=log, stderr=log, text=True)
+
+
+def at_work(results: Path, engine: str) -> tuple[Path, int] | None:
+    """Work folder and process of a run in `engine` that has written a whole state."""
+    for work in results.glob(f"*/*/{engine}/.replica-*.work-*"):
+        if restarts.newest(work, engine) is None:
+            continue
+        for process in Path("/proc").glob("[0-9]*"):
+            try:
+                first, *words = (process / "cmdline").read_text(errors="replace").split("\0")
+                if (process / "cwd").resolve() == work and "restart_every" in " ".join(words) and Path(first).name not in _STARTERS:
+                    return work, int(process.name)
+            except OSError:
+                continue
+    return None
+
+
+def wait(question, seconds: float, process: subprocess.Popen[str], folder: Path):
+    deadline = time.monotonic() + seconds
+    while not (answer := question()):
+        assert time.monotonic() < deadline and process.poll() is None, (folder / "dembark.log").read_text()[-3000:]
+        time.sleep(0.1)
+    return answer
+
+
+def outcome(folder: Path, process: subprocess.Popen[str], seconds: float = 1200) -> None:
+    code = process.wait(seconds)
+    log = folder / "results" / "workflow.log"
+    assert code == 0, (folder / "dembark.log").read_text()[-4000:] + (log.read_text()[-4000:] if log.exists() else "")
+
+
+def records(results: Path) -> dict[str, dict]:
+    return {str(path.parent.relative_to(results)): read_json(path) for path in results.glob("*/*/*/replica-*/run.json")}
+
+
+def quantities(results: Path) -> dict[tuple[str, str], dict]:
+    return {(str(path.parent.relative_to(results)), one["name"]): one
+            for path in results.glob("*/*/*/metrics.json") for one in read_json(path)["quantities"]}
+
+
+@pytest.fixture
+def real_engines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both engines, and a copy of the case: whoever edits its deck meanwhile would change the inputs."""
+    shutil.copytree(cases.deck_root() / "silo", tmp_path / "decks" / "silo")
+    monkeypatch.setenv("DEMBARK_DECKS", str(tmp_path / "decks"))
+    try:
+        for name in ("liggghts", "yade"):
+            engines.find(name)
+    except DembarkError as error:
+        pytest.skip(str(error))
+
+
+def write_profile(folder: Path, preamble: str = "") -> None:
+    """The shipped profile for Slurm, asking after its jobs more often, with a preamble."""
+    folder.mkdir()
+    text = (profiles.find("slurm").folder / "config.yaml").read_text()
+    (folder / "config.yaml").write_text(text.replace("checks: 20", "checks: 5").replace("latency-wait: 60", "latency-wait: 10"))
+    (folder / "preamble.sh").write_text(preamble)
+
+
+def with_faults(folder: Path, site: Path, cluster: Cluster) -> tuple[Path, Path]:
+    """Submit, kill a LIGGGHTS at work, restart the scheduler, freeze a YADE, kill the submitter; the folders of both runs."""
+    results = folder / "results"
+    process = dembark(folder, "submit", str(folder / "friction.toml"), "--executor", str(site), "--out", str(results))
+    try:
+        killed, number = wait(lambda: at_work(results, "liggghts"), 300, process, folder)
+        os.kill(number, signal.SIGKILL)
+        cluster.stop_controller()
+        cluster.start_controller()
+        frozen, number = wait(lambda: at_work(results, "yade"), 300, process, folder)
+        os.kill(number, signal.SIGSTOP)
+    finally:
+        process.kill()
+        process.wait()
+    return killed, frozen
+
+
+def test_a_sweep_of_both_engines_survives_and_gives_the_numbers_of_one_without_faults(
+        tmp_path: Path, on_cluster: Cluster, real_engines: None) -> None:
+    site, results, clean = tmp_path / "site", tmp_path / "results", tmp_path / "clean"
+    write_profile(site)
+    (tmp_path / "friction.toml").write_text(CAMPAIGN)
+    try:
+        killed, frozen = with_faults(tmp_path, site, on_cluster)
+        assert slurm.jobs(results)
+        outcome(tmp_path, dembark(tmp_path, "resume", str(results)))
+    finally:
+        slurm.cancel_all(results)
+    ended = [state for state, comment in on_cluster.jobs().values() if "simulate" in comment]
+    assert "TIMEOUT" in ended and "FAILED" in ended
+
+    # Every run complete, exactly once, and nothing left.
+    found = records(results)
+    assert len(found) == RUNS == len({record["inputs"] for record in found.values()})
+    assert slurm.jobs(results) == [] and not list(results.glob("*/*/*/.replica-*.work-*"))
+    for work in (killed, frozen):
+        record = found[str((work.parent / work.name[1:].partition(".work-")[0]).relative_to(results))]
+        assert record["attempts"] == 2 and len(record["resumed_at"]) == 1 and record["resumed_at"][0] > 0
+    with closing(sqlite3.connect(results / "store.sqlite")) as store:
+        assert store.execute("SELECT state, COUNT(*) FROM runs GROUP BY state").fetchall() == [("finished", RUNS)]
+        again = store.execute("SELECT COUNT(*) FROM runs WHERE attempts > 1").fetchone()[0]
+        assert again == sum(record["attempts"] > 1 for record in found.values())
+        rows = store.execute("SELECT COUNT(*) FROM quantities").fetchone()[0]
+    report = (results / "report.html").read_text()
+    for place in {Path(key).parent for key in found}:
+        assert (results / place / "metrics.json").is_file() and read_json(results / place / "metrics.json")["replicas_missing"] == []
+        assert place.parts[1].partition("=")[2] in report
+    assert {entry["state"] for entry in read_json(results / "runs.json")["runs"]} == {"finished"}
+
+    outcome(tmp_path, dembark(tmp_path, "submit", str(tmp_path / "friction.toml"), "--out", str(clean), "--cores", "2"))
+    reference = records(clean)
+    assert {key: one["inputs"] for key, one in reference.items()} == {key: one["inputs"] for key, one in found.items()}
+    for key, one in found.items():
+        if one["attempts"] == 1 or one["resume"] == "exact":
+            assert (results / key / "grains.dump").read_bytes() == (clean / key / "grains.dump").read_bytes(), key
+    numbers, expected = quantities(results), quantities(clean)
+    assert set(numbers) == set(expected) and rows == len(numbers)
+    for key, quantity in numbers.items():
+        low, high = expected[key]["interval"] if expected[key]["interval"] else (expected[key]["value"],) * 2
+        assert quantity["value"] is None or low <= quantity["value"] <= high, key
+
+
+@pytest.mark.parametrize("launcher", ["", "srun --mpi=pmix"])
+def test_a_run_with_mpi_loses_a_rank_and_goes_on(tmp_path: Path, on_cluster: Cluster, real_engines: None, launcher: str) -> None:
+    site, results, file = tmp_path / "site", tmp_path / "results", tmp_path / "ranks.toml"
+    write_profile(site, f"export DEMBARK_MPIRUN='{launcher}'\n")
+    text = CAMPAIGN.replace('engines = ["liggghts", "yade"]', 'engines = ["liggghts"]').replace("replicas = 3", "replicas = 1")
+    file.write_text(text.replace("[0.3, 0.5]", "[0.3]").replace('restart_interval = "0.2 s"', 'restart_interval = "0.1 s"\nranks = 2'))
+    process = dembark(tmp_path, "submit", str(file), "--executor", str(site), "--out", str(results))
+    try:
+        _, number = wait(lambda: at_work(results, "liggghts"), 300, process, tmp_path)
+        os.kill(number, signal.SIGKILL)
+        outcome(tmp_path, process)
+    finally:
+        process.kill()
+        process.wait()
+        slurm.cancel_all(results)
+    (record,) = records(results).values()
+    assert record["attempts"] == 2 and record["resumed_at"][0] > 0 and record["provenance"]["ranks"] == 2
+    assert record["command"][0] == (launcher.split()[0] if launcher else "mpirun")
+    states = [state for state, comment in on_cluster.jobs().values() if "simulate_silo" in comment]
+    assert "FAILED" in states and "COMPLETED" in states

@@ -1,0 +1,222 @@
+"""A campaign's file: what is right is read as it is meant, and each mistake gets one line that says where it is and what would be right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from dembark.validation.campaigns import sizes
+from dembark.validation.campaigns.expand import points
+from dembark.validation.campaigns.spec import locate, read
+from dembark.validation.cli import main
+from dembark.validation.errors import DembarkError
+from harness import decks, stand_in  # noqa: F401
+from hypothesis import given
+from hypothesis import strategies as st
+
+pytestmark = pytest.mark.usefixtures("decks", "stand_in")
+
+RIGHT = """
+[campaign]
+name = "boxes"
+description = "Boxes of all sizes."
+profile = "quick"
+engines = ["liggghts"]
+replicas = 2
+
+[[sweeps]]
+case = "box"
+variant = "wet"
+grid = { grain_diameter = ["4 mm", 0.005], grain_count = [10, 20] }
+fixed = { contact_angle = "20 deg" }
+
+[[sweeps]]
+case = "box"
+name = "pairs"
+profile = "standard"
+engines = ["yade", "liggghts"]
+replicas = 3
+list = [ { static_friction = 0.5, kinetic_friction = 0.4 }, { static_friction = 0.6, kinetic_friction = 0.6 } ]
+
+[sweeps.resources.yade]
+threads = 4
+
+[resources]
+memory = "500 MB"
+
+[resources.liggghts]
+ranks = 2
+time = "2 h 30 min"
+restart_interval = "10 min"
+
+[resources.measure]
+memory = "2 GiB"
+"""
+
+
+@pytest.fixture
+def write(tmp_path: Path):
+    """`write(text)`: a campaign file with it."""
+    def put(text: str) -> Path:
+        path = tmp_path / "campaign.toml"
+        path.write_text(text)
+        return path
+    return put
+
+
+def test_a_right_file_is_read_as_it_is_meant(write) -> None:
+    spec = read(write(RIGHT))
+    first, second = spec.sweeps
+    assert (spec.name, spec.retries, spec.measure.memory) == ("boxes", 3, 2 * 2**30)
+    assert first.engines == ("liggghts",) and first.axes == ("grain_diameter", "grain_count") and first.replicas == 2
+    assert [dict(row) for row in first.rows] == [{"grain_diameter": d, "grain_count": n} for d in (0.004, 0.005) for n in (10, 20)]
+    assert first.fixed["contact_angle"] == pytest.approx(0.3490658503988659, rel=1e-14)
+    assert second.engines == ("yade", "liggghts") and second.profile == "standard" and second.replicas == 3
+    assert first.resources["liggghts"].ranks == 2 and first.resources["liggghts"].time == 9000.0
+    assert first.resources["liggghts"].memory == first.resources["yade"].memory == 5e8
+    assert first.resources["yade"].threads == 1 and second.resources["yade"].threads == 4 and second.resources["yade"].memory == 5e8
+
+
+HEAD = '[campaign]\nname = "boxes"\nprofile = "quick"\n'
+SWEEP = HEAD + '[[sweeps]]\ncase = "box"\n'
+GRID = SWEEP + "grid = { grain_count = [10, 20] }\n"
+
+MISTAKES = {
+    "invalid TOML": (SWEEP + "grid = {\n", "line 6"),
+    "no text": ("\x00", "cannot be read"),
+    "unknown table": (GRID + "[resuorces]\n", "unknown key 'resuorces', [top level] of"),
+    "no campaign": ('[[sweeps]]\ncase = "box"\n', "campaign is missing"),
+    "no name": ('[campaign]\nprofile = "quick"\n[[sweeps]]\ncase = "box"\n', "[campaign] of"),
+    "unknown key": (HEAD + 'replica = 2\n[[sweeps]]\ncase = "box"\n', "unknown key 'replica', [campaign] of"),
+    "unknown key of a sweep": (SWEEP + "gird = {}\n", "[sweeps 1] of"),
+    "name with a slash": ('[campaign]\nname = "a/b"\n[[sweeps]]\ncase = "box"\n', "'a/b' is no name of a folder"),
+    "empty name": ('[campaign]\nname = ""\n[[sweeps]]\ncase = "box"\n', "no name of a folder"),
+    "wrong type of name": ('[campaign]\nname = 3\n[[sweeps]]\ncase = "box"\n', "name = 3 has the wrong type, [campaign] of"),
+    "wrong type of engines": (HEAD + 'engines = "yade"\n[[sweeps]]\ncase = "box"\n', "wanted is a list"),
+    "no sweeps": ("sweeps = []\n" + HEAD, "there are no sweeps"),
+    "sweeps missing": (HEAD, "sweeps is missing"),
+    "sweeps no tables": (HEAD.replace("[campaign]", "sweeps = [3]\n[campaign]"), "3 is no sweep"),
+    "case missing": (HEAD + "[[sweeps]]\ngrid = { grain_count = [1] }\n", "case is missing, [sweeps 1]"),
+    "unknown case": (HEAD + '[[sweeps]]\ncase = "bxo"\n', "did you mean box?"),
+    "unknown variant": (SWEEP + 'variant = "wett"\n', "did you mean wet?"),
+    "unknown variant among several": (SWEEP + 'variants = ["dry", "wte"]\n', "unknown variant 'wte', [sweeps 1]"),
+    "variant and variants": (SWEEP + 'variant = "dry"\nvariants = ["wet"]\n', "give one of them"),
+    "a variant twice": (SWEEP + 'variants = ["dry", "dry"]\n', "names dry twice"),
+    "no variants": (SWEEP + "variants = []\n", "variants = [] is empty"),
+    "unknown engine": (HEAD + 'engines = ["yaed"]\n[[sweeps]]\ncase = "box"\n', "did you mean yade?"),
+    "unknown engine of a sweep": (GRID + 'engines = ["lammps"]\n', "unknown engine 'lammps', [sweeps 1] of"),
+    "unknown profile": (GRID.replace('"quick"', '"quikc"'), "did you mean quick?"),
+    "unknown profile of a sweep": (GRID + 'profile = "full"\n', "unknown profile 'full', [sweeps 1]"),
+    "no profile": (GRID.replace('profile = "quick"\n', ""), "profile is missing, [sweeps 1]"),
+    "unknown parameter": (SWEEP + "grid = { grain_cuont = [10] }\n", "did you mean grain_count or"),
+    "unknown parameter in fixed": (GRID + "fixed = { grain_diamter = 1 }\n", "[sweeps 1.fixed] of"),
+    "wrong unit": (SWEEP + 'grid = { grain_diameter = ["4 kg"] }\n', "[sweeps 1.grid] of"),
+    "angle without its dimension": (SWEEP + 'grid = { contact_angle = ["30 mm"] }\n', "contact_angle"),
+    "out of range": (SWEEP + "grid = { grain_diameter = [0.004, -0.004] }\n", "grain_diameter = -0.004 m is out of range, allowed is > 0"),
+    "not whole": (SWEEP + "grid = { grain_count = [10.5] }\n", "is not a whole number"),
+    "no such choice": (SWEEP + 'grid = { behaviour = ["wild"] }\n', "allowed are ok | exit"),
+    "a truth value": (SWEEP + "grid = { grain_count = [true] }\n", "grain_count = True has the wrong type"),
+    "a table as value": (SWEEP + "grid = { grain_count = [{ a = 1 }] }\n", "wanted is a number or a text"),
+    "not a number": (SWEEP + "grid = { grain_diameter = [nan] }\n", "is not a number"),
+    "empty grid": (SWEEP + "grid = {}\n", "the grid is empty"),
+    "axis without values": (SWEEP + "grid = { grain_count = [] }\n", "grain_count = [] has no values"),
+    "axis that is no list": (SWEEP + "grid = { grain_count = 10 }\n", "write grain_count = [...]"),
+    "value twice": (SWEEP + 'grid = { grain_diameter = [0.004, "4 mm"] }\n', "has the value '4 mm' twice"),
+    "grid and list": (GRID + "list = [{ grain_count = 5 }]\n", "grid and list are both given"),
+    "empty list": (SWEEP + "list = []\n", "list = [] has no points"),
+    "point that is none": (SWEEP + "list = [3]\n", "3 is no point"),
+    "point twice": (SWEEP + "list = [{ grain_count = 5 }, { grain_count = 5 }]\n", "is that of sweeps 1.list 1 again"),
+    "points with different keys": (SWEEP + "list = [{ grain_count = 5 }, { grain_diameter = 0.004 }]\n",
+                                   "all must have the first one's grain_count"),
+    "nothing varies": (SWEEP, "nothing varies"),
+    "fixed and varied": (GRID + "fixed = { grain_count = 5 }\n", "grain_count is fixed and varies"),
+    "replicas as an axis": (SWEEP + "grid = { replicas = [1, 2] }\n", "replicas is no parameter of a sweep"),
+    "no replicas": (GRID + "replicas = 0\n", "replicas = 0 is out of range, [sweeps 1]"),
+    "negative retries": (GRID.replace("[[", "retries = -1\n[["), "retries = -1 is out of range"),
+    "negative ranks": (GRID + "[resources.liggghts]\nranks = -2\n", "ranks = -2 is out of range, [resources.liggghts] of"),
+    "no threads": (GRID + "[resources]\nthreads = 0\n", "threads = 0 is out of range, [resources] of"),
+    "ranks for YADE": (GRID + "[resources.yade]\nranks = 2\n", "use threads: YADE runs in one process"),
+    "ranks of a sweep for YADE": (GRID + "[sweeps.resources.yade]\nranks = 2\n", "[sweeps 1.resources.yade]"),
+    "memory without unit": (GRID + '[resources]\nmemory = "500"\n', "'500' is no amount of memory"),
+    "negative memory": (GRID + '[resources]\nmemory = "-1 GB"\n', "'-1 GB' is no amount of memory"),
+    "memory as a number": (GRID + "[resources]\nmemory = 500\n", "wanted is a text"),
+    "unreadable time": (GRID + '[resources]\ntime = "two hours"\n', "'two hours' is no duration, wanted is a positive one"),
+    "negative time": (GRID + '[resources]\ntime = "-2 h"\n', "'-2 h' is no duration"),
+    "restart later than the end": (GRID + '[resources]\ntime = "1 h"\nrestart_interval = "2 h"\n',
+                                   "restart_interval is not shorter than time"),
+    "unknown resource": (GRID + '[resources]\nmemry = "1 GB"\n', "did you mean memory?"),
+    "unknown resource of measuring": (GRID + "[resources.measure]\nranks = 2\n", "unknown key 'ranks', [resources.measure]"),
+    "condition broken": (SWEEP + "fixed = { static_friction = 0.5 }\ngrid = { kinetic_friction = [0.4, 0.6] }\n",
+                         "point dry_kinetic_friction=0.6 of [sweeps 1] of"),
+    "same run twice": (SWEEP + 'variants = ["dry", "wet"]\ngrid = { contact_angle = [0.1, 0.2] }\n',
+                       "points dry_contact_angle=0.1 and wet_contact_angle=0.1 are the same run"),
+    "one folder for two": (GRID + '[[sweeps]]\ncase = "box"\nfixed = { contact_angle = 0.2 }\ngrid = { grain_count = [10] }\n',
+                           "[sweeps 1] and [sweeps 2]"),
+    "too many": (SWEEP + f"replicas = 10001\ngrid = {{ grain_count = {list(range(1, 3))} }}\n", "a campaign may have 20000"),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_gets_one_line_before_anything_starts(name: str, write, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text, expected = MISTAKES[name]
+    assert main(["submit", str(write(text)), "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and error.startswith("dembark: ")
+    assert expected in error and "campaign.toml" in error
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("words", "expected"), [
+    (["nowhere.toml"], "there is no campaign 'nowhere.toml'"),
+    (["sub/nowhere.toml"], "there is no file sub/nowhere.toml"),
+    (["."], "is a folder"),
+    (["small", "--executor", "slrum"], "--executor slrum is neither local, nor slurm, nor the folder"),
+    (["small", "--jobs", "3"], "--jobs is for a cluster"),
+    (["wide", "--cores", "2"], "is to run on 3 cores, 2 are there"),
+    (["large", "--cores", "2"], "is to have 1e+03 GB of memory"),
+    (["smal"], "did you mean small?"),
+])
+def test_a_wrong_command_gets_one_line(words: list[str], expected: str, decks: Path, tmp_path: Path,  # noqa: F811
+                                       monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    (decks / "box/campaigns").mkdir()
+    (decks / "box/campaigns/small.toml").write_text(GRID)
+    (decks / "box/campaigns/wide.toml").write_text(GRID + "[resources]\nthreads = 3\n")
+    (decks / "box/campaigns/large.toml").write_text(GRID + '[resources]\nmemory = "1000 GB"\n')
+    assert main(["submit", *words, "--dry-run"]) == 2
+    error = capsys.readouterr().err
+    assert expected in error and error.count("\n") == 1
+
+
+def test_shipped_campaigns_are_right(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DEMBARK_DECKS")
+    from dembark.validation.campaigns.spec import shipped
+
+    assert len(shipped()) >= 10
+    for name, path in shipped().items():
+        spec = read(path)
+        assert spec.name == name and spec.description and points(spec)
+        assert locate(name) == path.resolve()
+
+
+@given(st.integers(0, 400), st.integers(0, 23), st.integers(0, 59), st.integers(0, 59))
+def test_durations_add_up(days: int, hours: int, minutes: int, rest: int) -> None:
+    wanted = 86400 * days + 3600 * hours + 60 * minutes + rest
+    text = f"{days} d {hours}h {minutes} min {rest} s"
+    if wanted:
+        assert sizes.seconds(text) == wanted
+    else:
+        with pytest.raises(DembarkError):
+            sizes.seconds(text)
+
+
+@pytest.mark.parametrize("text", ["", " ", "s", "1", "1 m", "1 h 2", "1 h, 2 min", "nan s", "inf s", "1e3 s", "0 s"])
+def test_texts_that_are_no_duration(text: str) -> None:
+    with pytest.raises(DembarkError, match="no duration"):
+        sizes.seconds(text)
+
+
+@given(st.floats(1.0, 1e15))
+def test_sizes_are_written_as_they_are(count: float) -> None:
+    number, unit = sizes.size_text(count).split()
+    assert float(number) * {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9}[unit] == pytest.approx(count, rel=0.006, abs=0.5)

@@ -1,0 +1,191 @@
+"""Campaigns as users run them, with a stand-in for both engines: submitted, looked at, killed, resumed; nothing is lost or done twice."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from dembark.validation.campaigns import store
+from dembark.validation.campaigns.estimate import wall_clock
+from dembark.validation.campaigns.status import look
+from dembark.validation.cli import main
+from dembark.validation.files import lock, read_json
+from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
+
+pytestmark = pytest.mark.usefixtures("decks", "stand_in")
+
+CAMPAIGN = """
+[campaign]
+name = "boxes"
+description = "Boxes."
+profile = "quick"
+engines = ["liggghts"]
+retries = 2
+
+[[sweeps]]
+title = "Behaviours"
+case = "box"
+grid = { behaviour = ["kill", "exit", "ok"] }
+
+[[sweeps]]
+case = "box"
+variant = "wet"
+engines = ["yade"]
+replicas = 2
+grid = { grain_diameter = ["4 mm"] }
+
+[resources]
+memory = "10 MB"
+time = "1 min"
+restart_interval = "0.0001 s"
+"""
+
+
+def start(folder: Path, environment: dict[str, str], *words: str) -> subprocess.Popen[str]:  # noqa: F811
+    return subprocess.Popen([sys.executable, "-m", "dembark.validation.cli", *words], cwd=folder, env=environment,
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def dembark(folder: Path, environment: dict[str, str], *words: str) -> tuple[int, str, str]:  # noqa: F811
+    process = start(folder, environment, *words)
+    out, error = process.communicate(timeout=300)
+    assert "Traceback" not in error, error
+    return process.returncode, out, error
+
+
+def logs(results: Path) -> str:
+    return "".join((results / name).read_text() for name in ("workflow.log", "campaign.log") if (results / name).is_file())
+
+
+@pytest.fixture
+def signals() -> Iterator[None]:
+    """The handlers of signals are afterwards what they were."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("signals")
+def test_a_dry_run_says_what_it_will_cost_and_leaves_nothing(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "c.toml").write_text(CAMPAIGN)
+    assert main(["submit", "c.toml", "--dry-run", "--cores", "2"]) == 0
+    out = capsys.readouterr().out
+    rows = {tuple(line.split()[:3]): line.split()[3:] for line in out.splitlines() if line.startswith("box ")}
+    assert rows["box", "wet_grain_diameter=0.004", "yade"][:6] == ["2", "2", "1", "100", "0.001", "s"]
+    # 100 steps of 10 grains, five runs; 2e6 and 3e5 particle-steps a second for cases that nothing is known of.
+    assert "boxes: 5 runs; to do: 5e+03 particle-steps" in out and "yade 3e+05" in out and "liggghts 2e+06" in out
+    assert not (tmp_path / "results").exists()
+
+
+def test_faults_are_tried_again_and_a_changed_file_repeats_nothing(tmp_path: Path, environment: dict[str, str]) -> None:  # noqa: F811
+    (tmp_path / "c.toml").write_text(CAMPAIGN)
+    code, out, error = dembark(tmp_path, environment, "submit", "c.toml")
+    results = tmp_path / "results/campaigns/boxes"
+    assert code == 1 and "4 of 5 runs finished" in out and "not finished: box dry_behaviour=exit liggghts 1: " in out, error + logs(results)
+    attempts = {(run["variant"], run["replica"]): (run["state"], run["attempts"]) for run in store.read_runs(results)}
+    assert attempts == {("dry_behaviour=ok", 1): ("finished", 1), ("dry_behaviour=kill", 1): ("finished", 2),
+                        ("dry_behaviour=exit", 1): ("failed", None), ("wet_grain_diameter=0.004", 1): ("finished", 1),
+                        ("wet_grain_diameter=0.004", 2): ("finished", 1)}
+    assert re.search("kill liggghts 1: finished in .* in attempt 2", error)
+    # What failed by its own fault is remembered: the workflow asks three times, the engine starts once.
+    assert error.count("exit liggghts 1: FAILED") == 1
+    (told,) = (results / ".progress").glob("*.final")
+    assert "the engine ended with exit code 1" in read_json(told)["message"]
+    assert (results / "workflow.log").read_text().count("the engine ended with exit code 1") == 3
+    assert "box dry_behaviour=ok liggghts 1: finished in" in (results / "campaign.log").read_text()
+    state = look(results)
+    assert state.headline == "boxes: 4 of 5 done, 0 running, 0 waiting, 1 failed; nobody runs it now" and state.measured == 3
+    assert [row["value"] for row in store.read_quantities(results)] == [1, 1, 2]
+    assert {(row["variant"], row["value"]) for row in store.read(results, "points")} == {
+        *((f"dry_behaviour={word}", word) for word in ("kill", "exit", "ok")), ("wet_grain_diameter=0.004", 0.004)}
+    assert [sweep["title"] for sweep in read_json(results / "runs.json")["sweeps"]] == ["Behaviours", ""]
+    made = {path: path.stat().st_mtime_ns for path in results.glob("*/*/*/replica-*/run.json")}
+
+    # The faulty point is taken out, another comes in, the store is lost: only the new run is made, and the store is whole again.
+    changed = CAMPAIGN.replace('"exit", ', "").replace('["4 mm"]', '["4 mm", "5 mm"]')
+    (tmp_path / "c.toml").write_text(changed)
+    (results / "store.sqlite").unlink()
+    code, out, error = dembark(tmp_path, environment, "submit", "c.toml")
+    assert code == 0 and error.count("kept") == 4 and "6 of 6 runs finished" in out, error
+    assert {path: path.stat().st_mtime_ns for path in made} == made and {run["state"] for run in store.read_runs(results)} == {"finished"}
+    assert len(store.read_runs(results)) == 6 and len(store.read_quantities(results)) == 4
+    facts = read_json(results / "campaign.json")
+    assert (results / "campaign.toml").read_text() == changed and len(facts["submissions"]) == 2
+    assert facts["name"] == "boxes" and facts["submissions"][0]["file"] == str(tmp_path / "c.toml")
+    assert look(results).complete and str(results / "report.html") in out
+
+
+def test_a_folder_with_other_things_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "c.toml").write_text(CAMPAIGN)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/thesis.tex").touch()
+    for words, expected in ((("submit", "c.toml", "--out", "mine"), "not empty"), (("resume", "mine"), "no campaign's folder"),
+                            (("status", "mine"), "no campaign's folder"), (("submit", "c.toml", "--out", "c.toml"), "is a file"),
+                            (("export", "mine"), "there is no store"), (("report", "mine"), "no results in")):
+        assert main(list(words)) == 2
+        error = capsys.readouterr().err
+        assert expected in error and error.count("\n") == 1
+    assert os.listdir(tmp_path / "mine") == ["thesis.tex"]
+
+
+def test_a_campaign_goes_on_after_its_submitter_was_killed(
+        tmp_path: Path, environment: dict[str, str], wait_for: Callable[..., Any], engine_pid: Callable[[Path], int],  # noqa: F811
+        lives: Callable[[int], bool]) -> None:  # noqa: F811
+    head, _, _ = CAMPAIGN.partition('[[sweeps]]\ncase = "box"\nvariant')
+    text = head.replace('"kill", "exit", "ok"', '"hang", "ok"') + '[resources]\nrestart_interval = "0.0001 s"\n'
+    (tmp_path / "c.toml").write_text(text)
+    process = start(tmp_path, environment, "submit", "c.toml", "--out", "o", "--cores", "2")
+    results = tmp_path / "o"
+    wait_for(lambda: (results / "box/dry_behaviour=ok/liggghts/metrics.json").is_file(), 120)
+    pid = engine_pid(results / "box/dry_behaviour=hang")
+    state = look(results)
+    assert state.running and [one.state for one in state.states].count("running") == 1
+    process.kill()
+    _, error = process.communicate(timeout=90)
+    assert "Traceback" not in error
+    wait_for(lambda: not lives(pid))
+    time.sleep(0.5)
+    state = look(results)
+    assert not state.running and "nobody runs it now" in state.headline
+    record = results / "box/dry_behaviour=ok/liggghts/replica-1/run.json"
+    made = record.stat().st_mtime_ns
+
+    # It hangs only in its first attempt: when it goes on from a restart file it comes to its end. Another campaign does not get in between.
+    (tmp_path / "d.toml").write_text(text.replace('"boxes"', '"others"'))
+    code, out, error = dembark(tmp_path, environment, "resume", "o")
+    assert code == 0 and "2 of 2 runs finished" in out, error + logs(results)
+    assert record.stat().st_mtime_ns == made
+    assert [(run["state"], run["variant"]) for run in store.read_runs(results)].count(("finished", "dry_behaviour=hang")) == 1
+    assert len(store.read_runs(results)) == 2 and len(store.read_quantities(results)) == 2
+    code, _, error = dembark(tmp_path, environment, "submit", "d.toml", "--out", "o")
+    assert code == 2 and "belongs to the campaign boxes" in error
+
+
+@pytest.mark.usefixtures("signals")
+def test_two_submissions_of_one_campaign_do_not_mix(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "c.toml").write_text(CAMPAIGN)
+    with lock(tmp_path / "o/.lock", "held"):
+        assert main(["submit", "c.toml", "--out", "o"]) == 2
+    assert "is being run by another process" in capsys.readouterr().err and os.listdir(tmp_path / "o") == [".lock"]
+
+
+@pytest.mark.parametrize(("costs", "cores", "expected"), [
+    ([], 4, 0.0), ([(3.0, 1)], 1, 3.0), ([(3.0, 1)] * 4, 2, 6.0), ([(4.0, 2), (4.0, 2)], 2, 8.0), ([(1.0, 8)], 2, 1.0),
+    ([(5.0, 1), (3.0, 1), (2.0, 1)], 2, 5.0),
+])
+def test_time_on_some_cores(costs: list[tuple[float, int]], cores: int, expected: float) -> None:
+    assert wall_clock(costs, cores) == expected
