@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from dembark.postproc import ContactFrame, GrainFrame, profiles, stress
 from dembark.postproc.spheres import slice_volumes, volume
-from dembark.validation.checks.run import Replica, wall_friction
+from dembark.validation.checks.run import Replica, once, wall_friction
 from dembark.validation.statistics import Estimate, block_mean, steady_start
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
@@ -149,6 +149,7 @@ class Channel:
         return self.flow.sum(axis=1) / slab / (self.base_speed * bulk) - 1.0
 
 
+@once
 def read(replica: Replica) -> Channel:
     """Measure one run folder."""
     values = replica.parameters

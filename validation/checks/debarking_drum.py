@@ -86,6 +86,24 @@ class Drum:
         return np.asarray(rows.reshape(self.quarters, ROWS // 4).sum(axis=1))
 
 
+def contacts_in_window(given: Mapping[str, Any], impacts: Array) -> Array:
+    """Rows of `Replica.impacts` whose contact began in the measuring window."""
+    period = 2.0 * math.pi / given["drum_speed"]
+    begin = period * int(given["run_in"])
+    return impacts[(impacts[:, 2] >= begin) & (impacts[:, 2] < begin + int(given["revolutions"]) * period)]
+
+
+def quarters(given: Mapping[str, Any], impacts: Array) -> NDArray[np.int64]:
+    """Quarter of a revolution of each impact in the window, counted from its begin."""
+    turned = impacts[:, 2] * given["drum_speed"] / (2.0 * math.pi) - int(given["run_in"])
+    return np.minimum((4.0 * turned).astype(np.int64), 4 * int(given["revolutions"]) - 1)
+
+
+def angles(impacts: Array) -> Array:
+    """Place of each impact in degrees from the drum's lowest point; the shell turns about +y, so that point moves towards -x."""
+    return np.degrees(np.arctan2(-impacts[:, 8], -impacts[:, 10]))
+
+
 def read(replica: Replica) -> Drum:
     """The window of `replica`; DumpError when its files do not belong together."""
     given, times, impacts = replica.parameters, replica.times(), replica.impacts()
@@ -104,17 +122,16 @@ def read(replica: Replica) -> Drum:
         stored = np.concatenate([[stored[0]], stored])
     else:
         stored = stored[before - 1 :]
-    begin = period * int(given["run_in"])
-    impacts = impacts[(impacts[:, 2] >= begin) & (impacts[:, 2] < begin + turns * period) & (impacts[:, 6] >= given["impact_speed"])]
-    # The shell turns about +y, so its lowest point moves towards -x.
-    angle = np.degrees(np.arctan2(-impacts[:, 8], -impacts[:, 10]))
+    impacts = contacts_in_window(given, impacts)
+    impacts = impacts[impacts[:, 6] >= given["impact_speed"]]
+    quarter, angle = quarters(given, impacts), angles(impacts)
     return Drum(
         logs=logs, revolutions=turns, period=period, weight=total_weight(given), radius=radius,
         steps=int(times["step"][-1] - (times["step"][before - 1] if before else 0)),
         work=times["torque"][before:] * given["drum_speed"] * row, lost=change("dissipated_energy"), stored=stored,
         torque=times["torque"][before:], lift=times["shell_fz"][before:], impulse=change("impulse_sum"),
         pivots=change("pivots"), certificate=float(times["certificate"][-1]),
-        quarter=np.minimum((4.0 * (impacts[:, 2] - begin) / period).astype(np.int64), 4 * turns - 1), peak=impacts[:, 4],
+        quarter=quarter, peak=impacts[:, 4],
         angle=angle, shell=impacts[:, 1] < 0)
 
 
@@ -212,9 +229,19 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
         "The last revolution of the first load of each engine lies as an animation (GIF) among the figures beside the report.",
         f"{KOLESNIKOV.short}: {KOLESNIKOV.statement}",
     ]
+    if given["drum_radius"] is not None and given["drum_radius"] > 0.0:
+        remarks.append("The drum's radius is given, so the number of logs follows from it and the filling; log_count is not used.")
     if len(replicas) < 3:
         remarks.append("With fewer than three loads the intervals come from quarter revolutions within the run.")
     return found, _profiles(drums, limit), remarks
+
+
+def fields(replicas: Sequence[Replica], found: Sequence[Quantity]) -> Any:
+    """Power of the impacts over the cross-section and along the shell, with quantities drawn from them."""
+    from dembark.validation.checks.fields_drum import measure
+
+    del found
+    return measure(replicas)
 
 
 def _profiles(drums: Sequence[Drum], limit: float) -> list[dict[str, Any]]:

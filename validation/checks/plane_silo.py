@@ -12,7 +12,6 @@ from typing import Any
 from dembark.validation.checks.column import read
 from dembark.validation.checks.quantity import Quantity
 from dembark.validation.checks.run import Replica
-from dembark.validation.checks.silo import picture as picture_of_a_silo
 from dembark.validation.checks.silo import results
 from dembark.validation.references import JANSSEN, WALKER
 
@@ -21,7 +20,7 @@ REFERENCES = (JANSSEN, WALKER)
 
 def picture(parameters: dict[str, Any]) -> dict[str, Any]:
     """How the report shows the packing: as it is, since nothing hides its inside but its own front."""
-    return {**picture_of_a_silo(parameters), "cut": False}
+    return {"colour_by": "force", "scale": parameters["gravity"], "cut": False}
 
 
 def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[str, Any]], list[str]]:

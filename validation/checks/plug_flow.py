@@ -195,6 +195,13 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
     return found, _profiles(channels), remarks
 
 
+def fields(replicas: Sequence[Replica], found: Sequence[Quantity]) -> Any:
+    """Fields over width and height, with quantities drawn from them."""
+    from dembark.validation.checks.fields_channel import measure
+
+    return measure(replicas, next(one.reason for one in found if one.name == "core_flatness"))
+
+
 def _profiles(channels: Sequence[Channel]) -> list[dict[str, Any]]:
     first = channels[0]
     whole = [(np.ones(len(one.solid), bool), np.ones(one.solid.shape[2], bool)) for one in channels]

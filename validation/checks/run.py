@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from dembark.postproc import ContactsDump, DumpError, GrainsDump, read_times
@@ -14,6 +15,7 @@ from dembark.validation.statistics import ONE_SAMPLE, Estimate, block_count, jac
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Measured = TypeVar("Measured")
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,19 @@ class Replica:
             if one.step != other.step:
                 raise DumpError(f"{self.folder}: step {one.step} of grains.dump stands beside step {other.step} of contacts.dump")
             yield one, other
+
+
+def once(read: Callable[[Replica], Measured]) -> Callable[[Replica], Measured]:
+    """`read(replica)`, done once for each Replica object: the quantities of a case and its fields share what was read."""
+
+    @wraps(read)
+    def kept(replica: Replica) -> Measured:
+        found = replica.__dict__.setdefault("_read", {})
+        if read not in found:
+            found[read] = read(replica)
+        return found[read]
+
+    return kept
 
 
 def wall_friction(parameters: Mapping[str, Any]) -> float:

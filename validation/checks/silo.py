@@ -76,7 +76,7 @@ def _scalars(column: Column) -> dict[str, Estimate]:
 
 def picture(parameters: Mapping[str, Any]) -> dict[str, Any]:
     """How the report shows the packing."""
-    return {"colour_by": "force", "scale": parameters["gravity"], "cut": True}
+    return {"colour_by": "stress", "scale": 1e3, "cut": True, "radius": parameters["cylinder_radius"]}
 
 
 def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[str, Any]], list[str]]:
@@ -84,6 +84,13 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
     remarks = [f"{one.short}: {one.statement}" for one in (LANDRY, CAMBAU)]
     found, drawn, said = results([read(replica) for replica in replicas], "R", "r")
     return found, drawn, [said[0], *remarks, *said[1:]]
+
+
+def fields(replicas: Sequence[Replica], found: Sequence[Quantity]) -> Any:
+    """Fields over radius and height, with quantities drawn from them."""
+    from dembark.validation.checks.fields_silo import measure
+
+    return measure(replicas, {one.name: one for one in found}, TOLERANCE, BALANCE_TOLERANCE)
 
 
 def results(columns: Sequence[Column], length: str, across: str) -> tuple[list[Quantity], list[dict[str, Any]], list[str]]:

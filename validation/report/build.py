@@ -6,15 +6,17 @@ import base64
 import logging
 import os
 import re
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from dembark.postproc import DumpError
 from dembark.validation.errors import RunError
-from dembark.validation.files import disk_error
-from dembark.validation.report import cross_section, figures, numbers, pictures
+from dembark.validation.files import disk_error, write_json
+from dembark.validation.report import cross_section, fields, figures, numbers, pictures, verification
 from dembark.validation.report.gather import Page, gather, studies
+from dembark.validation.verification.item import Item
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup, escape
 from matplotlib.figure import Figure
@@ -37,22 +39,23 @@ def build(results_profile_folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         for old in folder.iterdir():
             old.unlink()
-        html = _environment().get_template("template.html.j2").render(_context(results_profile_folder, pages, folder))
-        _write_pdf(html, results_profile_folder / "report.pdf")
-        return _write(results_profile_folder / "report.html", html.encode())
+        html = environment().get_template("template.html.j2").render(_context(results_profile_folder, pages, folder))
+        write_pdf(html, results_profile_folder / "report.pdf")
+        return write_whole(results_profile_folder / "report.html", html.encode())
     except OSError as error:
         raise disk_error(error, results_profile_folder) from None
 
 
-def _environment() -> Environment:
-    environment = Environment(
-        loader=FileSystemLoader(_HERE),
+def environment(*folders: Path) -> Environment:
+    """Templates of the report, and those in `folders`, with its filters and functions."""
+    found = Environment(
+        loader=FileSystemLoader([*folders, _HERE]),
         autoescape=select_autoescape(["html", "j2"]),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {
+    found.filters |= {
         "plain": numbers.plain,
         "compact": numbers.compact,
         "subscripts": _subscripts,
@@ -60,8 +63,8 @@ def _environment() -> Environment:
         "duration": numbers.duration,
         "engine": figures.engine_name,
     }
-    environment.globals |= {"signs": _SIGNS, "estimate": numbers.with_interval, "colour": figures.colour, "machine": _machine}
-    return environment
+    found.globals |= {"signs": _SIGNS, "estimate": numbers.with_interval, "colour": figures.colour}
+    return found
 
 
 def _subscripts(text: str) -> Markup:
@@ -69,7 +72,8 @@ def _subscripts(text: str) -> Markup:
     return Markup(re.sub(r"\b([σρμKv])_([a-z]+)", r"\1<sub>\2</sub>", str(escape(text))))
 
 
-def _write(path: Path, content: bytes) -> Path:
+def write_whole(path: Path, content: bytes) -> Path:
+    """Write a file so that it is the old or the whole new one."""
     part = path.with_name(f".{path.name}.part-{os.getpid()}")
     try:
         part.write_bytes(content)
@@ -79,16 +83,27 @@ def _write(path: Path, content: bytes) -> Path:
     return path
 
 
-def _write_pdf(html: str, path: Path) -> None:
+def write_pdf(html: str, path: Path) -> None:
+    """Lay out the document as PDF; without Pango, which no Python package brings along, there is none, and a line says so."""
     # Its log speaks of CSS meant for screens, which is no news to anybody.
     logging.getLogger("weasyprint").setLevel(logging.ERROR)
     logging.getLogger("fontTools").setLevel(logging.ERROR)
-    from weasyprint import HTML
+    try:
+        from weasyprint import HTML
+    except OSError as error:
+        path.unlink(missing_ok=True)
+        reason = " ".join(str(error).split())[:120]
+        print(f"dembark: no {path.name}, for Pango is missing ({reason}); report.html holds the same", file=sys.stderr)
+        return
+    write_whole(path, HTML(string=html, base_url=str(_HERE)).write_pdf())
 
-    _write(path, HTML(string=html, base_url=str(_HERE)).write_pdf())
+
+def style() -> Markup:
+    """The style sheet of the reports."""
+    return Markup((_HERE / "style.css").read_text(encoding="utf-8"))
 
 
-def _embed(figure: Figure, folder: Path, name: str, alt: str) -> Markup:
+def embed(figure: Figure, folder: Path, name: str, alt: str) -> Markup:
     """The figure as an image inside the document, and as a file beside its data."""
     data = figures.svg(figure)
     (folder / f"{name}.svg").write_bytes(data)
@@ -125,7 +140,9 @@ def overview(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _context(results: Path, pages: list[Page], folder: Path) -> dict[str, Any]:
-    rows = list(checks(pages))
+    items = verification.compute()
+    rows = [*checks(pages), *verification.rows(items)]
+    write_json(results / "verification.json", {"quantities": [quantity.as_json() for item in items for quantity in item.quantities]})
     counts = {verdict: sum(row["verdict"] == verdict for row in rows) for verdict in _SIGNS}
     groups: dict[str, list[Any]] = {}
     for page in pages:
@@ -175,6 +192,9 @@ def _context(results: Path, pages: list[Page], folder: Path) -> dict[str, Any]:
             for row in rows
         ),
     )
+    provenance = [
+        (page, engine, metrics["provenance"]) for page in pages if not page.is_study for engine, metrics in sorted(page.metrics.items())
+    ]
     return {
         "profile": results.name,
         "rows": rows,
@@ -182,17 +202,31 @@ def _context(results: Path, pages: list[Page], folder: Path) -> dict[str, Any]:
         "counts": counts,
         "summary": summary(counts, pages),
         "verdict": "fail" if counts["fail"] or counts["missing"] else "pass",
-        "scatter": _embed(
+        "scatter": embed(
             figures.scatter_figure(groups), folder, "scatter", "all quantities: measured against reference, and bias and scatter"
         ),
         "pages": [_page(page, pages, folder) for page in pages],
-        "style": Markup((_HERE / "style.css").read_text(encoding="utf-8")),
+        "verification": [_item(item, folder) for item in items],
+        "instruments": verification.from_runs(pages),
+        "style": style(),
         "references": list(
             {one["short"]: one for page in pages for metrics in page.metrics.values() for one in metrics.get("references", [])}.values()
         ),
-        "provenance": [
-            (page, engine, metrics["provenance"]) for page in pages if not page.is_study for engine, metrics in sorted(page.metrics.items())
-        ],
+        "provenance": provenance,
+        "machine": machine((engine, facts) for _, engine, facts in provenance),
+    }
+
+
+def _item(item: Item, folder: Path) -> dict[str, Any]:
+    """An item of the verification chapter for the template; the data of its figure are written beside the report."""
+    figure = verification.figure(item)
+    if figure is not None:
+        figures.write_csv(folder / f"verification-{item.name}.csv", *verification.table(item))
+    return {
+        "item": item,
+        "quantities": [quantity.as_json() for quantity in item.quantities],
+        "image": figure and embed(figure, folder, f"verification-{item.name}", item.title),
+        "csv": f"verification-{item.name}.csv",
     }
 
 
@@ -222,6 +256,7 @@ def _page(page: Page, pages: list[Page], folder: Path) -> dict[str, Any]:
     for name in names:
         of_engine = {engine: one for engine, found in profiles.items() for one in found if one["name"] == name}
         figures.write_csv(folder / f"{page.anchor}-{name}.csv", *figures.profile_table(of_engine))
+    of_fields, unread = _fields(page, folder)
     quantities = list(dict.fromkeys(one["name"] for metrics in page.metrics.values() for one in metrics["quantities"]))
     table = [
         {
@@ -233,13 +268,15 @@ def _page(page: Page, pages: list[Page], folder: Path) -> dict[str, Any]:
     agreement = {one["name"]: one for one in (page.comparison or {}).get("quantities", [])}
     return {
         "page": page,
-        "picture": image and _embed(image, folder, f"{page.anchor}-packing", f"packings of {page.name}"),
+        "picture": image and embed(image, folder, f"{page.anchor}-packing", f"packings of {page.name}"),
         "picture_reasons": reasons,
-        "profiles": _embed(figures.profile_figure(profiles), folder, f"{page.anchor}-profiles", f"profiles of {page.name}")
+        "profiles": embed(figures.profile_figure(profiles), folder, f"{page.anchor}-profiles", f"profiles of {page.name}")
         if names
         else None,
         "bases": {engine: _bases(metrics) for engine, metrics in sorted(page.metrics.items())},
         "csv": [f"{page.anchor}-{name}.csv" for name in names],
+        "fields": of_fields,
+        "fields_unread": unread,
         "table": table,
         "agreement": agreement,
         "numerical": numerical,
@@ -253,6 +290,26 @@ def _page(page: Page, pages: list[Page], folder: Path) -> dict[str, Any]:
         ),
         "parameters": next(iter(page.metrics.values()), {}).get("parameters", {}),
     }
+
+
+def _fields(page: Page, folder: Path) -> tuple[list[dict[str, Any]], str]:
+    """The page's figures of fields, their data written beside the report; and why there are none although there is a file."""
+    try:
+        drawn = fields.figures(fields.read(page.folder, sorted(page.metrics)))
+    except (OSError, ValueError, KeyError, AttributeError) as error:
+        return [], f"fields.nc cannot be drawn: {error}"
+    for one in drawn:
+        for name, table in one.tables.items():
+            figures.write_csv(folder / f"{page.anchor}-fields-{name}.csv", *table)
+    return [
+        {
+            "title": one.title,
+            "image": embed(one.figure, folder, f"{page.anchor}-fields-{one.name}", f"{one.title}, {page.name}"),
+            "caption": one.caption,
+            "csv": [f"{page.anchor}-fields-{name}.csv" for name in one.tables],
+        }
+        for one in drawn
+    ], ""
 
 
 def _bases(metrics: dict[str, Any]) -> str:
@@ -285,15 +342,15 @@ def _scene(page: Page, engine: str) -> pictures.Scene | cross_section.Section | 
         return str(error)
 
 
-def _machine(provenance: list[tuple[Page, str, dict[str, Any]]]) -> list[tuple[str, str]]:
-    """Facts about code and machine; each once, with all values that occur."""
+def machine(provenance: Iterable[tuple[str, Mapping[str, Any]]]) -> list[tuple[str, str]]:
+    """Facts about code and machine from (engine, provenance) of all measurements; each once, with all values that occur."""
     found: dict[str, dict[str, None]] = {}
 
     def note(title: str, value: Any) -> None:
         if value not in (None, "", {}):
             found.setdefault(title, {})[str(value)] = None
 
-    for _, engine, facts in provenance:
+    for engine, facts in provenance:
         commit = facts.get("commit")
         note("commit", commit and commit + (" with changes that are not in it" if facts.get("dirty") else ""))
         for name, version in facts.get("versions", {}).items():

@@ -12,6 +12,7 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from dembark.postproc.style import STYLE
 from dembark.validation.statistics import Scatter, scatter
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
@@ -20,31 +21,6 @@ from matplotlib.ticker import NullFormatter
 COLOURS = {"liggghts": "#0072B2", "yade": "#D55E00"}
 MARKERS = {"liggghts": "o", "yade": "s"}
 _SPARE = ["#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
-_INK, _GRID = "#22262b", "#e3e6ea"
-_STYLE = {
-    "font.size": 7.5,
-    "axes.titlesize": 8.5,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.edgecolor": "#9aa1a9",
-    "axes.linewidth": 0.6,
-    "axes.labelcolor": _INK,
-    "text.color": _INK,
-    "xtick.color": "#555b63",
-    "ytick.color": "#555b63",
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "svg.hashsalt": "dembark",
-    "svg.fonttype": "path",
-    "axes.grid": True,
-    "grid.color": _GRID,
-    "grid.linewidth": 0.5,
-    "lines.linewidth": 1.3,
-    "axes.axisbelow": True,
-}
 
 
 def colour(engine: str) -> str:
@@ -68,7 +44,7 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) 
 def svg(figure: Figure) -> bytes:
     """The figure as SVG text, the same for the same data."""
     buffer = io.BytesIO()
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     return buffer.getvalue()
 
@@ -77,7 +53,7 @@ def profile_figure(profiles: Mapping[str, Sequence[dict[str, Any]]], columns: in
     """All profiles of a page in one figure, the engines over the reference; `profiles` holds each engine's list."""
     names = list(dict.fromkeys(one["name"] for of_engine in profiles.values() for one in of_engine))
     rows = max(1, math.ceil(len(names) / columns))
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         tall = 2.35 * rows + 0.35
         figure = Figure(figsize=(7.2, tall))
         # Fixed margins: long titles must not make the panels narrow.
@@ -106,7 +82,7 @@ def _panel(axes: Any, entries: Sequence[tuple[str, dict[str, Any]]], handles: di
             fill(place, _numbers(one["low"]), _numbers(one["high"]), color=paint, alpha=0.18, linewidth=0)
         (handle,) = axes.plot(value, place, color=paint) if one["vertical"] else axes.plot(place, value, color=paint)
         handles.setdefault(engine_name(engine), handle)
-    across, along = _symbols(first["across"]), _symbols(first["along"])
+    across, along = symbols(first["across"]), symbols(first["along"])
     axes.set(**({"xlabel": across, "ylabel": along} if first["vertical"] else {"xlabel": along, "ylabel": across}))
     labels = sorted({one["reference_label"] for _, one in entries if one.get("reference_label")})
     note = "; ".join([*labels, *([first["note"]] if first.get("note") else [])])
@@ -115,7 +91,7 @@ def _panel(axes: Any, entries: Sequence[tuple[str, dict[str, Any]]], handles: di
         axes.text(
             0.0,
             1.01,
-            _symbols(f"reference: {note}" if labels else note),
+            symbols(f"reference: {note}" if labels else note),
             transform=axes.transAxes,
             fontsize=5.8,
             color="#666c75",
@@ -129,7 +105,7 @@ def _panel(axes: Any, entries: Sequence[tuple[str, dict[str, Any]]], handles: di
         axes.set_ylim(min(0.0, low), high + 0.05 * (high - low))
 
 
-def _symbols(text: str) -> str:
+def symbols(text: str) -> str:
     return re.sub(r"([σρμKv])_([a-z]+)", r"$\\mathrm{\1_{\2}}$", text)
 
 
@@ -174,7 +150,7 @@ def statistics(found: Sequence[tuple[str, float, float, float, float]]) -> Scatt
 def scatter_figure(groups: Mapping[str, Sequence[tuple[str, float, float, float, float]]], tolerance: float = 0.10) -> Figure:
     """Measured against reference, all quantities on logarithmic axes; `groups` (by key: engine name or 'engines') of `pairs`."""
     everything = [one for group in groups.values() for one in group]
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 3.1), layout="constrained")
         axes, ratio = figure.subplots(1, 2, width_ratios=[1.0, 1.25])
         ends = [value for one in everything for value in one[1:3]] or [0.1, 10.0]

@@ -6,17 +6,22 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib
 import numpy as np
-from dembark.postproc import ContactsDump, GrainsDump
+from dembark.postproc import ContactFrame, ContactsDump, GrainFrame, GrainsDump
+from dembark.postproc.coarse_graining import WallContacts, rows_of
+from dembark.postproc.spheres import volume
+from dembark.postproc.walls import CylinderWall, PlaneWall, wall_contacts
 from dembark.validation.report.figures import engine_name
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 _MAP = "cividis"
 _TIMEOUT = 180
@@ -32,16 +37,22 @@ class Scene:
     label: str
 
 
-def scene(folder: Path, colour_by: str, scale: float, cut: bool) -> Scene:
+def scene(folder: Path, colour_by: str, scale: float, cut: bool, radius: float = 0.0) -> Scene:
     """The last frame of the run in `folder`.
 
-    `colour_by` is "velocity" (downward, over `scale` in m/s) or "force" (sum of the normal contact forces on a grain over the mean
-    weight of a grain, `scale` being gravity in m/s2); `cut` leaves out the half that is nearer to the eye.
+    `colour_by` is "velocity" (downward, over `scale` in m/s), "force" (sum of the normal contact forces on a grain over the mean
+    weight of a grain, `scale` being gravity in m/s2) or "stress" (pressure in a grain by its contacts with others, and with wall
+    and base of a silo of `radius` (m), over `scale` in Pa); `cut` leaves out the half that is nearer to the eye.
     """
     grains = GrainsDump(folder / "grains.dump")
     frame = grains[len(grains) - 1]
     if colour_by == "velocity":
         values, label = -frame.velocities[:, 2] / scale, "downward velocity v / v₀"
+    elif colour_by == "stress":
+        contacts = ContactsDump(folder / "contacts.dump")[len(grains) - 1]
+        walls = [wall_contacts(frame, wall) for wall in (CylinderWall("side", radius), PlaneWall("base"))] if radius else []
+        values = grain_pressure(frame, contacts, walls) / scale
+        label = "pressure in a grain" + (" (kPa)" if scale == 1e3 else f" / {scale:g} Pa")
     else:
         contacts = ContactsDump(folder / "contacts.dump")[len(grains) - 1]
         length = np.linalg.norm(contacts.branch, axis=1)
@@ -57,6 +68,20 @@ def scene(folder: Path, colour_by: str, scale: float, cut: bool) -> Scene:
         frame.positions[:, 2] <= free.max() + 3.0 * frame.radii.max()
     )
     return Scene(frame.wrapped[keep], frame.radii[keep], values[keep], label)
+
+
+def grain_pressure(frame: GrainFrame, contacts: ContactFrame, walls: Sequence[WallContacts] = ()) -> NDArray[np.float64]:
+    """Pressure (n,) in Pa in each grain: -1/3 of the sum of f . r over its contacts, over its volume, r from its centre to the contact;
+    compression positive."""
+    index = rows_of(frame.ids, contacts.ids, contacts.step)
+    # The contact lies where the two grains share the way between their centres by their radii.
+    share = frame.radii[index] / np.maximum(frame.radii[index].sum(axis=1), 1e-300)[:, None]
+    moment = -np.sum(contacts.forces * contacts.branch, axis=1)[:, None] * share
+    total = sum(np.bincount(index[:, side], moment[:, side], len(frame.ids)) for side in (0, 1))
+    for wall in walls:
+        _, row = cKDTree(frame.positions).query(wall.positions)
+        total = total - np.bincount(row, np.sum(wall.forces * (wall.points - wall.positions), axis=1), len(frame.ids))
+    return np.asarray(total / (3.0 * volume(frame.radii)))
 
 
 def picture(scenes: dict[str, Scene | str], height: float = 3.3) -> tuple[Figure | None, list[str]]:

@@ -8,12 +8,15 @@ import types
 
 import numpy as np
 import pytest
+import xarray
+from dembark.postproc.coarse_graining import WallContacts
 from dembark.validation import report
 from dembark.validation.compare import compare
 from dembark.validation.errors import RunError
 from dembark.validation.metrics import measure
-from dembark.validation.report import figures, numbers, pictures
-from dembark.validation.report.build import overview
+from dembark.validation.report import fields, figures, numbers, pictures
+from dembark.validation.report.build import _fields, overview
+from dembark.validation.verification import scenes
 from synthetic import plug_flow, silo
 
 
@@ -89,6 +92,61 @@ def test_every_profile_has_its_data_beside_it(results):
         own = [float(row["value"]) for row in rows if row["engine"] == "liggghts"]
         np.testing.assert_allclose(own, profile["value"])
     assert (results / "figures" / "scatter.csv").is_file()
+
+
+def test_fields_are_drawn_with_their_data_beside_them(results):
+    html = (results / "report.html").read_text()
+    assert "Fields over radius and height" in html and "Eulerian beside Lagrangian profiles" in html
+    rows = list(csv.DictReader((results / "figures" / "silo-dry-fields-section.csv").open()))
+    assert {row["engine"] for row in rows} == {"liggghts", "yade"}
+    fields = xarray.load_dataset(results / "silo" / "dry" / "yade" / "fields.nc", engine="h5netcdf")
+    place, stress = (np.array([float(row[name]) for row in rows if row["engine"] == "yade"]) for name in ("height_m", "sigma_zz_Pa"))
+    np.testing.assert_allclose(np.interp(place, fields.height, fields.stress_zz_section), stress)
+    assert (results / "figures" / "silo-dry-fields-maps.svg").is_file()
+
+
+def test_fields_that_cannot_be_drawn_are_no_silent_gap(tmp_path):
+    page = types.SimpleNamespace(folder=tmp_path, metrics={"yade": {}}, anchor="silo-dry", name="silo / dry")
+    assert _fields(page, tmp_path) == ([], "")
+    (tmp_path / "yade").mkdir()
+    (tmp_path / "yade" / "fields.nc").write_text("not NetCDF")
+    drawn, reason = _fields(page, tmp_path)
+    assert drawn == [] and reason.startswith("fields.nc cannot be drawn: ")
+
+
+def test_verification_is_a_chapter_and_its_verdicts_count(results):
+    html = (results / "report.html").read_text()
+    assert "Static balance" in html and 'href="#verification"' in html
+    own = {row["quantity"]: row["verdict"] for row in csv.DictReader((results / "figures" / "verdicts.csv").open()) if row["engine"] == "dembark"}
+    assert own["balance_order"] == own["mass_error"] == "pass"
+    written = json.loads((results / "verification.json").read_text())["quantities"]
+    assert {one["name"] for one in written} == own.keys()
+    assert (results / "figures" / "verification-balance.csv").is_file()
+
+
+def test_drum_is_drawn_without_a_single_impact_on_the_shell():
+    place, angle, force = np.array([-0.5, 0.5]), np.arange(-175.0, 180.0, 10.0), np.logspace(1.1, 5.9, 25)
+    none = np.zeros((len(angle), len(force)))
+    variables = {"impact_power": (("x", "z"), np.array([[0.0, 1.0], [2.0, 0.0]])), "shell_power": (("angle",), none[:, 0]),
+                 "shell_power_half": (("angle",), none[:, 0]), "shell_peaks": (("angle", "force"), none),
+                 **{name: (("log",), np.array([0.1])) for name in ("log_x", "log_z", "log_radius")}}
+    attributes = {"kind": "drum", "drum_radius": 1.0, "impact_speed": 0.1, "revolutions": 3, "replicas": 1, "impacts": 2, "log_length": 1.0}
+    one = xarray.Dataset(variables, {"x": place, "z": place, "angle": angle, "force": force}, attributes)
+    found, unrolled = fields.figures({"yade": one})
+    assert len(found.tables["power"][1]) == 4 and len(unrolled.tables["shell_power"][1]) == len(angle)
+    assert figures.svg(found.figure).startswith(b"<?xml") and figures.svg(unrolled.figure).startswith(b"<?xml")
+
+
+def test_pressure_in_a_grain_between_two_others():
+    """A row of three, pressed with the force F: F d over three volumes in the middle one, half of that at the ends."""
+    place = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    frame = scenes.grains(place, np.full(3, 0.5), low=-np.ones(3), high=np.full(3, 3.0))
+    pairs = np.array([[0, 1], [1, 2]])
+    links = scenes.contacts(place[pairs[:, 0]], np.tile([1.0, 0.0, 0.0], (2, 1)), np.tile([-6.0, 0.0, 0.0], (2, 1)), pairs)
+    middle = 6.0 * 1.0 / (3.0 * np.pi / 6.0)
+    np.testing.assert_allclose(pictures.grain_pressure(frame, links), [0.5 * middle, middle, 0.5 * middle])
+    wall = WallContacts(np.array([[-0.5, 0.0, 0.0]]), place[:1], np.array([[6.0, 0.0, 0.0]]))
+    np.testing.assert_allclose(pictures.grain_pressure(frame, links, [wall]), [middle, middle, 0.5 * middle])
 
 
 def test_nothing_to_report_is_an_error(tmp_path, monkeypatch):

@@ -1,0 +1,64 @@
+"""What an item of the verification chapter consists of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from dembark.validation.checks.quantity import Quantity
+from dembark.validation.statistics import Estimate
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Sums of some thousand terms of one sign, to round-off.
+ROUND_OFF = 1e-12
+# As for the studies of the impact scheme: an observed order of convergence against that of theory.
+ORDER_TOLERANCE = 0.1
+
+
+@dataclass(frozen=True)
+class Curve:
+    """`value` over `place`; `theory`: drawn as a thin dark line instead of points."""
+
+    label: str
+    place: Array
+    value: Array
+    theory: bool = False
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A plot of curves on logarithmic axes, or with a linear one along if `linear`."""
+
+    title: str
+    along: str
+    across: str
+    curves: Sequence[Curve]
+    linear: bool = False
+
+
+@dataclass(frozen=True)
+class Item:
+    """One thing that is verified: `text` says what is known and how it was tested."""
+
+    name: str
+    title: str
+    text: str
+    quantities: list[Quantity]
+    panels: list[Panel] = field(default_factory=list)
+    caption: str = ""
+
+
+def exact(name: str, label: str, error: float, source: str, *, tolerance: float = ROUND_OFF, detail: str = "", unit: str = "1") -> Quantity:
+    """An error that is due to be zero to `tolerance`."""
+    return Quantity(name, label, unit, Estimate(float(error), 0.0), reference=Estimate(0.0, 0.0), absolute=True, tolerance=tolerance,
+                    source=source, detail=detail, compared=False)
+
+
+def order(name: str, label: str, steps: Array, errors: Array, due: float, source: str, detail: str = "") -> Quantity:
+    """Observed order of convergence, the slope of ln(error) over ln(step), against the one of theory."""
+    slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
+    return Quantity(name, label, "1", Estimate(slope, 0.0), reference=Estimate(due, 0.0), absolute=True, tolerance=ORDER_TOLERANCE,
+                    source=source, detail=detail, compared=False)
