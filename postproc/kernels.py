@@ -68,12 +68,17 @@ class Kernel:
             return 105.0 / (16.0 * np.pi * self.width**3) * (1.0 + 3.0 * share) * (1.0 - share) ** 3
         return np.where(share < 1.0, 3.0 / (4.0 * np.pi * self.width**3), 0.0)
 
-    def panels(self, length: float) -> int:
-        """Into how many panels, with three Gauss points each, a line of `length` (m) is cut for its line integral.
+    @property
+    def nodes_per_panel(self) -> int:
+        """Gauss points of each panel of a line integral."""
+        return 4 if self.name == "gaussian" else 3
 
-        A panel is at most a width long for the Gaussian, half of one for Lucy's kernel, a quarter for Heaviside's; at most MAX_PANELS.
+    def panels(self, length: float) -> int:
+        """Into how many panels a line of `length` (m) is cut for its line integral.
+
+        A panel is at most 1.25 widths long for the Gaussian, half of one for Lucy's kernel, a quarter for Heaviside's; at most MAX_PANELS.
         """
-        per_width = {"gaussian": 1.0, "lucy": 2.0, "heaviside": 4.0}[self.name]
+        per_width = {"gaussian": 0.8, "lucy": 2.0, "heaviside": 4.0}[self.name]
         return int(np.clip(np.ceil(per_width * length / self.width * (1.0 - 1e-9)), 1, MAX_PANELS))
 
     def nodes_per_cell(self, grid: Grid) -> int:
@@ -92,7 +97,7 @@ def line_nodes(kernel: Kernel, length: float) -> tuple[Array, Array]:
     if length == 0.0:
         return np.array([0.0]), np.array([1.0])
     count = kernel.panels(length)
-    place, weight = unit_gauss(3)
+    place, weight = unit_gauss(kernel.nodes_per_panel)
     return (np.arange(count)[:, None] + place).ravel() / count, np.tile(weight, count) / count
 
 

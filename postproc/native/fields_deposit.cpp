@@ -1,6 +1,7 @@
 #include "fields_deposit.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <thread>
@@ -58,7 +59,9 @@ void add_images(const Cells& cells, const Box& box, const Kernel& kernel, const 
     const Place place = place_of(lines, box, image);
     const double a = place.first[axis], b = a + place.branch[axis];
     const double low = cells.low[axis] - (std::max(a, b) + kernel.reach), high = cells.high[axis] - (std::min(a, b) - kernel.reach);
-    if (!box.periodic[axis]) {
+    if (box.folded[axis]) {
+      from[axis] = to[axis] = -int(std::floor((a - box.home[axis]) / box.edge[axis][axis]));
+    } else if (!box.periodic[axis]) {
       from[axis] = 0;
       to[axis] = low < 0.0 && high > 0.0 ? 0 : -1;
     } else {
@@ -269,6 +272,81 @@ class Worker {
   std::vector<Window> windows_;
 };
 
+// A grid that is wider than `inner` by `halo` cells on both sides: what leaves a periodic grid is caught there and added on the other
+// side, which saves spreading the images of all lines near a border.
+struct Wide {
+  Cells cells;
+  Box box;
+  int halo[3] = {0, 0, 0};
+
+  Wide(const Cells& inner, const Box& around, const Kernel& kernel, const Lines& lines, int threads) : cells(inner), box(around) {
+    // Across a sheared border the cells do not meet; a spherical kernel is normalised over its window, wherever that is.
+    const bool sheared = box.edge[1][0] != 0.0 || box.edge[2][0] != 0.0 || box.edge[2][1] != 0.0;
+    if (sheared || kernel.kind != KernelKind::gaussian || lines.count == 0) return;
+    const std::array<double, 3> longest = reach_of_branches(lines, threads);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!inner.periodic[axis] || !box.periodic[axis]) continue;
+      halo[axis] = int(std::ceil((kernel.reach + longest[std::size_t(axis)]) / inner.spacing[axis])) + 1;
+      box.folded[axis] = true;
+      box.home[axis] = inner.low[axis];
+      cells.low[axis] -= halo[axis] * inner.spacing[axis];
+      cells.high[axis] += halo[axis] * inner.spacing[axis];
+      cells.shape[axis] += 2 * halo[axis];
+    }
+  }
+
+  bool any() const { return halo[0] || halo[1] || halo[2]; }
+
+  // Adds `wide` (this grid) to `out` (the inner one), each with `columns`; the planes of `out` are shared among the threads.
+  void fold(const Cells& inner, int columns, int threads, const double* wide, double* out) const {
+    const auto home = [&](int axis, int cell) {
+      const int count = inner.shape[axis];
+      return ((cell - halo[axis]) % count + count) % count;
+    };
+    const std::size_t depth = std::size_t(cells.shape[2]), inner_depth = std::size_t(inner.shape[2]);
+    std::vector<std::size_t> place(depth);
+    for (std::size_t k = 0; k < depth; ++k) place[k] = std::size_t(home(2, int(k)));
+    on_threads(threads, [&](int n) {
+      const Range range(inner.shape[0], n, threads);
+      for (int i = 0; i < cells.shape[0]; ++i) {
+        const int x = home(0, i);
+        if (x < range.begin || x >= range.end) continue;
+        for (int j = 0; j < cells.shape[1]; ++j) {
+          const double* from = wide + (std::size_t(i) * cells.shape[1] + j) * columns * depth;
+          double* to = out + (std::size_t(x) * inner.shape[1] + home(1, j)) * columns * inner_depth;
+          for (int c = 0; c < columns; ++c, from += depth, to += inner_depth)
+            for (std::size_t k = 0; k < depth; ++k) to[place[k]] += from[k];
+        }
+      }
+    });
+  }
+
+ private:
+  static std::array<double, 3> reach_of_branches(const Lines& lines, int threads) {
+    if (!lines.branch) return {0.0, 0.0, 0.0};
+    std::vector<std::array<double, 3>> parts(std::size_t(threads), {0.0, 0.0, 0.0});
+    on_threads(threads, [&](int n) {
+      const Range range(lines.count, n, threads);
+      for (std::int64_t at = 3 * range.begin; at < 3 * range.end; at += 3)
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          parts[std::size_t(n)][axis] = std::max(parts[std::size_t(n)][axis], std::abs(lines.branch[at + std::int64_t(axis)]));
+    });
+    for (const auto& part : parts)
+      for (std::size_t axis = 0; axis < 3; ++axis) parts[0][axis] = std::max(parts[0][axis], part[axis]);
+    return parts[0];
+  }
+};
+
+template <class Source>
+void deposit_on(const Cells& cells, const Box& box, const Kernel& kernel, const Nodes& nodes, const Lines& lines, const Source& source,
+                int threads, double* out) {
+  const Sorted sorted = sort_images(cells, box, kernel, lines, threads);
+  const int count = std::clamp(threads, 1, cells.shape[0]);
+  const std::vector<int> bounds = slabs(sorted, count);
+  std::vector<Worker<Source>> workers(std::size_t(count), Worker<Source>(cells, box, kernel, nodes, lines, source, sorted, out));
+  on_threads(count, [&](int n) { workers[std::size_t(n)].run(bounds[std::size_t(n)], bounds[std::size_t(n) + 1]); });
+}
+
 }  // namespace
 
 const char* instruction_set() {
@@ -283,11 +361,13 @@ const char* instruction_set() {
 template <class Source>
 void deposit(const Cells& cells, const Box& box, const Kernel& kernel, const Nodes& nodes, const Lines& lines, const Source& source,
              int threads, double* out) {
-  const Sorted sorted = sort_images(cells, box, kernel, lines, std::max(1, threads));
-  const int count = std::clamp(threads, 1, cells.shape[0]);
-  const std::vector<int> bounds = slabs(sorted, count);
-  std::vector<Worker<Source>> workers(std::size_t(count), Worker<Source>(cells, box, kernel, nodes, lines, source, sorted, out));
-  on_threads(count, [&](int n) { workers[std::size_t(n)].run(bounds[std::size_t(n)], bounds[std::size_t(n) + 1]); });
+  threads = std::max(1, threads);
+  if constexpr (Source::placed) return deposit_on(cells, box, kernel, nodes, lines, source, threads, out);
+  const Wide wide(cells, box, kernel, lines, threads);
+  if (!wide.any()) return deposit_on(cells, box, kernel, nodes, lines, source, threads, out);
+  std::vector<double> sums(std::size_t(wide.cells.shape[0]) * wide.cells.shape[1] * wide.cells.shape[2] * source.columns, 0.0);
+  deposit_on(wide.cells, wide.box, kernel, nodes, lines, source, threads, sums.data());
+  wide.fold(cells, source.columns, threads, sums.data(), out);
 }
 
 template void deposit(const Cells&, const Box&, const Kernel&, const Nodes&, const Lines&, const PlainSource&, int, double*);

@@ -12,6 +12,9 @@ namespace dembark::fields {
 struct Box {
   double edge[3][3];
   bool periodic[3];
+  // Along these axes one image of each line counts, the one that begins at or above `home`.
+  bool folded[3] = {false, false, false};
+  double home[3] = {0.0, 0.0, 0.0};
 };
 
 // Lines from `first` (count, 3) to `first + branch` (count, 3), or points where `branch` is null.

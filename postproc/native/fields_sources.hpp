@@ -26,6 +26,7 @@ inline void product(const double a[3], const double b[3], double factor, double*
 }
 
 struct PlainSource {
+  static constexpr bool placed = false;  // whether what it carries depends on where an image is
   int columns;
   const double* values;  // (count, columns)
 
@@ -35,6 +36,7 @@ struct PlainSource {
 };
 
 struct GrainSource {
+  static constexpr bool placed = true;
   static constexpr int columns = grain_columns;
   const double *masses, *radii, *velocities, *peculiar, *touches, *liquid;  // (n,), (n,), (n, 3), (n, 3), (n,), (n,) or null
   double middle[3];
@@ -62,6 +64,7 @@ struct GrainSource {
 };
 
 struct ContactSource {
+  static constexpr bool placed = false;
   static constexpr int columns = contact_columns;
   const double *branch, *forces;                 // (m, 3)
   const std::int64_t* pairs;                     // (m, 2): rows of the grains

@@ -204,7 +204,8 @@ inline void spread_gaussian(const Cells& cells, const Kernel& kernel, const Node
   const int *start = group.all.start, *count = group.all.count, columns = group.columns, lines = group.count;
   const long depth = cells.shape[2], stride = factors.stride[2];
   const int begin = from > start[0] ? from : start[0], end = to < start[0] + count[0] ? to : start[0] + count[0];
-  const auto fill = nodes.count == 1 ? plane_rows<1> : nodes.count == 3 ? plane_rows<3> : plane_rows<0>;
+  constexpr decltype(&plane_rows<0>) fills[] = {plane_rows<0>, plane_rows<1>, plane_rows<2>, plane_rows<3>, plane_rows<4>};
+  const auto fill = fills[nodes.count <= 4 ? nodes.count : 0];
   // As many columns at once as registers hold.
   constexpr int at_once = LANES == 8 ? 20 : 8;
   for (int i = begin; i < end; ++i) {
