@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from dembark.validation.campaigns.report import against as other
 from dembark.validation.campaigns.report import figures, tables
 from dembark.validation.campaigns.report.gather import Campaign, gather
-from dembark.validation.campaigns.report.sweeps import Sweep, numerical_errors, words
+from dembark.validation.campaigns.report.sweeps import Point, Sweep, numerical_errors, words
 from dembark.validation.errors import RunError
 from dembark.validation.files import disk_error
 from dembark.validation.report import figures as shared
@@ -47,12 +47,13 @@ def _context(campaign: Campaign, drawn: Path) -> dict[str, Any]:
     shared.write_csv(drawn / "scatter.csv",
                      ("kind", "quantity", "measured", "reference", "relative_half_width", "reference_relative_half_width"),
                      ([key, *one] for key, group in groups.items() for one in group))
-    verdicts = [one["verdict"] for content in campaign.contents for one in content["quantities"] if one["tolerance"] is not None]
+    judged = [*campaign.contents, *campaign.comparisons]
+    verdicts = [one["verdict"] for content in judged for one in content["quantities"] if one["tolerance"] is not None]
     return {
         "campaign": campaign,
         "counts": {kind: verdicts.count(kind) for kind in ("pass", "fail", "info")} | {"missing": len(campaign.missing)},
         "scatter": embed(shared.scatter_figure(groups), drawn, "scatter", "all quantities: measured against reference, bias and scatter"),
-        "sweeps": [_sweep(sweep, drawn) for sweep in campaign.sweeps],
+        "sweeps": [_sweep(sweep, campaign, drawn) for sweep in campaign.sweeps],
         "errors": numerical_errors(campaign.sweeps),
         "runs": campaign.contents,
         "machine": machine([(content["engine"], content["provenance"]) for content in campaign.contents]),
@@ -72,12 +73,13 @@ def _pairs(campaign: Campaign) -> dict[str, list[Any]]:
     return {key: groups[key] for key in sorted(groups, key=lambda key: (key == "engines", key))}
 
 
-def _sweep(sweep: Sweep, drawn: Path) -> dict[str, Any]:
+def _sweep(sweep: Sweep, campaign: Campaign, drawn: Path) -> dict[str, Any]:
     quantities = sweep.quantities()
     chosen, name = quantities[:_PANELS], sweep.name
     tables.write_table_csv(drawn / f"{name}.csv", sweep)
     write_whole(drawn / f"{name}.tex", tables.latex(sweep, quantities).encode())
     study = figures.study_figure(sweep, chosen)
+    compared = {one["variant"]: one for one in campaign.comparisons if one["case"] == sweep.case}
     maps = {engine: figures.map_figure(sweep, engine, chosen) for engine in sweep.engines}
     return {
         "sweep": sweep,
@@ -85,18 +87,18 @@ def _sweep(sweep: Sweep, drawn: Path) -> dict[str, Any]:
         "left_out": len(quantities) - len(chosen),
         "study": study and embed(study, drawn, f"{name}-study", f"quantities along {sweep.along}"),
         "maps": [embed(figure, drawn, f"{name}-map-{engine}", f"maps of {engine}") for engine, figure in maps.items() if figure],
-        "verdicts": [_verdicts(sweep, point) for point in sweep.points],
+        "verdicts": [_verdicts(sweep, point, compared.get(point.variant)) for point in sweep.points],
     }
 
 
-def _verdicts(sweep: Sweep, point: Any) -> dict[str, Any]:
-    counted = {}
-    for engine, metrics in sorted(point.metrics.items()):
-        found = [one["verdict"] for one in metrics["quantities"] if one["tolerance"] is not None]
-        counted[engine] = {kind: found.count(kind) for kind in ("pass", "fail", "info")}
-    failed = [f"{shared.engine_name(engine)}: {one['label']}" for engine, metrics in sorted(point.metrics.items())
-              for one in metrics["quantities"] if one["tolerance"] is not None and one["verdict"] == "fail"]
-    return {"values": {axis: point.values[axis] for axis in sweep.axes}, "counts": counted, "failed": failed}
+def _verdicts(sweep: Sweep, point: Point, comparison: Mapping[str, Any] | None) -> dict[str, Any]:
+    """One line of the table of checks: numbers of verdicts of each engine and of the engines against each other, and what failed."""
+    groups = {shared.engine_name(engine): metrics for engine, metrics in sorted(point.metrics.items())}
+    groups |= {"against each other": comparison} if comparison else {}
+    judged = {name: [one for one in content["quantities"] if one["tolerance"] is not None] for name, content in groups.items()}
+    counts = {name: {kind: sum(one["verdict"] == kind for one in found) for kind in ("pass", "fail", "info")} for name, found in judged.items()}
+    failed = [f"{name}: {one['label']}" for name, found in judged.items() for one in found if one["verdict"] == "fail"]
+    return {"values": {axis: point.values[axis] for axis in sweep.axes}, "counts": counts, "failed": failed}
 
 
 def _comparison(campaign: Campaign, against: Path | None, drawn: Path) -> dict[str, Any]:

@@ -19,7 +19,7 @@ _MARKS = ["o", "s", "D", "^", "v", "P", "X"]
 COLUMNS = 3
 
 
-def _panels(count: int, height: float = 2.3) -> tuple[Figure, list[Any]]:
+def _panels(count: int, height: float = 1.95) -> tuple[Figure, list[Any]]:
     rows = max(1, math.ceil(count / COLUMNS))
     tall = height * rows + 0.5
     figure = Figure(figsize=(7.2, tall))
@@ -71,7 +71,7 @@ def _bars(line: Sequence[tuple[float, Mapping[str, Any]]]) -> np.ndarray[Any, An
 def _title(quantity: Mapping[str, Any]) -> str:
     unit = "" if quantity["unit"] == "1" else f" ({quantity['unit']})"
     text = quantity["label"]
-    return symbols((text if len(text) <= 46 else quantity["name"].replace("_", " ")) + unit)
+    return symbols((text if len(text) + len(unit) <= 34 else quantity["name"].replace("_", " ")) + unit)
 
 
 def map_axes(sweep: Sweep) -> tuple[str, str] | None:
@@ -91,7 +91,7 @@ def map_figure(sweep: Sweep, engine: str, quantities: Sequence[Mapping[str, Any]
     across, down = axes_names
     columns, rows = sweep.levels(across), sweep.levels(down)
     with matplotlib.rc_context(STYLE | {"axes.grid": False}):
-        figure, panels = _panels(len(quantities), 0.95 + 0.32 * len(rows) if len(rows) > 3 else 2.1)
+        figure, panels = _panels(len(quantities), min(1.95, 0.95 + 0.32 * len(rows)))
         for axes, quantity in zip(panels, quantities, strict=True):
             values = np.full((len(rows), len(columns)), np.nan)
             failed = []
