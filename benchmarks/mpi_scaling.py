@@ -154,7 +154,8 @@ def rows(points: Iterable[Point]) -> list[list[str]]:
 def markdown(points: Iterable[Point], facts: dict[str, object]) -> str:
     """The table with what it was measured on."""
     lines = ["| " + " | ".join(HEADS) + " |", "|" + " --- |" * len(HEADS), *("| " + " | ".join(row) + " |" for row in rows(points))]
-    machine = f"{facts['date']}, {facts['cpu']}, {facts['cores']} cores, load {facts['load']:.1f} before and {facts['load_after']:.1f} after"
+    load = f"load {facts['load']:.1f} before and {facts['load_after']:.1f} after"
+    machine = f"{facts['date']}, {facts['cpu']}, {facts['cores']} cores, {load}"
     return "\n".join([*lines, "", f"Processor time, medians of {facts['rounds']} samples. {machine}.", ""])
 
 
@@ -162,7 +163,8 @@ def parsed(words: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.mpi_scaling", description=__doc__)
     cores = len(os.sched_getaffinity(0))
     parser.add_argument("--grains", type=int, nargs="+", default=[2500, 20000], help="2500, 20000, or 20000 times a square")
-    parser.add_argument("--cores", type=int, nargs="+", help="ranks (LIGGGHTS) and threads (YADE)", default=[2**k for k in range(cores.bit_length()) if 2**k <= cores])
+    powers = [2**k for k in range(cores.bit_length()) if 2**k <= cores]
+    parser.add_argument("--cores", type=int, nargs="+", help="ranks (LIGGGHTS) and threads (YADE)", default=powers)
     parser.add_argument("--engine", choices=["liggghts", "yade"], action="append")
     parser.add_argument("--rounds", type=int, default=3, help="samples of each")
     parser.add_argument("--relax", type=int, default=100, help="steps before the timed ones (a tenth in YADE)")

@@ -13,7 +13,8 @@ from pathlib import Path
 from dembark.validation import cases, engines, provenance
 from dembark.validation.errors import DembarkError
 
-_PACKAGES = ("numpy", "scipy", "MDAnalysis", "snakemake", "typer", "rich", "pint", "jinja2", "matplotlib", "weasyprint", "pyvista")
+_PACKAGES = ("numpy", "scipy", "MDAnalysis", "snakemake", "snakemake-executor-plugin-slurm", "typer", "rich", "pint", "jinja2", "matplotlib",
+             "weasyprint", "pyvista", "xarray", "h5netcdf", "h5py")
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,7 @@ def examine() -> list[Finding]:
         *(_asked(what, lambda name=name: _engine(name)) for name, what in engines.NAMES.items()),
         _asked("cases", _decks),
         Finding("mpirun", mpirun, False, "install openmpi-bin to use --ranks"),
+        Finding("Slurm", shutil.which("sbatch"), False, "only a cluster has it; campaigns run here without it"),
         Finding("commit", commit["commit"] and commit["commit"][:12] + (" with changes" if commit["dirty"] else ""), False,
                 "not a Git checkout: results will not name a commit"),
         Finding("machine", f"{os.cpu_count()} cores, {free >> 30} GB free in this folder", False),

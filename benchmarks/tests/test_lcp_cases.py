@@ -50,4 +50,4 @@ def test_small_measurement(tmp_path):
     assert measure(tmp_path, 1, wall=False, say=lambda line: None, quick=True) == []
     text = (tmp_path / "lcp.md").read_text(encoding="utf-8")
     assert "| coupled | 10 | dembark energy |" in text
-    assert {path.name for path in tmp_path.iterdir()} == {"lcp.json", "lcp.md", "lcp.png"}
+    assert {path.name for path in tmp_path.iterdir()} == {"lcp.csv", "lcp.json", "lcp.md", "lcp.png"}

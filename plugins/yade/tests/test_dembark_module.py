@@ -130,8 +130,9 @@ def test_parameters_and_column(yade):
     done = yade(path)
     assert "done" in done.stdout, done.stderr
     plain, given, unset, sites, columns = json.loads((yade.folder / "column.json").read_text())
-    assert plain == {"grain_count": 20, "diameter": 0.005, "static_friction": None, "shape": "round"}
-    assert given == {"grain_count": 7, "diameter": 0.004, "static_friction": 0.4, "shape": "square"}
+    restarts = {"restart_every": 0, "resume": False}
+    assert plain == {"grain_count": 20, "diameter": 0.005, "static_friction": None, "shape": "round"} | restarts
+    assert given == {"grain_count": 7, "diameter": 0.004, "static_friction": 0.4, "shape": "square"} | restarts
     assert unset["static_friction"] is None
     assert len(sites) == 3 * 3 * 2
     assert sites[0] == pytest.approx([0.00345, 0.00345, 0.01345])

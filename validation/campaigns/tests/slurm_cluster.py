@@ -130,7 +130,8 @@ class Cluster:
                           f"RealMemory={self.memory} State=UNKNOWN" for k in range(1, self.nodes + 1))
         text = _CONFIGURATION.format(port=self.port, host=host, folder=self.folder, nodes=nodes, longest=self.longest)
         (self.folder / "slurm.conf").write_text(text)
-        (self.folder / "cgroup.conf").write_text("IgnoreSystemd=yes\n")
+        # Nothing here uses control groups; asked for by name, version 1 does not look for them, which a container may lack.
+        (self.folder / "cgroup.conf").write_text("CgroupPlugin=cgroup/v1\nIgnoreSystemd=yes\n")
         # Snakemake's executor hides SLURM_CONF from the srun within a job; a site has its file where srun looks for it anyway.
         srun = self.folder / "bin" / "srun"
         srun.parent.mkdir()
