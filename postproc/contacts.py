@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
-from dembark.postproc.dumps.frames import Array, Dump, DumpError, RawFrame, integers, less_edges, numbered, take
+from dembark.postproc.dumps.frames import Array, DumpError, RawFrame, integers, less_edges, numbered, take
 from dembark.postproc.dumps.opening import Trajectory, open_dump
+from dembark.postproc.dumps.typed import TypedDump
 from numpy.typing import NDArray
 
 Column = int | str | Sequence[int | str]
@@ -44,7 +44,7 @@ class ContactFrame:
     extra: Mapping[str, Array] = field(default_factory=dict)
 
 
-class ContactsDump:
+class ContactsDump(TypedDump[ContactFrame]):
     """Contacts as a sequence of ContactFrame, read one at a time."""
 
     def __init__(
@@ -58,50 +58,12 @@ class ContactsDump:
         dumped in order, that is {"first": (1, 2, 3), "second": (4, 5, 6), "ids": (7, 8), "forces": (10, 11, 12)}. Columns without a
         name given are in `extra` under that of the dump.
         """
-        self._dump: Dump = open_dump(path, skip_truncated, stream=stream)
+        super().__init__(open_dump(path, skip_truncated, stream=stream))
         self._columns = columns
         if columns is not None:
             lacking = [name for name in ("first", "forces", "ids") if name not in columns]
             if lacking or ("second" in columns) == ("branch" in columns):
                 raise DumpError(f"{self.path}: columns= must name {', '.join(lacking) or 'either second or branch'}")
-
-    @property
-    def path(self) -> Path:
-        """The file, or the first of them."""
-        return self._dump.path
-
-    @property
-    def truncated(self) -> str:
-        """One line about a cut-off last frame that was left out, or ''."""
-        return self._dump.truncated
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """Lines about what was left out or put in order."""
-        return self._dump.remarks
-
-    @property
-    def steps(self) -> NDArray[np.int64]:
-        """The step of every frame."""
-        return self._dump.steps
-
-    @property
-    def counts(self) -> NDArray[np.int64]:
-        """The number of contacts of every frame."""
-        return self._dump.counts
-
-    def refresh(self) -> None:
-        """Look at the file anew: an engine may have written more."""
-        self._dump.refresh()
-
-    def __len__(self) -> int:
-        return len(self._dump)
-
-    def __iter__(self) -> Iterator[ContactFrame]:
-        return map(self._frame, self._dump)
-
-    def __getitem__(self, number: int) -> ContactFrame:
-        return self._frame(self._dump.frame(number))
 
     def _frame(self, raw: RawFrame) -> ContactFrame:
         where = f"{self.path}, step {raw.step}"

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
-from dembark.postproc.dumps.frames import Array, Dump, DumpError, RawFrame, cell, integers, less_edges, numbered, take
+from dembark.postproc.dumps.frames import Array, DumpError, RawFrame, cell, integers, less_edges, numbered, take
 from dembark.postproc.dumps.opening import Trajectory, open_dump
+from dembark.postproc.dumps.typed import TypedDump
 from dembark.postproc.spheres import volume
 from numpy.typing import NDArray
 
@@ -193,7 +193,7 @@ def _wall(name: str) -> tuple[str, ...]:
     return tuple(f"f_force_{name}[{axis}]" for axis in (1, 2, 3))
 
 
-class GrainsDump:
+class GrainsDump(TypedDump[GrainFrame]):
     """Grains of either engine as a sequence of GrainFrame, read one at a time: any file that open_dump reads."""
 
     def __init__(
@@ -209,52 +209,12 @@ class GrainsDump:
 
         `density` (kg/m^3) is that of solid grains where the dump has no masses, `columns` are those of a binary dump.
         """
-        self._dump: Dump = open_dump(path, skip_truncated, stream=stream, columns=columns)
+        super().__init__(open_dump(path, skip_truncated, stream=stream, columns=columns))
         self._density = density
-
-    @property
-    def path(self) -> Path:
-        """The file, or the first of them."""
-        return self._dump.path
-
-    @property
-    def truncated(self) -> str:
-        """One line about a cut-off last frame that was left out, or ''."""
-        return self._dump.truncated
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """Lines about what was left out or put in order."""
-        return self._dump.remarks
-
-    @property
-    def steps(self) -> NDArray[np.int64]:
-        """The step of every frame."""
-        return self._dump.steps
-
-    @property
-    def counts(self) -> NDArray[np.int64]:
-        """The number of grains of every frame."""
-        return self._dump.counts
 
     def raw(self, number: int, columns: Sequence[str]) -> RawFrame:
         """Only some columns of a frame, as they stand in the file."""
         return self._dump.frame(number, columns)
-
-    def refresh(self) -> None:
-        """Look at the file anew: an engine may have written more."""
-        self._dump.refresh()
-
-    def __len__(self) -> int:
-        return len(self._dump)
-
-    def __iter__(self) -> Iterator[GrainFrame]:
-        return map(self._frame, self._dump)
-
-    def __getitem__(self, number: int) -> GrainFrame:
-        if number < 0:
-            number += len(self)
-        return self._frame(self._dump.frame(number))
 
     def _frame(self, raw: RawFrame) -> GrainFrame:
         return grain_frame(raw, f"{self.path}, step {raw.step}", self._density)

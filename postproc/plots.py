@@ -253,11 +253,9 @@ def save(folder: str | Path, figures: Mapping[str, Figure]) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         found = []
         for name, figure in figures.items():
-            whole = WholeFile(folder / f"{name}.png")
-            with matplotlib.rc_context(STYLE):
-                figure.savefig(whole.part, dpi=160, metadata={"Software": None})
-            whole.keep()
-            found.append(whole.path)
+            with WholeFile(folder / f"{name}.png") as part, matplotlib.rc_context(STYLE):
+                figure.savefig(part, dpi=160, metadata={"Software": None})
+            found.append(folder / f"{name}.png")
     except OSError as error:
         raise disk_error(error, folder) from None
     return found

@@ -21,7 +21,6 @@ from dembark.postproc.grains import GrainFrame
 from dembark.postproc.output.whole import Labelled, WholeFile
 from dembark.postproc.plots import labelled, scalar
 from dembark.validation.errors import RunError
-from dembark.validation.files import disk_error
 from dembark.postproc.style import STYLE
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
@@ -154,12 +153,7 @@ def picture(scene: Scene, scale: tuple[float, float] | None = None, height: floa
 
 def animate(path: str | Path, scenes: Iterable[Scene], scale: tuple[float, float], *, duration: int = 80, pixels: int = 400) -> Path:
     """Scenes one after the other as a GIF, each for `duration` ms, on one colour `scale`; returns the path."""
-    whole = WholeFile(path)
-    images = [Image.fromarray(image).quantize(64) for image in render(scenes, scale, pixels)]
-    try:
-        images[0].save(whole.part, format="GIF", save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)
-    except OSError as error:
-        whole.drop()
-        raise disk_error(error, whole.path) from None
-    whole.keep()
-    return whole.path
+    with WholeFile(path) as part:
+        images = [Image.fromarray(image).quantize(64) for image in render(scenes, scale, pixels)]
+        images[0].save(part, format="GIF", save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)
+    return Path(path)

@@ -55,19 +55,11 @@ def write_netcdf(path: str | Path, fields: Labelled | Iterable[tuple[float, Labe
 
 def write_wall_netcdf(path: str | Path, walls: Iterable[WallStress], attributes: Attributes | None = None) -> Path:
     """Write wall loads, a group for each wall by its name: `xarray.open_dataset(path, group="side")`; returns the path."""
-    whole = WholeFile(path)
-    try:
-        with h5netcdf.File(whole.part, "w") as file:
+    with WholeFile(path) as part:
+        with h5netcdf.File(part, "w") as file:
             file.attrs.update({"Conventions": "CF-1.11", **(attributes or {})})
-        add_walls(whole.part, walls)
-    except OSError as error:
-        whole.drop()
-        raise disk_error(error, whole.path) from None
-    except BaseException:
-        whole.drop()
-        raise
-    whole.keep()
-    return whole.path
+        add_walls(part, walls)
+    return Path(path)
 
 
 def add_walls(path: Path, walls: Iterable[WallStress]) -> None:

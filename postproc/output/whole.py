@@ -62,7 +62,8 @@ class Selection:
 class WholeFile:
     """A file that is written under another name beside its place and moved there when it is finished.
 
-    `part` is where to write. `keep()` makes it the file; `drop()` removes it. What was there before stays until `keep()`.
+    `part` is where to write. `keep()` makes it the file; `drop()` removes it. What was there before stays until `keep()`. As a context
+    manager it keeps what a block has written to its end, and drops it when the block raises.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -87,3 +88,14 @@ class WholeFile:
     def drop(self) -> None:
         """Remove what was written."""
         self.part.unlink(missing_ok=True)
+
+    def __enter__(self) -> Path:
+        return self.part
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+        if kind is None:
+            self.keep()
+            return
+        self.drop()
+        if isinstance(error, OSError):
+            raise disk_error(error, self.path) from None

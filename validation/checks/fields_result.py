@@ -11,7 +11,6 @@ import numpy as np
 import xarray
 from dembark.postproc.output.whole import WholeFile
 from dembark.validation.checks.quantity import Quantity
-from dembark.validation.files import disk_error
 from numpy.typing import NDArray
 
 FILE = "fields.nc"
@@ -38,14 +37,6 @@ def labelled(variables: Mapping[str, Any], coordinates: Mapping[str, Any], **att
 
 def write(folder: Path, dataset: xarray.Dataset) -> Path:
     """Write `fields.nc` into `folder`, whole or not at all."""
-    whole = WholeFile(folder / FILE)
-    try:
-        dataset.to_netcdf(whole.part, engine="h5netcdf")
-    except OSError as error:
-        whole.drop()
-        raise disk_error(error, whole.path) from None
-    except BaseException:
-        whole.drop()
-        raise
-    whole.keep()
-    return whole.path
+    with WholeFile(folder / FILE) as part:
+        dataset.to_netcdf(part, engine="h5netcdf")
+    return folder / FILE

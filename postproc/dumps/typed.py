@@ -1,0 +1,63 @@
+"""What the dumps of grains and those of contacts have in common."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Generic, TypeVar
+
+import numpy as np
+from dembark.postproc.dumps.frames import Dump, RawFrame
+from numpy.typing import NDArray
+
+Frame = TypeVar("Frame")
+
+
+class TypedDump(ABC, Generic[Frame]):
+    """A dump as a sequence of frames of one kind, read one at a time; negative numbers count from the end."""
+
+    def __init__(self, dump: Dump) -> None:
+        self._dump = dump
+
+    @property
+    def path(self) -> Path:
+        """The file, or the first of them."""
+        return self._dump.path
+
+    @property
+    def truncated(self) -> str:
+        """One line about a cut-off last frame that was left out, or ''."""
+        return self._dump.truncated
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Lines about what was left out or put in order."""
+        return self._dump.remarks
+
+    @property
+    def steps(self) -> NDArray[np.int64]:
+        """The step of every frame."""
+        return self._dump.steps
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """The number of grains or contacts of every frame."""
+        return self._dump.counts
+
+    def refresh(self) -> None:
+        """Look at the file anew: an engine may have written more."""
+        self._dump.refresh()
+
+    def __len__(self) -> int:
+        return len(self._dump)
+
+    def __iter__(self) -> Iterator[Frame]:
+        return map(self._frame, self._dump)
+
+    def __getitem__(self, number: int) -> Frame:
+        return self._frame(self._dump.frame(number + len(self) if number < 0 else number))
+
+    @abstractmethod
+    def _frame(self, raw: RawFrame) -> Frame:
+        """The frame from the table of its numbers."""
