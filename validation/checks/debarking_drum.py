@@ -219,8 +219,8 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
         Quantity("torque_arm", "drum's moment over weight × radius", "1", over("arm"),
                  detail="in the mean the horizontal distance of the logs' centre of mass from the axis, over the radius"),
         Quantity("shell_share", "share of the impacts that are on the shell", "1", over("shell")),
-        Quantity("pivots_per_step", "pivots per step", "1", over("pivots"), detail="all solves of a step together, warm-started",
-                 compared=False),
+        Quantity("pivots_per_step", "pivots per step", "1", over("pivots"), compared=False,
+                 detail="all solves of a step together; contacts that closed or opened where Gauss–Seidel solved it"),
     ]
     critical = math.sqrt(given["gravity"] / drums[0].radius)
     remarks = [
