@@ -198,6 +198,7 @@ def _context(results: Path, pages: list[Page], folder: Path) -> dict[str, Any]:
     return {
         "profile": results.name,
         "rows": rows,
+        "troubles": [row for row in rows if row["verdict"] in ("fail", "missing")],
         "overview": overview(rows),
         "counts": counts,
         "summary": summary(counts, pages),
