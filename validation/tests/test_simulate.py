@@ -133,7 +133,7 @@ def test_a_signal_to_the_command_ends_the_engine(command: Command, number: int, 
     process, out = command
     pid = engine_pid(out)
     process.send_signal(number)
-    _, error = process.communicate(timeout=20)
+    _, error = process.communicate(timeout=90)
     assert process.returncode == 130 and "interrupted" in error and "Traceback" not in error
     assert not lives(pid) and not list(out.glob(".*work*"))
 

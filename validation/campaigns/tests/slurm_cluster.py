@@ -121,7 +121,7 @@ class Cluster:
 
     def wait_for_nodes(self) -> None:
         """Wait until every node is idle."""
-        _wait(lambda: self.call("sinfo", "--noheader", "--Node", "--states=idle", "--format=%N", check=False).count("n") >= self.nodes, 20,
+        _wait(lambda: self.call("sinfo", "--noheader", "--Node", "--states=idle", "--format=%N", check=False).count("n") >= self.nodes, 60,
               f"not all nodes became idle, see {self.folder}/*.log,")
 
     def _write_configuration(self) -> None:
@@ -145,7 +145,7 @@ class Cluster:
         key.chmod(0o400)
         self._spawn("munged", "--foreground", "--force", f"--socket={place}/socket", f"--key-file={key}", f"--pid-file={place}/pid",
                     f"--log-file={place}/log", f"--seed-file={place}/seed", "--num-threads=2")
-        _wait((place / "socket").exists, 10, "munged opened no socket")
+        _wait((place / "socket").exists, 60, "munged opened no socket")
 
     def _spawn(self, name: str, *words: str, key: str = "") -> None:
         # A test run that is killed takes its daemons along; so does the end of the thread that started them.
@@ -159,7 +159,7 @@ class Cluster:
     def start_controller(self) -> None:
         """Start slurmctld, which goes on from its saved state."""
         self._spawn("slurmctld", "-D")
-        _wait(lambda: "UP" in self.call("scontrol", "ping", check=False), 15, f"slurmctld did not answer, see {self.folder}/slurmctld.log,")
+        _wait(lambda: "UP" in self.call("scontrol", "ping", check=False), 60, f"slurmctld did not answer, see {self.folder}/slurmctld.log,")
 
     def stop_controller(self, number: int = signal.SIGTERM) -> None:
         """End slurmctld: running jobs go on, nothing can be submitted or asked; by SIGKILL it also forgets jobs of the last seconds."""

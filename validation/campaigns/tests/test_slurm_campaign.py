@@ -167,7 +167,7 @@ def test_a_terminated_submitter_takes_its_jobs_back_and_they_go_on_later(
     process.terminate()
     code, _, error = campaign.end(process, 400)
     assert code == 130 and "interrupted" in error
-    wait_for(lambda: not slurm.jobs(campaign.results), 30)
+    wait_for(lambda: not slurm.jobs(campaign.results), 120)
     code, out, error = campaign.end(campaign.start("resume", str(campaign.results)))
     assert code == 0, campaign.log() + out + error
     records = campaign.records()
