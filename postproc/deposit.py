@@ -132,7 +132,7 @@ def _plain(values: Array | Index | None) -> Array | Index | None:
 
 
 def _longest(branch: Array) -> float:
-    return float(np.sqrt((branch**2).sum(axis=1).max())) if len(branch) else 0.0
+    return float(np.sqrt(np.einsum("ij,ij->i", branch, branch).max())) if len(branch) else 0.0
 
 
 def _deposit(

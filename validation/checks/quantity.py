@@ -75,7 +75,7 @@ class Quantity:
             "reference_interval": None if reference is None else _pair(reference),
             "deviation": None if self.deviation is None else _number(self.deviation),
             "deviation_kind": "absolute" if self.absolute else "relative",
-            "tolerance": self.tolerance,
+            "tolerance": None if self.tolerance is None else _number(self.tolerance),
             "verdict": verdict,
             "reason": reason,
             "detail": self.detail,

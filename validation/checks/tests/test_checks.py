@@ -1,6 +1,7 @@
 """The cases' checks find what was put into synthetic runs, and do not pass what is wrong."""
 
 import json
+import math
 import types
 
 import numpy as np
@@ -240,3 +241,11 @@ def test_a_case_may_bring_its_own_checks(tmp_path):
     assert find("drum", tmp_path).REFERENCES == ()
     with pytest.raises(RunError, match="no checks"):
         find("drum")
+
+
+def test_a_bound_that_is_not_finite_is_none_in_the_file() -> None:
+    """A column too small for an interval allows anything; JSON has no number for that."""
+    entry = Quantity("field_balance", "balance", "1", Estimate(0.1, math.inf), reference=Estimate(0.0, 0.0), tolerance=math.inf,
+                     absolute=True).as_json()
+    assert entry["tolerance"] is None and entry["interval"] is None
+    json.dumps(entry, allow_nan=False)
