@@ -31,18 +31,23 @@ def _sync(path: Path) -> None:
         os.close(descriptor)
 
 
-def write_json(path: Path, content: Any) -> None:
-    """Write `content` so that a reader sees the old file or the whole new one, also after a crash."""
-    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
+def write_whole(path: Path, content: bytes) -> Path:
+    """Write `content` so that a reader sees the old file or the whole new one, also after a crash; returns the path."""
     part = path.with_name(f".{path.name}.part-{os.getpid()}")
     try:
-        part.write_text(text, encoding="utf-8")
+        part.write_bytes(content)
         _sync(part)
         part.replace(path)
     except OSError as error:
         part.unlink(missing_ok=True)
         raise disk_error(error, path) from None
     _sync(path.parent)
+    return path
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Write `content` as JSON, see `write_whole`."""
+    write_whole(path, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
 
 
 def read_json(path: Path) -> dict[str, Any] | None:

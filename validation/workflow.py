@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dembark.validation.campaigns.source import Source
+from dembark.validation.engines import end_with_parent
 from dembark.validation.errors import DembarkError, Interrupted
 from dembark.validation.files import lock, read_json
 from dembark.validation.jobs import (
@@ -73,8 +74,7 @@ def _snakemake(source: Source, results: Path, way: Way, cases: Sequence[str], en
     if source.file:
         chosen = [f"campaign={source.file}", f"results={results}"]
     config = [*chosen, f"cases={' '.join(cases)}", f"engines={' '.join(engines)}"]
-    guard = ["setpriv", "--pdeathsig", "KILL", "--"] if shutil.which("setpriv") else []
-    return [*guard, sys.executable, "-m", "snakemake", "--snakefile", str(Path(__file__).with_name("Snakefile")), *way.words,
+    return [*end_with_parent("KILL"), sys.executable, "-m", "snakemake", "--snakefile", str(Path(__file__).with_name("Snakefile")), *way.words,
             "--keep-going", "--nolock", "--rerun-incomplete", "--rerun-triggers", "mtime",
             "--scheduler", "greedy", "--nocolor", "--directory", str(results / ".workflow"), "--config", *config]
 

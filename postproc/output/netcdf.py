@@ -132,22 +132,13 @@ class FieldsNetcdf:
             variable.attrs.update(_attributes(fields, name))
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        try:
-            self._file.close()
-            if kind is None and self._count == 0:
-                raise DembarkError(f"nothing to write to {self._whole.path}", "there is no field of any time")
-            if kind is None:
-                add_walls(self._whole.part, self._walls)
-        except OSError as problem:
-            self._whole.drop()
-            raise disk_error(problem, self._whole.path) from None
-        except BaseException:
-            self._whole.drop()
-            raise
-        if kind is None:
-            self._whole.keep()
-        else:
-            self._whole.drop()
+        self._whole.settle(self._finish if kind is None else self._file.close, kind is None)
+
+    def _finish(self) -> None:
+        self._file.close()
+        if self._count == 0:
+            raise DembarkError(f"nothing to write to {self._whole.path}", "there is no field of any time")
+        add_walls(self._whole.part, self._walls)
 
 
 _TIME = {"units": "s", "long_name": "simulated time, middle of the averaged span", "axis": "T", "standard_name": "time",

@@ -97,21 +97,13 @@ class _Vtkhdf:
                     self._steps[f"FieldDataSizes/{name}"] = np.tile(np.array([1, len(data)], np.int64), (count, 1))
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._whole.settle(self._close if kind is None else self._file.close, kind is None)
+
+    def _close(self) -> None:
         try:
-            if kind is None:
-                self._finish()
+            self._finish()
+        finally:
             self._file.close()
-        except OSError as problem:
-            self._whole.drop()
-            raise disk_error(problem, self._whole.path) from None
-        except BaseException:
-            self._file.close()
-            self._whole.drop()
-            raise
-        if kind is None:
-            self._whole.keep()
-        else:
-            self._whole.drop()
 
 
 class FieldsVtkhdf(_Vtkhdf):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -88,6 +88,21 @@ class WholeFile:
     def drop(self) -> None:
         """Remove what was written."""
         self.part.unlink(missing_ok=True)
+
+    def settle(self, finish: Callable[[], None], good: bool) -> None:
+        """Call `finish`, which writes the rest; then keep what is `good`, drop what is not, and drop it too when `finish` raises."""
+        try:
+            finish()
+        except OSError as error:
+            self.drop()
+            raise disk_error(error, self.path) from None
+        except BaseException:
+            self.drop()
+            raise
+        if good:
+            self.keep()
+        else:
+            self.drop()
 
     def __enter__(self) -> Path:
         return self.part

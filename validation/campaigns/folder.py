@@ -17,7 +17,7 @@ from dembark.validation.campaigns.expand import Plan
 from dembark.validation.campaigns.spec import read
 from dembark.validation.cases import deck_root
 from dembark.validation.errors import DembarkError
-from dembark.validation.files import disk_error, read_json, write_json
+from dembark.validation.files import read_json, write_json, write_whole
 
 FILE = "campaign.toml"
 FACTS = "campaign.json"
@@ -108,15 +108,8 @@ def enter(folder: Path, file: Path, plan: Plan, chosen: Options) -> None:
 
 def _copy(text: bytes, copy: Path) -> None:
     """Write the campaign's file; one that is the same keeps its date, by which the report is known to be up to date."""
-    if copy.is_file() and copy.read_bytes() == text:
-        return
-    part = copy.with_name(f".{copy.name}.part-{os.getpid()}")
-    try:
-        part.write_bytes(text)
-        part.replace(copy)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise disk_error(error, copy) from None
+    if not copy.is_file() or copy.read_bytes() != text:
+        write_whole(copy, text)
 
 
 def versions(plan: Plan) -> Mapping[str, str | None]:

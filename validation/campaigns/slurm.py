@@ -5,7 +5,6 @@ from __future__ import annotations
 import getpass
 import hashlib
 import math
-import os
 import re
 import shlex
 import shutil

@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
@@ -19,7 +18,7 @@ from urllib.parse import quote
 
 from dembark.validation.campaigns.schema import KEYS, TABLES, VERSION, statements
 from dembark.validation.errors import DembarkError, RunError
-from dembark.validation.files import disk_error, read_json
+from dembark.validation.files import disk_error, read_json, write_whole
 from dembark.validation.parameters import pick
 from dembark.validation.plan import Run, Series, finished, studies
 
@@ -278,11 +277,4 @@ def as_csv(path: Path | str, table: str) -> str:
 
 def export(path: Path | str, table: str, target: Path) -> None:
     """Write a table as CSV to `target`, whole or not at all."""
-    text = as_csv(path, table)
-    part = target.with_name(f".{target.name}.part-{os.getpid()}")
-    try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(target)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise disk_error(error, target) from None
+    write_whole(target, as_csv(path, table).encode())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import logging
-import os
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
@@ -13,7 +12,7 @@ from typing import Any
 
 from dembark.postproc import DumpError
 from dembark.validation.errors import RunError
-from dembark.validation.files import disk_error, write_json
+from dembark.validation.files import disk_error, write_json, write_whole
 from dembark.validation.report import cross_section, fields, figures, numbers, pictures, verification
 from dembark.validation.report.gather import Page, gather, studies
 from dembark.validation.verification.item import Item
@@ -70,17 +69,6 @@ def environment(*folders: Path) -> Environment:
 def _subscripts(text: str) -> Markup:
     """Symbols like σ_zz with real subscripts."""
     return Markup(re.sub(r"\b([σρμKv])_([a-z]+)", r"\1<sub>\2</sub>", str(escape(text))))
-
-
-def write_whole(path: Path, content: bytes) -> Path:
-    """Write a file so that it is the old or the whole new one."""
-    part = path.with_name(f".{path.name}.part-{os.getpid()}")
-    try:
-        part.write_bytes(content)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
-    return path
 
 
 def write_pdf(html: str, path: Path) -> None:

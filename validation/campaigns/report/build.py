@@ -11,9 +11,9 @@ from dembark.validation.campaigns.report import figures, tables
 from dembark.validation.campaigns.report.gather import Campaign, gather
 from dembark.validation.campaigns.report.sweeps import Point, Sweep, numerical_errors, words
 from dembark.validation.errors import RunError
-from dembark.validation.files import disk_error
+from dembark.validation.files import disk_error, write_whole
 from dembark.validation.report import figures as shared
-from dembark.validation.report.build import embed, environment, machine, style, write_pdf, write_whole
+from dembark.validation.report.build import embed, environment, machine, style, write_pdf
 
 _HERE = Path(__file__).parent
 # A page that shows everything shows nothing: the rest is in the tables.
