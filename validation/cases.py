@@ -32,10 +32,15 @@ class Constraint:
 
 @dataclass(frozen=True)
 class PlannedRun:
-    """One line of `[runs]`: a variant and the engines it runs in."""
+    """One line of `[runs]`: a variant, the engines it runs in, and how many replicas where that differs from the profile's number."""
 
     variant: str
     engines: tuple[str, ...]
+    replicas: Mapping[str, int] = field(default_factory=dict)
+
+    def changes(self, engine: str) -> dict[str, Value]:
+        """What this line changes of the variant's parameters in `engine`."""
+        return {"replicas": self.replicas[engine]} if engine in self.replicas else {}
 
 
 @dataclass(frozen=True)
@@ -152,7 +157,7 @@ class _Reader(TableReader):
         return Case(
             name=head["name"], title=head["title"], description=head.get("description", "").strip(), source=tuple(head.get("source", ())),
             engines=tuple(head["engines"]), folder=self.path.parent, parameters=parameters, profiles=profiles, variants=variants,
-            runs=self.runs(data.get("runs", {}), profiles, variants, tuple(head["engines"])),
+            runs=self.runs(data.get("runs", {}), profiles, variants, tuple(head["engines"]), parameters),
             constraints=tuple(self.constraint(entry, parameters) for entry in data.get("constraints", ())),
             studies={name: self.study(name, entry, parameters, variants) for name, entry in data.get("studies", {}).items()},
             outputs=outputs, particles=self.expression("case", head["particles"], parameters) if "particles" in head else None)
@@ -193,23 +198,32 @@ class _Reader(TableReader):
         return {key: self.check(table, parameters[key], value) for key, value in entry.items()}
 
     def runs(self, data: Mapping[str, Any], profiles: Mapping[str, Any], variants: Mapping[str, Any],
-             engines: tuple[str, ...]) -> dict[str, tuple[PlannedRun, ...]]:
+             engines: tuple[str, ...], parameters: Mapping[str, Parameter]) -> dict[str, tuple[PlannedRun, ...]]:
         result = {}
         for profile, entries in data.items():
             pick(profile, profiles, "profile", f"[runs] of {self.path}")
             planned = []
             for entry in entries:
-                self.table(entry, "runs", {"variant": str, "engines": list}, ("variant",))
+                self.table(entry, "runs", {"variant": str, "engines": list, "replicas": dict}, ("variant",))
                 chosen = tuple(entry.get("engines", engines))
                 pick(entry["variant"], variants, "variant", f"[runs] of {self.path}")
                 for engine in chosen:
                     pick(engine, engines, "engine", f"[runs] of {self.path}")
-                planned.append(PlannedRun(entry["variant"], chosen))
+                planned.append(PlannedRun(entry["variant"], chosen, self.replicas(entry, chosen, parameters)))
             pairs = [(run.variant, engine) for run in planned for engine in run.engines]
             if len(set(pairs)) < len(pairs):
                 raise self.fail("runs", f"{profile} names a variant twice for the same engine")
             result[profile] = tuple(planned)
         return result
+
+    def replicas(self, entry: Mapping[str, Any], engines: tuple[str, ...], parameters: Mapping[str, Parameter]) -> dict[str, int]:
+        counts = entry.get("replicas", {})
+        for engine, count in counts.items():
+            pick(engine, engines, "engine", f"replicas in [runs] of {self.path}")
+            if "replicas" not in parameters:
+                raise self.fail("runs", "replicas are given, but nothing in this case is random", "leave them out")
+            self.check("runs", parameters["replicas"], count)
+        return dict(counts)
 
     def study(self, name: str, entry: Any, parameters: Mapping[str, Parameter], variants: Mapping[str, Any]) -> Study:
         table = f"studies.{name}"

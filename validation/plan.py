@@ -146,7 +146,7 @@ def campaign(profile: str, only_cases: Sequence[str] = (), only_engines: Sequenc
     for name in only_engines:
         pick(name, ENGINES, "engine", "in --engine")
     pick(profile, {name for case in cases.values() for name in case.profiles}, "profile", "in the cases")
-    result = [series(case, planned.variant, profile, engines.find(engine))
+    result = [series(case, planned.variant, profile, engines.find(engine), planned.changes(engine))
               for case in cases.values() if not only_cases or case.name in only_cases
               for planned in case.runs.get(profile, ())
               for engine in planned.engines if not only_engines or engine in only_engines]
