@@ -59,6 +59,12 @@ class OutputParser:
 
     def __init__(self) -> None:
         self.steps, self.step, self.time_step, self.finished = 0, 0, 0.0, False
+        self._unfinished = b""
+
+    def hear(self, chunk: bytes) -> bool:
+        """Take some bytes of the output, lines or parts of them; True when they brought news."""
+        *lines, self._unfinished = (self._unfinished + chunk).split(b"\n")
+        return any([self.feed(line.decode(errors="replace")) for line in lines])
 
     def feed(self, line: str) -> bool:
         """Take one line; True when it brought news."""

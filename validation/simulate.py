@@ -6,37 +6,25 @@ state in it, on whatever host. A run that fails by its own fault begins anew.
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
-import signal
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from select import select
 from typing import Any
 
-from dembark.validation import provenance, restarts
-from dembark.validation.cases import OUTPUTS
+from dembark.validation import outcome, provenance, restarts
 from dembark.validation.claim import claim
-from dembark.validation.engines import end_with_parent
 from dembark.validation.errors import DembarkError, Interrupted, Killed, RunError
-from dembark.validation.files import DISK_FULL, check_impacts, check_times, count_frames, disk_error, move_into_place, sweep, write_json
-from dembark.validation.parameters import Value
+from dembark.validation.files import DISK_FULL, disk_error, move_into_place, sweep, write_json
 from dembark.validation.plan import Run, deck_files, finished
+from dembark.validation.process import chunks, running
 from dembark.validation.progress import Board, OutputParser
 
-# A line of grains.dump and two to three of contacts.dump for each grain and frame.
-_BYTES_PER_GRAIN_AND_FRAME = 800
-_RESERVE = 4 << 20
-_DUMPS = {"grains": "ATOMS", "contacts": "ENTRIES"}
-_GRACE = 5.0
-# Signals by which a user, a scheduler or the system ends what is sound; the others are faults of the engine.
-_STOPPED = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGXCPU)
 _RESUMED = re.compile(r"dembark: resumed at step (\d+) (exact|approximate)ly")
 
 
@@ -94,7 +82,7 @@ def _run_into(run: Run, target: Path, board: Board, ended: _Ended, used: Resourc
         for other in restarts.work_folders(target):
             if other != work:
                 shutil.rmtree(other)
-        check_room(run, target.parent)
+        outcome.check_room(run, target.parent)
         step, computed = restarts.begin(run, work), True
         record = _execute(run, work, step, board, ended, used)
         restarts.clear(work)
@@ -149,22 +137,6 @@ def _forget_failure(target: Path) -> None:
         kept.rmdir()
 
 
-def check_room(run: Run, folder: Path) -> None:
-    """RunError when the disk of `folder` has less room than the output of `run` will need by a rough estimate."""
-    grains, frames = run.values.get("grain_count"), run.values.get("frames")
-    if not isinstance(grains, int) or not isinstance(frames, int):
-        return
-    need = grains * frames * _BYTES_PER_GRAIN_AND_FRAME + _RESERVE
-    free = shutil.disk_usage(folder).free
-    if free < need:
-        raise RunError("the disk is too full", f"{folder} has {free >> 20} MB free", f"the run needs about {need >> 20} MB")
-
-
-def _wrapped(command: list[str]) -> list[str]:
-    # The engine must not go on alone when this process is killed, and its lines must come when it writes them.
-    return [*end_with_parent("TERM"), *(["stdbuf", "-oL"] if shutil.which("stdbuf") else []), *command]
-
-
 def _execute(run: Run, work: Path, step: int | None, board: Board, ended: _Ended, used: Resources) -> dict[str, Any]:
     """One attempt in `work`, from `step` on (None: from the start); the record of the finished run."""
     words, every = dict(run.values), 0
@@ -175,8 +147,6 @@ def _execute(run: Run, work: Path, step: int | None, board: Board, ended: _Ended
     before = _heard(work, restarts.attempts(work))
     began, clock = datetime.now(UTC), time.monotonic()
     restarts.remember(work, replace(before, attempts=before.attempts + 1, ended=False))
-    process = subprocess.Popen(_wrapped(command), cwd=work, env=run.engine.environment(used.threads), stdin=subprocess.DEVNULL,
-                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
     parser = OutputParser()
     board.post(run.name, attempt=before.attempts + 1, resumed_from=step or 0)
 
@@ -184,15 +154,15 @@ def _execute(run: Run, work: Path, step: int | None, board: Board, ended: _Ended
         board.post(run.name, step=parser.step, steps=parser.steps, time_step=parser.time_step)
 
     try:
-        _listen(process, work, parser, news, ended)
-        code = process.wait()
+        with running(command, work, run.engine.environment(used.threads)) as process:
+            _listen(process, work, parser, news, ended)
+            code = process.wait()
     finally:
-        end_group(process)
         wall = time.monotonic() - clock
         done = _heard(work, replace(before, attempts=before.attempts + 1, wall_time=before.wall_time + wall, ended=False))
         restarts.remember(work, done)
-    _judge(code, parser, work)
-    frames = _check_output(work, run.case.outputs, run.values.get("frames"))
+    outcome.judge(code, parser, work)
+    frames = outcome.check_output(work, run.case.outputs, run.values.get("frames"))
     # The speed of this attempt: of the others nobody knows how many steps were done twice.
     speed = run.particles * (parser.steps - (step or 0)) / wall if run.particles else None
     return {
@@ -220,105 +190,14 @@ def _heard(work: Path, told: restarts.Attempts) -> restarts.Attempts:
 
 def _listen(process: subprocess.Popen[bytes], work: Path, parser: OutputParser, news: Callable[[], None],
             ended: _Ended) -> None:
-    assert process.stdout
-    pending, looked = b"", time.monotonic()
+    looked = time.monotonic()
     with (work / "engine.log").open("wb", buffering=0) as log:
-        while True:
+        for chunk in chunks(process):
             if ended.is_set():
                 raise Interrupted("interrupted")
             if time.monotonic() - looked > 2.0:
                 looked = time.monotonic()
-                if shutil.disk_usage(work).free < _RESERVE:
-                    raise RunError(DISK_FULL, f"less than {_RESERVE >> 20} MB are free in {work.parent}")
-            if not select([process.stdout], [], [], 0.3)[0]:
-                # A grandchild may hold the pipe open although the engine itself has ended.
-                if process.poll() is not None:
-                    return
-                continue
-            chunk = os.read(process.stdout.fileno(), 1 << 16)
-            if not chunk:
-                return
+                outcome.check_disk(work)
             log.write(chunk)
-            *lines, pending = (pending + chunk).split(b"\n")
-            heard = [parser.feed(line.decode(errors="replace")) for line in lines]
-            if any(heard):
+            if parser.hear(chunk):
                 news()
-
-
-def end_group(process: subprocess.Popen[bytes]) -> None:
-    """End the process and all that it started (its process group): politely first, after some seconds for good."""
-    for number in (signal.SIGTERM, signal.SIGKILL):
-        try:
-            os.killpg(process.pid, number)
-        except ProcessLookupError:
-            break
-        deadline = time.monotonic() + _GRACE
-        while time.monotonic() < deadline and _group_lives(process):
-            time.sleep(0.05)
-    process.wait()
-    if process.stdout:
-        process.stdout.close()
-
-
-def _group_lives(process: subprocess.Popen[bytes]) -> bool:
-    process.poll()
-    try:
-        os.killpg(process.pid, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
-def _tail(log: Path, size: int = 20000) -> list[str]:
-    with log.open("rb") as handle:
-        handle.seek(max(0, log.stat().st_size - size))
-        return handle.read().decode(errors="replace").splitlines()
-
-
-def reason(lines: list[str]) -> str:
-    """The engine's own word about what went wrong: the last line that looks like an error, else its last line."""
-    told = re.compile(r"^\s*(?:dembark: (?!steps|finished|resumed)|ERROR|\w*(?:Error|Exception)\b.*|.*[Nn]o space left)")
-    spoken = [line.strip() for line in lines if line.strip()]
-    return next((line for line in reversed(spoken) if told.match(line)), spoken[-1] if spoken else "it said nothing")
-
-
-def _judge(code: int, parser: OutputParser, work: Path) -> None:
-    lines = _tail(work / "engine.log")
-    where = f"at step {parser.step} of {parser.steps}" if parser.steps else "before its first step"
-    if any("No space left" in line for line in lines):
-        raise RunError(DISK_FULL, f"the engine stopped {where}")
-    relayed = re.search(r"exited on signal (\d+)", "\n".join(lines)) if code else None
-    # srun tells of a signal as shells do, by 128 and its number.
-    number = -code if code < 0 else int(relayed.group(1)) if relayed else code - 128 if code - 128 in _STOPPED else 0
-    if number:
-        hint = "by hand or because memory ran out" if number == signal.SIGKILL else ""
-        kind = Killed if number in _STOPPED else RunError
-        raise kind(f"the engine was killed by {signal.Signals(number).name} {where}", hint)
-    if not parser.finished and any(line.startswith("SIGINT/SIGTERM caught") for line in lines):
-        raise Killed(f"the engine was told to stop {where}")
-    if code:
-        raise RunError(f"the engine ended with exit code {code} {where}", reason(lines))
-    if not parser.finished:
-        raise RunError(f"the engine ended without 'dembark: finished' {where}", reason(lines))
-    if not parser.steps:
-        raise RunError("the engine never said 'dembark: steps <N> time_step <dt>'", "the deck must print this line")
-
-
-def _check_output(work: Path, outputs: Sequence[str], wanted: Value) -> int:
-    """Frames in the dumps (0 without any) of a run that wrote all of `outputs` whole; RunError otherwise."""
-    try:
-        counts = {kind: count_frames(work / OUTPUTS[kind], key) for kind, key in _DUMPS.items() if kind in outputs}
-        if len(set(counts.values())) > 1:
-            raise RunError("grains.dump and contacts.dump have different numbers of frames")
-        for kind, frames in counts.items():
-            if isinstance(wanted, int) and frames != wanted:
-                raise RunError(f"{OUTPUTS[kind]} holds {frames} frames instead of {wanted}")
-        if "times" in outputs:
-            check_times(work / OUTPUTS["times"])
-        if "impacts" in outputs:
-            check_impacts(work / OUTPUTS["impacts"])
-    except RunError as error:
-        # The engines do not notice a full disk: what tells is a file that was cut off and no room left.
-        full = shutil.disk_usage(work).free < _RESERVE
-        raise RunError(DISK_FULL if full else "", str(error)) from None
-    return next(iter(counts.values()), 0)

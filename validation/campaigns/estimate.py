@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
 import tempfile
 import threading
 import time
@@ -12,7 +11,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from select import select
 
 from dembark.validation import engines
 from dembark.validation.campaigns.expand import Plan
@@ -20,8 +18,8 @@ from dembark.validation.campaigns.rates import Rate, Rates
 from dembark.validation.campaigns.sizes import size_text
 from dembark.validation.errors import DembarkError, Interrupted
 from dembark.validation.plan import Run, Series
+from dembark.validation.process import chunks, running
 from dembark.validation.progress import OutputParser
-from dembark.validation.simulate import end_group
 
 _PATIENCE = 60.0
 
@@ -57,26 +55,14 @@ class Estimate:
 def announced(run: Run, cancel: threading.Event) -> tuple[int, float]:
     """Steps and time step (s) that the deck of `run` announces: its engine is started and ended again as soon as it has said them."""
     words = run.engine.command(run.case.deck(run.engine.name), run.values)
-    flushed = ["stdbuf", "-oL", *words] if shutil.which("stdbuf") else words
-    parser, pending, deadline = OutputParser(), b"", time.monotonic() + _PATIENCE
-    with tempfile.TemporaryDirectory(prefix="dembark-") as folder:
-        process = subprocess.Popen(flushed, cwd=folder, env=run.engine.environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                   stderr=subprocess.STDOUT, start_new_session=True)
-        assert process.stdout
-        try:
-            while not parser.steps and time.monotonic() < deadline:
-                if cancel.is_set():
-                    raise Interrupted("interrupted")
-                if not select([process.stdout], [], [], 0.2)[0]:
-                    continue
-                chunk = os.read(process.stdout.fileno(), 1 << 16)
-                if not chunk:
-                    break
-                *lines, pending = (pending + chunk).split(b"\n")
-                for line in lines:
-                    parser.feed(line.decode(errors="replace"))
-        finally:
-            end_group(process)
+    parser, deadline = OutputParser(), time.monotonic() + _PATIENCE
+    with tempfile.TemporaryDirectory(prefix="dembark-") as folder, running(words, Path(folder), run.engine.environment()) as process:
+        for chunk in chunks(process):
+            if cancel.is_set():
+                raise Interrupted("interrupted")
+            parser.hear(chunk)
+            if parser.steps or time.monotonic() > deadline:
+                break
     if not parser.steps:
         raise DembarkError(f"{run.name} does not start", f"its deck says no 'dembark: steps <N> time_step <dt>' ({words[0]})",
                            f"try it with 'dembark run {run.case.name} --engine {run.engine.name}'")

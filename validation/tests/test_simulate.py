@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from dembark.validation import cases, engines, simulate
+from dembark.validation import cases, engines, outcome, simulate
 from dembark.validation.cases import find
 from dembark.validation.errors import DembarkError, Interrupted, RunError
 from dembark.validation.files import read_json
@@ -187,7 +187,7 @@ def test_mpi_ranks_are_for_liggghts() -> None:
 
 
 def test_the_engines_own_word_is_found() -> None:
-    assert simulate.reason(["Traceback (most recent call last):", "  x", "ValueError: no", "bye"]) == "ValueError: no"
-    assert simulate.reason(["ERROR: Unknown pair style (force.cpp:1)", "Last command: x"]).startswith("ERROR: Unknown pair")
-    assert simulate.reason(["dembark: steps 3", "only this"]) == "only this"
-    assert simulate.reason([]) == "it said nothing"
+    assert outcome.reason(["Traceback (most recent call last):", "  x", "ValueError: no", "bye"]) == "ValueError: no"
+    assert outcome.reason(["ERROR: Unknown pair style (force.cpp:1)", "Last command: x"]).startswith("ERROR: Unknown pair")
+    assert outcome.reason(["dembark: steps 3", "only this"]) == "only this"
+    assert outcome.reason([]) == "it said nothing"
