@@ -30,6 +30,9 @@ ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 SIZES = (10, 25, 50, 100, 200, 400, 800)
 NETWORKS = (1000, 2000, 5000, 10000, 20000)
 PEERS = ("lemke", "newton_min", "pgs")
+# What one call of a peer may be expected to take (s), and its matrix, which is always dense, to hold (bytes), so that it is measured.
+LONGEST = 100.0
+LARGEST = 4 << 30
 
 
 def siconos_version() -> str | None:
@@ -94,7 +97,7 @@ def beside(case: str, problem: Problem, rounds: int, wall: bool, with_peers: boo
     """A dense problem, dembark's methods and Siconos's in turn; every second round the other way round."""
     clock = time.perf_counter if wall else time.process_time
     n = len(problem.q)
-    mine = {name: Row(case, n, f"dembark {name}") for name in ("auto", "energy", "block", "pgs")}
+    mine = {name: Row(case, n, f"dembark {name}") for name in ("auto", "energy", "block", "murty", "pgs")}
     theirs = {name: Row(case, n, f"Siconos {name}") for name in PEERS}
     say(f"{case}, {n} contacts: {rounds} rounds")
     for turn in range(rounds):
@@ -106,10 +109,16 @@ def beside(case: str, problem: Problem, rounds: int, wall: bool, with_peers: boo
     return [row.summary() for row in [*mine.values(), *theirs.values()] if row.seconds]
 
 
-def cold_networks(sizes: tuple[int, ...], rounds: int, wall: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
-    """Sparse planar networks from nothing: checks, islands, order, answer."""
+def expected(row: dict[str, Any], contacts: int) -> float:
+    """Seconds of a peer at `contacts` from those at a smaller size: a sweep costs its square, a factorisation its cube."""
+    return row["median"] * (contacts / row["contacts"]) ** (2 if row["solver"].endswith("pgs") else 3)
+
+
+def cold_networks(sizes: tuple[int, ...], rounds: int, wall: bool, with_peers: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
+    """Sparse planar networks from nothing: checks, islands, order, answer; the peers, which store them dense, once, while they can."""
     clock = time.perf_counter if wall else time.process_time
-    rows = []
+    rows: list[dict[str, Any]] = []
+    going = dict.fromkeys(PEERS if with_peers else ())
     for n in sizes:
         say(f"sparse network, {n} contacts: {rounds} rounds")
         problem = network(n)
@@ -118,6 +127,14 @@ def cold_networks(sizes: tuple[int, ...], rounds: int, wall: bool, say: Callable
             for name, row in pair.items():
                 own(problem, clock, row, method=name)
         rows += [row.summary() for row in pair.values()]
+        going = {name: last for name, last in going.items()
+                 if 8 * n**2 <= LARGEST and (last is None or expected(last, n) <= LONGEST)}
+        theirs = {name: Row("network, sparse", n, f"Siconos {name}") for name in going}
+        if theirs:
+            say(f"sparse network, {n} contacts, stored dense: Siconos {', '.join(theirs)}")
+            peers(problem, theirs, wall)
+        going = {name: row.summary() for name, row in theirs.items()}
+        rows += going.values()
     return rows
 
 
@@ -245,7 +262,7 @@ def measure(out: Path, rounds: int, wall: bool, say: Callable[[str], None], quic
         rows += beside("coupled", coupled(n), rounds, wall, version is not None, say)
         planar = network(n)
         rows += beside("network, stored dense", Problem(planar.M.toarray(), planar.q), rounds, wall, version is not None, say)
-    rows += cold_networks(NETWORKS[:1] if quick else NETWORKS, rounds, wall, say)
+    rows += cold_networks(NETWORKS[:1] if quick else NETWORKS, rounds, wall, version is not None, say)
     rows += warm(200 if quick else 1000, 10 if quick else 100, wall, say)
     facts["load_after"] = os.getloadavg()[0]
     asked = goals(rows)

@@ -33,3 +33,8 @@ def test_nothing_to_draw_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixtu
         lcp.redraw(tmp_path, tmp_path / "scaling.png")
     assert run.main(["--redraw", "--out", str(tmp_path)]) == 2
     assert "--only lcp" in capsys.readouterr().err
+
+
+def test_a_peer_is_left_out_where_one_call_would_take_too_long() -> None:
+    assert lcp.expected(row("Siconos lemke", 100), 1000) == pytest.approx(1e3 * 1e-4)
+    assert lcp.expected(row("Siconos pgs", 100), 1000) == pytest.approx(1e2 * 1e-4)
