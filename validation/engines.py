@@ -18,6 +18,8 @@ from dembark.validation.cases import checkout
 from dembark.validation.errors import DembarkError
 from dembark.validation.parameters import Value
 
+# An environment variable for each engine: which program it was that told its version, and the version.
+_TOLD = "DEMBARK_TOLD_BY_"
 NAMES = {"liggghts": "LIGGGHTS with dembark's styles", "yade": "YADE with dembark's laws"}
 
 
@@ -148,16 +150,25 @@ def _first_match(pattern: str, command: list[str], environment: Mapping[str, str
     raise DembarkError(f"{command[0]} does not tell its version", "", last[0])
 
 
+def _version(engine: Engine, pattern: str, *words: str) -> str:
+    """The version that the program tells; asked once by a process and those that it starts, for a start takes a second or two."""
+    facts = engine.executable.stat()
+    asked = f"{engine.executable}:{facts.st_size}:{facts.st_mtime_ns}"
+    told = os.environ.get(_TOLD + engine.name.upper(), "").rpartition("=")
+    if told[0] == asked:
+        return told[2]
+    version = _first_match(pattern, [str(engine.executable), *words], engine.environment())
+    os.environ[_TOLD + engine.name.upper()] = f"{asked}={version}"
+    return version
+
+
 @cache
 def find(name: str) -> Engine:
     """The engine called `name` (`liggghts` or `yade`), asked for its version; DembarkError telling what to do if there is none."""
     if name == "liggghts":
         program = _find_liggghts()
-        bare = Engine(name, program, "", "")
-        version = _first_match(r"\(Version (?:LIGGGHTS-PUBLIC )?([^\s,)]+)", [str(program), "-in", "/dev/null", "-log", "none"],
-                               bare.environment())
+        version = _version(Engine(name, program, "", ""), r"\(Version (?:LIGGGHTS-PUBLIC )?([^\s,)]+)", "-in", "/dev/null", "-log", "none")
         return Engine(name, program, version, _digest([program]))
     program, prefix = _find_yade()
-    bare = Engine(name, program, "", "", prefix)
-    version = _first_match(r"[Yy]ade version:?\s*(\S+)", [str(program), "--version"], bare.environment())
+    version = _version(Engine(name, program, "", "", prefix), r"[Yy]ade version:?\s*(\S+)", "--version")
     return Engine(name, program, version, _digest([program, *_own_files(prefix)]), prefix)

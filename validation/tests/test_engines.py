@@ -127,6 +127,22 @@ def test_output_that_is_no_text_is_kept(tmp_path: Path) -> None:
     assert done.stdout.splitlines()[0] == "ERROR: too small"
 
 
+def test_a_program_is_asked_for_its_version_once_by_all_processes_and_again_when_it_changes(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program, asked = tmp_path / "liggghts-dembark", tmp_path / "asked"
+    monkeypatch.setenv("DEMBARK_LIGGGHTS", str(program))
+    monkeypatch.setenv("DEMBARK_TOLD_BY_LIGGGHTS", "/nowhere:1:1=0.1")
+    versions = []
+    for version in ("3.8.0", "3.8.0", "3.8.11"):
+        text = f"#!/bin/sh\necho x >> {asked}\necho '(Version LIGGGHTS-PUBLIC {version}, compiled)'\n"
+        if not program.exists() or program.read_text() != text:
+            program.write_text(text)
+            program.chmod(0o755)
+        engines.find.cache_clear()
+        versions.append(engines.find("liggghts").version)
+    assert versions == ["3.8.0", "3.8.0", "3.8.11"] and asked.read_text().count("x") == 2
+
+
 
 def plan(engine: str, **changes: object) -> Run:
     return series(find("fall"), "default", None, engines.find(engine), changes).runs[0]
