@@ -9,6 +9,7 @@ from dembark.physics.friction import FinnieRabinowicz, FrictionPath
 from dembark.physics.impact import Drum, Impact, ImpactChain, ImpactMotion, ImpactSystem, Plane
 from dembark.physics.lcp import LCP_METHODS, LcpCertificate, LcpResult, LcpSolver, solve_lcp
 from dembark.physics.normal import effective_shear_modulus, effective_youngs_modulus
+from dembark.physics.viscous import ViscousResistance, viscous_resistance
 
 __all__ = [
     "CAPILLARY_MODELS",
@@ -28,6 +29,7 @@ __all__ = [
     "LcpSolver",
     "Plane",
     "Trajectory",
+    "ViscousResistance",
     "capillary_force",
     "collide",
     "drop",
@@ -35,4 +37,5 @@ __all__ = [
     "effective_youngs_modulus",
     "rupture_distance",
     "solve_lcp",
+    "viscous_resistance",
 ]
