@@ -2,6 +2,7 @@
 // force.
 //
 //   pair_style gran model hertz tangential ... cohesion capillary [capillary_model exact|willett|willett_full|rabinovich|bagheri|constant]
+//              [viscous on|off]
 //
 // Works compiled out of tree into liggghts-dembark and, unchanged, copied into a LIGGGHTS src/ folder.
 #ifdef COHESION_MODEL
@@ -17,12 +18,16 @@ COHESION_MODEL(COHESION_CAPILLARY,capillary,20)
 #include <string>
 #include <vector>
 
+#include "atom.h"
 #include "contact_models.h"
 #include "cohesion_model_base.h"
 #include "global_properties.h"
 #include "neighbor.h"
+#include "update.h"
 
 #include "dembark/capillary/bridge.hpp"
+#include "dembark/capillary/viscous.hpp"
+#include "dembark/vec3.hpp"
 #include "model_properties.h"
 #include "settings_choice.h"
 
@@ -39,6 +44,8 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
   int model_ = 0;
   int types_ = 0;
   double surface_tension_ = 0.0;
+  bool viscous_ = false;
+  dembark::capillary::ViscousLiquid liquid_;
   std::vector<PairLiquid> pairs_;  // one a pair of types, row by row
   std::map<double, std::shared_ptr<const dembark::capillary::BridgeForce>> built_;  // by mean contact angle
 
@@ -50,6 +57,38 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
       i_forces.delta_F[k] -= scale * force * normal[k];
       if (!d.is_wall) j_forces.delta_F[k] += force * normal[k];
     }
+  }
+
+  // What the liquid resists with, of a bridge of `volume` at `gap`. The engine sets velocities of surfaces for touching pairs only.
+  void resist(const SurfacesCloseData& d, const double* normal, double gap, double volume, ForceData& i_forces, ForceData& j_forces) const {
+    typedef dembark::Vec3<double> Vec3;
+    const auto vec = [](const double* a) { return Vec3{a[0], a[1], a[2]}; };
+    const Vec3 n = vec(normal), relative = vec(d.v_i) - vec(d.v_j);
+    const double arm_i = d.radi + 0.5 * gap, arm_j = d.is_wall ? 0.0 : d.radj + 0.5 * gap;
+    Vec3 spin = arm_i * vec(d.is_wall ? d.omega_i : atom->omega[d.i]);
+    if (!d.is_wall) spin += arm_j * vec(atom->omega[d.j]);
+    const double normal_velocity = dot(relative, n);
+    const auto resistance = dembark::capillary::viscous_resistance(liquid_, bridge_radius(d), gap, volume);
+    const Vec3 tangential = -resistance.tangential * (relative - normal_velocity * n - cross(spin, n));
+    const Vec3 force = tangential - resistance.normal * normal_velocity * n, moment = cross(n, tangential);
+    const double scale = d.is_wall ? d.area_ratio : 1.0;
+    const double f[3] = {force.x, force.y, force.z}, m[3] = {moment.x, moment.y, moment.z};
+    for (int k = 0; k < 3; ++k) {
+      i_forces.delta_F[k] += scale * f[k];
+      i_forces.delta_torque[k] -= scale * arm_i * m[k];
+      if (d.is_wall) continue;
+      j_forces.delta_F[k] -= f[k];
+      j_forces.delta_torque[k] -= arm_j * m[k];
+    }
+  }
+
+  void check_time_step(double radius, double effective_mass) const {
+    const double limit = dembark::capillary::viscous_time_step(liquid_, radius, effective_mass);
+    if (update->dt <= limit) return;
+    char line[256];
+    snprintf(line, sizeof line, "cohesion capillary: with viscous on a bridge between these grains needs a time step <= %.3g s, not %g s, or a larger minimumGap",
+             limit, update->dt);
+    error->one(FLERR, line);
   }
 
   // A bridge longer than the neighbour list looks would vanish without a word. `size`: r_i + r_j, r_i against a wall.
@@ -75,7 +114,10 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     hsetup->add_history_value("bridge_rupture_distance", "0");
   }
 
-  void registerSettings(Settings& settings) { dembark_liggghts::register_choice(settings, "capillary_model", model_, dembark::capillary::model_names()); }
+  void registerSettings(Settings& settings) {
+    dembark_liggghts::register_choice(settings, "capillary_model", model_, dembark::capillary::model_names());
+    settings.registerOnOff("viscous", viscous_, false);
+  }
 
   inline void postSettings(IContactHistorySetup*, ContactModelBase*) {}
 
@@ -87,6 +129,10 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     pairs_.assign(types_ * types_, {});
     surface_tension_ = read.scalar("surfaceTension");
     if (!(surface_tension_ >= 0.0)) read.fail("surfaceTension (N/m) must be >= 0");
+    liquid_.viscosity = viscous_ ? read.scalar("liquidViscosity") : read.scalar("liquidViscosity", 0.0);
+    if (!viscous_ && liquid_.viscosity != 0.0) read.fail("liquidViscosity is given, but viscous forces are off; write 'viscous on' after the models, or leave it out");
+    if (viscous_) liquid_.minimum_gap = read.scalar("minimumGap");
+    if (const char* wrong = liquid_.error()) read.fail(std::string("liquidViscosity, minimumGap: ") + wrong);
     double largest = 0.0;
     for (int i = 1; i < types_; ++i)
       for (int j = 1; j < types_; ++j) {
@@ -138,16 +184,21 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
 
   inline void surfacesIntersect(SurfacesIntersectData& sidata, ForceData& i_forces, ForceData& j_forces) {
     if (sidata.contact_flags) *sidata.contact_flags |= CONTACT_COHESION_MODEL;
+    const double& volume = sidata.contact_history[offset_];
+    const bool dry = !(volume > 0.0);
     const double attraction = touching_force(sidata.contact_history, sidata.itype, sidata.jtype, bridge_radius(sidata), sidata.is_wall ? sidata.radi : sidata.radsum,
                                              sidata.computeflag && sidata.shearupdate, sidata.is_wall && !sidata.mesh);
     pull(sidata, attraction, sidata.en, i_forces, j_forces);
+    if (!liquid_.on() || !(volume > 0.0)) return;
+    if (dry) check_time_step(bridge_radius(sidata), sidata.meff);
+    resist(sidata, sidata.en, -sidata.deltan, volume, i_forces, j_forces);
   }
 
   inline void surfacesClose(SurfacesCloseData& scdata, ForceData& i_forces, ForceData& j_forces) {
     if (!scdata.contact_history) return;
-    const double distance = sqrt(scdata.rsq);
+    const double distance = sqrt(scdata.rsq), gap = distance - (scdata.is_wall ? scdata.radi : scdata.radsum);
     double attraction;
-    if (!gap_force(scdata.contact_history, scdata.itype, scdata.jtype, bridge_radius(scdata), distance - (scdata.is_wall ? scdata.radi : scdata.radsum), attraction)) {
+    if (!gap_force(scdata.contact_history, scdata.itype, scdata.jtype, bridge_radius(scdata), gap, attraction)) {
       if (scdata.contact_flags) *scdata.contact_flags &= ~CONTACT_COHESION_MODEL;
       return;
     }
@@ -155,6 +206,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     scdata.has_force_update = true;
     const double normal[3] = {scdata.delta[0] / distance, scdata.delta[1] / distance, scdata.delta[2] / distance};
     pull(scdata, attraction, normal, i_forces, j_forces);
+    if (liquid_.on()) resist(scdata, normal, gap, scdata.contact_history[offset_], i_forces, j_forces);
   }
 
   inline void endSurfacesIntersect(SurfacesIntersectData&, ForceData&, ForceData&) {}

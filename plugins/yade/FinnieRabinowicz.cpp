@@ -92,6 +92,10 @@ void Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys::go(
 		if (!(surfaceTension >= 0.0)) fail("Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.surfaceTension must be a number >= 0 N/m when bridgeVolume is > 0");
 		phys->surfaceTension = surfaceTension;
 		phys->contactAngle   = pairValue(contactAngle, "contactAngle", a, b);
+		if (const char* wrong = ::dembark::capillary::ViscousLiquid{liquidViscosity, minimumGap}.error())
+			fail(std::string("Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.liquidViscosity, minimumGap: ") + wrong);
+		phys->liquidViscosity = liquidViscosity;
+		phys->minimumGap      = minimumGap;
 	}
 	interaction->phys = phys;
 }
@@ -133,16 +137,23 @@ void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::prepare(
 	p.limit_force            = limitForce;
 	p.friction               = {phys.staticFriction, phys.kineticFriction, phys.criticalSlipDistance, phys.interfaceShearStrength, phys.healingTime, path};
 	if (wet && (phys.newBridgeVolume > 0.0 || phys.bridgeVolume > 0.0))
-		p.liquid = {bridgeForce(model, phys.contactAngle), phys.surfaceTension, phys.newBridgeVolume};
+		p.liquid = {bridgeForce(model, phys.contactAngle), phys.surfaceTension, phys.newBridgeVolume, {phys.liquidViscosity, phys.minimumGap}};
 	phys.contact = p;
+
+	const double r1 = phys.wallBody == 1 ? INFINITY : geom.radius1, r2 = phys.wallBody == 2 ? INFINITY : geom.radius2;
+	const double m1 = phys.wallBody != 1 && body1.isDynamic() ? body1.state->mass : INFINITY;
+	const double m2 = phys.wallBody != 2 && body2.isDynamic() ? body2.state->mass : INFINITY;
+	if (p.liquid.viscous.on() && !(std::isinf(m1) && std::isinf(m2))) {
+		const double limit = ::dembark::capillary::viscous_time_step(p.liquid.viscous, 2.0 * ::dembark::reduced(r1, r2), ::dembark::reduced(m1, m2));
+		if (scene->dt > limit)
+			fail("bodies " + std::to_string(body1.getId()) + " and " + std::to_string(body2.getId()) + ": their viscous bridge needs O.dt <= " +
+			     text(limit) + " s, not " + text(scene->dt) + " s, or a larger minimumGap");
+	}
 
 	phys.linearStiffness = 0.0;
 	if (normal == ::dembark::NormalLaw::hooke) {
 		if (!(characteristicVelocity > 0.0))
 			fail("Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz.characteristicVelocity must be > 0 m/s for normalLaw='hooke'");
-		const double r1 = phys.wallBody == 1 ? INFINITY : geom.radius1, r2 = phys.wallBody == 2 ? INFINITY : geom.radius2;
-		const double m1 = phys.wallBody != 1 && body1.isDynamic() ? body1.state->mass : INFINITY;
-		const double m2 = phys.wallBody != 2 && body2.isDynamic() ? body2.state->mass : INFINITY;
 		phys.linearStiffness = ::dembark::hooke(::dembark::HookeParameters{phys.effectiveYoungsModulus, phys.restitution, characteristicVelocity},
 		                                        ::dembark::reduced(r1, r2), ::dembark::reduced(m1, m2), 1.0, 0.0).force;
 	}
@@ -220,10 +231,12 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 	phys.bridgeVolume        = state.bridge_volume;
 	phys.ruptureDistance     = state.rupture_distance;
 	phys.capillaryForce      = out.capillary_force;
+	phys.viscousForce        = out.viscous_normal;
 	if (!out.interacting) return false;
 
 	const Vector3r force      = vec(out.force);
-	const Vector3r tangential = vec(out.tangential);
+	const Vector3r tangential = vec(out.tangential + out.viscous_tangential);
+	const bool     turns      = out.overlap > 0.0 || phys.contact.liquid.viscous.on();
 	// YADE's forces of a contact are those on its body 2.
 	const double sign = swapped ? 1.0 : -1.0;
 	phys.shearForce  = sign * tangential;
@@ -244,9 +257,9 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 	const Body::id_t first = swapped ? id2 : id1, second = swapped ? id1 : id2;
 	scene->forces.addForce(first, force);
 	scene->forces.addForce(second, -force);
-	if (out.overlap > 0.0) scene->forces.addTorque(first, vec(out.torque_1));
+	if (turns) scene->forces.addTorque(first, vec(out.torque_1));
 	if (phys.wallBody == 0) {
-		if (out.overlap > 0.0) scene->forces.addTorque(second, vec(out.torque_2));
+		if (turns) scene->forces.addTorque(second, vec(out.torque_2));
 	} else {
 		scene->forces.addTorque(second, -surface.cross(force));
 	}

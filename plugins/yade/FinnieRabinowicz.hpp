@@ -33,6 +33,7 @@ public:
 		((Real,bridgeVolume,0,,"Volume [m^3] of the liquid bridge that is there; 0 = no bridge"))
 		((Real,ruptureDistance,0,,"Gap [m] beyond which that bridge breaks"))
 		((Real,capillaryForce,0,,"Force [N] of the bridge, positive = attractive"))
+		((Real,viscousForce,0,,"Force [N] along the normal by which the liquid resists, positive = repulsive"))
 		((Real,effectiveYoungsModulus,0,Attr::triggerPostLoad,"E* [Pa], 1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2"))
 		((Real,effectiveShearModulus,0,Attr::triggerPostLoad,"G* [Pa], 1/G* = (2-nu1)/G1 + (2-nu2)/G2"))
 		((Real,restitution,1,Attr::triggerPostLoad,"Coefficient of restitution"))
@@ -43,7 +44,9 @@ public:
 		((Real,healingTime,0,Attr::triggerPostLoad,"Time constant [s] in which slip is forgotten while the contact sticks; 0 = at once"))
 		((Real,newBridgeVolume,0,Attr::triggerPostLoad,"Volume [m^3] of a bridge that forms when the bodies touch"))
 		((Real,surfaceTension,0,Attr::triggerPostLoad,"Surface tension [N/m]"))
-		((Real,contactAngle,0,Attr::triggerPostLoad,"Contact angle [rad]")),
+		((Real,contactAngle,0,Attr::triggerPostLoad,"Contact angle [rad]"))
+		((Real,liquidViscosity,0,Attr::triggerPostLoad,"Viscosity [Pa s] of the liquid; 0 = no viscous force"))
+		((Real,minimumGap,0,Attr::triggerPostLoad,"Gap [m] below which viscous forces do not grow")),
 		createIndex();
 	);
 	// clang-format on
@@ -65,6 +68,8 @@ public:
 		((shared_ptr<MatchMaker>,bridgeVolume,,,"Volume [m^3] of each liquid bridge, formed when two bodies touch; not given or 0 = dry."))
 		((shared_ptr<MatchMaker>,contactAngle,,,"Contact angle [rad], 0...pi/2. Required with a bridge volume."))
 		((Real,surfaceTension,NaN,,"Surface tension [N/m], >= 0. Required with a bridge volume."))
+		((Real,liquidViscosity,0,,"Viscosity [Pa s] of the liquid, >= 0; 0 = no viscous force."))
+		((Real,minimumGap,0,,"Gap [m], > 0, below which viscous forces do not grow: the roughness of the surfaces. Required with a viscosity."))
 		((Real,healingTime,0,,"Time constant [s] in which slip is forgotten while a contact sticks; 0 = at once."))
 	);
 	// clang-format on
@@ -80,7 +85,7 @@ public:
 	long contactCount() const;
 	FUNCTOR2D(ScGeom, FinnieRabinowiczPhys);
 	// clang-format off
-	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz,LawFunctor,"Normal force of Hertz or Hooke with damping from a coefficient of restitution, tangential force of Finnie and Rabinowicz, and a capillary bridge. A body whose shape is not a :yref:`Sphere` is a wall of infinite radius and mass; a sphere that is not dynamic has infinite mass; two bodies of which neither is dynamic have no force. A bridge keeps its interaction until it ruptures, at any gap.",
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz,LawFunctor,"Normal force of Hertz or Hooke with damping from a coefficient of restitution, tangential force of Finnie and Rabinowicz, and a liquid bridge with capillary and, if wanted, viscous force. A body whose shape is not a :yref:`Sphere` is a wall of infinite radius and mass; a sphere that is not dynamic has infinite mass; two bodies of which neither is dynamic have no force. A bridge keeps its interaction until it ruptures, at any gap.",
 		((string,normalLaw,"hertz",Attr::triggerPostLoad,"'hertz' or 'hooke'"))
 		((Real,characteristicVelocity,NaN,Attr::triggerPostLoad,"Impact speed [m/s] at which the overlap of 'hooke' equals that of 'hertz'. Required for 'hooke'."))
 		((string,presliding,"linear",Attr::triggerPostLoad,"Tangential force before gross slip: 'linear' or 'exponential'"))
