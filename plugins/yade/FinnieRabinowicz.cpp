@@ -88,7 +88,8 @@ void Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys::go(
 
 	phys->newBridgeVolume = pairValue(bridgeVolume, "bridgeVolume", a, b, 0.0);
 	if (!(phys->newBridgeVolume >= 0.0)) fail("bridgeVolume of " + pairName(a, b) + " is " + text(phys->newBridgeVolume) + "; it must be >= 0 m^3");
-	if (phys->newBridgeVolume > 0.0) {
+	phys->wettable = phys->newBridgeVolume > 0.0 || (contactAngle && !std::isnan(surfaceTension));
+	if (phys->wettable) {
 		if (!(surfaceTension >= 0.0)) fail("Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.surfaceTension must be a number >= 0 N/m when bridgeVolume is > 0");
 		phys->surfaceTension = surfaceTension;
 		phys->contactAngle   = pairValue(contactAngle, "contactAngle", a, b);
@@ -136,7 +137,13 @@ void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::prepare(
 	p.tangential_damping     = tangentialDamping;
 	p.limit_force            = limitForce;
 	p.friction               = {phys.staticFriction, phys.kineticFriction, phys.criticalSlipDistance, phys.interfaceShearStrength, phys.healingTime, path};
-	if (wet && (phys.newBridgeVolume > 0.0 || phys.bridgeVolume > 0.0))
+	if (carriedLiquid) {
+		const std::string name = "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz.carriedLiquid";
+		if (!wet) fail(name + " needs a capillaryModel other than none");
+		if (!phys.wettable) fail(name + " needs surfaceTension and contactAngle of Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys");
+		if (phys.newBridgeVolume > 0.0) fail(name + ": bridgeVolume of Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys must not be given, bridges take what the bodies carry");
+	}
+	if (wet && (carriedLiquid || phys.newBridgeVolume > 0.0 || phys.bridgeVolume > 0.0))
 		p.liquid = {bridgeForce(model, phys.contactAngle), phys.surfaceTension, phys.newBridgeVolume, {phys.liquidViscosity, phys.minimumGap}};
 	phys.contact = p;
 
@@ -160,6 +167,25 @@ void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::prepare(
 	phys.preparedBy = revision;
 }
 
+/// What the contact asks for, or gives back, after its forces are known.
+void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::trade(
+        FinnieRabinowiczPhys& phys, const ScGeom& geom, const Interaction& interaction, double volumeBefore) {
+	if (phys.bridgeVolume > 0.0) return;
+	Body::id_t first = interaction.getId1(), second = interaction.getId2();
+	double     firstRadius = geom.radius1, secondRadius = phys.wallBody == 2 ? INFINITY : geom.radius2;
+	if (phys.wallBody == 1) {
+		std::swap(first, second);
+		firstRadius  = geom.radius2;
+		secondRadius = INFINITY;
+	}
+	if (volumeBefore > 0.0) {
+		exchange->giveBack(scene->iter, {first, second, volumeBefore, phys.bridgeImbalance, phys.wallBody != 0});
+		phys.bridgeImbalance = 0.0;
+	} else if (geom.penetrationDepth > 0.0) {
+		exchange->ask(scene->iter, {first, second, firstRadius, secondRadius, &phys});
+	}
+}
+
 bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* interaction) {
 	const ScGeom&         geom = *static_cast<ScGeom*>(igeom.get());
 	FinnieRabinowiczPhys& phys = *static_cast<FinnieRabinowiczPhys*>(iphys.get());
@@ -173,7 +199,12 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 	const bool free1 = phys.wallBody != 1 && body1.isDynamic(), free2 = phys.wallBody != 2 && body2.isDynamic();
 	if (!free1 && !free2) {  // nothing that they do to each other has an effect
 		phys.normalForce = phys.shearForce = Vector3r::Zero();
-		return geom.penetrationDepth > 0.0;
+		if (carriedLiquid && phys.bridgeVolume > 0.0) {
+			const double volume = phys.bridgeVolume;
+			if (-geom.penetrationDepth > phys.ruptureDistance) phys.bridgeVolume = phys.ruptureDistance = 0.0;
+			trade(phys, geom, *interaction, volume);
+		}
+		return geom.penetrationDepth > 0.0 || phys.bridgeVolume > 0.0;
 	}
 
 	Vector3r shift = Vector3r::Zero(), shiftVelocity = Vector3r::Zero();
@@ -222,6 +253,8 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 	state.bridge_volume              = phys.bridgeVolume;
 	state.rupture_distance           = phys.ruptureDistance;
 
+	const double volumeBefore = phys.bridgeVolume;
+
 	const ::dembark::ContactForce out = ::dembark::contact_step(phys.contact, bodies, scene->dt, state);
 
 	if (!(out.overlap > 0.0) && phys.dissipatedEnergy > 0.0) endedDissipation += phys.dissipatedEnergy;
@@ -232,6 +265,7 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 	phys.ruptureDistance     = state.rupture_distance;
 	phys.capillaryForce      = out.capillary_force;
 	phys.viscousForce        = out.viscous_normal;
+	if (carriedLiquid) trade(phys, geom, *interaction, volumeBefore);
 	if (!out.interacting) return false;
 
 	const Vector3r force      = vec(out.force);
