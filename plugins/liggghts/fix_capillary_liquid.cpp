@@ -120,6 +120,7 @@ void FixCapillaryLiquid::post_create() {
   property_ = modify->add_fix_property_atom(9, const_cast<char **>(words), style);
   if (!property_->recent_restart)
     for (int i = 0; i < atom->nlocal; ++i) property_->set_arrays(i);
+  property_->just_created = 0;  // it has its values: `set` may follow
 }
 
 void FixCapillaryLiquid::pre_delete(bool unfix) {
@@ -130,8 +131,8 @@ void FixCapillaryLiquid::init() {
   if (force->newton_pair) refuse("newton must be off: each rank settles the contacts of the grains that it owns");
   if (std::strcmp(update->integrate_style, "verlet") != 0) refuse("only run_style verlet is supported");
   if (!places_.count(nullptr)) refuse("it needs pair_style gran ... cohesion capillary ... carried_liquid on");
-  // The engine would set new arrays back in the middle of the set-up, when the grains have their liquid already.
-  just_created = property_->just_created = 0;
+  // The engine would set new arrays back in the middle of the set-up.
+  just_created = 0;
   find_walls();
   totals_step_ = -1;
 }

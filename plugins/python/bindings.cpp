@@ -62,10 +62,12 @@ struct Contact {
 
 void bind_lcp(nb::module_& m);
 void bind_impact(nb::module_& m);
+void bind_liquid(nb::module_& m);
 
 NB_MODULE(_physics, m) {
   bind_lcp(m);
   bind_impact(m);
+  bind_liquid(m);
   nb::set_leak_warnings(false);  // cached laws live until the interpreter is gone, which is no leak
   m.attr("unlimited_strength") = unlimited_strength;
   m.def("capillary_models", &capillary::model_names);
