@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rig.liggghts_driver import properties, read_dump, run_deck
+from rig.packing import packing
 from rig.scenarios import Material
 
 LIQUID = Material(static_friction=0.5, kinetic_friction=0.4, bridge_volume=1.0)
@@ -177,6 +178,36 @@ run 250"""
     np.testing.assert_allclose(held + lost, held[0], rtol=1e-13)
     assert column(rows, "atoms")[-1] == 65
     assert column(rows, "walls")[-1] == 0.0
+
+
+def periodic(run: str, ranks: int) -> str:
+    """64 grains that fall on a floor, periodic along it; for one rank or two."""
+    bed = packing(Material(static_friction=0.5, kinetic_friction=0.4, bridge_volume=1.0), run, every=1000)
+    bed = re.sub(r"fix p_bridgeVolume.*", "", bed).replace("capillary_model exact", "capillary_model exact carried_liquid on")
+    bed = bed.replace("thermo 1000", f"{THERMO}\nthermo_modify norm no format float %.17g\nthermo 250")
+    bed = bed.replace("fix weight", f"fix liquid all capillary/liquid content 0.01 return taken\nfix weight")
+    return bed if ranks == 2 else bed.replace("processors 2 1 1\n", "")
+
+
+def test_periodic_borders(tmp_path):
+    runs = {}
+    for ranks in (1, 2):
+        rows = runs[ranks] = run_shaken(tmp_path / str(ranks), periodic("run 3000", ranks), ranks=ranks)
+        np.testing.assert_allclose(column(rows, "held"), column(rows, "held")[0], rtol=1e-14)
+        assert (column(rows, "lost") == 0.0).all() and column(rows, "count")[-1] > 64
+    np.testing.assert_allclose(runs[2][:, 2:9], runs[1][:, 2:9], rtol=1e-7, atol=1e-20)
+
+
+def test_new_grains_bring_the_same_content(tmp_path):
+    commands = """\
+run 500
+create_atoms 1 single 0.015 0.015 0.045 units box
+set atom 126 diameter 0.004 density 2500
+run 500"""
+    rows = run_shaken(tmp_path, shaken(commands))
+    assert column(rows, "atoms")[-1] == 126
+    np.testing.assert_allclose(column(rows, "added")[-1], 0.01 * np.pi / 6.0 * 0.004**3, rtol=1e-13)
+    np.testing.assert_allclose(column(rows, "held") - column(rows, "added"), column(rows, "held")[0], rtol=1e-14)
 
 
 def test_liquid_set_by_hand_and_spread_by_contacts(tmp_path):
