@@ -31,7 +31,8 @@ const char *const property_name = "capillaryLiquid";
 
 FixCapillaryLiquid::FixCapillaryLiquid(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg) {
   for (int k = 0; k < modify->nfix; ++k)
-    if (modify->fix[k] != this && std::strcmp(modify->fix[k]->style, style) == 0) refuse("there can be one such fix only, and there is fix " + std::string(modify->fix[k]->id));
+    if (modify->fix[k] != this && std::strcmp(modify->fix[k]->style, style) == 0)
+      refuse("there can be one such fix only, and there is fix " + std::string(modify->fix[k]->id));
   if (std::strcmp(arg[1], "all") != 0) refuse("the group must be 'all': every grain owns its liquid");
   parse(narg, arg);
   restart_global = restart_peratom = create_attribute = 1;
@@ -90,7 +91,8 @@ void FixCapillaryLiquid::parse(int narg, char **arg) {
       if (!(largest_ > 0.0)) refuse("max_bridge (m^3) must be > 0");
       k += 2;
     } else if (word == "wall") {
-      if (k + 4 >= narg) refuse("wall must be followed by the ID of a fix wall/gran, its liquid (m^3), the share it gives and the part it gets back");
+      if (k + 4 >= narg)
+        refuse("wall must be followed by the ID of a fix wall/gran, its liquid (m^3), the share it gives and the part it gets back");
       Wall wall;
       wall.id = arg[k + 1];
       wall.pool = number(k + 2, "the liquid of the wall");

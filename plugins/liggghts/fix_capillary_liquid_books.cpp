@@ -1,7 +1,7 @@
-// fix capillary/liquid: books per grain, against the bridges that are really there; grains that come and go; restarts.
+// fix capillary/liquid: books per grain, against the bridges that are really there; grains and walls that come and go.
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <cstdio>
 #include <string>
 
 #include "atom.h"
@@ -26,6 +26,12 @@ namespace {
 
 // Books and bridges differ by the rounding of sums only; more than this part of them is a bridge that came or went unseen.
 constexpr double rounding = 1e-11;
+
+std::string words(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
 
 }  // namespace
 
@@ -75,8 +81,8 @@ void FixCapillaryLiquid::find_walls() {
     // Its bridges fall back to the grains; its own liquid went with it.
     lost_ += known.pool;
     reference_ -= known.pool;
-    if (known.pool > 0.0 && comm->me == 0)
-      error->warning(FLERR, ("fix capillary/liquid: wall " + known.id + " is gone, and with it " + std::to_string(known.pool) + " m^3 of liquid").c_str());
+    const std::string line = "fix capillary/liquid: wall " + known.id + " is gone, and with it " + words(known.pool) + " m^3 of liquid";
+    if (known.pool > 0.0 && comm->me == 0) error->warning(FLERR, line.c_str());
   }
   rearrange(now);
 }
@@ -107,7 +113,8 @@ void FixCapillaryLiquid::setup_pre_force(int) {
   requests_.clear();
   for (Wall &wall : walls_)
     if (!wall.fix->is_mesh_wall())
-      wall.history = static_cast<FixPropertyAtom *>(modify->find_fix_property(("history_" + wall.id).c_str(), "property/atom", "vector", 0, 0, style));
+      wall.history = static_cast<FixPropertyAtom *>(
+          modify->find_fix_property(("history_" + wall.id).c_str(), "property/atom", "vector", 0, 0, style));
   after_new_list(false);
 }
 
@@ -126,26 +133,24 @@ void FixCapillaryLiquid::after_new_list(bool in_run) {
 
 /// New grains get their liquid.
 void FixCapillaryLiquid::take_in() {
-  double mine = 0.0, all = 0.0;
-  double came = 0.0;
+  double mine[2] = {0.0, 0.0}, all[2] = {0.0, 0.0};  // liquid, grains
   for (int i = 0; i < atom->nlocal; ++i) {
     double &own = liquid()[i];
     if (own == -1.0) {
       own = initial(i);
-      mine += own;
-      came += 1.0;
+      mine[0] += own;
+      mine[1] += 1.0;
     } else if (!(own >= 0.0) || !std::isfinite(own)) {
-      const std::string line = "fix capillary/liquid: grain " + std::to_string(atom->tag[i]) + " has liquid " + std::to_string(own) + " m^3; it must be >= 0";
+      const std::string line =
+          "fix capillary/liquid: grain " + std::to_string(atom->tag[i]) + " has liquid " + words(own) + " m^3; it must be >= 0";
       error->one(FLERR, line.c_str());
     }
   }
-  double sums[2] = {mine, came}, total[2] = {0.0, 0.0};
-  MPI_Allreduce(sums, total, 2, MPI_DOUBLE, MPI_SUM, world);
-  all = total[0];
+  MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_SUM, world);
   if (atoms_ < 0) return;  // all are new
-  added_ += all;
-  reference_ += all;
-  atoms_ += static_cast<bigint>(total[1]);
+  added_ += all[0];
+  reference_ += all[0];
+  atoms_ += static_cast<bigint>(all[1]);
 }
 
 /// Bridges that the list does not have any more (their partner left the box, or jumped further than the list looks) fall back: each
@@ -159,8 +164,8 @@ void FixCapillaryLiquid::check_pairs(bool in_run) {
   for (int i = 0; i < atom->nlocal; ++i) {
     const double back = book(i)[0] - held[i], exact = rounding * std::max(book(i)[0], liquid()[i]);
     if (back < -exact) {
-      const std::string line = "fix capillary/liquid: the bridges of grain " + std::to_string(atom->tag[i]) + " hold " + std::to_string(-back / held[i]) +
-                               " more than was given to them; is the box smaller than two cut-offs?";
+      const std::string line = "fix capillary/liquid: the bridges of grain " + std::to_string(atom->tag[i]) + " hold " +
+                               words(-back / held[i]) + " more than was given to them; is the box smaller than two cut-offs?";
       error->one(FLERR, line.c_str());
     }
     // In a set-up rounding is left alone: a resumed run must not differ.
@@ -171,8 +176,8 @@ void FixCapillaryLiquid::check_pairs(bool in_run) {
   }
 }
 
-/// The engine moves, copies and drops the contacts with a mesh as grains pass from triangle to triangle, and forgets a primitive wall out of
-/// reach: what fell out goes back as from a broken bridge, what was doubled is shared.
+/// The engine moves, copies and drops the contacts with a mesh as grains pass from triangle to triangle, and forgets a primitive wall out
+/// of reach: what fell out goes back as from a broken bridge, what was doubled is shared.
 void FixCapillaryLiquid::check_walls() {
   for (std::size_t w = 0; w < walls_.size(); ++w)
     for (int i = 0; i < atom->nlocal; ++i) {
@@ -180,9 +185,8 @@ void FixCapillaryLiquid::check_walls() {
       if (booked == 0.0) continue;
       double held = 0.0;
       each_wall_bridge(walls_[w], i, [&](double volume) { held += volume; });
-      const double exact = rounding * std::max(booked, held);
-      if (std::fabs(booked - held) <= exact && held > 0.0) continue;
-      if (held > booked) {
+      if (held > 0.0 && std::fabs(booked - held) <= rounding * held) continue;
+      if (held > 0.0 && held > booked) {
         const double scale = std::max(booked, 0.0) / held;
         each_wall_bridge(walls_[w], i, [&](double &volume) { volume *= scale; });
         continue;
@@ -218,7 +222,7 @@ void FixCapillaryLiquid::count_all() {
     reference_ = now;
   } else if (std::fabs(missing) > 1e-9 * std::max(now, reference_)) {
     if (!update->setupflag && update->ntimestep > update->firststep) {
-      const std::string line = "fix capillary/liquid: " + std::to_string(missing / reference_) + " of the liquid is missing";
+      const std::string line = "fix capillary/liquid: " + words(missing / reference_) + " of the liquid is missing";
       error->all(FLERR, line.c_str());
     }
     added_ -= missing;  // by a command between two runs
@@ -244,81 +248,3 @@ const FixCapillaryLiquid::Totals &FixCapillaryLiquid::totals() {
   totals_step_ = update->ntimestep;
   return totals_;
 }
-
-void FixCapillaryLiquid::grow_arrays(int n) {
-  books_.resize(std::size_t(n) * width(), 0.0);
-  grants_.resize(std::size_t(n), -1.0);
-}
-
-void FixCapillaryLiquid::copy_arrays(int i, int j, int) { std::copy_n(book(i), width(), book(j)); }
-
-void FixCapillaryLiquid::set_arrays(int i) { std::fill_n(book(i), width(), 0.0); }
-
-int FixCapillaryLiquid::pack_exchange(int i, double *buffer) {
-  std::copy_n(book(i), width(), buffer);
-  return int(width());
-}
-
-int FixCapillaryLiquid::unpack_exchange(int i, double *buffer) {
-  std::copy_n(buffer, width(), book(i));
-  return int(width());
-}
-
-int FixCapillaryLiquid::pack_restart(int i, double *buffer) {
-  buffer[0] = double(width() + 1);
-  std::copy_n(book(i), width(), buffer + 1);
-  return int(width()) + 1;
-}
-
-void FixCapillaryLiquid::unpack_restart(int i, int nth) {
-  const double *from = atom->extra[i];
-  for (int k = 0; k < nth; ++k) from += static_cast<int>(*from);
-  std::copy_n(from + 1, std::min(width(), static_cast<std::size_t>(*from) - 1), book(i));
-}
-
-int FixCapillaryLiquid::size_restart(int) { return int(width()) + 1; }
-
-int FixCapillaryLiquid::maxsize_restart() { return int(width()) + 1; }
-
-void FixCapillaryLiquid::write_restart(FILE *file) {
-  if (comm->me != 0) return;
-  std::vector<double> numbers = {double(walls_.size()), reference_, lost_, added_, double(atoms_)};
-  std::string names;
-  for (const Wall &wall : walls_) {
-    numbers.push_back(wall.pool);
-    names += wall.id + '\n';
-  }
-  const int bytes = int(numbers.size() * sizeof(double) + names.size() + 1);
-  fwrite(&bytes, sizeof(int), 1, file);
-  fwrite(numbers.data(), sizeof(double), numbers.size(), file);
-  fwrite(names.c_str(), 1, names.size() + 1, file);
-}
-
-/// The walls of the file, with what they held; init() finds their fixes. What the arguments say of a wall, but for its liquid, holds.
-void FixCapillaryLiquid::restart(char *buffer) {
-  std::vector<double> numbers(5);
-  std::memcpy(numbers.data(), buffer, 5 * sizeof(double));
-  const std::size_t n = static_cast<std::size_t>(numbers[0]);
-  reference_ = numbers[1];
-  lost_ = numbers[2];
-  added_ = numbers[3];
-  atoms_ = static_cast<bigint>(numbers[4]);
-  std::vector<Wall> walls;
-  const char *name = buffer + (5 + n) * sizeof(double);
-  for (std::size_t w = 0; w < n; ++w) {
-    const char *const end = std::strchr(name, '\n');
-    Wall wall;
-    wall.id.assign(name, end);
-    for (const Wall &given : walls_)
-      if (given.id == wall.id) wall = given;
-    std::memcpy(&wall.pool, buffer + (5 + w) * sizeof(double), sizeof(double));
-    walls.push_back(wall);
-    name = end + 1;
-  }
-  for (const Wall &given : walls_)
-    if (std::none_of(walls.begin(), walls.end(), [&](const Wall &wall) { return wall.id == given.id; })) walls.push_back(given);
-  walls_ = walls;
-  books_.assign(std::size_t(atom->nmax) * width(), 0.0);
-}
-
-double FixCapillaryLiquid::memory_usage() { return double((books_.size() + grants_.size()) * sizeof(double)); }

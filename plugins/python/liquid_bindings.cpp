@@ -23,16 +23,20 @@ Result make_result(std::size_t n, double*& data) {
   return Result(data, {n}, nb::capsule(data, [](void* p) noexcept { delete[] static_cast<double*>(p); }));
 }
 
+capillary::ShareRule share_rule(bool cap, double factor) {
+  return {cap ? capillary::ShareRule::Kind::cap : capillary::ShareRule::Kind::fraction, factor};
+}
+
 }  // namespace
 
 void bind_liquid(nb::module_& m) {
   m.def("liquid_returns", &capillary::return_names);
   m.def("liquid_share_error", [](bool cap, double factor) {
-    const char* const wrong = capillary::ShareRule{cap ? capillary::ShareRule::Kind::cap : capillary::ShareRule::Kind::fraction, factor}.error();
+    const char* const wrong = share_rule(cap, factor).error();
     return std::string(wrong ? wrong : "");
   });
   m.def("liquid_share", [](Array radius, Array other, bool cap, double factor) {
-    const capillary::ShareRule rule{cap ? capillary::ShareRule::Kind::cap : capillary::ShareRule::Kind::fraction, factor};
+    const capillary::ShareRule rule = share_rule(cap, factor);
     double* out;
     Result result = make_result(radius.shape(0), out);
     for (std::size_t i = 0; i < radius.shape(0); ++i) out[i] = rule(radius(i), other(i));
@@ -53,9 +57,11 @@ void bind_liquid(nb::module_& m) {
     const auto back = static_cast<capillary::Return>(rule);
     for (std::size_t k = 0; k < n; ++k) {
       const bool wall = !(radius_j(k) < capillary::flat<double>);
-      const capillary::NewBridge<double> b = wall ? capillary::form_wall_bridge(given_i(k), given_j(k), wall_part(k), back, largest(k))
-                                                  : capillary::form_bridge(given_i(k), given_j(k), radius_i(k), radius_j(k), back, largest(k));
-      const double values[] = {b.volume, b.from_i, b.from_j, capillary::returned(b.volume, b.imbalance), capillary::returned(b.volume, -b.imbalance)};
+      const capillary::NewBridge<double> b =
+          wall ? capillary::form_wall_bridge(given_i(k), given_j(k), wall_part(k), back, largest(k))
+               : capillary::form_bridge(given_i(k), given_j(k), radius_i(k), radius_j(k), back, largest(k));
+      const double values[] = {b.volume, b.from_i, b.from_j, capillary::returned(b.volume, b.imbalance),
+                               capillary::returned(b.volume, -b.imbalance)};
       for (int c = 0; c < 5; ++c) out[c][k] = values[c];
     }
     return nb::tuple(columns);
