@@ -110,7 +110,10 @@ if rough:
 weight = (0, 0, -p.gravity)
 box = ((-d_max, p.channel_width + d_max), (0, p.channel_depth), (z_low, z_box))
 dump = dembark.DumpWriter(walls=walls, bounds=box, boundary="ff pp ff", gravity=weight)
-history = dembark.HistoryWriter(walls=walls, glued=glued if rough else {}, gravity=weight, path="time.csv")
+# Grains own liquid and lend it to bridges, instead of bridges of a volume of their own. Walls have none and keep none.
+carried = p.liquid_content > 0
+liquid = CapillaryLiquid(content=p.liquid_content)
+history = dembark.HistoryWriter(walls=walls, glued=glued if rough else {}, gravity=weight, path="time.csv", liquid=liquid if carried else None)
 
 
 def record() -> None:
@@ -136,10 +139,11 @@ O.engines = [
         [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
             restitution=p.restitution, staticFriction=pairs(grain_static, wall_static), kineticFriction=pairs(grain_kinetic, wall_kinetic),
             criticalSlipDistance=p.critical_slip_distance, interfaceShearStrength=p.interface_shear_strength,
-            bridgeVolume=p.bridge_volume, contactAngle=p.contact_angle, surfaceTension=p.surface_tension)],
+            bridgeVolume=0 if carried else p.bridge_volume, contactAngle=p.contact_angle, surfaceTension=p.surface_tension)],
         [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(
-            presliding=p.presliding, capillaryModel=p.capillary_model if p.bridge_volume > 0 else "none")],
+            presliding=p.presliding, capillaryModel=p.capillary_model if carried or p.bridge_volume > 0 else "none", carriedLiquid=carried)],
     ),
+    *([liquid] if carried else []),
     # Between forces and motion, where positions and forces belong to the same time.
     PyRunner(command="record()", iterPeriod=1),
     NewtonIntegrator(damping=0, gravity=weight),

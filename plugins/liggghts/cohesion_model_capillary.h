@@ -1,7 +1,8 @@
-// LIGGGHTS adapter of capillary bridges with a volume of their own: fetches the contact, calls dembark/capillary/bridge.hpp, adds the
-// force.
+// LIGGGHTS adapter of capillary bridges: fetches the contact, calls dembark/capillary/bridge.hpp, adds the force. The volume of a bridge is
+// fixed by the types, or taken from the grains (carried_liquid on, with fix capillary/liquid, which settles what forms and breaks).
 //
 //   pair_style gran model hertz tangential ... cohesion capillary [capillary_model exact|willett|willett_full|rabinovich|bagheri|constant]
+//              [viscous on|off] [carried_liquid on|off]
 //
 // Works compiled out of tree into liggghts-dembark and, unchanged, copied into a LIGGGHTS src/ folder.
 #ifdef COHESION_MODEL
@@ -17,12 +18,19 @@ COHESION_MODEL(COHESION_CAPILLARY,capillary,20)
 #include <string>
 #include <vector>
 
+#include "atom.h"
 #include "contact_models.h"
 #include "cohesion_model_base.h"
+#include "fix_wall_gran.h"
 #include "global_properties.h"
 #include "neighbor.h"
+#include "update.h"
 
 #include "dembark/capillary/bridge.hpp"
+#include "dembark/capillary/viscous.hpp"
+#include "dembark/vec3.hpp"
+#include "bridge_reach.h"
+#include "fix_capillary_liquid.h"
 #include "model_properties.h"
 #include "settings_choice.h"
 
@@ -39,6 +47,12 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
   int model_ = 0;
   int types_ = 0;
   double surface_tension_ = 0.0;
+  bool viscous_ = false, carried_ = false;
+  int imbalance_ = -1;  // where a bridge of carried liquid keeps how it will be split
+  IContactHistorySetup* host_;
+  LAMMPS_NS::FixCapillaryLiquid* owner_ = nullptr;  // of carried liquid
+  const LAMMPS_NS::FixWallGran* wall_ = nullptr;
+  dembark::capillary::ViscousLiquid liquid_;
   std::vector<PairLiquid> pairs_;  // one a pair of types, row by row
   std::map<double, std::shared_ptr<const dembark::capillary::BridgeForce>> built_;  // by mean contact angle
 
@@ -52,32 +66,95 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     }
   }
 
-  // A bridge longer than the neighbour list looks would vanish without a word. `size`: r_i + r_j, r_i against a wall.
-  void check_reach(double rupture_distance, double size, bool primitive_wall) const {
-    char line[256];
-    if (primitive_wall && rupture_distance > neighbor->skin) {
-      // The engine keeps the grains near a primitive wall within the skin only.
-      snprintf(line, sizeof line, "cohesion capillary: a bridge to a primitive wall reaches %g m but the neighbour skin is %g m; use neighbor %.3g bin",
-               rupture_distance, neighbor->skin, 1.01 * rupture_distance);
-      error->one(FLERR, line);
+  // What the liquid resists with, of a bridge of `volume` at `gap`. The engine sets velocities of surfaces for touching pairs only.
+  void resist(const SurfacesCloseData& d, const double* normal, double gap, double volume, ForceData& i_forces, ForceData& j_forces) const {
+    typedef dembark::Vec3<double> Vec3;
+    const auto vec = [](const double* a) { return Vec3{a[0], a[1], a[2]}; };
+    const Vec3 n = vec(normal), relative = vec(d.v_i) - vec(d.v_j);
+    const double arm_i = d.radi + 0.5 * gap, arm_j = d.is_wall ? 0.0 : d.radj + 0.5 * gap;
+    Vec3 spin = arm_i * vec(d.is_wall ? d.omega_i : atom->omega[d.i]);
+    if (!d.is_wall) spin += arm_j * vec(atom->omega[d.j]);
+    const double normal_velocity = dot(relative, n);
+    const auto resistance = dembark::capillary::viscous_resistance(liquid_, bridge_radius(d), gap, volume);
+    const Vec3 tangential = -resistance.tangential * (relative - normal_velocity * n - cross(spin, n));
+    const Vec3 force = tangential - resistance.normal * normal_velocity * n, moment = cross(n, tangential);
+    const double scale = d.is_wall ? d.area_ratio : 1.0;
+    const double f[3] = {force.x, force.y, force.z}, m[3] = {moment.x, moment.y, moment.z};
+    for (int k = 0; k < 3; ++k) {
+      i_forces.delta_F[k] += scale * f[k];
+      i_forces.delta_torque[k] -= scale * arm_i * m[k];
+      if (d.is_wall) continue;
+      j_forces.delta_F[k] -= f[k];
+      j_forces.delta_torque[k] -= arm_j * m[k];
     }
-    const double reach = (neighbor->contactDistanceFactor - 1.0) * size;
-    if (rupture_distance <= reach) return;
-    const double needed = 1.0 + rupture_distance / size;
-    snprintf(line, sizeof line, "cohesion capillary: a bridge reaches %g m but neighbours are kept to %g m only; use neigh_modify contact_distance_factor %.3g",
-             rupture_distance, reach, needed * 1.01);
+  }
+
+  void check_time_step(double radius, double effective_mass) const {
+    const double limit = dembark::capillary::viscous_time_step(liquid_, radius, effective_mass);
+    if (update->dt <= limit) return;
+    char line[256];
+    snprintf(line, sizeof line, "cohesion capillary: with viscous on a bridge between these grains needs a time step <= %.3g s, not %g s, or a larger minimumGap",
+             limit, update->dt);
     error->one(FLERR, line);
   }
 
+  // With carried liquid: who owns it, and where the reach of its bridges is reckoned from; 0 if not known.
+  double find_owner(dembark_liggghts::PropertyReader& read, double largest_radius) {
+    owner_ = static_cast<LAMMPS_NS::FixCapillaryLiquid*>(modify->find_fix_style("capillary/liquid", 0));
+    if (!carried_) {
+      if (owner_) read.fail("fix capillary/liquid is there, but liquid is not carried; write 'carried_liquid on' after the models, or leave the fix out");
+      return 0.0;
+    }
+    if (!owner_) read.fail("carried_liquid on needs the liquid: fix ID all capillary/liquid content C");
+    if (read.given("bridgeVolume")) read.fail("bridgeVolume is given, but with carried_liquid on a bridge takes its volume from the grains; leave one of them out");
+    wall_ = dynamic_cast<LAMMPS_NS::FixWallGran*>(host_);
+    owner_->place(wall_, offset_, imbalance_);
+    return owner_->likely_bridge(largest_radius < 1e10 ? largest_radius : 0.0);
+  }
+
+  // A touching contact without a bridge asks for liquid, once in a step.
+  void ask(const SurfacesIntersectData& d) const {
+    if (!d.computeflag || !d.shearupdate || !owner_->collecting()) return;
+    LAMMPS_NS::FixCapillaryLiquid::Request request;
+    request.i = d.i;
+    request.j = d.is_wall ? -1 : d.j;
+    request.wall = d.is_wall ? owner_->wall_number(wall_) : -1;
+    request.radius_i = d.radi;
+    request.radius_j = d.is_wall ? dembark::capillary::flat<double> : d.radj;
+    request.bridge_radius = bridge_radius(d);
+    request.bridge = d.contact_history + offset_;
+    request.imbalance = d.contact_history + imbalance_;
+    request.force = pairs_[d.itype * types_ + d.jtype].force.get();
+    request.primitive_wall = d.is_wall && !d.mesh;
+    owner_->ask(request);
+  }
+
+  // A bridge of carried liquid at a gap beyond its rupture distance: it gives its liquid back and is no more.
+  void give_back(const SurfacesCloseData& d) const {
+    if (!d.computeflag || !d.shearupdate || !owner_->collecting()) return;
+    double *const bridge = d.contact_history + offset_, &imbalance = d.contact_history[imbalance_];
+    if (d.is_wall)
+      owner_->broke_wall(d.i, owner_->wall_number(wall_), bridge[0], imbalance);
+    else
+      owner_->broke(d.i, d.j, bridge[0], imbalance);
+    bridge[0] = bridge[1] = imbalance = 0.0;
+  }
+
  public:
-  CohesionModel(LAMMPS* lmp, IContactHistorySetup* hsetup, class ContactModelBase* c) : CohesionModelBase(lmp, hsetup, c) {
+  CohesionModel(LAMMPS* lmp, IContactHistorySetup* hsetup, class ContactModelBase* c) : CohesionModelBase(lmp, hsetup, c), host_(hsetup) {
     offset_ = hsetup->add_history_value("bridge_volume", "0");
     hsetup->add_history_value("bridge_rupture_distance", "0");
   }
 
-  void registerSettings(Settings& settings) { dembark_liggghts::register_choice(settings, "capillary_model", model_, dembark::capillary::model_names()); }
+  void registerSettings(Settings& settings) {
+    dembark_liggghts::register_choice(settings, "capillary_model", model_, dembark::capillary::model_names());
+    settings.registerOnOff("viscous", viscous_, false);
+    settings.registerOnOff("carried_liquid", carried_, false);
+  }
 
-  inline void postSettings(IContactHistorySetup*, ContactModelBase*) {}
+  inline void postSettings(IContactHistorySetup* hsetup, ContactModelBase*) {
+    if (carried_) imbalance_ = hsetup->add_history_value("bridge_imbalance", "1");
+  }
 
   void connectToProperties(PropertyRegistry& registry) {
     dembark_liggghts::PropertyReader read(registry, modify, error, "cohesion capillary");
@@ -87,20 +164,25 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     pairs_.assign(types_ * types_, {});
     surface_tension_ = read.scalar("surfaceTension");
     if (!(surface_tension_ >= 0.0)) read.fail("surfaceTension (N/m) must be >= 0");
+    liquid_.viscosity = viscous_ ? read.scalar("liquidViscosity") : read.scalar("liquidViscosity", 0.0);
+    if (!viscous_ && liquid_.viscosity != 0.0) read.fail("liquidViscosity is given, but viscous forces are off; write 'viscous on' after the models, or leave it out");
+    if (viscous_) liquid_.minimum_gap = read.scalar("minimumGap");
+    if (const char* wrong = liquid_.error()) read.fail(std::string("liquidViscosity, minimumGap: ") + wrong);
+    const double r_min = registry.min_radius(), r_max = registry.max_radius();
+    const double carried_volume = find_owner(read, r_max);
     double largest = 0.0;
     for (int i = 1; i < types_; ++i)
       for (int j = 1; j < types_; ++j) {
         PairLiquid& pair = pairs_[i * types_ + j];
-        pair.volume = read.per_pair("bridgeVolume", i, j);
+        pair.volume = carried_ ? 0.0 : read.per_pair("bridgeVolume", i, j);
         if (!(pair.volume >= 0.0)) read.fail("bridgeVolume (m^3) must be >= 0 (types " + std::to_string(i) + "-" + std::to_string(j) + ")");
         const double angle = 0.5 * (read.per_type("contactAngle", i) + read.per_type("contactAngle", j));
         if (!(angle >= 0.0 && angle <= 0.5 * dembark::pi)) read.fail("contactAngle is in radians (stock models take degrees) and must lie in 0...pi/2; the mean of types " + std::to_string(i) + " and " + std::to_string(j) + " is " + std::to_string(angle));
         std::shared_ptr<const dembark::capillary::BridgeForce>& force = built_[angle];
         if (!force) force = std::make_shared<const dembark::capillary::BridgeForce>(model, angle);
         pair.force = force;
-        const double r_min = registry.min_radius(), r_max = registry.max_radius();
         if (r_min > 0.0 && r_max < 1e10)
-          for (const double r : {r_min, 2.0 * r_min, r_max, 2.0 * r_max}) largest = std::max(largest, force->rupture_distance(r, pair.volume) / r_min);
+          for (const double r : {r_min, 2.0 * r_min, r_max, 2.0 * r_max}) largest = std::max(largest, force->rupture_distance(r, carried_ ? carried_volume : pair.volume) / r_min);
       }
     // Pairs are kept to (f - 1)(r_i + r_j), walls to (f - 1) r_i; the wall needs the larger factor.
     if (largest > 0.0) neighbor->register_contact_dist_factor(1.0 + 1.001 * largest);
@@ -115,7 +197,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
       if (!(pair.volume > 0.0)) return 0.0;
       volume = pair.volume;
       const double rupture = pair.force->rupture_distance(radius, volume);
-      check_reach(rupture, size, primitive_wall);
+      dembark_liggghts::check_reach(neighbor, error, rupture, size, primitive_wall);
       if (update_history) {
         history[0] = volume;
         history[1] = rupture;
@@ -138,16 +220,31 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
 
   inline void surfacesIntersect(SurfacesIntersectData& sidata, ForceData& i_forces, ForceData& j_forces) {
     if (sidata.contact_flags) *sidata.contact_flags |= CONTACT_COHESION_MODEL;
+    const double& volume = sidata.contact_history[offset_];
+    const bool dry = !(volume > 0.0);
+    if (dry && carried_) {
+      if (liquid_.on()) check_time_step(bridge_radius(sidata), sidata.meff);
+      ask(sidata);
+      return;
+    }
     const double attraction = touching_force(sidata.contact_history, sidata.itype, sidata.jtype, bridge_radius(sidata), sidata.is_wall ? sidata.radi : sidata.radsum,
                                              sidata.computeflag && sidata.shearupdate, sidata.is_wall && !sidata.mesh);
     pull(sidata, attraction, sidata.en, i_forces, j_forces);
+    if (!liquid_.on() || !(volume > 0.0)) return;
+    if (dry) check_time_step(bridge_radius(sidata), sidata.meff);
+    resist(sidata, sidata.en, -sidata.deltan, volume, i_forces, j_forces);
   }
 
   inline void surfacesClose(SurfacesCloseData& scdata, ForceData& i_forces, ForceData& j_forces) {
     if (!scdata.contact_history) return;
-    const double distance = sqrt(scdata.rsq);
+    const double distance = sqrt(scdata.rsq), gap = distance - (scdata.is_wall ? scdata.radi : scdata.radsum);
+    if (carried_ && scdata.contact_history[offset_] > 0.0 && gap > scdata.contact_history[offset_ + 1]) {
+      give_back(scdata);
+      if (scdata.contact_flags) *scdata.contact_flags &= ~CONTACT_COHESION_MODEL;
+      return;
+    }
     double attraction;
-    if (!gap_force(scdata.contact_history, scdata.itype, scdata.jtype, bridge_radius(scdata), distance - (scdata.is_wall ? scdata.radi : scdata.radsum), attraction)) {
+    if (!gap_force(scdata.contact_history, scdata.itype, scdata.jtype, bridge_radius(scdata), gap, attraction)) {
       if (scdata.contact_flags) *scdata.contact_flags &= ~CONTACT_COHESION_MODEL;
       return;
     }
@@ -155,6 +252,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     scdata.has_force_update = true;
     const double normal[3] = {scdata.delta[0] / distance, scdata.delta[1] / distance, scdata.delta[2] / distance};
     pull(scdata, attraction, normal, i_forces, j_forces);
+    if (liquid_.on()) resist(scdata, normal, gap, scdata.contact_history[offset_], i_forces, j_forces);
   }
 
   inline void endSurfacesIntersect(SurfacesIntersectData&, ForceData&, ForceData&) {}

@@ -14,6 +14,7 @@
 #include "modify.h"
 #include "signal_handling.h"
 
+#include "fix_capillary_liquid.h"
 #include "fix_lcp_impact.h"
 #include "fix_resume_exact.h"
 #include "granular_combinations.h"
@@ -62,6 +63,7 @@ int main(int argc, char** argv) {
   // The library enters its own combinations in this constructor; ours come after, where its fallback can be replaced.
   dembark_liggghts::register_contact_models();
   std::map<std::string, FixCreator>& fixes = *(lammps->modify->*table(FixTable()));
+  fixes["capillary/liquid"] = &create_fix<LAMMPS_NS::FixCapillaryLiquid>;
   fixes["lcp/impact"] = &create_fix<LAMMPS_NS::FixLcpImpact>;
   fixes["resume/exact"] = &create_fix<LAMMPS_NS::FixResumeExact>;
   (*(lammps->input->*table(CommandTable())))["resume_state"] = [](LAMMPS_NS::LAMMPS* host, int narg, char** arg) {

@@ -40,6 +40,9 @@ class PropertyReader {
 
   void fail(const std::string& what) { error_->all(FLERR, (model_ + ": " + what).c_str()); }
 
+  /// Whether a table of pairs of types is there.
+  bool given(const char* name) { return find(name, "peratomtypepair", false) != nullptr; }
+
   double scalar(const char* name) { return find(name, "scalar", true)->compute_scalar(); }
   double scalar(const char* name, double otherwise) {
     LAMMPS_NS::FixPropertyGlobal* fix = find(name, "scalar", false);

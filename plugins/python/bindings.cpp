@@ -62,10 +62,12 @@ struct Contact {
 
 void bind_lcp(nb::module_& m);
 void bind_impact(nb::module_& m);
+void bind_liquid(nb::module_& m);
 
 NB_MODULE(_physics, m) {
   bind_lcp(m);
   bind_impact(m);
+  bind_liquid(m);
   nb::set_leak_warnings(false);  // cached laws live until the interpreter is gone, which is no leak
   m.attr("unlimited_strength") = unlimited_strength;
   m.def("capillary_models", &capillary::model_names);
@@ -88,6 +90,18 @@ NB_MODULE(_physics, m) {
         for (std::size_t i = 0; i < n; ++i) out[i] = self.rupture_distance(radius(i), volume(i));
         return result;
       });
+
+  m.def("viscous_resistance", [](Array radius, Array gap, Array volume, Array viscosity, Array minimum_gap) {
+    const std::size_t n = radius.shape(0);
+    double *normal, *tangential;
+    Result normals = make_result(n, normal), tangentials = make_result(n, tangential);
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto r = capillary::viscous_resistance(capillary::ViscousLiquid{viscosity(i), minimum_gap(i)}, radius(i), gap(i), volume(i));
+      normal[i] = r.normal;
+      tangential[i] = r.tangential;
+    }
+    return nb::make_tuple(normals, tangentials);
+  });
 
   m.def("effective_youngs_modulus", &effective_youngs_modulus);
   m.def("effective_shear_modulus", &effective_shear_modulus);
@@ -123,7 +137,7 @@ NB_MODULE(_physics, m) {
   nb::class_<Contact>(m, "Contact")
       .def("__init__", [](Contact* self, const std::string& normal_law, double youngs, double shear, double restitution, double characteristic_velocity,
                           bool tangential_damping, bool limit_force, const FinnieRabinowicz& friction, const std::string& capillary_model,
-                          double contact_angle, double surface_tension, double bridge_volume) {
+                          double contact_angle, double surface_tension, double bridge_volume, double viscosity, double minimum_gap) {
         new (self) Contact();
         if (normal_law != "hertz" && normal_law != "hooke") throw std::invalid_argument("normal law must be 'hertz' or 'hooke', not '" + normal_law + "'");
         ContactParameters& p = self->parameters;
@@ -135,7 +149,7 @@ NB_MODULE(_physics, m) {
         p.friction = friction;
         if (bridge_volume > 0.0) {
           self->bridge = std::make_shared<const capillary::BridgeForce>(model_of(capillary_model), contact_angle);
-          p.liquid = {self->bridge.get(), surface_tension, bridge_volume};
+          p.liquid = {self->bridge.get(), surface_tension, bridge_volume, {viscosity, minimum_gap}};
         }
       })
       .def("step", [](Contact& self, const nb::tuple& separation, const nb::tuple& v1, const nb::tuple& v2, const nb::tuple& w1, const nb::tuple& w2,
@@ -152,7 +166,7 @@ NB_MODULE(_physics, m) {
         b.mass_2 = mass_2;
         const ContactForce f = contact_step(self.parameters, b, dt, self.state, update);
         return nb::make_tuple(tuple(f.force), tuple(f.torque_1), tuple(f.torque_2), f.overlap, f.normal_force, f.capillary_force,
-                              tuple(f.tangential), f.interacting);
+                              tuple(f.tangential), f.viscous_normal, tuple(f.viscous_tangential), f.interacting);
       })
       .def_prop_ro("slip", [](const Contact& self) { return self.state.friction.slip; })
       .def_prop_ro("dissipated_energy", [](const Contact& self) { return self.state.friction.dissipated_energy; })

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from rig import python_driver
 from rig.scenarios import DRY, SCENARIOS, TURN, loaded, rotation_matrix
+from scipy.integrate import quad
 
-from dembark.physics import rupture_distance
+from dembark.physics import capillary_force, rupture_distance, viscous_resistance
 
 DRIVERS = ["python", "liggghts", "yade"]
 BRIDGES = [name for name in SCENARIOS if name.startswith("approach, bridge")]
@@ -118,3 +119,58 @@ def test_grain_leaves_the_wall_with_less_energy(motions, driver):
         assert energy[-1] < 0.95 * energy[0]
         # A grain that has left takes its spin about the normal along unchanged.
         assert motion.angular_velocity[-1, 0, 2] == grain.angular_velocity[2]
+
+
+@drivers
+@pytest.mark.parametrize("name", ["head-on, bridge", "head-on, viscous bridge"])
+def test_energy_of_a_cycle_is_the_work_of_the_liquid(motions, driver, name):
+    """Elastic grains come together and part for good. The kinetic energy that is missing is the hysteresis work of the bridge, which
+    forms at touching and breaks on the way out, and what the resistance of the liquid took."""
+    case, motion = SCENARIOS[name], motions(driver, name)
+    m, (one, two) = case.material, case.grains
+    reduced = one.mass * two.mass / (one.mass + two.mass)
+    speed = (motion.velocity[:, 0] - motion.velocity[:, 1])[:, 2]
+    gap = (motion.position[:, 0] - motion.position[:, 1])[:, 2] - one.radius - two.radius
+    end = rupture_distance(m.bridge_volume, m.contact_angle, one.radius, two.radius)
+    assert gap[-1] > end
+    lost = 0.5 * reduced * (one.velocity[2] ** 2 - speed[-1] ** 2)
+
+    def against_bridge(u):  # the slope of the force is infinite at rupture: gap = end (1 - u^2)
+        return 2.0 * end * u * capillary_force(one.radius, two.radius, end * (1 - u * u), m.bridge_volume, m.surface_tension, m.contact_angle)
+
+    hysteresis = quad(against_bridge, 0.0, 1.0, epsrel=1e-9)[0]
+    held = np.arange(len(gap)) >= int(np.argmax(gap < 0.0))
+    held &= gap <= end
+    resistance = viscous_resistance(one.radius, two.radius, gap, m.bridge_volume, m.viscosity, m.minimum_gap).normal
+    resisted = np.trapezoid(np.where(held, resistance * speed**2, 0.0), motion.time)
+    assert lost == pytest.approx(hysteresis + resisted, rel=2e-3)
+    assert 0.2 * lost < hysteresis < lost * (1 + 2e-3) and (resisted > 0.2 * lost if m.viscosity else resisted == 0.0)
+
+
+@drivers
+@pytest.mark.parametrize("name", [name for name in SCENARIOS if "viscous bridge" in name and not name.startswith("head-on")])
+def test_liquid_resists_only_while_there_is_a_bridge(motions, driver, name):
+    """The force is that of the dry contact before the first touch and after each rupture; in between it opposes the motion."""
+    case, motion = SCENARIOS[name], motions(driver, name)
+    m = case.material
+    radius = np.inf if case.wall else case.grains[1].radius
+    distance = motion.position[:, 0, 2] if case.wall else np.linalg.norm(motion.position[:, 0] - motion.position[:, 1], axis=1)
+    gap = distance - case.grains[0].radius - (0.0 if case.wall else radius)
+    end = rupture_distance(m.bridge_volume, m.contact_angle, case.grains[0].radius, radius)
+    first = int(np.argmax(gap < 0.0))
+    broken = first + int(np.argmax(gap[first:] > end * (1.0 + 1e-9)))
+    second = broken + int(np.argmax(gap[broken:] < 0.0))
+    assert 0 < first < broken < second
+    for dry in (slice(0, first), slice(broken, second)):
+        assert (motion.force[dry] == 0.0).all() and (motion.torque[dry] == 0.0).all()
+    held = np.arange(len(gap))
+    held = (held > first) & (held < broken) & (gap > 0.0)
+    relative = motion.velocity[held, 0] - (0.0 if case.wall else motion.velocity[held, 1])
+    parting = np.einsum("ij,ij->i", relative, motion.normal[held])
+    pull = capillary_force(case.grains[0].radius, radius, gap[held], m.bridge_volume, m.surface_tension, m.contact_angle)
+    resisting = motion.normal_force[held] + pull
+    expected = viscous_resistance(case.grains[0].radius, radius, gap[held], m.bridge_volume, m.viscosity, m.minimum_gap)
+    np.testing.assert_allclose(resisting, -expected.normal * parting, rtol=1e-6, atol=1e-9 * pull.max())
+    if name.startswith("dragged"):
+        sheared = np.linalg.norm(motion.tangential_force[held], axis=1)
+        assert (sheared > 0.0).all() and np.abs(motion.torque[held]).max() > 0.0

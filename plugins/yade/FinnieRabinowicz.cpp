@@ -88,10 +88,15 @@ void Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys::go(
 
 	phys->newBridgeVolume = pairValue(bridgeVolume, "bridgeVolume", a, b, 0.0);
 	if (!(phys->newBridgeVolume >= 0.0)) fail("bridgeVolume of " + pairName(a, b) + " is " + text(phys->newBridgeVolume) + "; it must be >= 0 m^3");
-	if (phys->newBridgeVolume > 0.0) {
+	phys->wettable = phys->newBridgeVolume > 0.0 || (contactAngle && !std::isnan(surfaceTension));
+	if (phys->wettable) {
 		if (!(surfaceTension >= 0.0)) fail("Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.surfaceTension must be a number >= 0 N/m when bridgeVolume is > 0");
 		phys->surfaceTension = surfaceTension;
 		phys->contactAngle   = pairValue(contactAngle, "contactAngle", a, b);
+		if (const char* wrong = ::dembark::capillary::ViscousLiquid{liquidViscosity, minimumGap}.error())
+			fail(std::string("Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.liquidViscosity, minimumGap: ") + wrong);
+		phys->liquidViscosity = liquidViscosity;
+		phys->minimumGap      = minimumGap;
 	}
 	interaction->phys = phys;
 }
@@ -132,21 +137,53 @@ void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::prepare(
 	p.tangential_damping     = tangentialDamping;
 	p.limit_force            = limitForce;
 	p.friction               = {phys.staticFriction, phys.kineticFriction, phys.criticalSlipDistance, phys.interfaceShearStrength, phys.healingTime, path};
-	if (wet && (phys.newBridgeVolume > 0.0 || phys.bridgeVolume > 0.0))
-		p.liquid = {bridgeForce(model, phys.contactAngle), phys.surfaceTension, phys.newBridgeVolume};
+	if (carriedLiquid) {
+		const std::string name = "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz.carriedLiquid";
+		if (!wet) fail(name + " needs a capillaryModel other than none");
+		if (!phys.wettable) fail(name + " needs surfaceTension and contactAngle of Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys");
+		if (phys.newBridgeVolume > 0.0) fail(name + ": bridgeVolume of Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys must not be given, bridges take what the bodies carry");
+	}
+	if (wet && (carriedLiquid || phys.newBridgeVolume > 0.0 || phys.bridgeVolume > 0.0))
+		p.liquid = {bridgeForce(model, phys.contactAngle), phys.surfaceTension, phys.newBridgeVolume, {phys.liquidViscosity, phys.minimumGap}};
 	phys.contact = p;
+
+	const double r1 = phys.wallBody == 1 ? INFINITY : geom.radius1, r2 = phys.wallBody == 2 ? INFINITY : geom.radius2;
+	const double m1 = phys.wallBody != 1 && body1.isDynamic() ? body1.state->mass : INFINITY;
+	const double m2 = phys.wallBody != 2 && body2.isDynamic() ? body2.state->mass : INFINITY;
+	if (p.liquid.viscous.on() && !(std::isinf(m1) && std::isinf(m2))) {
+		const double limit = ::dembark::capillary::viscous_time_step(p.liquid.viscous, 2.0 * ::dembark::reduced(r1, r2), ::dembark::reduced(m1, m2));
+		if (scene->dt > limit)
+			fail("bodies " + std::to_string(body1.getId()) + " and " + std::to_string(body2.getId()) + ": their viscous bridge needs O.dt <= " +
+			     text(limit) + " s, not " + text(scene->dt) + " s, or a larger minimumGap");
+	}
 
 	phys.linearStiffness = 0.0;
 	if (normal == ::dembark::NormalLaw::hooke) {
 		if (!(characteristicVelocity > 0.0))
 			fail("Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz.characteristicVelocity must be > 0 m/s for normalLaw='hooke'");
-		const double r1 = phys.wallBody == 1 ? INFINITY : geom.radius1, r2 = phys.wallBody == 2 ? INFINITY : geom.radius2;
-		const double m1 = phys.wallBody != 1 && body1.isDynamic() ? body1.state->mass : INFINITY;
-		const double m2 = phys.wallBody != 2 && body2.isDynamic() ? body2.state->mass : INFINITY;
 		phys.linearStiffness = ::dembark::hooke(::dembark::HookeParameters{phys.effectiveYoungsModulus, phys.restitution, characteristicVelocity},
 		                                        ::dembark::reduced(r1, r2), ::dembark::reduced(m1, m2), 1.0, 0.0).force;
 	}
 	phys.preparedBy = revision;
+}
+
+/// What the contact asks for, or gives back, after its forces are known.
+void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::trade(
+        FinnieRabinowiczPhys& phys, const ScGeom& geom, const Interaction& interaction, double volumeBefore) {
+	if (phys.bridgeVolume > 0.0) return;
+	Body::id_t first = interaction.getId1(), second = interaction.getId2();
+	double     firstRadius = geom.radius1, secondRadius = phys.wallBody == 2 ? INFINITY : geom.radius2;
+	if (phys.wallBody == 1) {
+		std::swap(first, second);
+		firstRadius  = geom.radius2;
+		secondRadius = INFINITY;
+	}
+	if (volumeBefore > 0.0) {
+		exchange->giveBack(scene->iter, {first, second, volumeBefore, phys.bridgeImbalance, phys.wallBody != 0});
+		phys.bridgeImbalance = 0.0;
+	} else if (geom.penetrationDepth > 0.0) {
+		exchange->ask(scene->iter, {first, second, firstRadius, secondRadius, &phys});
+	}
 }
 
 bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* interaction) {
@@ -162,7 +199,12 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 	const bool free1 = phys.wallBody != 1 && body1.isDynamic(), free2 = phys.wallBody != 2 && body2.isDynamic();
 	if (!free1 && !free2) {  // nothing that they do to each other has an effect
 		phys.normalForce = phys.shearForce = Vector3r::Zero();
-		return geom.penetrationDepth > 0.0;
+		if (carriedLiquid && phys.bridgeVolume > 0.0) {
+			const double volume = phys.bridgeVolume;
+			if (-geom.penetrationDepth > phys.ruptureDistance) phys.bridgeVolume = phys.ruptureDistance = 0.0;
+			trade(phys, geom, *interaction, volume);
+		}
+		return geom.penetrationDepth > 0.0 || phys.bridgeVolume > 0.0;
 	}
 
 	Vector3r shift = Vector3r::Zero(), shiftVelocity = Vector3r::Zero();
@@ -211,6 +253,8 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 	state.bridge_volume              = phys.bridgeVolume;
 	state.rupture_distance           = phys.ruptureDistance;
 
+	const double volumeBefore = phys.bridgeVolume;
+
 	const ::dembark::ContactForce out = ::dembark::contact_step(phys.contact, bodies, scene->dt, state);
 
 	if (!(out.overlap > 0.0) && phys.dissipatedEnergy > 0.0) endedDissipation += phys.dissipatedEnergy;
@@ -220,10 +264,13 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 	phys.bridgeVolume        = state.bridge_volume;
 	phys.ruptureDistance     = state.rupture_distance;
 	phys.capillaryForce      = out.capillary_force;
+	phys.viscousForce        = out.viscous_normal;
+	if (carriedLiquid) trade(phys, geom, *interaction, volumeBefore);
 	if (!out.interacting) return false;
 
 	const Vector3r force      = vec(out.force);
-	const Vector3r tangential = vec(out.tangential);
+	const Vector3r tangential = vec(out.tangential + out.viscous_tangential);
+	const bool     turns      = out.overlap > 0.0 || phys.contact.liquid.viscous.on();
 	// YADE's forces of a contact are those on its body 2.
 	const double sign = swapped ? 1.0 : -1.0;
 	phys.shearForce  = sign * tangential;
@@ -244,9 +291,9 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 	const Body::id_t first = swapped ? id2 : id1, second = swapped ? id1 : id2;
 	scene->forces.addForce(first, force);
 	scene->forces.addForce(second, -force);
-	if (out.overlap > 0.0) scene->forces.addTorque(first, vec(out.torque_1));
+	if (turns) scene->forces.addTorque(first, vec(out.torque_1));
 	if (phys.wallBody == 0) {
-		if (out.overlap > 0.0) scene->forces.addTorque(second, vec(out.torque_2));
+		if (turns) scene->forces.addTorque(second, vec(out.torque_2));
 	} else {
 		scene->forces.addTorque(second, -surface.cross(force));
 	}

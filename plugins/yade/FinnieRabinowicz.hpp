@@ -2,6 +2,8 @@
 // pair of materials, and the law. The formulas are those of dembark/contact.hpp; here only YADE's conventions are mapped to them.
 #pragma once
 
+#include <boost/make_shared.hpp>
+
 #include <core/Dispatching.hpp>
 #include <lib/base/openmp-accu.hpp>
 #include <pkg/common/ElastMat.hpp>
@@ -9,6 +11,7 @@
 #include <pkg/common/NormShearPhys.hpp>
 #include <pkg/dem/ScGeom.hpp>
 
+#include "CapillaryLiquid.hpp"
 #include "dembark/contact.hpp"
 
 namespace yade {
@@ -24,6 +27,13 @@ public:
 	double                       linearStiffness = 0.0;
 
 	void postLoad(FinnieRabinowiczPhys&) { preparedBy = -1; }
+	/// A bridge of carried liquid forms between spheres of `radius` (m).
+	void setBridge(double volume, double imbalance, double radius)
+	{
+		bridgeVolume    = volume;
+		bridgeImbalance = imbalance;
+		ruptureDistance = contact.liquid.force->rupture_distance(radius, volume);
+	}
 
 	// clang-format off
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR(FinnieRabinowiczPhys,NormShearPhys,"Contact of :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz`. :yref:`NormPhys.normalForce` holds the force along the normal with damping and bridge, so that it and :yref:`NormShearPhys.shearForce` are the whole force.",
@@ -32,7 +42,9 @@ public:
 		((Real,dissipatedEnergy,0,,"Energy [J] lost by slip and tangential damping since the contact began"))
 		((Real,bridgeVolume,0,,"Volume [m^3] of the liquid bridge that is there; 0 = no bridge"))
 		((Real,ruptureDistance,0,,"Gap [m] beyond which that bridge breaks"))
+		((Real,bridgeImbalance,0,,"Volume [m^3] that body 1 (the sphere, of a sphere and a wall) gets back when a bridge of carried liquid breaks, less that of the other"))
 		((Real,capillaryForce,0,,"Force [N] of the bridge, positive = attractive"))
+		((Real,viscousForce,0,,"Force [N] along the normal by which the liquid resists, positive = repulsive"))
 		((Real,effectiveYoungsModulus,0,Attr::triggerPostLoad,"E* [Pa], 1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2"))
 		((Real,effectiveShearModulus,0,Attr::triggerPostLoad,"G* [Pa], 1/G* = (2-nu1)/G1 + (2-nu2)/G2"))
 		((Real,restitution,1,Attr::triggerPostLoad,"Coefficient of restitution"))
@@ -42,8 +54,11 @@ public:
 		((Real,interfaceShearStrength,1e30,Attr::triggerPostLoad,"Shear strength [Pa] of the interface; 1e30 or more = unlimited"))
 		((Real,healingTime,0,Attr::triggerPostLoad,"Time constant [s] in which slip is forgotten while the contact sticks; 0 = at once"))
 		((Real,newBridgeVolume,0,Attr::triggerPostLoad,"Volume [m^3] of a bridge that forms when the bodies touch"))
+		((bool,wettable,false,Attr::triggerPostLoad,"Surface tension and contact angle are known"))
 		((Real,surfaceTension,0,Attr::triggerPostLoad,"Surface tension [N/m]"))
-		((Real,contactAngle,0,Attr::triggerPostLoad,"Contact angle [rad]")),
+		((Real,contactAngle,0,Attr::triggerPostLoad,"Contact angle [rad]"))
+		((Real,liquidViscosity,0,Attr::triggerPostLoad,"Viscosity [Pa s] of the liquid; 0 = no viscous force"))
+		((Real,minimumGap,0,Attr::triggerPostLoad,"Gap [m] below which viscous forces do not grow")),
 		createIndex();
 	);
 	// clang-format on
@@ -63,8 +78,10 @@ public:
 		((shared_ptr<MatchMaker>,criticalSlipDistance,,,"Slip [m] over which friction falls from its static to its kinetic value, >= 0. Required."))
 		((shared_ptr<MatchMaker>,interfaceShearStrength,,,"Shear strength [Pa] of the interface, > 0; not given, or 1e30 and more = unlimited."))
 		((shared_ptr<MatchMaker>,bridgeVolume,,,"Volume [m^3] of each liquid bridge, formed when two bodies touch; not given or 0 = dry."))
-		((shared_ptr<MatchMaker>,contactAngle,,,"Contact angle [rad], 0...pi/2. Required with a bridge volume."))
-		((Real,surfaceTension,NaN,,"Surface tension [N/m], >= 0. Required with a bridge volume."))
+		((shared_ptr<MatchMaker>,contactAngle,,,"Contact angle [rad], 0...pi/2. Required with a bridge volume, and with carried liquid."))
+		((Real,surfaceTension,NaN,,"Surface tension [N/m], >= 0. Required with a bridge volume, and with carried liquid."))
+		((Real,liquidViscosity,0,,"Viscosity [Pa s] of the liquid, >= 0; 0 = no viscous force."))
+		((Real,minimumGap,0,,"Gap [m], > 0, below which viscous forces do not grow: the roughness of the surfaces. Required with a viscosity."))
 		((Real,healingTime,0,,"Time constant [s] in which slip is forgotten while a contact sticks; 0 = at once."))
 	);
 	// clang-format on
@@ -79,12 +96,15 @@ public:
 	long bridgeCount() const;
 	long contactCount() const;
 	FUNCTOR2D(ScGeom, FinnieRabinowiczPhys);
+
+	const shared_ptr<LiquidExchange> exchange = boost::make_shared<LiquidExchange>();
 	// clang-format off
-	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz,LawFunctor,"Normal force of Hertz or Hooke with damping from a coefficient of restitution, tangential force of Finnie and Rabinowicz, and a capillary bridge. A body whose shape is not a :yref:`Sphere` is a wall of infinite radius and mass; a sphere that is not dynamic has infinite mass; two bodies of which neither is dynamic have no force. A bridge keeps its interaction until it ruptures, at any gap.",
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz,LawFunctor,"Normal force of Hertz or Hooke with damping from a coefficient of restitution, tangential force of Finnie and Rabinowicz, and a liquid bridge with capillary and, if wanted, viscous force. A body whose shape is not a :yref:`Sphere` is a wall of infinite radius and mass; a sphere that is not dynamic has infinite mass; two bodies of which neither is dynamic have no force. A bridge keeps its interaction until it ruptures, at any gap.",
 		((string,normalLaw,"hertz",Attr::triggerPostLoad,"'hertz' or 'hooke'"))
 		((Real,characteristicVelocity,NaN,Attr::triggerPostLoad,"Impact speed [m/s] at which the overlap of 'hooke' equals that of 'hertz'. Required for 'hooke'."))
 		((string,presliding,"linear",Attr::triggerPostLoad,"Tangential force before gross slip: 'linear' or 'exponential'"))
 		((string,capillaryModel,"none",Attr::triggerPostLoad,"'none', or the force law of a bridge: 'exact', 'willett', 'willett_full', 'rabinovich', 'bagheri', 'constant'"))
+		((bool,carriedLiquid,false,Attr::triggerPostLoad,"Bridges take their liquid from the bodies and give it back; needs the engine :yref:`CapillaryLiquid` after the :yref:`InteractionLoop`"))
 		((bool,tangentialDamping,true,Attr::triggerPostLoad,"Viscous tangential force while a contact sticks"))
 		((bool,limitForce,false,Attr::triggerPostLoad,"No attraction by normal damping"))
 		((OpenMPAccumulator<Real>,endedDissipation,,Attr::hidden,"Energy [J] that contacts which have ended had lost"))
@@ -98,6 +118,7 @@ public:
 
 private:
 	void prepare(FinnieRabinowiczPhys&, const ScGeom&, const Body&, const Body&) const;
+	void trade(FinnieRabinowiczPhys&, const ScGeom&, const Interaction&, double volumeBefore);
 
 	::dembark::NormalLaw        normal     = ::dembark::NormalLaw::hertz;
 	::dembark::Presliding       path       = ::dembark::Presliding::linear;

@@ -227,14 +227,20 @@ Bridges = Callable[[Array], Array]
 
 def _wall_bridges(values: Mapping[str, Any]) -> Bridges | None:
     """Force (N) of a liquid bridge between the wall and touching grains of given radii (m); None when the run is dry."""
-    volume = float(values.get("bridge_volume") or 0.0)
-    if volume <= 0.0:
+    own, content = float(values.get("bridge_volume") or 0.0), float(values.get("liquid_content") or 0.0)
+    if own <= 0.0 and content <= 0.0:
         return None
-    return lambda radii: np.asarray(
-        capillary_force(
-            radii, np.inf, 0.0, volume, float(values["surface_tension"]), float(values["contact_angle"]), model=str(values["capillary_model"])
+
+    def pull(radii: Array) -> Array:
+        # A bridge to the wall takes half of what a grain carries, or less when others came first; its force at touching hardly depends on it.
+        volume = 0.5 * content * 4.0 / 3.0 * np.pi * radii**3 if content > 0.0 else own
+        return np.asarray(
+            capillary_force(
+                radii, np.inf, 0.0, volume, float(values["surface_tension"]), float(values["contact_angle"]), model=str(values["capillary_model"])
+            )
         )
-    )
+
+    return pull
 
 
 def _wall_pull(grains: GrainFrame, side: Array, vessel: Vessel, bridges: Bridges | None) -> Array:

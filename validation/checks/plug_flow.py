@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from dembark.validation.checks.carried_liquid import liquid_quantities
 from dembark.validation.checks.channel import Array, Channel, read
 from dembark.validation.checks.quantity import Quantity
 from dembark.validation.checks.run import Replica, pooled, profile, resampled, time_blocks
@@ -192,7 +193,7 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
             "range is quoted."
         ),
     ]
-    return found, _profiles(channels), remarks
+    return [*found, *liquid_quantities(replicas)], _profiles(channels), remarks
 
 
 def fields(replicas: Sequence[Replica], found: Sequence[Quantity]) -> Any:

@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from dembark.validation.checks.carried_liquid import liquid_quantities
 from dembark.validation.checks.column import Array, Column, Mask, janssen, read
 from dembark.validation.checks.filling import filling_study
 from dembark.validation.checks.quantity import Quantity
@@ -83,7 +84,7 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
     """Quantities, profiles and remarks for the report from all replicas of a series."""
     remarks = [f"{one.short}: {one.statement}" for one in (LANDRY, CAMBAU)]
     found, drawn, said = results([read(replica) for replica in replicas], "R", "r")
-    return found, drawn, [said[0], *remarks, *said[1:]]
+    return [*found, *liquid_quantities(replicas)], drawn, [said[0], *remarks, *said[1:]]
 
 
 def fields(replicas: Sequence[Replica], found: Sequence[Quantity]) -> Any:

@@ -24,7 +24,7 @@ def check_model(model: str) -> None:
         raise ValueError(f"capillary model {model!r} is unknown; it can be {', '.join(CAPILLARY_MODELS)}")
 
 
-def _bridge_radius(radius_i: ArrayLike, radius_j: ArrayLike) -> NDArray[np.float64]:
+def bridge_radius(radius_i: ArrayLike, radius_j: ArrayLike) -> NDArray[np.float64]:
     """R = 2 R* = 2 Ri Rj / (Ri + Rj), 2 Ri against a wall (Rj = inf)."""
     a = numbers("radius_i", radius_i, "m", low=0.0, low_open=True, infinite=True)
     b = numbers("radius_j", radius_j, "m", low=0.0, low_open=True, infinite=True)
@@ -68,7 +68,7 @@ def capillary_force(radius_i: ArrayLike, radius_j: ArrayLike, gap: ArrayLike, vo
     """
     check_model(model)
     angle = numbers("contact_angle", contact_angle, "rad", low=0.0, high=np.pi / 2)
-    return _by_angle(angle, model, _physics.BridgeForce.force, _bridge_radius(radius_i, radius_j), numbers("gap", gap, "m", infinite=True),
+    return _by_angle(angle, model, _physics.BridgeForce.force, bridge_radius(radius_i, radius_j), numbers("gap", gap, "m", infinite=True),
                      numbers("volume", volume, "m^3", low=0.0), numbers("surface_tension", surface_tension, "N/m", low=0.0))
 
 
@@ -81,5 +81,5 @@ def rupture_distance(volume: ArrayLike, contact_angle: ArrayLike, radius_i: Arra
     """
     check_model(model)
     angle = numbers("contact_angle", contact_angle, "rad", low=0.0, high=np.pi / 2)
-    return _by_angle(angle, model, _physics.BridgeForce.rupture_distance, _bridge_radius(radius_i, radius_j),
+    return _by_angle(angle, model, _physics.BridgeForce.rupture_distance, bridge_radius(radius_i, radius_j),
                      numbers("volume", volume, "m^3", low=0.0))

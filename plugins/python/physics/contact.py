@@ -16,6 +16,7 @@ from dembark import _physics
 from dembark.physics._checks import numbers
 from dembark.physics.capillary import check_model
 from dembark.physics.friction import FinnieRabinowicz
+from dembark.physics.viscous import check_viscous
 
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
@@ -38,7 +39,9 @@ class ContactForce:
     overlap: float  # negative = gap
     normal_force: float  # repulsive, of the normal law alone
     capillary_force: float  # attractive
-    tangential: Vector
+    tangential: Vector  # friction
+    viscous_normal: float  # of the liquid, along the normal from body 2 to body 1
+    viscous_tangential: Vector  # of the liquid
     interacting: bool  # touching or held by a bridge
 
 
@@ -51,6 +54,7 @@ class Contact:
     friction : the tangential law
     normal_law : 'hertz' or 'hooke' (with characteristic_velocity, m/s)
     bridge_volume : m^3 of each bridge, 0 = dry; with surface_tension (N/m), contact_angle (rad) and capillary_model
+    viscosity : Pa s of the liquid, 0 = no viscous force; with minimum_gap (m, > 0), see `viscous_resistance`
     """
 
     effective_youngs_modulus: float
@@ -65,6 +69,8 @@ class Contact:
     surface_tension: float = 0.0
     contact_angle: float = 0.0
     capillary_model: str = "exact"
+    viscosity: float = 0.0
+    minimum_gap: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.restitution <= 1.0:
@@ -78,12 +84,14 @@ class Contact:
         numbers("surface_tension", self.surface_tension, "N/m", low=0.0)
         numbers("contact_angle", self.contact_angle, "rad", low=0.0, high=np.pi / 2)
         check_model(self.capillary_model)
+        check_viscous(self.viscosity, self.minimum_gap)
 
     def begin(self) -> _physics.Contact:
         """State of a contact that has not touched yet."""
         return _physics.Contact(self.normal_law, self.effective_youngs_modulus, self.effective_shear_modulus, self.restitution,
                                 self.characteristic_velocity, self.tangential_damping, self.limit_force, self.friction._law,
-                                self.capillary_model, self.contact_angle, self.surface_tension, self.bridge_volume)
+                                self.capillary_model, self.contact_angle, self.surface_tension, self.bridge_volume, self.viscosity,
+                                self.minimum_gap)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -77,6 +77,8 @@ def properties(m: Material, **overrides: str) -> str:
         "contactAngle": each.format(m.contact_angle),
         "bridgeVolume": pair.format(m.bridge_volume),
     }
+    if m.viscosity > 0.0:
+        values |= {"liquidViscosity": f"scalar {m.viscosity!r}", "minimumGap": f"scalar {m.minimum_gap!r}"}
     assert not overrides.keys() - values.keys()
     values |= overrides
     return "\n".join(f"fix p_{name} all property/global {name} {value}" for name, value in values.items() if value)
@@ -87,6 +89,7 @@ def models(m: Material, tangential: str = "finnie_rabinowicz", wall: str = "") -
     wet = m.bridge_volume > 0.0
     settings = f" presliding {m.presliding}" if tangential == "finnie_rabinowicz" else ""
     settings += f" capillary_model {m.capillary_model}" if wet else ""
+    settings += " viscous on" if wet and m.viscosity > 0.0 else ""
     return f"model {m.normal_law} tangential {tangential}{' cohesion capillary' if wet else ''} {wall}{settings}"
 
 

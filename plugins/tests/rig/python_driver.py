@@ -15,6 +15,7 @@ def contact(m: Material) -> Contact:
         effective_youngs_modulus=effective_youngs_modulus(*elastic), effective_shear_modulus=effective_shear_modulus(*elastic),
         restitution=m.restitution, normal_law=m.normal_law, characteristic_velocity=m.characteristic_velocity,
         bridge_volume=m.bridge_volume, surface_tension=m.surface_tension, contact_angle=m.contact_angle, capillary_model=m.capillary_model,
+        viscosity=m.viscosity, minimum_gap=m.minimum_gap,
         friction=FinnieRabinowicz(
             static_friction=m.static_friction, kinetic_friction=m.kinetic_friction, critical_slip_distance=m.critical_slip_distance,
             interface_shear_strength=m.interface_shear_strength, presliding=m.presliding, healing_time=m.healing_time))

@@ -33,6 +33,8 @@ class Material:
     surface_tension: float = 0.072
     contact_angle: float = 0.35
     capillary_model: str = "exact"
+    viscosity: float = 0.0
+    minimum_gap: float = 1e-5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,6 +147,7 @@ def rotation_matrix(axis: tuple[float, float, float], angle: float) -> NDArray[n
 
 DRY = Material()
 WET = Material(bridge_volume=2e-10)
+VISCOUS = Material(bridge_volume=2e-10, viscosity=0.2)
 ALL_OF_IT = Material(interface_shear_strength=2e4, bridge_volume=2e-10)
 TURN = rotation_matrix((0.3, -0.7, 0.5), 1.1)
 
@@ -158,6 +161,15 @@ def _approach(name: str, material: Material, radius: float = 5e-3, wall: bool = 
     path = Path(displacement=("0", "0", "-0.0005*(1-cos(2*PI*100*t))"), velocity=("0", "0", "-0.0005*2*PI*100*sin(2*PI*100*t)"))
     upper = Grain(position=(0.0, 0.0, 5.9e-3), path=path)
     grains = (upper,) if wall else (upper, _lower(radius))
+    return Scenario(name=name, material=material, grains=grains, wall=wall, time_step=1e-5, steps=2000)
+
+
+def _dragged(name: str, material: Material, radius: float = 5e-3, wall: bool = False) -> Scenario:
+    """As `_approach`, but the grains also slide and spin, so that the liquid is sheared over overlap and gap."""
+    path = Path(displacement=("0.0002*sin(2*PI*300*t)", "0.0001*(1-cos(2*PI*200*t))", "-0.0005*(1-cos(2*PI*100*t))"),
+                velocity=("0.0002*2*PI*300*cos(2*PI*300*t)", "0.0001*2*PI*200*sin(2*PI*200*t)", "-0.0005*2*PI*100*sin(2*PI*100*t)"))
+    upper = Grain(position=(0.0, 0.0, 5.9e-3), angular_velocity=(20.0, -10.0, 30.0), path=path)
+    grains = (upper,) if wall else (upper, replace(_lower(radius), angular_velocity=(-5.0, 25.0, 10.0)))
     return Scenario(name=name, material=material, grains=grains, wall=wall, time_step=1e-5, steps=2000)
 
 
@@ -209,6 +221,12 @@ def _collision(name: str, material: Material, ratio: float) -> Scenario:
                       velocity=(0.1, -0.1, 0.2), angular_velocity=(-10.0, 30.0, 15.0))))
 
 
+def _head_on(name: str, material: Material) -> Scenario:
+    """Slow central impact without spin that ends after the bridge broke: all that is lost goes into the liquid."""
+    return Scenario(name=name, material=replace(material, restitution=1.0), time_step=2e-6, steps=14000, stride=4,
+                    grains=(Grain(position=(0.0, 0.0, 5.02e-3), velocity=(0.0, 0.0, -0.08)), Grain(radius=3e-3, position=(0.0, 0.0, -3e-3))))
+
+
 def _drop(name: str, material: Material) -> Scenario:
     """A spinning grain falls on the wall and bounces."""
     return Scenario(name=name, material=material, wall=True, gravity=(0.0, 0.0, -9.81), time_step=2e-6, steps=2500,
@@ -227,6 +245,12 @@ def _all() -> dict[str, Scenario]:
         _approach("approach, bridge, wall", WET, wall=True),
         *(_approach(f"approach, bridge, {model}", replace(WET, capillary_model=model))
           for model in ("willett", "willett_full", "rabinovich", "bagheri", "constant")),
+        _approach("approach, viscous bridge", VISCOUS),
+        _approach("approach, viscous bridge, unequal", VISCOUS, radius=2.5e-3),
+        _approach("approach, viscous bridge, wall", VISCOUS, wall=True),
+        _dragged("dragged, viscous bridge", VISCOUS),
+        _dragged("dragged, viscous bridge, unequal", VISCOUS, radius=2.5e-3),
+        _dragged("dragged, viscous bridge, wall", VISCOUS, wall=True),
         _cycles("cycles, linear", DRY),
         linear,
         _cycles("cycles, exponential", replace(DRY, presliding="exponential")),
@@ -248,8 +272,12 @@ def _all() -> dict[str, Scenario]:
         _collision("collision, hooke", replace(DRY, normal_law="hooke", characteristic_velocity=0.5), 0.6),
         wet_collision,
         wet_collision.rotated(TURN, "collision, wet, rotated frame"),
+        _collision("collision, viscous", replace(ALL_OF_IT, viscosity=0.05), 0.6),
+        _head_on("head-on, bridge", WET),
+        _head_on("head-on, viscous bridge", replace(WET, viscosity=0.005)),
         _drop("drop, dry", strong),
         _drop("drop, wet", ALL_OF_IT),
+        _drop("drop, viscous", replace(ALL_OF_IT, viscosity=0.05)),
         _drop("drop, hooke", replace(DRY, normal_law="hooke", characteristic_velocity=0.5)),
     ]
     return {case.name: case for case in cases}

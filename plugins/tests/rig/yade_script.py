@@ -59,7 +59,8 @@ def run(case, arrays):
         healingTime=m["healing_time"])
     wet = m["bridge_volume"] > 0.0
     if wet:
-        laws.update(bridgeVolume=m["bridge_volume"], contactAngle=m["contact_angle"], surfaceTension=m["surface_tension"])
+        laws.update(bridgeVolume=m["bridge_volume"], contactAngle=m["contact_angle"], surfaceTension=m["surface_tension"],
+                    liquidViscosity=m["viscosity"], minimumGap=m["minimum_gap"])
     gravity = Vector3(*case["gravity"])
     ids = []
     for g in case["grains"]:

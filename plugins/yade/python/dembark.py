@@ -16,7 +16,7 @@ import tomllib
 import zlib
 from types import SimpleNamespace
 
-from yade import CylinderWall, DembarkSnapshot, Omega, Sphere, utils
+from yade import CapillaryLiquid, CylinderWall, DembarkSnapshot, Omega, Sphere, utils
 from yade.minieigenHP import Vector3, Vector3i
 
 O = Omega()
@@ -400,11 +400,16 @@ class DumpWriter:
 
 
 class HistoryWriter:
-    """Appends lines to time.csv: step, time, kinetic energy of the grains, force of each wall (with its glued grains) on the grains."""
+    """Appends lines to time.csv: step, time, kinetic energy of the grains, force of each wall (with its glued grains) on the grains; with
+    `liquid`, the CapillaryLiquid that the scene has or will have, also where its liquid is (m^3) and the number of bridges."""
 
-    def __init__(self, walls, glued=None, gravity=(0.0, 0.0, -9.81), path="time.csv", progress=True, types=None):
+    LIQUID = {"liquid_grains": "inGrains", "liquid_bridges": "inBridges", "liquid_walls": "onWalls"}
+
+    def __init__(self, walls, glued=None, gravity=(0.0, 0.0, -9.81), path="time.csv", progress=True, types=None, liquid=None):
         self._snapshot = _Snapshot(walls, glued, gravity, types)
-        header = ",".join(["step", "time", "kinetic_energy", *(f"{name}_f{axis}" for name in walls for axis in "xyz")])
+        self._liquid = liquid is not None
+        columns = [*self.LIQUID, "liquid_lost", "bridge_count"] if self._liquid else []
+        header = ",".join(["step", "time", "kinetic_energy", *(f"{name}_f{axis}" for name in walls for axis in "xyz"), *columns])
         self._file = _table(path, header)
         self.progress = progress
 
@@ -413,7 +418,12 @@ class HistoryWriter:
         shot = self._snapshot.current()
         energy = shot.kineticEnergy()
         forces = (f"{component:.9g}" for force in shot.wallForces() for component in force)
-        self._file.write(",".join([str(O.iter), f"{O.time:.9g}", f"{energy:.9g}", *forces]) + "\n")
+        where = []
+        if self._liquid:
+            # A scene that was loaded has engines of its own.
+            books = next(one for one in O.engines if isinstance(one, CapillaryLiquid))
+            where = [*(f"{getattr(books, name)():.17g}" for name in self.LIQUID.values()), f"{books.lost:.17g}", str(books.bridgeCount())]
+        self._file.write(",".join([str(O.iter), f"{O.time:.9g}", f"{energy:.9g}", *forces, *where]) + "\n")
         self._file.flush()
         if self.progress:
             print(O.iter, f"{O.time:.6g}", f"{energy:.6g}", flush=True)

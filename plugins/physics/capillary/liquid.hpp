@@ -1,0 +1,133 @@
+// Liquid that is carried by grains and walls, lent to bridges and given back: who gives how much, who gets how much back.
+//
+// Every holder (a grain, a wall) owns a volume L of liquid. A contact without a bridge asks both sides for a share of what they own:
+//
+//   cap       c/2 (1 - sqrt(1 - Rj^2 / (Ri + Rj)^2)) of Li: the film on the cap of i that faces j, the cone from the centre of i around j
+//             (Shi & McCarthy, Powder Technology 184 (2008) 64, in the form that the model easo/capillary/viscous of LIGGGHTS takes);
+//             c/2 against a wall. With c = 1 the caps of touching spheres do not overlap: their shares add up to 1 at most
+//   fraction  c of Li, whatever the radii. c = 1 and a largest volume: the rule of the liquid migration models of MercuryDPM
+//
+// All shares that one step asks of a holder are summed, D. Each is granted L / max(1, D) times its share: no more is taken than is there,
+// and the order of the contacts does not matter. A bridge may be limited to a largest volume; the rest stays where it was.
+// A bridge is split again when it breaks: into halves, by the radii, or into what each side gave. The part that would go to i is fixed
+// when the bridge forms, so each side can keep its own books. SI units; nothing here knows an engine.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace dembark::capillary {
+
+/// Radius of a wall in the functions below.
+template <class Real>
+inline constexpr Real flat = std::numeric_limits<Real>::infinity();
+
+/// Part (0...1/2) of the surface of a sphere that faces a touching sphere of radius `other`; 1/2 if that is flat.
+template <class Real>
+inline Real cap_share(Real radius, Real other) {
+  using std::sqrt;
+  if (!(other < flat<Real>)) return Real(0.5);
+  const Real larger = std::max(radius, other), own = radius / larger, its = other / larger;  // no overflow
+  const Real sine = its / (own + its), cosine = sqrt(own * (own + Real(2) * its)) / (own + its);
+  return Real(0.5) * sine * sine / (Real(1) + cosine);  // 1 - cosine without cancellation
+}
+
+/// What a new bridge asks of one side.
+struct ShareRule {
+  enum class Kind { cap, fraction };
+  Kind kind = Kind::cap;
+  double factor = 1.0;  // c above: 0...2 of the cap, 0...1 as a fraction
+
+  /// Nullptr, or what is wrong.
+  const char* error() const {
+    if (kind == Kind::cap) return factor > 0.0 && factor <= 2.0 ? nullptr : "the factor of the facing cap must lie in (0, 2]";
+    return factor > 0.0 && factor <= 1.0 ? nullptr : "the fraction of the liquid must lie in (0, 1]";
+  }
+  /// Share of its liquid that a grain of `radius` is asked for by a bridge to `other` (flat: a wall).
+  template <class Real>
+  Real operator()(Real radius, Real other) const {
+    return Real(factor) * (kind == Kind::cap ? cap_share(radius, other) : Real(1));
+  }
+};
+
+/// How the liquid of a broken bridge is split.
+enum class Return { equal, radius, taken };
+
+/// The names that users write, in the order of `Return`.
+inline std::vector<std::string> return_names() { return {"equal", "radius", "taken"}; }
+
+/// Volume (m^3) that a holder of `liquid` gives per unit share when the shares asked of it in one step add up to `demand`.
+template <class Real>
+inline Real grant(Real liquid, Real demand) {
+  return demand > Real(1) ? liquid / demand : liquid;
+}
+
+/// What is left of `liquid` after `amount`; the last bit of a sum of grants does not make it negative.
+template <class Real>
+inline Real remaining(Real liquid, Real amount) {
+  return std::max(liquid - amount, Real(0));
+}
+
+/// A bridge as it forms. `imbalance`: what i gets back when it breaks less what j gets; it changes sign when i and j change places.
+template <class Real>
+struct NewBridge {
+  Real volume, from_i, from_j, imbalance;
+};
+
+/// Part of a broken bridge that goes to i; with the imbalance negated, to j.
+template <class Real>
+inline Real returned(Real volume, Real imbalance) {
+  return Real(0.5) * (volume + imbalance);
+}
+
+/// Bridge of two sides that give `given_i` and `given_j` (share times grant) and hold `largest` at most. For Return::radius the part of i
+/// is Ri / (Ri + Rj). Both sides swapped give the same volume bit for bit.
+template <class Real>
+inline NewBridge<Real> form_bridge(Real given_i, Real given_j, Real radius_i, Real radius_j, Return rule, Real largest = flat<Real>) {
+  NewBridge<Real> bridge{given_i + given_j, given_i, given_j, Real(0)};
+  if (bridge.volume > largest) {
+    const Real scale = largest / bridge.volume;
+    bridge.from_i *= scale;
+    bridge.from_j *= scale;
+    bridge.volume = bridge.from_i + bridge.from_j;
+  }
+  if (rule == Return::taken) bridge.imbalance = bridge.from_i - bridge.from_j;
+  if (rule == Return::radius) bridge.imbalance = bridge.volume * ((radius_i - radius_j) / (radius_i + radius_j));
+  return bridge;
+}
+
+/// Bridge of a grain and a wall that keeps the part `wall_part` (0...1) of it when it breaks; with Return::taken what it gave.
+template <class Real>
+inline NewBridge<Real> form_wall_bridge(Real given_i, Real given_wall, Real wall_part, Return rule, Real largest = flat<Real>) {
+  NewBridge<Real> bridge = form_bridge(given_i, given_wall, Real(1), Real(1), rule, largest);
+  if (rule != Return::taken) bridge.imbalance = bridge.volume * (Real(1) - Real(2) * wall_part);
+  return bridge;
+}
+
+/// The sums of what one step asks of holders 0...n-1. Cleared in a time that goes with the number of those that were asked.
+class Demands {
+ public:
+  void resize(std::size_t holders) {
+    clear();
+    if (sums_.size() < holders) sums_.resize(holders, 0.0);
+  }
+  void add(std::size_t holder, double share) {
+    if (sums_[holder] == 0.0) asked_.push_back(holder);
+    sums_[holder] += share;
+  }
+  double of(std::size_t holder) const { return sums_[holder]; }
+  void clear() {
+    for (const std::size_t holder : asked_) sums_[holder] = 0.0;
+    asked_.clear();
+  }
+
+ private:
+  std::vector<double> sums_;
+  std::vector<std::size_t> asked_;
+};
+
+}  // namespace dembark::capillary

@@ -1,0 +1,107 @@
+"""The reference of case liquid_exchange against numbers worked out by hand, and verdicts on books that are right and wrong."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dembark.validation.checks import carried_liquid, liquid_exchange
+from dembark.validation.checks.run import Replica
+
+CASE = Path(__file__).resolve().parents[3] / "input_decks/liquid_exchange/case.toml"
+with CASE.open("rb") as file:
+    TABLES = tomllib.load(file)
+STEPS = list(range(20, 8001, 20))
+COLUMNS = "step,time,kinetic_energy,liquid_grains,liquid_bridges,liquid_walls,liquid_lost,bridge_count"
+
+
+def values(variant: str, **changes: Any) -> dict[str, Any]:
+    return {key: table.get("value") for key, table in TABLES["parameters"].items()} | TABLES["variants"][variant] | changes
+
+
+@cache
+def due(variant: str) -> liquid_exchange.Books:
+    return liquid_exchange.expected(values(variant), STEPS, 1)
+
+
+@pytest.mark.parametrize("variant", TABLES["variants"])
+def test_reference_keeps_all_liquid_and_is_busy(variant: str) -> None:
+    books = due(variant)
+    assert np.abs(books.total / books.total[0] - 1.0).max() < 1e-14
+    assert books.grains.min() >= 0.0
+    assert np.abs(np.diff(books.count)).sum() > 40
+    assert books.count.min() == 0 and books.count.max() >= 4
+
+
+def test_first_bridge_by_hand() -> None:
+    """Grain 4 (0.8 d) meets grain 3 (1.2 d) first: sin = 0.6, so the facing cap is half of 1 - 0.8 of it."""
+    p, books = values("cap"), due("cap")
+    first = int(np.argmax(books.count > 0))
+    fourth = p["liquid_content"] * math.pi / 6.0 * (0.8 * p["grain_diameter"]) ** 3
+    assert books.count[first] == 1.0
+    assert books.bridges[first] == pytest.approx(0.1 * fourth, rel=1e-12)
+    assert books.grains[first, 3] == pytest.approx(0.9 * fourth, rel=1e-12)
+
+
+def test_what_is_asked_at_once_is_shared() -> None:
+    """All overlap in the first step: both wet grains give all they have, halves to each side, and the wall its share."""
+    p = values("all_of_it", gap=-0.01, time_step=1e-9)
+    books = liquid_exchange.expected(p, [1], 1)
+    first, fourth = (p["liquid_content"] * math.pi / 6.0 * (size * p["grain_diameter"]) ** 3 for size in (1.0, 0.8))
+    assert books.count[0] == 4.0  # of six; two dry sides make none
+    assert books.grains[0].sum() == pytest.approx(0.0, abs=1e-24)
+    assert books.wall[0] == pytest.approx(0.8 * p["wall_liquid"], rel=1e-12)
+    assert books.bridges[0] == pytest.approx(first + fourth + 0.2 * p["wall_liquid"], rel=1e-12)
+
+
+def replica(folder: Path, variant: str, spoil: str = "") -> Replica:
+    p, books = values(variant), due(variant)
+    grains = books.grains.copy()
+    lost = np.zeros(len(STEPS))
+    if spoil == "grain":
+        grains[100, 2] *= 1.0 + 1e-9
+    if spoil == "lost":
+        lost += 1e-20
+    table = np.column_stack([STEPS, np.array(STEPS) * p["time_step"], np.ones(len(STEPS)), grains.sum(axis=1), books.bridges, books.wall, lost,
+                             books.count + (spoil == "count"), grains])
+    np.savetxt(folder / "time.csv", table, delimiter=",", fmt="%.17g", comments="", header=COLUMNS + "".join(f",liquid_{k}" for k in range(1, 6)))
+    return Replica(folder, {"parameters": p, "time_step": p["time_step"], "engine": "liggghts"})
+
+
+@pytest.mark.parametrize("variant", TABLES["variants"])
+def test_right_books_pass(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, variant: str) -> None:
+    run = replica(tmp_path, variant)
+    monkeypatch.setattr(liquid_exchange, "expected", lambda *words: due(variant))
+    found, curves, remarks = liquid_exchange.quantities([run])
+    assert {one.judged()[0] for one in found} == {"pass"}
+    assert len(curves) == 6 and remarks
+
+
+@pytest.mark.parametrize(("spoil", "names"), [("grain", {"liquid_3_error", "total_liquid_error"}), ("lost", {"lost", "total_liquid_error"}),
+                                              ("count", {"bridge_count_error"})])
+def test_wrong_books_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, spoil: str, names: set[str]) -> None:
+    run = replica(tmp_path, "cap", spoil)
+    monkeypatch.setattr(liquid_exchange, "expected", lambda *words: due("cap"))
+    found, _, _ = liquid_exchange.quantities([run])
+    assert {one.name for one in found if one.judged()[0] == "fail"} == names
+
+
+def test_carried_liquid_of_any_case(tmp_path: Path) -> None:
+    steps = np.arange(1, 401)
+    bridges = 0.3 + 0.01 * np.sin(steps)
+    header = "step,time,kinetic_energy,base_fz,liquid_grains,liquid_bridges,liquid_walls,liquid_lost,bridge_count"
+    for drift, verdict in ((0.0, "pass"), (1e-11, "fail")):
+        table = np.column_stack([steps, steps * 1e-3, steps * 0 + 1.0, steps * 0, (0.7 - bridges) + drift * steps, bridges, steps * 0 + 0.25, steps * 0 + 0.05, 300 + steps % 3])
+        np.savetxt(tmp_path / "time.csv", table, delimiter=",", fmt="%.15g", comments="", header=header)
+        run = Replica(tmp_path, {"parameters": {"liquid_content": 0.01, "grain_count": 100}})
+        found = {one.name: one for one in carried_liquid.liquid_quantities([run])}
+        assert found["liquid_total"].judged()[0] == verdict
+        assert found["bridge_count"].estimate.value == pytest.approx(3.01, abs=0.01)
+        assert found["liquid_in_bridges"].estimate.value == pytest.approx(0.3, abs=0.002)
+    assert carried_liquid.liquid_quantities([Replica(tmp_path, {"parameters": {"liquid_content": 0.0}})]) == []
