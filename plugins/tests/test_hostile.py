@@ -56,6 +56,15 @@ CASES = {
 CASES = {name: replace(case, name=name, stride=1 if case.steps < 100 else 10) for name, case in CASES.items()}
 
 
+def worst(expected, found) -> dict[str, float]:
+    """Deviations; a tangential force that is round-off of the whole is left out."""
+    result = deviation(expected, found)
+    if np.abs(expected.tangential_force).max() < 1e-12 * np.abs(expected.force).max():
+        assert np.abs(found.tangential_force).max() < 1e-12 * np.abs(expected.force).max()
+        del result["tangential_force"]
+    return result
+
+
 def finite(motion) -> bool:
     return all(np.isfinite(getattr(motion, name)).all() for name in QUANTITIES)
 
@@ -96,13 +105,13 @@ def test_python_gives_numbers(expected, name):
 
 @pytest.mark.parametrize("name", CASES)
 def test_liggghts_gives_the_same(expected, liggghts, name):
-    found = deviation(expected[name], liggghts[name])
+    found = worst(expected[name], liggghts[name])
     assert max(found.values()) < 1e-9, found
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_yade_gives_the_same(expected, yade, name):
-    found = deviation(expected[name], yade[name])
+    found = worst(expected[name], yade[name])
     assert max(found.values()) < 1e-9, found
 
 
