@@ -63,22 +63,16 @@ while IFS= read -r file; do
   copy "$here/plugins/physics/$file" "$src/dembark/$file"
 done < <(cd "$here/plugins/physics" && find . -name '*.hpp' -not -path './tests/*' -not -path './python/*' | sed 's|^\./||' | sort)
 
-# The combinations that liggghts-dembark holds (register_contact_models() in plugins/liggghts/granular_combinations.cpp).
+# The combinations that liggghts-dembark holds.
 whitelist=$src/style_contact_model_user.whitelist
-for normal in HERTZ HOOKE; do
-  for laws in "TANGENTIAL_FINNIE_RABINOWICZ, COHESION_OFF" "TANGENTIAL_FINNIE_RABINOWICZ, COHESION_CAPILLARY" \
-              "TANGENTIAL_HISTORY, COHESION_CAPILLARY"; do
-    for rolling in ROLLING_OFF ROLLING_CDT ROLLING_EPSD2; do
-      line="GRAN_MODEL($normal, $laws, $rolling, SURFACE_DEFAULT)"
-      if ! grep -qxF "$line" "$whitelist" 2>/dev/null; then
-        # A last line without a newline would swallow ours.
-        if [ -s "$whitelist" ] && [ -n "$(tail -c 1 "$whitelist")" ]; then echo >>"$whitelist"; fi
-        echo "$line" >>"$whitelist"
-        changed=$((changed + 1))
-      fi
-    done
-  done
-done
+while IFS= read -r line; do
+  if ! grep -qxF "$line" "$whitelist" 2>/dev/null; then
+    # A last line without a newline would swallow ours.
+    if [ -s "$whitelist" ] && [ -n "$(tail -c 1 "$whitelist")" ]; then echo >>"$whitelist"; fi
+    echo "$line" >>"$whitelist"
+    changed=$((changed + 1))
+  fi
+done < <(grep '^GRAN_MODEL' "$here/plugins/liggghts/granular_combinations_list.h")
 
 if [ "$changed" = 0 ]; then echo "dembark: $src is up to date"; else echo "dembark: installed into $src"; fi
 if grep -q 'static_cast< std::ostringstream' "$src/utils.h"; then

@@ -248,3 +248,43 @@ def test_two_runs_are_not_one(tmp_path: Path) -> None:
     whole, parts, joined = (end_state(tmp_path, steps) for steps in ("run 200", "run 100\nrun 100", "run 100\nrun 100 pre no"))
     assert np.array_equal(whole, joined)
     assert np.abs(whole - parts).max() > 1e-9
+
+
+def pressed_over_edge(folder: Path, angle: float, place: float, curvature: str = "") -> float:
+    """Force (N) along z on a grain 0.03 mm deep in the first of two strips; the second one beyond x = 0 rises by `angle` (degrees)."""
+    c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+    far = (0.02 * c, 0.02 * s)
+    strips = [((-0.02, 0.0), (0.0, 0.0)), ((0.0, 0.0), far)]
+    corners = []
+    for (x, z), (u, w) in strips:
+        a, b, d, e = (x, -0.02, z), (u, -0.02, w), (u, 0.021, w), (x, 0.021, z)
+        corners += [(a, b, d), (a, d, e)]
+    facets = "".join(" facet normal 0 0 1\n  outer loop\n" + "".join(f"   vertex {p[0]!r} {p[1]!r} {p[2]!r}\n" for p in three) +
+                     "  endloop\n endfacet\n" for three in corners)
+    (folder / "bent.stl").write_text(f"solid bent\n{facets}endsolid bent\n")
+    body = scene(0.005) + f"create_atoms 1 single {place!r} 0.003 0.00497 units box\nset group all density 2500 diameter 0.01\n" + MATERIAL
+    body += f"""
+pair_style gran model hertz tangential history
+pair_coeff * *
+timestep 1e-9
+fix stl all mesh/surface file bent.stl type 2 {curvature}
+fix wall all wall/gran model hertz tangential history mesh n_meshes 1 meshes stl
+compute f all reduce sum fz
+variable f equal c_f
+thermo_style custom step c_f
+run 1
+print 'force ${{f}}'
+"""
+    result = run(folder, body)
+    assert result.returncode == 0, result.stdout[-2000:] + result.stderr
+    return float(next(line.split()[1] for line in result.stdout.splitlines() if line.startswith("force ")))
+
+
+def test_edges_of_a_mesh_count_beside_their_faces(tmp_path: Path) -> None:
+    """At a ridge twice the force of the face, as far as sqrt(2 R overlap); none with a large `curvature`; a groove counts both faces."""
+    flat = pressed_over_edge(tmp_path, 0.0, -1e-5)
+    assert flat > 0.0
+    assert max(pressed_over_edge(tmp_path, -2.0, place) for place in (-1e-5, 3e-4)) == pytest.approx(2.0 * flat, rel=0.05)
+    assert pressed_over_edge(tmp_path, -2.0, -1e-3) == pytest.approx(flat, rel=1e-6)
+    assert pressed_over_edge(tmp_path, -2.0, 8e-5, "curvature 3") == 0.0
+    assert pressed_over_edge(tmp_path, 2.0, -1e-5) == pytest.approx(2.0 * flat, rel=0.1)

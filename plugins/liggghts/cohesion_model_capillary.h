@@ -13,6 +13,7 @@ COHESION_MODEL(COHESION_CAPILLARY,capillary,20)
 #define COHESION_MODEL_CAPILLARY_H_
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <string>
@@ -43,6 +44,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     std::shared_ptr<const dembark::capillary::BridgeForce> force;
     double volume = 0.0;
   };
+  static constexpr double largest_ratio = 100.0;  // of volume and cube of the radius; beyond it is a mistake in the unit
   int offset_;
   int model_ = 0;
   int types_ = 0;
@@ -163,7 +165,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     types_ = read.types() + 1;
     pairs_.assign(types_ * types_, {});
     surface_tension_ = read.scalar("surfaceTension");
-    if (!(surface_tension_ >= 0.0)) read.fail("surfaceTension (N/m) must be >= 0");
+    if (!(surface_tension_ >= 0.0 && surface_tension_ < INFINITY)) read.fail("surfaceTension (N/m) must be >= 0 and finite");
     liquid_.viscosity = viscous_ ? read.scalar("liquidViscosity") : read.scalar("liquidViscosity", 0.0);
     if (!viscous_ && liquid_.viscosity != 0.0) read.fail("liquidViscosity is given, but viscous forces are off; write 'viscous on' after the models, or leave it out");
     if (viscous_) liquid_.minimum_gap = read.scalar("minimumGap");
@@ -175,12 +177,15 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
       for (int j = 1; j < types_; ++j) {
         PairLiquid& pair = pairs_[i * types_ + j];
         pair.volume = carried_ ? 0.0 : read.per_pair("bridgeVolume", i, j);
-        if (!(pair.volume >= 0.0)) read.fail("bridgeVolume (m^3) must be >= 0 (types " + std::to_string(i) + "-" + std::to_string(j) + ")");
+        if (!(pair.volume >= 0.0 && pair.volume < INFINITY)) read.fail("bridgeVolume (m^3) must be >= 0 and finite (types " + std::to_string(i) + "-" + std::to_string(j) + ")");
         const double angle = 0.5 * (read.per_type("contactAngle", i) + read.per_type("contactAngle", j));
         if (!(angle >= 0.0 && angle <= 0.5 * dembark::pi)) read.fail("contactAngle is in radians (stock models take degrees) and must lie in 0...pi/2; the mean of types " + std::to_string(i) + " and " + std::to_string(j) + " is " + std::to_string(angle));
         std::shared_ptr<const dembark::capillary::BridgeForce>& force = built_[angle];
         if (!force) force = std::make_shared<const dembark::capillary::BridgeForce>(model, angle);
         pair.force = force;
+        if (r_min > 0.0 && r_max < 1e10 && pair.volume > largest_ratio * r_max * r_max * r_max)
+          read.fail("bridgeVolume (m^3) of types " + std::to_string(i) + "-" + std::to_string(j) + " is " + std::to_string(pair.volume / (r_max * r_max * r_max)) +
+                    " cubes of the largest radius; a bridge between grains has at most a few, give its volume in m^3");
         if (r_min > 0.0 && r_max < 1e10)
           for (const double r : {r_min, 2.0 * r_min, r_max, 2.0 * r_max}) largest = std::max(largest, force->rupture_distance(r, carried_ ? carried_volume : pair.volume) / r_min);
       }

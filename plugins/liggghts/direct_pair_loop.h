@@ -178,6 +178,7 @@ class DirectPairLoop : public StockLoop<Cohesion> {
         const double radius_j = radius[j], radius_sum = radius_i + radius_j;
         double* const history = histories + static_cast<std::ptrdiff_t>(stride) * pick->slot;
         int& flag = flags[pick->slot];
+        if (!(pick->distance_squared > 0.0)) friction.refuse_coincidence(i, j);
         const double distance = std::sqrt(pick->distance_squared), reduced_radius = radius_i * radius_j / radius_sum;
         const Vec3 normal = pick->delta * (1.0 / distance);
 

@@ -1,5 +1,6 @@
 #include "granular_combinations.h"
 
+#include <cctype>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -21,6 +22,7 @@
 #include "fix_wall_gran_base.h"
 
 #include "direct_pair_loop.h"
+#include "mesh_wall.h"
 
 namespace dembark_liggghts {
 namespace {
@@ -29,10 +31,31 @@ using LAMMPS_NS::LAMMPS;
 using namespace LIGGGHTS;
 using namespace LIGGGHTS::ContactModels;
 
-// What register_contact_models() compiles, in the words of a user.
-const char* const available =
-    "model hertz|hooke, tangential finnie_rabinowicz with cohesion off|capillary or tangential history with cohesion capillary, "
-    "rolling_friction off|cdt|epsd2, surface default";
+/// What of granular_combinations_list.h a user can write, in the words of a script: combinations that differ in one model stand together.
+std::string available() {
+  // By tangential, cohesion and surface model: the rolling models of each normal model.
+  std::map<std::string, std::map<std::string, std::string>> groups;
+  const auto word = [](const std::string& id, const std::string& kind) {
+    std::string name = id.substr(id.rfind(kind, 0) == 0 ? kind.size() : 0);
+    for (char& c : name) c = static_cast<char>(std::tolower(c));
+    return name;
+  };
+  const auto add = [&](const char* normal, const char* tangential, const char* cohesion, const char* rolling, const char* surface) {
+    std::string& of_normal = groups["tangential " + word(tangential, "TANGENTIAL_") + " cohesion " + word(cohesion, "COHESION_") + " surface " +
+                                    word(surface, "SURFACE_")][word(normal, "NORMAL_")];
+    of_normal += (of_normal.empty() ? "" : "|") + word(rolling, "ROLLING_");
+  };
+#define GRAN_MODEL(normal, tangential, cohesion, rolling, surface) add(#normal, #tangential, #cohesion, #rolling, #surface);
+#include "granular_combinations_list.h"
+#undef GRAN_MODEL
+  std::string line;
+  for (const auto& [rest, normals] : groups) {
+    std::map<std::string, std::string> same;  // normal models by their rolling models
+    for (const auto& [normal, rollings] : normals) same[rollings] += (same[rollings].empty() ? "" : "|") + normal;
+    for (const auto& [rollings, names] : same) line += (line.empty() ? "" : "; ") + ("model " + names + " " + rest) + " rolling_friction " + rollings;
+  }
+  return line;
+}
 
 template <class Host>
 using Creator = Host* (*)(LAMMPS*, typename Host::ParentType*, std::int64_t);
@@ -62,7 +85,7 @@ template <class Host>
 Host* fallback_or_refuse(LAMMPS* lammps, typename Host::ParentType* parent, std::int64_t hash) {
   const int tangential = (hash >> 6) & 63, cohesion = (hash >> 12) & 63;
   if (tangential == TANGENTIAL_FINNIE_RABINOWICZ || cohesion == COHESION_CAPILLARY) {
-    const std::string line = std::string("this combination of contact models is not compiled; there is ") + available;
+    const std::string line = std::string("this combination of contact models is not compiled; there is ") + available();
     lammps->error->all(FLERR, line.c_str());
   }
   return stock_fallback<Host>(lammps, parent, hash);
@@ -83,21 +106,11 @@ struct PairLoop<GranStyle<HERTZ, TANGENTIAL_FINNIE_RABINOWICZ, Cohesion, ROLLING
   typedef DirectPairLoop<Cohesion> type;
 };
 
-template <int Normal, int Tangential, int Cohesion, int Rolling>
+template <int Normal, int Tangential, int Cohesion, int Rolling, int Surface>
 void add_combination() {
-  typedef GranStyle<Normal, Tangential, Cohesion, Rolling, SURFACE_DEFAULT> Style;
+  typedef GranStyle<Normal, Tangential, Cohesion, Rolling, Surface> Style;
   PairStyles::Factory::instance().addStyle("gran", Style::HASHCODE, &create<PairStyles::IGranularPairStyle, typename PairLoop<Style>::type>);
-  Walls::Factory::instance().addStyle("gran", Style::HASHCODE, &create<Walls::IGranularWall, Walls::Granular<ContactModel<Style>>>);
-}
-
-template <int Tangential, int Cohesion>
-void add_with_normal_and_rolling() {
-  add_combination<HERTZ, Tangential, Cohesion, ROLLING_OFF>();
-  add_combination<HERTZ, Tangential, Cohesion, ROLLING_CDT>();
-  add_combination<HERTZ, Tangential, Cohesion, ROLLING_EPSD2>();
-  add_combination<HOOKE, Tangential, Cohesion, ROLLING_OFF>();
-  add_combination<HOOKE, Tangential, Cohesion, ROLLING_CDT>();
-  add_combination<HOOKE, Tangential, Cohesion, ROLLING_EPSD2>();
+  Walls::Factory::instance().addStyle("gran", Style::HASHCODE, &create<Walls::IGranularWall, MeshWall<ContactModel<Style>>>);
 }
 
 template <class Host, class Tag, class Factory>
@@ -114,9 +127,9 @@ void register_contact_models() {
   models.addTangentialModel("finnie_rabinowicz", TANGENTIAL_FINNIE_RABINOWICZ);
   models.addCohesionModel("capillary", COHESION_CAPILLARY);
 
-  add_with_normal_and_rolling<TANGENTIAL_FINNIE_RABINOWICZ, COHESION_OFF>();
-  add_with_normal_and_rolling<TANGENTIAL_FINNIE_RABINOWICZ, COHESION_CAPILLARY>();
-  add_with_normal_and_rolling<TANGENTIAL_HISTORY, COHESION_CAPILLARY>();
+#define GRAN_MODEL(normal, tangential, cohesion, rolling, surface) add_combination<normal, tangential, cohesion, rolling, surface>();
+#include "granular_combinations_list.h"
+#undef GRAN_MODEL
 
   guard_fallback<PairStyles::IGranularPairStyle, PairTable>(PairStyles::Factory::instance());
   guard_fallback<Walls::IGranularWall, WallTable>(Walls::Factory::instance());

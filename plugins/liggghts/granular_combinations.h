@@ -1,6 +1,7 @@
 // Entry of dembark's contact models into the tables of LIGGGHTS.
 //
-// To add a law: write its header like tangential_model_finnie_rabinowicz.h, and give it a line in register_contact_models().
+// To add a law: write its header like tangential_model_finnie_rabinowicz.h, and give its combinations
+// lines in granular_combinations_list.h.
 #pragma once
 
 namespace dembark_liggghts {

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "atom.h"
 #include "error.h"
 #include "fix_property_global.h"
 #include "modify.h"
@@ -19,17 +20,26 @@ class PropertyReader {
   int types_;
   std::string model_;
 
+  LAMMPS_NS::Fix* look_up(const char* name, const char* shape, int n, int m) const {
+    return modify_->find_fix_property(name, "property/global", shape, n, m, model_.c_str(), false);
+  }
+
   LAMMPS_NS::FixPropertyGlobal* find(const char* name, const char* shape, bool required) {
     // The engine's look-up accepts a scalar only with length 0 and otherwise checks the length.
     const int n = std::string(shape) == "scalar" ? 0 : types_;
     const int m = std::string(shape) == "peratomtypepair" ? types_ : 0;
-    LAMMPS_NS::Fix* fix = modify_->find_fix_property(name, "property/global", shape, n, m, model_.c_str(), false);
-    if (!fix && required) {
-      const std::string values = n == 0 ? "VALUE" : m == 0 ? "VALUE (one a type)" : std::to_string(types_) + " VALUE (one a pair of types)";
-      const std::string line = model_ + " needs the material property '" + name + "': fix ID all property/global " + name + " " + shape + " " + values;
-      error_->all(FLERR, line.c_str());
-    }
-    return static_cast<LAMMPS_NS::FixPropertyGlobal*>(fix);
+    LAMMPS_NS::Fix* fix = look_up(name, shape, n, m);
+    if (fix) return static_cast<LAMMPS_NS::FixPropertyGlobal*>(fix);
+    // One that is there in another form is a mistake, also where none is needed.
+    std::string other;
+    for (const char* form : {"scalar", "peratomtype", "peratomtypepair"})
+      if (std::string(form) != shape && look_up(name, form, 0, 0)) other = form;
+    if (!required && other.empty()) return nullptr;
+    const std::string values = n == 0 ? "VALUE" : m == 0 ? "VALUE (one a type)" : std::to_string(lmp_->atom->ntypes) + " VALUE (one a pair of types)";
+    const std::string line = model_ + " needs the material property '" + name + "': fix ID all property/global " + name + " " + shape + " " + values +
+                             (other.empty() ? "" : ", not " + other);
+    error_->all(FLERR, line.c_str());
+    return nullptr;
   }
 
  public:

@@ -94,7 +94,17 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
   /// The contact has ended.
   void forget(double* contact_history) const { store(contact_history + offset_, {}); }
 
+  /// The run ends when two centres lie on each other: there is no normal, and the engine's own models would give no number.
+  DEMBARK_COLD void refuse_coincidence(int i, int j) const {
+    char line[160];
+    const int* const tag = atom->tag;
+    if (j < 0) snprintf(line, sizeof line, "the centre of atom %d lies on a wall: it has no normal; take a smaller time step or another start", tag[i]);
+    else snprintf(line, sizeof line, "atoms %d and %d have the same centre: their contact has no normal; place them apart", tag[i], tag[j]);
+    error->one(FLERR, line);
+  }
+
   inline void surfacesIntersect(const SurfacesIntersectData& sidata, ForceData& i_forces, ForceData& j_forces) {
+    if (!(sidata.r != 0.0)) refuse_coincidence(sidata.i, sidata.is_wall ? -1 : sidata.j);
     if (sidata.contact_flags) *sidata.contact_flags |= CONTACT_TANGENTIAL_MODEL;
     const bool update_history = sidata.computeflag && sidata.shearupdate;
     const dembark::Vec3<double> normal{sidata.en[0], sidata.en[1], sidata.en[2]};

@@ -164,7 +164,13 @@ NB_MODULE(_physics, m) {
         b.radius_2 = radius_2;
         b.mass_1 = mass_1;
         b.mass_2 = mass_2;
+        const ContactState before = self.state;
         const ContactForce f = contact_step(self.parameters, b, dt, self.state, update);
+        // A comparison with what is no number is false: such a contact would end without a word.
+        if (!std::isfinite(f.overlap + f.force.x + f.force.y + f.force.z)) {
+          self.state = before;
+          throw nb::value_error("the contact has no finite force: positions, velocities, radii, masses and the time step must be finite numbers");
+        }
         return nb::make_tuple(tuple(f.force), tuple(f.torque_1), tuple(f.torque_2), f.overlap, f.normal_force, f.capillary_force,
                               tuple(f.tangential), f.viscous_normal, tuple(f.viscous_tangential), f.interacting);
       })

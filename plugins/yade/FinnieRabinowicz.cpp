@@ -69,7 +69,9 @@ void Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys::go(
 	const FrictMat& b = *YADE_CAST<FrictMat*>(material2.get());
 	const auto phys = shared_ptr<FinnieRabinowiczPhys>(new FinnieRabinowiczPhys());
 
-	if (!(a.young > 0.0 && b.young > 0.0)) fail("FrictMat.young of " + pairName(a, b) + " must be > 0 Pa");
+	if (!(a.young > 0.0 && b.young > 0.0 && a.young < INFINITY && b.young < INFINITY)) fail("FrictMat.young of " + pairName(a, b) + " must be > 0 Pa and finite");
+	if (!(a.poisson > -1.0 && b.poisson > -1.0 && a.poisson <= 0.5 && b.poisson <= 0.5))
+		fail("FrictMat.poisson of " + pairName(a, b) + " must be > -1 and <= 0.5");
 	phys->effectiveYoungsModulus = ::dembark::effective_youngs_modulus(a.young, a.poisson, b.young, b.poisson);
 	phys->effectiveShearModulus  = ::dembark::effective_shear_modulus(a.young, a.poisson, b.young, b.poisson);
 	phys->restitution = pairValue(restitution, "restitution", a, b);
@@ -87,10 +89,12 @@ void Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys::go(
 	if (const char* wrong = law.error()) fail(std::string(wrong) + ", " + pairName(a, b));
 
 	phys->newBridgeVolume = pairValue(bridgeVolume, "bridgeVolume", a, b, 0.0);
-	if (!(phys->newBridgeVolume >= 0.0)) fail("bridgeVolume of " + pairName(a, b) + " is " + text(phys->newBridgeVolume) + "; it must be >= 0 m^3");
+	if (!(phys->newBridgeVolume >= 0.0 && phys->newBridgeVolume < INFINITY))
+		fail("bridgeVolume of " + pairName(a, b) + " is " + text(phys->newBridgeVolume) + "; it must be >= 0 m^3 and finite");
 	phys->wettable = phys->newBridgeVolume > 0.0 || (contactAngle && !std::isnan(surfaceTension));
 	if (phys->wettable) {
-		if (!(surfaceTension >= 0.0)) fail("Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.surfaceTension must be a number >= 0 N/m when bridgeVolume is > 0");
+		if (!(surfaceTension >= 0.0 && surfaceTension < INFINITY))
+			fail("Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.surfaceTension must be a finite number >= 0 N/m when bridgeVolume is > 0");
 		phys->surfaceTension = surfaceTension;
 		phys->contactAngle   = pairValue(contactAngle, "contactAngle", a, b);
 		if (const char* wrong = ::dembark::capillary::ViscousLiquid{liquidViscosity, minimumGap}.error())
@@ -256,6 +260,10 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 	const double volumeBefore = phys.bridgeVolume;
 
 	const ::dembark::ContactForce out = ::dembark::contact_step(phys.contact, bodies, scene->dt, state);
+	// A comparison with what is no number is false: such a contact would vanish without a word.
+	if (!std::isfinite(out.overlap + out.force.x + out.force.y + out.force.z))
+		fail("the contact of bodies " + std::to_string(id1) + " and " + std::to_string(id2) + " has no finite force in step " + std::to_string(scene->iter) +
+		     "; look at their positions, velocities and parameters, and at the time step", 1);
 
 	if (!(out.overlap > 0.0) && phys.dissipatedEnergy > 0.0) endedDissipation += phys.dissipatedEnergy;
 	phys.elasticDisplacement = vec(state.friction.displacement);

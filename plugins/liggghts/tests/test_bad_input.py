@@ -49,7 +49,23 @@ def test_optional_property(tmp_path, name):
     ("contactAngle", "peratomtype 1.7 1.7", ("contactAngle is in radians (stock models take degrees) and must lie in 0...pi/2", "1.7")),
     ("contactAngle", "peratomtype -0.1 -0.1", ("contactAngle is in radians (stock models take degrees) and must lie in 0...pi/2",)),
     ("contactAngle", "peratomtype 0.3", ("contactAngle",)),
-    ("staticFriction", "scalar 0.5", ("staticFriction",)),
+    ("contactAngle", "peratomtype 20 20", ("contactAngle is in radians",)),
+    ("contactAngle", "peratomtype 1e999 1e999", ("contactAngle is in radians",)),
+    ("staticFriction", PAIR + "1e999 1e999 1e999 1e999", ("static friction must be a number >= 0",)),
+    ("surfaceTension", "scalar 1e999", ("surfaceTension (N/m) must be >= 0 and finite",)),
+    ("bridgeVolume", PAIR + "1e999 1e999 1e999 1e999", ("bridgeVolume (m^3) must be >= 0 and finite",)),
+    ("bridgeVolume", PAIR + "1 1 1 1", ("bridgeVolume (m^3)", "cubes of the largest radius")),
+    # One in a form that does not fit is told even where the property may be left out; it was disregarded.
+    ("staticFriction", "scalar 0.5", ("staticFriction peratomtypepair 2 VALUE", "not scalar")),
+    ("staticFriction", "peratomtype 0.5 0.5", ("staticFriction peratomtypepair 2 VALUE", "not peratomtype")),
+    ("surfaceTension", "peratomtype 0.07 0.07", ("surfaceTension scalar VALUE", "not peratomtype")),
+    ("contactAngle", "scalar 0.3", ("contactAngle peratomtype VALUE", "not scalar")),
+    ("interfaceShearStrength", "scalar 1e5", ("interfaceShearStrength peratomtypepair 2 VALUE", "not scalar")),
+    ("healingTime", "peratomtype 0 0", ("healingTime scalar VALUE", "not peratomtype")),
+    # These are lines of the engine itself.
+    ("bridgeVolume", "peratomtypepair 1 1e-10", ("bridgeVolume", "Length not correct")),
+    ("staticFriction", PAIR + "0.5 0.5 0.5", ("staticFriction", "multiple of nCols")),
+    ("staticFriction", PAIR + "nan 0.5 0.5 0.5", ("Expected floating point parameter",)),
 ])
 def test_bad_value(tmp_path, name, values, words):
     assert_one_line(run(tmp_path, **{name: values}), *words)
@@ -71,5 +87,21 @@ def test_bad_models(tmp_path, old, new, words):
         for other, keyword in (("no_history", "presliding linear"), ("sjkr", "capillary_model exact")):
             changed = changed.replace(keyword, "") if other in new else changed
         return changed
+
+    assert_one_line(run(tmp_path, change), *words)
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("0.0 0.0 0.0051 ", "0.0 0.0 -0.0048 ", ("atoms 1 and 2 have the same centre",)),
+    ("run 10", "group one id 1\nvariable nothing equal ln(-1)\nset group one vx v_nothing\nrun 10", ("ERROR",)),
+])
+@pytest.mark.parametrize("rolling", ["", "rolling_friction cdt"])
+def test_what_has_no_normal_or_number(tmp_path, old, new, words, rolling):
+    """Coincident centres in our pair loop and in the engine's; a velocity that is no number."""
+    def change(deck):
+        lines = "fix p_roll all property/global coefficientRollingFriction peratomtypepair 2 0 0 0 0\npair_style"
+        deck = deck.replace("pair_style", lines).replace("cohesion capillary", f"cohesion capillary {rolling}")
+        assert old in deck
+        return deck.replace(old, new)
 
     assert_one_line(run(tmp_path, change), *words)

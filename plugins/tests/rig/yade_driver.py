@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
@@ -30,12 +30,14 @@ def run_script(folder: Path, script: Path, *words: str) -> subprocess.CompletedP
     return call(command, folder, engine().environment())
 
 
-def run_all(cases: Iterable[Scenario], folder: Path) -> dict[str, Motion]:
+def run_all(cases: Iterable[Scenario], folder: Path, surfaces: Mapping[str, Mapping[str, object]] | None = None) -> dict[str, Motion]:
+    """Motions by name; `surfaces`: what stands in for the floor of some cases (`wall_of` in the script)."""
     cases = list(cases)
     folder.mkdir(parents=True, exist_ok=True)
     records = []
     for number, case in enumerate(cases):
-        record = asdict(case) | {"prescribed": case.prescribed, "arrays": str(folder / f"path-{number}.npz")}
+        record = asdict(case) | {"prescribed": case.prescribed, "arrays": str(folder / f"path-{number}.npz"),
+                                 "surface": (surfaces or {}).get(case.name, {})}
         if case.prescribed:
             position, velocity, spin = prescribed(case)
             np.savez(record["arrays"], position=position, velocity=velocity, spin=spin)

@@ -50,6 +50,25 @@ class Record:
         self.rows.append(row)
 
 
+def wall_of(surface, material, time_step):
+    """Body and engines of a wall: the floor z = 0 by default. Grains on a path are one step ahead at the first forces."""
+    kind = surface.get("kind", "wall")
+    if kind == "cylinder":
+        body = Body()
+        body.shape, body.state.pos = CylinderWall(radius=surface["radius"], axis=(1, 0, 0)), Vector3(0, 0, surface["radius"])
+        body.material, body.state.blockedDOFs = material, "xyzXYZ"
+    elif kind == "box":
+        body = utils.box((0, 0, -0.01), (0.1, 0.1, 0.01), fixed=True, material=material)
+    elif kind == "wall":
+        body = utils.wall(0.0, axis=2, sense=1, material=material)
+    else:  # its middle is the origin, so that it turns about that
+        body = utils.facet([(-0.1 * 3**0.5, -0.1, 0), (0.1 * 3**0.5, -0.1, 0), (0, 0.2, 0)], material=material)
+    body.state.vel, body.state.angVel = Vector3(*surface.get("velocity", (0, 0, 0))), Vector3(*surface.get("spin", (0, 0, 0)))
+    body.state.pos += time_step * body.state.vel
+    joint = FacetSurface() if kind == "joined facet" else None
+    return body, joint, Ig2_FacetSurface_Sphere_ScGeom(surface=joint) if joint else Ig2_Facet_Sphere_ScGeom()
+
+
 def run(case, arrays):
     O.reset()
     m = case["material"]
@@ -69,16 +88,17 @@ def run(case, arrays):
         body.state.vel = Vector3(*g["velocity"]) - 0.5 * case["time_step"] * gravity
         body.state.angVel = Vector3(*g["angular_velocity"])
         ids.append(O.bodies.append(body))
+    wall, joint, facets = wall_of(case.get("surface", {}), O.materials[-1], case["time_step"])
     if case["wall"]:
-        O.bodies.append(utils.wall(0.0, axis=2, sense=1, material=O.materials[-1]))
+        O.bodies.append(wall)
     first = 1 if case["prescribed"] else 0
     move, record = None, Record(ids, case, first)
     engines = [
         ForceResetter(),
         # The grains are moved from outside, so the collider looks at each step.
-        InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()], verletDist=0),
+        InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb(), Bo1_Box_Aabb(), Bo1_Facet_Aabb(), Bo1_CylinderWall_Aabb()], verletDist=0),
         InteractionLoop(
-            [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()], [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**laws)],
+            [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom(), Ig2_Box_Sphere_ScGeom(), facets, Ig2_CylinderWall_Sphere_ScGeom()], [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**laws)],
             [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(
                 normalLaw=m["normal_law"], characteristicVelocity=m["characteristic_velocity"], presliding=m["presliding"],
                 capillaryModel=m["capillary_model"] if wet else "none")]),
@@ -89,8 +109,9 @@ def run(case, arrays):
         move = Prescribe(ids, *arrays)
     # PyRunner finds its names in the builtins.
     builtins.rig_move, builtins.rig_record = move, record
-    O.engines = ([PyRunner(iterPeriod=1, firstIterRun=0, initRun=True, command="rig_move()")] if move else []) + engines[:3] + [
-        PyRunner(iterPeriod=1, firstIterRun=0, initRun=True, command="rig_record()")] + engines[3:]
+    engines[2:2] = [joint] if joint else []
+    O.engines = ([PyRunner(iterPeriod=1, firstIterRun=0, initRun=True, command="rig_move()")] if move else []) + engines[:-1] + [
+        PyRunner(iterPeriod=1, firstIterRun=0, initRun=True, command="rig_record()")] + engines[-1:]
     O.run(case["steps"] + 1 - first, True)
     return np.array(record.rows)
 

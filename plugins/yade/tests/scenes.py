@@ -264,6 +264,94 @@ def messages():
     return said
 
 
+def bad_values():
+    """What wrong numbers say when a contact is made; `nothing` for none."""
+    ok = {**PAIR, **WET}
+    found = {}
+    cases = [(name, {name: value}) for name, values in {
+        "restitution": (0.0, 1.5, math.nan), "staticFriction": (-0.1, math.inf, math.nan), "kineticFriction": (0.9, -0.1, math.nan),
+        "criticalSlipDistance": (-1e-6, math.nan), "interfaceShearStrength": (0.0, -1.0, math.nan), "healingTime": (-1.0, math.nan),
+        "bridgeVolume": (-1e-10, math.inf, math.nan), "surfaceTension": (-0.07, math.inf, math.nan), "contactAngle": (math.nan,)}.items() for value in values]
+    cases += [(name, {name: None}) for name in ("restitution", "staticFriction", "kineticFriction", "criticalSlipDistance", "contactAngle")]
+    for name, wrong in cases:
+        words = {key: value for key, value in {**ok, **wrong}.items() if value is not None}
+        scene_with([moving((0, 0, 0), 0.0025), moving((0, 0, 0.00499), 0.0025)], capillaryModel="exact")
+        O.engines[2].physDispatcher.functors = [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**words)]
+        try:
+            utils.createInteraction(0, 1)
+            said = "nothing"
+        except RuntimeError as error:
+            said = str(error)
+        found[f"{name} {wrong[name]}"] = said
+    for name, value in (("young", -1.0), ("young", math.inf), ("young", math.nan), ("poisson", 0.7), ("poisson", math.nan)):
+        scene_with([moving((0, 0, 0), 0.0025), moving((0, 0, 0.00499), 0.0025)])
+        setattr(O.materials[0], name, value)
+        try:
+            utils.createInteraction(0, 1)
+            said = "nothing"
+        except RuntimeError as error:
+            said = str(error)
+        found[f"{name} {value}"] = said
+    return found
+
+
+def hostile():
+    """Scenes that must not go wrong silently, each in a process of its own: its exit code and last line."""
+    def coincident():
+        scene_with([moving((0, 0, 0), 0.0025), moving((0, 0, 0), 0.0025)])
+        O.run(10, True)
+        assert O.bodies[1].state.pos.norm() < math.inf and O.bodies[1].state.vel.norm() > 0
+
+    def no_number():
+        scene_with([moving((0, 0, 0), 0.0025), moving((0, 0, 0.00499), 0.0025, (math.nan, 0, 0))])
+        O.run(10, True)
+
+    def erased():
+        law = scene_with([moving((0, 0, 0.00495 * k), 0.0025) for k in range(3)], WET, capillaryModel="exact")
+        O.run(10, True)
+        assert law.bridgeCount() == 2
+        O.bodies.erase(1)
+        O.run(10, True)
+        assert law.bridgeCount() == 0 and O.bodies[2].state.pos.norm() < 1
+
+    def on_top_of_a_bridge():
+        law = scene_with([moving((0, 0, 0.0), 0.0025), moving((0, 0, 0.00499), 0.0025, (0, 0, 0.2))], WET, capillaryModel="exact")
+        O.run(500, True)
+        assert law.bridgeCount() == 1 and law.contactCount() == 0
+        new = moving((0.004, 0, 0.0025), 0.0025, material=O.materials[0])
+        O.bodies.append(new)
+        O.run(50, True)
+        assert law.bridgeCount() == 3
+
+    def crowd():
+        around = [moving((0.0269 * math.cos(0.19 * k), 0.0269 * math.sin(0.19 * k), 0.0), 0.0025) for k in range(33)]
+        law = scene_with([moving((0, 0, 0), 0.0245), *around], WET, capillaryModel="exact")
+        O.run(2, True)
+        assert law.contactCount() >= 33 and O.forces.f(0).norm() < math.inf
+
+    def through_a_wall():
+        scene_with([utils.wall(0, 2), moving((0, 0, 0.0026), 0.0025, (0, 0, -2000.0))])
+        O.run(3, True)
+
+    found = {}
+    for case in (coincident, no_number, erased, on_top_of_a_bridge, crowd, through_a_wall):
+        sys.stdout.flush()
+        child = os.fork()
+        if child == 0:
+            sys.stderr = open(f"{case.__name__}.txt", "w", buffering=1)
+            os.dup2(sys.stderr.fileno(), 2)
+            try:
+                case()
+                os._exit(0)
+            except BaseException as error:
+                print(f"{type(error).__name__}: {error}", file=sys.stderr)
+                os._exit(3)
+        code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        with open(f"{case.__name__}.txt") as file:
+            found[case.__name__] = [code, file.read().strip()]
+    return found
+
+
 out, *names = sys.argv[1:]
 results = {name: globals()[name]() for name in names}
 with open(out, "w") as file:

@@ -18,7 +18,8 @@ WET = {"bridge_volume": 2e-10, "surface_tension": 0.072, "contact_angle": 0.35}
 
 @pytest.fixture(scope="module")
 def found(yade):
-    return yade.scenes("plain_law", "walls", "held_sphere", "cylinder", "cylinder_fill", "periodic", "bridge", "energy", "hooke", "messages")
+    return yade.scenes("plain_law", "walls", "held_sphere", "cylinder", "cylinder_fill", "periodic", "bridge", "energy", "hooke", "messages",
+                       "bad_values", "hostile")
 
 
 def mass(radius):
@@ -144,3 +145,26 @@ def test_wrong_words_name_attribute_and_choices(found):
                                      ("CylinderWall.axis", "not zero")), strict=True):
         assert message.startswith("dembark: ") and "\n" not in message
         assert all(part in message for part in parts), message
+
+
+def test_each_wrong_number_is_told(found):
+    """One line that names what is wrong, for wrong, missing and infinite values and those that are no numbers."""
+    for case, said in found["bad_values"].items():
+        name = case.split()[0]
+        if name == "healingTime" or "Friction" in name or "Slip" in name or "Strength" in name:
+            name = {"healingTime": "healing time", "staticFriction": "static", "kineticFriction": "kinetic", "criticalSlipDistance": "ritical",
+                    "interfaceShearStrength": "hear"}[name]
+        assert said.startswith("dembark: ") and "\n" not in said and name.lower() in said.lower().replace("staticfriction", "static friction"), (case, said)
+
+
+@pytest.mark.parametrize("scene", ["coincident", "erased", "on_top_of_a_bridge", "crowd"])
+def test_hostile_scenes_run(found, scene):
+    assert found["hostile"][scene] == [0, ""], found["hostile"][scene]
+
+
+@pytest.mark.parametrize(("scene", "words"), [("no_number", ("has no finite force", "bodies 0 and 1")), ("through_a_wall", ("went through wall",))])
+def test_hostile_scenes_end_with_a_line(found, scene, words):
+    code, said = found["hostile"][scene]
+    lines = [line for line in said.splitlines() if line.startswith("dembark: ")]
+    assert code in (1, 2, 3) and (len(lines) == 1 or all(word in said for word in words)), said
+    assert all(word in said for word in words)

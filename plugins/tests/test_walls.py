@@ -1,0 +1,121 @@
+"""Every kind of wall of both engines carries the same contact: impact, slip with reversals, drag, and a bridge, against Python."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rig import liggghts_driver, walls, yade_driver
+from rig.motion import deviation
+from rig.scenarios import ALL_OF_IT, SCENARIOS, Grain, Path, Scenario
+from rig.walls import CYLINDER, FLOOR, Surface
+
+from dembark.validation.errors import DembarkError
+
+TOLERANCE = 1e-9
+
+
+def _shorter(name: str, steps: int) -> Scenario:
+    return replace(SCENARIOS[name], name=name, material=ALL_OF_IT, steps=steps, stride=5)
+
+
+# Impact, a bridge that forms and breaks; loops with slip and reversals on two axes; and a drag across the axis of the cylinder.
+CASES = {
+    "approach": _shorter("approach, bridge, wall", 1200),
+    "cycles": _shorter("cycles, wall", 2200),
+    "exponential": replace(_shorter("cycles, wall", 1500), material=replace(ALL_OF_IT, presliding="exponential")),
+    "sliding": _shorter("sliding, slow weakening", 1000),
+    "around": Scenario(
+        name="around", material=ALL_OF_IT, wall=True, time_step=1e-5, steps=1500,
+        grains=(Grain(position=(0.0, 0.0, 5.05e-3), angular_velocity=(3.0, 2.0, 1.0), path=Path(
+            displacement=("0.02*t", "0.045*sin(20*t)", "0.045*(1-cos(20*t))-0.0000400*(1-cos(2*PI*70*t))"),
+            velocity=("0.02", "0.045*20*cos(20*t)", "0.045*20*sin(20*t)-0.0000400*2*PI*70*sin(2*PI*70*t)"))),)),
+}
+DRIFT, TURN = (0.03, -0.02, 0.05), (0.0, 0.0, 6.0)
+ROLL = (7.0, 0.0, 0.0)  # of a cylinder about its axis
+# Kind: surface, what LIGGGHTS calls it, what YADE calls it.
+SURFACES = {
+    "plane": (Surface(), "plane", {"kind": "wall"}),
+    "mesh": (Surface(), "mesh", {"kind": "facet"}),
+    "joined facet": (Surface(), None, {"kind": "joined facet"}),
+    "box": (Surface(), None, {"kind": "box"}),
+    "drifting": (Surface(velocity=DRIFT), "mesh linear -0 0 0", {"kind": "joined facet", "velocity": DRIFT}),
+    "drifting wall": (Surface(velocity=DRIFT), None, {"kind": "wall", "velocity": DRIFT}),
+    "turning": (Surface(spin=TURN), "mesh rotate", {"kind": "joined facet", "spin": TURN}),
+    "turning box": (Surface(spin=TURN), None, {"kind": "box", "spin": TURN}),
+    "cylinder": (Surface(shape="cylinder"), "cylinder", {"kind": "cylinder", "radius": CYLINDER}),
+    "rolling cylinder": (Surface(shape="cylinder", spin=ROLL), None, {"kind": "cylinder", "radius": CYLINDER, "spin": ROLL}),
+}
+
+
+def parts():
+    """(kind, case) of all, with the case in the frame of its surface; `around` is for cylinders only."""
+    for kind, (surface, _, _) in SURFACES.items():
+        for name, case in CASES.items():
+            if (name == "around") <= (surface.shape == "cylinder"):
+                yield kind, name, replace(walls.moved_with(case, surface.velocity), name=f"{kind}, {name}")
+
+
+def _deck(case: Scenario, word: str, folder, name: str) -> str:
+    text = liggghts_driver.deck(case)
+    if word == "cylinder":
+        return text.replace("primitive type 2 zplane 0", f"primitive type 2 xcylinder {CYLINDER} 0 {CYLINDER}")
+    if word == "plane":
+        return text
+    move = {"mesh": "", "mesh linear -0 0 0": "linear {} {} {}".format(*DRIFT),
+            "mesh rotate": f"rotate origin 0 0 0 axis 0 0 1 period {2.0 * np.pi / TURN[2]!r}"}[word]
+    return walls.on_mesh(text, folder, FLOOR, move, name=name)
+
+
+@pytest.fixture(scope="module")
+def liggghts(tmp_path_factory):
+    try:
+        liggghts_driver.engine()
+    except DembarkError as error:
+        pytest.skip(str(error))
+    folder, decks, cases = tmp_path_factory.mktemp("walls"), {}, {}
+    for kind, name, case in parts():
+        word = SURFACES[kind][1]
+        if word:
+            decks[kind, name] = _deck(case, word, folder, f"{len(decks)}.stl")
+            cases[kind, name] = case
+    walls.batch(folder, decks)
+    return {key: walls.motion_of(cases[key], folder / f"{number}.dump") for number, key in enumerate(decks)}
+
+
+@pytest.fixture(scope="module")
+def yade(tmp_path_factory):
+    try:
+        yade_driver.engine()
+    except DembarkError as error:
+        pytest.skip(str(error))
+    cases = {(kind, name): case for kind, name, case in parts()}
+    found = yade_driver.run_all(cases.values(), tmp_path_factory.mktemp("walls"), {case.name: SURFACES[kind][2] for (kind, _), case in cases.items()})
+    return {key: found[case.name] for key, case in cases.items()}
+
+
+ALL = [(kind, name) for kind, name, _ in parts()]
+
+
+@pytest.mark.parametrize(("kind", "name"), [key for key in ALL if SURFACES[key[0]][1]])
+def test_wall_of_liggghts_is_that_of_python(liggghts, kind, name):
+    case = next(c for k, n, c in parts() if (k, n) == (kind, name))
+    expected = walls.follow(case, SURFACES[kind][0])
+    assert np.abs(expected.force).max() > 0.02
+    found = deviation(expected, liggghts[kind, name])
+    assert max(found.values()) < TOLERANCE, found
+
+
+@pytest.mark.parametrize(("kind", "name"), ALL)
+def test_wall_of_yade_is_that_of_python(yade, kind, name):
+    case = next(c for k, n, c in parts() if (k, n) == (kind, name))
+    expected = walls.follow(case, SURFACES[kind][0])
+    assert np.abs(expected.force).max() > 0.02
+    found = deviation(expected, yade[kind, name])
+    assert max(found.values()) < TOLERANCE, found
+
+
+def test_curvature_enters_through_the_nearest_point_only():
+    """A grain that stays above the line where the cylinder touches the plane has the same force on both."""
+    for name in ("approach", "sliding"):
+        flat, curved = (walls.follow(CASES[name], Surface(shape=shape)) for shape in ("plane", "cylinder"))
+        assert max(deviation(flat, curved).values()) < 1e-12

@@ -1,0 +1,84 @@
+"""Facets that a FacetSurface joins act as one wall; what the stock functor does beside it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+HERE = Path(__file__).parent
+FORCE, SLIP, VOLUME, LOST, REAL, TOUCH = slice(0, 3), 6, 7, 8, 9, 10
+
+
+@pytest.fixture(scope="module")
+def found(yade):
+    out = yade.folder / "surface.json"
+    done = yade(HERE / "surface_scenes.py", str(out), "flat", "bends", "corner", "moving", "periodic", "changes", "messages")
+    assert "scenes: finished" in done.stdout, (done.stdout + done.stderr)[-3000:]
+    return json.loads(out.read_text())
+
+
+def rows(run):
+    return np.array(run["rows"])
+
+
+def assert_same(run, reference, tolerance=1e-9):
+    """Force, torque, slip, volume, energy and elastic displacement of all contacts, each relative to its largest value."""
+    one, other = rows(run), rows(reference)
+    for column in range(one.shape[1]):
+        scale = np.abs(other[:, column]).max()
+        assert np.abs(one[:, column] - other[:, column]).max() <= tolerance * scale, column
+
+
+@pytest.mark.parametrize("name", ["patch", "fine", "reloaded"])
+def test_a_flat_patch_is_a_plane(found, name):
+    """Sticking, slipping, in touch and held by a bridge over many borders; also when saved and loaded on the way."""
+    flat = found["flat"]
+    assert_same(flat[name], flat["plane"])
+    assert flat[name]["handed"] > 5
+    assert flat[name]["lost"] == pytest.approx(flat["plane"]["lost"], rel=1e-9)
+    table = rows(flat["plane"])
+    assert 0.2 < (table[:, TOUCH] == 0).mean() < 0.8 and (table[:, VOLUME] > 0.0).all() and table[:, SLIP].max() > 1e-5
+
+
+def test_stock_facets_double_forces_and_bridges(found):
+    """What is mended: with Ig2_Facet_Sphere_ScGeom each facet at a border has a contact of its own."""
+    stock, plane = rows(found["flat"]["stock"]), rows(found["flat"]["plane"])
+    assert stock[:, REAL].max() >= 3
+    assert np.abs(stock[:, 2]).max() > 1.5 * np.abs(plane[:, 2]).max()
+    assert stock[:, VOLUME].max() > 1.9 * plane[:, VOLUME].max()
+
+
+@pytest.mark.parametrize(("name", "limit"), [("convex", 0.02), ("concave", 0.08), ("convex, not smooth", 0.02)])
+def test_force_has_no_jump_over_an_edge(found, name, limit):
+    """A groove turns the normal by 2 degrees in one step, a ridge bit by bit; friction and bridge go over both."""
+    table, flat = rows(found["bends"][name]), rows(found["bends"]["flat"])
+    scale = np.linalg.norm(flat[100, FORCE])
+    assert np.linalg.norm(np.diff(table[20:, FORCE], axis=0), axis=1).max() < limit * scale
+    assert table[:, REAL].max() == 1
+    assert (table[:, VOLUME] == table[0, VOLUME]).all()
+    assert found["bends"][name]["handed"] == 1
+    if name != "concave":
+        assert np.linalg.norm(table[:, FORCE], axis=1).max() < 1.01 * scale
+
+
+def test_a_corner_of_facets_is_one_of_planes(found):
+    assert_same(found["corner"]["facets"], found["corner"]["planes"])
+    assert (rows(found["corner"]["facets"])[:, REAL] == 3).all()
+
+
+def test_moving_facets_and_periodic_images(found):
+    assert_same(found["moving"]["moving"], found["moving"]["rest"])
+    assert_same(found["periodic"]["images"], found["periodic"]["free"])
+    assert found["moving"]["moving"]["handed"] > 0 and found["periodic"]["images"]["handed"] > 0
+
+
+def test_facets_may_come_and_go(found):
+    """A deeper facet beside the patch is a contact of its own; where the owner was erased, the edges of the hole carry."""
+    (alone, one), (both, two), (after, _) = found["changes"]
+    assert one == 1 and two == 2 and both > alone and after > 0.0
+
+
+def test_wrong_numbers_are_told(found):
+    for message, name in zip(found["messages"], ("smoothAngle", "weld", "smoothAngle"), strict=True):
+        assert message.startswith("dembark: FacetSurface.") and name in message
