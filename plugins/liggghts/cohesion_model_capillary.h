@@ -12,6 +12,7 @@ COHESION_MODEL(COHESION_CAPILLARY,capillary,20)
 #define COHESION_MODEL_CAPILLARY_H_
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <string>
@@ -42,7 +43,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
   std::vector<PairLiquid> pairs_;  // one a pair of types, row by row
   std::map<double, std::shared_ptr<const dembark::capillary::BridgeForce>> built_;  // by mean contact angle
 
-  static double bridge_radius(const SurfacesCloseData& d) { return d.is_wall ? 2.0 * d.radi : 2.0 * d.radi * d.radj / d.radsum; }
+  static double other_radius(const SurfacesCloseData& d) { return d.is_wall ? INFINITY : d.radj; }
 
   void pull(const SurfacesCloseData& d, double force, const double* normal, ForceData& i_forces, ForceData& j_forces) const {
     const double scale = d.is_wall ? d.area_ratio : 1.0;
@@ -100,45 +101,46 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
         pair.force = force;
         const double r_min = registry.min_radius(), r_max = registry.max_radius();
         if (r_min > 0.0 && r_max < 1e10)
-          for (const double r : {r_min, 2.0 * r_min, r_max, 2.0 * r_max}) largest = std::max(largest, force->rupture_distance(r, pair.volume) / r_min);
+          for (const double r : {r_min, r_max})
+            for (const double other : {r_min, r_max, static_cast<double>(INFINITY)}) largest = std::max(largest, force->rupture_distance(r, other, pair.volume) / r_min);
       }
     // Pairs are kept to (f - 1)(r_i + r_j), walls to (f - 1) r_i; the wall needs the larger factor.
     if (largest > 0.0) neighbor->register_contact_dist_factor(1.0 + 1.001 * largest);
   }
 
   /// Attraction (N) of a touching pair; its bridge forms now if it has none, unless it must not be stored (`update_history`).
-  double touching_force(double* contact_history, int itype, int jtype, double radius, double size, bool update_history, bool primitive_wall = false) const {
+  double touching_force(double* contact_history, int itype, int jtype, double radius_i, double radius_j, double size, bool update_history, bool primitive_wall = false) const {
     const PairLiquid& pair = pairs_[itype * types_ + jtype];
     double* const history = contact_history + offset_;
     double volume = history[0];
     if (!(volume > 0.0)) {
       if (!(pair.volume > 0.0)) return 0.0;
       volume = pair.volume;
-      const double rupture = pair.force->rupture_distance(radius, volume);
+      const double rupture = pair.force->rupture_distance(radius_i, radius_j, volume);
       check_reach(rupture, size, primitive_wall);
       if (update_history) {
         history[0] = volume;
         history[1] = rupture;
       }
     }
-    return pair.force->force(radius, 0.0, volume, surface_tension_);
+    return pair.force->force(radius_i, radius_j, 0.0, volume, surface_tension_);
   }
 
   /// Whether a bridge holds the pair over the gap, and its attraction (N); it ruptures here.
-  bool gap_force(double* contact_history, int itype, int jtype, double radius, double gap, double& attraction) const {
+  bool gap_force(double* contact_history, int itype, int jtype, double radius_i, double radius_j, double gap, double& attraction) const {
     double* const history = contact_history + offset_;
     if (!(history[0] > 0.0)) return false;
     if (gap > history[1]) {
       history[0] = history[1] = 0.0;
       return false;
     }
-    attraction = pairs_[itype * types_ + jtype].force->force(radius, gap, history[0], surface_tension_);
+    attraction = pairs_[itype * types_ + jtype].force->force(radius_i, radius_j, gap, history[0], surface_tension_);
     return true;
   }
 
   inline void surfacesIntersect(SurfacesIntersectData& sidata, ForceData& i_forces, ForceData& j_forces) {
     if (sidata.contact_flags) *sidata.contact_flags |= CONTACT_COHESION_MODEL;
-    const double attraction = touching_force(sidata.contact_history, sidata.itype, sidata.jtype, bridge_radius(sidata), sidata.is_wall ? sidata.radi : sidata.radsum,
+    const double attraction = touching_force(sidata.contact_history, sidata.itype, sidata.jtype, sidata.radi, other_radius(sidata), sidata.is_wall ? sidata.radi : sidata.radsum,
                                              sidata.computeflag && sidata.shearupdate, sidata.is_wall && !sidata.mesh);
     pull(sidata, attraction, sidata.en, i_forces, j_forces);
   }
@@ -147,7 +149,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     if (!scdata.contact_history) return;
     const double distance = sqrt(scdata.rsq);
     double attraction;
-    if (!gap_force(scdata.contact_history, scdata.itype, scdata.jtype, bridge_radius(scdata), distance - (scdata.is_wall ? scdata.radi : scdata.radsum), attraction)) {
+    if (!gap_force(scdata.contact_history, scdata.itype, scdata.jtype, scdata.radi, other_radius(scdata), distance - (scdata.is_wall ? scdata.radi : scdata.radsum), attraction)) {
       if (scdata.contact_flags) *scdata.contact_flags &= ~CONTACT_COHESION_MODEL;
       return;
     }

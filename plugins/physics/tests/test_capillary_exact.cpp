@@ -118,10 +118,10 @@ TEST_CASE("the table against an independent solver", "[capillary]") {
   for (const Reference& r : references) {
     const BridgeForce force(Model::exact, r.degrees * degree);
     CAPTURE(r.degrees, r.volume);
-    const double reach = force.rupture_distance(1.0, r.volume);
+    const double reach = force.rupture_distance(1.0, 1.0, r.volume);
     CHECK_THAT(reach, WithinRel(r.rupture, 1e-5));
-    for (int i = 0; i < 5; ++i) CHECK_THAT(force.force(1.0, parts[i] * r.rupture, r.volume, 1.0), WithinRel(r.force[i], 1e-3));
-    CHECK_THAT(force.force(1.0, reach, r.volume, 1.0), WithinRel(r.at_rupture, 1e-2));
+    for (int i = 0; i < 5; ++i) CHECK_THAT(force.force(1.0, 1.0, parts[i] * r.rupture, r.volume, 1.0), WithinRel(r.force[i], 1e-3));
+    CHECK_THAT(force.force(1.0, 1.0, reach, r.volume, 1.0), WithinRel(r.at_rupture, 1e-2));
   }
 }
 
@@ -129,7 +129,7 @@ TEST_CASE("a vanishing touching bridge pulls with 2 pi R gamma cos(theta)", "[ca
   for (const double theta : {0.0, 30.0 * degree, 60.0 * degree}) {
     const BridgeForce force(Model::exact, theta);
     const double limit = 2.0 * pi * std::cos(theta);
-    const double coarse = limit - force.force(1.0, 0.0, 1.6e-7, 1.0), fine = limit - force.force(1.0, 0.0, 1e-8, 1.0);
+    const double coarse = limit - force.force(1.0, 1.0, 0.0, 1.6e-7, 1.0), fine = limit - force.force(1.0, 1.0, 0.0, 1e-8, 1.0);
     CHECK(coarse > 0.0);
     CHECK(coarse < 0.05 * limit);
     // The first correction goes with the half-filling angle, V^(1/4).
@@ -140,7 +140,7 @@ TEST_CASE("a vanishing touching bridge pulls with 2 pi R gamma cos(theta)", "[ca
 TEST_CASE("rupture goes to Lian's distance for small wetting bridges", "[capillary]") {
   for (const double theta : {0.0, 20.0 * degree, 40.0 * degree}) {
     const BridgeForce force(Model::exact, theta);
-    for (const double v : {1e-8, 1e-6, 1e-4, 1e-3}) CHECK_THAT(force.rupture_distance(1.0, v), WithinRel((1.0 + 0.5 * theta) * std::cbrt(v), 0.04));
+    for (const double v : {1e-8, 1e-6, 1e-4, 1e-3}) CHECK_THAT(force.rupture_distance(1.0, 1.0, v), WithinRel((1.0 + 0.5 * theta) * std::cbrt(v), 0.04));
   }
 }
 
@@ -175,7 +175,7 @@ TEST_CASE("a bridge that does not wet pushes when touching and pulls when drawn 
   const BridgeForce force(Model::exact, 90.0 * degree);
   for (const double v : {1e-4, 1e-2}) {
     // Thin cylinder of radius a between the spheres, pi a^4 / 2 = V: F = -pi a.
-    CHECK_THAT(force.force(1.0, 0.0, v, 1.0), WithinRel(-pi * std::pow(2.0 * v / pi, 0.25), 0.01));
-    CHECK(force.force(1.0, 0.5 * force.rupture_distance(1.0, v), v, 1.0) > 0.0);
+    CHECK_THAT(force.force(1.0, 1.0, 0.0, v, 1.0), WithinRel(-pi * std::pow(2.0 * v / pi, 0.25), 0.01));
+    CHECK(force.force(1.0, 1.0, 0.5 * force.rupture_distance(1.0, 1.0, v), v, 1.0) > 0.0);
   }
 }
