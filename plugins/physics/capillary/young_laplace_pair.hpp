@@ -161,6 +161,13 @@ class PairYoungLaplace {
     return false;
   }
 
+  /// Of the conditions on contact angle, volume and gap; 0 where a branch turns or another one crosses it.
+  double determinant(double volume, const PairCoordinates& x) const {
+    const double gap = shape(x).gap;
+    const Jacobian j = jacobian(x, residual(x, volume, gap), volume, gap);
+    return dot(j.row[0], cross(j.row[1], j.row[2]));
+  }
+
  private:
   struct Residual {
     bool valid = false;
