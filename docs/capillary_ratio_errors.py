@@ -1,8 +1,8 @@
 """Unequal spheres and walls: the error of the effective radius R = 2 R*, and the deviation of `exact` from an independent solution.
 
-The law for equal spheres of R = 2 R* (the approximation of Derjaguin) is what tables and formulas made for equal spheres can do; it is compared
-with `exact`, which takes the spheres as they are. `exact` is compared with dembark.physics.young_laplace. Run as a script it solves for
-the reference, some minutes, writes figures/capillary_ratio_reference.csv and figures/capillary_ratio_errors.csv beside it and prints the
+The law for equal spheres of R = 2 R* (the approximation of Derjaguin) is what tables and formulas made for equal spheres can do; it is
+compared with `exact`, which takes the spheres as they are. `exact` is compared with dembark.physics.young_laplace. Run as a script it
+solves for the reference, some minutes, writes figures/capillary_ratio_reference.csv and figures/capillary_ratio_errors.csv beside it and prints the
 tables of the page.
 """
 
@@ -24,7 +24,7 @@ FOLDER = Path(__file__).with_name("figures")
 ANGLES = (0, 30, 60)  # degrees
 RATIOS = (0.5, 0.2, 0.05, 0.0)  # smaller radius over larger; 0 = wall
 VOLUMES = np.geomspace(1e-6, 0.1, 21)  # over R^3, R = 2 R*
-SHARES = np.concatenate([[0.0], np.linspace(0.02, 0.98, 49)])  # of the rupture distance
+SHARES = np.append(np.linspace(0.0, 0.95, 20), 0.98)  # of the rupture distance
 REFERENCE_VOLUMES = (1e-5, 1e-3, 0.1)
 REFERENCE_SHARES = (0.0, 0.1, 0.5, 0.9, 0.99)
 
@@ -108,9 +108,9 @@ def write_errors() -> None:
     for ratio in RATIOS:
         for angle in ANGLES:
             forces, ends = effective_radius_errors(ratio, angle)
-            rows += [[ratio, angle, volume, share, value] for volume, line in zip(VOLUMES, forces, strict=True)
+            rows += [[ratio, angle, volume, share, round(value, 6)] for volume, line in zip(VOLUMES, forces, strict=True)
                      for share, value in zip(SHARES, line, strict=True)]
-            rows += [[ratio, angle, volume, 1.0, value] for volume, value in zip(VOLUMES, ends, strict=True)]
+            rows += [[ratio, angle, volume, 1.0, round(value, 6)] for volume, value in zip(VOLUMES, ends, strict=True)]
     _write("capillary_ratio_errors.csv", ("radius_ratio", "contact_angle_deg", "volume_over_R3", "gap_over_rupture", "equal_spheres"), rows)
 
 

@@ -11,9 +11,9 @@
 //   constant      2 pi R gamma cos(theta) up to rupture
 //
 // R = 2 R* = 2 Ri Rj / (Ri + Rj); 2 Ri against a wall, an infinite Rj. The closed forms know this R alone. SI units. Positive = attractive.
-// `exact` can push for contact angles near 90 degrees: a bridge that does not wet has its least area at a gap > 0. Rupture of `exact` is the
-// gap where the bridge ceases to be stable (young_laplace.hpp), of `willett`, `willett_full` and `bagheri` Willett's, of `rabinovich` and
-// `constant` Lian's distance.
+// `exact` can push for contact angles near 90 degrees: a bridge that does not wet has its least area at a gap > 0. Rupture of `exact` is
+// the gap where the bridge ceases to be stable (young_laplace.hpp), of `willett`, `willett_full` and `bagheri` Willett's, of `rabinovich`
+// and `constant` Lian's distance.
 #pragma once
 
 #include <algorithm>
@@ -48,7 +48,7 @@ inline bool model_from_name(const char* name, Model& model) {
 /// Force law of one model and one contact angle. Immutable; copies share the tables, so that it may be read from many threads.
 class BridgeForce {
  public:
-  /// `contact_angle` in rad, 0...pi/2, the mean of the two surfaces; std::invalid_argument otherwise. `exact` solves for its first table here.
+  /// `contact_angle` in rad, 0...pi/2, the mean of the two surfaces; std::invalid_argument otherwise. `exact` solves for its first table.
   BridgeForce(Model model, double contact_angle) : model_(model), theta_(contact_angle) {
     if (!(contact_angle >= 0.0 && contact_angle <= 0.5 * detail::pi * (1.0 + 1e-12))) {
       char line[128];

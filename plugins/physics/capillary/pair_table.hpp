@@ -23,7 +23,7 @@ class PairTable {
   static constexpr int cells = 24;  ///< in zeta
   static constexpr int slices = 2;  ///< in y
 
-  /// Solves for contact angle `theta` (rad, 0...pi/2), of which `equal` is the table for equal spheres; std::runtime_error should it not converge.
+  /// Solves for contact angle `theta` (rad, 0...pi/2); `equal` is its table for equal spheres. std::runtime_error should it not converge.
   PairTable(double theta, const BridgeTable& equal) : rows_(slices * octaves), patches_(slices * octaves * cells) {
     // Columns of all volumes for the four asymmetries of a slice.
     std::array<std::vector<Column>, 4> layers;
@@ -123,7 +123,9 @@ class PairTable {
     return columns;
   }
 
-  static double node_volume(int n) { return n == 3 * octaves ? detail::volume_at(octaves - 1, 1.0) : detail::volume_at(n / 3, n % 3 / 3.0); }
+  static double node_volume(int n) {
+    return n == 3 * octaves ? detail::volume_at(octaves - 1, 1.0) : detail::volume_at(n / 3, n % 3 / 3.0);
+  }
 
   static std::vector<Column> layer(double theta, double asymmetry) {
     const PairYoungLaplace bridges(theta, asymmetry);

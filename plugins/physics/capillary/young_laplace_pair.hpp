@@ -2,8 +2,8 @@
 // stable one of given volume and gap.
 //
 // Lengths in R = 2 R* = 2 R1 R2 / (R1 + R2), force in gamma R. The spheres have the curvatures 1 + e (body 1, the smaller) and 1 - e, with
-// the asymmetry e = (R2 - R1) / (R1 + R2), 0 = equal, 1 = a plane. With t the arc length of the meridian from the contact line on body 1 (radius
-// r1, slope phi1 against the radius) and p the pressure inside minus outside, the first integral of young_laplace.hpp gives
+// the asymmetry e = (R2 - R1) / (R1 + R2), 0 = equal, 1 = a plane. With t the arc length of the meridian from the contact line on body 1
+// (radius r1, slope phi1 against the radius) and p the pressure inside minus outside, the first integral of young_laplace.hpp gives
 //   r^2 - r1^2 = 2 r1 cos(phi1) t sinc(p t) + (1 - p r1 sin(phi1)) t^2 sinc^2(p t/2) = D(t),     r sin(phi) = r1 sin(phi1) + p D/2,
 // regular for every pressure. A meridian is fixed by the half-filling angle b1 on body 1 (r1 = sin(b1) / (1 + e), phi1 = pi - b1 - theta),
 // p L and its length L; it is a bridge when it meets body 2 at the contact angle, sin(phi2 - theta) = (1 - e) r2.
@@ -38,7 +38,9 @@ namespace detail {
 struct Cap {
   double height, volume, area;
   Cap(double rim, double half_angle)
-      : height(rim * std::tan(0.5 * half_angle)), volume(pi * height * (3.0 * rim * rim + height * height) / 6.0), area(pi * (rim * rim + height * height)) {}
+      : height(rim * std::tan(0.5 * half_angle)),
+        volume(pi * height * (3.0 * rim * rim + height * height) / 6.0),
+        area(pi * (rim * rim + height * height)) {}
 };
 
 }  // namespace detail
@@ -57,7 +59,8 @@ class PairYoungLaplace {
     static const detail::EvenGauss<16> rule;
     const double b1 = near_ * std::exp(x[0]), length = std::exp(x[2]), k = x[1], p = k / length;
     if (!(b1 < detail::pi)) return {};
-    const double r1 = std::sin(b1) / near_, rise1 = r1 * std::sin(b1 + theta_), run1 = -r1 * std::cos(b1 + theta_), spread = 1.0 - p * rise1;
+    const double r1 = std::sin(b1) / near_, rise1 = r1 * std::sin(b1 + theta_), run1 = -r1 * std::cos(b1 + theta_);
+    const double spread = 1.0 - p * rise1;
     double height = 0.0, revolved = 0.0, area = 0.0;
     for (std::size_t i = 0; i < rule.node.size(); ++i)
       for (const double node : {-rule.node[i], rule.node[i]}) {
@@ -69,9 +72,10 @@ class PairYoungLaplace {
         revolved += rule.weight[i] * rise * r2;
         area += rule.weight[i] * r;
       }
-    const double s = detail::sinc(0.5 * k), c = std::cos(0.5 * k), d = length * s * (2.0 * run1 * c + spread * length * s), square = r1 * r1 + d;
+    const double s = detail::sinc(0.5 * k), d = length * s * (2.0 * run1 * std::cos(0.5 * k) + spread * length * s), square = r1 * r1 + d;
     if (!(square > 0.0)) return {};
-    const double r2 = std::sqrt(square), b2 = std::atan2(rise1 + 0.5 * p * d, run1 * std::cos(k) + spread * length * detail::sinc(k)) - theta_;
+    const double rise2 = rise1 + 0.5 * p * d, run2 = run1 * std::cos(k) + spread * length * detail::sinc(k);
+    const double r2 = std::sqrt(square), b2 = std::atan2(rise2, run2) - theta_;
     const detail::Cap cap1(r1, b1), cap2(r2, b2);
     PairShape b;
     b.miss = (std::sin(b2) - far_ * r2) / b1;

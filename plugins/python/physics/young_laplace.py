@@ -6,9 +6,9 @@ smaller sphere, phi the angle of the meridian against the radius,
 
     dr/dt = cos(phi),   dz/dt = sin(phi),   dphi/dt = p - sin(phi)/r.
 
-It starts at half-filling angle b on the smaller sphere (curvature c), r = sin(b)/c, phi = pi - b - theta, and ends on the other one (curvature c'),
-where sin(phi - theta') = c' r. Liquid and free area are further equations of the system. Unknown are b, the pressure and the length of the
-meridian; the conditions are the contact angle at its end, the volume and the gap (or a step along a branch of constant volume).
+It starts at half-filling angle b on the smaller sphere (curvature c), r = sin(b)/c, phi = pi - b - theta, and ends on the other one
+(curvature c'), where sin(phi - theta') = c' r. Liquid and free area are further equations of the system. Unknown are b, the pressure and the
+length of the meridian; the conditions are the contact angle at its end, the volume and the gap (or a step along a branch of constant volume).
 
 A bridge is stable up to the first gap at which the determinant of these conditions is zero. Between unequal spheres that is the largest
 gap. Between equal ones it can come before: a branch of asymmetric bridges leaves the symmetric one, and the liquid drains to one side.
@@ -16,8 +16,8 @@ gap. Between equal ones it can come before: a branch of asymmetric bridges leave
 It shares nothing with the tables of ``capillary/bridge.hpp``, which use the first integral of these equations: here the axial force is a
 result, 2 pi r sin(phi) - pi r^2 p, the same at every r. Slow (about a second for a branch) and meant for tests and error maps.
 
-Lengths are in R = 2 R* = 2 R1 R2 / (R1 + R2) (the radius of equal spheres, 2 R1 against a plane), volumes in R^3, forces in gamma R, pressures
-in gamma/R, energies in gamma R^2; angles in rad.
+Lengths are in R = 2 R* = 2 R1 R2 / (R1 + R2) (the radius of equal spheres, 2 R1 against a plane), volumes in R^3, forces in gamma R,
+pressures in gamma/R, energies in gamma R^2; angles in rad.
 """
 
 from __future__ import annotations
@@ -108,7 +108,8 @@ def _integrate(unknowns: NDArray, bodies: _Bodies, **options):
     start[0] = np.sin(half_angle) / bodies.curvatures[0]
     start[2] = np.pi - half_angle - bodies.angles[0]
     # t runs in lengths of the meridian, so that all columns end together and share the steps: their differences are smooth.
-    return start, solve_ivp(_rhs, (0.0, 1.0), start.ravel(), method="DOP853", rtol=1e-11, atol=1e-13 * float(min(length.min(), start[0].min())),
+    smallest = float(min(length.min(), start[0].min()))
+    return start, solve_ivp(_rhs, (0.0, 1.0), start.ravel(), method="DOP853", rtol=1e-11, atol=1e-13 * smallest,
                             args=(length, unknowns[1] / length), **options)
 
 
@@ -125,9 +126,11 @@ def _shoot(unknowns: NDArray, bodies: _Bodies) -> NDArray:
     liquid, caps = volume - filled - far_filled, height + far_height
     if not (np.all(liquid > 0.0) and np.all(z > 0.0)):
         raise FloatingPointError("the spheres fill the bridge")
-    force, far_force = (2.0 * np.pi * radius * np.sin(slope) - np.pi * radius**2 * pressure for radius, slope in ((start[0], start[2]), (r, phi)))
+    force, far_force = (2.0 * np.pi * radius * np.sin(slope) - np.pi * radius**2 * pressure
+                        for radius, slope in ((start[0], start[2]), (r, phi)))
     energy = area - np.cos(bodies.angles[0]) * wetted - np.cos(bodies.angles[1]) * far_wetted
-    return np.array([(np.sin(far_angle) - bodies.curvatures[1] * r) / half_angle, np.log(liquid), z - caps, caps, force, energy, far_force - force])
+    miss = (np.sin(far_angle) - bodies.curvatures[1] * r) / half_angle
+    return np.array([miss, np.log(liquid), z - caps, caps, force, energy, far_force - force])
 
 
 def _newton(guess: NDArray, bodies: _Bodies, volume: float, *, gap: float | None = None,
@@ -137,7 +140,7 @@ def _newton(guess: NDArray, bodies: _Bodies, volume: float, *, gap: float | None
     shift = np.hstack([np.zeros((3, 1)), _STEP * np.eye(3)])
 
     def conditions(out: NDArray, at_gap: float) -> NDArray:
-        return np.array([out[0], out[1] - np.log(volume), np.log((out[3] + out[2]) / (out[3] + at_gap))])
+        return np.array([out[0], out[1] - np.log(volume), np.log(np.maximum(out[3] + out[2], 0.0) / np.maximum(out[3] + at_gap, 1e-300))])
 
     def residuals(x: NDArray, out: NDArray) -> NDArray:
         f = conditions(out, gap if gap is not None else 0.0)
@@ -271,8 +274,8 @@ def rupture_gap(volume: float, contact_angle: float | Sequence[float], ratio: fl
 def bridge(volume: float, gap: float, contact_angle: float | Sequence[float], ratio: float = 1.0) -> Bridge:
     """The stable bridge of ``volume`` (R^3, 1e-8 to 1) over ``gap`` (R, >= 0).
 
-    ``contact_angle`` in rad, 0 to 70 degrees: one, or those of the smaller and the larger sphere. ``ratio`` of the smaller radius to the larger,
-    1 for equal spheres, 0 for a plane.
+    ``contact_angle`` in rad, 0 to 70 degrees: one, or those of the smaller and the larger sphere. ``ratio`` of the smaller radius to the
+    larger, 1 for equal spheres, 0 for a plane.
 
     Raises NoBridge beyond rupture, ValueError for arguments outside the ranges.
     """

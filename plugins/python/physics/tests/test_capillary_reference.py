@@ -107,7 +107,7 @@ def test_force_between_unequal_spheres_is_the_derivative_of_the_surface_energy()
 
 
 def test_equal_spheres_lose_stability_to_asymmetric_bridges():
-    """At 50 degrees almost equal spheres break nearly where equal ones do; the symmetric branch alone would go 8 % farther."""
+    """At 50 degrees almost equal spheres break nearly where equal ones do; the symmetric branch alone goes 6 % farther."""
     angle, volume = np.radians(50.0), 1e-3
     equal, other = rupture_gap(volume, angle), rupture_gap(volume, angle, ratio=0.99)
     assert 0.985 * equal < other < equal
