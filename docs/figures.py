@@ -132,7 +132,7 @@ def ratio_map() -> None:
                                     shading="nearest")
             axis.set_xscale("log")
             name = "wall" if ratio == 0.0 else f"radii 1:{1.0 / ratio:.0f}"
-            axis.set_title(f"{name}, θ = {angle}°, rupture up to {100.0 * end[np.argmax(np.abs(end))]:+.0f} %", fontsize=7)
+            axis.set_title(f"{name}, {angle}°, rupture to {100.0 * end[np.argmax(np.abs(end))]:+.0f} %", fontsize=7)
     for axis in axes[-1]:
         axis.set_xlabel("V / R³")
     for axis in axes[:, 0]:
