@@ -1,6 +1,6 @@
-"""Draws the figures of the documentation into figures/: friction curves, capillary force curves and the error map of the models.
+"""Draws the figures of the documentation into figures/: friction curves, capillary force curves and the error maps of the models.
 
-The error map shows figures/capillary_errors.csv, which capillary_errors.py computes.
+The first error map shows figures/capillary_errors.csv, which capillary_errors.py computes.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import matplotlib
 matplotlib.use("Agg")
 
 import capillary_errors
+import capillary_ratio_errors
 import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.colors import BoundaryNorm
@@ -118,6 +119,28 @@ def error_map() -> None:
     save(figure, "capillary_errors")
 
 
+def ratio_map() -> None:
+    """Error of the effective radius over volume and gap for unequal spheres and walls."""
+    ratios, angles = capillary_ratio_errors.RATIOS, capillary_ratio_errors.ANGLES
+    bounds = [-50, -20, -10, -5, -2, -1, -0.5, 0.5, 1, 2, 5, 10, 20, 50]
+    norm = BoundaryNorm(bounds, 256, extend="both")
+    figure, axes = plt.subplots(len(ratios), len(angles), figsize=(7.2, 7.2), sharex=True, sharey=True)
+    for ratio, row in zip(ratios, axes, strict=True):
+        for angle, axis in zip(angles, row, strict=True):
+            force, end = capillary_ratio_errors.effective_radius_errors(ratio, angle)
+            drawn = axis.pcolormesh(capillary_ratio_errors.VOLUMES, capillary_ratio_errors.SHARES, 100.0 * force.T, cmap="RdBu_r", norm=norm,
+                                    shading="nearest")
+            axis.set_xscale("log")
+            name = "wall" if ratio == 0.0 else f"radii 1:{1.0 / ratio:.0f}"
+            axis.set_title(f"{name}, {angle}°, rupture to {100.0 * end[np.argmax(np.abs(end))]:+.0f} %", fontsize=7)
+    for axis in axes[-1]:
+        axis.set_xlabel("V / R³")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("gap / rupture distance")
+    figure.colorbar(drawn, ax=axes, label="equal spheres of R = 2R* / exact − 1 (%)", shrink=0.5, ticks=bounds)
+    save(figure, "capillary_ratio_errors")
+
+
 def main() -> None:
     """Draw all figures."""
     FOLDER.mkdir(exist_ok=True)
@@ -125,6 +148,7 @@ def main() -> None:
         friction()
         capillary()
         error_map()
+        ratio_map()
 
 
 if __name__ == "__main__":

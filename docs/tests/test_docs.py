@@ -112,10 +112,10 @@ def test_cpp_snippet(text: str, tmp_path: Path) -> None:
     assert float(subprocess.run(["./main"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout.split()[0]) > 0.0
 
 
-def load_errors() -> object:
+def load_errors(name: str = "capillary_errors") -> object:
     import importlib.util
 
-    spec = importlib.util.spec_from_file_location("capillary_errors", ROOT / "docs/capillary_errors.py")
+    spec = importlib.util.spec_from_file_location(name, ROOT / f"docs/{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -125,6 +125,19 @@ def test_table_of_capillary_errors_is_that_of_the_data() -> None:
     errors = load_errors()
     page = (ROOT / "docs/liggghts_cohesion_capillary.md").read_text(encoding="utf-8")
     assert page.split("<!-- capillary_errors.py -->\n")[1].split("\n<!-- end -->")[0] == errors.markdown(errors.summary(errors.read()))
+
+
+def test_tables_of_unequal_spheres_are_those_of_the_data() -> None:
+    errors = load_errors("capillary_ratio_errors")
+    page = (ROOT / "docs/liggghts_cohesion_capillary.md").read_text(encoding="utf-8")
+    for name, table in (("table", errors.table()), ("law", errors.law_table())):
+        assert page.split(f"<!-- capillary_ratio_errors.py: {name} -->\n")[1].split("\n<!-- end -->")[0] == table
+
+
+def test_reference_of_unequal_spheres_is_that_of_the_code() -> None:
+    errors = load_errors("capillary_ratio_errors")
+    stored = next(row for row in errors.read_reference() if tuple(row[:3]) == (0.05, 60, 1e-3))
+    assert errors.reference_row(0.05, 60, 1e-3) == pytest.approx(stored, rel=1e-5)
 
 
 @pytest.mark.parametrize(("angle", "volume", "share"), [(0, 1e-6, 0.0), (30, 1e-2, 0.5), (60, 0.1, 0.9)])

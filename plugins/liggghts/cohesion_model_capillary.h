@@ -58,7 +58,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
   std::vector<PairLiquid> pairs_;  // one a pair of types, row by row
   std::map<double, std::shared_ptr<const dembark::capillary::BridgeForce>> built_;  // by mean contact angle
 
-  static double bridge_radius(const SurfacesCloseData& d) { return d.is_wall ? 2.0 * d.radi : 2.0 * d.radi * d.radj / d.radsum; }
+  static double other_radius(const SurfacesCloseData& d) { return d.is_wall ? INFINITY : d.radj; }
 
   void pull(const SurfacesCloseData& d, double force, const double* normal, ForceData& i_forces, ForceData& j_forces) const {
     const double scale = d.is_wall ? d.area_ratio : 1.0;
@@ -123,7 +123,6 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     request.wall = d.is_wall ? owner_->wall_number(wall_) : -1;
     request.radius_i = d.radi;
     request.radius_j = d.is_wall ? dembark::capillary::flat<double> : d.radj;
-    request.bridge_radius = bridge_radius(d);
     request.bridge = d.contact_history + offset_;
     request.imbalance = d.contact_history + imbalance_;
     request.force = pairs_[d.itype * types_ + d.jtype].force.get();
@@ -187,39 +186,41 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
           read.fail("bridgeVolume (m^3) of types " + std::to_string(i) + "-" + std::to_string(j) + " is " + std::to_string(pair.volume / (r_max * r_max * r_max)) +
                     " cubes of the largest radius; a bridge between grains has at most a few, give its volume in m^3");
         if (r_min > 0.0 && r_max < 1e10)
-          for (const double r : {r_min, 2.0 * r_min, r_max, 2.0 * r_max}) largest = std::max(largest, force->rupture_distance(r, carried_ ? carried_volume : pair.volume) / r_min);
+          for (const double r : {r_min, r_max})
+            for (const double other : {r_min, r_max, static_cast<double>(INFINITY)})
+              largest = std::max(largest, force->rupture_distance(r, other, carried_ ? carried_volume : pair.volume) / r_min);
       }
     // Pairs are kept to (f - 1)(r_i + r_j), walls to (f - 1) r_i; the wall needs the larger factor.
     if (largest > 0.0) neighbor->register_contact_dist_factor(1.0 + 1.001 * largest);
   }
 
   /// Attraction (N) of a touching pair; its bridge forms now if it has none, unless it must not be stored (`update_history`).
-  double touching_force(double* contact_history, int itype, int jtype, double radius, double size, bool update_history, bool primitive_wall = false) const {
+  double touching_force(double* contact_history, int itype, int jtype, double radius_i, double radius_j, double size, bool update_history, bool primitive_wall = false) const {
     const PairLiquid& pair = pairs_[itype * types_ + jtype];
     double* const history = contact_history + offset_;
     double volume = history[0];
     if (!(volume > 0.0)) {
       if (!(pair.volume > 0.0)) return 0.0;
       volume = pair.volume;
-      const double rupture = pair.force->rupture_distance(radius, volume);
+      const double rupture = pair.force->rupture_distance(radius_i, radius_j, volume);
       dembark_liggghts::check_reach(neighbor, error, rupture, size, primitive_wall);
       if (update_history) {
         history[0] = volume;
         history[1] = rupture;
       }
     }
-    return pair.force->force(radius, 0.0, volume, surface_tension_);
+    return pair.force->force(radius_i, radius_j, 0.0, volume, surface_tension_);
   }
 
   /// Whether a bridge holds the pair over the gap, and its attraction (N); it ruptures here.
-  bool gap_force(double* contact_history, int itype, int jtype, double radius, double gap, double& attraction) const {
+  bool gap_force(double* contact_history, int itype, int jtype, double radius_i, double radius_j, double gap, double& attraction) const {
     double* const history = contact_history + offset_;
     if (!(history[0] > 0.0)) return false;
     if (gap > history[1]) {
       history[0] = history[1] = 0.0;
       return false;
     }
-    attraction = pairs_[itype * types_ + jtype].force->force(radius, gap, history[0], surface_tension_);
+    attraction = pairs_[itype * types_ + jtype].force->force(radius_i, radius_j, gap, history[0], surface_tension_);
     return true;
   }
 
@@ -232,7 +233,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
       ask(sidata);
       return;
     }
-    const double attraction = touching_force(sidata.contact_history, sidata.itype, sidata.jtype, bridge_radius(sidata), sidata.is_wall ? sidata.radi : sidata.radsum,
+    const double attraction = touching_force(sidata.contact_history, sidata.itype, sidata.jtype, sidata.radi, other_radius(sidata), sidata.is_wall ? sidata.radi : sidata.radsum,
                                              sidata.computeflag && sidata.shearupdate, sidata.is_wall && !sidata.mesh);
     pull(sidata, attraction, sidata.en, i_forces, j_forces);
     if (!liquid_.on() || !(volume > 0.0)) return;
@@ -249,7 +250,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
       return;
     }
     double attraction;
-    if (!gap_force(scdata.contact_history, scdata.itype, scdata.jtype, bridge_radius(scdata), gap, attraction)) {
+    if (!gap_force(scdata.contact_history, scdata.itype, scdata.jtype, scdata.radi, other_radius(scdata), gap, attraction)) {
       if (scdata.contact_flags) *scdata.contact_flags &= ~CONTACT_COHESION_MODEL;
       return;
     }

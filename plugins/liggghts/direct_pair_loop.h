@@ -187,7 +187,7 @@ class DirectPairLoop : public StockLoop<Cohesion> {
           friction.forget(history);
           if constexpr (wet) {
             double pull;
-            if (!cohesion.gap_force(history, type_i, type_j, 2.0 * reduced_radius, distance - radius_sum, pull)) continue;
+            if (!cohesion.gap_force(history, type_i, type_j, radius_i, radius_j, distance - radius_sum, pull)) continue;
             flag |= LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL;
             force_i -= pull * normal;
             if (j < owned) add(f[j], pull * pair->relax(j), normal);
@@ -217,7 +217,7 @@ class DirectPairLoop : public StockLoop<Cohesion> {
                                               response.tangential_stiffness, tangential_damping_ ? response.tangential_damping : 0.0,
                                               reduced_radius * overlap, dt, update_history);
         double pull = 0.0;
-        if constexpr (wet) pull = cohesion.touching_force(history, type_i, type_j, 2.0 * reduced_radius, radius_sum, update_history);
+        if constexpr (wet) pull = cohesion.touching_force(history, type_i, type_j, radius_i, radius_j, radius_sum, update_history);
 
         const Vec3 force = (response.force - pull) * normal + tangential, moment = cross(normal, tangential);
         force_i += force;

@@ -236,7 +236,7 @@ void FixCapillaryLiquid::form(const Request &r) {
     bridge = capillary::form_bridge(given_i, share_(r.radius_j, r.radius_i) * grants_[r.j], r.radius_i, r.radius_j, return_, largest_);
   }
   if (!(bridge.volume > 0.0)) return;
-  const double rupture = r.force->rupture_distance(r.bridge_radius, bridge.volume);
+  const double rupture = r.force->rupture_distance(r.radius_i, r.radius_j, bridge.volume);
   dembark_liggghts::check_reach(neighbor, error, rupture, r.j < 0 ? r.radius_i : r.radius_i + r.radius_j, r.primitive_wall);
   r.bridge[0] = bridge.volume;
   r.bridge[1] = rupture;

@@ -31,7 +31,7 @@ class FixCapillaryLiquid : public Fix {
   /// A touching contact without a bridge. `j`: -1 for a wall. `bridge`: where volume and rupture distance go, `imbalance`: as in NewBridge.
   struct Request {
     int i, j, wall;
-    double radius_i, radius_j, bridge_radius;
+    double radius_i, radius_j;
     double *bridge, *imbalance;
     const dembark::capillary::BridgeForce *force;
     bool primitive_wall;

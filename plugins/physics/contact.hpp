@@ -104,11 +104,11 @@ inline ContactForce contact_step(const ContactParameters& p, const ContactBodies
   else if (touching || state.bridge_volume > 0.0) {
     if (!(state.bridge_volume > 0.0) && p.liquid.bridge_volume > 0.0) {
       state.bridge_volume = p.liquid.bridge_volume;
-      state.rupture_distance = p.liquid.force->rupture_distance(bridge_radius, state.bridge_volume);
+      state.rupture_distance = p.liquid.force->rupture_distance(b.radius_1, b.radius_2, state.bridge_volume);
     }
     if (state.bridge_volume > 0.0) {
       if (-out.overlap > state.rupture_distance) state.bridge_volume = state.rupture_distance = 0.0;
-      else out.capillary_force = p.liquid.force->force(bridge_radius, -out.overlap, state.bridge_volume, p.liquid.surface_tension);
+      else out.capillary_force = p.liquid.force->force(b.radius_1, b.radius_2, -out.overlap, state.bridge_volume, p.liquid.surface_tension);
     }
   }
 

@@ -76,18 +76,18 @@ NB_MODULE(_physics, m) {
       .def("__init__", [](capillary::BridgeForce* self, const std::string& model, double contact_angle) {
         new (self) capillary::BridgeForce(model_of(model), contact_angle);
       }, "model"_a, "contact_angle"_a)
-      .def("force", [](const capillary::BridgeForce& self, Array radius, Array gap, Array volume, Array surface_tension) {
+      .def("force", [](const capillary::BridgeForce& self, Array radius_1, Array radius_2, Array gap, Array volume, Array surface_tension) {
         double* out;
-        const std::size_t n = radius.shape(0);
+        const std::size_t n = gap.shape(0);
         Result result = make_result(n, out);
-        for (std::size_t i = 0; i < n; ++i) out[i] = self.force(radius(i), gap(i), volume(i), surface_tension(i));
+        for (std::size_t i = 0; i < n; ++i) out[i] = self.force(radius_1(i), radius_2(i), gap(i), volume(i), surface_tension(i));
         return result;
       })
-      .def("rupture_distance", [](const capillary::BridgeForce& self, Array radius, Array volume) {
+      .def("rupture_distance", [](const capillary::BridgeForce& self, Array radius_1, Array radius_2, Array volume) {
         double* out;
-        const std::size_t n = radius.shape(0);
+        const std::size_t n = volume.shape(0);
         Result result = make_result(n, out);
-        for (std::size_t i = 0; i < n; ++i) out[i] = self.rupture_distance(radius(i), volume(i));
+        for (std::size_t i = 0; i < n; ++i) out[i] = self.rupture_distance(radius_1(i), radius_2(i), volume(i));
         return result;
       });
 

@@ -199,7 +199,7 @@ void CapillaryLiquid::grant(const std::vector<LiquidExchange::Request>& asked) {
 		taken[k]         = bridge.from_i;
 		takenOfSecond[k] = bridge.from_j;
 		if (!(bridge.volume > 0.0)) continue;
-		r.phys->setBridge(bridge.volume, bridge.imbalance, 2.0 * ::dembark::reduced(r.firstRadius, r.secondRadius));
+		r.phys->setBridge(bridge.volume, bridge.imbalance, r.firstRadius, r.secondRadius);
 		bridges[{r.first, r.second}] = {bridge.volume, bridge.imbalance, wall};
 	}
 	// All grants are of what was owned before the first.

@@ -27,12 +27,12 @@ public:
 	double                       linearStiffness = 0.0;
 
 	void postLoad(FinnieRabinowiczPhys&) { preparedBy = -1; }
-	/// A bridge of carried liquid forms between spheres of `radius` (m).
-	void setBridge(double volume, double imbalance, double radius)
+	/// A bridge of carried liquid forms between spheres of these radii (m; infinite = a wall).
+	void setBridge(double volume, double imbalance, double radius1, double radius2)
 	{
 		bridgeVolume    = volume;
 		bridgeImbalance = imbalance;
-		ruptureDistance = contact.liquid.force->rupture_distance(radius, volume);
+		ruptureDistance = contact.liquid.force->rupture_distance(radius1, radius2, volume);
 	}
 
 	// clang-format off

@@ -1,19 +1,19 @@
 // Capillary force of a pendular liquid bridge between two spheres, or a sphere and a wall.
 //
-//   exact         the stable axisymmetric bridge between equal spheres of radius R (equation of Young and Laplace, no gravity), from a
-//                 table built once, about 50 ms. For V/R^3 = 1e-6...0.1 and contact angles up to 60 degrees it is within 0.1 % of an
-//                 independent solution up to 0.9999 of rupture, and within 0.3 % there. The table spans 1e-9...1 (to 0.5 %) and
-//                 angles up to 90 degrees; smaller volumes go on by similarity, larger ones act as V/R^3 = 1. Past 70 degrees the rupture
-//                 distance has a kink in the volume, near which the table is good to 3 %
+//   exact         the stable axisymmetric bridge (equation of Young and Laplace, no gravity) between the spheres as they are, from tables
+//                 built once: about 70 ms of one core for equal spheres, and 0.25 s more with the first unequal pair or wall.
+//                 docs/liggghts_cohesion_capillary.md has the errors. The tables span V/R^3 = 1e-9...1 and angles up to 90 degrees;
+//                 smaller volumes go on by similarity, larger ones act as V/R^3 = 1
 //   willett       closed form and
 //   willett_full  regression of Willett, Adams, Johnson & Seville, Langmuir 16 (2000) 9396
 //   rabinovich    Rabinovich, Esayanur & Moudgil, Langmuir 21 (2005) 10992
 //   bagheri       Bagheri, Roy & Poeschel (2024), arXiv:2310.11485
 //   constant      2 pi R gamma cos(theta) up to rupture
 //
-// R = 2 R* = 2 Ri Rj / (Ri + Rj); 2 Ri against a wall. SI units. Positive = attractive. `exact` can push for contact angles near 90
-// degrees: a bridge that does not wet has its least area at a gap > 0. Rupture of `exact` is the gap where the stable and the unstable
-// branch meet, of `willett`, `willett_full` and `bagheri` Willett's, of `rabinovich` and `constant` Lian's distance.
+// R = 2 R* = 2 Ri Rj / (Ri + Rj); 2 Ri against a wall, an infinite Rj. The closed forms know this R alone. SI units. Positive = attractive.
+// `exact` can push for contact angles near 90 degrees: a bridge that does not wet has its least area at a gap > 0. Rupture of `exact` is
+// the gap where the bridge ceases to be stable (young_laplace.hpp), of `willett`, `willett_full` and `bagheri` Willett's, of `rabinovich`
+// and `constant` Lian's distance.
 #pragma once
 
 #include <algorithm>
@@ -24,8 +24,8 @@
 #include <string>
 #include <vector>
 
-#include "bridge_table.hpp"
 #include "closed_forms.hpp"
+#include "exact_bridge.hpp"
 
 namespace dembark::capillary {
 
@@ -45,10 +45,10 @@ inline bool model_from_name(const char* name, Model& model) {
   return false;
 }
 
-/// Force law of one model and one contact angle. Immutable; copies share the table, so that it may be read from many threads.
+/// Force law of one model and one contact angle. Immutable; copies share the tables, so that it may be read from many threads.
 class BridgeForce {
  public:
-  /// `contact_angle` in rad, 0...pi/2, the mean of the two surfaces; std::invalid_argument otherwise. `exact` solves for its table here.
+  /// `contact_angle` in rad, 0...pi/2, the mean of the two surfaces; std::invalid_argument otherwise. `exact` solves for its first table.
   BridgeForce(Model model, double contact_angle) : model_(model), theta_(contact_angle) {
     if (!(contact_angle >= 0.0 && contact_angle <= 0.5 * detail::pi * (1.0 + 1e-12))) {
       char line[128];
@@ -57,7 +57,7 @@ class BridgeForce {
     }
     sine_ = std::sin(contact_angle);
     cosine_ = std::max(std::cos(contact_angle), 0.0);
-    if (model == Model::exact) table_ = std::make_shared<const BridgeTable>(contact_angle);
+    if (model == Model::exact) exact_ = std::make_shared<const ExactBridge>(contact_angle);
     if (model == Model::willett_full) regression_ = WillettRegression(contact_angle);
     if (model == Model::bagheri) fit_ = BagheriFit(contact_angle);
   }
@@ -65,35 +65,46 @@ class BridgeForce {
   Model model() const { return model_; }
   double contact_angle() const { return theta_; }
 
-  /// Gap (m) beyond which there is no bridge of `volume` (m^3) between spheres of `radius` (m).
-  double rupture_distance(double radius, double volume) const {
-    const double v = reduced(volume, 1.0 / radius);
-    return usable(v) ? radius * reduced_rupture(v) : 0.0;
+  /// Gap (m) beyond which there is no bridge of `volume` (m^3) between spheres of `radius_1` and `radius_2` (m; infinite = a wall).
+  double rupture_distance(double radius_1, double radius_2, double volume) const {
+    const PairSize pair(radius_1, radius_2);
+    const double v = pair.reduced(volume);
+    return usable(v) ? pair.radius * reduced_rupture(v, pair.asymmetry) : 0.0;
   }
 
   /// Force (N) at `gap` (m; <= 0 counts as touching) for `volume` (m^3) and `surface_tension` (N/m); 0 beyond rupture and without liquid.
-  double force(double radius, double gap, double volume, double surface_tension) const {
-    const double inverse = 1.0 / radius, v = reduced(volume, inverse);
+  double force(double radius_1, double radius_2, double gap, double volume, double surface_tension) const {
+    const PairSize pair(radius_1, radius_2);
+    const double v = pair.reduced(volume);
     if (!usable(v)) return 0.0;
-    const double scale = surface_tension * radius;
-    if (model_ == Model::exact) return scale * (gap > 0.0 ? table_->force(gap * inverse, v) : table_->touching_force(v));
-    return scale * reduced_closed_form(gap > 0.0 ? gap * inverse : 0.0, v);
+    const double scale = surface_tension * pair.radius, s = gap > 0.0 ? gap * pair.inverse : 0.0;
+    if (model_ != Model::exact) return scale * reduced_closed_form(s, v);
+    return scale * (gap > 0.0 ? exact_->force(s, v, pair.asymmetry) : exact_->touching_force(v, pair.asymmetry));
   }
 
  private:
-  static double reduced(double volume, double inverse_radius) { return volume * (inverse_radius * inverse_radius * inverse_radius); }
+  struct PairSize {
+    double inverse, radius, asymmetry;  // 1/R, R = 2 R*, |R2 - R1| / (R1 + R2)
+    PairSize(double radius_1, double radius_2) {
+      const double curvature_1 = 1.0 / radius_1, curvature_2 = 1.0 / radius_2;
+      inverse = 0.5 * (curvature_1 + curvature_2);
+      radius = 1.0 / inverse;
+      asymmetry = 0.5 * std::fabs(curvature_1 - curvature_2) * radius;
+    }
+    double reduced(double volume) const { return volume * (inverse * inverse * inverse); }
+  };
   // No liquid, or numbers that overflow or are none.
   static bool usable(double v) { return v > 0.0 && v < 1e30; }
 
   Model model_;
   double theta_, sine_ = 0.0, cosine_ = 1.0;
-  std::shared_ptr<const BridgeTable> table_;
+  std::shared_ptr<const ExactBridge> exact_;
   WillettRegression regression_;
   BagheriFit fit_;
 
-  double reduced_rupture(double v) const {
+  double reduced_rupture(double v, double asymmetry = 0.0) const {
     switch (model_) {
-      case Model::exact: return table_->rupture(v);
+      case Model::exact: return exact_->rupture(v, asymmetry);
       case Model::rabinovich:
       case Model::constant: return lian_rupture(v, theta_);
       default: return willett_rupture(v, theta_);

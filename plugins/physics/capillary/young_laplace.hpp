@@ -155,8 +155,9 @@ class YoungLaplace {
     return f.valid && f.norm() < round_off;
   }
 
-  /// From the touching bridge along the branch of constant volume to its largest gap, where the stable branch meets the unstable one.
-  /// `path`, when given, receives the steps from there (without the start).
+  /// From the touching bridge along the branch of constant volume to where it ceases to be stable: to its largest gap, where it meets the
+  /// unstable branch, or to the gap where liquid begins to drain to one of the spheres, whichever comes first. `path`, when given,
+  /// receives the steps from there (without the start).
   bool rupture(double volume, ShapeCoordinates& x, std::vector<ShapeCoordinates>* path = nullptr) const {
     constexpr double longest = 0.08;
     Direction d = direction(x);
@@ -173,8 +174,8 @@ class YoungLaplace {
         if (step < 1e-6) return false;
         continue;
       }
-      if (next.stretch <= 0.0) {
-        if (!refine(volume, x, d, step, next.stretch)) return false;
+      if (next.margin() <= 0.0) {
+        if (!refine(volume, x, d, step, next.margin())) return false;
         if (path) path->push_back(x);
         return true;
       }
@@ -194,10 +195,15 @@ class YoungLaplace {
     double norm() const { return std::hypot(volume, height); }
   };
 
-  // Unit direction of constant volume, and the growth of the gap along it.
+  // Unit direction of constant volume, the growth of the gap along it, and how far the bridge is from swaying. The meridian shifted along
+  // itself keeps volume and gap to first order; with slope phi and sin(b) = r at its end it also keeps the contact angles where
+  // d(phi - b)/dt = 0. There a branch of asymmetric bridges leaves the symmetric one, which is not stable beyond. Between planes (b = 0)
+  // this is an inflection at the contact line (Vogel, Discrete Contin. Dyn. Syst. Suppl. 2005, 862). `steadiness` is -d(phi - b)/dt without
+  // the factor 1 - p r0 of all derivatives along the meridian, which is 0 for a cylinder.
   struct Direction {
     bool valid = false;
-    double phase = 0.0, log_slenderness = 0.0, stretch = 0.0;
+    double phase = 0.0, log_slenderness = 0.0, stretch = 0.0, steadiness = 0.0;
+    double margin() const { return std::min(stretch, steadiness); }
     void reverse() { phase = -phase, log_slenderness = -log_slenderness, stretch = -stretch; }
     double along(const Direction& o) const { return phase * o.phase + log_slenderness * o.log_slenderness; }
   };
@@ -233,8 +239,10 @@ class YoungLaplace {
     const Gradients g = gradients(x);
     const double length = std::hypot(g.volume[0], g.volume[1]);
     if (!(g.valid && length > 0.0)) return {};
-    Direction d{true, -g.volume[1] / length, g.volume[0] / length, 0.0};
+    Direction d{true, -g.volume[1] / length, g.volume[0] / length, 0.0, 0.0};
     d.stretch = g.gap[0] * d.phase + g.gap[1] * d.log_slenderness;
+    const double beta = shape(x).half_filling_angle, k = x.phase, end = detail::sinc(0.5 * k);
+    d.steadiness = std::cos(beta) * (std::exp(x.log_slenderness) - 0.5 * k * end * end) + std::sin(beta) * detail::sinc(k);
     return d;
   }
 
@@ -253,10 +261,10 @@ class YoungLaplace {
     return false;
   }
 
-  // The gap grows at x and shrinks (`at_high` < 0) a step ahead of it; the largest in between goes to x.
+  // The bridge is stable at x and not (`at_high` < 0) a step ahead of it; the last stable one goes to x.
   bool refine(double volume, ShapeCoordinates& x, const Direction& d, double step, double at_high) const {
     const ShapeCoordinates from = x;
-    double low = 0.0, high = step, at_low = d.stretch;
+    double low = 0.0, high = step, at_low = d.margin();
     for (int iteration = 0; iteration < 60 && high - low > 1e-9; ++iteration) {
       double middle = 0.5 * (low + high);
       // Regula falsi alone may keep one end for ever; every third step halves.
@@ -266,9 +274,10 @@ class YoungLaplace {
       Direction here = direction(x);
       if (!here.valid) return false;
       if (here.along(d) < 0.0) here.reverse();
-      if (here.stretch > 0.0) low = middle, at_low = here.stretch;
-      else high = middle, at_high = here.stretch;
-      if (here.stretch == 0.0) break;
+      const double margin = here.margin();
+      if (margin > 0.0) low = middle, at_low = margin;
+      else high = middle, at_high = margin;
+      if (margin == 0.0) break;
     }
     return true;
   }

@@ -23,11 +23,11 @@ const std::initializer_list<Model> models{Model::exact, Model::willett, Model::w
 /// Largest change of the force between neighbours of `steps` gaps, close together at touching and, as the square of the distance to it,
 /// at rupture, where the slope of the exact force is infinite.
 double largest_step(const BridgeForce& force, double v, int steps) {
-  const double reach = force.rupture_distance(1.0, v);
-  double before = force.force(1.0, 0.0, v, 1.0), largest = 0.0;
+  const double reach = force.rupture_distance(1.0, 1.0, v);
+  double before = force.force(1.0, 1.0, 0.0, v, 1.0), largest = 0.0;
   for (int i = 1; i < steps; ++i) {
     const double u = 1.0 - static_cast<double>(i) / steps;
-    const double f = force.force(1.0, reach * (1.0 - u * u), v, 1.0);
+    const double f = force.force(1.0, 1.0, reach * (1.0 - u * u), v, 1.0);
     largest = std::max(largest, std::fabs(f - before));
     before = f;
   }
@@ -64,17 +64,17 @@ TEST_CASE("Willett's closed form agrees with the capillary law of YADE", "[capil
   // A value of YADE's own checks: radii 19 and 32.5 um, 248.485 nm apart.
   const double r1 = 19e-6, r2 = 32.5e-6;
   const BridgeForce force(Model::willett, 10.0 * degree);
-  CHECK_THAT(force.force(2.0 * r1 * r2 / (r1 + r2), 248.485e-9, 12e-19, 0.024), WithinRel(6.78192074e-7, 2e-9));
+  CHECK_THAT(force.force(r1, r2, 248.485e-9, 12e-19, 0.024), WithinRel(6.78192074e-7, 2e-9));
 }
 
 TEST_CASE("touching forces of the closed forms", "[capillary]") {
   const double v = 1e-3;
   for (const double theta : {0.0, 0.4, 1.0}) {
     const double dry = 2.0 * pi * std::cos(theta);
-    CHECK_THAT(BridgeForce(Model::willett, theta).force(1.0, 0.0, v, 1.0), WithinRel(dry, 1e-14));
-    CHECK_THAT(BridgeForce(Model::constant, theta).force(1.0, 0.0, v, 1.0), WithinRel(dry, 1e-14));
+    CHECK_THAT(BridgeForce(Model::willett, theta).force(1.0, 1.0, 0.0, v, 1.0), WithinRel(dry, 1e-14));
+    CHECK_THAT(BridgeForce(Model::constant, theta).force(1.0, 1.0, 0.0, v, 1.0), WithinRel(dry, 1e-14));
     const double alpha = std::pow(2.0 * v / pi, 0.25);
-    CHECK_THAT(BridgeForce(Model::rabinovich, theta).force(1.0, 0.0, v, 1.0), WithinRel(dry + 2.0 * pi * std::sin(alpha) * std::sin(alpha + theta), 1e-13));
+    CHECK_THAT(BridgeForce(Model::rabinovich, theta).force(1.0, 1.0, 0.0, v, 1.0), WithinRel(dry + 2.0 * pi * std::sin(alpha) * std::sin(alpha + theta), 1e-13));
   }
 }
 
@@ -84,7 +84,7 @@ TEST_CASE("Rabinovich's formula in its published form", "[capillary]") {
   for (const double s : {1e-4, 1e-2, 0.1}) {
     const double q = -1.0 + std::sqrt(1.0 + 2.0 * v / (pi * s * s)), d = 0.5 * s * q, alpha = std::sqrt(s * q);
     const double published = 2.0 * pi * (std::cos(theta) / (1.0 + s / (2.0 * d)) + std::sin(alpha) * std::sin(alpha + theta));
-    CHECK_THAT(force.force(1.0, s, v, 1.0), WithinRel(published, 1e-11));
+    CHECK_THAT(force.force(1.0, 1.0, s, v, 1.0), WithinRel(published, 1e-11));
   }
 }
 
@@ -94,10 +94,10 @@ TEST_CASE("the regressions stay near the exact force", "[capillary]") {
     const BridgeForce exact(Model::exact, theta), willett(Model::willett_full, theta), bagheri(Model::bagheri, theta);
     for (const double v : {1e-4, 1e-3, 1e-2, 5e-2})
       for (const double x : {0.0, 0.05, 0.2, 0.4, 0.6, 0.8}) {
-        const double s = x * exact.rupture_distance(1.0, v), f = exact.force(1.0, s, v, 1.0);
+        const double s = x * exact.rupture_distance(1.0, 1.0, v), f = exact.force(1.0, 1.0, s, v, 1.0);
         CAPTURE(theta, v, x);
-        CHECK(std::fabs(willett.force(1.0, s, v, 1.0) / f - 1.0) < 0.035);
-        CHECK(std::fabs(bagheri.force(1.0, s, v, 1.0) / f - 1.0) < 0.12);
+        CHECK(std::fabs(willett.force(1.0, 1.0, s, v, 1.0) / f - 1.0) < 0.035);
+        CHECK(std::fabs(bagheri.force(1.0, 1.0, s, v, 1.0) / f - 1.0) < 0.12);
       }
   }
 }
@@ -106,17 +106,17 @@ TEST_CASE("rupture distances of the closed forms", "[capillary]") {
   const double r = 2e-3, volume = 1e-11, theta = 0.6;
   const double lian = (1.0 + 0.5 * theta) * std::cbrt(volume);
   const double c = std::cbrt(volume) / r, willett = r * (1.0 + 0.5 * theta) * (c + 0.1 * c * c);
-  for (const Model m : {Model::rabinovich, Model::constant}) CHECK_THAT(BridgeForce(m, theta).rupture_distance(r, volume), WithinRel(lian, 1e-13));
+  for (const Model m : {Model::rabinovich, Model::constant}) CHECK_THAT(BridgeForce(m, theta).rupture_distance(r, r, volume), WithinRel(lian, 1e-13));
   for (const Model m : {Model::willett, Model::willett_full, Model::bagheri})
-    CHECK_THAT(BridgeForce(m, theta).rupture_distance(r, volume), WithinRel(willett, 1e-13));
+    CHECK_THAT(BridgeForce(m, theta).rupture_distance(r, r, volume), WithinRel(willett, 1e-13));
 }
 
 TEST_CASE("forces scale with size and surface tension", "[capillary]") {
   for (const Model m : models) {
     const BridgeForce force(m, 0.3);
-    const double one = force.force(1.0, 0.03, 1e-3, 1.0);
-    CHECK_THAT(force.force(2.5e-4, 0.03 * 2.5e-4, 1e-3 * std::pow(2.5e-4, 3), 0.072), WithinRel(one * 2.5e-4 * 0.072, 1e-11));
-    CHECK_THAT(force.rupture_distance(2.5e-4, 1e-3 * std::pow(2.5e-4, 3)), WithinRel(2.5e-4 * force.rupture_distance(1.0, 1e-3), 1e-12));
+    const double one = force.force(1.0, 1.0, 0.03, 1e-3, 1.0);
+    CHECK_THAT(force.force(2.5e-4, 2.5e-4, 0.03 * 2.5e-4, 1e-3 * std::pow(2.5e-4, 3), 0.072), WithinRel(one * 2.5e-4 * 0.072, 1e-11));
+    CHECK_THAT(force.rupture_distance(2.5e-4, 2.5e-4, 1e-3 * std::pow(2.5e-4, 3)), WithinRel(2.5e-4 * force.rupture_distance(1.0, 1.0, 1e-3), 1e-12));
   }
 }
 
@@ -126,14 +126,14 @@ TEST_CASE("forces are continuous from touching to rupture, finite there and zero
       const BridgeForce force(m, theta);
       for (const double v : {1e-6, 1e-4, 3e-2}) {
         CAPTURE(model_names()[static_cast<int>(m)], theta, v);
-        const double touching = force.force(1.0, 0.0, v, 1.0), reach = force.rupture_distance(1.0, v);
-        CHECK(force.force(1.0, -0.2, v, 1.0) == touching);
-        CHECK_THAT(force.force(1.0, 1e-9 * std::sqrt(v), v, 1.0), WithinRel(touching, 1e-6));
+        const double touching = force.force(1.0, 1.0, 0.0, v, 1.0), reach = force.rupture_distance(1.0, 1.0, v);
+        CHECK(force.force(1.0, 1.0, -0.2, v, 1.0) == touching);
+        CHECK_THAT(force.force(1.0, 1.0, 1e-9 * std::sqrt(v), v, 1.0), WithinRel(touching, 1e-6));
         // A jump is as large in a hundred times finer steps; a steep slope, or the power-law onset of the regression, is not.
         CHECK(largest_step(force, v, 50000) <= 0.5 * largest_step(force, v, 500));
-        CHECK(force.force(1.0, reach, v, 1.0) > 0.0);
-        CHECK_THAT(force.force(1.0, reach * (1.0 - 1e-13), v, 1.0), WithinRel(force.force(1.0, reach, v, 1.0), 1e-5));
-        CHECK(force.force(1.0, reach * (1.0 + 1e-9), v, 1.0) == 0.0);
+        CHECK(force.force(1.0, 1.0, reach, v, 1.0) > 0.0);
+        CHECK_THAT(force.force(1.0, 1.0, reach * (1.0 - 1e-13), v, 1.0), WithinRel(force.force(1.0, 1.0, reach, v, 1.0), 1e-5));
+        CHECK(force.force(1.0, 1.0, reach * (1.0 + 1e-9), v, 1.0) == 0.0);
       }
     }
 }
@@ -144,11 +144,11 @@ TEST_CASE("the pull of a wetting bridge falls all the way", "[capillary]") {
       const BridgeForce force(m, theta);
       for (const double v : {1e-6, 1e-5, 1e-3, 2e-2}) {
         CAPTURE(model_names()[static_cast<int>(m)], theta, v);
-        double before = force.force(1.0, 0.0, v, 1.0);
+        double before = force.force(1.0, 1.0, 0.0, v, 1.0);
         bool falls = true;
-        const double reach = force.rupture_distance(1.0, v);
+        const double reach = force.rupture_distance(1.0, 1.0, v);
         for (int i = 1; i < 2000; ++i) {
-          const double f = force.force(1.0, reach * i / 2000.0, v, 1.0);
+          const double f = force.force(1.0, 1.0, reach * i / 2000.0, v, 1.0);
           falls = falls && f <= before;
           before = f;
         }
@@ -161,9 +161,9 @@ TEST_CASE("no liquid, no force", "[capillary]") {
   for (const Model m : models) {
     const BridgeForce force(m, 0.2);
     for (const double volume : {0.0, -0.0, -1e-12, std::numeric_limits<double>::quiet_NaN()}) {
-      CHECK(force.force(1e-3, 0.0, volume, 0.07) == 0.0);
-      CHECK(force.force(1e-3, 1e-5, volume, 0.07) == 0.0);
-      CHECK(force.rupture_distance(1e-3, volume) == 0.0);
+      CHECK(force.force(1e-3, 1e-3, 0.0, volume, 0.07) == 0.0);
+      CHECK(force.force(1e-3, 1e-3, 1e-5, volume, 0.07) == 0.0);
+      CHECK(force.rupture_distance(1e-3, 1e-3, volume) == 0.0);
     }
   }
 }
@@ -176,10 +176,10 @@ TEST_CASE("any numbers give finite forces", "[capillary]") {
       bool finite = true;
       for (const double radius : {1e-9, 1e-3, 1.0})
         for (const double v : {1e-300, 1e-30, 1e-12, 9.3e-10, 9.4e-10, 1e-9, 1e-6, 0.03, 0.1, 0.5, 0.9999999999999999, 1.0, 2.0, 1e3, 1e29, 1e200}) {
-          const double volume = v * radius * radius * radius, reach = force.rupture_distance(radius, volume);
+          const double volume = v * radius * radius * radius, reach = force.rupture_distance(radius, radius, volume);
           finite = finite && std::isfinite(reach) && reach >= 0.0;
           for (const double gap : {-infinity, -1.0, -1e-300, 0.0, 1e-320, 1e-300, 1e-12 * radius, 0.5 * reach, reach * (1.0 - 1e-16), reach, 2.0 * reach, radius, infinity}) {
-            const double f = force.force(radius, gap, volume, 0.07);
+            const double f = force.force(radius, radius, gap, volume, 0.07);
             const bool good = std::isfinite(f) && std::fabs(f) < 20.0 * radius * 0.07;
             if (!good) UNSCOPED_INFO(model_names()[static_cast<int>(m)] << " theta " << theta << " V* " << v << " R " << radius << " gap " << gap << ": " << f);
             finite = finite && good;
@@ -192,7 +192,7 @@ TEST_CASE("any numbers give finite forces", "[capillary]") {
 TEST_CASE("copies share the law", "[capillary]") {
   const BridgeForce first(Model::exact, 0.25);
   const BridgeForce second = first;
-  CHECK(first.force(1e-3, 1e-5, 1e-12, 0.07) == second.force(1e-3, 1e-5, 1e-12, 0.07));
+  CHECK(first.force(1e-3, 1e-3, 1e-5, 1e-12, 0.07) == second.force(1e-3, 1e-3, 1e-5, 1e-12, 0.07));
   CHECK(second.model() == Model::exact);
   CHECK(second.contact_angle() == 0.25);
 }

@@ -26,11 +26,16 @@ def check_model(model: str) -> None:
 
 def bridge_radius(radius_i: ArrayLike, radius_j: ArrayLike) -> NDArray[np.float64]:
     """R = 2 R* = 2 Ri Rj / (Ri + Rj), 2 Ri against a wall (Rj = inf)."""
+    a, b = _radii(radius_i, radius_j)
+    return 2.0 / (1.0 / a + 1.0 / b)
+
+
+def _radii(radius_i: ArrayLike, radius_j: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     a = numbers("radius_i", radius_i, "m", low=0.0, low_open=True, infinite=True)
     b = numbers("radius_j", radius_j, "m", low=0.0, low_open=True, infinite=True)
     if (np.isinf(a) & np.isinf(b)).any():
         raise ValueError("radius_i and radius_j must not both be infinite: two walls hold no pendular bridge")
-    return 2.0 / (1.0 / a + 1.0 / b)
+    return a, b
 
 
 def _by_angle(contact_angle: NDArray[np.float64], model: str, call, *arrays: NDArray[np.float64]) -> NDArray[np.float64] | float:
@@ -56,9 +61,10 @@ def capillary_force(radius_i: ArrayLike, radius_j: ArrayLike, gap: ArrayLike, vo
     volume : m^3 of liquid in the bridge, >= 0
     surface_tension : N/m, >= 0
     contact_angle : rad, 0 to pi/2, mean of the two surfaces
-    model : 'exact' (stable axisymmetric solution of Young and Laplace for equal spheres of radius R = 2 R*, within 1 % for
-        V/R^3 = 1e-6...0.1, angles up to 60 degrees), 'willett', 'willett_full' (Willett et al., Langmuir 16 (2000) 9396),
-        'rabinovich' (Langmuir 21 (2005) 10992), 'bagheri' (2024), 'constant'
+    model : 'exact' (stable axisymmetric solution of Young and Laplace for the two radii; for V/R^3 = 1e-6...0.1 and angles up to 60
+        degrees within 0.1 % up to 0.9 of the rupture distance), 'willett', 'willett_full' (Willett et al., Langmuir 16 (2000) 9396),
+        'rabinovich' (Langmuir 21 (2005) 10992), 'bagheri' (2024), 'constant'; R = 2 R* = 2 Ri Rj / (Ri + Rj), all that the closed
+        forms know of the radii
 
     Zero beyond the rupture distance (see `rupture_distance`). Raises ValueError or TypeError for arguments out of range.
 
@@ -68,7 +74,7 @@ def capillary_force(radius_i: ArrayLike, radius_j: ArrayLike, gap: ArrayLike, vo
     """
     check_model(model)
     angle = numbers("contact_angle", contact_angle, "rad", low=0.0, high=np.pi / 2)
-    return _by_angle(angle, model, _physics.BridgeForce.force, bridge_radius(radius_i, radius_j), numbers("gap", gap, "m", infinite=True),
+    return _by_angle(angle, model, _physics.BridgeForce.force, *_radii(radius_i, radius_j), numbers("gap", gap, "m", infinite=True),
                      numbers("volume", volume, "m^3", low=0.0), numbers("surface_tension", surface_tension, "N/m", low=0.0))
 
 
@@ -76,10 +82,10 @@ def rupture_distance(volume: ArrayLike, contact_angle: ArrayLike, radius_i: Arra
                      model: str = "exact") -> NDArray[np.float64] | float:
     """Gap (m) at which a stretched bridge breaks; arguments as in `capillary_force`.
 
-    'exact': where the stable and the unstable branch of the Young-Laplace bridge meet. 'rabinovich' and 'constant':
+    'exact': where the Young-Laplace bridge ceases to be stable. 'rabinovich' and 'constant':
     (1 + theta/2) V^(1/3) (Lian, Thornton & Adams, J. Colloid Interface Sci. 161 (1993) 138). Others: Willett et al. (2000).
     """
     check_model(model)
     angle = numbers("contact_angle", contact_angle, "rad", low=0.0, high=np.pi / 2)
-    return _by_angle(angle, model, _physics.BridgeForce.rupture_distance, bridge_radius(radius_i, radius_j),
+    return _by_angle(angle, model, _physics.BridgeForce.rupture_distance, *_radii(radius_i, radius_j),
                      numbers("volume", volume, "m^3", low=0.0))

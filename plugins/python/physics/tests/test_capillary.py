@@ -97,7 +97,11 @@ def test_scaling_and_symmetry(model, angle, log_volume, part, ratio, scale):
 def test_wall_is_the_limit_of_a_large_sphere(model):
     gap = np.linspace(0.0, 1e-4, 20)
     wall = capillary_force(R, np.inf, gap, 1e-12, GAMMA, 0.35, model=model)
-    np.testing.assert_allclose(wall, capillary_force(2 * R, 2 * R, gap, 1e-12, GAMMA, 0.35, model=model), rtol=1e-12)
+    # The closed forms know R = 2 R* alone; the exact bridge is flatter on the wall and ends earlier.
+    if model != "exact":
+        np.testing.assert_allclose(wall, capillary_force(2 * R, 2 * R, gap, 1e-12, GAMMA, 0.35, model=model), rtol=1e-12)
+    else:
+        assert rupture_distance(1e-12, 0.35, R, np.inf) < 0.99 * rupture_distance(1e-12, 0.35, 2 * R, 2 * R)
     np.testing.assert_allclose(wall, capillary_force(R, 1e6 * R, gap, 1e-12, GAMMA, 0.35, model=model), rtol=1e-4)
     np.testing.assert_array_equal(wall, capillary_force(np.inf, R, gap, 1e-12, GAMMA, 0.35, model=model))
 

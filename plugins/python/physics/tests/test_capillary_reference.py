@@ -76,10 +76,46 @@ def test_engines_force_law_against_the_reference(volume, degrees):
     assert last / (tension * radius) == pytest.approx(end.force, rel=1e-2)
 
 
-def test_wall_and_unequal_spheres_use_twice_the_reduced_radius():
-    volume, gap, angle = 1e-12, 3e-5, 0.2
-    radius = 2.0 * 1e-3 * 3e-3 / 4e-3
-    expected = bridge(volume / radius**3, gap / radius, angle).force * 0.07 * radius
-    assert capillary_force(1e-3, 3e-3, gap, volume, 0.07, angle) == pytest.approx(expected, rel=1e-3)
-    expected = bridge(volume / 2e-3**3, gap / 2e-3, angle).force * 0.07 * 2e-3
-    assert capillary_force(1e-3, np.inf, gap, volume, 0.07, angle) == pytest.approx(expected, rel=1e-3)
+@pytest.mark.parametrize(("ratio", "volume", "degrees"), [(0.7, 0.02, 35.0), (0.05, 3e-5, 10.0), (0.0, 0.1, 60.0)])
+def test_engines_force_law_against_the_reference_for_unequal_spheres(ratio, volume, degrees):
+    """0.1 % up to 0.9 of the rupture distance, 1 % up to 0.99, 0.2 % for the distance itself, in SI and from both sides."""
+    angle, radius, tension = np.radians(degrees), 1.7e-3, 0.0728
+    small = 0.5 * (1.0 + ratio) * radius
+    large = small / ratio if ratio else np.inf
+    end = rupture_gap(volume, angle, ratio)
+    assert rupture_distance(volume * radius**3, angle, small, large) == pytest.approx(end * radius, rel=2e-3)
+    assert rupture_distance(volume * radius**3, angle, large, small) == rupture_distance(volume * radius**3, angle, small, large)
+    for part, bound in ((0.0, 1e-3), (0.1, 1e-3), (0.5, 1e-3), (0.9, 1e-3), (0.99, 1e-2)):
+        expected = bridge(volume, part * end, angle, ratio).force * tension * radius
+        assert capillary_force(small, large, part * end * radius, volume * radius**3, tension, angle) == pytest.approx(expected, rel=bound)
+
+
+def test_small_bridge_to_a_wall():
+    """4 pi R1 gamma cos(theta) in the limit (Orr, Scriven & Rivas 1975); R = 2 R1 here."""
+    limit = 2.0 * np.pi * np.cos(0.5)
+    coarse, fine = (limit - bridge(v, 0.0, 0.5, ratio=0.0).force for v in (1.6e-6, 1e-7))
+    assert 0.0 < coarse < 0.1 * limit
+    assert coarse / fine == pytest.approx(2.0, rel=0.05)
+
+
+def test_force_between_unequal_spheres_is_the_derivative_of_the_surface_energy():
+    """Also with two contact angles."""
+    volume, gap, step, angles = 1e-2, 0.08, 5e-5, (0.3, 0.9)
+    energies = [bridge(volume, gap + k * step, angles, 0.3).energy for k in (-2, -1, 1, 2)]
+    slope = (energies[0] - 8.0 * energies[1] + 8.0 * energies[2] - energies[3]) / (12.0 * step)
+    assert bridge(volume, gap, angles, 0.3).force == pytest.approx(slope, rel=1e-4)
+
+
+def test_equal_spheres_lose_stability_to_asymmetric_bridges():
+    """At 50 degrees almost equal spheres break nearly where equal ones do; the symmetric branch alone goes 6 % farther."""
+    angle, volume = np.radians(50.0), 1e-3
+    equal, other = rupture_gap(volume, angle), rupture_gap(volume, angle, ratio=0.99)
+    assert 0.985 * equal < other < equal
+    assert rupture_distance(volume, angle, 1.0, 1.0) == pytest.approx(equal, rel=1e-5)
+    assert bridge(volume, 0.5 * equal, angle).force == pytest.approx(bridge(volume, 0.5 * equal, angle, ratio=0.99).force, rel=1e-5)
+
+
+@pytest.mark.parametrize(("arguments", "message"), [((1e-3, 0.0, 0.1, 1.1), "ratio"), ((1e-3, 0.0, (0.1, 1.5)), "contact_angle")])
+def test_ranges_of_unequal_spheres(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        bridge(*arguments)
