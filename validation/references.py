@@ -63,6 +63,24 @@ DEBNATH = Reference(
     "width and the shear zones' thickness as the width.",
 )
 
+CHUNG = Reference(
+    "Chung & Ooi 2011",
+    "Y. C. Chung, J. Y. Ooi, Benchmark tests for verifying discrete element modelling codes at particle impact level, Granular Matter 13 "
+    "(2011) 643-656.",
+    "not the paper; its set-ups and materials in the public implementations of YADE (examples/Benchmarks_Chung_and_Ooi, tests 1-4), "
+    "Kratos Multiphysics (DEM benchmarks, tests 1-8) and PySPH (DEM examples, tests 4, 5, 7, 8)",
+    "eight impacts of one sphere on a plane or another sphere verify a code at the level of one contact. Its curves from experiments and "
+    "finite elements could not be read and are left out.",
+)
+
+LYASHENKO = Reference(
+    "Lyashenko & Popov 2015",
+    "I. A. Lyashenko, V. L. Popov, Impact of an elastic sphere with an elastic half space revisited: numerical analysis based on the "
+    "method of dimensionality reduction, Sci. Rep. 5 (2015) 8479.",
+    "abstract",
+    "the oblique impact of an elastic sphere is solved by the method of dimensionality reduction.",
+)
+
 KOLESNIKOV = Reference(
     "Kolesnikov 2013",
     "G. N. Kolesnikov, Decomposition algorithm of linear complementarity problem and its application for simulation of pulpwood "

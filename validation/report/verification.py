@@ -17,7 +17,8 @@ from matplotlib.figure import Figure
 _PAINTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 _MARKS = ("o", "s", "D", "^")
 # Quantities of the cases that test an instrument, not the physics.
-_FROM_RUNS = ("wall_force_deviation", "field_momentum_residual", "field_balance_deviation", "eulerian_lagrangian_difference")
+_FROM_RUNS = ("wall_force_deviation", "field_momentum_residual", "field_balance_deviation", "eulerian_lagrangian_difference",
+              "scheme_deviation")
 
 
 @dataclass(frozen=True)
