@@ -11,6 +11,7 @@
 
 #include "capillary/bridge.hpp"
 #include "finnie_rabinowicz.hpp"
+#include "kinematics.hpp"
 #include "normal_force.hpp"
 #include "vec3.hpp"
 
@@ -91,19 +92,17 @@ inline ContactForce contact_step(const ContactParameters& p, const ContactBodies
   }
 
   if (touching) {
-    const Vec3<double> relative = b.velocity_1 - b.velocity_2;
-    const double normal_velocity = dot(relative, out.normal);
     const double arm_1 = b.radius_1 - 0.5 * out.overlap;
     const double arm_2 = wall ? 0.0 : b.radius_2 - 0.5 * out.overlap;
-    const Vec3<double> spin = arm_1 * b.angular_velocity_1 + arm_2 * b.angular_velocity_2;
-    const Vec3<double> tangential_velocity = relative - normal_velocity * out.normal - cross(spin, out.normal);
+    const ContactMotion<double> motion =
+        contact_motion(out.normal, b.velocity_1 - b.velocity_2, arm_1 * b.angular_velocity_1 + arm_2 * b.angular_velocity_2);
 
     const double effective_radius = reduced(b.radius_1, b.radius_2), effective_mass = reduced(b.mass_1, b.mass_2);
     NormalResponse<double> response =
         p.normal_law == NormalLaw::hertz
-            ? hertz(p.elasticity, effective_radius, effective_mass, out.overlap, normal_velocity)
+            ? hertz(p.elasticity, effective_radius, effective_mass, out.overlap, motion.normal)
             : hooke(HookeParameters(p.elasticity, p.characteristic_velocity),
-                    effective_radius, effective_mass, out.overlap, normal_velocity);
+                    effective_radius, effective_mass, out.overlap, motion.normal);
     if (p.limit_force && response.force < 0.0) response.force = 0.0;
     out.normal_force = response.force;
 
@@ -112,7 +111,7 @@ inline ContactForce contact_step(const ContactParameters& p, const ContactBodies
     state.friction.displacement = rotate_to_plane(state.friction.displacement, out.normal, twist);
     out.tangential = friction_step(p.friction, response.force, response.tangential_stiffness,
                                    p.tangential_damping ? response.tangential_damping : 0.0, response.contact_area,
-                                   tangential_velocity, step, state.friction);
+                                   motion.tangential, step, state.friction);
     const Vec3<double> moment = cross(out.normal, out.tangential);
     out.torque_1 = -arm_1 * moment;
     out.torque_2 = -arm_2 * moment;
