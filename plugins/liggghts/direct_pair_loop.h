@@ -1,15 +1,15 @@
 // The pair loop of liggghts-dembark's most used combinations: Hertz, Finnie-Rabinowicz, with or without capillary bridges.
 //
 // The engine's loop hands every number from model to model through memory and decides pair by pair whether there is a contact. Here
-// the contacts of a grain are picked first and computed one after the other in registers: the same laws and the same numbers to
-// round-off, in less time than the stock friction law takes. Whatever else the engine may ask of a pair style (energies, virial,
-// stored forces, rigid bodies, ...) is left to its own loop, step by step.
+// the contacts of many grains are picked first and computed in packs (pair_packs.h): the same laws and the same numbers to round-off, in
+// less time than the stock friction law takes. Whatever else the engine may ask of a pair style (energies, virial, stored forces, rigid
+// bodies, ...) is left to its own loop, step by step.
 #ifndef DEMBARK_DIRECT_PAIR_LOOP_H
 #define DEMBARK_DIRECT_PAIR_LOOP_H
 
-#include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <memory>
 #include <vector>
 
 #include "atom.h"
@@ -23,6 +23,7 @@
 
 #include "dembark/normal_force.hpp"
 #include "dembark/vec3.hpp"
+#include "pair_packs.h"
 
 namespace dembark_liggghts {
 
@@ -74,16 +75,14 @@ class DirectPairLoop : public StockLoop<Cohesion> {
   static constexpr int own_flags = LIGGGHTS::ContactModels::CONTACT_NORMAL_MODEL | LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL |
                                    LIGGGHTS::ContactModels::CONTACT_TANGENTIAL_MODEL;
 
-  struct Near {
-    Vec3 delta;
-    double distance_squared;
-    int slot, j;
-  };
-
   LAMMPS_NS::LAMMPS* lmp_;
   double **youngs_modulus_ = nullptr, **shear_modulus_ = nullptr, **damping_factor_ = nullptr;  // effective ones, by types
+  double dt_ = 0.0;  // of this step
+  bool update_history_ = false;
   bool plain_settings_ = true, limit_force_ = false, tangential_damping_ = true;
-  std::vector<Near> near_;
+  PairPacks* const packs_ = choose_pair_packs();
+  const std::unique_ptr<PairBlock> block_ = std::make_unique<PairBlock>();
+  std::vector<PairLaw> laws_;  // of this step
 
   bool plain_step(LAMMPS_NS::PairGran* pair, int eflag, int vflag, int addflag) const {
     const LAMMPS_NS::Atom* atom = lmp_->atom;
@@ -92,11 +91,52 @@ class DirectPairLoop : public StockLoop<Cohesion> {
            lmp_->force->nktv2p == 1.0 && atom->sphere_flag && !atom->shapetype_flag && lmp_->modify->n_fixes_style("insert/stream/predefined") == 0;
   }
 
-  static Vec3 row(double* const* array, int i) { return {array[i][0], array[i][1], array[i][2]}; }
-  static void add(double* to, double scale, const Vec3& what) {
-    to[0] += scale * what.x;
-    to[1] += scale * what.y;
-    to[2] += scale * what.z;
+  static Vec3 vector(const double* v) { return {v[0], v[1], v[2]}; }
+
+  DirectModel<Cohesion>& models() { return this->*open(ModelsOfLoop<Cohesion>()); }
+  auto& friction() { return models().*open(TangentialOfModels<Cohesion>()); }
+  auto& cohesion() { return models().*open(CohesionOfModels<Cohesion>()); }
+
+  // False when a law has to be left to its scalar form.
+  bool collect_laws(double dt) {
+    const int types = lmp_->atom->ntypes + 1;
+    bool linear = true;
+    laws_.assign(types * types, {});
+    for (int i = 1; i < types; ++i)
+      for (int j = 1; j < types; ++j) {
+        const dembark::FinnieRabinowicz& law = friction().law(i, j);
+        laws_[i * types + j] = {youngs_modulus_[i][j], shear_modulus_[i][j], damping_factor_[i][j], law.static_friction, law.kinetic_friction,
+                                law.interface_shear_strength, dembark::kept_slip(law, dt), 0.0};
+        linear = linear && law.presliding == dembark::Presliding::linear;
+      }
+    return linear;
+  }
+
+  static void scalar_friction(void* caller, const PairBlock& block, int k, const FrictionInput& in, double* force) {
+    DirectPairLoop& loop = *static_cast<DirectPairLoop*>(caller);
+    const int* const type = loop.lmp_->atom->type;
+    // What is no number never sticks in a pack: pairs without a normal end up here.
+    if (!(in.normal[0] == in.normal[0])) loop.friction().refuse_coincidence(block.grain[k], block.partner[k]);
+    const Vec3 t = loop.friction().step(block.history[k], type[block.grain[k]], type[block.partner[k]], vector(in.normal), vector(in.spin),
+                                        vector(in.velocity), in.normal_force, in.stiffness, in.damping, in.radius_overlap, loop.dt_, loop.update_history_);
+    force[0] = t.x;
+    force[1] = t.y;
+    force[2] = t.z;
+  }
+
+  static void bridges(void* caller, const PairBlock& block, int first, int count, const double* gap, double* pull) {
+    DirectPairLoop& loop = *static_cast<DirectPairLoop*>(caller);
+    const LAMMPS_NS::Atom* const atom = loop.lmp_->atom;
+    const auto& cohesion = loop.cohesion();
+    for (int n = 0; n < count; ++n) {
+      const int k = first + n, i = block.grain[k], j = block.partner[k], type_i = atom->type[i], type_j = atom->type[j];
+      const double radius_i = atom->radius[i], radius_j = atom->radius[j];
+      if (block.pick[k] & 1)
+        pull[n] = cohesion.touching_force(block.history[k], type_i, type_j, radius_i, radius_j, radius_i + radius_j, loop.update_history_);
+      else if (cohesion.gap_force(block.history[k], type_i, type_j, radius_i, radius_j, gap[n], pull[n]))
+        *block.flags[k] |= LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL;
+      else pull[n] = 0.0;
+    }
   }
 
  public:
@@ -126,112 +166,47 @@ class DirectPairLoop : public StockLoop<Cohesion> {
       return;
     }
     pair->evflag = pair->vflag_fdotr = 0;
-    DirectModel<Cohesion>& models = this->*open(ModelsOfLoop<Cohesion>());
-    auto& friction = models.*open(TangentialOfModels<Cohesion>());
-    auto& cohesion = models.*open(CohesionOfModels<Cohesion>());
-
+    const LAMMPS_NS::NeighList* const list = pair->list;
+    if (list->inum == 0) return;
     const LAMMPS_NS::Atom* const atom = lmp_->atom;
-    double** const x = atom->x;
-    double** const v = atom->v;
-    double** const omega = atom->omega;
-    double** const f = atom->f;
-    double** const torque = atom->torque;
-    const double* const radius = atom->radius;
-    const double* const mass = atom->rmass;
-    const int* const type = atom->type;
-    const int* const mask = atom->mask;
-    const int frozen = pair->freeze_group_bit();
-    const int owned = lmp_->force->newton_pair ? atom->nlocal + atom->nghost : atom->nlocal;
-    const bool update_history = pair->shearupdate();
-    const double dt = update_history ? lmp_->update->dt : 0.0;
-    const double reach_squared = lmp_->neighbor->contactDistanceFactor * lmp_->neighbor->contactDistanceFactor;
-    const int stride = pair->dnum();
+    update_history_ = pair->shearupdate();
+    dt_ = update_history_ ? lmp_->update->dt : 0.0;
 
-    for (int ii = 0; ii < pair->list->inum; ++ii) {
-      const int i = pair->list->ilist[ii], count = pair->list->numneigh[i];
-      const int* const neighbors = pair->list->firstneigh[i];
-      int* const flags = pair->listgranhistory->firstneigh[i];
-      double* const histories = pair->listgranhistory->firstdouble[i];
-      const Vec3 position = row(x, i);
-      const double radius_i = radius[i];
-
-      // Which pairs touch cannot be foreseen: no branch on it. Pairs near enough to have to forget a contact, or to keep a bridge,
-      // come along when they have anything stored.
-      if (near_.size() <= static_cast<std::size_t>(count)) near_.resize(count + 64);
-      Near* const near = near_.data();
-      int found = 0;
-      for (int slot = 0; slot < count; ++slot) {
-        const int j = neighbors[slot] & NEIGHMASK;
-        const Vec3 delta = position - row(x, j);
-        const double squared = dot(delta, delta), touching = (radius_i + radius[j]) * (radius_i + radius[j]);
-        near[found] = {delta, squared, slot, j};
-        found += (squared < touching) | ((flags[slot] != 0) & (squared < reach_squared * touching));
-      }
-      if (found == 0) continue;
-
-      const Vec3 velocity_i = row(v, i), omega_i = row(omega, i);
-      const double mass_i = mass[i];
-      const int type_i = type[i];
-      Vec3 force_i{}, torque_i{};
-      for (const Near* pick = near; pick != near + found; ++pick) {
-        const int j = pick->j, type_j = type[j];
-        const double radius_j = radius[j], radius_sum = radius_i + radius_j;
-        double* const history = histories + static_cast<std::ptrdiff_t>(stride) * pick->slot;
-        int& flag = flags[pick->slot];
-        if (!(pick->distance_squared > 0.0)) friction.refuse_coincidence(i, j);
-        const double distance = std::sqrt(pick->distance_squared), reduced_radius = radius_i * radius_j / radius_sum;
-        const Vec3 normal = pick->delta * (1.0 / distance);
-
-        if (!(pick->distance_squared < radius_sum * radius_sum)) {
-          flag &= ~own_flags;
-          friction.forget(history);
-          if constexpr (wet) {
-            double pull;
-            if (!cohesion.gap_force(history, type_i, type_j, radius_i, radius_j, distance - radius_sum, pull)) continue;
-            flag |= LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL;
-            force_i -= pull * normal;
-            if (j < owned) add(f[j], pull * pair->relax(j), normal);
-          }
-          continue;
-        }
-        flag |= wet ? own_flags : own_flags & ~LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL;
-
-        const double mass_j = mass[j];
-        double reduced_mass = mass_i * mass_j / (mass_i + mass_j);
-        if (mask[i] & frozen) reduced_mass = mass_j;
-        if (mask[j] & frozen) reduced_mass = mass_i;
-
-        const double overlap = radius_sum - distance, arm_i = radius_i - 0.5 * overlap, arm_j = radius_j - 0.5 * overlap;
-        const Vec3 omega_j = row(omega, j), relative = velocity_i - row(v, j);
-        const double normal_velocity = dot(relative, normal);
-        const Vec3 tangential_velocity = relative - normal_velocity * normal - cross(arm_i * omega_i + arm_j * omega_j, normal);
-
-        dembark::HertzParameters elasticity;
-        elasticity.effective_youngs_modulus = youngs_modulus_[type_i][type_j];
-        elasticity.effective_shear_modulus = shear_modulus_[type_i][type_j];
-        elasticity.damping = damping_factor_[type_i][type_j];
-        dembark::NormalResponse<double> response = dembark::hertz(elasticity, reduced_radius, reduced_mass, overlap, normal_velocity);
-        if (limit_force_ && response.force < 0.0) response.force = 0.0;
-
-        const Vec3 tangential = friction.step(history, type_i, type_j, normal, omega_i + omega_j, tangential_velocity, response.force,
-                                              response.tangential_stiffness, tangential_damping_ ? response.tangential_damping : 0.0,
-                                              reduced_radius * overlap, dt, update_history);
-        double pull = 0.0;
-        if constexpr (wet) pull = cohesion.touching_force(history, type_i, type_j, radius_i, radius_j, radius_sum, update_history);
-
-        const Vec3 force = (response.force - pull) * normal + tangential, moment = cross(normal, tangential);
-        force_i += force;
-        torque_i -= arm_i * moment;
-        if (j < owned) {
-          const double share = pair->relax(j);
-          add(f[j], -share, force);
-          add(torque[j], -share * arm_j, moment);
-        }
-      }
-      const double share = pair->relax(i);
-      add(f[i], share, force_i);
-      add(torque[i], share, torque_i);
-    }
+    PairStep step;
+    step.x = atom->x[0];
+    step.v = atom->v[0];
+    step.omega = atom->omega[0];
+    step.radius = atom->radius;
+    step.mass = atom->rmass;
+    step.type = atom->type;
+    step.mask = atom->mask;
+    step.f = atom->f[0];
+    step.torque = atom->torque[0];
+    step.owned = lmp_->force->newton_pair ? atom->nlocal + atom->nghost : atom->nlocal;
+    step.count = list->inum;
+    step.stride = pair->dnum();
+    step.offset = friction().offset();
+    step.grains = list->ilist;
+    step.numneigh = list->numneigh;
+    step.neighbors = list->firstneigh;
+    step.flags = pair->listgranhistory->firstneigh;
+    step.histories = pair->listgranhistory->firstdouble;
+    step.own_flags = own_flags;
+    step.touching_flags = wet ? own_flags : own_flags & ~LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL;
+    // The scalar law knows what a step of no length is.
+    step.pack_friction = collect_laws(dt_) && dt_ > 0.0;
+    step.laws = laws_.data();
+    step.types = atom->ntypes + 1;
+    step.dt = dt_;
+    step.reach_squared = lmp_->neighbor->contactDistanceFactor * lmp_->neighbor->contactDistanceFactor;
+    step.limit_force = limit_force_;
+    step.tangential_damping = tangential_damping_;
+    step.frozen = pair->freeze_group_bit();
+    step.caller = this;
+    step.friction = &scalar_friction;
+    step.bridges = nullptr;
+    if constexpr (wet) step.bridges = &bridges;
+    packs_(step, *block_);
   }
 };
 

@@ -78,6 +78,11 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     neighbor->register_contact_dist_factor(1.01);
   }
 
+  const dembark::FinnieRabinowicz& law(int itype, int jtype) const { return laws_[itype * types_ + jtype]; }
+
+  /// Where the state begins in a contact's history: displacement (3), slip, dissipated energy.
+  int offset() const { return offset_; }
+
   /// Tangential force on the first body of a touching pair. `spin`: sum of both bodies' angular velocities; `radius_overlap`: R* delta;
   /// `dt` is 0 at the set-up of a run, where forces are those of the stored state: a step of zero length, which is not stored.
   DEMBARK_HOT dembark::Vec3<double> step(double* contact_history, int itype, int jtype, const dembark::Vec3<double>& normal, const dembark::Vec3<double>& spin,
@@ -91,8 +96,6 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     return force;
   }
 
-  /// The contact has ended.
-  void forget(double* contact_history) const { store(contact_history + offset_, {}); }
 
   /// The run ends when two centres lie on each other: there is no normal, and the engine's own models would give no number.
   DEMBARK_COLD void refuse_coincidence(int i, int j) const {
@@ -123,7 +126,7 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
 
   inline void surfacesClose(SurfacesCloseData& scdata, ForceData&, ForceData&) {
     if (scdata.contact_flags) *scdata.contact_flags &= ~CONTACT_TANGENTIAL_MODEL;
-    if (scdata.contact_history) forget(scdata.contact_history);
+    if (scdata.contact_history) store(scdata.contact_history + offset_, {});
   }
 
   inline void beginPass(SurfacesIntersectData&, ForceData&, ForceData&) {}

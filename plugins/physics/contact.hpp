@@ -12,6 +12,7 @@
 #include "capillary/bridge.hpp"
 #include "capillary/viscous.hpp"
 #include "finnie_rabinowicz.hpp"
+#include "kinematics.hpp"
 #include "normal_force.hpp"
 #include "vec3.hpp"
 
@@ -75,14 +76,10 @@ struct RelativeMotion {
 };
 
 inline RelativeMotion relative_motion(const ContactBodies& b, const Vec3<double>& normal, double overlap) {
-  RelativeMotion m;
-  const Vec3<double> relative = b.velocity_1 - b.velocity_2;
-  m.normal_velocity = dot(relative, normal);
-  m.arm_1 = b.radius_1 - 0.5 * overlap;
-  m.arm_2 = std::isinf(b.radius_2) ? 0.0 : b.radius_2 - 0.5 * overlap;
-  const Vec3<double> spin = m.arm_1 * b.angular_velocity_1 + m.arm_2 * b.angular_velocity_2;
-  m.tangential_velocity = relative - m.normal_velocity * normal - cross(spin, normal);
-  return m;
+  const double arm_1 = b.radius_1 - 0.5 * overlap, arm_2 = std::isinf(b.radius_2) ? 0.0 : b.radius_2 - 0.5 * overlap;
+  const ContactMotion<double> motion =
+      contact_motion(normal, b.velocity_1 - b.velocity_2, arm_1 * b.angular_velocity_1 + arm_2 * b.angular_velocity_2);
+  return {motion.normal, motion.tangential, arm_1, arm_2};
 }
 
 /// One step of one contact. `dt` in s. With `update` false (the set-up of a run) forces are those of the present state, which

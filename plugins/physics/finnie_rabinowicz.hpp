@@ -114,14 +114,14 @@ inline Real slip_to_limit(const FinnieRabinowicz& law, Real k_t, Real trial, Rea
   return ds > 0.0 ? ds : Real(0.0);
 }
 
-template <class Real>
-inline void heal(const FinnieRabinowicz& law, Real dt, FrictionState<Real>& state) {
-  using std::exp;
-  if (law.healing_time > 0.0) state.slip *= exp(-dt / law.healing_time);
-  else state.slip = Real(0.0);
-}
-
 }  // namespace detail
+
+/// The share of its slip that a contact keeps when it sticks for `dt` (s).
+template <class Real>
+inline Real kept_slip(const FinnieRabinowicz& law, Real dt) {
+  using std::exp;
+  return law.healing_time > 0.0 ? exp(-dt / law.healing_time) : Real(0.0);
+}
 
 /// Turn the elastic displacement with the contact plane: into the plane of the new normal, then about the normal by the mean spin
 /// of the two bodies (`twist` = omega_n dt, rad). Its length stays as it is, so a pair that rotates as a rigid body keeps its
@@ -134,16 +134,20 @@ DEMBARK_HOT Vec3<Real> rotate_to_plane(Vec3<Real> v, const Vec3<Real>& normal, R
   const Real out_of_plane = dot(v, normal);
   const Real lost = out_of_plane * out_of_plane;
   const Real t = 0.5 * twist, t2 = t * t;
-  const Real factor = t2 < 1e-6 ? 2.0 * (1.0 - t2 * (1.0 - t2)) : 2.0 / (1.0 + t2);
+  Real factor = 2.0 * (1.0 - t2 * (1.0 - t2));
+  const auto twisted = !(t2 < 1e-6);
+  if (any(twisted)) factor = select(twisted, 2.0 / (1.0 + t2), factor);
   const Vec3<Real> turned = (factor * t) * cross(normal, v);
   v -= out_of_plane * normal;
   Real length = 1.0;
   // What follows stands in the innermost loop of an engine: the small angles of one step need no square root, and below 1e-7 rad
   // no correction. A normal that jumps by more than 60 degrees is no rotation of one contact: the projection is all there is.
-  if (lost > 1e-14 * size) {
+  const auto tilted = lost > 1e-14 * size;
+  if (any(tilted)) {
     const Real q = lost / size;
-    if (q < 1e-5) length = 1.0 + q * (0.5 + q * (0.375 + q * 0.3125));
-    else if (q < 0.75) length = 1.0 / sqrt(1.0 - q);
+    length = select(tilted & (q < 1e-5), 1.0 + q * (0.5 + q * (0.375 + q * 0.3125)), length);
+    const auto far = tilted & !(q < 1e-5) & (q < 0.75);
+    if (any(far)) length = select(far, 1.0 / sqrt(1.0 - q), length);
   }
   return (length * (1.0 - factor * t2)) * v + length * turned;
 }
@@ -157,7 +161,7 @@ DEMBARK_COLD Vec3<Real> exponential_step(const FinnieRabinowicz& law, Real norma
   using std::exp;
   const Real path = norm(increment);
   const Vec3<Real> before = stiffness * state.displacement;
-  if (path > 0.0 && dot(before, increment) < 0.0) heal(law, dt, state);
+  if (path > 0.0 && dot(before, increment) < 0.0) state.slip *= kept_slip(law, dt);
   const Real limit = shear_limit(law, friction_coefficient(law, state.slip), normal_force, contact_area);
   if (!(limit > 0.0)) {
     state.displacement = {};
@@ -211,6 +215,30 @@ DEMBARK_COLD bool linear_slip(const FinnieRabinowicz& law, Real normal_force, Re
 
 }  // namespace detail
 
+/// Whether a linear spring, displaced already, sticks without a doubt. Most contacts of a dense bed do, far from their limit: they are
+/// told by a bound that needs neither root nor exponential, T_max >= mu_k N (1 - mu_k N / (2 tau_s A)). `Law`: FinnieRabinowicz, or the
+/// members used here as packs.
+template <class Law, class Real>
+DEMBARK_HOT auto plainly_sticks(const Law& law, Real normal_force, Real stiffness, Real contact_area, const FrictionState<Real>& state) {
+  const Real coulomb = select(state.slip > 0.0, Real(law.kinetic_friction), Real(law.static_friction)) * normal_force;
+  Real bound = coulomb;
+  const auto limited = law.interface_shear_strength < unlimited_strength;
+  if (any(limited)) {
+    const Real strength = law.interface_shear_strength * contact_area;
+    bound = select(limited, select(coulomb < strength, coulomb - 0.5 * coulomb * coulomb / strength, Real(0.0)), bound);
+  }
+  return (bound > 0.0) & (stiffness * stiffness * dot(state.displacement, state.displacement) < bound * bound * (1.0 - 1e-8));
+}
+
+/// The force (N) on body 1 of a linear spring, displaced already, while it sticks: it keeps the share `kept` of its slip, and what its
+/// dash-pot takes is booked.
+template <class Real>
+DEMBARK_HOT Vec3<Real> sticking_force(Real stiffness, Real damping, const Vec3<Real>& velocity, Real dt, Real kept, FrictionState<Real>& state) {
+  state.slip *= kept;
+  state.dissipated_energy += damping * dot(velocity, velocity) * dt;
+  return -(stiffness * state.displacement + damping * velocity);
+}
+
 /// One step of the law.
 ///
 /// normal_force  N, N (negative values count as 0)     stiffness  k_t, N/m, > 0      damping  gamma_t, N s/m (0 = none)
@@ -234,19 +262,10 @@ DEMBARK_HOT Vec3<Real> friction_step(const FinnieRabinowicz& law, Real normal_fo
   }
 
   state.displacement += increment;
-  // Most contacts of a dense bed stick, far from their limit: they are told by a bound that needs neither root nor exponential,
-  // T_max >= mu_k N (1 - mu_k N / (2 tau_s A)).
-  const Real coulomb = (state.slip > 0.0 ? law.kinetic_friction : law.static_friction) * normal_force;
-  Real bound = coulomb;
-  if (law.interface_shear_strength < unlimited_strength) {
-    const Real strength = law.interface_shear_strength * contact_area;
-    bound = coulomb < strength ? coulomb - 0.5 * coulomb * coulomb / strength : Real(0.0);
-  }
-  const bool sticks = bound > 0.0 && stiffness * stiffness * dot(state.displacement, state.displacement) < bound * bound * (1.0 - 1e-8);
-  if (!sticks && detail::linear_slip(law, normal_force, stiffness, contact_area, increment, state)) return -stiffness * state.displacement;
-  if (state.slip > 0.0) detail::heal(law, dt, state);
-  state.dissipated_energy += damping * dot(velocity, velocity) * dt;
-  return -(stiffness * state.displacement + damping * velocity);
+  if (!plainly_sticks(law, normal_force, stiffness, contact_area, state) &&
+      detail::linear_slip(law, normal_force, stiffness, contact_area, increment, state))
+    return -stiffness * state.displacement;
+  return sticking_force(stiffness, damping, velocity, dt, state.slip > 0.0 ? kept_slip(law, dt) : Real(0.0), state);
 }
 
 }  // namespace dembark

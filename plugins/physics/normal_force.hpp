@@ -82,13 +82,14 @@ struct HookeParameters {
       : effective_youngs_modulus(same.effective_youngs_modulus), damping(same.damping), characteristic_velocity(velocity) {}
 };
 
-template <class Real>
-DEMBARK_HOT NormalResponse<Real> hertz(const HertzParameters& p, Real effective_radius, Real effective_mass, Real overlap, Real normal_velocity) {
+/// `Parameters`: HertzParameters, or the same three members as packs.
+template <class Parameters, class Real>
+DEMBARK_HOT NormalResponse<Real> hertz(const Parameters& p, Real effective_radius, Real effective_mass, Real overlap, Real normal_velocity) {
   using std::sqrt;
   const Real root = sqrt(effective_radius * overlap);
   const Real stiffness = 2.0 * p.effective_youngs_modulus * root;
   const Real k_t = 8.0 * p.effective_shear_modulus * root;
-  const double damping = -2.0 * sqrt_five_sixths * p.damping;
+  const auto damping = -2.0 * sqrt_five_sixths * p.damping;
   return {4.0 / 3.0 * p.effective_youngs_modulus * root * overlap - damping * sqrt(stiffness * effective_mass) * normal_velocity,
           k_t, damping * sqrt(k_t * effective_mass), pi * effective_radius * overlap};
 }

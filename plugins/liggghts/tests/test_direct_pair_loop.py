@@ -1,4 +1,5 @@
-"""Our pair loop against the engine's, which the same laws run in when a rolling model (here one without resistance) stands beside them."""
+"""Our pair loop against the engine's, which the same laws run in when a rolling model (here one without resistance) stands beside them,
+and with vectors of every width."""
 
 import numpy as np
 import pytest
@@ -31,3 +32,13 @@ def test_same_motion_as_in_the_engines_loop(tmp_path, cohesion, settings):
 def test_same_motion_on_two_ranks(tmp_path):
     words = {"cohesion": "cohesion capillary", "rolling": "", "settings": ""}
     assert deviation(frames(tmp_path / "two", ranks=2, **words), frames(tmp_path / "one", **words)) < 1e-10
+
+
+@pytest.mark.parametrize("cohesion", ["", "cohesion capillary"])
+def test_same_bits_with_narrower_vectors(tmp_path, monkeypatch, cohesion):
+    # A processor without the wider ones repeats the narrower ones.
+    runs = []
+    for lanes in (2, 4, 8):
+        monkeypatch.setenv("DEMBARK_LANES", str(lanes))
+        runs.append(frames(tmp_path / str(lanes), cohesion=cohesion, rolling="", settings=""))
+    assert np.array_equal(runs[0], runs[1]) and np.array_equal(runs[1], runs[2])

@@ -1,0 +1,123 @@
+// Packs of N doubles that a processor works on at once, as a scalar type for the laws: a law written with select(), any() and the usual
+// operators serves one contact (double, bool) and N contacts (Pack<N>, Mask<N>) with the same text. Every operation is that of IEEE 754
+// in each lane, so that a lane gets the bits that the scalar law gives.
+//
+// N is 2, 4 or 8. The vector extensions of GCC and Clang do the rest; where the processor has narrower vectors the compiler splits.
+#pragma once
+
+#include <cmath>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+#include "vec3.hpp"  // DEMBARK_HOT
+
+namespace dembark {
+
+namespace detail {
+
+template <int N>
+struct Vectors;
+template <>
+struct Vectors<2> {
+  typedef double Doubles __attribute__((vector_size(16)));
+  typedef long long Truths __attribute__((vector_size(16)));
+};
+template <>
+struct Vectors<4> {
+  typedef double Doubles __attribute__((vector_size(32)));
+  typedef long long Truths __attribute__((vector_size(32)));
+};
+template <>
+struct Vectors<8> {
+  typedef double Doubles __attribute__((vector_size(64)));
+  typedef long long Truths __attribute__((vector_size(64)));
+};
+
+}  // namespace detail
+
+/// A truth value in each lane: all bits or none.
+template <int N>
+struct Mask {
+  typedef typename detail::Vectors<N>::Truths Lanes;
+  Lanes lanes;
+
+  DEMBARK_HOT bool operator[](int k) const { return lanes[k] != 0; }
+  DEMBARK_HOT friend Mask operator&(const Mask& a, const Mask& b) { return {a.lanes & b.lanes}; }
+  DEMBARK_HOT friend Mask operator|(const Mask& a, const Mask& b) { return {a.lanes | b.lanes}; }
+  DEMBARK_HOT friend Mask operator!(const Mask& a) { return {~a.lanes}; }
+};
+
+template <int N>
+struct Pack {
+  static constexpr int size = N;
+  typedef typename detail::Vectors<N>::Doubles Lanes;
+  Lanes lanes;
+
+  Pack() = default;
+  DEMBARK_HOT Pack(const Lanes& given) : lanes(given) {}
+  DEMBARK_HOT Pack(double value) : lanes(value - Lanes{}) {}  // in every lane
+
+  DEMBARK_HOT static Pack load(const double* from) {
+    Pack p;
+    __builtin_memcpy(&p.lanes, from, sizeof p.lanes);
+    return p;
+  }
+  DEMBARK_HOT void store(double* to) const { __builtin_memcpy(to, &lanes, sizeof lanes); }
+  DEMBARK_HOT double operator[](int k) const { return lanes[k]; }
+
+  DEMBARK_HOT Pack& operator+=(const Pack& o) { lanes += o.lanes; return *this; }
+  DEMBARK_HOT Pack& operator-=(const Pack& o) { lanes -= o.lanes; return *this; }
+  DEMBARK_HOT Pack& operator*=(const Pack& o) { lanes *= o.lanes; return *this; }
+  DEMBARK_HOT friend Pack operator+(const Pack& a, const Pack& b) { return a.lanes + b.lanes; }
+  DEMBARK_HOT friend Pack operator-(const Pack& a, const Pack& b) { return a.lanes - b.lanes; }
+  DEMBARK_HOT friend Pack operator*(const Pack& a, const Pack& b) { return a.lanes * b.lanes; }
+  DEMBARK_HOT friend Pack operator/(const Pack& a, const Pack& b) { return a.lanes / b.lanes; }
+  DEMBARK_HOT friend Pack operator-(const Pack& a) { return -a.lanes; }
+  DEMBARK_HOT friend Mask<N> operator<(const Pack& a, const Pack& b) { return {a.lanes < b.lanes}; }
+  DEMBARK_HOT friend Mask<N> operator>(const Pack& a, const Pack& b) { return {a.lanes > b.lanes}; }
+};
+
+template <int N>
+DEMBARK_HOT Pack<N> sqrt(const Pack<N>& a) {
+#if DEMBARK_LANES == 8
+  if constexpr (N == 8) return typename Pack<N>::Lanes(_mm512_maskz_sqrt_pd(0xFF, __m512d(a.lanes)));
+#endif
+#if DEMBARK_LANES == 4
+  if constexpr (N == 4) return typename Pack<N>::Lanes(_mm256_sqrt_pd(__m256d(a.lanes)));
+#endif
+#if defined(__x86_64__)
+  if constexpr (N == 2) return typename Pack<N>::Lanes(_mm_sqrt_pd(__m128d(a.lanes)));
+#endif
+  Pack<N> root;
+  for (int k = 0; k < N; ++k) root.lanes[k] = std::sqrt(a.lanes[k]);
+  return root;
+}
+
+/// `yes` where the mask holds, else `no`.
+template <int N>
+DEMBARK_HOT Pack<N> select(const Mask<N>& mask, const Pack<N>& yes, const Pack<N>& no) {
+  return typename Pack<N>::Lanes(mask.lanes ? yes.lanes : no.lanes);
+}
+
+/// The lanes in which the mask holds, as bits.
+template <int N>
+DEMBARK_HOT unsigned bits(const Mask<N>& mask) {
+  unsigned found = 0;
+#if DEMBARK_LANES == 8
+  if constexpr (N == 8) return _mm512_movepi64_mask(__m512i(mask.lanes));
+#endif
+#if DEMBARK_LANES == 4
+  if constexpr (N == 4) return _mm256_movemask_pd(__m256d(mask.lanes));
+#endif
+#if defined(__x86_64__)
+  if constexpr (N == 2) return _mm_movemask_pd(__m128d(mask.lanes));
+#endif
+  for (int k = 0; k < N; ++k) found |= unsigned(mask.lanes[k] != 0) << k;
+  return found;
+}
+template <int N>
+DEMBARK_HOT bool any(const Mask<N>& mask) { return bits(mask) != 0; }
+
+}  // namespace dembark

@@ -1,0 +1,132 @@
+// The laws in packs of contacts give the bits of the scalar laws, lane by lane.
+#include <catch2/catch.hpp>
+
+#include <array>
+#include <random>
+#include <vector>
+
+#include "dembark/finnie_rabinowicz.hpp"
+#include "dembark/kinematics.hpp"
+#include "dembark/normal_force.hpp"
+#include "dembark/pack.hpp"
+
+using namespace dembark;
+
+namespace {
+
+template <int N>
+struct LawPack {
+  Pack<N> effective_youngs_modulus, effective_shear_modulus, damping, static_friction, kinetic_friction, interface_shear_strength, kept_slip;
+};
+
+// Rows of numbers, one a lane.
+template <int N>
+class Lanes {
+  std::mt19937 chance_{7};
+
+ public:
+  std::vector<std::array<double, N>> all;
+  Pack<N> uniform(double low, double high) {
+    std::array<double, N> row;
+    for (double& value : row) value = std::uniform_real_distribution<double>(low, high)(chance_);
+    all.push_back(row);
+    return Pack<N>::load(row.data());
+  }
+  // One of a few values, so that every branch is met.
+  Pack<N> among(const std::vector<double>& values) {
+    std::array<double, N> row;
+    for (double& value : row) value = values[chance_() % values.size()];
+    all.push_back(row);
+    return Pack<N>::load(row.data());
+  }
+  Vec3<Pack<N>> vector(double size) { return {uniform(-size, size), uniform(-size, size), uniform(-size, size)}; }
+};
+
+template <int N>
+Vec3<double> lane(const Vec3<Pack<N>>& v, int k) {
+  return {v.x[k], v.y[k], v.z[k]};
+}
+
+bool same(const Vec3<double>& a, const Vec3<double>& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+
+template <int N>
+void compare() {
+  Lanes<N> draw;
+  int stuck = 0, moving = 0;
+  for (int round = 0; round < 500; ++round) {
+    const LawPack<N> p{draw.uniform(1e6, 1e7), draw.uniform(1e5, 1e6), draw.uniform(-0.5, 0.0), draw.uniform(0.4, 0.6), draw.uniform(0.1, 0.4),
+                       draw.among({1e4, 1e30, INFINITY}), draw.among({0.0, 0.9})};
+    const Pack<N> radius = draw.uniform(1e-3, 2e-3), mass = draw.uniform(1e-5, 1e-4), overlap = draw.uniform(1e-6, 1e-4), dt = 1e-5;
+    Vec3<Pack<N>> normal = draw.vector(1.0);
+    normal *= 1.0 / sqrt(dot(normal, normal));
+    const Vec3<Pack<N>> relative = draw.vector(0.1), spin = draw.vector(0.1);
+    const Pack<N> twist = draw.among({0.0, 1e-9, 1e-5, 0.1, -1.0});
+    Vec3<Pack<N>> displacement = draw.vector(1e-6);
+    displacement -= draw.among({0.0, 0.9, 0.9999, 1.0, 1.0}) * dot(displacement, normal) * normal;
+    FrictionState<Pack<N>> state{displacement, draw.among({0.0, 0.0, 1e-6}), draw.uniform(0.0, 1.0)};
+    const FrictionState<Pack<N>> before = state;
+
+    const ContactMotion<Pack<N>> motion = contact_motion(normal, relative, spin);
+    const NormalResponse<Pack<N>> response = hertz(p, radius, mass, overlap, motion.normal);
+    state.displacement = rotate_to_plane(state.displacement, normal, twist) + motion.tangential * dt;
+    const unsigned sticks = bits(plainly_sticks(p, response.force, response.tangential_stiffness, response.contact_area, state));
+    const FrictionState<Pack<N>> moved = state;
+    const Vec3<Pack<N>> force = sticking_force(response.tangential_stiffness, response.tangential_damping, motion.tangential, dt, p.kept_slip, state);
+
+    for (int k = 0; k < N; ++k) {
+      const ContactMotion<double> one_motion = contact_motion(lane(normal, k), lane(relative, k), lane(spin, k));
+      CHECK(one_motion.normal == motion.normal[k]);
+      CHECK(same(one_motion.tangential, lane(motion.tangential, k)));
+      HertzParameters elasticity;
+      elasticity.effective_youngs_modulus = p.effective_youngs_modulus[k];
+      elasticity.effective_shear_modulus = p.effective_shear_modulus[k];
+      elasticity.damping = p.damping[k];
+      const NormalResponse<double> one = hertz(elasticity, radius[k], mass[k], overlap[k], one_motion.normal);
+      CHECK(one.force == response.force[k]);
+      CHECK(one.tangential_stiffness == response.tangential_stiffness[k]);
+      CHECK(one.tangential_damping == response.tangential_damping[k]);
+      CHECK(one.contact_area == response.contact_area[k]);
+      FrictionState<double> single{rotate_to_plane(lane(before.displacement, k), lane(normal, k), twist[k]), before.slip[k], before.dissipated_energy[k]};
+      CHECK(same(single.displacement + one_motion.tangential * dt[k], lane(moved.displacement, k)));
+      if (!(sticks >> k & 1)) {
+        ++moving;
+        continue;
+      }
+      // A lane that sticks for certain: the whole scalar step gives its force and its state.
+      ++stuck;
+      FinnieRabinowicz law;
+      law.static_friction = p.static_friction[k];
+      law.kinetic_friction = p.kinetic_friction[k];
+      law.interface_shear_strength = p.interface_shear_strength[k];
+      law.healing_time = p.kept_slip[k] > 0.0 ? -dt[k] / std::log(p.kept_slip[k]) : 0.0;
+      const Vec3<double> whole = friction_step(law, one.force, one.tangential_stiffness, one.tangential_damping, one.contact_area, one_motion.tangential, dt[k], single);
+      CHECK(same(whole, lane(force, k)));
+      CHECK(same(single.displacement, lane(state.displacement, k)));
+      CHECK(single.dissipated_energy == state.dissipated_energy[k]);
+      CHECK(single.slip == Approx(state.slip[k]).epsilon(1e-14).margin(0.0));
+    }
+  }
+  CHECK(stuck > 100);
+  CHECK(moving > 100);
+}
+
+}  // namespace
+
+TEST_CASE("laws in packs give the bits of the scalar laws") {
+  compare<2>();
+  compare<4>();
+  compare<8>();
+}
+
+TEST_CASE("masks and choices of packs") {
+  const double numbers[4] = {-1.0, NAN, 0.5, INFINITY};
+  const Pack<4> p = Pack<4>::load(numbers);
+  CHECK(bits(p > 0.0) == 0b1100);
+  CHECK(bits(!(p > 0.0)) == 0b0011);
+  CHECK(bits((p < 1.0) & (p > 0.0)) == 0b0100);
+  CHECK(bits((p < 0.0) | (p > 1.0)) == 0b1001);
+  CHECK_FALSE(any(p < -1.0));
+  const Pack<4> chosen = select(p > 0.0, p, Pack<4>(2.0));
+  CHECK((chosen[0] == 2.0 && chosen[1] == 2.0 && chosen[2] == 0.5 && chosen[3] == INFINITY));
+  CHECK(std::signbit(Pack<2>(-0.0)[1]));
+}
