@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from dembark import _fields
 from dembark.postproc import field_sums as column
 from dembark.postproc.carried import Contacts, Grains
 from dembark.postproc.contacts import ContactFrame
@@ -62,8 +63,10 @@ def coarse_grain(
     """
     phi = Kernel(kernel, float(width))
     check_periods(grid, grains)
-    _check_finite(grains.wrapped, "positions", grains.step)
-    touching, pairs = _touching(grains, contacts)
+    spreader = Spreader(grid, phi, grains, closed, threads, backend)
+    workers = spreader.workers
+    _check_finite(grains.wrapped, "positions", grains.step, workers)
+    touching, pairs, touches = _linked(grains, contacts, workers) if backend == "native" else _touching(grains, contacts)
     sums = FieldSums(
         grid,
         phi,
@@ -75,16 +78,14 @@ def coarse_grain(
         liquid=liquid in grains.extra or (contacts is not None and liquid in contacts.extra),
         power=contacts is not None and (power in contacts.extra or grains.has("omegas")),
     )
-    spreader = Spreader(grid, phi, grains, closed, threads, backend)
-    _check_finite(grains.velocities, "velocities", grains.step)
+    _check_finite(grains.velocities, "velocities", grains.step, workers)
     peculiar = grains.velocities if mean_velocity is None else grains.velocities - interpolate(mean_velocity, grid, grains.wrapped)
-    touches = np.bincount(pairs[touching].ravel(), minlength=len(grains.ids)).astype(float)
     spreader.grains(
         Grains(grains.wrapped, grains.masses, grains.radii, grains.velocities, peculiar, touches, grains.extra.get(liquid)), sums.grains
     )
     if contacts is not None:
         for name in ("first", "branch", "forces"):
-            _check_finite(getattr(contacts, name), name, contacts.step)
+            _check_finite(getattr(contacts, name), name, contacts.step, workers)
         omegas = grains.omegas if grains.has("omegas") else None
         spreader.contacts(
             Contacts(
@@ -100,7 +101,7 @@ def coarse_grain(
 
 def _add_wall(wall: WallContacts, sums: FieldSums, spreader: Spreader) -> None:
     for name in ("points", "positions", "forces"):
-        _check_finite(getattr(wall, name), f"wall {name}", spreader.frame.step)
+        _check_finite(getattr(wall, name), f"wall {name}", spreader.frame.step, spreader.workers)
     if sums.contacts is not None:
         branch = wall.points - wall.positions
         values = np.zeros((len(branch), column.CONTACT_COLUMNS))
@@ -109,13 +110,27 @@ def _add_wall(wall: WallContacts, sums: FieldSums, spreader: Spreader) -> None:
     spreader.points(wall.points, wall.forces, sums.boundary)
 
 
-def _touching(grains: GrainFrame, contacts: ContactFrame | None) -> tuple[NDArray[np.bool_], Index]:
-    """Which of m contacts touch (m,), and the rows (m, 2) of their grains."""
+def _linked(grains: GrainFrame, contacts: ContactFrame | None, threads: int) -> tuple[NDArray[np.bool_], Index, Array]:
+    """What `_touching` gives, compiled."""
+    count = 0 if contacts is None else len(contacts.ids)
+    touching, pairs, touches = np.zeros(count, bool), np.zeros((count, 2), np.int64), np.zeros(len(grains.ids))
+    if count:
+        wanted = np.ascontiguousarray(contacts.ids, np.int64)
+        ids, radii, branch = np.ascontiguousarray(grains.ids, np.int64), _doubles(grains.radii), _doubles(contacts.branch)
+        missing = _fields.link(ids, radii, wanted, branch, 1.0 + _TOUCHING, threads, pairs, touching, touches)
+        if missing >= 0:
+            raise _no_grain(wanted.ravel()[missing], contacts.step)
+    return touching, pairs, touches
+
+
+def _touching(grains: GrainFrame, contacts: ContactFrame | None) -> tuple[NDArray[np.bool_], Index, Array]:
+    """Which of m contacts touch (m,), the rows (m, 2) of their grains, and how many of them each of n grains has (n,)."""
     if contacts is None or len(contacts.ids) == 0:
-        return np.zeros(0, bool), np.zeros((0, 2), np.int64)
+        return np.zeros(0, bool), np.zeros((0, 2), np.int64), np.zeros(len(grains.ids))
     pairs = rows_of(grains.ids, contacts.ids, contacts.step)
     reach = (grains.radii[pairs[:, 0]] + grains.radii[pairs[:, 1]]) * (1.0 + _TOUCHING)
-    return np.einsum("ij,ij->i", contacts.branch, contacts.branch) <= reach**2, pairs
+    touching = np.einsum("ij,ij->i", contacts.branch, contacts.branch) <= reach**2
+    return touching, pairs, np.bincount(pairs[touching].ravel(), minlength=len(grains.ids)).astype(float)
 
 
 def rows_of(ids: Index, wanted: Index, step: int) -> Index:
@@ -131,8 +146,12 @@ def rows_of(ids: Index, wanted: Index, step: int) -> Index:
         rows = np.minimum(np.searchsorted(ids, wanted), len(ids) - 1)
         found = ids[rows] == wanted
     if not found.all():
-        raise DembarkError(f"a contact of grain {wanted[~found][0]}", f"step {step}", "no such grain is in the grains of that step")
+        raise _no_grain(wanted[~found][0], step)
     return rows
+
+
+def _no_grain(number: int, step: int) -> DembarkError:
+    return DembarkError(f"a contact of grain {number}", f"step {step}", "no such grain is in the grains of that step")
 
 
 def interpolate(field: Array, grid: Grid, places: Array) -> Array:
@@ -164,9 +183,10 @@ def interpolate(field: Array, grid: Grid, places: Array) -> Array:
     return result
 
 
-def _check_finite(values: Array, name: str, step: int) -> None:
-    # A sum is finite only if all its terms are; one that is not may also have overflowed.
-    with np.errstate(over="ignore", invalid="ignore"):
-        doubtful = not np.isfinite(values.sum())
-    if doubtful and not np.isfinite(values).all():
+def _check_finite(values: Array, name: str, step: int, threads: int) -> None:
+    if not _fields.finite(_doubles(values), threads):
         raise DembarkError(f"{name} with numbers that are not finite", f"step {step}", "every number must be finite")
+
+
+def _doubles(values: Array) -> Array:
+    return np.ascontiguousarray(values, np.float64)

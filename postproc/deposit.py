@@ -46,6 +46,11 @@ class Spreader:
         if self.threads is not None and self.threads < 1:
             raise DembarkError(f"{self.threads} threads", "coarse graining", "give at least 1")
 
+    @property
+    def workers(self) -> int:
+        """The number of threads."""
+        return self.threads or len(os.sched_getaffinity(0))
+
     def grains(self, grains: Grains, out: Array) -> None:
         """Add to `out` (nx, ny, nz, 32), made by `zeros`, what the grains carry times the kernel's shares about them."""
         # Moments are taken about the middle of the grid, so that the second ones lose few digits.
@@ -98,7 +103,7 @@ class Spreader:
             closed=self.closed,
             cell_place=places,
             cell_weight=shares,
-            threads=self.threads or len(os.sched_getaffinity(0)),
+            threads=self.workers,
         )
 
     def _images(self, first: Array, branch: Array | None) -> Iterator[tuple[Index, Array]]:

@@ -4,168 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <thread>
-#include <utility>
 #include <vector>
 
 namespace dembark::fields {
 namespace {
-
-// A line shifted by whole box edges.
-struct Image {
-  std::int32_t line;
-  std::int16_t edges[3];
-};
-
-struct Place {
-  double first[3], branch[3];
-};
-
-Place place_of(const Lines& lines, const Box& box, const Image& image) {
-  Place place;
-  for (int axis = 0; axis < 3; ++axis) {
-    double shift = 0.0;
-    for (int edge = 2; edge >= axis; --edge) shift += image.edges[edge] * box.edge[edge][axis];
-    place.first[axis] = lines.first[3 * std::int64_t(image.line) + axis] + shift;
-    place.branch[axis] = lines.branch ? lines.branch[3 * std::int64_t(image.line) + axis] : 0.0;
-  }
-  return place;
-}
-
-Window window_of(const Cells& cells, const Kernel& kernel, const Place& place) {
-  Window window;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double a = place.first[axis], b = a + place.branch[axis];
-    const double count = cells.shape[axis];
-    double start = std::floor((std::min(a, b) - kernel.reach - cells.low[axis]) / cells.spacing[axis]);
-    double stop = std::ceil((std::max(a, b) + kernel.reach - cells.low[axis]) / cells.spacing[axis]);
-    // A factor of each axis needs no cells outside the grid; a spherical kernel is normalised over the whole ball.
-    if (kernel.kind == KernelKind::gaussian) {
-      start = std::clamp(start, 0.0, count - 1.0);
-      stop = std::clamp(stop, 1.0, count);
-    }
-    window.start[axis] = int(start);
-    window.count[axis] = int(std::max(1.0, stop - start));
-  }
-  return window;
-}
-
-// Appends all images of a line that come within the kernel's reach of the cells.
-void add_images(const Cells& cells, const Box& box, const Kernel& kernel, const Lines& lines, std::int32_t line,
-                std::vector<Image>& images) {
-  int from[3], to[3];
-  Image image{line, {0, 0, 0}};
-  const auto range = [&](int axis) {
-    const Place place = place_of(lines, box, image);
-    const double a = place.first[axis], b = a + place.branch[axis];
-    const double low = cells.low[axis] - (std::max(a, b) + kernel.reach), high = cells.high[axis] - (std::min(a, b) - kernel.reach);
-    if (box.folded[axis]) {
-      from[axis] = to[axis] = -int(std::floor((a - box.home[axis]) / box.edge[axis][axis]));
-    } else if (!box.periodic[axis]) {
-      from[axis] = 0;
-      to[axis] = low < 0.0 && high > 0.0 ? 0 : -1;
-    } else {
-      const double length = box.edge[axis][axis];
-      // Open ends: an image that only touches the grid has no share in it.
-      from[axis] = int(std::floor(low / length)) + 1;
-      to[axis] = int(std::ceil(high / length)) - 1;
-    }
-  };
-  // From z to x: a later edge no longer moves an image along the axes done before.
-  range(2);
-  for (int c = from[2]; c <= to[2]; ++c) {
-    image.edges[2] = std::int16_t(c);
-    image.edges[1] = image.edges[0] = 0;
-    range(1);
-    for (int b = from[1]; b <= to[1]; ++b) {
-      image.edges[1] = std::int16_t(b);
-      image.edges[0] = 0;
-      range(0);
-      for (int a = from[0]; a <= to[0]; ++a) {
-        image.edges[0] = std::int16_t(a);
-        images.push_back(image);
-      }
-    }
-  }
-}
-
-// Calls `work(n)` for n = 0 ... count - 1, each on its own thread.
-template <class Work>
-void on_threads(int count, const Work& work) {
-  std::vector<std::thread> team;
-  for (int n = 1; n < count; ++n) team.emplace_back(work, n);
-  work(0);
-  for (std::thread& thread : team) thread.join();
-}
-
-// Part `n` of `parts` of a range of `size`.
-struct Range {
-  std::int64_t begin, end;
-  Range(std::int64_t size, int n, int parts) : begin(size * n / parts), end(size * (n + 1) / parts) {}
-};
-
-// All images of all lines, in the order of the lines.
-std::vector<Image> images_of(const Cells& cells, const Box& box, const Kernel& kernel, const Lines& lines, int threads) {
-  std::vector<std::vector<Image>> parts(static_cast<std::size_t>(threads));
-  on_threads(threads, [&](int n) {
-    const Range range(lines.count, n, threads);
-    std::vector<Image>& part = parts[std::size_t(n)];
-    part.reserve(std::size_t(range.end - range.begin) * 5 / 4);
-    for (std::int64_t line = range.begin; line < range.end; ++line) add_images(cells, box, kernel, lines, std::int32_t(line), part);
-  });
-  for (int n = 1; n < threads; ++n) parts[0].insert(parts[0].end(), parts[std::size_t(n)].begin(), parts[std::size_t(n)].end());
-  return std::move(parts[0]);
-}
-
-// Images sorted by the block in which their windows begin, ties in the order they came, and where each block begins. Blocks are of
-// block[axis] cells, numbered x, y, z with z running fastest.
-struct Sorted {
-  std::vector<Image> images;
-  int block[3] = {1, 1, 1};
-  std::vector<std::int64_t> begin;
-  std::vector<std::int64_t> work;  // (planes + 1,): lines that reach the planes before each, summed over these
-  int most[3] = {1, 1, 1};  // cells of the largest window
-};
-
-Sorted sort_images(const Cells& cells, const Box& box, const Kernel& kernel, const Lines& lines, int threads) {
-  Sorted sorted;
-  const std::vector<Image> images = images_of(cells, box, kernel, lines, threads);
-  std::vector<Window> windows(images.size());
-  on_threads(threads, [&](int n) {
-    const Range range(std::int64_t(images.size()), n, threads);
-    for (std::size_t at = std::size_t(range.begin); at < std::size_t(range.end); ++at)
-      windows[at] = window_of(cells, kernel, place_of(lines, box, images[at]));
-  });
-  const int planes = cells.shape[0];
-  std::vector<std::int64_t> change(std::size_t(planes) + 1, 0);
-  for (const Window& window : windows) {
-    for (int axis = 0; axis < 3; ++axis) sorted.most[axis] = std::max(sorted.most[axis], window.count[axis]);
-    ++change[std::size_t(std::clamp(window.start[0], 0, planes))];
-    --change[std::size_t(std::clamp(window.start[0] + window.count[0], 0, planes))];
-  }
-  // Larger blocks give larger groups, which pass the grid less often, but larger windows.
-  double together = double(images.size()) / (double(cells.shape[0]) * cells.shape[1] * cells.shape[2]);
-  for (int axis = 1; together < 8.0 && 3 * sorted.block[axis] < sorted.most[axis]; axis = 1 - axis, together *= 2.0)
-    sorted.block[axis] *= 2;
-  std::int64_t blocks[3], total = 1;
-  for (int axis = 0; axis < 3; ++axis) total *= blocks[axis] = (cells.shape[axis] - 1) / sorted.block[axis] + 1;
-  sorted.begin.assign(std::size_t(total) + 1, 0);
-  const auto key = [&](const Window& window) {
-    std::int64_t number = 0;
-    for (int axis = 0; axis < 3; ++axis)
-      number = number * blocks[axis] + std::clamp(window.start[axis], 0, cells.shape[axis] - 1) / sorted.block[axis];
-    return std::size_t(number);
-  };
-  for (const Window& window : windows) ++sorted.begin[key(window) + 1];
-  sorted.work.assign(std::size_t(planes) + 1, 0);
-  std::int64_t here = 0;
-  for (std::size_t plane = 0; plane < std::size_t(planes); ++plane) sorted.work[plane + 1] = sorted.work[plane] + (here += change[plane]);
-  for (std::size_t cell = 1; cell < sorted.begin.size(); ++cell) sorted.begin[cell] += sorted.begin[cell - 1];
-  std::vector<std::int64_t> next(sorted.begin.begin(), sorted.begin.end() - 1);  // the next free place of each block
-  sorted.images.resize(images.size());
-  for (std::size_t n = 0; n < images.size(); ++n) sorted.images[std::size_t(next[key(windows[n])]++)] = images[n];
-  return sorted;
-}
 
 // Bounds (threads + 1,) of slabs of planes with about the same work in each.
 std::vector<int> slabs(const Sorted& sorted, int threads) {
@@ -189,7 +31,7 @@ Spread* best_spread() {
   return spread_baseline;
 }
 
-// Takes the lines of one cell together: the sums over them stay in registers, and the part of the grid they reach in the cache.
+// Takes the lines of one block together: the sums over them stay in registers, and the part of the grid they reach in the cache.
 template <class Source>
 class Worker {
  public:
@@ -211,12 +53,14 @@ class Worker {
   // Adds all lines to the planes [from, to).
   void run(int from, int to) {
     static Spread* const spread = best_spread();
-    const std::size_t across = (sorted_.begin.size() - 1) / std::size_t((cells_.shape[0] - 1) / sorted_.block[0] + 1);
     for (std::size_t block = 0; block + 1 < sorted_.begin.size(); ++block) {
-      const int first = int(block / across) * sorted_.block[0];
+      const int first = int(block / std::size_t(sorted_.across)) * sorted_.block[0];
       if (first >= to || first + sorted_.block[0] - 1 + sorted_.most[0] <= from) continue;
-      for (std::int64_t at = sorted_.begin[block]; at < sorted_.begin[block + 1]; at += at_once_) {
-        const Group group = gather(at, std::min<std::int64_t>(at + at_once_, sorted_.begin[block + 1]), from, to);
+      const std::int64_t count = sorted_.begin[block + 1] - sorted_.begin[block];
+      const int groups = int((count + at_once_ - 1) / at_once_);
+      for (int n = 0; n < groups; ++n) {
+        const Range range(count, n, groups);
+        const Group group = gather(sorted_.begin[block] + range.begin, sorted_.begin[block] + range.end, from, to);
         if (group.count > 0) spread(cells_, kernel_, nodes_, group, from, to, scratch_.data(), out_);
       }
     }
@@ -226,14 +70,18 @@ class Worker {
   Group gather(std::int64_t begin, std::int64_t end, int from, int to) {
     Group group{int(end - begin), source_.columns, first_.data(), branch_.data(), values_.data(), windows_.data(), {}};
     int stop[3] = {0, 0, 0};
-    // The lines of a group lie anywhere in memory: those of the next groups are fetched while this one is spread.
-    const std::int64_t ahead = std::min<std::int64_t>(end + ahead_, std::int64_t(sorted_.images.size()));
-    for (std::int64_t next = std::min<std::int64_t>(begin + ahead_, ahead); next < ahead; ++next) {
-      const std::int64_t line = sorted_.images[std::size_t(next)].line;
+    // The lines of a group lie anywhere in memory: those of the next groups are fetched while this one is spread, and what they point
+    // to when they are there.
+    const auto ahead = [&](std::int64_t distance, const auto& fetch) {
+      const std::int64_t stop = std::min(end + distance, sorted_.count);
+      for (std::int64_t next = std::min(begin + distance, stop); next < stop; ++next) fetch(sorted_.images[std::size_t(next)].line);
+    };
+    ahead(2 * max_group, [&](std::int64_t line) {
       __builtin_prefetch(lines_.first + 3 * line);
       if (lines_.branch) __builtin_prefetch(lines_.branch + 3 * line);
       source_.prefetch(line);
-    }
+    });
+    ahead(max_group, [&](std::int64_t line) { source_.prefetch_linked(line); });
     for (int line = 0; line < group.count; ++line) {
       const Place place = place_of(lines_, box_, sorted_.images[std::size_t(begin + line)]);
       const Window window = windows_[std::size_t(line)] = window_of(cells_, kernel_, place);
@@ -256,8 +104,6 @@ class Worker {
     }
     return group;
   }
-
-  static constexpr std::int64_t ahead_ = 64;
 
   const Cells& cells_;
   const Box& box_;
@@ -365,9 +211,9 @@ void deposit(const Cells& cells, const Box& box, const Kernel& kernel, const Nod
   if constexpr (Source::placed) return deposit_on(cells, box, kernel, nodes, lines, source, threads, out);
   const Wide wide(cells, box, kernel, lines, threads);
   if (!wide.any()) return deposit_on(cells, box, kernel, nodes, lines, source, threads, out);
-  std::vector<double> sums(std::size_t(wide.cells.shape[0]) * wide.cells.shape[1] * wide.cells.shape[2] * source.columns, 0.0);
-  deposit_on(wide.cells, wide.box, kernel, nodes, lines, source, threads, sums.data());
-  wide.fold(cells, source.columns, threads, sums.data(), out);
+  const Buffer<double> sums = zeros<double>(std::size_t(wide.cells.shape[0]) * wide.cells.shape[1] * wide.cells.shape[2] * source.columns);
+  deposit_on(wide.cells, wide.box, kernel, nodes, lines, source, threads, sums.get());
+  wide.fold(cells, source.columns, threads, sums.get(), out);
 }
 
 template void deposit(const Cells&, const Box&, const Kernel&, const Nodes&, const Lines&, const PlainSource&, int, double*);

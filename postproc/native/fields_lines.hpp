@@ -44,9 +44,8 @@ struct Group {
 
 // Doubles of scratch that a group of `count` lines needs in windows of at most `most` cells along the axes.
 static inline long scratch_size(const Nodes& nodes, long count, const int most[3]) {
-  const long pad = 8, places = count * nodes.count, all = most[0] + most[1] + most[2];
-  const long rows = nodes.count * (most[1] + pad) + count * most[1] * (most[2] + pad), edges = places * (all + 3);
-  return places * (all + 3 * pad) + (edges > rows ? edges : rows) + 2L * most[0] * most[1] * most[2] + 8 * pad;
+  const long pad = 8, all = most[0] + most[1] + most[2];
+  return count * nodes.count * (all + 3 * pad) + 6 * pad + count * most[1] * (most[2] + pad) + 2L * most[0] * most[1] * most[2];
 }
 
 // Adds a group to the planes [from, to) of `out` (nx, ny, columns, nz).

@@ -31,6 +31,7 @@ struct PlainSource {
   const double* values;  // (count, columns)
 
   void prefetch(std::int64_t line) const { __builtin_prefetch(values + line * columns); }
+  void prefetch_linked(std::int64_t) const {}
 
   void fill(std::int64_t line, const double*, double* out) const { std::copy_n(values + line * columns, columns, out); }
 };
@@ -44,6 +45,7 @@ struct GrainSource {
   void prefetch(std::int64_t n) const {
     for (const double* values : {masses, radii, touches, velocities + 2 * n, peculiar + 2 * n}) __builtin_prefetch(values + n);
   }
+  void prefetch_linked(std::int64_t) const {}
 
   void fill(std::int64_t n, const double* place, double* out) const {
     const double mass = masses[n], radius = radii[n], *v = velocities + 3 * n, *w = peculiar + 3 * n;
@@ -75,6 +77,10 @@ struct ContactSource {
   void prefetch(std::int64_t m) const {
     __builtin_prefetch(forces + 3 * m);
     __builtin_prefetch(touching + m);
+    __builtin_prefetch(pairs + 2 * m);
+  }
+
+  void prefetch_linked(std::int64_t m) const {
     if (!omegas) return;
     for (const std::int64_t grain : {pairs[2 * m], pairs[2 * m + 1]}) {
       __builtin_prefetch(radii + grain);

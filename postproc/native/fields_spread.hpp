@@ -9,16 +9,17 @@ inline double clamp(double value, double low, double high) { return value < low 
 
 // Integral from 0 to x of the Gaussian of standard deviation 1, cut at 3 and normalised: x times a polynomial in x^2 of degree 16, fitted
 // to 1e-15 (erf(x / sqrt 2) / (2 erf(3 / sqrt 2)) at Chebyshev points).
-inline double half_gaussian(double x) {
-  x = clamp(x, -3.0, 3.0);
-  const double u = x * x * (1.0 / 4.5) - 1.0;
+template <class Number>
+inline Number half_gaussian(Number x) {
+  x = x < -3.0 ? Number{} - 3.0 : x > 3.0 ? Number{} + 3.0 : x;
+  const Number u = x * x * (1.0 / 4.5) - 1.0;
   static constexpr double c[17] = {0.22832961018667941, -0.09308378714444443, 0.046096695165837726, -0.020626803743848798,
                                    0.0080432045225557868, -0.0027365221310244204, 0.00082009289492281979, -0.00021881942106935577,
                                    5.2510114069543034e-05, -1.1434606565200895e-05, 2.2772871863171932e-06, -4.1764135591387858e-07,
                                    7.0927769907576937e-08, -1.1192516199860439e-08, 1.6650237004264441e-09, -2.464845016263867e-10,
                                    2.9930377544698147e-11};
-  double sum = c[16];
-  for (int k = 15; k >= 0; --k) sum = sum * u + c[k];
+  Number sum = u * c[16] + c[15];
+  for (int k = 14; k >= 0; --k) sum = sum * u + c[k];
   return sum * x;
 }
 
@@ -33,7 +34,7 @@ inline Pack load(const double* p) {
 inline void store(double* p, const Pack& pack) { __builtin_memcpy(p, &pack, sizeof pack); }
 
 // Shares along each axis of all places on the lines of a group: (count, nodes, stride) for each axis, in the cells of the group's window,
-// zero beyond the line's own.
+// zero beyond the line's own; those along x times the nodes' weights.
 struct Factors {
   double* of[3];
   long stride[3];
@@ -41,50 +42,57 @@ struct Factors {
 
 inline double* aligned(double* p) { return reinterpret_cast<double*>((reinterpret_cast<unsigned long long>(p) + 63) & ~63ull); }
 
+// `pack` moved up by one lane, with the last lane of `before` in the first.
+inline Pack moved_up(const Pack& before, const Pack& pack) {
+#if LANES == 8
+  return __builtin_shufflevector(before, pack, 7, 8, 9, 10, 11, 12, 13, 14);
+#elif LANES == 4
+  return __builtin_shufflevector(before, pack, 3, 4, 5, 6);
+#else
+  return __builtin_shufflevector(before, pack, 1, 2);
+#endif
+}
+
+// What the shares along an axis about `place` are scaled by.
+inline double closing(const Cells& cells, const Kernel& kernel, int axis, double place) {
+  if (!kernel.closed || cells.periodic[axis]) return 1.0;
+  const double scale = 1.0 / kernel.width;
+  const double inside = half_gaussian((cells.high[axis] - place) * scale) - half_gaussian((cells.low[axis] - place) * scale);
+  return place >= cells.low[axis] && place <= cells.high[axis] && inside > 0.0 ? 1.0 / inside : 0.0;
+}
+
 inline Factors gaussian_factors(const Cells& cells, const Kernel& kernel, const Nodes& nodes, const Group& group, double* scratch,
                                 double** free) {
-  const long places = long(group.count) * nodes.count;
-  Factors factors;
-  double* next = aligned(scratch);
-  for (int axis = 0; axis < 3; ++axis) {
-    factors.stride[axis] = (group.all.count[axis] + LANES - 1) / LANES * LANES;
-    factors.of[axis] = next;
-    next = aligned(next + factors.stride[axis] * places);
-  }
-  *free = next;
-  double* edges = next;
   const double scale = 1.0 / kernel.width;
-  long total = 0;
+  Pack above;  // numbers of the upper edges of the first cells
+  for (int lane = 0; lane < LANES; ++lane) above[lane] = lane + 1;
+  Factors factors;
   for (int axis = 0; axis < 3; ++axis) {
+    const long stride = factors.stride[axis] = (group.all.count[axis] + LANES - 1) / LANES * LANES;
     const double step = cells.spacing[axis], low = cells.low[axis];
+    double* to = factors.of[axis] = aligned(scratch);
     for (int line = 0; line < group.count; ++line) {
       const int start = group.windows[line].start[axis], count = group.windows[line].count[axis];
-      for (int q = 0; q < nodes.count; ++q, total += count + 1) {
+      const Pack edges = (above + double(start)) * step + low;
+      double* const from = to + (start - group.all.start[axis]);
+      for (int q = 0; q < nodes.count; ++q, to += stride) {
         const double place = group.first[3 * line + axis] + nodes.place[q] * group.branch[3 * line + axis];
-        for (int i = 0; i <= count; ++i) edges[total + i] = (low + double(start + i) * step - place) * scale;
-      }
-    }
-  }
-  // One long loop over all edges: it fills the vector lanes and hides the latency of the polynomial.
-  for (long n = 0; n < total; ++n) edges[n] = half_gaussian(edges[n]);
-  for (int axis = 0; axis < 3; ++axis) {
-    double* to = factors.of[axis];
-    for (int line = 0; line < group.count; ++line) {
-      const int count = group.windows[line].count[axis];
-      const int lead = group.windows[line].start[axis] - group.all.start[axis];
-      for (int q = 0; q < nodes.count; ++q, to += factors.stride[axis], edges += count + 1) {
-        double factor = 1.0;
-        if (kernel.closed && !cells.periodic[axis]) {
-          const double place = group.first[3 * line + axis] + nodes.place[q] * group.branch[3 * line + axis];
-          const double inside = half_gaussian((cells.high[axis] - place) * scale) - half_gaussian((cells.low[axis] - place) * scale);
-          factor = place >= cells.low[axis] && place <= cells.high[axis] && inside > 0.0 ? 1.0 / inside : 0.0;
+        // The node's weight goes into the shares along x.
+        const double factor = closing(cells, kernel, axis, place) * (axis == 0 ? nodes.weight[q] : 1.0);
+        const double lowest = (low + double(start) * step - place) * scale;
+        Pack below = Pack{} + (lowest > -3.0 ? half_gaussian(lowest) : half_gaussian(-3.0));
+        for (long i = 0; i < stride; i += LANES) store(to + i, Pack{});
+        // What a pack has too much belongs to the next place, which is filled later.
+        for (int i = 0; i < count; i += LANES) {
+          const Pack upper = half_gaussian<Pack>((edges + double(i) * step - place) * scale);
+          store(from + q * stride + i, (upper - moved_up(below, upper)) * factor);
+          below = upper;
         }
-        for (int i = 0; i < lead; ++i) to[i] = 0.0;
-        for (int i = 0; i < count; ++i) to[lead + i] = (edges[i + 1] - edges[i]) * factor;
-        for (long i = lead + count; i < factors.stride[axis]; ++i) to[i] = 0.0;
       }
     }
+    scratch = to + LANES;
   }
+  *free = aligned(scratch);
   return factors;
 }
 
@@ -147,86 +155,133 @@ inline void ball_shares(const Cells& cells, const Kernel& kernel, const Window& 
   for (long n = 0, end = long(nx) * ny * nz; n < end; ++n) share[n] *= scale;
 }
 
-// rows (cells of y, lines, z_stride) of the plane `x` of a group's window: the line's mean shares. Q: the number of nodes, or 0 for any.
+// Those lines of a group that reach a plane, with what they carry.
+struct Plane {
+  int count = 0;
+  int lines[max_group];
+  const double* values[max_group];
+};
+
+inline Plane plane_of(const Group& group, int x) {
+  Plane plane;
+  for (int line = 0; line < group.count; ++line) {
+    plane.lines[plane.count] = line;
+    plane.values[plane.count] = group.values + long(line) * group.columns;
+    plane.count += x >= group.windows[line].start[0] && x < group.windows[line].start[0] + group.windows[line].count[0];
+  }
+  return plane;
+}
+
+// Adds Q nodes of a line, from the node `place` of all lines on, to its `rows` of a plane: `height` ones, `pitch` apart. `first`: nothing
+// is there yet.
 template <int Q>
-inline void plane_rows(const Factors& factors, const Nodes& nodes, int lines, int y_count, long x, double* across, double* rows) {
-  const int count = Q ? Q : nodes.count;
-  const long x_stride = factors.stride[0], y_stride = factors.stride[1], z_stride = factors.stride[2];
-  for (int line = 0; line < lines; ++line) {
-    const long first = long(line) * count;
-    for (int q = 0; q < count; ++q) {
-      const double here = nodes.weight[q] * factors.of[0][(first + q) * x_stride + x];
-      const double* y = factors.of[1] + (first + q) * y_stride;
-      for (long j = 0; j < y_stride; j += LANES) store(across + q * y_stride + j, load(y + j) * here);
-    }
-    for (long k = 0; k < z_stride; k += LANES) {
-      const double* z = factors.of[2] + first * z_stride + k;
-      double* row = rows + line * z_stride + k;
-      for (int j = 0; j < y_count; ++j) {
-        Pack sum = load(z) * across[j];
-        for (int q = 1; q < count; ++q) sum += load(z + q * z_stride) * across[q * y_stride + j];
-        store(row + j * lines * z_stride, sum);
-      }
+inline void add_nodes(const Factors& factors, long place, long x, long y, int height, long pitch, bool first, double* rows) {
+  const long y_stride = factors.stride[1], z_stride = factors.stride[2];
+  const double* across = factors.of[1] + place * y_stride + y;
+  for (long k = 0; k < z_stride; k += LANES) {
+    Pack along[Q];
+    for (int q = 0; q < Q; ++q)
+      along[q] = load(factors.of[2] + (place + q) * z_stride + k) * factors.of[0][(place + q) * factors.stride[0] + x];
+    for (int j = 0; j < height; ++j) {
+      Pack sum = along[0] * across[j];
+      for (int q = 1; q < Q; ++q) sum += along[q] * across[q * y_stride + j];
+      double* row = rows + j * pitch + k;
+      store(row, first ? sum : load(row) + sum);
     }
   }
 }
 
-// out (N columns of stride `depth`, `cells` <= LANES of them) += sum over lines of row[0 ... LANES) times values[0 ... N).
-// The sums stay in registers; lanes beyond `cells` hold zeros, and are not stored where `room` does not allow it.
+// rows (cells of y, lines of the plane, z_stride) of the plane `x`: the lines' mean shares.
+inline void plane_rows(const Factors& factors, const Nodes& nodes, const Group& group, const Plane& plane, int x, double* rows) {
+  const long z_stride = factors.stride[2], pitch = plane.count * z_stride;
+  for (int n = 0; n < plane.count; ++n, rows += z_stride) {
+    const Window& window = group.windows[plane.lines[n]];
+    const int begin = window.start[1] - group.all.start[1], height = window.count[1];
+    const auto clear = [&](int from, int to) {
+      for (int j = from; j < to; ++j)
+        for (long k = 0; k < z_stride; k += LANES) store(rows + j * pitch + k, Pack{});
+    };
+    clear(0, begin);
+    clear(begin + height, group.all.count[1]);
+    const long first = long(plane.lines[n]) * nodes.count;
+    int q = 0;
+    for (; q + 4 <= nodes.count; q += 4) add_nodes<4>(factors, first + q, x, begin, height, pitch, q == 0, rows + begin * pitch);
+    for (; q < nodes.count; ++q) add_nodes<1>(factors, first + q, x, begin, height, pitch, q == 0, rows + begin * pitch);
+  }
+}
+
+// A part of a row of cells: `cells` <= LANES of them, columns `depth` apart. `room`: a whole pack may be stored, whose lanes beyond hold
+// zeros.
+struct Row {
+  int cells;
+  long depth;
+  bool room;
+};
+
+// out (N columns) += sum over lines of shares[0 ... LANES) times values[column ... column + N). The sums stay in registers.
 template <int N>
-inline void add_columns(int lines, const double* row, long row_stride, const double* values, long value_stride, int cells, long depth,
-                        bool room, double* out) {
+inline void add_columns(int lines, const double* shares, long stride, const double* const* values, int column, const Row& row,
+                        double* out) {
   Pack sum[N];
 #pragma GCC unroll 32
   for (int c = 0; c < N; ++c) sum[c] = Pack{};
-  for (int line = 0; line < lines; ++line, row += row_stride, values += value_stride) {
-    const Pack share = load(row);
+  for (int line = 0; line < lines; ++line, shares += stride) {
+    const Pack share = load(shares);
+    const double* value = values[line] + column;
+    // Otherwise the compiler adds `column` to each of the N offsets beforehand, which needs more registers than there are.
+    __asm__("" : "+r"(value));
 #pragma GCC unroll 32
-    for (int c = 0; c < N; ++c) sum[c] += share * values[c];
+    for (int c = 0; c < N; ++c) sum[c] += share * value[c];
   }
-  if (room) {
+  out += column * row.depth;
+  if (row.room) {
 #pragma GCC unroll 32
-    for (int c = 0; c < N; ++c) store(out + c * depth, load(out + c * depth) + sum[c]);
+    for (int c = 0; c < N; ++c) store(out + c * row.depth, load(out + c * row.depth) + sum[c]);
     return;
   }
   double last[N * LANES];
 #pragma GCC unroll 32
   for (int c = 0; c < N; ++c) store(last + c * LANES, sum[c]);
   for (int c = 0; c < N; ++c)
-    for (int k = 0; k < cells; ++k) out[c * depth + k] += last[c * LANES + k];
+    for (int k = 0; k < row.cells; ++k) out[c * row.depth + k] += last[c * LANES + k];
+}
+
+// The same for all columns, as many at once as registers hold.
+inline void add_lines(int lines, const double* shares, long stride, const double* const* values, int columns, const Row& row, double* out) {
+  constexpr int at_once = LANES == 8 ? 20 : 8;
+  int c = 0;
+  for (; c + at_once <= columns; c += at_once) add_columns<at_once>(lines, shares, stride, values, c, row, out);
+  if (LANES == 8 && c + 12 <= columns) {
+    add_columns<12>(lines, shares, stride, values, c, row, out);
+    c += 12;
+  }
+  for (; c + 4 <= columns; c += 4) add_columns<4>(lines, shares, stride, values, c, row, out);
+  for (; c < columns; ++c) add_columns<1>(lines, shares, stride, values, c, row, out);
 }
 
 inline void spread_gaussian(const Cells& cells, const Kernel& kernel, const Nodes& nodes, const Group& group, int from, int to,
                             double* scratch, double* out) {
-  double* free;
-  const Factors factors = gaussian_factors(cells, kernel, nodes, group, scratch, &free);
-  double *across = free, *rows = aligned(across + nodes.count * factors.stride[1]);
-  const int *start = group.all.start, *count = group.all.count, columns = group.columns, lines = group.count;
+  double* rows;
+  const Factors factors = gaussian_factors(cells, kernel, nodes, group, scratch, &rows);
+  const int *start = group.all.start, *count = group.all.count;
   const long depth = cells.shape[2], stride = factors.stride[2];
   const int begin = from > start[0] ? from : start[0], end = to < start[0] + count[0] ? to : start[0] + count[0];
-  constexpr decltype(&plane_rows<0>) fills[] = {plane_rows<0>, plane_rows<1>, plane_rows<2>, plane_rows<3>, plane_rows<4>};
-  const auto fill = fills[nodes.count <= 4 ? nodes.count : 0];
-  // As many columns at once as registers hold.
-  constexpr int at_once = LANES == 8 ? 20 : 8;
   for (int i = begin; i < end; ++i) {
-    fill(factors, nodes, lines, count[1], i - start[0], across, rows);
-    for (int j = 0; j < count[1]; ++j) {
-      double* cell = out + (long(i) * cells.shape[1] + start[1] + j) * columns * depth + start[2];
+    const Plane plane = plane_of(group, i);
+    plane_rows(factors, nodes, group, plane, i - start[0], rows);
+    const auto window = [&](int n) -> const Window& { return group.windows[plane.lines[n]]; };
+    // Lines come by where they end and begin along y: those that reach a row lie between two of them.
+    for (int j = 0, first = 0; j < count[1]; ++j) {
+      const int y = start[1] + j;
+      while (first < plane.count && window(first).start[1] + window(first).count[1] <= y) ++first;
+      int last = plane.count;
+      while (last > first && window(last - 1).start[1] > y) --last;
+      if (first == last) continue;
+      double* cell = out + (long(i) * cells.shape[1] + y) * group.columns * depth + start[2];
       for (int k = 0; k < count[2]; k += LANES) {
-        const double* row = rows + j * lines * stride + k;
-        const bool room = start[2] + k + LANES <= depth;
-        const int inside = count[2] - k < LANES ? count[2] - k : LANES;
-        int c = 0;
-        for (; c + at_once <= columns; c += at_once)
-          add_columns<at_once>(lines, row, stride, group.values + c, columns, inside, depth, room, cell + c * depth + k);
-        if (LANES == 8 && c + 12 <= columns) {
-          add_columns<12>(lines, row, stride, group.values + c, columns, inside, depth, room, cell + c * depth + k);
-          c += 12;
-        }
-        for (; c + 4 <= columns; c += 4)
-          add_columns<4>(lines, row, stride, group.values + c, columns, inside, depth, room, cell + c * depth + k);
-        for (; c < columns; ++c)
-          add_columns<1>(lines, row, stride, group.values + c, columns, inside, depth, room, cell + c * depth + k);
+        const Row row{count[2] - k < LANES ? count[2] - k : LANES, depth, start[2] + k + LANES <= depth};
+        add_lines(last - first, rows + (long(j) * plane.count + first) * stride + k, stride, plane.values + first, group.columns, row,
+                  cell + k);
       }
     }
   }

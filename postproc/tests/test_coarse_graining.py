@@ -1,5 +1,7 @@
 """Coarse-grained fields against conservation laws, closed forms and the plain peer of the compiled code."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from dembark.postproc.coarse_graining import WallContacts, coarse_grain, interpolate
@@ -71,6 +73,49 @@ def test_compiled_code_equals_numpy_and_no_bit_depends_on_threads(seed, periodic
         assert np.array_equal(getattr(one, part), getattr(many, part))
         # An edge of a cell is rounded to 1e-16 m, which a narrow kernel sees as 1e-16 / width.
         np.testing.assert_allclose(getattr(one, part), getattr(plain, part), atol=1e-13 + 1e-15 / width)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize("periodic", [False, True])
+def test_many_lines_of_all_lengths_in_one_cell_equal_numpy(periodic, closed):
+    # More lines than are spread together, whose windows begin and end in many cells.
+    random = np.random.default_rng(3)
+    grains, _ = random_frame(3, count=700, periodic=(periodic,) * 3)
+    pairs = random.integers(0, 700, (700, 2))
+    branch = random.uniform(-1, 1, (700, 3)) * random.uniform(0, 0.5, (700, 1))
+    contacts = ContactFrame(7, grains.wrapped[pairs[:, 0]], branch, random.normal(size=(700, 3)), grains.ids[pairs])
+    grid = Grid((0, 0, 0), (1, 1, 1), (9, 7, 11), (periodic,) * 3)
+    one, many, plain = (
+        coarse_grain(grains, contacts, grid, width=0.06, closed=closed, **how) for how in ({"threads": 1}, {"threads": 3}, {"backend": "numpy"})
+    )
+    for part in ("grains", "contacts"):
+        assert np.array_equal(getattr(one, part), getattr(many, part))
+        np.testing.assert_allclose(getattr(one, part), getattr(plain, part), atol=1e-12 * np.abs(getattr(plain, part)).max())
+
+
+@pytest.mark.parametrize("apart", [1, 1000, 2**60 // 12])
+def test_ids_may_lie_far_apart(apart):
+    grains, contacts = random_frame(2)
+    far = replace(grains, ids=grains.ids * apart)
+    grid = Grid((0, 0, 0), (1, 1, 1), (3, 3, 3))
+    near = coarse_grain(grains, contacts, grid, width=0.1)
+    found = coarse_grain(far, replace(contacts, ids=contacts.ids * apart), grid, width=0.1)
+    assert np.array_equal(near.grains, found.grains) and np.array_equal(near.contacts, found.contacts)
+    unknown = np.array([[apart, 12 * apart + 1]])
+    with pytest.raises(DembarkError, match=f"grain {12 * apart + 1}, step 7"):
+        coarse_grain(far, ContactFrame(7, *np.zeros((3, 1, 3)), unknown), grid, width=0.1)
+
+
+def test_huge_numbers_are_finite_and_infinities_are_not():
+    grains, contacts = random_frame(2)
+    grid = Grid((0, 0, 0), (1, 1, 1), (3, 3, 3))
+    huge = replace(grains, velocities=np.full((len(grains.ids), 3), 1e150))
+    assert np.isfinite(coarse_grain(huge, None, grid, width=0.1).grains[..., 1:4]).all()
+    for wrong in (np.inf, -np.inf, np.nan):
+        velocities = grains.velocities.copy()
+        velocities[-1, 2] = wrong
+        with pytest.raises(DembarkError, match="velocities with numbers that are not finite"):
+            coarse_grain(replace(grains, velocities=velocities), contacts, grid, width=0.1)
 
 
 def test_a_closed_grid_keeps_what_is_near_its_faces():
