@@ -169,7 +169,7 @@ NB_MODULE(_physics, m) {
         // A comparison with what is no number is false: such a contact would end without a word.
         if (!std::isfinite(f.overlap + f.force.x + f.force.y + f.force.z)) {
           self.state = before;
-          throw nb::value_error("the contact has no finite force: positions, velocities, radii, masses and the time step must be finite numbers");
+          throw std::invalid_argument("the contact has no finite force: positions, velocities, radii, masses and the time step must be finite numbers");
         }
         return nb::make_tuple(tuple(f.force), tuple(f.torque_1), tuple(f.torque_2), f.overlap, f.normal_force, f.capillary_force,
                               tuple(f.tangential), f.viscous_normal, tuple(f.viscous_tangential), f.interacting);
