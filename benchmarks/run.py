@@ -45,7 +45,7 @@ def liggghts_comparisons(bed: Path, cache: Path, wall_clock: bool, relax: int, s
         Comparison("LIGGGHTS, dry", [
             subject("history (stock)", stock, "history"),
             subject("finnie_rabinowicz", law, "finnie_rabinowicz"),
-        ], steps, {"finnie_rabinowicz": 1.05}),
+        ], steps, {"finnie_rabinowicz": 0.67}),
         Comparison("LIGGGHTS, wet", [
             subject("history + washino (stock)", stock, "history", "washino/capillary/viscous"),
             subject("history + capillary exact", law, "history", "capillary"),

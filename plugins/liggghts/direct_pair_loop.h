@@ -206,6 +206,7 @@ class DirectPairLoop : public StockLoop<Cohesion> {
     step.friction = &scalar_friction;
     step.bridges = nullptr;
     if constexpr (wet) step.bridges = &bridges;
+    // The factor of relaxed contacts (PairGran::relax) is 1 in this version of the engine.
     packs_(step, *block_);
   }
 };
