@@ -18,7 +18,7 @@ stride = math.ceil(p.duration / p.time_step / (p.frames - 1))
 steps = stride * (p.frames - 1)
 lead = p.lead_steps * p.time_step
 spacing = 4 * p.radius * max(1.0, p.size_ratio)
-stiffer, denser, larger = (p.stiffness_ratio, p.density_ratio, p.size_ratio)
+stiffer, denser, larger = p.stiffness_ratio, p.density_ratio, p.size_ratio
 
 
 def material(youngs_modulus: float, poisson_ratio: float, density: float) -> int:
@@ -38,7 +38,6 @@ rebound, partners = [], []
 for m, (youngs_modulus, poisson_ratio, density) in enumerate((
         (p.youngs_modulus_a, p.poisson_ratio_a, p.density_a), (p.youngs_modulus_b, p.poisson_ratio_b, p.density_b))):
     other = material(youngs_modulus * stiffer, poisson_ratio, density * (denser if p.partner == "rest" else 1.0))
-    partners.append(other)
     for k in range(p.points):
         value = p.sweep_from + (p.sweep_to - p.sweep_from) * k / max(p.points - 1, 1)
         angle = math.radians(value) if p.sweep in ("direction", "slide", "spin") else 0.0
@@ -52,14 +51,13 @@ for m, (youngs_modulus, poisson_ratio, density) in enumerate((
         site = m * p.points + k
         body((site * spacing, 0, p.radius + normal * lead), p.radius, (0, slide, -normal), spin, own, 1 << m)
         if p.partner == "mirror":
-            partners.append((site, (site * spacing, 0, -(p.radius + normal * lead)), p.radius, (0, -slide, normal), -spin, other, 1 << m))
+            partners.append(((site * spacing, 0, -(p.radius + normal * lead)), p.radius, (0, -slide, normal), -spin, other, 1 << m))
         elif p.partner == "rest":
-            partners.append((site, (site * spacing, 0, -p.radius * larger), p.radius * larger, (0, 0, 0), 0.0, other, 1 << m))
+            partners.append(((site * spacing, 0, -p.radius * larger), p.radius * larger, (0, 0, 0), 0.0, other, 1 << m))
     if p.partner == "plane":
         O.bodies.append(utils.wall((0, 0, 0), axis=2, sense=1, material=O.materials[other], mask=1 << m))
-for one in partners:
-    if not isinstance(one, int):
-        body(*one[1:])
+for partner in partners:
+    body(*partner)
 
 far = 2 * p.points * spacing
 

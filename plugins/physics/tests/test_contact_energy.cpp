@@ -1,0 +1,115 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "dembark/contact_energy.hpp"
+
+using namespace dembark;
+using Catch::WithinAbs;
+using Catch::WithinRel;
+
+namespace {
+
+const capillary::BridgeForce bridge(capillary::Model::willett, 0.35);
+
+/// Sums over an oblique impact of two spheres by leapfrog.
+struct Account {
+  double kinetic_change = 0.0, total = 0.0, normal = 0.0, viscous = 0.0, tangential = 0.0, friction = 0.0, capillary = 0.0, scale = 0.0, worst = 0.0;
+  double half_way = 0.0;  ///< worst difference of what the normal spring took and what it holds
+};
+
+double kinetic(const ContactBodies& b) {
+  const auto of = [](double m, double r, const Vec3<double>& v, const Vec3<double>& w) { return 0.5 * m * (dot(v, v) + 0.4 * r * r * dot(w, w)); };
+  return of(b.mass_1, b.radius_1, b.velocity_1, b.angular_velocity_1) + of(b.mass_2, b.radius_2, b.velocity_2, b.angular_velocity_2);
+}
+
+Account impact(const ContactParameters& p, double dt) {
+  ContactState state;
+  ContactBodies b;
+  b.radius_1 = 2e-3;
+  b.radius_2 = 3e-3;
+  b.mass_1 = 8e-5;
+  b.mass_2 = 3e-4;
+  b.separation = {0.0, 0.0, 5.00001e-3};
+  b.velocity_1 = {0.15, 0.05, -0.3};
+  b.angular_velocity_1 = {20.0, -15.0, 30.0};
+  Account out;
+  const double start = kinetic(b);
+  out.scale = start;
+  for (double t = 0.0; t < 4e-3; t += dt) {
+    const ContactForce f = contact_step(p, b, dt, state);
+    const ContactBodies before = b;
+    b.velocity_1 += (dt / b.mass_1) * f.force;
+    b.velocity_2 -= (dt / b.mass_2) * f.force;
+    b.angular_velocity_1 += (dt / (0.4 * b.mass_1 * b.radius_1 * b.radius_1)) * f.torque_1;
+    b.angular_velocity_2 += (dt / (0.4 * b.mass_2 * b.radius_2 * b.radius_2)) * f.torque_2;
+    ContactBodies mean = b;
+    mean.velocity_1 = 0.5 * (before.velocity_1 + b.velocity_1);
+    mean.velocity_2 = 0.5 * (before.velocity_2 + b.velocity_2);
+    mean.angular_velocity_1 = 0.5 * (before.angular_velocity_1 + b.angular_velocity_1);
+    mean.angular_velocity_2 = 0.5 * (before.angular_velocity_2 + b.angular_velocity_2);
+    const ContactEnergies e = contact_energies(p, mean, f, state.friction.displacement);
+    out.total += e.power() * dt;
+    out.normal += e.normal_elastic * dt;
+    out.viscous += (e.normal_viscous + e.tangential_viscous) * dt;
+    out.tangential += e.tangential_elastic * dt;
+    out.capillary += e.capillary * dt;
+    out.friction = std::max(out.friction, state.friction.dissipated_energy);
+    out.worst = std::max(out.worst, std::abs(kinetic(b) - start - out.total));
+    // Half of this step's work is of the way after its positions.
+    out.half_way = std::max(out.half_way, std::abs(-(out.normal - 0.5 * e.normal_elastic * dt) - e.normal_stored));
+    b.separation += dt * (b.velocity_1 - b.velocity_2);
+  }
+  out.kinetic_change = kinetic(b) - start;
+  return out;
+}
+
+ContactParameters parameters(double restitution, double friction, bool wet) {
+  ContactParameters p;
+  p.elasticity = {effective_youngs_modulus(5e6, 0.3, 5e6, 0.3), effective_shear_modulus(5e6, 0.3, 5e6, 0.3), restitution};
+  p.friction.static_friction = p.friction.kinetic_friction = friction;
+  if (wet) p.liquid = {&bridge, 0.072, 1e-11};
+  return p;
+}
+
+}  // namespace
+
+TEST_CASE("works of all parts of a contact balance the kinetic energy to round-off at any step") {
+  for (const bool wet : {false, true})
+    for (const double friction : {0.0, 0.2, 100.0})
+      for (const double restitution : {1.0, 0.4})
+        for (const double dt : {1e-6, 2e-5}) {
+          for (const NormalLaw law : {NormalLaw::hertz, NormalLaw::hooke})
+            for (const Presliding path : {Presliding::linear, Presliding::exponential}) {
+              ContactParameters p = parameters(restitution, friction, wet);
+              p.normal_law = law;
+              p.friction.presliding = path;
+              const Account a = impact(p, dt);
+              CHECK(std::abs(a.total) > 1e-9 * a.scale);
+              CHECK(a.worst < 1e-12 * a.scale);
+            }
+        }
+}
+
+TEST_CASE("each part does what it is due to") {
+  const Account slides = impact(parameters(0.4, 0.2, false), 1e-6);
+  CHECK(slides.viscous < 0.0);
+  CHECK(slides.tangential < 0.0);
+  CHECK(slides.capillary == 0.0);
+  // What the spring of a contact that has ended took is what the law says that slip lost, give or take the change of its stiffness.
+  const Account elastic = impact(parameters(1.0, 0.2, false), 1e-6);
+  CHECK(elastic.viscous == 0.0);
+  CHECK_THAT(-elastic.tangential, WithinRel(elastic.friction, 0.3));
+  CHECK_THAT(elastic.normal, WithinAbs(0.0, 1e-6 * elastic.scale));
+  const Account smooth = impact(parameters(1.0, 0.0, false), 1e-6);
+  CHECK(smooth.tangential == 0.0);
+  CHECK_THAT(smooth.kinetic_change, WithinAbs(0.0, 1e-6 * smooth.scale));
+  CHECK(impact(parameters(1.0, 0.0, true), 1e-6).capillary < 0.0);  // the bridge forms at the touch and ruptures far behind it
+}
+
+TEST_CASE("what the normal spring took is what it holds, with an error of second order in the step") {
+  const ContactParameters p = parameters(1.0, 0.0, false);
+  const double coarse = impact(p, 4e-6).half_way, fine = impact(p, 2e-6).half_way, finest = impact(p, 1e-6).half_way;
+  CHECK_THAT(std::log2(coarse / fine), WithinAbs(2.0, 0.2));
+  CHECK_THAT(std::log2(fine / finest), WithinAbs(2.0, 0.2));
+}
