@@ -26,7 +26,8 @@ def scene_with(bodies, gravity=(0, 0, 0), pair=None, **liquid):
         # Grains are put from place to place, so the collider looks at each step.
         InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()], verletDist=0),
         InteractionLoop(
-            [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()], [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**{**PAIR, **(pair or {})})],
+            [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
+            [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**{**PAIR, **(pair or {})})],
             [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(capillaryModel="willett", carriedLiquid=True)]),
         engine,
         NewtonIntegrator(damping=0, gravity=gravity),
@@ -160,7 +161,8 @@ def conserved(step=1e-5, blocks=15, length=100):
     for _ in range(blocks):
         O.run(length, True)
         rows.append(books(engine, 0))
-    return {"begin": engine.content * sum(4 / 3 * math.pi * b.shape.radius**3 for b in O.bodies if isinstance(b.shape, Sphere)) + 1e-9, "rows": rows}
+    solid = sum(4 / 3 * math.pi * b.shape.radius**3 for b in O.bodies if isinstance(b.shape, Sphere))
+    return {"begin": engine.content * solid + 1e-9, "rows": rows}
 
 
 def conserved_briefly():
