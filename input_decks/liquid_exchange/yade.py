@@ -77,7 +77,8 @@ O.engines = [
     InteractionLoop(
         [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
         [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
-            restitution=0.5, staticFriction=0, kineticFriction=0, criticalSlipDistance=0, contactAngle=p.contact_angle, surfaceTension=0.072)],
+            restitution=0.5, staticFriction=0, kineticFriction=0, criticalSlipDistance=0,
+            contactAngle=p.contact_angle, surfaceTension=0.072)],
         [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(capillaryModel="willett", carriedLiquid=True)]),
     liquid,
     PyRunner(command="record()", iterPeriod=1, initRun=True),

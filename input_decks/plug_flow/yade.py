@@ -141,7 +141,8 @@ O.engines = [
             criticalSlipDistance=p.critical_slip_distance, interfaceShearStrength=p.interface_shear_strength,
             bridgeVolume=0 if carried else p.bridge_volume, contactAngle=p.contact_angle, surfaceTension=p.surface_tension)],
         [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(
-            presliding=p.presliding, capillaryModel=p.capillary_model if carried or p.bridge_volume > 0 else "none", carriedLiquid=carried)],
+            presliding=p.presliding, capillaryModel=p.capillary_model if carried or p.bridge_volume > 0 else "none",
+            carriedLiquid=carried)],
     ),
     *([liquid] if carried else []),
     # Between forces and motion, where positions and forces belong to the same time.

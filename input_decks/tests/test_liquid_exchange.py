@@ -37,7 +37,8 @@ def start(engine: str, folder: Path, words: dict[str, Any]) -> Any:
     deck = folder / DECKS[engine]
     shutil.copy(CASE / DECKS[engine], deck)
     shutil.copy(CASE / "case.toml", folder)
-    return engines.call(found.command(deck, {key: str(value) for key, value in words.items() if value is not None}), folder, found.environment())
+    words = {key: str(value) for key, value in words.items() if value is not None}
+    return engines.call(found.command(deck, words), folder, found.environment())
 
 
 def test_liggghts_defaults_are_those_of_the_case_file() -> None:

@@ -237,7 +237,11 @@ const FixCapillaryLiquid::Totals &FixCapillaryLiquid::totals() {
   for (int i = 0; i < atom->nlocal; ++i) {
     mine[0] += std::max(liquid()[i], 0.0);
     for (std::size_t k = 0; k < width(); ++k) mine[1] += book(i)[k];
-    for (std::size_t w = 0; w < walls_.size(); ++w)
+  }
+  for (std::size_t w = 0; w < walls_.size(); ++w) {
+    // Between two runs a wall may be gone already.
+    if (modify->find_fix_id(walls_[w].id.c_str()) != walls_[w].fix) continue;
+    for (int i = 0; i < atom->nlocal; ++i)
       if (book(i)[1 + w] > 0.0) each_wall_bridge(walls_[w], i, [&](double) { mine[2] += 1.0L; });
   }
   each_pair_bridge([&](int, int j, double, double) { mine[2] += j < atom->nlocal ? 1.0L : 0.5L; });

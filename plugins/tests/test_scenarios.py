@@ -136,7 +136,8 @@ def test_energy_of_a_cycle_is_the_work_of_the_liquid(motions, driver, name):
     lost = 0.5 * reduced * (one.velocity[2] ** 2 - speed[-1] ** 2)
 
     def against_bridge(u):  # the slope of the force is infinite at rupture: gap = end (1 - u^2)
-        return 2.0 * end * u * capillary_force(one.radius, two.radius, end * (1 - u * u), m.bridge_volume, m.surface_tension, m.contact_angle)
+        gap = end * (1 - u * u)
+        return 2.0 * end * u * capillary_force(one.radius, two.radius, gap, m.bridge_volume, m.surface_tension, m.contact_angle)
 
     hysteresis = quad(against_bridge, 0.0, 1.0, epsrel=1e-9)[0]
     held = np.arange(len(gap)) >= int(np.argmax(gap < 0.0))

@@ -29,11 +29,13 @@ def liquid_quantities(replicas: Sequence[Replica]) -> list[Quantity]:
     late = [slice(len(total) // 2, None) for total in totals]
     grains = float(replicas[0].parameters["grain_count"])
     return [
-        Quantity("liquid_total", "liquid: largest change of the total, over the total", "1", Estimate(change, 0.0, "none, nothing is random"),
+        Quantity("liquid_total", "liquid: largest change of the total, over the total", "1",
+                 Estimate(change, 0.0, "none, nothing is random"),
                  reference=Estimate(0.0, 0.0), tolerance=ROUND_OFF, absolute=True, compared=False, source="conservation law",
                  detail=f"on grains, in bridges and on walls, and what left; {totals[0][0]:.4g} m³ at the start, over the whole run"),
         Quantity("bridge_count", "liquid bridges a grain", "1",
                  over_replicas([block_mean(times["bridge_count"][part] / grains) for times, part in zip(tables, late, strict=True)])),
         Quantity("liquid_in_bridges", "part of the liquid that is in bridges", "1",
-                 over_replicas([block_mean((times["liquid_bridges"] / total)[part]) for times, total, part in zip(tables, totals, late, strict=True)])),
+                 over_replicas([block_mean((times["liquid_bridges"] / total)[part])
+                                for times, total, part in zip(tables, totals, late, strict=True)])),
     ]

@@ -148,8 +148,10 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
         found.append(_zero(f"liquid_{k + 1}_error", f"largest error of the liquid of grain {k + 1}, over all liquid",
                            np.abs(grains[:, k] - books.grains[:, k]).max() / total, 1e-12))
     found += [
-        _zero("wall_liquid_error", "largest error of the liquid of the left wall, over all liquid", np.abs(times["liquid_walls"] - books.wall).max() / total, 1e-12),
-        _zero("bridge_volume_error", "largest error of the liquid in bridges, over all liquid", np.abs(times["liquid_bridges"] - books.bridges).max() / total, 1e-12),
+        _zero("wall_liquid_error", "largest error of the liquid of the left wall, over all liquid",
+              np.abs(times["liquid_walls"] - books.wall).max() / total, 1e-12),
+        _zero("bridge_volume_error", "largest error of the liquid in bridges, over all liquid",
+              np.abs(times["liquid_bridges"] - books.bridges).max() / total, 1e-12),
         _zero("bridge_count_error", "largest error of the number of bridges", np.abs(times["bridge_count"] - books.count).max(), 0.0),
     ]
     for k in range(GRAINS):
@@ -157,7 +159,8 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
         found.append(Quantity(f"liquid_{k + 1}", f"liquid of grain {k + 1} at the end", "m^3", exact(grains[-1, k]), reference=due,
                               tolerance=1e-12 * total, absolute=True, agreement=1e-12 * total, source="the rule on the given paths"))
     changes = int(np.abs(np.diff(books.count)).sum())
-    found.append(Quantity("changes", "changes of the number of bridges from row to row", "1", exact(np.abs(np.diff(times["bridge_count"])).sum()),
+    found.append(Quantity("changes", "changes of the number of bridges from row to row", "1",
+                          exact(np.abs(np.diff(times["bridge_count"])).sum()),
                           reference=exact(changes), tolerance=0.0, agreement=0.0, source="the rule on the given paths"))
     return found, _curves(times, grains, books), [f"All liquid: {total:.6g} m³. Paths are given; forces move nothing."]
 

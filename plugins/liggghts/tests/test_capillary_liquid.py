@@ -173,6 +173,8 @@ group half id 1:60
 delete_atoms group half compress no
 run 250
 unfix left
+variable seen equal f_liquid[5]
+print "bridges while a wall is gone: ${seen}"
 run 250"""
     rows = run_shaken(tmp_path, shaken(commands))
     held, lost = column(rows, "held"), column(rows, "lost")

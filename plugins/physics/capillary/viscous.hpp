@@ -34,7 +34,8 @@ struct ViscousLiquid {
   const char* error() const {
     if (!(viscosity >= 0.0 && std::isfinite(viscosity))) return "the viscosity (Pa s) must be >= 0 and finite";
     if (viscosity > 0.0 && !(minimum_gap > 0.0 && std::isfinite(minimum_gap)))
-      return "the minimum gap (m) must be > 0 and finite with a viscosity: viscous forces diverge as the gap closes; the roughness of the surfaces is usual";
+      return "the minimum gap (m) must be > 0 and finite with a viscosity: viscous forces diverge as the gap closes; the roughness of the "
+             "surfaces is usual";
     return nullptr;
   }
 };

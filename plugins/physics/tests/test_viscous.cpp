@@ -57,7 +57,8 @@ TEST_CASE("limits of the resistance", "[viscous]") {
   const double x = 1e-20 / (pi * R * 1e-8);
   REQUIRE_THAT(viscous_resistance(oil, R, 1e-4, 1e-20).normal, WithinRel(1.5 * pi * 0.1 * R * R * x * x / 1e-4, 1e-6));
   // A sphere along a wall: 6 pi eta a (8/15 ln(a/s) + 0.9588), a = R / 2.
-  REQUIRE_THAT(viscous_resistance(oil, R, 1e-5, volume).tangential, WithinRel(6.0 * pi * 0.1 * 1e-3 * (8.0 / 15.0 * std::log(100.0) + 0.9588), 1e-14));
+  REQUIRE_THAT(viscous_resistance(oil, R, 1e-5, volume).tangential,
+               WithinRel(6.0 * pi * 0.1 * 1e-3 * (8.0 / 15.0 * std::log(100.0) + 0.9588), 1e-14));
   // The asymptote of a narrow gap must not turn round in a wide one.
   REQUIRE(viscous_resistance(oil, R, 1.0, volume).tangential == 0.0);
   const auto dry = viscous_resistance(oil, R, 1e-5, 0.0), inviscid = viscous_resistance(ViscousLiquid{}, R, 1e-5, volume);
@@ -90,7 +91,8 @@ TEST_CASE("what is wrong with a viscous liquid is said", "[viscous]") {
   REQUIRE(oil.error() == nullptr);
   REQUIRE(ViscousLiquid{}.error() == nullptr);
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
-  for (const double bad : {-1.0, nan, infinite}) REQUIRE(std::string(ViscousLiquid{bad, 1e-6}.error()).find("viscosity") != std::string::npos);
+  for (const double bad : {-1.0, nan, infinite})
+    REQUIRE(std::string(ViscousLiquid{bad, 1e-6}.error()).find("viscosity") != std::string::npos);
   for (const double bad : {0.0, -1e-6, nan, infinite})
     REQUIRE(std::string(ViscousLiquid{1e-3, bad}.error()).find("minimum gap") != std::string::npos);
 }
@@ -118,11 +120,13 @@ TEST_CASE("the liquid takes energy from any motion, and no angular momentum", "[
     state.bridge_volume = volume;
     state.rupture_distance = 1.0;
     const ContactForce f = contact_step(p, b, 1e-7, state);
-    const double power = dot(f.force, b.velocity_1 - b.velocity_2) + dot(f.torque_1, b.angular_velocity_1) + dot(f.torque_2, b.angular_velocity_2);
+    const double power = dot(f.force, b.velocity_1 - b.velocity_2) + dot(f.torque_1, b.angular_velocity_1) +
+                         dot(f.torque_2, b.angular_velocity_2);
     const RelativeMotion m = relative_motion(b, f.normal, f.overlap);
     const auto c = viscous_resistance(oil, 2.0 * reduced(2e-3, 1.5e-3), -f.overlap, volume);
     REQUIRE(power < 0.0);
-    REQUIRE_THAT(power, WithinRel(-c.normal * m.normal_velocity * m.normal_velocity - c.tangential * dot(m.tangential_velocity, m.tangential_velocity), 1e-10));
+    REQUIRE_THAT(power, WithinRel(-c.normal * m.normal_velocity * m.normal_velocity -
+                                  c.tangential * dot(m.tangential_velocity, m.tangential_velocity), 1e-10));
     REQUIRE_THAT(norm(f.torque_1 + f.torque_2 + cross(b.separation, f.force)), WithinAbs(0.0, 1e-12 * norm(b.separation) * norm(f.force)));
 
     // Seen from the other body it is the same pair.

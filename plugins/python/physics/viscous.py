@@ -24,7 +24,8 @@ def check_viscous(viscosity: ArrayLike, minimum_gap: ArrayLike) -> tuple[NDArray
     eta = numbers("viscosity", viscosity, "Pa s", low=0.0)
     floor = numbers("minimum_gap", minimum_gap, "m", low=0.0)
     if ((eta > 0.0) & (floor == 0.0)).any():
-        raise ValueError("minimum_gap must be > 0 m with a viscosity: viscous forces diverge as the gap closes; the roughness of the surfaces is usual")
+        raise ValueError("minimum_gap must be > 0 m with a viscosity: viscous forces diverge as the gap closes; the roughness of the "
+                         "surfaces is usual")
     return eta, floor
 
 

@@ -68,9 +68,10 @@ def replica(folder: Path, variant: str, spoil: str = "") -> Replica:
         grains[100, 2] *= 1.0 + 1e-9
     if spoil == "lost":
         lost += 1e-20
-    table = np.column_stack([STEPS, np.array(STEPS) * p["time_step"], np.ones(len(STEPS)), grains.sum(axis=1), books.bridges, books.wall, lost,
-                             books.count + (spoil == "count"), grains])
-    np.savetxt(folder / "time.csv", table, delimiter=",", fmt="%.17g", comments="", header=COLUMNS + "".join(f",liquid_{k}" for k in range(1, 6)))
+    table = np.column_stack([STEPS, np.array(STEPS) * p["time_step"], np.ones(len(STEPS)), grains.sum(axis=1), books.bridges, books.wall,
+                             lost, books.count + (spoil == "count"), grains])
+    np.savetxt(folder / "time.csv", table, delimiter=",", fmt="%.17g", comments="",
+               header=COLUMNS + "".join(f",liquid_{k}" for k in range(1, 6)))
     return Replica(folder, {"parameters": p, "time_step": p["time_step"], "engine": "liggghts"})
 
 
@@ -97,7 +98,8 @@ def test_carried_liquid_of_any_case(tmp_path: Path) -> None:
     bridges = 0.3 + 0.01 * np.sin(steps)
     header = "step,time,kinetic_energy,base_fz,liquid_grains,liquid_bridges,liquid_walls,liquid_lost,bridge_count"
     for drift, verdict in ((0.0, "pass"), (1e-11, "fail")):
-        table = np.column_stack([steps, steps * 1e-3, steps * 0 + 1.0, steps * 0, (0.7 - bridges) + drift * steps, bridges, steps * 0 + 0.25, steps * 0 + 0.05, 300 + steps % 3])
+        table = np.column_stack([steps, steps * 1e-3, steps * 0 + 1.0, steps * 0, (0.7 - bridges) + drift * steps, bridges,
+                                 steps * 0 + 0.25, steps * 0 + 0.05, 300 + steps % 3])
         np.savetxt(tmp_path / "time.csv", table, delimiter=",", fmt="%.15g", comments="", header=header)
         run = Replica(tmp_path, {"parameters": {"liquid_content": 0.01, "grain_count": 100}})
         found = {one.name: one for one in carried_liquid.liquid_quantities([run])}

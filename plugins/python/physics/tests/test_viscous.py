@@ -31,7 +31,8 @@ def test_signs_scaling_and_symmetry(log_volume, log_gap, ratio, scale):
     volume, gap = 10.0**log_volume * R**3, 10.0**log_gap * R
     one = viscous_resistance(R, ratio * R, gap, volume, ETA, FLOOR)
     assert one.normal > 0.0 <= one.tangential
-    for factor, other in ((1.0, viscous_resistance(ratio * R, R, gap, volume, ETA, FLOOR)), (3.0, viscous_resistance(R, ratio * R, gap, volume, 3 * ETA, FLOOR)),
+    for factor, other in ((1.0, viscous_resistance(ratio * R, R, gap, volume, ETA, FLOOR)),
+                          (3.0, viscous_resistance(R, ratio * R, gap, volume, 3 * ETA, FLOOR)),
                           (scale, viscous_resistance(scale * R, scale * ratio * R, scale * gap, scale**3 * volume, ETA, scale * FLOOR))):
         np.testing.assert_allclose(other, factor * np.array(one), rtol=1e-9)
     assert viscous_resistance(R, ratio * R, gap, 2.0 * volume, ETA, FLOOR).normal > one.normal
@@ -51,7 +52,8 @@ def test_unbounded_liquid_and_wall():
     gap = np.array([1e-6, 1e-5])
     np.testing.assert_allclose(viscous_resistance(R, R, gap, 1e6, ETA, FLOOR).normal, 6 * np.pi * ETA * (R / 2) ** 2 / gap, rtol=1e-8)
     np.testing.assert_allclose(viscous_resistance(R, np.inf, gap, 1e6, ETA, FLOOR).normal, 6 * np.pi * ETA * R**2 / gap, rtol=1e-8)
-    np.testing.assert_array_equal(viscous_resistance(R, np.inf, gap, 1e-11, ETA, FLOOR), viscous_resistance(2 * R, 2 * R, gap, 1e-11, ETA, FLOOR))
+    np.testing.assert_array_equal(viscous_resistance(R, np.inf, gap, 1e-11, ETA, FLOOR),
+                                  viscous_resistance(2 * R, 2 * R, gap, 1e-11, ETA, FLOOR))
 
 
 def test_shapes():
@@ -88,7 +90,8 @@ def test_hysteresis_work_of_the_bridge(model):
     volume = 1e-11
     end = rupture_distance(volume, ANGLE, R, R, model=model)
     # Towards rupture the slope of the exact force is infinite: gap = end (1 - u^2).
-    work = quad(lambda u: capillary_force(R, R, end * (1 - u * u), volume, GAMMA, ANGLE, model=model) * 2 * end * u, 0.0, 1.0, epsrel=1e-9, limit=200)[0]
+    work = quad(lambda u: capillary_force(R, R, end * (1 - u * u), volume, GAMMA, ANGLE, model=model) * 2 * end * u, 0.0, 1.0, epsrel=1e-9,
+                limit=200)[0]
     assert work > 0.0
     ring = 2 * np.pi * R * GAMMA * np.cos(ANGLE)
     if model == "constant":
@@ -127,7 +130,8 @@ def test_energy_of_a_collision_is_lost_to_bridge_and_liquid_alone(viscosity, spe
     gap = np.array([-c.overlap for c in motion.contacts])
     liquid = np.array([c.viscous_normal for c in motion.contacts])
     dissipated = -np.sum(liquid * relative) * step
-    hysteresis = quad(lambda u: capillary_force(R, 0.6 * R, end * (1 - u * u), volume, GAMMA, ANGLE) * 2 * end * u, 0.0, 1.0, epsrel=1e-9)[0]
+    hysteresis = quad(lambda u: capillary_force(R, 0.6 * R, end * (1 - u * u), volume, GAMMA, ANGLE) * 2 * end * u, 0.0, 1.0,
+                      epsrel=1e-9)[0]
     assert lost == pytest.approx(hysteresis + dissipated, rel=2e-3)
     assert (gap.min() < 0.0) and (dissipated > 0.2 * hysteresis if viscosity else dissipated == 0.0)
     assert all(c.viscous_normal == 0.0 for c in motion.contacts[: int(np.argmax(gap < 0.0))])
