@@ -25,20 +25,22 @@ struct ContactEnergies {
   double tangential_elastic = 0.0;  ///< W, spring and slip
   double tangential_viscous = 0.0;  ///< W
   double capillary = 0.0;           ///< W
+  double liquid_viscous = 0.0;      ///< W, what the liquid of a bridge resists with
 
-  double power() const { return normal_elastic + normal_viscous + tangential_elastic + tangential_viscous + capillary; }
+  double power() const { return normal_elastic + normal_viscous + tangential_elastic + tangential_viscous + capillary + liquid_viscous; }
 };
 
 /// Energies of a contact of which `contact_step` has returned `force` and left `displacement` (xi). `mean` are the bodies at the same
 /// positions, with the velocities V(n) of (1).
 inline ContactEnergies contact_energies(const ContactParameters& p, const ContactBodies& mean, const ContactForce& force, const Vec3<double>& displacement) {
   ContactEnergies out;
-  const Vec3<double> relative = mean.velocity_1 - mean.velocity_2;
-  const double parting = dot(relative, force.normal);
+  const RelativeMotion motion = relative_motion(mean, force.normal, force.overlap);
+  const double parting = motion.normal_velocity;
+  const Vec3<double>& sliding = motion.tangential_velocity;
   out.capillary = -force.capillary_force * parting;
+  out.liquid_viscous = force.viscous_normal * parting + dot(force.viscous_tangential, sliding);
   if (!(force.overlap > 0.0)) return out;
 
-  const bool wall = std::isinf(mean.radius_2);
   const double effective_radius = reduced(mean.radius_1, mean.radius_2), effective_mass = reduced(mean.mass_1, mean.mass_2);
   // At rest there is no damping: what is left of the law is its spring.
   const NormalResponse<double> spring = p.normal_law == NormalLaw::hertz
@@ -48,9 +50,6 @@ inline ContactEnergies contact_energies(const ContactParameters& p, const Contac
   out.normal_elastic = spring.force * parting;
   out.normal_viscous = (force.normal_force - spring.force) * parting;
 
-  const double arm_1 = mean.radius_1 - 0.5 * force.overlap, arm_2 = wall ? 0.0 : mean.radius_2 - 0.5 * force.overlap;
-  const Vec3<double> spin = arm_1 * mean.angular_velocity_1 + arm_2 * mean.angular_velocity_2;
-  const Vec3<double> sliding = relative - cross(spin, force.normal);
   const Vec3<double> held = -spring.tangential_stiffness * displacement;
   out.tangential_stored = 0.5 * spring.tangential_stiffness * dot(displacement, displacement);
   out.tangential_elastic = dot(held, sliding);

@@ -14,7 +14,7 @@ const capillary::BridgeForce bridge(capillary::Model::willett, 0.35);
 
 /// Sums over an oblique impact of two spheres by leapfrog.
 struct Account {
-  double kinetic_change = 0.0, total = 0.0, normal = 0.0, viscous = 0.0, tangential = 0.0, friction = 0.0, capillary = 0.0, scale = 0.0, worst = 0.0;
+  double kinetic_change = 0.0, total = 0.0, normal = 0.0, viscous = 0.0, tangential = 0.0, friction = 0.0, capillary = 0.0, liquid = 0.0, scale = 0.0, worst = 0.0;
   double half_way = 0.0;  ///< worst difference of what the normal spring took and what it holds
 };
 
@@ -54,6 +54,7 @@ Account impact(const ContactParameters& p, double dt) {
     out.viscous += (e.normal_viscous + e.tangential_viscous) * dt;
     out.tangential += e.tangential_elastic * dt;
     out.capillary += e.capillary * dt;
+    out.liquid += e.liquid_viscous * dt;
     out.friction = std::max(out.friction, state.friction.dissipated_energy);
     out.worst = std::max(out.worst, std::abs(kinetic(b) - start - out.total));
     // Half of this step's work is of the way after its positions.
@@ -64,24 +65,24 @@ Account impact(const ContactParameters& p, double dt) {
   return out;
 }
 
-ContactParameters parameters(double restitution, double friction, bool wet) {
+ContactParameters parameters(double restitution, double friction, bool wet, double viscosity = 0.0) {
   ContactParameters p;
   p.elasticity = {effective_youngs_modulus(5e6, 0.3, 5e6, 0.3), effective_shear_modulus(5e6, 0.3, 5e6, 0.3), restitution};
   p.friction.static_friction = p.friction.kinetic_friction = friction;
-  if (wet) p.liquid = {&bridge, 0.072, 1e-11};
+  if (wet) p.liquid = {&bridge, 0.072, 1e-11, {viscosity, 1e-5}};
   return p;
 }
 
 }  // namespace
 
 TEST_CASE("works of all parts of a contact balance the kinetic energy to round-off at any step") {
-  for (const bool wet : {false, true})
+  for (const double viscosity : {-1.0, 0.0, 0.01})  // -1: dry
     for (const double friction : {0.0, 0.2, 100.0})
       for (const double restitution : {1.0, 0.4})
         for (const double dt : {1e-6, 2e-5}) {
           for (const NormalLaw law : {NormalLaw::hertz, NormalLaw::hooke})
             for (const Presliding path : {Presliding::linear, Presliding::exponential}) {
-              ContactParameters p = parameters(restitution, friction, wet);
+              ContactParameters p = parameters(restitution, friction, viscosity >= 0.0, viscosity);
               p.normal_law = law;
               p.friction.presliding = path;
               const Account a = impact(p, dt);
@@ -104,6 +105,8 @@ TEST_CASE("each part does what it is due to") {
   const Account smooth = impact(parameters(1.0, 0.0, false), 1e-6);
   CHECK(smooth.tangential == 0.0);
   CHECK_THAT(smooth.kinetic_change, WithinAbs(0.0, 1e-6 * smooth.scale));
+  CHECK(impact(parameters(1.0, 0.0, true), 1e-6).liquid == 0.0);
+  CHECK(impact(parameters(1.0, 0.0, true, 0.01), 1e-6).liquid < 0.0);
   CHECK(impact(parameters(1.0, 0.0, true), 1e-6).capillary < 0.0);  // the bridge forms at the touch and ruptures far behind it
 }
 
