@@ -29,6 +29,7 @@ COHESION_MODEL(COHESION_CAPILLARY,capillary,20)
 
 #include "dembark/capillary/bridge.hpp"
 #include "dembark/capillary/viscous.hpp"
+#include "dembark/kinematics.hpp"
 #include "dembark/vec3.hpp"
 #include "bridge_reach.h"
 #include "fix_capillary_liquid.h"
@@ -58,6 +59,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
   std::vector<PairLiquid> pairs_;  // one a pair of types, row by row
   std::map<double, std::shared_ptr<const dembark::capillary::BridgeForce>> built_;  // by mean contact angle
 
+  static double bridge_radius(const SurfacesCloseData& d) { return d.is_wall ? 2.0 * d.radi : 2.0 * d.radi * d.radj / d.radsum; }
   static double other_radius(const SurfacesCloseData& d) { return d.is_wall ? INFINITY : d.radj; }
 
   void pull(const SurfacesCloseData& d, double force, const double* normal, ForceData& i_forces, ForceData& j_forces) const {
@@ -76,10 +78,10 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     const double arm_i = d.radi + 0.5 * gap, arm_j = d.is_wall ? 0.0 : d.radj + 0.5 * gap;
     Vec3 spin = arm_i * vec(d.is_wall ? d.omega_i : atom->omega[d.i]);
     if (!d.is_wall) spin += arm_j * vec(atom->omega[d.j]);
-    const double normal_velocity = dot(relative, n);
+    const dembark::ContactMotion<double> motion = dembark::contact_motion(n, relative, spin);
     const auto resistance = dembark::capillary::viscous_resistance(liquid_, bridge_radius(d), gap, volume);
-    const Vec3 tangential = -resistance.tangential * (relative - normal_velocity * n - cross(spin, n));
-    const Vec3 force = tangential - resistance.normal * normal_velocity * n, moment = cross(n, tangential);
+    const Vec3 tangential = -resistance.tangential * motion.tangential;
+    const Vec3 force = tangential - resistance.normal * motion.normal * n, moment = cross(n, tangential);
     const double scale = d.is_wall ? d.area_ratio : 1.0;
     const double f[3] = {force.x, force.y, force.z}, m[3] = {moment.x, moment.y, moment.z};
     for (int k = 0; k < 3; ++k) {
