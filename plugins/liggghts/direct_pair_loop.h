@@ -77,6 +77,7 @@ class DirectPairLoop : public StockLoop<Cohesion> {
 
   LAMMPS_NS::LAMMPS* lmp_;
   double **youngs_modulus_ = nullptr, **shear_modulus_ = nullptr, **damping_factor_ = nullptr;  // effective ones, by types
+  int types_ = 1;    // that grains or walls have, and one: the engine's tables end there, whatever the box was made for
   double dt_ = 0.0;  // of this step
   bool update_history_ = false;
   bool plain_settings_ = true, limit_force_ = false, tangential_damping_ = true;
@@ -99,13 +100,12 @@ class DirectPairLoop : public StockLoop<Cohesion> {
 
   // False when a law has to be left to its scalar form.
   bool collect_laws(double dt) {
-    const int types = lmp_->atom->ntypes + 1;
     bool linear = true;
-    laws_.assign(types * types, {});
-    for (int i = 1; i < types; ++i)
-      for (int j = 1; j < types; ++j) {
+    laws_.assign(types_ * types_, {});
+    for (int i = 1; i < types_; ++i)
+      for (int j = 1; j < types_; ++j) {
         const dembark::FinnieRabinowicz& law = friction().law(i, j);
-        laws_[i * types + j] = {youngs_modulus_[i][j], shear_modulus_[i][j], damping_factor_[i][j], law.static_friction, law.kinetic_friction,
+        laws_[i * types_ + j] = {youngs_modulus_[i][j], shear_modulus_[i][j], damping_factor_[i][j], law.static_friction, law.kinetic_friction,
                                 law.interface_shear_strength, dembark::kept_slip(law, dt), 0.0};
         linear = linear && law.presliding == dembark::Presliding::linear;
       }
@@ -158,6 +158,7 @@ class DirectPairLoop : public StockLoop<Cohesion> {
     registry.connect("Yeff", youngs_modulus_, "model hertz");
     registry.connect("Geff", shear_modulus_, "model hertz");
     registry.connect("betaeff", damping_factor_, "model hertz");
+    types_ = registry.max_type() + 1;
   }
 
   void compute_force(LAMMPS_NS::PairGran* pair, int eflag, int vflag, int addflag) override {
@@ -196,7 +197,7 @@ class DirectPairLoop : public StockLoop<Cohesion> {
     // The scalar law knows what a step of no length is.
     step.pack_friction = collect_laws(dt_) && dt_ > 0.0;
     step.laws = laws_.data();
-    step.types = atom->ntypes + 1;
+    step.types = types_;
     step.dt = dt_;
     step.reach_squared = lmp_->neighbor->contactDistanceFactor * lmp_->neighbor->contactDistanceFactor;
     step.limit_force = limit_force_;
