@@ -42,7 +42,11 @@ copy() {  # copy FILE TARGET
   changed=$((changed + 1))
 }
 # The models and what they include; the rest of that folder is liggghts-dembark's own way into a finished library.
-for file in "$here"/plugins/liggghts/*_model_*.h "$here"/plugins/liggghts/{model_properties,settings_choice}.h; do
+for file in "$here"/plugins/liggghts/*_model_*.h "$here"/plugins/liggghts/{bridge_reach,model_properties,settings_choice}.h; do
+  copy "$file" "$src/$(basename "$file")"
+done
+# Liquid that grains and walls own.
+for file in "$here"/plugins/liggghts/fix_capillary_liquid*; do
   copy "$file" "$src/$(basename "$file")"
 done
 # States to resume from.

@@ -102,7 +102,7 @@ contact_angle = 0.1
 
 [runs]
 quick = [{variant = "dry"}, {variant = "wet", engines = ["liggghts"]}]
-standard = [{variant = "dry", replicas = {yade = 1}}]
+standard = [{variant = "dry"}]
 
 [[constraints]]
 expression = "kinetic_friction <= static_friction"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from dembark.validation import cases, simulate
+from dembark.validation import cases, outcome
 from dembark.validation.errors import DembarkError, RunError
 from dembark.validation.files import check_impacts
 from hypothesis import given
@@ -92,14 +92,14 @@ def write_run(folder: Path, frames: int = 2) -> None:
 def test_only_what_is_asked_for_is_looked_at(tmp_path: Path) -> None:
     write_run(tmp_path)
     everything = tuple(cases.OUTPUTS)
-    assert simulate._check_output(tmp_path, everything, 2) == 2
+    assert outcome.check_output(tmp_path, everything, 2) == 2
     for name, file in cases.OUTPUTS.items():
         (tmp_path / file).rename(tmp_path / "aside")
         with pytest.raises(RunError, match=f"no {file}"):
-            simulate._check_output(tmp_path, everything, 2)
+            outcome.check_output(tmp_path, everything, 2)
         rest = tuple(other for other in everything if other != name)
-        assert simulate._check_output(tmp_path, rest, 2) == 2
+        assert outcome.check_output(tmp_path, rest, 2) == 2
         (tmp_path / "aside").rename(tmp_path / file)
-    assert simulate._check_output(tmp_path, ("times", "impacts"), 2) == 0
+    assert outcome.check_output(tmp_path, ("times", "impacts"), 2) == 0
     with pytest.raises(RunError, match="2 frames instead of 3"):
-        simulate._check_output(tmp_path, ("contacts",), 3)
+        outcome.check_output(tmp_path, ("contacts",), 3)

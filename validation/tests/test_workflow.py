@@ -84,6 +84,8 @@ def test_studies_are_planned_for_engines_that_run_all_their_variants(decks: Path
 
 
 def test_a_line_of_runs_may_give_an_engine_its_own_number_of_replicas(decks: Path) -> None:
+    path = decks / "box" / "case.toml"
+    path.write_text(path.read_text().replace('standard = [{variant = "dry"}]', 'standard = [{variant = "dry", replicas = {yade = 1}}]'))
     assert {one.runs[0].engine.name: len(one.runs) for one in campaign("standard")} == {"liggghts": 3, "yade": 1}
 
 
