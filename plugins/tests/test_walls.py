@@ -79,8 +79,7 @@ def liggghts(tmp_path_factory):
         if word:
             decks[kind, name] = _deck(case, word, folder, f"{len(decks)}.stl")
             cases[kind, name] = case
-    walls.batch(folder, decks)
-    return {key: walls.motion_of(cases[key], folder / f"{number}.dump") for number, key in enumerate(decks)}
+    return walls.motions(folder, decks, cases)
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from rig.python_driver import contact, prescribed
 from rig.scenarios import Path, Scenario
 
 CYLINDER = 0.05
+Key = TypeVar("Key")
 Three = tuple[float, float, float]
 Triangle = tuple[Three, Three, Three]
 
@@ -83,11 +85,17 @@ def on_mesh(text: str, folder: FilePath, triangles: list[Triangle], move: str = 
     return text.replace(plane, lines + plane.replace("primitive type 2 zplane 0", "mesh n_meshes 1 meshes stl"))
 
 
-def batch(folder: FilePath, decks: dict[str, str], ranks: int = 1) -> None:
+def batch(folder: FilePath, decks: dict[Key, str], ranks: int = 1) -> None:
     """Runs decks one after the other in one start of LIGGGHTS; each dump gets its deck's number."""
     text = "\nclear\n".join(deck.replace("grains.dump", f"{number}.dump") for number, deck in enumerate(decks.values()))
     done = liggghts_driver.run_deck(folder, text, ranks=ranks)
     assert done.code == 0 and not done.error, done.error or done.output[-2000:]
+
+
+def motions(folder: FilePath, decks: dict[Key, str], cases: dict[Key, Scenario]) -> dict[Key, Motion]:
+    """What `batch` gives, read back, with the keys of `decks`."""
+    batch(folder, decks)
+    return {key: motion_of(cases[key], folder / f"{number}.dump") for number, key in enumerate(decks)}
 
 
 def motion_of(case: Scenario, dump: FilePath) -> Motion:
