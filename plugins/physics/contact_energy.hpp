@@ -13,19 +13,74 @@
 // grows with delta though no tangential work is done. Its stored energy and its work differ by slip and by that.
 #pragma once
 
+#include <array>
+
 #include "contact.hpp"
 
 namespace dembark {
 
+/// What the force of a contact is made of.
+enum class ContactPart {
+  normal_elastic,      ///< normal spring
+  normal_viscous,      ///< normal damping, and what `limit_force` cuts off
+  tangential_elastic,  ///< tangential spring, slip included
+  tangential_viscous,  ///< tangential damping
+  capillary,           ///< liquid bridge
+  liquid_viscous,      ///< what the liquid of a bridge resists with
+};
+constexpr std::size_t contact_part_count = 6;
+
+/// The parts of a contact's force on body 1 (N; body 2 gets the negatives) and what its springs hold. Their sum is the force; the torques
+/// of a part are those of the contact, -arm n x force, with the lever arms of relative_motion().
+struct ContactParts {
+  std::array<Vec3<double>, contact_part_count> force{};
+  double normal_stored = 0.0;      ///< J, elastic energy at this overlap
+  double tangential_stored = 0.0;  ///< J, k_t xi^2 / 2
+
+  Vec3<double>& operator[](ContactPart part) { return force[static_cast<std::size_t>(part)]; }
+  const Vec3<double>& operator[](ContactPart part) const { return force[static_cast<std::size_t>(part)]; }
+};
+
+/// Springs and dash-pots of a touching contact. `spring`: N, what the normal law gives at rest, which grows with overlap^exponent;
+/// `normal_force`: N, what it gave; `stiffness`: k_t; `tangential`: N, on body 1; `displacement`: xi after the step.
+inline void split_touching(ContactParts& parts, const Vec3<double>& normal, double overlap, double spring, double exponent, double normal_force,
+                           double stiffness, const Vec3<double>& tangential, const Vec3<double>& displacement) {
+  const Vec3<double> held = -stiffness * displacement;
+  parts[ContactPart::normal_elastic] = spring * normal;
+  parts[ContactPart::normal_viscous] = (normal_force - spring) * normal;
+  parts[ContactPart::tangential_elastic] = held;
+  parts[ContactPart::tangential_viscous] = tangential - held;
+  parts.normal_stored = spring * overlap / (1.0 + exponent);
+  parts.tangential_stored = 0.5 * stiffness * dot(displacement, displacement);
+}
+
+/// The parts of `force`, which `contact_step` has returned when it left `displacement` (xi). Of the bodies only radii and masses count.
+inline ContactParts contact_parts(const ContactParameters& p, const ContactBodies& bodies, const ContactForce& force, const Vec3<double>& displacement) {
+  ContactParts parts;
+  parts[ContactPart::capillary] = -force.capillary_force * force.normal;
+  parts[ContactPart::liquid_viscous] = force.viscous_normal * force.normal + force.viscous_tangential;
+  if (!(force.overlap > 0.0)) return parts;
+
+  const double effective_radius = reduced(bodies.radius_1, bodies.radius_2), effective_mass = reduced(bodies.mass_1, bodies.mass_2);
+  const bool is_hertz = p.normal_law == NormalLaw::hertz;
+  // At rest there is no damping: what is left of the law is its spring.
+  const NormalResponse<double> spring =
+      is_hertz ? hertz(p.elasticity, effective_radius, effective_mass, force.overlap, 0.0)
+               : hooke(HookeParameters(p.elasticity, p.characteristic_velocity), effective_radius, effective_mass, force.overlap, 0.0);
+  split_touching(parts, force.normal, force.overlap, spring.force, is_hertz ? 1.5 : 1.0, force.normal_force, spring.tangential_stiffness,
+                 force.tangential, displacement);
+  return parts;
+}
+
 struct ContactEnergies {
-  double normal_stored = 0.0;       ///< J, elastic energy at this overlap
-  double tangential_stored = 0.0;   ///< J, k_t xi^2 / 2
+  double normal_stored = 0.0;       ///< J, as in ContactParts
+  double tangential_stored = 0.0;   ///< J
   double normal_elastic = 0.0;      ///< W, power of the parts of the force on both bodies together
-  double normal_viscous = 0.0;      ///< W, damping, and what `limit_force` cuts off
-  double tangential_elastic = 0.0;  ///< W, spring and slip
+  double normal_viscous = 0.0;      ///< W
+  double tangential_elastic = 0.0;  ///< W
   double tangential_viscous = 0.0;  ///< W
   double capillary = 0.0;           ///< W
-  double liquid_viscous = 0.0;      ///< W, what the liquid of a bridge resists with
+  double liquid_viscous = 0.0;      ///< W
 
   double power() const { return normal_elastic + normal_viscous + tangential_elastic + tangential_viscous + capillary + liquid_viscous; }
 };
@@ -33,28 +88,14 @@ struct ContactEnergies {
 /// Energies of a contact of which `contact_step` has returned `force` and left `displacement` (xi). `mean` are the bodies at the same
 /// positions, with the velocities V(n) of (1).
 inline ContactEnergies contact_energies(const ContactParameters& p, const ContactBodies& mean, const ContactForce& force, const Vec3<double>& displacement) {
-  ContactEnergies out;
+  const ContactParts parts = contact_parts(p, mean, force, displacement);
   const RelativeMotion motion = relative_motion(mean, force.normal, force.overlap);
-  const double parting = motion.normal_velocity;
-  const Vec3<double>& sliding = motion.tangential_velocity;
-  out.capillary = -force.capillary_force * parting;
-  out.liquid_viscous = force.viscous_normal * parting + dot(force.viscous_tangential, sliding);
-  if (!(force.overlap > 0.0)) return out;
-
-  const double effective_radius = reduced(mean.radius_1, mean.radius_2), effective_mass = reduced(mean.mass_1, mean.mass_2);
-  // At rest there is no damping: what is left of the law is its spring.
-  const NormalResponse<double> spring = p.normal_law == NormalLaw::hertz
-      ? hertz(p.elasticity, effective_radius, effective_mass, force.overlap, 0.0)
-      : hooke(HookeParameters(p.elasticity, p.characteristic_velocity), effective_radius, effective_mass, force.overlap, 0.0);
-  out.normal_stored = (p.normal_law == NormalLaw::hertz ? 0.4 : 0.5) * spring.force * force.overlap;
-  out.normal_elastic = spring.force * parting;
-  out.normal_viscous = (force.normal_force - spring.force) * parting;
-
-  const Vec3<double> held = -spring.tangential_stiffness * displacement;
-  out.tangential_stored = 0.5 * spring.tangential_stiffness * dot(displacement, displacement);
-  out.tangential_elastic = dot(held, sliding);
-  out.tangential_viscous = dot(force.tangential - held, sliding);
-  return out;
+  const Vec3<double> velocity = motion.normal_velocity * force.normal + motion.tangential_velocity;
+  const auto power = [&](ContactPart part) { return dot(parts[part], velocity); };
+  return {parts.normal_stored, parts.tangential_stored,
+          power(ContactPart::normal_elastic), power(ContactPart::normal_viscous),
+          power(ContactPart::tangential_elastic), power(ContactPart::tangential_viscous),
+          power(ContactPart::capillary), power(ContactPart::liquid_viscous)};
 }
 
 }  // namespace dembark

@@ -1,4 +1,5 @@
 #include <catch2/catch.hpp>
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -16,6 +17,7 @@ const capillary::BridgeForce bridge(capillary::Model::willett, 0.35);
 struct Account {
   double kinetic_change = 0.0, total = 0.0, normal = 0.0, viscous = 0.0, tangential = 0.0, friction = 0.0, capillary = 0.0, liquid = 0.0, scale = 0.0, worst = 0.0;
   double half_way = 0.0;  ///< worst difference of what the normal spring took and what it holds
+  double unsplit = 0.0;   ///< worst difference of the parts' sum and the force, and of their torques, relative
 };
 
 double kinetic(const ContactBodies& b) {
@@ -38,6 +40,16 @@ Account impact(const ContactParameters& p, double dt) {
   out.scale = start;
   for (double t = 0.0; t < 4e-3; t += dt) {
     const ContactForce f = contact_step(p, b, dt, state);
+    const ContactParts parts = contact_parts(p, b, f, state.friction.displacement);
+    Vec3<double> rest = f.force, rest_torque = f.torque_2;
+    const double arm_2 = relative_motion(b, f.normal, f.overlap).arm_2;
+    for (const Vec3<double>& part : parts.force) {
+      rest -= part;
+      rest_torque += arm_2 * cross(f.normal, part);
+    }
+    // Next to nothing is left of spring and damping where they cancel.
+    const double size = norm(parts[ContactPart::normal_elastic]) + norm(parts[ContactPart::normal_viscous]) + norm(f.force);
+    if (size > 0.0) out.unsplit = std::max({out.unsplit, norm(rest) / size, norm(rest_torque) / (size * b.radius_2)});
     const ContactBodies before = b;
     b.velocity_1 += (dt / b.mass_1) * f.force;
     b.velocity_2 -= (dt / b.mass_2) * f.force;
@@ -88,6 +100,7 @@ TEST_CASE("works of all parts of a contact balance the kinetic energy to round-o
               const Account a = impact(p, dt);
               CHECK(std::abs(a.total) > 1e-9 * a.scale);
               CHECK(a.worst < 1e-12 * a.scale);
+              CHECK(a.unsplit < 1e-14);
             }
         }
 }
