@@ -32,6 +32,7 @@ COHESION_MODEL(COHESION_CAPILLARY,capillary,20)
 #include "dembark/kinematics.hpp"
 #include "dembark/vec3.hpp"
 #include "bridge_reach.h"
+#include "energy_books.h"
 #include "fix_capillary_liquid.h"
 #include "model_properties.h"
 #include "settings_choice.h"
@@ -55,6 +56,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
   IContactHistorySetup* host_;
   LAMMPS_NS::FixCapillaryLiquid* owner_ = nullptr;  // of carried liquid
   const LAMMPS_NS::FixWallGran* wall_ = nullptr;
+  dembark_liggghts::EnergyBooks* books_ = nullptr;
   dembark::capillary::ViscousLiquid liquid_;
   std::vector<PairLiquid> pairs_;  // one a pair of types, row by row
   std::map<double, std::shared_ptr<const dembark::capillary::BridgeForce>> built_;  // by mean contact angle
@@ -68,6 +70,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
       i_forces.delta_F[k] -= scale * force * normal[k];
       if (!d.is_wall) j_forces.delta_F[k] += force * normal[k];
     }
+    if (books_) account(dembark::ContactPart::capillary, d, normal, -force * dembark::Vec3<double>{normal[0], normal[1], normal[2]}, 0.0, 0.0);
   }
 
   // What the liquid resists with, of a bridge of `volume` at `gap`. The engine sets velocities of surfaces for touching pairs only.
@@ -91,6 +94,12 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
       j_forces.delta_F[k] -= f[k];
       j_forces.delta_torque[k] -= arm_j * m[k];
     }
+    if (books_) account(dembark::ContactPart::liquid_viscous, d, normal, force, arm_i, arm_j);
+  }
+
+  DEMBARK_COLD void account(dembark::ContactPart part, const SurfacesCloseData& d, const double* normal, const dembark::Vec3<double>& force, double arm_i,
+                            double arm_j) const {
+    books_->add(part, d, {normal[0], normal[1], normal[2]}, force, arm_i, arm_j);
   }
 
   void check_time_step(double radius, double effective_mass) const {
@@ -161,6 +170,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
 
   void connectToProperties(PropertyRegistry& registry) {
     dembark_liggghts::PropertyReader read(registry, modify, error, "cohesion capillary");
+    books_ = dembark_liggghts::find_energy_books(modify);
     dembark::capillary::Model model{};
     dembark::capillary::model_from_name(dembark::capillary::model_names()[model_].c_str(), model);
     types_ = read.types() + 1;

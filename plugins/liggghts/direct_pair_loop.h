@@ -3,7 +3,7 @@
 // The engine's loop hands every number from model to model through memory and decides pair by pair whether there is a contact. Here
 // the contacts of many grains are picked first and computed in packs (pair_packs.h): the same laws and the same numbers to round-off, in
 // less time than the stock friction law takes. Whatever else the engine may ask of a pair style (energies, virial, stored forces, rigid
-// bodies, ...) is left to its own loop, step by step.
+// bodies, accounts of energy, ...) is left to its own loop, step by step.
 #ifndef DEMBARK_DIRECT_PAIR_LOOP_H
 #define DEMBARK_DIRECT_PAIR_LOOP_H
 
@@ -162,7 +162,7 @@ class DirectPairLoop : public StockLoop<Cohesion> {
   }
 
   void compute_force(LAMMPS_NS::PairGran* pair, int eflag, int vflag, int addflag) override {
-    if (!plain_step(pair, eflag, vflag, addflag)) {
+    if (friction().books() || !plain_step(pair, eflag, vflag, addflag)) {
       Stock::compute_force(pair, eflag, vflag, addflag);
       return;
     }

@@ -15,6 +15,7 @@
 #include "signal_handling.h"
 
 #include "fix_capillary_liquid.h"
+#include "fix_energy_account.h"
 #include "fix_lcp_impact.h"
 #include "fix_resume_exact.h"
 #include "granular_combinations.h"
@@ -64,6 +65,7 @@ int main(int argc, char** argv) {
   dembark_liggghts::register_contact_models();
   std::map<std::string, FixCreator>& fixes = *(lammps->modify->*table(FixTable()));
   fixes["capillary/liquid"] = &create_fix<LAMMPS_NS::FixCapillaryLiquid>;
+  fixes["energy/account"] = &create_fix<LAMMPS_NS::FixEnergyAccount>;
   fixes["lcp/impact"] = &create_fix<LAMMPS_NS::FixLcpImpact>;
   fixes["resume/exact"] = &create_fix<LAMMPS_NS::FixResumeExact>;
   (*(lammps->input->*table(CommandTable())))["resume_state"] = [](LAMMPS_NS::LAMMPS* host, int narg, char** arg) {

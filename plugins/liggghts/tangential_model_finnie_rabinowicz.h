@@ -16,12 +16,16 @@ TANGENTIAL_MODEL(TANGENTIAL_FINNIE_RABINOWICZ,finnie_rabinowicz,20)
 #include "contact_models.h"
 #include "tangential_model_base.h"
 #include "atom.h"
-#include "update.h"
+#include "fix_wall_gran.h"
 #include "global_properties.h"
 #include "neighbor.h"
+#include "pair_gran.h"
+#include "update.h"
 
+#include "dembark/contact_energy.hpp"
 #include "dembark/finnie_rabinowicz.hpp"
 #include "dembark/normal_force.hpp"
+#include "energy_books.h"
 #include "model_properties.h"
 #include "settings_choice.h"
 
@@ -34,6 +38,9 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
   int presliding_ = 0;
   int types_ = 0;
   std::vector<dembark::FinnieRabinowicz> laws_;  // one a pair of types, row by row
+  IContactHistorySetup* host_;
+  dembark_liggghts::EnergyBooks* books_ = nullptr;
+  double exponent_ = 1.0;  // of the normal spring
 
   static dembark::FrictionState<double> load(const double* h) { return {{h[0], h[1], h[2]}, h[3], h[4]}; }
   static void store(double* h, const dembark::FrictionState<double>& s) {
@@ -45,7 +52,7 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
   }
 
  public:
-  TangentialModel(LAMMPS* lmp, IContactHistorySetup* hsetup, class ContactModelBase*) : TangentialModelBase(lmp, hsetup, nullptr) {
+  TangentialModel(LAMMPS* lmp, IContactHistorySetup* hsetup, class ContactModelBase*) : TangentialModelBase(lmp, hsetup, nullptr), host_(hsetup) {
     // "1": the sign turns when the engine swaps the two grains of a pair.
     offset_ = hsetup->add_history_value("tangential_displacement_x", "1");
     hsetup->add_history_value("tangential_displacement_y", "1");
@@ -73,6 +80,10 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
         law.presliding = presliding_ ? dembark::Presliding::exponential : dembark::Presliding::linear;
         if (law.error()) read.fail(std::string(law.error()) + " (types " + std::to_string(i) + "-" + std::to_string(j) + ")");
       }
+    books_ = dembark_liggghts::find_energy_books(modify);
+    LAMMPS_NS::FixWallGran* const wall = dynamic_cast<LAMMPS_NS::FixWallGran*>(host_);
+    const bool hertz = wall ? wall->contact_match("normal", "hertz") : dynamic_cast<LAMMPS_NS::PairGran&>(*host_).contact_match("normal", "hertz");
+    exponent_ = hertz ? 1.5 : 1.0;
     // The engine tells a model of the end of a contact only within this factor of the radii; without it a grain that bounces
     // between two builds of the neighbour list would keep the displacement of its last contact (as it does in `history`).
     neighbor->register_contact_dist_factor(1.01);
@@ -83,16 +94,21 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
   /// Where the state begins in a contact's history: displacement (3), slip, dissipated energy.
   int offset() const { return offset_; }
 
+  /// Whether fix energy/account is there.
+  bool books() const { return books_; }
+
   /// Tangential force on the first body of a touching pair. `spin`: sum of both bodies' angular velocities; `radius_overlap`: R* delta;
   /// `dt` is 0 at the set-up of a run, where forces are those of the stored state: a step of zero length, which is not stored.
+  /// `displacement`: of the spring, after the step.
   DEMBARK_HOT dembark::Vec3<double> step(double* contact_history, int itype, int jtype, const dembark::Vec3<double>& normal, const dembark::Vec3<double>& spin,
                                          const dembark::Vec3<double>& velocity, double normal_force, double k_t, double gamma_t, double radius_overlap,
-                                         double dt, bool update_history) const {
+                                         double dt, bool update_history, dembark::Vec3<double>* displacement = nullptr) const {
     double* const history = contact_history + offset_;
     dembark::FrictionState<double> state = load(history);
     state.displacement = dembark::rotate_to_plane(state.displacement, normal, 0.5 * dt * dot(spin, normal));
     const dembark::Vec3<double> force = dembark::friction_step(laws_[itype * types_ + jtype], normal_force, k_t, gamma_t, dembark::pi * radius_overlap, velocity, dt, state);
     if (update_history) store(history, state);
+    if (displacement) *displacement = state.displacement;
     return force;
   }
 
@@ -114,14 +130,16 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     dembark::Vec3<double> spin{sidata.omega_i[0], sidata.omega_i[1], sidata.omega_i[2]};
     if (!sidata.is_wall) spin += {sidata.omega_j[0], sidata.omega_j[1], sidata.omega_j[2]};
     const double reduced_radius = sidata.is_wall ? sidata.radi : sidata.radi * sidata.radj / sidata.radsum;
+    dembark::Vec3<double> displacement;
     const dembark::Vec3<double> force =
         step(sidata.contact_history, sidata.itype, sidata.jtype, normal, spin, {sidata.vtr1, sidata.vtr2, sidata.vtr3}, sidata.Fn, sidata.kt, sidata.gammat,
-             reduced_radius * sidata.deltan, update_history ? update->dt : 0.0, update_history);
+             reduced_radius * sidata.deltan, update_history ? update->dt : 0.0, update_history, &displacement);
 
     const dembark::Vec3<double> moment = cross(normal, force);
     const double scale = sidata.is_wall ? sidata.area_ratio : 1.0;
     add(i_forces, force, moment, scale, -scale * sidata.cri);
     if (!sidata.is_wall) add(j_forces, force, moment, -1.0, -sidata.crj);
+    if (books_) account(sidata, normal, force, displacement);
   }
 
   inline void surfacesClose(SurfacesCloseData& scdata, ForceData&, ForceData&) {
@@ -133,6 +151,13 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
   inline void endPass(SurfacesIntersectData&, ForceData&, ForceData&) {}
 
  private:
+  DEMBARK_COLD void account(const SurfacesIntersectData& d, const dembark::Vec3<double>& normal, const dembark::Vec3<double>& force,
+                            const dembark::Vec3<double>& displacement) const {
+    dembark::ContactParts parts;
+    split_touching(parts, normal, d.deltan, d.kn * d.deltan, exponent_, d.Fn, d.kt, force, displacement);
+    books_->add(d, normal, parts, d.cri, d.is_wall ? 0.0 : d.crj);
+  }
+
   static void add(ForceData& to, const dembark::Vec3<double>& force, const dembark::Vec3<double>& moment, double sign, double arm) {
     to.delta_F[0] += sign * force.x;
     to.delta_F[1] += sign * force.y;
