@@ -46,7 +46,7 @@ void FixEnergyAccount::refuse(const std::string &what) {
   std::abort();  // fix_error() does not return
 }
 
-int FixEnergyAccount::setmask() { return PRE_INITIAL_INTEGRATE | POST_INTEGRATE | PRE_FORCE | END_OF_STEP; }
+int FixEnergyAccount::setmask() { return PRE_INITIAL_INTEGRATE | POST_INTEGRATE | PRE_FORCE | FINAL_INTEGRATE | END_OF_STEP; }
 
 void FixEnergyAccount::init() {
   if (std::strcmp(update->integrate_style, "verlet") != 0) refuse("only run_style verlet is supported");
@@ -59,22 +59,38 @@ void *FixEnergyAccount::extract(const char *name, int &) { return std::strcmp(na
 /// Driven grains are to the others what walls are.
 bool FixEnergyAccount::follows_forces(int i) const { return (atom->mask[i] & moving_) && !(atom->mask[i] & frozen_); }
 
+/// Moment of inertia over m r^2, as in fix nve/sphere.
+double FixEnergyAccount::shape() const { return domain->dimension == 2 ? 0.5 : 0.4; }
+
 /// J, of this rank's grains that follow their forces. In long double, so that the order of the atoms does not show.
 double FixEnergyAccount::kinetic() const {
-  const double shape = domain->dimension == 2 ? 0.5 : 0.4;  // as in fix nve/sphere
+  const double c = shape();
   long double sum = 0.0;
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!follows_forces(i)) continue;
     const Vec3 v = vector(atom->v[i]), spin = vector(atom->omega[i]);
-    sum += 0.5 * atom->rmass[i] * (dot(v, v) + shape * atom->radius[i] * atom->radius[i] * dot(spin, spin));
+    sum += 0.5 * atom->rmass[i] * (dot(v, v) + c * atom->radius[i] * atom->radius[i] * dot(spin, spin));
   }
   return double(sum);
+}
+
+/// P and Q of the whole forces.
+void FixEnergyAccount::measure_all_forces(double &power, double &rate) const {
+  const double c = shape();
+  power = rate = 0.0;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!follows_forces(i)) continue;
+    const Vec3 force = vector(atom->f[i]), torque = vector(atom->torque[i]);
+    const double mass = atom->rmass[i], inertia = c * mass * atom->radius[i] * atom->radius[i];
+    power += dot(force, vector(atom->v[i])) + dot(torque, vector(atom->omega[i]));
+    rate += dot(force, force) / mass + dot(torque, torque) / inertia;
+  }
 }
 
 /// P and Q of all forces as they are, with the velocities as they are.
 void FixEnergyAccount::measure_powers() {
   if (books_.size() != std::size_t(atom->nlocal)) error->one(FLERR, "Fix energy/account: atoms came or went between the forces and the end of a step");
-  const double shape = domain->dimension == 2 ? 0.5 : 0.4;
+  const double c = shape();
   std::vector<Vec3> weights(gravities_.size());
   for (std::size_t g = 0; g < gravities_.size(); ++g) {
     double acceleration[3];
@@ -93,8 +109,8 @@ void FixEnergyAccount::measure_powers() {
       }
       continue;
     }
-    const double mass = atom->rmass[i], inertia = shape * mass * atom->radius[i] * atom->radius[i];
-    const Vec3 force = vector(atom->f[i]), torque = vector(atom->torque[i]), push = force * (1.0 / mass), turn = torque * (1.0 / inertia);
+    const double mass = atom->rmass[i], inertia = c * mass * atom->radius[i] * atom->radius[i];
+    const Vec3 push = vector(atom->f[i]) * (1.0 / mass), turn = vector(atom->torque[i]) * (1.0 / inertia);
     for (std::size_t p = 0; p < contact_part_count; ++p) {
       power[p] += dot(loads[p].force, v) + dot(loads[p].torque, spin);
       rate[p] += dot(loads[p].force, push) + dot(loads[p].torque, turn);
@@ -104,9 +120,8 @@ void FixEnergyAccount::measure_powers() {
       power[gravity] += mass * dot(weights[g], v);
       rate[gravity] += mass * dot(weights[g], push);
     }
-    power[all_forces] += dot(force, v) + dot(torque, spin);
-    rate[all_forces] += dot(force, push) + dot(torque, turn);
   }
+  measure_all_forces(power[all_forces], rate[all_forces]);
   for (std::size_t p = 0; p < contact_part_count; ++p) {
     power[p] -= books_.wall_power[p];
     power[walls] += books_.wall_power[p];
@@ -151,27 +166,30 @@ void FixEnergyAccount::setup_pre_force(int) {
   totalled_ = false;
 }
 
+/// What was changed since the velocities were last looked at, but by no force.
+void FixEnergyAccount::note_changes() {
+  const double kinetic_now = kinetic();
+  now_.imposed += kinetic_now - now_.kinetic;
+  now_.kinetic = kinetic_now;
+}
+
 void FixEnergyAccount::pre_initial_integrate() {
+  double power, rate;
+  measure_all_forces(power, rate);
+  int same = power == now_.power[all_forces] && rate == now_.rate[all_forces];
   if (!fresh_) {
-    const double kinetic_now = kinetic();
-    if (kinetic_now == now_.kinetic) return;
-    now_.imposed += kinetic_now - now_.kinetic;
-    now_.kinetic = kinetic_now;
-    measure_powers();
+    note_changes();
+    if (!same) measure_powers();
     return;
   }
   take_setup(now_, begun_);
-  const Works power = now_.power, rate = now_.rate;
-  measure_powers();
   if (resumed_) {
-    // The forces may have been put back to those of the restart file after the set-up; then so are its powers.
-    int mine = power[all_forces] == now_.power[all_forces] && rate[all_forces] == now_.rate[all_forces], all = 0;
-    MPI_Allreduce(&mine, &all, 1, MPI_INT, MPI_MIN, world);
-    if (all) {
-      now_.power = power;
-      now_.rate = rate;
-    }
+    // The forces may have been put back to those of the restart file after the set-up; then its powers hold, whatever was booked since.
+    int all = 0;
+    MPI_Allreduce(&same, &all, 1, MPI_INT, MPI_MIN, world);
+    resumed_ = all;
   }
+  if (!resumed_) measure_powers();
   fresh_ = resumed_ = false;
 }
 
@@ -188,10 +206,15 @@ void FixEnergyAccount::pre_force(int) {
   books_.clear(atom->nlocal);
 }
 
-void FixEnergyAccount::end_of_step() {
+/// The grains have got their velocities: init() has seen to the order.
+void FixEnergyAccount::final_integrate() {
   measure_powers();
   kick(-1.0);
   now_.kinetic = kinetic();
+}
+
+void FixEnergyAccount::end_of_step() {
+  note_changes();
   now_.normal_stored = books_.normal_stored;
   now_.tangential_stored = books_.tangential_stored;
   shown_ = now_;

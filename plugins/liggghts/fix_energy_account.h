@@ -34,6 +34,7 @@ class FixEnergyAccount : public Fix {
   void pre_initial_integrate();
   void post_integrate();
   void pre_force(int);
+  void final_integrate();
   void end_of_step();
   double compute_vector(int);
   void *extract(const char *, int &);
@@ -59,7 +60,10 @@ class FixEnergyAccount : public Fix {
   void check_models();
   void check_motion();
   bool follows_forces(int i) const;
+  double shape() const;
   double kinetic() const;
+  void measure_all_forces(double &power, double &rate) const;
+  void note_changes();
   void measure_powers();
   void kick(double sign);
   void take_setup(State &state, bool &begun) const;

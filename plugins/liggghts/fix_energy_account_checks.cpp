@@ -61,8 +61,10 @@ void FixEnergyAccount::check_motion() {
     if (is(fix, "gravity")) gravities_.push_back(static_cast<FixGravity *>(fix));
     if (is(fix, "freeze")) frozen_ |= fix->groupbit;
     if (!fix->time_integrate) continue;
-    if (is(fix, "nve/sphere")) moving_ |= fix->groupbit;
-    else if (!is(fix, "move") && !is(fix, "nve/noforce")) refuse(named + " moves atoms; only fix nve/sphere, fix move and fix nve/noforce are accounted for");
+    if (is(fix, "nve/sphere")) {
+      moving_ |= fix->groupbit;
+      if (k > modify->my_index(this)) refuse("it must come after " + named + ", which changes the velocities");
+    } else if (!is(fix, "move") && !is(fix, "nve/noforce")) refuse(named + " moves atoms; only fix nve/sphere, fix move and fix nve/noforce are accounted for");
     movers.push_back(fix);
   }
   if (!moving_) refuse("no grain follows its forces: it needs fix nve/sphere");
