@@ -42,11 +42,15 @@ copy() {  # copy FILE TARGET
   changed=$((changed + 1))
 }
 # The models and what they include; the rest of that folder is liggghts-dembark's own way into a finished library.
-for file in "$here"/plugins/liggghts/*_model_*.h "$here"/plugins/liggghts/{bridge_reach,model_properties,settings_choice}.h; do
+for file in "$here"/plugins/liggghts/*_model_*.h "$here"/plugins/liggghts/{bridge_reach,energy_books,model_properties,settings_choice}.h; do
   copy "$file" "$src/$(basename "$file")"
 done
 # Liquid that grains and walls own.
 for file in "$here"/plugins/liggghts/fix_capillary_liquid*; do
+  copy "$file" "$src/$(basename "$file")"
+done
+# Accounts of energy.
+for file in "$here"/plugins/liggghts/fix_energy_account*; do
   copy "$file" "$src/$(basename "$file")"
 done
 # States to resume from.

@@ -233,6 +233,31 @@ def test_several_runs_and_velocities_set_between(tmp_path):
     assert account.imposed[after] == pytest.approx(account.full[after] - account.full[before], rel=1e-12)
 
 
+@pytest.mark.parametrize("place", ["before", "after"])
+def test_velocities_set_by_another_fix_are_imposed(tmp_path, place):
+    momentum = "fix still all momentum 10 linear 1 1 0"
+    text = bed("run 800", fixes=momentum) if place == "before" else bed(f"{momentum}\nrun 800")
+    account = account_bed(tmp_path, text)
+    account.assert_balanced()
+    assert account.imposed[-1] < -1e-6 * account.turnover
+
+
+def test_moving_wall_and_an_output_of_contacts(tmp_path):
+    """The plane gives energy by friction; forces that are computed for output only do not count."""
+    plane = models(DRY, wall="primitive type 2 zplane 0")
+    output = "compute pairs all pair/gran/local pos force\ndump pairs all local 50 pairs.dump c_pairs[1] c_pairs[7]\nrun 1500"
+    account = account_bed(tmp_path, bed(output).replace(plane, plane.replace("zplane 0", "zplane 0 shear x 0.2")))
+    account.assert_balanced()
+    assert account.walls[-1] > 0.01 * account.turnover
+
+
+def test_carried_liquid(tmp_path):
+    text = bed("run 1000", material=WET, fixes="fix liquid all capillary/liquid content 0.01").replace("viscous on", "viscous on carried_liquid on")
+    account = account_bed(tmp_path, re.sub(r"fix p_bridgeVolume.*\n", "", text))
+    account.assert_balanced()
+    assert max(account.bridges[-1], account.viscous[-1]) < -1e-3 * account.turnover
+
+
 def test_grains_that_come_and_go(tmp_path):
     """Grains are inserted above, and others leave through an open side."""
     insertion = """\
@@ -317,6 +342,7 @@ STOCK = "model hertz tangential history"
     (lambda t: t.replace(models(DRY), STOCK).replace("tangential finnie_rabinowicz primitive", "tangential history primitive").replace(" presliding linear", ""),
      ("tangential finnie_rabinowicz", "pair style")),
     (lambda t: t.replace("fix motion all nve/sphere", ""), ("no grain follows its forces", "nve/sphere")),
+    (lambda t: t.replace(FIX, f"{FIX}\nfix late all nve/sphere"), ("must come after fix late",)),
     (lambda t: t.replace("nve/sphere", "nve/limit radius_ratio 0.1"), ("fix motion (nve/limit)", "only fix nve/sphere")),
     (lambda t: t.replace(FIX, f"group one id 7\nfix push one move linear 0.1 0 0\n{FIX}"), ("atom 7", "fix motion and fix push", "disjoint")),
     (lambda t: t.replace("timestep", "run_style respa 2 2\ntimestep"), ("run_style verlet",)),
