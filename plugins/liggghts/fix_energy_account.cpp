@@ -54,7 +54,9 @@ void FixEnergyAccount::init() {
   check_motion();
 }
 
-void *FixEnergyAccount::extract(const char *name, int &) { return std::strcmp(name, dembark_liggghts::energy_books_name) == 0 ? &books_ : nullptr; }
+void *FixEnergyAccount::extract(const char *name, int &) {
+  return std::strcmp(name, dembark_liggghts::energy_books_name) == 0 ? &books_ : nullptr;
+}
 
 /// Driven grains are to the others what walls are.
 bool FixEnergyAccount::follows_forces(int i) const { return (atom->mask[i] & moving_) && !(atom->mask[i] & frozen_); }
@@ -89,7 +91,8 @@ void FixEnergyAccount::measure_all_forces(double &power, double &rate) const {
 
 /// P and Q of all forces as they are, with the velocities as they are.
 void FixEnergyAccount::measure_powers() {
-  if (books_.size() != std::size_t(atom->nlocal)) error->one(FLERR, "Fix energy/account: atoms came or went between the forces and the end of a step");
+  if (books_.size() != std::size_t(atom->nlocal))
+    error->one(FLERR, "Fix energy/account: atoms came or went between the forces and the end of a step");
   const double c = shape();
   std::vector<Vec3> weights(gravities_.size());
   for (std::size_t g = 0; g < gravities_.size(); ++g) {
@@ -248,8 +251,9 @@ double FixEnergyAccount::compute_vector(int n) {
   const double balance = all.kinetic - all.first_kinetic - all.work[all_forces] - all.imposed;
   const double scale = all.first_kinetic + sizes + std::abs(all.work[gravity]) + std::abs(other) + std::abs(all.imposed);
   const double step_error = all.work[0] + all.normal_stored - all.first_stored;
-  const double values[] = {all.kinetic, all.first_kinetic, all.work[gravity], all.work[0], all.work[1], all.work[2], all.work[3], all.work[4], all.work[5],
-                           all.work[walls], other, all.imposed, balance, all.normal_stored, all.tangential_stored, step_error, scale};
+  const double values[] = {all.kinetic, all.first_kinetic, all.work[gravity], all.work[0], all.work[1], all.work[2], all.work[3],
+                           all.work[4], all.work[5], all.work[walls], other, all.imposed, balance, all.normal_stored,
+                           all.tangential_stored, step_error, scale};
   return values[n];
 }
 

@@ -36,7 +36,8 @@ bool is(const Fix *fix, const char *style) { return std::strcmp(fix->style, styl
 void FixEnergyAccount::check_models() {
   if (force->newton_pair) refuse("newton must be off: each rank books for the grains that it owns");
   if (force->ftm2v != 1.0 || force->mvv2e != 1.0 || force->nktv2p != 1.0) refuse("units must be si or cgs");
-  if (!atom->sphere_flag || !atom->rmass || atom->superquadric_flag || atom->shapetype_flag) refuse("it accounts for spheres only: atom_style granular");
+  if (!atom->sphere_flag || !atom->rmass || atom->superquadric_flag || atom->shapetype_flag)
+    refuse("it accounts for spheres only: atom_style granular");
   PairGran *const pair = dynamic_cast<PairGran *>(force->pair);
   if (!pair) refuse("it needs pair_style gran model hertz|hooke tangential finnie_rabinowicz ...");
   const std::string needed = unknown_model(*pair);
@@ -44,7 +45,8 @@ void FixEnergyAccount::check_models() {
   for (int k = 0; k < modify->nfix; ++k)
     if (FixWallGran *const wall = dynamic_cast<FixWallGran *>(modify->fix[k])) {
       const std::string missed = unknown_model(*wall);
-      if (!missed.empty()) refuse("the parts of the contact forces are known with " + missed + " only; fix " + wall->id + " has another model");
+      if (!missed.empty())
+        refuse("the parts of the contact forces are known with " + missed + " only; fix " + wall->id + " has another model");
     }
 }
 
@@ -57,14 +59,14 @@ void FixEnergyAccount::check_motion() {
     const std::string named = "fix " + std::string(fix->id) + " (" + fix->style + ")";
     if (std::strncmp(fix->style, "rigid", 5) == 0 || std::strncmp(fix->style, "multisphere", 11) == 0)
       refuse("it accounts for single grains, and " + named + " moves bodies made of several");
-    if (is(fix, "lcp/impact")) refuse(named + " changes velocities by impulses, whose works are not known");
     if (is(fix, "gravity")) gravities_.push_back(static_cast<FixGravity *>(fix));
     if (is(fix, "freeze")) frozen_ |= fix->groupbit;
     if (!fix->time_integrate) continue;
     if (is(fix, "nve/sphere")) {
       moving_ |= fix->groupbit;
       if (k > modify->my_index(this)) refuse("it must come after " + named + ", which changes the velocities");
-    } else if (!is(fix, "move") && !is(fix, "nve/noforce")) refuse(named + " moves atoms; only fix nve/sphere, fix move and fix nve/noforce are accounted for");
+    } else if (!is(fix, "move") && !is(fix, "nve/noforce"))
+      refuse(named + " moves atoms; only fix nve/sphere, fix move and fix nve/noforce are accounted for");
     movers.push_back(fix);
   }
   if (!moving_) refuse("no grain follows its forces: it needs fix nve/sphere");
@@ -73,8 +75,8 @@ void FixEnergyAccount::check_motion() {
     for (const Fix *fix : movers) {
       if (!(atom->mask[i] & fix->groupbit)) continue;
       if (mover) {
-        const std::string line = "Fix energy/account (id " + std::string(id) + "): atom " + std::to_string(atom->tag[i]) + " is moved by both fix " + mover->id +
-                                 " and fix " + fix->id + "; make their groups disjoint";
+        const std::string line = "Fix energy/account (id " + std::string(id) + "): atom " + std::to_string(atom->tag[i]) +
+                                 " is moved by both fix " + mover->id + " and fix " + fix->id + "; make their groups disjoint";
         error->one(FLERR, line.c_str());
       }
       mover = fix;
