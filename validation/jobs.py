@@ -74,6 +74,8 @@ def measure_series(folder: Path, runs: Iterable[Run]) -> dict[str, Any]:
         raise
     except Exception as error:  # whatever goes wrong in the analysis is a failed measurement, to be told in one line
         raise RunError(f"{folder} could not be measured", f"{type(error).__name__}: {error}") from error
+    if "replicas" in content["parameters"]:
+        content["parameters"]["replicas"] = len(wanted)  # those of an earlier request for fewer or more are kept, and know its number
     content["measured"] = _now()
     content["inputs"] = [run.inputs for run in done]
     content["replicas_missing"] = sorted(run.replica for run in wanted.values() if run not in done)

@@ -57,8 +57,9 @@ class Run:
 
     @property
     def inputs(self) -> str:
-        """Hash of everything that decides the outcome: parameters, deck and engine, but not where or with how many cores."""
-        facts = {"parameters": dict(self.values), "deck": deck_files(self.case, self.engine.name),
+        """Hash of everything that decides the outcome: parameters, deck and engine, but not where, on how many cores or beside how many replicas."""
+        parameters = {key: value for key, value in self.values.items() if key != "replicas"}
+        facts = {"parameters": parameters, "deck": deck_files(self.case, self.engine.name),
                  "engine": [self.engine.name, self.engine.version, self.engine.identity]}
         return hashlib.sha256(json.dumps(facts, sort_keys=True, allow_nan=False).encode()).hexdigest()
 

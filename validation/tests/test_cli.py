@@ -92,6 +92,18 @@ def test_run_makes_all_replicas_with_their_own_seeds(dembark: Dembark, tmp_path:
     assert "kept" in dembark("run", "box", "--engine", "yade", "--profile", "standard").stderr
 
 
+def test_more_replicas_keep_those_that_are_there(dembark: Dembark, tmp_path: Path) -> None:
+    words = ("run", "box", "--engine", "liggghts", "--profile", "standard", "--out", "o")
+    assert dembark(*words).returncode == 0
+    folder = tmp_path / "o"
+    before = {k: (folder / f"replica-{k}/run.json").read_bytes() for k in (1, 2, 3)}
+    done = dembark(*words, "--set", "replicas=4")
+    assert done.returncode == 0, done.stderr
+    assert {k: (folder / f"replica-{k}/run.json").read_bytes() for k in (1, 2, 3)} == before
+    assert (folder / "replica-4/run.json").is_file()
+    assert read_json(folder / "metrics.json")["parameters"]["replicas"] == 4
+
+
 def test_results_of_other_inputs_are_replaced_only_when_asked(dembark: Dembark, tmp_path: Path) -> None:
     words = ("run", "box", "--engine", "liggghts", "--out", "o")
     assert dembark(*words).returncode == 0
