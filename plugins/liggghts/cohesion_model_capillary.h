@@ -2,7 +2,7 @@
 // fixed by the types, or taken from the grains (carried_liquid on, with fix capillary/liquid, which settles what forms and breaks).
 //
 //   pair_style gran model hertz tangential ... cohesion capillary [capillary_model exact|willett|willett_full|rabinovich|bagheri|constant]
-//              [viscous on|off] [carried_liquid on|off]
+//              [viscous_liquid on|off] [carried_liquid on|off]
 //
 // Works compiled out of tree into liggghts-dembark and, unchanged, copied into a LIGGGHTS src/ folder.
 #ifdef COHESION_MODEL
@@ -106,7 +106,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     const double limit = dembark::capillary::viscous_time_step(liquid_, radius, effective_mass);
     if (update->dt <= limit) return;
     char line[256];
-    snprintf(line, sizeof line, "cohesion capillary: with viscous on a bridge between these grains needs a time step <= %.3g s, not %g s, or a larger minimumGap",
+    snprintf(line, sizeof line, "cohesion capillary: with viscous_liquid on a bridge between these grains needs a time step <= %.3g s, not %g s, or a larger minimumGap",
              limit, update->dt);
     error->one(FLERR, line);
   }
@@ -160,7 +160,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
 
   void registerSettings(Settings& settings) {
     dembark_liggghts::register_choice(settings, "capillary_model", model_, dembark::capillary::model_names());
-    settings.registerOnOff("viscous", viscous_, false);
+    settings.registerOnOff("viscous_liquid", viscous_, false);
     settings.registerOnOff("carried_liquid", carried_, false);
   }
 
@@ -178,7 +178,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     surface_tension_ = read.scalar("surfaceTension");
     if (!(surface_tension_ >= 0.0 && surface_tension_ < INFINITY)) read.fail("surfaceTension (N/m) must be >= 0 and finite");
     liquid_.viscosity = viscous_ ? read.scalar("liquidViscosity") : read.scalar("liquidViscosity", 0.0);
-    if (!viscous_ && liquid_.viscosity != 0.0) read.fail("liquidViscosity is given, but viscous forces are off; write 'viscous on' after the models, or leave it out");
+    if (!viscous_ && liquid_.viscosity != 0.0) read.fail("liquidViscosity is given, but viscous forces are off; write 'viscous_liquid on' after the models, or leave it out");
     if (viscous_) liquid_.minimum_gap = read.scalar("minimumGap");
     if (const char* wrong = liquid_.error()) read.fail(std::string("liquidViscosity, minimumGap: ") + wrong);
     const double r_min = registry.min_radius(), r_max = registry.max_radius();

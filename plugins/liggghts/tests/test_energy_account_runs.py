@@ -54,7 +54,7 @@ def test_moving_wall_and_an_output_of_contacts(tmp_path):
 
 
 def test_carried_liquid(tmp_path):
-    text = bed("run 1000", material=WET, fixes="fix liquid all capillary/liquid content 0.01").replace("viscous on", "viscous on carried_liquid on")
+    text = bed("run 1000", material=WET, fixes="fix liquid all capillary/liquid content 0.01").replace("viscous_liquid on", "viscous_liquid on carried_liquid on")
     account = account_bed(tmp_path, re.sub(r"fix p_bridgeVolume.*\n", "", text))
     account.assert_balanced()
     assert max(account.bridges[-1], account.viscous[-1]) < -1e-3 * account.turnover

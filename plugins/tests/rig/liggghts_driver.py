@@ -89,7 +89,7 @@ def models(m: Material, tangential: str = "finnie_rabinowicz", wall: str = "") -
     wet = m.bridge_volume > 0.0
     settings = f" presliding {m.presliding}" if tangential == "finnie_rabinowicz" else ""
     settings += f" capillary_model {m.capillary_model}" if wet else ""
-    settings += " viscous on" if wet and m.viscosity > 0.0 else ""
+    settings += " viscous_liquid on" if wet and m.viscosity > 0.0 else ""
     return f"model {m.normal_law} tangential {tangential}{' cohesion capillary' if wet else ''} {wall}{settings}"
 
 

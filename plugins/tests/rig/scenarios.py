@@ -273,6 +273,7 @@ def _all() -> dict[str, Scenario]:
         wet_collision,
         wet_collision.rotated(TURN, "collision, wet, rotated frame"),
         _collision("collision, viscous", replace(ALL_OF_IT, viscosity=0.05), 0.6),
+        _collision("collision, viscous, hooke", replace(ALL_OF_IT, viscosity=0.05, normal_law="hooke", characteristic_velocity=0.5), 0.6),
         _head_on("head-on, bridge", WET),
         _head_on("head-on, viscous bridge", replace(WET, viscosity=0.005)),
         _drop("drop, dry", strong),
