@@ -9,6 +9,7 @@
 #include <core/Scene.hpp>
 #include <pkg/common/Sphere.hpp>
 
+#include "ContactView.hpp"
 #include "report.hpp"
 
 namespace yade {
@@ -17,14 +18,12 @@ YADE_PLUGIN((FinnieRabinowiczPhys)(Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys)(L
 
 static_assert(std::is_same<Real, double>::value, "dembark's laws need a YADE built with REAL_PRECISION_BITS=64");
 
-using ::dembark::Vec3;
+using dembark_yade::ContactView;
 using dembark_yade::fail;
 using dembark_yade::text;
+using dembark_yade::vec;
 
 namespace {
-
-inline Vec3<double> vec(const Vector3r& v) { return {v[0], v[1], v[2]}; }
-inline Vector3r     vec(const Vec3<double>& v) { return Vector3r(v.x, v.y, v.z); }
 
 std::string pairName(const Material& a, const Material& b) {
 	return "materials " + std::to_string(a.id) + " and " + std::to_string(b.id);
@@ -150,6 +149,7 @@ void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::prepare(
 	if (wet && (carriedLiquid || phys.newBridgeVolume > 0.0 || phys.bridgeVolume > 0.0))
 		p.liquid = {bridgeForce(model, phys.contactAngle), phys.surfaceTension, phys.newBridgeVolume, {phys.liquidViscosity, phys.minimumGap}};
 	phys.contact = p;
+	if (!p.liquid.viscous.on()) phys.viscousShearForce = Vector3r::Zero();
 
 	const double r1 = phys.wallBody == 1 ? INFINITY : geom.radius1, r2 = phys.wallBody == 2 ? INFINITY : geom.radius2;
 	const double m1 = phys.wallBody != 1 && body1.isDynamic() ? body1.state->mass : INFINITY;
@@ -217,38 +217,13 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 		shiftVelocity = scene->cell->intrShiftVel(interaction->cellDist);
 	}
 
-	// Body 1 of contact_step is YADE's body 1 of two spheres, but always the sphere of a sphere and a wall.
-	const bool              swapped = phys.wallBody == 1;
-	::dembark::ContactBodies bodies;
-	Vector3r                 surface = Vector3r::Zero();  // wall: its surface point below the sphere, from the wall's position
-	if (phys.wallBody == 0) {
-		bodies.separation         = vec(Vector3r(state1.pos - state2.pos - shift));
-		bodies.velocity_1         = vec(state1.vel);
-		bodies.velocity_2         = vec(Vector3r(state2.vel + shiftVelocity));
-		bodies.angular_velocity_1 = vec(state1.angVel);
-		bodies.angular_velocity_2 = vec(state2.angVel);
-		bodies.radius_1           = geom.radius1;
-		bodies.radius_2           = geom.radius2;
-		bodies.mass_1             = free1 ? state1.mass : INFINITY;
-		bodies.mass_2             = free2 ? state2.mass : INFINITY;
-	} else {
-		const State&   sphere = swapped ? state2 : state1;
-		const State&   wall   = swapped ? state1 : state2;
-		const double   radius = swapped ? geom.radius2 : geom.radius1;
-		const double   sign   = swapped ? 1.0 : -1.0;
-		const Vector3r outward = sign * geom.normal;  // from the wall to the sphere
-		const double   distance = radius - geom.penetrationDepth;
-		if (!(distance > 0.0))
-			fail("the centre of sphere " + std::to_string(swapped ? id2 : id1) + " went through wall " + std::to_string(swapped ? id1 : id2) +
-			     " in step " + std::to_string(scene->iter) + "; take a smaller time step or a stiffer material", 1);
-		bodies.separation = vec(Vector3r(distance * outward));
-		bodies.velocity_1 = vec(Vector3r(sphere.vel + sign * shiftVelocity));
-		surface           = sphere.pos + sign * shift - wall.pos - distance * outward;
-		bodies.velocity_2 = vec(Vector3r(wall.vel + wall.angVel.cross(surface)));
-		bodies.angular_velocity_1 = vec(sphere.angVel);
-		bodies.radius_1   = radius;
-		bodies.mass_1     = sphere.mass;
-	}
+	if (phys.wallBody && !((phys.wallBody == 1 ? geom.radius2 : geom.radius1) > geom.penetrationDepth))
+		fail("the centre of sphere " + std::to_string(phys.wallBody == 1 ? id2 : id1) + " went through wall " +
+		     std::to_string(phys.wallBody == 1 ? id1 : id2) + " in step " + std::to_string(scene->iter) +
+		     "; take a smaller time step or a stiffer material", 1);
+	ContactView view(phys.wallBody, geom, body1, body2, shift);
+	view.move(state1.vel, state1.angVel, state2.vel + shiftVelocity, state2.angVel);
+	const ::dembark::ContactBodies& bodies = view.bodies;
 
 	::dembark::ContactState state;
 	state.friction.displacement      = vec(phys.elasticDisplacement);
@@ -279,10 +254,9 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 	const Vector3r force      = vec(out.force);
 	const Vector3r tangential = vec(out.tangential + out.viscous_tangential);
 	const bool     turns      = out.overlap > 0.0 || phys.contact.liquid.viscous.on();
-	// YADE's forces of a contact are those on its body 2.
-	const double sign = swapped ? 1.0 : -1.0;
-	phys.shearForce  = sign * tangential;
-	phys.normalForce = sign * (force - tangential);
+	phys.shearForce  = view.sign() * tangential;
+	phys.normalForce = view.sign() * (force - tangential);
+	if (phys.contact.liquid.viscous.on()) phys.viscousShearForce = view.sign() * vec(out.viscous_tangential);
 	if (out.overlap > 0.0) {
 		const double radius = phys.wallBody ? bodies.radius_1 : bodies.radius_1 * bodies.radius_2 / (bodies.radius_1 + bodies.radius_2);
 		if (normal == ::dembark::NormalLaw::hertz) {
@@ -296,14 +270,14 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 		phys.kn = phys.ks = 0.0;
 	}
 
-	const Body::id_t first = swapped ? id2 : id1, second = swapped ? id1 : id2;
+	const Body::id_t first = view.swapped() ? id2 : id1, second = view.swapped() ? id1 : id2;
 	scene->forces.addForce(first, force);
 	scene->forces.addForce(second, -force);
 	if (turns) scene->forces.addTorque(first, vec(out.torque_1));
 	if (phys.wallBody == 0) {
 		if (turns) scene->forces.addTorque(second, vec(out.torque_2));
 	} else {
-		scene->forces.addTorque(second, -surface.cross(force));
+		scene->forces.addTorque(second, -view.surface.cross(force));
 	}
 	return true;
 }

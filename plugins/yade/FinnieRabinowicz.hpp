@@ -45,6 +45,7 @@ public:
 		((Real,bridgeImbalance,0,,"Volume [m^3] that body 1 (the sphere, of a sphere and a wall) gets back when a bridge of carried liquid breaks, less that of the other"))
 		((Real,capillaryForce,0,,"Force [N] of the bridge, positive = attractive"))
 		((Real,viscousForce,0,,"Force [N] along the normal by which the liquid resists, positive = repulsive"))
+		((Vector3r,viscousShearForce,Vector3r::Zero(),,"Force [N] in the plane of contact by which the liquid resists; it is part of :yref:`NormShearPhys.shearForce`"))
 		((Real,effectiveYoungsModulus,0,Attr::triggerPostLoad,"E* [Pa], 1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2"))
 		((Real,effectiveShearModulus,0,Attr::triggerPostLoad,"G* [Pa], 1/G* = (2-nu1)/G1 + (2-nu2)/G2"))
 		((Real,restitution,1,Attr::triggerPostLoad,"Coefficient of restitution"))

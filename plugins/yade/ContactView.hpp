@@ -1,0 +1,61 @@
+// An interaction of YADE in the order and the terms of dembark/contact.hpp.
+#pragma once
+
+#include <cmath>
+
+#include <core/Body.hpp>
+#include <pkg/dem/ScGeom.hpp>
+
+#include "dembark/contact.hpp"
+
+namespace yade::dembark_yade {
+
+inline ::dembark::Vec3<double> vec(const Vector3r& v) { return {v[0], v[1], v[2]}; }
+inline Vector3r                vec(const ::dembark::Vec3<double>& v) { return Vector3r(v.x, v.y, v.z); }
+
+/// Bodies 1 and 2 of `bodies` are YADE's of two spheres; of a sphere and a wall body 1 is always the sphere.
+struct ContactView {
+	::dembark::ContactBodies bodies;
+	Vector3r                 surface  = Vector3r::Zero();  // wall: its surface point below the sphere, from the wall's position
+	int                      wallBody = 0;                 // 1 or 2: this body of the interaction is a wall; 0: two spheres
+
+	bool swapped() const { return wallBody == 1; }
+	/// YADE's forces of a contact are those on its body 2: this times the force on body 1 of `bodies`, and the other way round.
+	double sign() const { return swapped() ? 1.0 : -1.0; }
+
+	ContactView() = default;
+	/// `shift`: of body 2, to the image that takes part. The centre of a sphere must be on the near side of a wall.
+	ContactView(int wall, const ScGeom& geom, const Body& body1, const Body& body2, const Vector3r& shift) : wallBody(wall) {
+		const State &state1 = *body1.state, &state2 = *body2.state;
+		if (wallBody == 0) {
+			bodies.separation = vec(Vector3r(state1.pos - state2.pos - shift));
+			bodies.radius_1   = geom.radius1;
+			bodies.radius_2   = geom.radius2;
+			bodies.mass_1     = body1.isDynamic() ? state1.mass : INFINITY;
+			bodies.mass_2     = body2.isDynamic() ? state2.mass : INFINITY;
+			return;
+		}
+		const State&   sphere   = swapped() ? state2 : state1;
+		const State&   plane    = swapped() ? state1 : state2;
+		const Vector3r outward  = sign() * geom.normal;  // from the wall to the sphere
+		bodies.radius_1         = swapped() ? geom.radius2 : geom.radius1;
+		bodies.mass_1           = sphere.mass;
+		const double   distance = bodies.radius_1 - geom.penetrationDepth;
+		bodies.separation       = vec(Vector3r(distance * outward));
+		surface                 = sphere.pos + sign() * shift - plane.pos - distance * outward;
+	}
+
+	/// Velocities and angular velocities of the interaction's bodies; that of a wall becomes the velocity of its surface.
+	void move(const Vector3r& velocity1, const Vector3r& spin1, const Vector3r& velocity2, const Vector3r& spin2) {
+		bodies.velocity_1         = vec(swapped() ? velocity2 : velocity1);
+		bodies.angular_velocity_1 = vec(swapped() ? spin2 : spin1);
+		if (wallBody == 0) {
+			bodies.velocity_2         = vec(velocity2);
+			bodies.angular_velocity_2 = vec(spin2);
+		} else {
+			bodies.velocity_2 = vec(Vector3r(swapped() ? velocity1 + spin1.cross(surface) : velocity2 + spin2.cross(surface)));
+		}
+	}
+};
+
+}  // namespace yade::dembark_yade

@@ -1,0 +1,74 @@
+// Energy of a run: the works of all parts of all contacts, of gravity, walls and numerical damping, beside the kinetic energy. The
+// splitting of forces and the reason why the works balance to round-off are those of dembark/contact_energy.hpp.
+#pragma once
+
+#include <mutex>
+#include <vector>
+
+#include <boost/weak_ptr.hpp>
+
+#include <core/Body.hpp>
+#include <core/GlobalEngine.hpp>
+
+#include "ContactWorks.hpp"
+
+namespace yade {
+
+class NewtonIntegrator;
+
+class EnergyAccount : public GlobalEngine {
+public:
+	virtual ~EnergyAccount() = default;
+	void                action() override;
+	void                preSave(EnergyAccount&) { update(); }
+	void                reset();
+	Real                get(const std::string& name);
+	boost::python::list keys() const;
+	boost::python::list items();
+	boost::python::dict energies();
+	// clang-format off
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(EnergyAccount,GlobalEngine,"Energies [J] of a scene whose contacts are those of :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz`: kinetic energy, what springs hold, and the works of all parts of the contacts' forces, of gravity, walls, numerical damping and other forces, which balance the kinetic energy to round-off in each step. Stands after :yref:`InteractionLoop` and all engines that add forces, and before :yref:`NewtonIntegrator`. Read like :yref:`O.energy<Omega.energy>`: account['gravity'], account.keys(), account.items().",
+		((vector<Real>,sums,,Attr::hidden,"All energies in the order of keys()"))
+		((vector<Real>,known,,Attr::hidden,"Kinetic energy [J] of each body by id, -1 = no body"))
+		((vector<Real>,springBase,,Attr::hidden,"Energy [J] of normal and tangential springs that no work explains: it came and left with bodies"))
+		((long,step,-1,Attr::readonly,"Last step whose works are in the sums; -1 = none"))
+		, /*ctor*/
+		, /*py*/
+		.def("__getitem__",&EnergyAccount::get,(boost::python::arg("name")),"One of the energies [J] by its name.")
+		.def("keys",&EnergyAccount::keys,"Names of the energies.")
+		.def("items",&EnergyAccount::items,"Tuples (name, energy [J]).")
+		.def("energies",&EnergyAccount::energies,"All energies [J] by name.")
+		.def("reset",&EnergyAccount::reset,"Begin anew with the next step: all works are zero there.")
+	);
+	// clang-format on
+
+private:
+	/// A body in the step that is being booked, and what acts on it; `motion` is that before the step, and then its mean.
+	struct Mover {
+		shared_ptr<Body> body;
+		Real             mass = 0.0;
+		Vector3r         inertia = Vector3r::Zero();
+		Vector3r         force, torque, weight, damping, dampingTorque;
+	};
+	const NewtonIntegrator& integrator() const;
+	void                    update();
+	void                    book();
+	void                    record(const NewtonIntegrator&);
+	bool                    recordBodies(const NewtonIntegrator&);
+	void                    recordForces(Body::id_t, const NewtonIntegrator&);
+	Real                    kineticEnergy(Body::id_t) const;
+	void                    begin();
+
+	std::vector<Mover>                movers;   // by id
+	std::vector<dembark_yade::BodyMotion> motions;  // by id
+	std::vector<bool>                 changed;  // by id: came, left, or is another one than a step ago
+	dembark_yade::ContactWorks        contacts;
+	bool                              pending  = false;  // the step `recorded` is not in the sums yet
+	long                              recorded = -1;
+	Real                              length   = 0.0;  // s, of that step
+	boost::weak_ptr<Scene>            home;
+	std::mutex                        guard;
+};
+REGISTER_SERIALIZABLE(EnergyAccount);
+
+}  // namespace yade
