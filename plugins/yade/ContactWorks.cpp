@@ -15,24 +15,19 @@ using ::dembark::dot;
 
 namespace {
 
-constexpr std::size_t springs[] = {std::size_t(ContactPart::normal_elastic), std::size_t(ContactPart::tangential_elastic)};
-
-/// Velocity of body 1 against body 2 where they touch.
-::dembark::Vec3<double> contactVelocity(const ContactView& view, const ::dembark::ContactForce& force) {
-	const auto motion = ::dembark::relative_motion(view.bodies, force.normal, force.overlap);
-	return motion.normal_velocity * force.normal + motion.tangential_velocity;
+::dembark::RelativeMotion motionOf(const ContactView& view, const ::dembark::ContactForce& force) {
+	return ::dembark::relative_motion(view.bodies, force.normal, force.overlap);
 }
 
 }  // namespace
 
 void ContactWorks::Sums::add(const Sums& other) {
 	for (std::size_t k = 0; k < parts.size(); ++k) parts[k] += other.parts[k];
-	for (std::size_t k = 0; k < 2; ++k) {
-		stored[k] += other.stored[k];
-		half[k] += other.half[k];
-	}
 	onFree += other.onFree;
 	onBlocked += other.onBlocked;
+	normalStored += other.normalStored;
+	tangentialStored += other.tangentialStored;
+	half += other.half;
 }
 
 /// The sum of what `visit(index, sums)` adds, over blocks of one length in their order: it does not depend on the number of threads.
@@ -66,8 +61,9 @@ void ContactWorks::recordOne(Contact& c, const Interaction& interaction, Scene& 
 	c.id2 = interaction.getId2();
 	const auto* phys = dynamic_cast<const FinnieRabinowiczPhys*>(interaction.phys.get());
 	if (!phys)
-		fail("EnergyAccount: bodies " + std::to_string(c.id1) + " and " + std::to_string(c.id2) + " interact by " + interaction.phys->getClassName() +
-		     ", whose energies it does not know; all contacts must be of Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz");
+		fail("EnergyAccount: bodies " + std::to_string(c.id1) + " and " + std::to_string(c.id2) + " interact by "
+		     + interaction.phys->getClassName() + ", whose energies it does not know; all contacts must be of "
+		     "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz");
 	const Body &body1 = *Body::byId(c.id1, &scene), &body2 = *Body::byId(c.id2, &scene);
 	// Without a law that has seen it, or between two held bodies, a contact has no force.
 	if (phys->preparedBy < 0 || !((phys->wallBody != 1 && body1.isDynamic()) || (phys->wallBody != 2 && body2.isDynamic()))) return;
@@ -90,13 +86,10 @@ void ContactWorks::recordOne(Contact& c, const Interaction& interaction, Scene& 
 	f.tangential         = shear - f.viscous_tangential;
 	c.parts              = ::dembark::contact_parts(phys->contact, bodies, f, vec(phys->elasticDisplacement));
 
-	const double stored[] = {c.parts.normal_stored, c.parts.tangential_stored};
-	const auto   velocity = contactVelocity(c.view, f);
-	for (int k = 0; k < 2; ++k) {
-		c.half[k] = 0.5 * scene.dt * dot(c.parts.force[springs[k]], velocity);
-		sums.half[k] += c.half[k];
-		sums.stored[k] += stored[k];
-	}
+	c.half = 0.5 * scene.dt * dot(c.parts[ContactPart::normal_elastic], f.normal) * motionOf(c.view, f).normal_velocity;
+	sums.half += c.half;
+	sums.normalStored += c.parts.normal_stored;
+	sums.tangentialStored += c.parts.tangential_stored;
 }
 
 ContactWorks::Sums ContactWorks::book(const std::vector<BodyMotion>& mean, double dt, int threads) {
@@ -108,30 +101,26 @@ ContactWorks::Sums ContactWorks::book(const std::vector<BodyMotion>& mean, doubl
 void ContactWorks::bookOne(Contact& c, const std::vector<BodyMotion>& mean, double dt, Sums& sums) const {
 	const BodyMotion &one = mean[c.id1], &two = mean[c.id2];
 	c.view.move(one.velocity, one.spin, two.velocity, two.spin);
-	const auto velocity = contactVelocity(c.view, c.whole);
+	const auto motion   = motionOf(c.view, c.whole);
+	const auto velocity = motion.normal_velocity * c.whole.normal + motion.tangential_velocity;
 	for (std::size_t k = 0; k < c.parts.force.size(); ++k) sums.parts[k] += dt * dot(c.parts.force[k], velocity);
-	for (int k = 0; k < 2; ++k) c.work[k] = dt * dot(c.parts.force[springs[k]], velocity);
+	c.work = dt * dot(c.parts[ContactPart::normal_elastic], velocity);
 
 	// The whole force, as it acts on the bodies: what the parts above miss of it is missing in the balance.
-	const auto     arms = ::dembark::relative_motion(c.view.bodies, c.whole.normal, c.whole.overlap);
 	const Vector3r force = vec(c.whole.force), moment = vec(cross(c.whole.normal, c.whole.force));
-	const Vector3r torques[] = {-arms.arm_1 * moment, c.view.wallBody ? Vector3r(-c.view.surface.cross(force)) : Vector3r(-arms.arm_2 * moment)};
-	const BodyMotion*  sides[]   = {c.view.swapped() ? &two : &one, c.view.swapped() ? &one : &two};
-	for (int side = 0; side < 2; ++side) {
-		const BodyMotion&  m    = *sides[side];
-		const Vector3r push = side == 0 ? force : Vector3r(-force);
-		sums.onFree += dt * (along(push, m.velocity, m.blocked, false) + along(torques[side], m.spin, m.blocked, true));
-		sums.onBlocked += dt * (along(push, m.velocity, m.blocked, false, false) + along(torques[side], m.spin, m.blocked, true, false));
-	}
+	const auto     act   = [&](const BodyMotion& body, const Vector3r& push, const Vector3r& turn) {
+		sums.onFree += dt * (along(push, body.velocity, body.blocked, false) + along(turn, body.spin, body.blocked, true));
+		sums.onBlocked += dt * (along(push, body.velocity, body.blocked, false, false) + along(turn, body.spin, body.blocked, true, false));
+	};
+	act(c.view.swapped() ? two : one, force, -motion.arm_1 * moment);
+	act(c.view.swapped() ? one : two, -force, c.view.wallBody ? Vector3r(-c.view.surface.cross(force)) : Vector3r(-motion.arm_2 * moment));
 }
 
-std::array<double, 2> ContactWorks::unexplained(const std::vector<bool>& bodies, bool arriving) const {
-	std::array<double, 2> sum{};
-	for (const Contact& c : contacts) {
-		if (!c.acting || !(bodies[c.id1] || bodies[c.id2])) continue;
-		const double stored[] = {c.parts.normal_stored, c.parts.tangential_stored};
-		for (int k = 0; k < 2; ++k) sum[k] += arriving ? stored[k] + c.half[k] : c.work[k] - c.half[k] - stored[k];
-	}
+double ContactWorks::unexplained(const std::vector<bool>& bodies, bool arriving) const {
+	double sum = 0.0;
+	for (const Contact& c : contacts)
+		if (c.acting && (bodies[c.id1] || bodies[c.id2]))
+			sum += arriving ? c.parts.normal_stored + c.half : c.work - c.half - c.parts.normal_stored;
 	return sum;
 }
 

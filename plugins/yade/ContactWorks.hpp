@@ -33,22 +33,23 @@ inline Real along(const Vector3r& a, const Vector3r& b, unsigned blocked, bool r
 
 class ContactWorks {
 public:
-	/// J, summed over contacts. Springs are in the order normal, tangential.
+	/// J, summed over contacts.
 	struct Sums {
 		std::array<double, ::dembark::contact_part_count> parts{};
-		double                onFree = 0.0, onBlocked = 0.0;  // works on degrees of freedom that forces change, and that they do not
-		std::array<double, 2> stored{}, half{};               // half: work of the springs in the half step up to these positions
-		void                  add(const Sums&);
+		double onFree = 0.0, onBlocked = 0.0;  // works on degrees of freedom that forces change, and on those that they do not
+		double normalStored = 0.0, tangentialStored = 0.0;
+		double half = 0.0;  // work of the normal springs in the half step up to these positions
+		void   add(const Sums&);
 	};
 
-	/// Takes up all interactions of the scene after their law has run; fills `stored` and `half`.
+	/// Takes up all interactions of the scene after their law has run; fills what is stored, and `half`.
 	Sums record(Scene&, int threads);
 	/// Works of the step that was recorded, `mean` being the mean motions of the bodies by id in it; fills the rest.
 	Sums book(const std::vector<BodyMotion>& mean, double dt, int threads);
-	/// What the springs of the contacts of these bodies have more than their works so far say: when they begin to be booked (arriving)
-	/// what they hold, when they are booked no more what they take along.
-	std::array<double, 2> unexplained(const std::vector<bool>& bodies, bool arriving) const;
-	void                  clear() { contacts.clear(); }
+	/// What the normal springs of these bodies' contacts hold and no work explains: when they begin to be booked all of it, when they are
+	/// booked no more its negative.
+	double unexplained(const std::vector<bool>& bodies, bool arriving) const;
+	void clear() { contacts.clear(); }
 
 private:
 	struct Contact {
@@ -57,7 +58,7 @@ private:
 		ContactView             view;
 		::dembark::ContactForce whole;  // of dembark/contact.hpp what ContactParts needs
 		::dembark::ContactParts parts;
-		std::array<double, 2>   half{}, work{};
+		double                  half = 0.0, work = 0.0;  // J, of the normal spring, as in Sums, and in the whole step
 	};
 	void recordOne(Contact&, const Interaction&, Scene&, Sums&) const;
 	void bookOne(Contact&, const std::vector<BodyMotion>& mean, double dt, Sums&) const;

@@ -21,17 +21,17 @@ using dembark_yade::BodyMotion;
 
 namespace {
 
-/// Places in the sums. The parts of a contact's force are in the order of ::dembark::ContactPart, springs in the order normal, tangential.
+/// Places in the sums; the parts of a contact's force are in the order of ::dembark::ContactPart.
 struct Entry {
 	enum {
-		kinetic, inserted, gravity, walls, parts, damping = parts + int(::dembark::contact_part_count), external, balance,
-		stored, unstored = stored + 2, count = unstored + 2
+		kinetic, firstKinetic, gravity, parts, walls = parts + int(::dembark::contact_part_count), damping, other, imposed, balance, normalStored,
+		tangentialStored, stepError, scale, count
 	};
 };
-const char* const entryNames[] = {"kinetic", "inserted", "gravity", "walls", "normal_elastic", "normal_viscous", "tangential_elastic",
-	"tangential_viscous", "capillary", "liquid_viscous", "numerical_damping", "external", "balance", "normal_stored", "tangential_stored",
-	"normal_error", "tangential_lost"};
-static_assert(std::size(entryNames) == Entry::count, "each line has a name");
+const char* const entryNames[] = {"kinetic", "first_kinetic", "gravity", "normal_elastic", "normal_viscous", "tangential_elastic",
+	"tangential_viscous", "capillary", "liquid_viscous", "walls", "numerical_damping", "other", "imposed", "balance", "normal_stored",
+	"tangential_stored", "step_error", "scale"};
+static_assert(std::size(entryNames) == Entry::count, "each entry has a name");
 
 /// What NewtonIntegrator's damping, a share of the acceleration against the mean velocity of the step, adds to an acceleration.
 Vector3r dampingAcceleration(Real share, const Vector3r& acceleration, const Vector3r& velocity, Real dt) {
@@ -69,17 +69,18 @@ const NewtonIntegrator& EnergyAccount::integrator() const {
 void EnergyAccount::action() {
 	const NewtonIntegrator&           newton = integrator();
 	const std::lock_guard<std::mutex> lock(guard);
-	if (pending && scene->iter == recorded + 1) book();
+	if (pending && scene->iter == recorded + 1) book(*scene);
 	// A step that was recorded and did not come to its end is recorded anew.
 	pending = false;
-	if (known.empty()) {
+	const bool first = known.empty();
+	if (first) {
 		begin();
 		step = scene->iter - 1;
 	}
 	if (scene->iter != step + 1)
 		fail("EnergyAccount has booked step " + std::to_string(step) + " and now sees step " + std::to_string(scene->iter) +
 		     "; it must run in every step, or be told to begin anew by its reset()");
-	record(newton);
+	record(newton, first);
 	home     = Omega::instance().getScene();
 	recorded = scene->iter;
 	length   = scene->dt;
@@ -90,12 +91,12 @@ void EnergyAccount::action() {
 void EnergyAccount::update() {
 	const std::lock_guard<std::mutex> lock(guard);
 	const auto                        present = home.lock();
-	if (pending && present && present->iter == recorded + 1) book();
+	if (pending && present && present->iter == recorded + 1) book(*present);
 }
 
 void EnergyAccount::begin() {
 	sums.assign(Entry::count, 0.0);
-	springBase.assign(2, 0.0);
+	firstStored = 0.0;
 	known.clear();
 	movers.clear();
 	contacts.clear();
@@ -109,20 +110,19 @@ void EnergyAccount::reset() {
 }
 
 /// J, of the degrees of freedom that forces change.
-Real EnergyAccount::kineticEnergy(Body::id_t id) const {
-	const Mover&   mover   = movers[id];
-	const State&   state   = *mover.body->state;
+Real EnergyAccount::kineticEnergy(Body::id_t id, const Vector3r& velocity, const Vector3r& spin) const {
 	const unsigned blocked = motions[id].blocked;
-	return 0.5 * (mover.mass * along(state.vel, state.vel, blocked, false)
-	              + along(mover.inertia.cwiseProduct(state.angVel), state.angVel, blocked, true));
+	const Real     turning = along(movers[id].inertia.cwiseProduct(spin), spin, blocked, true);
+	return 0.5 * (movers[id].mass * along(velocity, velocity, blocked, false) + turning);
 }
 
-void EnergyAccount::recordForces(Body::id_t id, const NewtonIntegrator& newton) {
-	Mover&       mover  = movers[id];
+void EnergyAccount::recordForces(const Body& body, const NewtonIntegrator& newton) {
+	const Body::id_t id     = body.getId();
+	Mover&           mover  = movers[id];
 	BodyMotion&      motion = motions[id];
-	const State& state  = *mover.body->state;
-	if (!mover.body->isStandalone()) fail(bodyName(id) + " belongs to a clump, whose rotation cannot be booked; use single spheres");
-	if (newton.exactAsphericalRot && mover.body->isAspherical() && !(motion.blocked & State::DOF_RXRYRZ))
+	const State&     state  = *body.state;
+	if (!body.isStandalone()) fail(bodyName(id) + " belongs to a clump, whose rotation cannot be booked; use single spheres");
+	if (newton.exactAsphericalRot && body.isAspherical() && !(motion.blocked & State::DOF_RXRYRZ))
 		fail(bodyName(id) + " is aspherical and turns by another rule than spheres; block its rotation, or set "
 		     "NewtonIntegrator.exactAsphericalRot to False");
 	motion.velocity = state.vel;
@@ -141,7 +141,7 @@ void EnergyAccount::recordForces(Body::id_t id, const NewtonIntegrator& newton) 
 }
 
 /// Takes up the bodies as they are before the step. Returns whether any of them came, left, or is another one than a step ago.
-bool EnergyAccount::recordBodies(const NewtonIntegrator& newton) {
+bool EnergyAccount::recordBodies(const NewtonIntegrator& newton, bool first) {
 	const auto&       bodies = *scene->bodies;
 	const std::size_t count  = std::max(bodies.size(), known.size());
 	known.resize(count, -1.0);
@@ -149,65 +149,93 @@ bool EnergyAccount::recordBodies(const NewtonIntegrator& newton) {
 	motions.resize(count);
 	changed.assign(count, false);
 	sums[Entry::kinetic] = 0.0;
-	bool any      = false;
-	for (std::size_t id = 0; id < count; ++id) {
-		const shared_ptr<Body> body  = id < bodies.size() ? bodies[id] : shared_ptr<Body>();
-		Mover&                 mover = movers[id];
-		const Real             had   = known[id];
+	bool any             = false;
+	for (std::size_t k = 0; k < count; ++k) {
+		const Body* const body  = k < bodies.size() ? bodies[k].get() : nullptr;
+		Mover&            mover = movers[k];
+		const Real        had   = known[k];
 		if (body) {
 			const bool     moves   = newton.mask <= 0 || body->maskCompatible(newton.mask);
 			const unsigned blocked = moves ? body->state->blockedDOFs : static_cast<unsigned>(State::DOF_ALL);
-			const bool     same    = mover.body == body && motions[id].blocked == blocked && mover.mass == body->state->mass
+			const bool     same    = mover.body == body && motions[k].blocked == blocked && mover.mass == body->state->mass
 			        && mover.inertia == body->state->inertia;
 			// After loading nothing is known of a body but its energy.
-			changed[id] = had < 0.0 || (mover.body && !same);
+			changed[k] = had < 0.0 || (mover.body && !same);
 			if (!same) {
-				mover               = {body, body->state->mass, body->state->inertia, {}, {}, {}, {}, {}};
-				motions[id].blocked = blocked;
+				mover              = {body, body->state->mass, body->state->inertia, {}, {}, {}, {}, {}};
+				motions[k].blocked = blocked;
 			}
-			recordForces(static_cast<Body::id_t>(id), newton);
-			known[id] = kineticEnergy(static_cast<Body::id_t>(id));
-			sums[Entry::kinetic] += known[id];
+			recordForces(*body, newton);
+			known[k] = kineticEnergy(body->getId(), body->state->vel, body->state->angVel);
+			sums[Entry::kinetic] += known[k];
 		} else {
-			changed[id] = had >= 0.0;
-			mover.body  = body;
-			known[id]   = -1.0;
+			changed[k] = had >= 0.0;
+			mover.body = nullptr;
+			known[k]   = -1.0;
 		}
-		if (!changed[id]) continue;
-		any = true;
-		sums[Entry::inserted] += std::max(known[id], 0.0) - std::max(had, 0.0);
+		any = any || changed[k];
+		// Velocities that were set since the last step are told by the same difference.
+		sums[first ? Entry::firstKinetic : Entry::imposed] += std::max(known[k], 0.0) - std::max(had, 0.0);
 	}
 	return any;
 }
 
 /// Takes up the state before the step: the forces are known, the velocities are still those of half a step ago.
-void EnergyAccount::record(const NewtonIntegrator& newton) {
+void EnergyAccount::record(const NewtonIntegrator& newton, bool first) {
 	scene->forces.sync();
-	const bool any    = recordBodies(newton);
-	const auto gone   = any ? contacts.unexplained(changed, false) : std::array<double, 2>{};
+	const bool any = recordBodies(newton, first);
+	if (any) firstStored += contacts.unexplained(changed, false);
 	const auto totals = contacts.record(*scene, ompThreads);
-	const auto come   = any ? contacts.unexplained(changed, true) : std::array<double, 2>{};
-	const ::dembark::ContactPart springs[] = {::dembark::ContactPart::normal_elastic, ::dembark::ContactPart::tangential_elastic};
-	for (int k = 0; k < 2; ++k) {
-		springBase[k] += gone[k] + come[k];
-		sums[Entry::stored + k] = totals.stored[k];
-		// Up to the positions of this step the springs have done half of its part.
-		sums[Entry::unstored + k] = springBase[k] - (sums[Entry::parts + int(springs[k])] + totals.half[k]) - totals.stored[k];
+	if (any) firstStored += contacts.unexplained(changed, true);
+	sums[Entry::normalStored]     = totals.normalStored;
+	sums[Entry::tangentialStored] = totals.tangentialStored;
+	// Up to the positions of this step the springs have done half of its part.
+	const Real work        = sums[Entry::parts + int(::dembark::ContactPart::normal_elastic)] + totals.half;
+	sums[Entry::stepError] = work + totals.normalStored - firstStored;
+}
+
+/// Makes the motion of a body the mean of the step, and takes up its kinetic energy. Velocities that are not what the forces make of
+/// those before were set by a script; those of a body that was erased since (no state) are taken to be what the forces make.
+void EnergyAccount::moveOn(Body::id_t id, const State* state) {
+	const Mover&   mover    = movers[id];
+	BodyMotion&    motion   = motions[id];
+	const Vector3r before[] = {motion.velocity, motion.spin};
+	const Vector3r now[]    = {state ? state->vel : before[0], state ? state->angVel : before[1]};
+	Vector3r       after[]  = {now[0], now[1]};
+	bool           differs  = false;
+	for (int turn = 0; turn < 2; ++turn)
+		for (int i = 0; i < 3; ++i) {
+			if (!isFree(motion.blocked, i, turn)) continue;
+			const Real push = turn ? mover.torque[i] : mover.force[i], weight = turn ? 0.0 : mover.weight[i];
+			const Real rate = length / (turn ? mover.inertia[i] : mover.mass), damping = turn ? mover.dampingTorque[i] : mover.damping[i];
+			const Real expected = before[turn][i] + rate * (push + weight + damping);
+			const Real roundOff = 1e-13 * (math::abs(before[turn][i]) + rate * (math::abs(push) + math::abs(weight)));
+			if (math::abs(now[turn][i] - expected) <= roundOff) continue;
+			differs        = true;
+			after[turn][i] = expected;
+		}
+	known[id] = kineticEnergy(id, after[0], after[1]);
+	if (differs && state) {
+		const Real set = kineticEnergy(id, now[0], now[1]);
+		sums[Entry::imposed] += set - known[id];
+		known[id] = set;
 	}
+	sums[Entry::kinetic] += known[id];
+	motion.velocity = 0.5 * (before[0] + after[0]);
+	motion.spin     = 0.5 * (before[1] + after[1]);
 }
 
 /// The recorded step is over: its works, by the mean velocities.
-void EnergyAccount::book() {
-	Real gravity = 0.0, damping = 0.0, onFree = 0.0;
+void EnergyAccount::book(const Scene& after) {
+	const auto& bodies  = *after.bodies;
+	Real        gravity = 0.0, damping = 0.0, onFree = 0.0;
 	sums[Entry::kinetic] = 0.0;
-	for (std::size_t id = 0; id < movers.size(); ++id) {
-		const Mover& mover = movers[id];
-		BodyMotion&      mean  = motions[id];
+	for (std::size_t k = 0; k < movers.size(); ++k) {
+		const Mover&      mover = movers[k];
+		const BodyMotion& mean  = motions[k];
 		if (!mover.body) continue;
-		mean.velocity = 0.5 * (mean.velocity + mover.body->state->vel);
-		mean.spin     = 0.5 * (mean.spin + mover.body->state->angVel);
-		known[id]     = kineticEnergy(static_cast<Body::id_t>(id));
-		sums[Entry::kinetic] += known[id];
+		const Body* const now = k < bodies.size() ? bodies[k].get() : nullptr;
+		moveOn(static_cast<Body::id_t>(k), now == mover.body ? now->state.get() : nullptr);
 		gravity += along(mover.weight, mean.velocity, mean.blocked, false);
 		damping += along(mover.damping, mean.velocity, mean.blocked, false) + along(mover.dampingTorque, mean.spin, mean.blocked, true);
 		onFree += along(mover.force, mean.velocity, mean.blocked, false) + along(mover.torque, mean.spin, mean.blocked, true);
@@ -215,22 +243,27 @@ void EnergyAccount::book() {
 	const auto totals = contacts.book(motions, length, ompThreads);
 	sums[Entry::gravity] += length * gravity;
 	sums[Entry::damping] += length * damping;
-	sums[Entry::external] += length * onFree - totals.onFree;
+	sums[Entry::other] += length * onFree - totals.onFree;
 	sums[Entry::walls] -= totals.onBlocked;
-	Real explained = sums[Entry::inserted] + sums[Entry::gravity] + sums[Entry::damping] + sums[Entry::external] + sums[Entry::walls];
-	for (std::size_t k = 0; k < totals.parts.size(); ++k) explained += sums[Entry::parts + k] += totals.parts[k];
+	for (std::size_t k = 0; k < totals.parts.size(); ++k) sums[Entry::parts + k] += totals.parts[k];
+	Real explained = 0.0, scale = 0.0;
+	for (int k = Entry::firstKinetic; k < Entry::balance; ++k) {
+		explained += sums[k];
+		scale += math::abs(sums[k]);
+	}
 	sums[Entry::balance] = sums[Entry::kinetic] - explained;
-	pending       = false;
-	step          = recorded;
+	sums[Entry::scale]   = scale;
+	pending              = false;
+	step                 = recorded;
 }
 
 Real EnergyAccount::get(const std::string& name) {
 	update();
 	const auto found = std::find(std::begin(entryNames), std::end(entryNames), name);
 	if (found == std::end(entryNames)) {
-		std::string known_;
-		for (const char* each : entryNames) known_ += (known_.empty() ? "" : ", ") + std::string(each);
-		PyErr_SetString(PyExc_KeyError, ("dembark: EnergyAccount has no energy '" + name + "'; it has " + known_).c_str());
+		std::string all;
+		for (const char* each : entryNames) all += (all.empty() ? "" : ", ") + std::string(each);
+		PyErr_SetString(PyExc_KeyError, ("dembark: EnergyAccount has no energy '" + name + "'; it has " + all).c_str());
 		boost::python::throw_error_already_set();
 	}
 	const std::lock_guard<std::mutex> lock(guard);

@@ -30,7 +30,7 @@ public:
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(EnergyAccount,GlobalEngine,"Energies [J] of a scene whose contacts are those of :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz`: kinetic energy, what springs hold, and the works of all parts of the contacts' forces, of gravity, walls, numerical damping and other forces, which balance the kinetic energy to round-off in each step. Stands after :yref:`InteractionLoop` and all engines that add forces, and before :yref:`NewtonIntegrator`. Read like :yref:`O.energy<Omega.energy>`: account['gravity'], account.keys(), account.items().",
 		((vector<Real>,sums,,Attr::hidden,"All energies in the order of keys()"))
 		((vector<Real>,known,,Attr::hidden,"Kinetic energy [J] of each body by id, -1 = no body"))
-		((vector<Real>,springBase,,Attr::hidden,"Energy [J] of normal and tangential springs that no work explains: it came and left with bodies"))
+		((Real,firstStored,0,Attr::hidden,"Energy [J] of normal springs that no work explains: it came and left with bodies"))
 		((long,step,-1,Attr::readonly,"Last step whose works are in the sums; -1 = none"))
 		, /*ctor*/
 		, /*py*/
@@ -43,24 +43,25 @@ public:
 	// clang-format on
 
 private:
-	/// A body in the step that is being booked, and what acts on it; `motion` is that before the step, and then its mean.
+	/// A body in the step that is being booked, and what acts on it.
 	struct Mover {
-		shared_ptr<Body> body;
-		Real             mass = 0.0;
-		Vector3r         inertia = Vector3r::Zero();
-		Vector3r         force, torque, weight, damping, dampingTorque;
+		const Body* body = nullptr;  // to tell whether it is still the same; to own it could mean to end a Python object without the interpreter
+		Real        mass = 0.0;
+		Vector3r    inertia = Vector3r::Zero();
+		Vector3r    force, torque, weight, damping, dampingTorque;
 	};
 	const NewtonIntegrator& integrator() const;
 	void                    update();
-	void                    book();
-	void                    record(const NewtonIntegrator&);
-	bool                    recordBodies(const NewtonIntegrator&);
-	void                    recordForces(Body::id_t, const NewtonIntegrator&);
-	Real                    kineticEnergy(Body::id_t) const;
+	void                    book(const Scene&);
+	void                    record(const NewtonIntegrator&, bool first);
+	bool                    recordBodies(const NewtonIntegrator&, bool first);
+	void                    recordForces(const Body&, const NewtonIntegrator&);
+	Real                    kineticEnergy(Body::id_t, const Vector3r& velocity, const Vector3r& spin) const;
+	void                    moveOn(Body::id_t, const State*);
 	void                    begin();
 
 	std::vector<Mover>                movers;   // by id
-	std::vector<dembark_yade::BodyMotion> motions;  // by id
+	std::vector<dembark_yade::BodyMotion> motions;  // by id, before the step, and then in the mean of it
 	std::vector<bool>                 changed;  // by id: came, left, or is another one than a step ago
 	dembark_yade::ContactWorks        contacts;
 	bool                              pending  = false;  // the step `recorded` is not in the sums yet

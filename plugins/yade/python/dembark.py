@@ -16,7 +16,7 @@ import tomllib
 import zlib
 from types import SimpleNamespace
 
-from yade import CapillaryLiquid, CylinderWall, DembarkSnapshot, Omega, Sphere, utils
+from yade import CapillaryLiquid, CylinderWall, DembarkSnapshot, EnergyAccount, Omega, Sphere, utils
 from yade.minieigenHP import Vector3, Vector3i
 
 O = Omega()
@@ -280,7 +280,8 @@ def _cut(path, step):
     os.truncate(path, end)
 
 
-def run(steps, restart_every=0, resume=False, outputs=("time.csv", "grains.dump", "contacts.dump"), base="state", saving=None, loaded=None):
+def run(steps, restart_every=0, resume=False, outputs=("time.csv", "energies.csv", "grains.dump", "contacts.dump"), base="state", saving=None,
+        loaded=None):
     """Run the scene until step `steps` is written, and say that it is finished.
 
     Every `restart_every` steps (0: never) the scene is saved as `base`.<step>.yade.gz. With `resume` the newest of these that is whole
@@ -427,6 +428,28 @@ class HistoryWriter:
         self._file.flush()
         if self.progress:
             print(O.iter, f"{O.time:.6g}", f"{energy:.6g}", flush=True)
+
+
+def energies():
+    """All energies (J) of the scene's EnergyAccount by name, at the end of the last step that is over: see its keys() for the names."""
+    # A scene that was loaded has engines of its own.
+    account = next((one for one in O.engines if isinstance(one, EnergyAccount)), None)
+    if account is None:
+        fail("energies: there is no EnergyAccount in O.engines; put one before NewtonIntegrator")
+    return account.energies()
+
+
+class EnergyWriter:
+    """Appends lines to energies.csv: step, time and all energies (J) of the EnergyAccount that the scene has or will have, at the end of
+    the step before; with all their digits. It may run anywhere among the engines, and between runs."""
+
+    def __init__(self, path="energies.csv"):
+        self._file = _table(path, ",".join(["step", "time", *EnergyAccount().keys()]))
+
+    def write(self):
+        """Append the present state."""
+        self._file.write(",".join([str(O.iter), f"{O.time:.9g}", *(f"{energy:.17g}" for energy in energies().values())]) + "\n")
+        self._file.flush()
 
 
 class LogWriter:

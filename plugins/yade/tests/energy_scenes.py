@@ -1,0 +1,354 @@
+"""Runs inside YADE: `yade -n -x energy_scenes.py out.json scene...`. Each scene is a function that returns plain data."""
+
+import json
+import math
+import os
+import random
+import sys
+
+from yade import dembark, utils
+
+PAIR = dict(restitution=0.6, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5)
+WET = dict(bridgeVolume=2e-11, surfaceTension=0.072, contactAngle=0.35, liquidViscosity=5e-3, minimumGap=1e-5)
+DENSITY, R = 2500.0, 0.0025
+
+
+def scene_with(bodies, pair=None, law=None, gravity=(0, 0, 0), damping=0.0, step=2e-6, before=(), between=(), **newton):
+    """A new scene of `bodies` with an account, engines before it and between it and the integrator; returns the account."""
+    O.reset()
+    O.materials.append(FrictMat(young=5e6, poisson=0.3, density=DENSITY, frictionAngle=0))
+    for body in bodies:
+        body.mat = O.materials[0]
+        if isinstance(body.shape, Sphere):
+            mass = 4 / 3 * math.pi * body.shape.radius**3 * DENSITY
+            body.state.mass, body.state.inertia = mass, Vector3(1, 1, 1) * 0.4 * mass * body.shape.radius**2
+        O.bodies.append(body)
+    account, surface = EnergyAccount(), FacetSurface()
+    O.dt = step
+    O.engines = [
+        ForceResetter(),
+        InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb(), Bo1_Box_Aabb(), Bo1_Facet_Aabb(), Bo1_CylinderWall_Aabb()],
+                              verletDist=0.2 * R, allowBiggerThanPeriod=True),
+        surface,
+        InteractionLoop(
+            [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom(), Ig2_Box_Sphere_ScGeom(), Ig2_FacetSurface_Sphere_ScGeom(surface=surface),
+             Ig2_CylinderWall_Sphere_ScGeom()],
+            [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**{**PAIR, **(pair or {})})],
+            [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(**(law or {}))]),
+        *before, account, *between,
+        NewtonIntegrator(damping=damping, gravity=gravity, **newton),
+    ]
+    return account
+
+
+def grain(position, radius=R, velocity=(0, 0, 0), spin=(0, 0, 0), **options):
+    body = utils.sphere(position, radius, **options)
+    body.state.vel, body.state.angVel = Vector3(*velocity), Vector3(*spin)
+    return body
+
+
+def _motion(steps, ids):
+    """Before each step and after the last: positions, velocities, angular velocities; and xi of the only contact in each step."""
+    state = lambda: [[*O.bodies[i].state.pos, *O.bodies[i].state.vel, *O.bodies[i].state.angVel] for i in ids]
+    rows, displacement = [state()], []
+    for _ in range(steps):
+        O.step()
+        rows.append(state())
+        contact = next((i for i in O.interactions if i.isReal), None)
+        displacement.append(list(contact.phys.elasticDisplacement) if contact else [0, 0, 0])
+    return {"rows": rows, "displacement": displacement}
+
+
+def impacts():
+    """Oblique impacts, of two grains and of a grain on a wall that moves, listed first or last; with all positions and velocities."""
+    found = {}
+    for law in ({}, dict(normalLaw="hooke", characteristicVelocity=0.5), dict(limitForce=True)):
+        name = "+".join(["grains", *map(str, law.values())])
+        account = scene_with([grain((0, 0, 0), 0.003, (0.4, 0.9, 0), (0, 5, 30)), grain((0.00551, 0.0005, 0), R, (-0.3, 0, 0.02))], law=law)
+        found[name] = _motion(600, (0, 1)) | {"energies": account.energies(), "law": law}
+    for order in (0, 1):
+        wall = utils.wall(0, 2)
+        wall.state.vel = Vector3(0.1, 0, 0.2)
+        bodies = [wall, grain((0.001, 0.0005, 0.00251), R, (0.9, 0.1, -0.5), (20, -30, 10))]
+        account = scene_with(bodies[::-1] if order else bodies)
+        found[f"wall{order}"] = _motion(600, (1 - order, order)) | {"energies": account.energies(), "law": {}}
+    return found
+
+
+def elastic():
+    """Head-on impact without damping and friction: the largest energy in the spring, and the energies at the end, for two time steps."""
+    found = []
+    for step in (4e-6, 2e-6):
+        account = scene_with([grain((0, 0, 0)), grain((0.00501, 0, 0), R, (-0.5, 0, 0))],
+                             dict(restitution=1.0, staticFriction=0, kineticFriction=0), step=step)
+        highest, errors = 0.0, []
+        for _ in range(round(1.6e-3 / step)):
+            O.step()
+            highest = max(highest, account["normal_stored"])
+            errors.append(account["step_error"])
+        found.append({"highest": highest, "error": max(map(abs, errors)), "end": account.energies()})
+    return found
+
+
+def column(wet=False, damping=0.0, step=2e-5, gate=None, count=12):
+    """Grains of three sizes in a column on a floor of triangles, with a gate of two; returns the account and the ids of the gate."""
+    chance = random.Random(1)
+    width, cell = 0.026, 0.0052
+    corner = lambda i, j: (0.02 * i - 0.01, 0.02 * j - 0.01, 0.0)
+    squares = [(corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)) for i in range(7) for j in range(3)]
+    floor = [utils.facet(three) for a, b, c, d in squares for three in ((a, b, c), (a, c, d))]
+    walls = [*floor, utils.wall(0, 0), utils.wall(0, 1), utils.wall(width, 1)]
+    low, right, top, left = [(width, y, z) for y, z in ((-0.01, -0.01), (0.04, -0.01), (0.04, 0.1), (-0.01, 0.1))]
+    gates = [utils.facet([low, right, top]), utils.facet([low, top, left])] if gate is None else [gate]
+    grains = [grain([cell * (n + 0.5) + chance.uniform(-1e-4, 1e-4) for n in (i, j, k)], R * chance.choice((0.85, 0.95, 1.0)))
+              for k in range(count) for j in range(5) for i in range(5)]
+    liquid = (WET, dict(capillaryModel="willett")) if wet else (None, None)
+    account = scene_with([*walls, *gates, *grains], *liquid, (0, 0, -9.81), damping, step)
+    return account, range(len(walls), len(walls) + len(gates))
+
+
+def collapse(settle=1500, steps=3000, samples=15, **options):
+    """A column of 300 grains is set down, its gate is lifted and drags it along, and it collapses. Energies on the way."""
+    account, gates = column(**options)
+    rows = []
+    for part in range(samples):
+        if part == samples // 3:
+            for gate in gates:
+                O.bodies[gate].state.vel = Vector3(0, 0.05, 0.8)
+        O.run((settle if part < samples // 3 else steps // 2) // (samples // 3), True)
+        rows.append(account.energies())
+    return {"rows": rows, "grains": sum(isinstance(b.shape, Sphere) for b in O.bodies), "step": account.step, "iter": O.iter,
+            "handed": O.engines[2].handedOver, "law": O.engines[3].lawDispatcher.functors[0].dissipatedEnergy()}
+
+
+def dry():
+    return collapse()
+
+
+def wet():
+    return collapse(wet=True)
+
+
+def damped():
+    return collapse(settle=1000, steps=2000, wet=True, damping=0.2)
+
+
+def box_gate():
+    """The gate is a Box that is pushed into the column."""
+    account, gates = column(gate=utils.box((0.036, 0.013, 0.03), (0.01, 0.03, 0.06), fixed=True), count=4)
+    O.bodies[gates[0]].state.vel = Vector3(-0.1, 0, 0.1)
+    O.run(1200, True)
+    return account.energies()
+
+
+def drum():
+    """Grains in a drum that turns and drifts along its axis, one of them held and carried around, one held along one axis only."""
+    shape = Body()
+    shape.shape, shape.state.blockedDOFs = CylinderWall(radius=0.02, axis=(0, 1, 0)), "xyzXYZ"
+    shape.state.vel, shape.state.angVel = Vector3(0, 0.02, 0), Vector3(0, 12, 0)
+    sites = dembark.lattice((4, 3, 4), (0.0055,) * 3, (-0.011, -0.008, -0.011))
+    grains = [grain((x, y, z), r) for x, y, z, r in dembark.column(sites, 40, 0.005, 0.1, 3, 0.0001)]
+    held, guided = grain((0, 0.0, -0.0174), R, (0.05, 0, 0), fixed=True), grain((0.0005, 0.0165, 0.001), R, (0, -0.2, 0))
+    guided.state.blockedDOFs = "yX"
+    account = scene_with([shape, held, guided, *grains], gravity=(0, 0, -9.81), step=1e-5)
+    O.run(3000, True)
+    return account.energies()
+
+
+def periodic():
+    """Grains that fly about in a periodic cell."""
+    chance = random.Random(5)
+    grains = [grain([0.006 * n + 0.003 for n in (i, j, k)], R, [chance.uniform(-0.5, 0.5) for _ in range(3)])
+              for i in range(4) for j in range(4) for k in range(4)]
+    account = scene_with(grains, WET, dict(capillaryModel="willett"), step=1e-5)
+    O.periodic, O.cell.hSize = True, Matrix3(0.024, 0, 0, 0, 0.024, 0, 0, 0, 0.024)
+    O.run(2000, True)
+    return account.energies()
+
+
+def carried():
+    """Bridges of carried liquid form and break between the forces and the account."""
+    chance = random.Random(5)
+    grains = [grain([0.0052 * n + 0.003 for n in (i, j, k)], R, [chance.uniform(-1, 1) for _ in range(3)])
+              for i in range(3) for j in range(3) for k in range(3)]
+    words = {key: value for key, value in WET.items() if key != "bridgeVolume"}
+    liquid = CapillaryLiquid(content=0.01)
+    account = scene_with(grains, words, dict(capillaryModel="willett", carriedLiquid=True), step=1e-5, before=[liquid])
+    counts = []
+    for _ in range(20):
+        O.run(50, True)
+        counts.append(liquid.bridgeCount())
+    return {"energies": account.energies(), "bridges": counts}
+
+
+def two_steps():
+    """The step's error in the first 0.03 s of a falling column, for three time steps."""
+    found = []
+    for step in (4e-5, 2e-5, 1e-5):
+        account, _ = column(step=step, count=3)
+        errors = []
+        for _ in range(20):
+            O.run(round(1.5e-3 / step), True)
+            errors.append(account["step_error"])
+        found.append(errors)
+    return found
+
+
+def briefly():
+    """Energies of a column after 400 steps: on one and on two threads."""
+    account, gates = column(wet=True, count=4)
+    for gate in gates:
+        O.bodies[gate].state.vel = Vector3(0.3, 0, 0.5)
+    O.run(400, True)
+    return account.energies()
+
+
+def save_load():
+    """Energies of a run that goes on, and of one that was saved and loaded, at the saving and 300 steps later."""
+    found = {}
+    for ending in ("xml", "yade.gz", "bin"):
+        account, _ = column(wet=True, count=3)
+        O.run(500, True)
+        name = f"energy.{ending}"
+        O.save(name)
+        before = account.energies()
+        O.run(300, True)
+        straight = account.energies()
+        O.load(name)
+        after = dembark.energies()
+        O.run(300, True)
+        found[ending] = {"before": before, "after": after, "straight": straight, "resumed": dembark.energies()}
+        os.remove(name)
+    return found
+
+
+def come_and_go():
+    """Bodies are inserted in contact, erased in contact, held and let go; velocities are set; a force is added; the time step changes."""
+    account = scene_with([utils.wall(0, 2), grain((0, 0, 0.0024)), grain((0.004, 0, 0.0024), R, (0.3, 0, 0.1))], gravity=(0, 0, -9.81))
+    rows = []
+
+    def after(act):
+        act()
+        O.run(200, True)
+        rows.append(account.energies())
+
+    def fly():
+        O.bodies[1].state.vel = Vector3(0.1, 0.2, 0.3)
+
+    def hold(body, how):
+        O.bodies[body].state.blockedDOFs = how
+
+    after(lambda: None)
+    after(lambda: O.bodies.append(grain((0.002, 0.003, 0.0045), R, (0.1, 0.5, -0.4), material=O.materials[0])))
+    after(lambda: O.bodies.erase(2))
+    after(fly)
+    after(lambda: hold(1, "xyzXYZ"))
+    after(lambda: hold(1, ""))
+    after(lambda: O.forces.setPermF(3, Vector3(0.001, 0, 0)))
+    after(lambda: setattr(O, "dt", 1e-6))
+    return rows
+
+
+def in_a_step():
+    """What an engine reads before, between and after account and integrator, and how often it may ask."""
+    import builtins
+
+    builtins.seen = []
+    ask = lambda where: PyRunner(
+        iterPeriod=1, command=f"seen.append(('{where}', O.iter, account_['kinetic'], account_['balance'], account_.step))")
+    account = scene_with([utils.wall(0, 2), grain((0, 0, 0.0024), R, (0, 0, -0.1))], gravity=(0, 0, -9.81), before=[ask("before")],
+                         between=[ask("between")])
+    builtins.account_ = account
+    O.engines = [*O.engines, ask("after")]
+    O.run(50, True)
+    return {"seen": builtins.seen, "end": account.energies(), "step": account.step}
+
+
+def set_in_a_step():
+    """An engine behind the account sets a velocity and adds a force: neither is lost."""
+    kick = PyRunner(iterPeriod=7, command="O.forces.addF(0, (0, 0, 1e-3))")
+    account = scene_with([grain((0, 0, 0), R, (0, 0, 0.1)), grain((1, 0, 0))], between=[kick])
+    O.engines = [*O.engines, PyRunner(iterPeriod=10, command="O.bodies[1].state.vel += Vector3(0.01, 0, 0)")]
+    O.run(95, True)
+    return account.energies()
+
+
+def reset():
+    account = scene_with([utils.wall(0, 2), grain((0, 0, 0.0024), R, (0.2, 0, -0.1))], gravity=(0, 0, -9.81))
+    O.run(300, True)
+    before = account.energies()
+    account.reset()
+    zero = account.energies()
+    O.run(300, True)
+    return [before, zero, account.energies()]
+
+
+def table():
+    """energies.csv, and a mapping's habits."""
+    account = scene_with([utils.wall(0, 2), grain((0, 0, 0.0024), R, (0.2, 0, -0.1))], gravity=(0, 0, -9.81))
+    import builtins
+
+    builtins.writer = dembark.EnergyWriter()
+    O.engines = [*O.engines, PyRunner(iterPeriod=10, command="writer.write()")]
+    O.run(31, True)
+    return {"text": open("energies.csv").read(), "keys": account.keys(), "items": [list(item) for item in account.items()],
+            "energies": account.energies(), "found": dembark.energies()}
+
+
+def messages():
+    """What the account says to scenes whose energies it cannot book; `nothing` for none."""
+    found = {}
+
+    def heard(name, change, **options):
+        account = scene_with([grain((0, 0, 0)), grain((0.02, 0, 0))], **options)
+        try:
+            change(account)
+            O.step()
+            O.step()
+            found[name] = "nothing"
+        except (RuntimeError, KeyError) as error:
+            found[name] = str(error).strip("'\"")
+
+    def engines(change):
+        O.engines = change(list(O.engines))
+
+    def missed(account):
+        O.step()
+        account.dead = True
+        O.step()
+        account.dead = False
+
+    heard("all right", lambda account: None)
+    heard("no integrator", lambda account: engines(lambda e: e[:-1]))
+    heard("two integrators", lambda account: engines(lambda e: [*e, NewtonIntegrator()]))
+    heard("before the loop", lambda account: engines(lambda e: [e[0], e[4], *e[1:4], e[5]]))
+    heard("after the integrator", lambda account: engines(lambda e: [*e[:4], e[5], e[4]]))
+    heard("density scaling", lambda account: setattr(O.engines[-1], "densityScaling", True))
+    heard("clump", lambda account: O.bodies.clump([0, 1]))
+    heard("aspherical", lambda account: setattr(O.bodies[0], "aspherical", True))
+    heard("cell", lambda account: (setattr(O, "periodic", True), setattr(O.cell, "velGrad", Matrix3(0, 1, 0, 0, 0, 0, 0, 0, 0))))
+    heard("missed", missed)
+    heard("unknown", lambda account: account["heat"])
+    return found
+
+
+def without_account():
+    O.reset()
+    dembark.energies()
+
+
+def other_law():
+    O.reset()
+    O.bodies.append([utils.sphere((0, 0, 0), 1), utils.sphere((0, 0, 1.99), 1)])
+    O.engines = [
+        ForceResetter(), InsertionSortCollider([Bo1_Sphere_Aabb()]),
+        InteractionLoop([Ig2_Sphere_Sphere_ScGeom()], [Ip2_FrictMat_FrictMat_FrictPhys()], [Law2_ScGeom_FrictPhys_CundallStrack()]),
+        EnergyAccount(), NewtonIntegrator()]
+    O.run(3, True)
+
+
+out, *names = sys.argv[1:]
+results = {name: globals()[name]() for name in names}
+with open(out, "w") as file:
+    json.dump(results, file)
+print("scenes: finished", flush=True)
