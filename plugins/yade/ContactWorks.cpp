@@ -1,6 +1,7 @@
 #include "ContactWorks.hpp"
 
 #include <algorithm>
+#include <typeinfo>
 
 #include <core/Scene.hpp>
 
@@ -59,11 +60,12 @@ void ContactWorks::recordOne(Contact& c, const Interaction& interaction, Scene& 
 	if (!interaction.isReal()) return;
 	c.id1 = interaction.getId1();
 	c.id2 = interaction.getId2();
-	const auto* phys = dynamic_cast<const FinnieRabinowiczPhys*>(interaction.phys.get());
-	if (!phys)
+	const IPhys& data = *interaction.phys;
+	if (typeid(data) != typeid(FinnieRabinowiczPhys))
 		fail("EnergyAccount: bodies " + std::to_string(c.id1) + " and " + std::to_string(c.id2) + " interact by "
-		     + interaction.phys->getClassName() + ", whose energies it does not know; all contacts must be of "
+		     + data.getClassName() + ", whose energies it does not know; all contacts must be of "
 		     "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz");
+	const auto* phys  = static_cast<const FinnieRabinowiczPhys*>(&data);
 	const Body &body1 = *Body::byId(c.id1, &scene), &body2 = *Body::byId(c.id2, &scene);
 	// Without a law that has seen it, or between two held bodies, a contact has no force.
 	if (phys->preparedBy < 0 || !((phys->wallBody != 1 && body1.isDynamic()) || (phys->wallBody != 2 && body2.isDynamic()))) return;

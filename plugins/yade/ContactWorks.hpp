@@ -25,6 +25,7 @@ inline bool isFree(unsigned blocked, int axis, bool rotation) { return !(blocked
 
 /// Sum of a * b over the axes that are free or, with `free` false, those that are blocked.
 inline Real along(const Vector3r& a, const Vector3r& b, unsigned blocked, bool rotation, bool free = true) {
+	if (blocked == State::DOF_NONE || blocked == State::DOF_ALL) return (blocked == State::DOF_NONE) == free ? a.dot(b) : 0.0;
 	Real sum = 0.0;
 	for (int i = 0; i < 3; ++i)
 		if (isFree(blocked, i, rotation) == free) sum += a[i] * b[i];

@@ -70,15 +70,16 @@ void EnergyAccount::action() {
 	const NewtonIntegrator&           newton = integrator();
 	const std::lock_guard<std::mutex> lock(guard);
 	if (pending && scene->iter == recorded + 1) book(*scene);
-	// A step that was recorded and did not come to its end is recorded anew.
-	pending = false;
 	const bool first = known.empty();
 	if (first) {
 		begin();
 		step = scene->iter - 1;
 	}
-	if (scene->iter != step + 1)
-		fail("EnergyAccount has booked step " + std::to_string(step) + " and now sees step " + std::to_string(scene->iter) +
+	// A step that was recorded and did not come to its end is recorded anew.
+	const bool again = pending && scene->iter == recorded;
+	const long next  = (pending ? recorded : step) + 1;
+	if (!again && scene->iter != next)
+		fail("EnergyAccount expected step " + std::to_string(next) + " and sees step " + std::to_string(scene->iter) +
 		     "; it must run in every step, or be told to begin anew by its reset()");
 	record(newton, first);
 	home     = Omega::instance().getScene();

@@ -212,7 +212,7 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 	}
 
 	Vector3r shift = Vector3r::Zero(), shiftVelocity = Vector3r::Zero();
-	if (scene->isPeriodic) {
+	if (scene->isPeriodic && !interaction->cellDist.isZero()) {
 		shift         = scene->cell->intrShiftPos(interaction->cellDist);
 		shiftVelocity = scene->cell->intrShiftVel(interaction->cellDist);
 	}

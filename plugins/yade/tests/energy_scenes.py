@@ -62,16 +62,18 @@ def _motion(steps, ids):
 def impacts():
     """Oblique impacts, of two grains and of a grain on a wall that moves, listed first or last; with all positions and velocities."""
     found = {}
-    for law in ({}, dict(normalLaw="hooke", characteristicVelocity=0.5), dict(limitForce=True)):
+    wet = dict(capillaryModel="willett")
+    for law in ({}, dict(normalLaw="hooke", characteristicVelocity=0.5), dict(limitForce=True), wet):
         name = "+".join(["grains", *map(str, law.values())])
-        account = scene_with([grain((0, 0, 0), 0.003, (0.4, 0.9, 0), (0, 5, 30)), grain((0.00551, 0.0005, 0), R, (-0.3, 0, 0.02))], law=law)
+        grains = [grain((0, 0, 0), 0.003, (0.4, 0.9, 0), (0, 5, 30)), grain((0.00551, 0.0005, 0), R, (-0.3, 0, 0.02))]
+        account = scene_with(grains, WET if law is wet else None, law)
         found[name] = _motion(600, (0, 1)) | {"energies": account.energies(), "law": law}
-    for order in (0, 1):
+    for order, law in ((0, {}), (1, {}), (0, wet)):
         wall = utils.wall(0, 2)
         wall.state.vel = Vector3(0.1, 0, 0.2)
         bodies = [wall, grain((0.001, 0.0005, 0.00251), R, (0.9, 0.1, -0.5), (20, -30, 10))]
-        account = scene_with(bodies[::-1] if order else bodies)
-        found[f"wall{order}"] = _motion(600, (1 - order, order)) | {"energies": account.energies(), "law": {}}
+        account = scene_with(bodies[::-1] if order else bodies, WET if law else None, law)
+        found["+".join([f"wall{order}", *law.values()])] = _motion(600, (1 - order, order)) | {"energies": account.energies(), "law": law}
     return found
 
 
@@ -224,7 +226,8 @@ def save_load():
 
 def come_and_go():
     """Bodies are inserted in contact, erased in contact, held and let go; velocities are set; a force is added; the time step changes."""
-    account = scene_with([utils.wall(0, 2), grain((0, 0, 0.0024)), grain((0.004, 0, 0.0024), R, (0.3, 0, 0.1))], gravity=(0, 0, -9.81))
+    account = scene_with([utils.wall(0, 2), grain((0, 0, 0.00247)), grain((0.00497, 0, 0.00247), R, (0.01, 0, 0.02))],
+                         gravity=(0, 0, -9.81))
     rows = []
 
     def after(act):
@@ -239,7 +242,7 @@ def come_and_go():
         O.bodies[body].state.blockedDOFs = how
 
     after(lambda: None)
-    after(lambda: O.bodies.append(grain((0.002, 0.003, 0.0045), R, (0.1, 0.5, -0.4), material=O.materials[0])))
+    after(lambda: O.bodies.append(grain((0.0025, 0.003, 0.00553), R, (0, -0.01, -0.02), material=O.materials[0])))
     after(lambda: O.bodies.erase(2))
     after(fly)
     after(lambda: hold(1, "xyzXYZ"))
@@ -312,6 +315,10 @@ def messages():
     def engines(change):
         O.engines = change(list(O.engines))
 
+    def scaled(account):
+        O.engines = [*O.engines, GlobalStiffnessTimeStepper(active=False)]
+        O.engines[-2].densityScaling = True
+
     def missed(account):
         O.step()
         account.dead = True
@@ -319,11 +326,11 @@ def messages():
         account.dead = False
 
     heard("all right", lambda account: None)
-    heard("no integrator", lambda account: engines(lambda e: e[:-1]))
+    heard("no integrator", lambda account: engines(lambda e: [account]))
     heard("two integrators", lambda account: engines(lambda e: [*e, NewtonIntegrator()]))
     heard("before the loop", lambda account: engines(lambda e: [e[0], e[4], *e[1:4], e[5]]))
     heard("after the integrator", lambda account: engines(lambda e: [*e[:4], e[5], e[4]]))
-    heard("density scaling", lambda account: setattr(O.engines[-1], "densityScaling", True))
+    heard("density scaling", scaled)
     heard("clump", lambda account: O.bodies.clump([0, 1]))
     heard("aspherical", lambda account: setattr(O.bodies[0], "aspherical", True))
     heard("cell", lambda account: (setattr(O, "periodic", True), setattr(O.cell, "velGrad", Matrix3(0, 1, 0, 0, 0, 0, 0, 0, 0))))
