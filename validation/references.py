@@ -89,3 +89,43 @@ KOLESNIKOV = Reference(
     "each step of the motion of logs on springs, by backward differences, is a linear complementarity problem with a positive definite "
     "matrix, solved by exchanges chosen by their energy.",
 )
+
+LUBE = Reference(
+    "Lube et al. 2005",
+    "G. Lube, H. E. Huppert, R. S. J. Sparks, A. Freundt, Collapses of two-dimensional granular columns, Phys. Rev. E 72 (2005) 041301.",
+    "not the paper; its laws as several public programs quote them, alike",
+    "columns in a channel run out (L − W)/W = 1.2 a for a = H/W < 1.8 and 1.9 a^(2/3) for a > 2.8, where the deposit is W a^(2/5) high, "
+    "whatever the grains and the roughness of the floor.",
+)
+
+LAJEUNESSE = Reference(
+    "Lajeunesse et al. 2005",
+    "E. Lajeunesse, J. B. Monnier, G. M. Homsy, Granular slumping on a horizontal surface, Phys. Fluids 17 (2005) 103302.",
+    "nothing",
+    "measured the same with glass beads; its constants could not be read and are left out.",
+)
+
+SARLIN = Reference(
+    "Sarlin et al. 2021",
+    "W. Sarlin, C. Morize, A. Sauret, P. Gondret, Collapse dynamics of dry granular columns: from free-fall to quasistatic flow, "
+    "Phys. Rev. E 104 (2021) 064904.",
+    "abstract",
+    "the speed at which a column is released governs its collapse: released fast it leaves the deposits of the classical power laws.",
+)
+
+STARON = Reference(
+    "Staron & Hinch 2005",
+    "L. Staron, E. J. Hinch, Study of the collapse of granular columns using two-dimensional discrete-grain simulation, J. Fluid Mech. 545 "
+    "(2005) 1-27.",
+    "abstract",
+    "the collapse is mostly controlled by the free fall of the column, and the energy that is left for the flow sideways is proportional to the "
+    "initial potential energy.",
+)
+
+UTILI = Reference(
+    "Utili et al. 2015",
+    "S. Utili, T. Zhao, G. T. Houlsby, 3D DEM investigation of granular column collapse: evaluation of debris motion and its destructive "
+    "power, Eng. Geol. 186 (2015) 3-16.",
+    "abstract",
+    "in simulations most of a column's energy is dissipated by friction between grains, the more the higher the column.",
+)

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from dembark.validation.checks.log_exact import PairMotion, pair_motion
-from dembark.validation.checks.logs import SAME, LogRun, energy_curves, exact, kept, over_time, read, solver_quantities
+from dembark.validation.checks.logs import SAME, LogRun, energy_curves, exact, fitted_exponent, kept, over_time, read, solver_quantities
 from dembark.validation.checks.quantity import Quantity
 from dembark.validation.checks.run import Replica, profile
 from dembark.validation.references import KOLESNIKOV
@@ -301,11 +301,6 @@ def study(name: str, points: Sequence[dict[str, Any]], along: str) -> tuple[list
             )
         )
     return found, curves, [f"θ = {theta:g}. Each impact begins at the end of a step, so that the errors differ by the step alone."]
-
-
-def fitted_exponent(steps: Array, errors: Array) -> float:
-    """Slope of log error over log step by least squares."""
-    return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
 
 
 def _error(point: Mapping[str, Any], name: str) -> float:

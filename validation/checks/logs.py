@@ -33,6 +33,11 @@ def exact(value: float, half: float = 0.0) -> Estimate:
     return Estimate(float(value), half, "none, nothing is random" if half == 0.0 else "the time step")
 
 
+def fitted_exponent(steps: Array, errors: Array) -> float:
+    """Slope of log error over log step by least squares."""
+    return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
+
+
 @dataclass(frozen=True)
 class TouchFrame:
     """The m contacts with a force at one step: `ids` (m, 2), the second < 0 for a wall; `normals` (m, 3), the direction of the force on
