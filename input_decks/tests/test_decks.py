@@ -12,15 +12,22 @@ import pytest
 
 from dembark.postproc import ContactsDump, GrainsDump, read_times
 from dembark.validation import engines
+from dembark.validation.checks import column_collapse
+from dembark.validation.checks.run import Replica
 from dembark.validation.errors import DembarkError
 
 ROOT = Path(__file__).resolve().parents[1]
 WALLS = {"silo": ("side", "base"), "plane_silo": ("left", "right", "base"), "plug_flow": ("left", "right", "base"),
-         "gravity_channel": ("left", "right")}
+         "gravity_channel": ("left", "right"), "column_collapse": ("back", "base", "gate")}
+# Columns of time.csv, where they are not the forces of the walls.
+ENERGIES = ["first_kinetic", "gravity", "normal_elastic", "normal_viscous", "tangential_elastic", "tangential_viscous", "capillary",
+            "liquid_viscous", "walls", "other", "imposed", "balance", "normal_stored", "tangential_stored", "step_error", "scale",
+            "potential_energy", "weight_height"]
+COLUMNS = {"column_collapse": ENERGIES}
 # The cases of grains; those of logs have other columns and tests of their own.
 CASES = sorted(WALLS)
 # Axes along which the dumps say that the box is periodic.
-PERIODIC = {"silo": [], "plane_silo": [1], "plug_flow": [1], "gravity_channel": [1, 2]}
+PERIODIC = {"silo": [], "plane_silo": [1], "plug_flow": [1], "gravity_channel": [1, 2], "column_collapse": [1]}
 # Keys for the harness alone: a deck makes one packing.
 HARNESS_ONLY = {"replicas"}
 # How a run is saved and resumed is no input of it.
@@ -34,9 +41,12 @@ TINY: dict[str, dict[str, Any]] = {
                   "frames": 3},
     "gravity_channel": {"channel_width": 0.04, "channel_depth": 0.021, "channel_length": 0.02, "youngs_modulus": 5e6, "solid_fraction": 0.62,
                         "pack_time": 10.0, "run_in": 8.0, "measure": 0.1, "frames": 3},
+    "column_collapse": {"grain_count": 60, "column_width": 0.021, "column_depth": 0.021, "settle_time": 0.15, "collapse_time": 0.15, "frames": 11},
 }
-CHANGES: dict[str, dict[str, Any]] = {"dry": {}, "wet": {"bridge_volume": 8e-11}, "rough": {"wall_roughness": "rough"}}
-VARIANTS = {"silo": ("dry", "wet"), "plane_silo": ("dry", "wet"), "plug_flow": ("dry", "wet", "rough"), "gravity_channel": ("dry", "wet")}
+CHANGES: dict[str, dict[str, Any]] = {"dry": {}, "wet": {"bridge_volume": 8e-11}, "rough": {"wall_roughness": "rough"},
+                                      "viscous": {"bridge_volume": 8e-11, "liquid_viscosity": 0.01}}
+VARIANTS = {"silo": ("dry", "wet"), "plane_silo": ("dry", "wet"), "plug_flow": ("dry", "wet", "rough"), "gravity_channel": ("dry", "wet"),
+            "column_collapse": ("dry", "viscous")}
 RUNS = [(case, engine, variant) for case in CASES for engine in ("liggghts", "yade") for variant in VARIANTS[case]]
 
 
@@ -123,7 +133,7 @@ def test_outputs_have_the_common_schema(case: str, engine: str, variant: str, fi
         assert set(frame.wall_forces) == set(WALLS[case])
         assert np.nonzero(frame.periodic)[0].tolist() == PERIODIC[case]
         assert np.isin(contact.ids, frame.ids).all()
-    assert list(times)[3:] == [f"{wall}_f{axis}" for wall in WALLS[case] for axis in "xyz"]
+    assert list(times)[3:] == COLUMNS.get(case, [f"{wall}_f{axis}" for wall in WALLS[case] for axis in "xyz"])
     assert len(times["step"]) >= 200
     np.testing.assert_allclose(times["time"], times["step"] * time_step, rtol=1e-8)
 
@@ -140,7 +150,7 @@ def test_engines_start_from_the_same_grains(case: str, finished: Any) -> None:
     np.testing.assert_allclose(tables[0], tables[1], rtol=1e-7)
 
 
-@pytest.mark.parametrize(("case", "engine", "variant"), RUNS)
+@pytest.mark.parametrize(("case", "engine", "variant"), [run for run in RUNS if run[0] != "column_collapse"])
 def test_forces_on_each_grain_add_up(case: str, engine: str, variant: str, finished: Any) -> None:
     """Contacts, walls and gravity make up the engine's own total; liquid bridges over a gap are contacts too.
 
@@ -177,3 +187,28 @@ def test_the_gravity_channel_holds_its_solid_fraction(engine: str, finished: Any
     # Nothing but the walls holds the grains once gravity acts.
     packed = times["time"] < 9.0 * np.sqrt(0.005 / 9.81)
     assert np.abs((times["left_fz"] + times["right_fz"])[packed]).mean() < np.abs((times["left_fz"] + times["right_fz"])[~packed]).mean()
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+@pytest.mark.parametrize("variant", VARIANTS["column_collapse"])
+def test_energies_of_a_collapse_balance(engine: str, variant: str, finished: Any) -> None:
+    folder, _, time_step, values = finished("column_collapse", engine, variant)
+    given = {key: table.get("value") for key, table in parameters("column_collapse").items()} | values
+    found, _, _ = column_collapse.quantities([Replica(folder, {"parameters": given, "time_step": time_step, "engine": engine})])
+    measured = {one.name: one.estimate.value for one in found}
+    verdicts = {one.name: one.judged()[0] for one in found if one.tolerance is not None}
+    assert verdicts == dict.fromkeys(("energy_balance", "potential_error", "dissipation_sign"), "pass"), measured
+    # All of it happens, and the shares are all that becomes of the potential energy but for the error of the step.
+    ways = ("friction_share", "normal_viscous_share", "tangential_viscous_share", *(("liquid_viscous_share",) if variant == "viscous" else ()))
+    assert all(measured[name] > 0.01 for name in ways) and measured["kinetic_share"] > 0.0
+    assert abs(measured["gate_share"]) > 1e-5
+    assert sum(value for name, value in measured.items() if name.endswith("_share")) == pytest.approx(1.0, abs=2 * measured["step_error"])
+    rows = read_times(folder / "time.csv")
+    assert (rows["other"] <= 1e-13 * rows["scale"][-1]).all() and (rows["imposed"] == 0.0).all()
+    assert measured["run_out"] > 0.1
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+def test_viscosity_without_liquid_is_refused(engine: str, tmp_path: Path) -> None:
+    with pytest.raises(AssertionError, match="liquid_viscosity"):
+        run_by_hand("column_collapse", engine, tmp_path, {"liquid_viscosity": 0.01})

@@ -1,124 +1,30 @@
 """Checks of case `column_collapse`: the energies that the engine's account booked, row by row, and the deposit.
 
-Sums run from the first row of time.csv to the last; shares belong to the collapse, from the row in which the gate begins to move. All
-energies in J; works are positive when they make grains faster.
+Balances run over all rows of time.csv, shares over the collapse, from the row in which the gate begins to move.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from dembark.postproc import DumpError, GrainFrame
+from dembark.validation.checks.collapse import FRONT, Collapse, given_back, imbalance, potential_error, read, step_error
 from dembark.validation.checks.logs import exact, fitted_exponent
 from dembark.validation.checks.quantity import Quantity, measured
-from dembark.validation.checks.run import Replica, once, profile
+from dembark.validation.checks.run import Replica, profile
 from dembark.validation.references import LAJEUNESSE, LUBE, SARLIN, STARON, UTILI
-from dembark.validation.statistics import Estimate, over_replicas
+from dembark.validation.statistics import Estimate, combined, over_replicas
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 REFERENCES = (LUBE, LAJEUNESSE, SARLIN, STARON, UTILI)
-PARTS = ("normal_elastic", "normal_viscous", "tangential_elastic", "tangential_viscous", "capillary", "liquid_viscous")
-DISSIPATING = ("normal_viscous", "tangential_viscous", "liquid_viscous")
 # What is exact but for round-off: 1e-16 a step and contact, over some ten thousand steps, stays far below.
 ROUND_OFF = 1e-10
+# Of the exponent of the step's error: higher orders and collapses that differ.
+ORDER_TOLERANCE = 0.2
 _NO_INTERVAL = "one run of a chaotic motion says nothing about its spread"
 _POINTS = 100
-# Share of the mass behind the front: single grains roll on after the others have come to rest.
-FRONT = 0.98
-
-
-@dataclass(frozen=True)
-class Collapse:
-    """One run: `rows`, the columns of time.csv; `opening`, the row in which the gate begins to move; `gained`, the change since then of
-    every column; `fallen` (J), the potential energy lost since then in the last row; `first`, `last`: grains then and at the end; W and d
-    in m."""
-
-    rows: dict[str, Array]
-    opening: int
-    first: GrainFrame
-    last: GrainFrame
-    width: float
-    diameter: float
-
-    def gained(self, name: str) -> Array:
-        return self.rows[name][self.opening :] - self.rows[name][self.opening]
-
-    @property
-    def time(self) -> Array:
-        return self.rows["time"][self.opening :] - self.rows["time"][self.opening]
-
-    @property
-    def fallen(self) -> float:
-        return float(-self.gained("potential_energy")[-1])
-
-    def lost_in(self, name: str) -> Array:
-        """What this way has taken since the opening, over all the potential energy lost in the run."""
-        taken = {
-            "friction": lambda: -self.gained("tangential_elastic") - self.gained("tangential_stored"),
-            "held": lambda: self.gained("normal_stored") + self.gained("tangential_stored"),
-            "kinetic": lambda: self.gained("kinetic_energy"),
-            "gate": lambda: -self.gained("walls"),
-        }.get(name, lambda: -self.gained(name))()
-        return np.asarray(taken / self.fallen)
-
-    @property
-    def height(self) -> float:
-        """m, of the column: twice that of its centre of mass."""
-        return float(2.0 * np.average(self.first.positions[:, 2], weights=self.first.masses))
-
-    @property
-    def front(self) -> float:
-        """m, behind which a share FRONT of the mass lies at the end."""
-        order = np.argsort(self.last.positions[:, 0])
-        behind = np.cumsum(self.last.masses[order]) / self.last.masses.sum()
-        return float(self.last.positions[order[np.searchsorted(behind, FRONT)], 0])
-
-    def surface(self, frame: GrainFrame, edges: Array) -> Array:
-        """m, highest point of a grain whose centre is in each cell of x (0 where there is none)."""
-        top = np.zeros(len(edges) - 1)
-        cell = np.searchsorted(edges, frame.positions[:, 0]) - 1
-        inside = (cell >= 0) & (cell < len(top))
-        np.maximum.at(top, cell[inside], (frame.positions[:, 2] + frame.radii)[inside])
-        return top
-
-
-@once
-def read(replica: Replica) -> Collapse:
-    """What was written; DumpError when the first frame has no row in time.csv."""
-    frames, rows = replica.grains(), replica.times()
-    opening = np.flatnonzero(rows["step"] == frames[0].step)
-    if len(opening) != 1 or opening[0] + 1 >= len(rows["step"]):
-        raise DumpError(f"{replica.folder}: time.csv has no row at step {frames[0].step}, the first of grains.dump, or none after it")
-    p = replica.parameters
-    return Collapse(rows, int(opening[0]), frames[0], frames[len(frames) - 1], p["column_width"], p["grain_diameter"])
-
-
-def imbalance(rows: dict[str, Array]) -> float:
-    """Largest difference between kinetic energy and the works of known forces, over the energy turned over so far."""
-    works = rows["gravity"] + rows["walls"] + sum(rows[name] for name in PARTS)
-    # What the account found besides, `other` and `imposed`, counts as unexplained: this case has neither.
-    left = np.maximum(np.abs(rows["kinetic_energy"] - rows["first_kinetic"] - works), np.abs(rows["balance"]))
-    return float((left / rows["scale"]).max())
-
-
-def potential_error(one: Collapse, column: str = "potential_energy") -> float:
-    """Largest difference between gravity's work since the first row and the potential energy lost, over the largest such work."""
-    work = one.rows["gravity"] - one.rows["gravity"][0]
-    return float(np.abs(work + one.rows[column] - one.rows[column][0]).max() / np.abs(work).max())
-
-
-def given_back(rows: dict[str, Array]) -> float:
-    """Largest energy that a dissipating part gave from one row to the next, over the energy turned over; 0 when none ever did."""
-    return float(max(np.diff(rows[name], prepend=0.0).max() for name in DISSIPATING) / rows["scale"][-1])
-
-
-def step_error(one: Collapse) -> float:
-    """Largest energy that the step added to or took from the normal springs since the opening, over the potential energy lost."""
-    return float(np.abs(one.gained("step_error")).max() / one.fallen)
 
 
 def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[str, Any]], list[str]]:
@@ -130,35 +36,81 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
         return over_replicas([Estimate(measure(one), float("inf"), _NO_INTERVAL) for one in runs])
 
     def worst(name: str, label: str, measure: Callable[[Collapse], float], detail: str, source: str) -> Quantity:
-        return Quantity(name, label, "1", exact(max(measure(one) for one in runs)), reference=exact(0.0), tolerance=ROUND_OFF, absolute=True,
-                        compared=False, detail=f"{detail}; the worst of {len(runs)} runs", source=source)
+        value = float(np.max([measure(one) for one in runs]))  # of numbers that are none: none
+        return Quantity(
+            name,
+            label,
+            "1",
+            exact(value),
+            reference=exact(0.0),
+            tolerance=ROUND_OFF,
+            absolute=True,
+            compared=False,
+            detail=f"{detail}; the worst of {len(runs)} runs",
+            source=source,
+        )
 
     def share(name: str, label: str, detail: str = "") -> Quantity:
-        return Quantity(f"{name}_share", f"{label}, over the potential energy lost", "1", over(lambda one: float(one.lost_in(name)[-1])),
-                        detail=detail or "from the opening of the gate to the end")
+        return Quantity(
+            f"{name}_share",
+            f"{label}, over the potential energy lost",
+            "1",
+            over(lambda one: float(one.lost_in(name)[-1])),
+            detail=detail or "from the opening of the gate to the end",
+        )
 
     found = [
-        worst("energy_balance", "largest difference between kinetic energy and works, over the energy turned over",
-              lambda one: imbalance(one.rows), "any row of the run, rain included", "kicks of the integrator: exact at any step"),
-        worst("potential_error", "largest difference between gravity's work and the potential energy lost, over the work",
-              potential_error, "potential energy at the heights that telescope (README)", "sum of the integrator's steps"),
-        worst("dissipation_sign", "largest energy that damping or the liquid's viscosity gave in a row, over the energy turned over",
-              lambda one: given_back(one.rows), "0: none ever gave any", "second law"),
-        Quantity("step_error", "energy error of the step in the normal springs, over the potential energy lost", "1",
-                 over(step_error), detail="largest since the opening; falls with the square of the step", compared=False),
-        Quantity("height_error", "gravity's work against the fall of the positions themselves, over the work", "1",
-                 over(lambda one: potential_error(one, "weight_height")), compared=False,
-                 detail="works and positions of a row are not of one time: second order in the step in LIGGGHTS, first in YADE"),
+        worst(
+            "energy_balance",
+            "largest difference between kinetic energy and works, over the energy turned over",
+            lambda one: imbalance(one.rows),
+            "any row of the run, rain included",
+            "kicks of the integrator: exact at any step",
+        ),
+        worst(
+            "potential_error",
+            "largest difference between gravity's work and the potential energy lost, over the work",
+            potential_error,
+            "potential energy at the heights that telescope (README)",
+            "sum of the integrator's steps",
+        ),
+        worst(
+            "dissipation_sign",
+            "largest energy that damping or the liquid's viscosity gave in a row, over the energy turned over",
+            lambda one: given_back(one.rows),
+            "0: none ever gave any",
+            "second law",
+        ),
+        Quantity(
+            "step_error",
+            "energy error of the step in the normal springs, over the potential energy lost",
+            "1",
+            over(step_error),
+            detail="largest since the opening; falls with the square of the step",
+            compared=False,
+        ),
+        Quantity(
+            "height_error",
+            "gravity's work against the fall of the positions themselves, over the work",
+            "1",
+            over(lambda one: potential_error(one, "weight_height")),
+            compared=False,
+            detail="works and positions of a row are not of one time: second order in the step in LIGGGHTS, first in YADE",
+        ),
         share("friction", "lost by friction", "slip, and what a spring loses when its contact opens or softens"),
         share("normal_viscous", "lost by normal damping"),
         share("tangential_viscous", "lost by tangential damping"),
     ]
     if wet:
-        found += [share("liquid_viscous", "lost in the viscous liquid"),
-                  share("capillary", "taken by the pull of liquid bridges", "what bridges take when they are drawn out and do not give back")]
-    found += [share("gate", "taken by the gate"),
-              share("held", "held by springs at the end", "less than when the gate opened, when the column weighed on them"),
-              share("kinetic", "kinetic energy left")]
+        found += [
+            share("liquid_viscous", "lost in the viscous liquid"),
+            share("capillary", "taken by the pull of liquid bridges", "what bridges take when they are drawn out and do not give back"),
+        ]
+    found += [
+        share("gate", "taken by the gate"),
+        share("held", "held by springs at the end", "less than when the gate opened, when the column weighed on them"),
+        share("kinetic", "kinetic energy left"),
+    ]
     return found + _deposit(runs, over), _curves(runs, wet), _remarks(runs)
 
 
@@ -180,22 +132,38 @@ def _deposit(runs: Sequence[Collapse], over: Callable[[Callable[[Collapse], floa
 
     def deposit(name: str, label: str, measure: Callable[[Collapse], float], detail: str) -> Quantity:
         law = laws[name]
-        return Quantity(name, label, "W", over(measure), reference=None if law is None else exact(law), source=LUBE.short if law else "",
-                        reason=other if law else "", detail=detail)
+        return Quantity(
+            name,
+            label,
+            "W",
+            over(measure),
+            reference=None if law is None else exact(law),
+            source=LUBE.short if law else "",
+            reason=other if law else "",
+            detail=detail,
+        )
 
     return [
-        Quantity("aspect_ratio", "height of the column over its width, H/W", "1", aspect, detail="H: twice the height of the centre of mass"),
+        Quantity(
+            "aspect_ratio", "height of the column over its width, H/W", "1", aspect, detail="H: twice the height of the centre of mass"
+        ),
         deposit("run_out", "run-out (L − W)/W", lambda one: one.front / one.width - 1.0, f"{FRONT:.0%} of the mass lie within L"),
-        deposit("final_height", "height of the deposit at the back wall", lambda one: float(one.surface(one.last, edges[id(one)])[0]) / one.width,
-                "highest grain within 2 d of the wall"),
+        deposit(
+            "final_height",
+            "height of the deposit at the back wall",
+            lambda one: float(one.surface(one.last, edges[id(one)])[0]) / one.width,
+            "highest grain within 2 d of it",
+        ),
     ]
 
 
 def _remarks(runs: Sequence[Collapse]) -> list[str]:
     fallen = float(np.mean([one.fallen for one in runs]))
     turned = float(np.mean([one.rows["scale"][-1] for one in runs]))
-    remarks = [f"The collapse loses {1e3 * fallen:.4g} mJ of potential energy; all works of the run, rain included, turn over {1e3 * turned:.4g} mJ.",
-               *(f"{one.short}: {one.statement}" for one in (LUBE, SARLIN, STARON, UTILI))]
+    remarks = [
+        f"The collapse loses {1e3 * fallen:.4g} mJ of potential energy; all works of the run, rain included, make {1e3 * turned:.4g} mJ.",
+        *(f"{one.short}: {one.statement}" for one in (LUBE, SARLIN, STARON, UTILI)),
+    ]
     if len(runs) < 3:
         remarks.append("Shares and deposit vary from packing to packing; fewer than three tell nothing about by how much.")
     return remarks
@@ -206,11 +174,23 @@ def _curves(runs: Sequence[Collapse], wet: bool) -> list[dict[str, Any]]:
     place = np.linspace(0.0, first.time[-1], _POINTS + 1)
 
     def curve(name: str, title: str, get: Callable[[Collapse], Array]) -> dict[str, Any]:
-        return profile(name, title, "time since the gate moves (s)", "over the potential energy lost", place,
-                       [np.interp(place, one.time, get(one)) for one in runs])
+        return profile(
+            name,
+            title,
+            "time since the gate moves (s)",
+            "over the potential energy lost",
+            place,
+            [np.interp(place, one.time, get(one)) for one in runs],
+        )
 
-    ways = [("kinetic", "Kinetic energy"), ("friction", "Lost by friction"), ("normal_viscous", "Lost by normal damping"),
-            ("tangential_viscous", "Lost by tangential damping"), ("held", "Held by springs"), ("gate", "Taken by the gate")]
+    ways = [
+        ("kinetic", "Kinetic energy"),
+        ("friction", "Lost by friction"),
+        ("normal_viscous", "Lost by normal damping"),
+        ("tangential_viscous", "Lost by tangential damping"),
+        ("held", "Held by springs"),
+        ("gate", "Taken by the gate"),
+    ]
     if wet:
         ways += [("liquid_viscous", "Lost in the viscous liquid"), ("capillary", "Taken by liquid bridges")]
     edges = np.arange(0.0, 5.0 * first.width, first.diameter)
@@ -219,24 +199,58 @@ def _curves(runs: Sequence[Collapse], wet: bool) -> list[dict[str, Any]]:
     return [
         curve("potential", "Potential energy lost", lambda one: -one.gained("potential_energy") / one.fallen),
         *(curve(name, title, lambda one, name=name: one.lost_in(name)) for name, title in ways),  # type: ignore[misc]
-        profile("deposit", "Deposit", "x / W", "height / W", middle, [one.surface(one.last, edges) / one.width for one in runs],
-                reference=before, reference_label="when the gate opens"),
+        profile(
+            "deposit",
+            "Deposit",
+            "x / W",
+            "height / W",
+            middle,
+            [one.surface(one.last, edges) / one.width for one in runs],
+            reference=before,
+            reference_label="when the gate opens",
+        ),
     ]
 
 
 def study(name: str, points: Sequence[dict[str, Any]], along: str) -> tuple[list[Quantity], list[dict[str, Any]], list[str]]:
-    """The study `step`: exponent of the step's energy error."""
+    """The study `step`: exponent of the step's energy error, with the interval that those of the errors give it."""
     del name
+    points = sorted(points, key=lambda point: float(point["parameters"][along]))
     steps = np.array([point["parameters"][along] for point in points])
-    errors = np.array([measured(point, "step_error").value for point in points])
-    order = np.argsort(steps)
-    found = Quantity("order_step_error", "energy error of the step ∝ Δt^p, p", "1", exact(fitted_exponent(steps, errors)), reference=exact(2.0),
-                     absolute=True, source="trapezoidal rule of a smooth force", reason="runs at another step are other collapses",
-                     detail="errors " + ", ".join(f"{errors[k]:.2e} at {steps[k]:g}" for k in order) + " of the Rayleigh time")
-    line = errors[order][-1] * (steps[order] / steps[order][-1]) ** 2
-    curve = profile("step_error", "Energy error of the step", "log₁₀ time step over the Rayleigh time", "log₁₀ error", np.log10(steps[order]),
-                    [np.log10(errors[order])], reference=np.log10(line), reference_label="slope 2")
-    return [found], [curve], ["Works and kinetic energy balance to round-off at each of these steps; this is what the step itself makes of the energy."]
+    errors = [measured(point, "step_error") for point in points]
+    values = np.array([one.value for one in errors])
+    # The slope of a straight line is a sum of the logarithms with these weights.
+    away = np.log(steps) - np.log(steps).mean()
+    parts = [float(weight * one.half / one.value) for weight, one in zip(away / (away @ away), errors, strict=True)]
+    found = Quantity(
+        "order_step_error",
+        "energy error of the step ∝ Δt^p, p",
+        "1",
+        Estimate(fitted_exponent(steps, values), combined(parts), "propagated from the errors"),
+        reference=exact(2.0),
+        tolerance=ORDER_TOLERANCE,
+        absolute=True,
+        source="trapezoidal rule",
+        compared=False,
+        detail="errors "
+        + ", ".join(f"{error:.2e} at {step:g}" for step, error in zip(steps, values, strict=True))
+        + " of the Rayleigh time",
+    )
+    curve = profile(
+        "step_error",
+        "Energy error of the step",
+        "log₁₀ time step over the Rayleigh time",
+        "log₁₀ error",
+        np.log10(steps),
+        [np.log10(values)],
+        reference=np.log10(values[-1] * (steps / steps[-1]) ** 2),
+        reference_label="slope 2",
+    )
+    return (
+        [found],
+        [curve],
+        ["Works balance the kinetic energy to round-off at each of these steps; this is what the step makes of the energy."],
+    )
 
 
 def picture(parameters: dict[str, Any]) -> dict[str, Any]:
