@@ -200,8 +200,7 @@ def test_energies_of_a_collapse_balance(engine: str, variant: str, finished: Any
     assert verdicts == dict.fromkeys(("energy_balance", "potential_error", "dissipation_sign"), "pass"), measured
     # All of it happens, and the shares are all that becomes of the potential energy but for the error of the step.
     ways = ("friction_share", "normal_viscous_share", "tangential_viscous_share", *(("liquid_viscous_share",) if variant == "viscous" else ()))
-    assert all(measured[name] > 0.01 for name in ways) and measured["kinetic_share"] > 0.0
-    assert abs(measured["gate_share"]) > 1e-5
+    assert all(measured[name] > 0.01 for name in ways) and abs(measured["gate_share"]) > 1e-5
     assert sum(value for name, value in measured.items() if name.endswith("_share")) == pytest.approx(1.0, abs=2 * measured["step_error"])
     rows = read_times(folder / "time.csv")
     assert (rows["other"] <= 1e-13 * rows["scale"][-1]).all() and (rows["imposed"] == 0.0).all()
