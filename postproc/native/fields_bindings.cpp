@@ -50,6 +50,7 @@ class Target {
       cells_.high[axis] = high.data()[axis];
       cells_.shape[axis] = int(shape.data()[axis]);
       cells_.spacing[axis] = (cells_.high[axis] - cells_.low[axis]) / cells_.shape[axis];
+      cells_.per_metre[axis] = 1.0 / cells_.spacing[axis];
       cells_.periodic[axis] = periodic.data()[axis] != 0.0;
       box_.periodic[axis] = box_periodic.data()[axis] != 0.0;
       for (int other = 0; other < 3; ++other) box_.edge[axis][other] = edges.data()[3 * axis + other];
@@ -72,26 +73,31 @@ class Target {
     const std::size_t n = places.shape(0);
     require(masses.shape(0) == n && radii.shape(0) == n && velocities.shape(0) == n && velocities.shape(1) == 3 &&
             peculiar.shape(0) == n && peculiar.shape(1) == 3 && touches.shape(0) == n && middle.shape(0) == 3);
-    const GrainSource source{masses.data(), radii.data(), velocities.data(), peculiar.data(), touches.data(), maybe(liquid, n),
+    require(places.shape(1) == 3);
+    const GrainSource source{std::int64_t(n),  places.data(),    masses.data(),  radii.data(),
+                             velocities.data(), peculiar.data(), touches.data(), maybe(liquid, n),
                              {middle.data()[0], middle.data()[1], middle.data()[2]}};
-    add(places, nullptr, one_node(), source, out);
+    add(one_node(), source, out);
   }
 
   void contacts(Rows first, Rows branch, Rows forces, Pairs pairs, Flags touching, Vector radii, Rows velocities,
                 std::optional<Rows> omegas, std::optional<Vector> liquid, std::optional<Vector> power, Vector place, Vector weight,
                 Field out) const {
     const std::size_t m = first.shape(0), n = radii.shape(0);
-    require(branch.shape(0) == m && branch.shape(1) == 3 && forces.shape(0) == m && forces.shape(1) == 3 && pairs.shape(0) == m &&
-            pairs.shape(1) == 2 && touching.shape(0) == m && velocities.shape(0) == n && velocities.shape(1) == 3 &&
-            (!omegas || (omegas->shape(0) == n && omegas->shape(1) == 3)));
-    const ContactSource source{branch.data(), forces.data(), pairs.data(), touching.data(), radii.data(), velocities.data(),
-                               omegas ? omegas->data() : nullptr, maybe(liquid, m), maybe(power, m)};
-    add(first, branch.data(), nodes_of(place, weight), source, out);
+    require(first.shape(1) == 3 && branch.shape(0) == m && branch.shape(1) == 3 && forces.shape(0) == m && forces.shape(1) == 3 &&
+            pairs.shape(0) == m && pairs.shape(1) == 2 && touching.shape(0) == m && velocities.shape(0) == n &&
+            velocities.shape(1) == 3 && n < (std::size_t(1) << 31) && (!omegas || (omegas->shape(0) == n && omegas->shape(1) == 3)));
+    Buffer<Motion> motions;
+    if (omegas) motions = motions_of(std::int64_t(n), radii.data(), velocities.data(), omegas->data(), std::max(1, threads_));
+    const ContactSource source{std::int64_t(m), first.data(), branch.data(), forces.data(), pairs.data(), touching.data(),
+                               motions.get(), maybe(liquid, m), maybe(power, m)};
+    add(nodes_of(place, weight), source, out);
   }
 
   void lines(Rows first, Rows branch, Rows values, Vector place, Vector weight, Field out) const {
-    require(branch.shape(0) == first.shape(0) && branch.shape(1) == 3 && values.shape(0) == first.shape(0));
-    add(first, branch.data(), nodes_of(place, weight), PlainSource{int(values.shape(1)), values.data()}, out);
+    const std::size_t m = first.shape(0);
+    require(first.shape(1) == 3 && branch.shape(0) == m && branch.shape(1) == 3 && values.shape(0) == m);
+    add(nodes_of(place, weight), PlainSource{std::int64_t(m), first.data(), branch.data(), int(values.shape(1)), values.data()}, out);
   }
 
  private:
@@ -106,13 +112,11 @@ class Target {
   }
 
   template <class Source>
-  void add(const Rows& first, const double* branch, const Nodes& nodes, const Source& source, Field& out) const {
+  void add(const Nodes& nodes, const Source& source, Field& out) const {
     require(int(out.shape(0)) == cells_.shape[0] && int(out.shape(1)) == cells_.shape[1] && int(out.shape(2)) == source.columns &&
-            int(out.shape(3)) == cells_.shape[2]);
-    require(first.shape(1) == 3 && first.shape(0) < (std::size_t(1) << 31));
-    const Lines lines{std::int64_t(first.shape(0)), first.data(), branch};
+            int(out.shape(3)) == cells_.shape[2] && source.count < (std::int64_t(1) << 31));
     nb::gil_scoped_release release;
-    deposit(cells_, box_, kernel_, nodes, lines, source, threads_, out.data());
+    deposit(cells_, box_, kernel_, nodes, source, threads_, out.data());
   }
 
   Cells cells_{};

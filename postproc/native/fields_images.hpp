@@ -1,14 +1,8 @@
-// The periodic images of lines, sorted by where on the grid they begin.
+// Points and lines, their periodic images, and the cells that these reach.
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
 #include <cstdint>
-#include <cstdlib>
-#include <memory>
-#include <new>
-#include <thread>
-#include <vector>
 
 #include "fields_lines.hpp"
 
@@ -23,33 +17,23 @@ struct Box {
   double home[3] = {0.0, 0.0, 0.0};
 };
 
-// Lines from `first` (count, 3) to `first + branch` (count, 3), or points where `branch` is null.
-struct Lines {
-  std::int64_t count;
-  const double *first, *branch;
+struct Point {
+  double first[3];
+  static constexpr double branch[3] = {0.0, 0.0, 0.0};
 };
 
-// A line shifted by whole box edges.
-struct Image {
-  std::int32_t line;
-  std::int16_t edges[3];
-};
-
-struct Place {
+// From `first` to `first + branch`.
+struct Segment {
   double first[3], branch[3];
 };
 
-inline Place place_of(const Lines& lines, const Box& box, const Image& image) {
-  Place place;
-  const std::int64_t at = 3 * std::int64_t(image.line);
-  for (int axis = 0; axis < 3; ++axis) {
-    place.first[axis] = lines.first[at + axis];
-    place.branch[axis] = lines.branch ? lines.branch[at + axis] : 0.0;
-  }
-  if (image.edges[0] == 0 && image.edges[1] == 0 && image.edges[2] == 0) return place;
+// `place` shifted by whole edges of the box.
+template <class Place>
+Place shifted(Place place, const Box& box, const int edges[3]) {
+  if (edges[0] == 0 && edges[1] == 0 && edges[2] == 0) return place;
   for (int axis = 0; axis < 3; ++axis) {
     double shift = 0.0;
-    for (int edge = 2; edge >= axis; --edge) shift += image.edges[edge] * box.edge[edge][axis];
+    for (int edge = 2; edge >= axis; --edge) shift += edges[edge] * box.edge[edge][axis];
     place.first[axis] += shift;
   }
   return place;
@@ -61,13 +45,14 @@ inline double whole_below(double value) {
   return whole > value ? whole - 1.0 : whole;
 }
 
-inline Window window_of(const Cells& cells, const Kernel& kernel, const Place& place) {
+template <class Place>
+Window window_of(const Cells& cells, const Kernel& kernel, const Place& place) {
   Window window;
   for (int axis = 0; axis < 3; ++axis) {
     const double a = place.first[axis], b = a + place.branch[axis];
     const double count = cells.shape[axis];
-    double start = (std::min(a, b) - kernel.reach - cells.low[axis]) / cells.spacing[axis];
-    double stop = (std::max(a, b) + kernel.reach - cells.low[axis]) / cells.spacing[axis];
+    double start = (std::min(a, b) - kernel.reach - cells.low[axis]) * cells.per_metre[axis];
+    double stop = (std::max(a, b) + kernel.reach - cells.low[axis]) * cells.per_metre[axis];
     // A factor of each axis needs no cells outside the grid; a spherical kernel is normalised over the whole ball.
     if (kernel.kind == KernelKind::gaussian) {
       start = std::clamp(start, 0.0, count - 1.0);
@@ -81,49 +66,45 @@ inline Window window_of(const Cells& cells, const Kernel& kernel, const Place& p
   return window;
 }
 
-struct Free {
-  void operator()(void* memory) const { std::free(memory); }
-};
-
-template <class T>
-using Buffer = std::unique_ptr<T[], Free>;
-
-// `count` zeros. The system clears large memory where it is touched first, which is the work of many threads.
-template <class T>
-Buffer<T> zeros(std::size_t count) {
-  void* memory = std::calloc(count > 0 ? count : 1, sizeof(T));
-  if (memory == nullptr) throw std::bad_alloc();
-  return Buffer<T>(static_cast<T*>(memory));
+// Calls `take(edges)` for all images of `place`, shifted by whole edges of the box, that come within the kernel's reach of the cells.
+template <class Place, class Take>
+void for_images(const Cells& cells, const Box& box, const Kernel& kernel, const Place& place, const Take& take) {
+  int from[3], to[3], edges[3] = {0, 0, 0};
+  const auto range = [&](int axis) {
+    double a = place.first[axis];
+    for (int edge = 2; edge > axis; --edge) a += edges[edge] * box.edge[edge][axis];
+    const double b = a + place.branch[axis];
+    if (box.folded[axis]) {
+      from[axis] = to[axis] = -int(whole_below((a - box.home[axis]) / box.edge[axis][axis]));
+      return;
+    }
+    const double low = cells.low[axis] - (std::max(a, b) + kernel.reach), high = cells.high[axis] - (std::min(a, b) - kernel.reach);
+    if (!box.periodic[axis]) {
+      from[axis] = 0;
+      to[axis] = low < 0.0 && high > 0.0 ? 0 : -1;
+    } else {
+      const double length = box.edge[axis][axis];
+      // Open ends: an image that only touches the grid has no share in it.
+      from[axis] = int(whole_below(low / length)) + 1;
+      to[axis] = -int(whole_below(-high / length)) - 1;
+    }
+  };
+  // From z to x: a later edge no longer moves an image along the axes done before.
+  range(2);
+  for (int c = from[2]; c <= to[2]; ++c) {
+    edges[2] = c;
+    edges[1] = edges[0] = 0;
+    range(1);
+    for (int b = from[1]; b <= to[1]; ++b) {
+      edges[1] = b;
+      edges[0] = 0;
+      range(0);
+      for (int a = from[0]; a <= to[0]; ++a) {
+        edges[0] = a;
+        take(edges);
+      }
+    }
+  }
 }
-
-// Calls `work(n)` for n = 0 ... count - 1, each on its own thread.
-template <class Work>
-void on_threads(int count, const Work& work) {
-  std::vector<std::thread> team;
-  for (int n = 1; n < count; ++n) team.emplace_back(work, n);
-  work(0);
-  for (std::thread& thread : team) thread.join();
-}
-
-// Part `n` of `parts` of a range of `size`.
-struct Range {
-  std::int64_t begin, end;
-  Range(std::int64_t size, int n, int parts) : begin(size * n / parts), end(size * (n + 1) / parts) {}
-};
-
-// All images of lines that come within the kernel's reach of the cells, by the block in which their windows begin. Blocks are of
-// block[axis] cells, numbered x, y, z with z running fastest. In a block they come by where along y their windows end and begin, so that
-// those that reach a row of cells lie close together; ties in the order of the lines.
-struct Sorted {
-  std::int64_t count = 0;
-  Buffer<Image> images;
-  int block[3] = {1, 1, 1};
-  std::int64_t across = 1;          // blocks with the same x
-  std::vector<std::int64_t> begin;  // of each block
-  std::vector<std::int64_t> work;   // (planes + 1,): lines that reach the planes before each, summed over these
-  int most[3] = {1, 1, 1};          // cells of the largest window
-};
-
-Sorted sort_images(const Cells& cells, const Box& box, const Kernel& kernel, const Lines& lines, int threads);
 
 }  // namespace dembark::fields

@@ -6,12 +6,12 @@
 #include <limits>
 #include <vector>
 
-#include "fields_images.hpp"
+#include "fields_memory.hpp"
 
 namespace dembark::fields {
 namespace {
 
-// Rows of rising ids: by a table where this is not much larger than they are, else by bisection.
+// Rows of rising ids: counted where no number is left out, else by a table where this is not much larger than they are, else by bisection.
 class RowOf {
  public:
   RowOf(const std::int64_t* ids, std::int64_t count) : ids_(ids), count_(count) {
@@ -19,15 +19,18 @@ class RowOf {
     const std::uint64_t span = count > 0 ? std::uint64_t(ids[count - 1]) - std::uint64_t(ids[0]) : 0;
     if (count == 0 || span >= 8 * std::uint64_t(count) + 1000) return;
     size_ = span + 1;
-    table_ = zeros<std::int32_t>(size_);
-    for (std::int64_t row = 0; row < count; ++row) table_[std::uint64_t(ids[row]) - std::uint64_t(ids[0])] = std::int32_t(row + 1);
+    std::int64_t row = 0;
+    while (row < count && ids[row] - ids[0] == row) ++row;
+    if (row == count) return;
+    table_ = zeros<std::int32_t>(size_, 1);
+    for (row = 0; row < count; ++row) table_[std::uint64_t(ids[row]) - std::uint64_t(ids[0])] = std::int32_t(row + 1);
   }
 
   // -1 when it is not there.
   std::int64_t operator()(std::int64_t id) const {
     if (size_ > 0) {
       const std::uint64_t place = std::uint64_t(id) - std::uint64_t(ids_[0]);
-      return place < size_ ? table_[place] - 1 : -1;
+      return place >= size_ ? -1 : table_ ? table_[place] - 1 : std::int64_t(place);
     }
     const std::int64_t* found = std::lower_bound(ids_, ids_ + count_, id);
     return found != ids_ + count_ && *found == id ? found - ids_ : -1;
@@ -61,7 +64,7 @@ bool all_finite(const double* values, std::int64_t count, int threads) {
 
 std::int64_t link(const Links& links, int threads, std::int64_t* rows, bool* touching, double* touches) {
   const RowOf row_of(links.ids, links.grains);
-  const Buffer<std::atomic<std::int32_t>> counts = zeros<std::atomic<std::int32_t>>(std::size_t(links.grains));
+  const Buffer<std::atomic<std::int32_t>> counts = zeros<std::atomic<std::int32_t>>(std::size_t(links.grains), threads);
   std::vector<std::int64_t> missing(std::size_t(threads), -1);
   on_threads(threads, [&](int n) {
     const Range range(links.contacts, n, threads);

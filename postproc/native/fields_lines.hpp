@@ -10,7 +10,7 @@ constexpr int max_cell_nodes = 16;  // Gauss points along an axis of a cell
 constexpr int max_group = 64;       // lines that are spread together
 
 struct Cells {
-  double low[3], high[3], spacing[3];
+  double low[3], high[3], spacing[3], per_metre[3];  // per_metre: cells per length, 1 / spacing
   int shape[3];
   bool periodic[3];
 };

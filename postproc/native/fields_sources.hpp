@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <initializer_list>
+
+#include "fields_shafts.hpp"
 
 namespace dembark::fields {
 
@@ -25,87 +26,136 @@ inline void product(const double a[3], const double b[3], double factor, double*
     for (int j = 0; j < 3; ++j) out[3 * i + j] = factor * a[i] * b[j];
 }
 
+inline Segment segment(const double* first, const double* branch) {
+  return {{first[0], first[1], first[2]}, {branch[0], branch[1], branch[2]}};
+}
+
+// Each source knows the place of each of its `count` lines, what of a line has to be carried there to tell its columns (`Carried`), and
+// fills those in. `moved`: what columns become when a place is moved by `shift`.
+
+// Lines from `first` to `first + branch`, (count, 3) each, with any columns.
 struct PlainSource {
-  static constexpr bool placed = false;  // whether what it carries depends on where an image is
+  static constexpr bool placed = false;  // whether columns depend on where an image is
+  using Place = Segment;
+  struct Carried {
+    std::int32_t line;
+  };
+  std::int64_t count;
+  const double *first, *branch;
   int columns;
   const double* values;  // (count, columns)
 
-  void prefetch(std::int64_t line) const { __builtin_prefetch(values + line * columns); }
-  void prefetch_linked(std::int64_t) const {}
-
-  void fill(std::int64_t line, const double*, double* out) const { std::copy_n(values + line * columns, columns, out); }
+  Place place(std::int64_t n) const { return segment(first + 3 * n, branch + 3 * n); }
+  Carried carry(std::int64_t n) const { return {std::int32_t(n)}; }
+  void prefetch(const Carried& carried) const { __builtin_prefetch(values + std::int64_t(carried.line) * columns); }
+  void fill(const Record<PlainSource>& record, double* out) const {
+    std::copy_n(values + std::int64_t(record.carried.line) * columns, columns, out);
+  }
 };
 
+// What grains carry.
 struct GrainSource {
   static constexpr bool placed = true;
   static constexpr int columns = grain_columns;
+  using Place = Point;
+  struct Carried {
+    double mass, radius, velocity[3], peculiar[3], touches, liquid;
+  };
+  std::int64_t count;
+  const double* places;  // (count, 3)
   const double *masses, *radii, *velocities, *peculiar, *touches, *liquid;  // (n,), (n,), (n, 3), (n, 3), (n,), (n,) or null
   double middle[3];
 
-  void prefetch(std::int64_t n) const {
-    for (const double* values : {masses, radii, touches, velocities + 2 * n, peculiar + 2 * n}) __builtin_prefetch(values + n);
+  Place place(std::int64_t n) const { return {{places[3 * n], places[3 * n + 1], places[3 * n + 2]}}; }
+  Carried carry(std::int64_t n) const {
+    const double *v = velocities + 3 * n, *w = peculiar + 3 * n;
+    return {masses[n], radii[n], {v[0], v[1], v[2]}, {w[0], w[1], w[2]}, touches[n], liquid ? liquid[n] : 0.0};
   }
-  void prefetch_linked(std::int64_t) const {}
+  void prefetch(const Carried&) const {}
 
-  void fill(std::int64_t n, const double* place, double* out) const {
-    const double mass = masses[n], radius = radii[n], *v = velocities + 3 * n, *w = peculiar + 3 * n;
+  void fill(const Record<GrainSource>& record, double* out) const {
+    const Carried& grain = record.carried;
+    const double mass = grain.mass, *place = record.place.first;
     const double x[3] = {place[0] - middle[0], place[1] - middle[1], place[2] - middle[2]};
     out[0] = mass;
     for (int i = 0; i < 3; ++i) {
-      out[1 + i] = mass * v[i];
+      out[1 + i] = mass * grain.velocity[i];
       out[10 + i] = mass * x[i];
     }
-    symmetric_parts(w, w, mass, out + 4);
+    symmetric_parts(grain.peculiar, grain.peculiar, mass, out + 4);
     symmetric_parts(x, x, mass, out + 13);
-    product(v, x, mass, out + 19);
+    product(grain.velocity, x, mass, out + 19);
     out[28] = 1.0;
-    out[29] = 4.0 / 3.0 * 3.14159265358979323846 * radius * radius * radius;
-    out[30] = touches[n];
-    out[31] = liquid ? liquid[n] : 0.0;
+    out[29] = 4.0 / 3.0 * 3.14159265358979323846 * grain.radius * grain.radius * grain.radius;
+    out[30] = grain.touches;
+    out[31] = grain.liquid;
+  }
+
+  static void moved(const double shift[3], double* values) {
+    constexpr int pair[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
+    const double mass = values[0], *momentum = values + 1, *x = values + 10;
+    for (int part = 0; part < 6; ++part) {
+      const int a = pair[part][0], b = pair[part][1];
+      values[13 + part] += x[a] * shift[b] + shift[a] * x[b] + mass * shift[a] * shift[b];
+    }
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) values[19 + 3 * i + j] += momentum[i] * shift[j];
+    for (int i = 0; i < 3; ++i) values[10 + i] += mass * shift[i];
   }
 };
 
+// How a grain moves, in one line of the cache.
+struct alignas(64) Motion {
+  double velocity[3], omega[3], radius;
+};
+
+// What contacts carry.
 struct ContactSource {
   static constexpr bool placed = false;
   static constexpr int columns = contact_columns;
-  const double *branch, *forces;                 // (m, 3)
-  const std::int64_t* pairs;                     // (m, 2): rows of the grains
-  const bool* touching;                          // (m,)
-  const double *radii, *velocities, *omegas;     // (n,), (n, 3), (n, 3) or null
-  const double *liquid, *power;                  // (m,) or null
+  using Place = Segment;
+  struct Carried {
+    double force[3];
+    std::int32_t pair[2], line;
+    bool touching;
+  };
+  std::int64_t count;
+  const double *first, *branch, *forces;  // (m, 3)
+  const std::int64_t* pairs;              // (m, 2): rows of the grains
+  const bool* touching;                   // (m,)
+  const Motion* motions;                  // (n,) of the grains, or null
+  const double *liquid, *power;           // (m,) or null
 
-  void prefetch(std::int64_t m) const {
-    __builtin_prefetch(forces + 3 * m);
-    __builtin_prefetch(touching + m);
-    __builtin_prefetch(pairs + 2 * m);
+  Place place(std::int64_t m) const { return segment(first + 3 * m, branch + 3 * m); }
+  Carried carry(std::int64_t m) const {
+    const double* f = forces + 3 * m;
+    return {{f[0], f[1], f[2]}, {std::int32_t(pairs[2 * m]), std::int32_t(pairs[2 * m + 1])}, std::int32_t(m), touching[m]};
   }
 
-  void prefetch_linked(std::int64_t m) const {
-    if (!omegas) return;
-    for (const std::int64_t grain : {pairs[2 * m], pairs[2 * m + 1]}) {
-      __builtin_prefetch(radii + grain);
-      __builtin_prefetch(velocities + 3 * grain);
-      __builtin_prefetch(omegas + 3 * grain);
-    }
+  void prefetch(const Carried& carried) const {
+    if (motions)
+      for (const std::int32_t grain : carried.pair) __builtin_prefetch(motions + grain);
+    if (liquid) __builtin_prefetch(liquid + carried.line);
+    if (power) __builtin_prefetch(power + carried.line);
   }
 
-  void fill(std::int64_t m, const double*, double* out) const {
-    const double *l = branch + 3 * m, *f = forces + 3 * m;
+  void fill(const Record<ContactSource>& record, double* out) const {
+    const double *l = record.place.branch, *f = record.carried.force;
     const double length = std::sqrt(l[0] * l[0] + l[1] * l[1] + l[2] * l[2]), inverse = 1.0 / std::max(length, 1e-300);
-    const double n[3] = {l[0] * inverse, l[1] * inverse, l[2] * inverse};
+    const double n[3] = {l[0] * inverse, l[1] * inverse, l[2] * inverse}, touches = record.carried.touching ? 1.0 : 0.0;
     product(f, l, -1.0, out);
-    symmetric_parts(n, n, touching[m] ? 1.0 : 0.0, out + 9);
-    out[15] = touching[m] ? 1.0 : 0.0;
+    symmetric_parts(n, n, touches, out + 9);
+    out[15] = touches;
     out[16] = out[17] = 0.0;
-    out[18] = liquid ? liquid[m] : 0.0;
+    out[18] = liquid ? liquid[record.carried.line] : 0.0;
     out[19] = 1.0;
-    if (omegas) {
-      const std::int64_t one = pairs[2 * m], two = pairs[2 * m + 1];
-      const double half = 0.5 * (radii[one] + radii[two] - length), arm_one = radii[one] - half, arm_two = radii[two] - half;
+    if (motions) {
+      const Motion &one = motions[record.carried.pair[0]], &two = motions[record.carried.pair[1]];
+      const double half = 0.5 * (one.radius + two.radius - length), arm_one = one.radius - half, arm_two = two.radius - half;
       double spin[3], relative[3];
       for (int i = 0; i < 3; ++i) {
-        spin[i] = arm_one * omegas[3 * one + i] + arm_two * omegas[3 * two + i];
-        relative[i] = velocities[3 * one + i] - velocities[3 * two + i];
+        spin[i] = arm_one * one.omega[i] + arm_two * two.omega[i];
+        relative[i] = one.velocity[i] - two.velocity[i];
       }
       relative[0] += spin[1] * n[2] - spin[2] * n[1];
       relative[1] += spin[2] * n[0] - spin[0] * n[2];
@@ -114,8 +164,21 @@ struct ContactSource {
       out[16] = -dot(f, relative);
       out[17] = out[16] + dot(f, n) * dot(relative, n);
     }
-    if (power) out[16] = power[m];
+    if (power) out[16] = power[record.carried.line];
   }
 };
+
+// `radii` (n,), `velocities` and `omegas` (n, 3) of grains, together.
+inline Buffer<Motion> motions_of(std::int64_t count, const double* radii, const double* velocities, const double* omegas, int threads) {
+  Buffer<Motion> motions = room<Motion>(std::size_t(count));
+  on_threads(threads, [&](int part) {
+    const Range range(count, part, threads);
+    for (std::int64_t n = range.begin; n < range.end; ++n) {
+      const double *v = velocities + 3 * n, *w = omegas + 3 * n;
+      motions[std::size_t(n)] = {{v[0], v[1], v[2]}, {w[0], w[1], w[2]}, radii[n]};
+    }
+  });
+  return motions;
+}
 
 }  // namespace dembark::fields

@@ -93,6 +93,15 @@ def test_many_lines_of_all_lengths_in_one_cell_equal_numpy(periodic, closed):
         np.testing.assert_allclose(getattr(one, part), getattr(plain, part), atol=1e-12 * np.abs(getattr(plain, part)).max())
 
 
+def test_large_frames_one_after_another_do_not_see_each_other():
+    # Large enough for memory that the compiled code keeps from frame to frame.
+    grid = Grid((0, 0, 0), (1, 1, 1), (22, 22, 22), (True,) * 3)
+    frames = [random_frame(seed, 30000, 30000, periodic=(True,) * 3)[0] for seed in (1, 2)]
+    first, _, again = (coarse_grain(frame, None, grid, width=0.03) for frame in (frames[0], frames[1], frames[0]))
+    assert np.array_equal(first.grains, again.grains)
+    assert again.grains[..., 28].sum() == pytest.approx(30000, rel=1e-12)
+
+
 @pytest.mark.parametrize("apart", [1, 1000, 2**60 // 12])
 def test_ids_may_lie_far_apart(apart):
     grains, contacts = random_frame(2)
