@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 
 from dembark import _fields
-from dembark.postproc.coarse_graining import coarse_grain
 from dembark.postproc.contacts import ContactFrame
+from dembark.postproc.fields.coarse_graining import coarse_grain
+from dembark.postproc.fields.grid import Grid
 from dembark.postproc.grains import GrainFrame
-from dembark.postproc.grid import Grid
 from dembark.validation.errors import DembarkError
 from dembark.validation.files import write_json
 from dembark.validation.provenance import commit, cpu, package_version

@@ -15,9 +15,9 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-from dembark.postproc.coarse_graining import coarse_grain
-from dembark.postproc.face_stress import face_stress
-from dembark.postproc.grid import Grid
+from dembark.postproc.fields.coarse_graining import coarse_grain
+from dembark.postproc.fields.face_stress import face_stress
+from dembark.postproc.fields.grid import Grid
 
 HERE = Path(__file__).parent
 FIGURES = HERE / "figures"

@@ -82,7 +82,7 @@ def fields(
     threads: Annotated[int | None, typer.Option(min=1, help="Threads; default: all cores. The result does not depend on it.")] = None,
 ) -> None:
     """Stress, velocity, strain rate and more on a grid, from grains and contacts, by coarse graining or by cell averages."""
-    from dembark.postproc.field_run import FieldJob, Words
+    from dembark.postproc.fields.run import FieldJob, Words
     from dembark.postproc.words import reading
 
     how = reading(time_step, density, columns, contact_columns)
@@ -111,7 +111,7 @@ def walls(
     contact_columns: ContactColumns = None,
 ) -> None:
     """Normal and shear stress on walls and inclusions: distribution, time series, fluctuations, peaks."""
-    from dembark.postproc.wall_run import WallJob
+    from dembark.postproc.walls.run import WallJob
     from dembark.postproc.words import reading
 
     how = reading(time_step, density, columns, contact_columns)

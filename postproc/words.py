@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.sources import Reading
-from dembark.postproc.wall_patches import Patches, box_patches, cylinder_patches, inclusion_patches, mesh_patches, plane_patches
 from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, Motion, PlaneWall, Wall
+from dembark.postproc.walls.patches import Patches, box_patches, cylinder_patches, inclusion_patches, mesh_patches, plane_patches
 from dembark.validation.errors import DembarkError
 from dembark.validation.units import to_si
 

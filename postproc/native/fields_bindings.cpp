@@ -1,4 +1,4 @@
-// dembark._fields: the compiled part of coarse graining. Private; dembark.postproc.deposit adds checks, units and documentation.
+// dembark._fields: the compiled part of coarse graining. Private; dembark.postproc.fields.deposit adds checks, units and documentation.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>

@@ -1,4 +1,4 @@
-// What grains, contacts and plain arrays carry onto the grid. The columns are those of dembark.postproc.field_sums.
+// What grains, contacts and plain arrays carry onto the grid. The columns are those of dembark.postproc.fields.sums.
 #pragma once
 
 #include <algorithm>

@@ -14,10 +14,10 @@ from typing import Any, Self
 
 import h5py
 import numpy as np
+from dembark.postproc.fields.grid import Grid
 from dembark.postproc.grains import GrainFrame
-from dembark.postproc.grid import Grid
 from dembark.postproc.output.whole import Labelled, WholeFile
-from dembark.postproc.wall_stress import COMPONENTS, WallStress
+from dembark.postproc.walls.stress import COMPONENTS, WallStress
 from dembark.validation.errors import DembarkError
 from dembark.validation.files import disk_error
 from numpy.typing import NDArray

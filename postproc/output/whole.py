@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from dembark.postproc.grid import Grid
+from dembark.postproc.fields.grid import Grid
 from dembark.validation.errors import DembarkError
 from dembark.validation.files import disk_error
 from numpy.typing import NDArray

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from dembark.postproc.coarse_graining import WallContacts
 from dembark.postproc.contacts import ContactFrame
+from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.postproc.grains import GrainFrame, cell
 
 FREE = (False, False, False)

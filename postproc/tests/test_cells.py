@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from dembark.postproc.cells import cell_average, cell_grid, cell_totals
-from dembark.postproc.grid import Grid
+from dembark.postproc.fields.cells import cell_average, cell_grid, cell_totals
+from dembark.postproc.fields.grid import Grid
 from dembark.validation.errors import DembarkError
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 import xarray
-from dembark.postproc import field_run
 from dembark.postproc.cli import progress
+from dembark.postproc.fields import run as field_run
 from dembark.postproc.words import counts, frame_numbers, length, parse_wall, span
 from dembark.validation.cli import main
 from dembark.validation.errors import DembarkError

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from dembark.postproc.grid import Grid, periodic_images
+from dembark.postproc.fields.grid import Grid, periodic_images
 from dembark.validation.errors import DembarkError
 from packings import grain_frame
 

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray
-from dembark.postproc.coarse_graining import coarse_grain
-from dembark.postproc.grid import Grid
+from dembark.postproc.fields.coarse_graining import coarse_grain
+from dembark.postproc.fields.grid import Grid
 from dembark.postproc.output import (
     FieldsNetcdf,
     FieldsVtkhdf,
@@ -21,9 +21,9 @@ from dembark.postproc.output import (
     write_vtkhdf_wall,
     write_wall_netcdf,
 )
-from dembark.postproc.wall_patches import cylinder_patches, mesh_patches, plane_patches
-from dembark.postproc.wall_stress import wall_stress
 from dembark.postproc.walls import CylinderWall, MeshWall, Motion, PlaneWall
+from dembark.postproc.walls.patches import cylinder_patches, mesh_patches, plane_patches
+from dembark.postproc.walls.stress import wall_stress
 from dembark.validation.errors import DembarkError, RunError
 from scenes import frame_of
 from vtkmodules.util.numpy_support import vtk_to_numpy

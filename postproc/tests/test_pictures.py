@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from dembark.postproc import plots, render
-from dembark.postproc.coarse_graining import coarse_grain
-from dembark.postproc.grid import Grid
-from dembark.postproc.wall_patches import box_patches, mesh_patches
-from dembark.postproc.wall_stress import wall_stress
+from dembark.postproc.fields.coarse_graining import coarse_grain
+from dembark.postproc.fields.grid import Grid
 from dembark.postproc.walls import CylinderWall, MeshWall, PlaneWall
+from dembark.postproc.walls.patches import box_patches, mesh_patches
+from dembark.postproc.walls.stress import wall_stress
 from dembark.validation.errors import DembarkError, RunError
 from matplotlib.figure import Figure
 from PIL import Image

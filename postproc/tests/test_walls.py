@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from dembark.postproc import ContactsDump, DumpError, GrainsDump, read_times
-from dembark.postproc.wall_mesh import TriangleTree, nearest_on_triangles, read_stl
-from dembark.postproc.wall_patches import box_patches, cylinder_patches, inclusion_patches, mesh_patches, plane_patches
-from dembark.postproc.wall_peaks import Blocks, Histogram, PeakFinder
-from dembark.postproc.wall_stress import wall_stress
 from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, Motion, PlaneWall, into_box, wall_contacts
+from dembark.postproc.walls.mesh import TriangleTree, nearest_on_triangles, read_stl
+from dembark.postproc.walls.patches import box_patches, cylinder_patches, inclusion_patches, mesh_patches, plane_patches
+from dembark.postproc.walls.peaks import Blocks, Histogram, PeakFinder
+from dembark.postproc.walls.stress import wall_stress
 from dembark.validation import cases, engines
 from dembark.validation.errors import DembarkError
 from hypothesis import example, given, settings

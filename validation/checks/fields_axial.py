@@ -19,7 +19,7 @@ from functools import cached_property
 
 import numpy as np
 from dembark.postproc import ContactFrame, GrainFrame, spheres
-from dembark.postproc.coarse_graining import WallContacts
+from dembark.postproc.fields.coarse_graining import WallContacts
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.special import ive, ndtr

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 from dembark.postproc import ContactFrame, GrainFrame
-from dembark.postproc.coarse_graining import WallContacts, coarse_grain, rows_of
-from dembark.postproc.field_sums import Fields, FieldSums
-from dembark.postproc.grid import Grid
-from dembark.postproc.kernels import CUTOFF
+from dembark.postproc.fields.coarse_graining import WallContacts, coarse_grain, rows_of
+from dembark.postproc.fields.grid import Grid
+from dembark.postproc.fields.kernels import CUTOFF
+from dembark.postproc.fields.sums import Fields, FieldSums
 from dembark.postproc.walls import PlaneWall, wall_contacts
 from dembark.validation.checks import channel as channels
 from dembark.validation.checks.channel import Channel

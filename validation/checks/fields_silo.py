@@ -9,9 +9,9 @@ from operator import add
 from typing import Any
 
 import numpy as np
-from dembark.postproc.wall_patches import cylinder_patches
-from dembark.postproc.wall_stress import WallRecorder
 from dembark.postproc.walls import CylinderWall, PlaneWall, wall_contacts
+from dembark.postproc.walls.patches import cylinder_patches
+from dembark.postproc.walls.stress import WallRecorder
 from dembark.validation.checks import fields_axial as axial
 from dembark.validation.checks.column import janssen
 from dembark.validation.checks.fields_axial import Fields, Rings

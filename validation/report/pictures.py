@@ -13,7 +13,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from dembark.postproc import ContactFrame, ContactsDump, GrainFrame, GrainsDump
-from dembark.postproc.coarse_graining import WallContacts, rows_of
+from dembark.postproc.fields.coarse_graining import WallContacts, rows_of
 from dembark.postproc.spheres import volume
 from dembark.postproc.walls import CylinderWall, PlaneWall, wall_contacts
 from dembark.validation.report.figures import engine_name

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from dembark.postproc.coarse_graining import coarse_grain
-from dembark.postproc.field_sums import Fields
-from dembark.postproc.grid import Grid
-from dembark.postproc.kernels import Kernel
-from dembark.postproc.wall_patches import plane_patches
-from dembark.postproc.wall_stress import wall_stress
+from dembark.postproc.fields.coarse_graining import coarse_grain
+from dembark.postproc.fields.grid import Grid
+from dembark.postproc.fields.kernels import Kernel
+from dembark.postproc.fields.sums import Fields
 from dembark.postproc.walls import PlaneWall
+from dembark.postproc.walls.patches import plane_patches
+from dembark.postproc.walls.stress import wall_stress
 from dembark.validation.verification import scenes
 from dembark.validation.verification.item import Curve, Item, Panel, exact, order
 from dembark.validation.verification.scenes import GRAVITY, Network

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from dembark.postproc.coarse_graining import coarse_grain
-from dembark.postproc.field_sums import FieldSums
-from dembark.postproc.grid import Grid
-from dembark.postproc.kernels import NAMES, Kernel
+from dembark.postproc.fields.coarse_graining import coarse_grain
+from dembark.postproc.fields.grid import Grid
+from dembark.postproc.fields.kernels import NAMES, Kernel
+from dembark.postproc.fields.sums import FieldSums
 from dembark.validation.verification import scenes
 from dembark.validation.verification.item import Array, Curve, Item, Panel, exact, order
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from dembark.postproc.coarse_graining import coarse_grain
-from dembark.postproc.grid import Grid
-from dembark.postproc.kernels import CUTOFF
+from dembark.postproc.fields.coarse_graining import coarse_grain
+from dembark.postproc.fields.grid import Grid
+from dembark.postproc.fields.kernels import CUTOFF
 from dembark.validation.checks import fields_axial as axial
 from dembark.validation.verification import scenes
 from dembark.validation.verification.item import Array, Curve, Item, Panel, exact

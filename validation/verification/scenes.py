@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from dembark.postproc import ContactFrame, GrainFrame
-from dembark.postproc.coarse_graining import WallContacts
+from dembark.postproc.fields.coarse_graining import WallContacts
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 

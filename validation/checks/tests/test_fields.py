@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray
 from dembark.postproc import ContactFrame
-from dembark.postproc.coarse_graining import WallContacts
+from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.validation.checks import fields_axial as axial
 from dembark.validation.checks.fields_axial import Rings
 from dembark.validation.checks.fields_channel import free_grains

@@ -9,7 +9,7 @@ import types
 import numpy as np
 import pytest
 import xarray
-from dembark.postproc.coarse_graining import WallContacts
+from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.validation import report
 from dembark.validation.compare import compare
 from dembark.validation.errors import RunError

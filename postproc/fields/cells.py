@@ -15,11 +15,11 @@ from dataclasses import dataclass, fields
 from typing import ClassVar
 
 import numpy as np
-from dembark.postproc.coarse_graining import WallContacts
 from dembark.postproc.contacts import ContactFrame
-from dembark.postproc.field_sums import full_tensor, ratio, symmetric_parts
+from dembark.postproc.fields.coarse_graining import WallContacts
+from dembark.postproc.fields.grid import Grid, check_periods
+from dembark.postproc.fields.sums import full_tensor, ratio, symmetric_parts
 from dembark.postproc.grains import GrainFrame, cell
-from dembark.postproc.grid import Grid, check_periods
 from dembark.postproc.spheres import volume
 from dembark.validation.errors import DembarkError
 from numpy.typing import NDArray

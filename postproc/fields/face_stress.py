@@ -14,11 +14,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from dembark.postproc.coarse_graining import WallContacts
 from dembark.postproc.contacts import ContactFrame
+from dembark.postproc.fields.coarse_graining import WallContacts
+from dembark.postproc.fields.grid import Grid, check_periods, periodic_images
+from dembark.postproc.fields.kernels import Kernel, cumulative, unit_gauss
 from dembark.postproc.grains import GrainFrame
-from dembark.postproc.grid import Grid, check_periods, periodic_images
-from dembark.postproc.kernels import Kernel, cumulative, unit_gauss
 from numpy.typing import NDArray
 from scipy.interpolate import BarycentricInterpolator
 

@@ -1,11 +1,4 @@
-"""Walls that grains press on: planes, cylinders, triangle meshes, and the surface of an inclusion (a group of grains).
-
-A dump holds the force of each wall on each grain, not where it acts: that is taken as the point of the wall nearest to the grain's
-centre, which is exact for spheres on a plane or a cylinder. A grain that touches several triangles of a mesh counts for the nearest.
-
-Everywhere a force is that of the wall on the grains. It is taken apart along a basis that belongs to the contact point: `normal` from
-the wall to the grains (a wall that is pressed has a positive normal stress), `shear_1` and `shear_2` along the wall.
-"""
+"""Planes, cylinders and triangle meshes that grains press on, and where grains touch them."""
 
 from __future__ import annotations
 
@@ -16,11 +9,7 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from dembark.postproc.coarse_graining import WallContacts, rows_of
-from dembark.postproc.contacts import ContactFrame
-from dembark.postproc.dumptext import DumpError
-from dembark.postproc.grains import GrainFrame, cell
-from dembark.postproc.wall_mesh import TriangleTree, read_stl
+from dembark.postproc.walls.mesh import TriangleTree, read_stl
 from dembark.validation.errors import DembarkError
 from numpy.typing import NDArray
 
@@ -233,104 +222,3 @@ class MeshWall:
         side = np.where(np.einsum("ka,ka->k", centres - points, basis[:, 0]) < 0.0, -1.0, 1.0)
         basis[:, 0] *= side[:, None]
         return Places(points, basis, np.column_stack([triangle, np.zeros(len(triangle))]))
-
-
-@dataclass(frozen=True)
-class Inclusion:
-    """The surface of a group of grains, such as one large grain or grains that are glued into a body; contacts load it.
-
-    Stresses refer to the sphere (`surface` "sphere") or the cylinder ("cylinder") of `radius` (m) about the group's centre of mass;
-    without `radius` it is that of the single grain, or of the sphere (cylinder) about the centres that holds the group. Coordinates are
-    (angle about `axis` in rad, angle from `axis` in rad) on the sphere and (angle, height in m) on the cylinder. The normal is radial;
-    shear_1 is along the meridian towards `axis` or along the axis, shear_2 along the rising angle.
-    """
-
-    name: str
-    ids: tuple[int, ...]
-    surface: str = "sphere"
-    radius: float | None = None
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-
-    def __post_init__(self) -> None:
-        if not self.ids:
-            raise DembarkError(f"inclusion {self.name}: no ids", "", "it needs at least one grain")
-        if self.surface not in ("sphere", "cylinder"):
-            raise DembarkError(f"inclusion {self.name}: surface {self.surface!r}", "", "it must be 'sphere' or 'cylinder'")
-
-    def _cylinder(self, radius: float) -> CylinderWall:
-        return CylinderWall(self.name, radius, self.axis, inward=False)
-
-    def size(self, frame: GrainFrame) -> float:
-        """Radius (m) of the surface that stresses refer to."""
-        if self.radius is not None:
-            return self.radius
-        members, relative = self.members(frame)
-        if self.surface == "cylinder":
-            axis = self._cylinder(1.0).axes[0]
-            relative = relative - (relative @ axis)[:, None] * axis
-        return float(np.max(np.linalg.norm(relative, axis=1) + members.radii))
-
-    def members(self, frame: GrainFrame) -> tuple[GrainFrame, Array]:
-        """The group's grains and their places (m, 3) about its centre of mass; DumpError when one is not there."""
-        wanted = np.unique(np.asarray(self.ids, np.int64))
-        found = np.isin(frame.ids, wanted)
-        if found.sum() != len(wanted):
-            lost = np.setdiff1d(wanted, frame.ids)
-            raise DumpError(f"inclusion {self.name}: grain {lost[0]} is not in the frame of step {frame.step}")
-        members = frame.select(found)
-        return members, members.positions - np.average(members.positions, axis=0, weights=members.masses)
-
-    def loads(self, frame: GrainFrame, contacts: ContactFrame) -> tuple[Places, Array]:
-        """Places of its k contacts with other grains, relative to its centre, and the forces (k, 3) of the inclusion on those, N.
-
-        A contact lies on the line of the centres, in the middle of the overlap or of the gap.
-        """
-        members, relative = self.members(frame)
-        ours = np.isin(contacts.ids, members.ids)
-        rows = np.nonzero(ours[:, 0] != ours[:, 1])[0]
-        first = ours[rows, 0]
-        branch = np.where(first[:, None], contacts.branch[rows], -contacts.branch[rows])
-        forces = np.where(first[:, None], -contacts.forces[rows], contacts.forces[rows])
-        member, other = (np.where(first, *pair) for pair in (contacts.ids[rows].T, contacts.ids[rows, ::-1].T))
-        index = rows_of(frame.ids, other, contacts.step)
-        own = np.searchsorted(members.ids, member)
-        length = np.maximum(np.linalg.norm(branch, axis=1), 1e-300)
-        share = 0.5 * (length + members.radii[own] - frame.radii[index]) / length
-        return self._places(relative[own] + share[:, None] * branch), forces
-
-    def _places(self, points: Array) -> Places:
-        cylinder = self._cylinder(1.0).places(points)
-        if self.surface == "cylinder":
-            return replace(cylinder, points=points)
-        radial = points / np.maximum(np.linalg.norm(points, axis=1), 1e-300)[:, None]
-        around = cylinder.basis[:, 2]
-        axis = self._cylinder(1.0).axes[0]
-        polar = np.arctan2(np.linalg.norm(np.cross(axis, radial), axis=1), radial @ axis)
-        basis = np.stack([radial, np.cross(radial, around), around], axis=1)
-        return Places(points, basis, np.column_stack([cylinder.coordinates[:, 0], polar]))
-
-
-def into_box(frame: GrainFrame) -> Array:
-    """Positions (n, 3) in m inside the box on periodic axes: engines let grains drift a little out of it between neighbour lists."""
-    if not frame.periodic.any():
-        return frame.wrapped
-    edges = cell(frame.low, frame.high, frame.tilt)
-    share = np.linalg.solve(edges.T, (frame.wrapped - frame.low).T).T
-    return frame.wrapped - np.where(frame.periodic, np.floor(share), 0.0) @ edges
-
-
-def touching(frame: GrainFrame, name: str) -> tuple[NDArray[np.bool_], Array]:
-    """Which grains (n,) the wall `name` pushes or pulls, and its forces on those (k, 3); DumpError when the dump has no such wall."""
-    if name not in frame.wall_forces:
-        known = ", ".join(frame.wall_forces) or "none"
-        raise DumpError(f"wall {name!r} has no columns f_force_{name}[1..3] in the dump; there are: {known}")
-    forces = frame.wall_forces[name]
-    mask = np.any(forces != 0.0, axis=1)
-    return mask, forces[mask]
-
-
-def wall_contacts(frame: GrainFrame, wall: Wall, time: float = 0.0) -> WallContacts:
-    """Where `wall` touches the grains of `frame` and with what force, for `coarse_grain(walls=...)`; `time` (s) places a moving wall."""
-    mask, forces = touching(frame, wall.name)
-    centres = into_box(frame)[mask]
-    return WallContacts(wall.at(time).places(centres).points, centres, forces)

@@ -12,9 +12,9 @@ import numpy as np
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.dumptext import DumpError
 from dembark.postproc.grains import GrainFrame
-from dembark.postproc.wall_patches import Patches
-from dembark.postproc.wall_peaks import Blocks, Histogram, PeakFinder
 from dembark.postproc.walls import Inclusion, Places, Wall, into_box, touching
+from dembark.postproc.walls.patches import Patches
+from dembark.postproc.walls.peaks import Blocks, Histogram, PeakFinder
 from dembark.validation.errors import DembarkError
 from numpy.typing import NDArray
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from dembark.postproc import field_sums as column
-from dembark.postproc.field_sums import symmetric_parts
+from dembark.postproc.fields import sums as column
+from dembark.postproc.fields.sums import symmetric_parts
 from dembark.postproc.spheres import volume
 from numpy.typing import NDArray
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from dembark.postproc.grid import Grid
+from dembark.postproc.fields.grid import Grid
 from dembark.validation.errors import DembarkError
 from numpy.typing import NDArray
 from scipy.special import erf

@@ -15,8 +15,8 @@ from dembark.postproc.output.netcdf import write_wall_netcdf
 from dembark.postproc.output.vtkhdf import write_vtkhdf_wall
 from dembark.postproc.output.whole import WholeFile
 from dembark.postproc.sources import Reading, Source, open_source
-from dembark.postproc.wall_stress import WallRecorder, WallStress
 from dembark.postproc.walls import Inclusion
+from dembark.postproc.walls.stress import WallRecorder, WallStress
 from dembark.postproc.words import WallWord, frame_numbers, length, parse_wall, plain
 from dembark.validation.errors import DembarkError
 

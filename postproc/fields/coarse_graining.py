@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from dembark import _fields
-from dembark.postproc import field_sums as column
-from dembark.postproc.carried import Contacts, Grains
 from dembark.postproc.contacts import ContactFrame
-from dembark.postproc.deposit import Spreader, zeros
-from dembark.postproc.field_sums import FieldSums
+from dembark.postproc.fields import sums as column
+from dembark.postproc.fields.carried import Contacts, Grains
+from dembark.postproc.fields.deposit import Spreader, zeros
+from dembark.postproc.fields.grid import Grid, check_periods
+from dembark.postproc.fields.kernels import Kernel
+from dembark.postproc.fields.sums import FieldSums
 from dembark.postproc.grains import GrainFrame
-from dembark.postproc.grid import Grid, check_periods
-from dembark.postproc.kernels import Kernel
 from dembark.validation.errors import DembarkError
 from numpy.typing import NDArray
 

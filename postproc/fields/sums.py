@@ -10,8 +10,8 @@ from operator import add
 from typing import ClassVar
 
 import numpy as np
-from dembark.postproc.grid import Grid
-from dembark.postproc.kernels import Kernel
+from dembark.postproc.fields.grid import Grid
+from dembark.postproc.fields.kernels import Kernel
 from dembark.validation.errors import DembarkError
 from numpy.typing import NDArray
 

@@ -8,20 +8,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from dembark.postproc.cells import CellAverage, CellTotals, cell_grid, cell_totals
-from dembark.postproc.coarse_graining import coarse_grain
 from dembark.postproc.contacts import ContactFrame
-from dembark.postproc.field_sums import MASS, MOMENTUM, Fields, FieldSums
+from dembark.postproc.fields.cells import CellAverage, CellTotals, cell_grid, cell_totals
+from dembark.postproc.fields.coarse_graining import coarse_grain
+from dembark.postproc.fields.grid import Grid
+from dembark.postproc.fields.kernels import Kernel
+from dembark.postproc.fields.sums import MASS, MOMENTUM, Fields, FieldSums
 from dembark.postproc.grains import GrainFrame
-from dembark.postproc.grid import Grid
-from dembark.postproc.kernels import Kernel
 from dembark.postproc.output.netcdf import FieldsNetcdf
 from dembark.postproc.output.vtkhdf import FieldsVtkhdf, GrainsVtkhdf
 from dembark.postproc.output.whole import Selection
 from dembark.postproc.sources import Reading, Source
-from dembark.postproc.wall_run import begin, check_inclusions, check_outputs, choose_walls, recorders_of, source_lines, wall_lines
-from dembark.postproc.wall_stress import WallStress
 from dembark.postproc.walls import Inclusion, wall_contacts
+from dembark.postproc.walls.run import begin, check_inclusions, check_outputs, choose_walls, recorders_of, source_lines, wall_lines
+from dembark.postproc.walls.stress import WallStress
 from dembark.postproc.words import WallWord, counts, length, near, span
 from dembark.validation.errors import DembarkError
 from numpy.typing import NDArray
