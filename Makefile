@@ -16,7 +16,7 @@ TEST_JOBS ?= $(shell nproc)
 
 sources := $(shell find plugins -name '*.hpp' -o -name '*.h' -o -name '*.cpp' -o -name 'CMakeLists.txt' | grep -v '^plugins/yade')
 yade_sources := $(shell find plugins/yade -type f -not -path '*/tests/*' -not -name '*.pyc') $(shell find plugins/physics -name '*.hpp')
-python_files := $(shell find plugins/python postproc validation input_decks -type f -not -name '*.pyc' -not -path '*/tests/*')
+python_files := $(shell find plugins/python common postproc validation input_decks -type f -not -name '*.pyc' -not -path '*/tests/*')
 
 .PHONY: all help system liggghts yade-engine yade-plugin yade test validate bench doctor figures install-liggghts clean
 

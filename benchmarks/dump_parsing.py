@@ -23,9 +23,9 @@ from pathlib import Path
 import MDAnalysis
 import numpy as np
 from benchmarks.measure import spread
+from dembark.common.errors import DembarkError
+from dembark.common.files import write_json
 from dembark.postproc import GrainsDump, TextDump, universe
-from dembark.validation.errors import DembarkError
-from dembark.validation.files import write_json
 from MDAnalysis.coordinates.LAMMPS import DumpReader
 from rich.console import Console
 from rich.table import Table

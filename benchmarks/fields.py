@@ -21,12 +21,12 @@ from typing import Any
 import numpy as np
 
 from dembark import _fields
+from dembark.common.errors import DembarkError
+from dembark.common.files import write_json
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.grains import GrainFrame
-from dembark.validation.errors import DembarkError
-from dembark.validation.files import write_json
 from dembark.validation.provenance import commit, cpu, package_version
 
 DIAMETER = 0.005

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.lcp_cases import Problem, certificate, coupled, network, sequence
+from dembark.common.errors import DembarkError, RunError
+from dembark.common.files import write_json
 from dembark.physics import LcpResult, LcpSolver, solve_lcp
-from dembark.validation.errors import DembarkError, RunError
-from dembark.validation.files import write_json
 from dembark.validation.provenance import cpu, commit, package_version
 
 HERE = Path(__file__).parent

@@ -14,8 +14,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from dembark.common.errors import DembarkError, RunError
 from dembark.validation.engines import Engine
-from dembark.validation.errors import DembarkError, RunError
 
 HERE = Path(__file__).parent
 DIAMETER = 0.005

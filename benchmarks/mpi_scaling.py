@@ -20,9 +20,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from benchmarks.measure import HERE, clock_library, read_log, settled_bed
+from dembark.common.errors import DembarkError, RunError
+from dembark.common.files import write_json
 from dembark.validation.engines import Engine, call, find
-from dembark.validation.errors import DembarkError, RunError
-from dembark.validation.files import write_json
 from dembark.validation.provenance import collect
 
 ROOT = HERE.parent

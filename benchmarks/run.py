@@ -15,9 +15,9 @@ from benchmarks import lcp
 from benchmarks.measure import (
     HERE, Comparison, Subject, clock_library, liggghts_sample, settled_bed, stock_liggghts, yade_sample,
 )
+from dembark.common.errors import DembarkError
+from dembark.common.files import write_json
 from dembark.validation.engines import find
-from dembark.validation.errors import DembarkError
-from dembark.validation.files import write_json
 from dembark.validation.provenance import collect
 
 ROOT = HERE.parent

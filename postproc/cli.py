@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from dembark.common.errors import DembarkError, Interrupted
 from dembark.postproc.dumptext import DumpError
-from dembark.validation.errors import DembarkError, Interrupted
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 

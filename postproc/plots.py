@@ -8,13 +8,13 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from dembark.common.errors import DembarkError
+from dembark.common.files import disk_error
 from dembark.postproc.output.whole import Labelled, WholeFile
 from dembark.postproc.style import STYLE
 from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, PlaneWall
 from dembark.postproc.walls.peaks import Histogram
 from dembark.postproc.walls.stress import WallStress
-from dembark.validation.errors import DembarkError
-from dembark.validation.files import disk_error
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize

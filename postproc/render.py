@@ -16,12 +16,12 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from dembark.common.errors import RunError
 from dembark.postproc.fields.coarse_graining import interpolate
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.output.whole import Labelled, WholeFile
 from dembark.postproc.plots import labelled, scalar
 from dembark.postproc.style import STYLE
-from dembark.validation.errors import RunError
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure

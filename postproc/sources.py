@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dembark.common.errors import DembarkError
+from dembark.common.files import read_json
 from dembark.postproc.contacts import ContactFrame, ContactsDump
 from dembark.postproc.dumptext import DumpError
 from dembark.postproc.grains import GrainFrame, GrainsDump
 from dembark.postproc.walls import CylinderWall, Motion, PlaneWall, Wall
-from dembark.validation.errors import DembarkError
-from dembark.validation.files import read_json
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from dembark.common.errors import DembarkError
+from dembark.common.units import to_si
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.sources import Reading
 from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, Motion, PlaneWall, Wall
 from dembark.postproc.walls.patches import Patches, box_patches, cylinder_patches, inclusion_patches, mesh_patches, plane_patches
-from dembark.validation.errors import DembarkError
-from dembark.validation.units import to_si
 
 _DIAMETERS = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*d\s*")
 _KINDS: Mapping[str, tuple[str, ...]] = {

@@ -9,11 +9,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from dembark.validation.errors import DembarkError
+from dembark.common.errors import DembarkError
+from dembark.common.units import known_unit
 from dembark.validation.expressions import Expression
 from dembark.validation.parameters import Parameter, Value, checked, nearest, pick
 from dembark.validation.tables import TableReader, load_toml
-from dembark.validation.units import known_unit
 
 ENGINES = ("liggghts", "yade")
 STUDY_PREFIX = "study-"

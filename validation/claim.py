@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from dembark.validation.errors import DembarkError, Interrupted
+from dembark.common.errors import DembarkError, Interrupted
 
 BEAT = 10.0
 # Longer than a beat and what a network file system may hold back.

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
+from dembark.common.errors import DembarkError, RunError
 from dembark.validation.campaigns import cli as campaigns
-from dembark.validation.errors import DembarkError, RunError
 
 if TYPE_CHECKING:
     from dembark.validation.workflow import Outcome

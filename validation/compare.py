@@ -6,8 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from dembark.validation.errors import RunError
-from dembark.validation.files import read_json, write_json
+from dembark.common.errors import RunError
+from dembark.common.files import read_json, write_json
 from dembark.validation.statistics import joint_half
 
 CAP = 0.10

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from dembark.common.errors import DembarkError
 from dembark.validation import cases, engines, provenance
-from dembark.validation.errors import DembarkError
 
 _PACKAGES = ("numpy", "scipy", "MDAnalysis", "snakemake", "snakemake-executor-plugin-slurm", "typer", "rich", "pint", "jinja2", "matplotlib",
              "weasyprint", "pyvista", "xarray", "h5netcdf", "h5py")

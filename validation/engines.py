@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from dembark.common.errors import DembarkError
 from dembark.validation.cases import checkout
-from dembark.validation.errors import DembarkError
 from dembark.validation.parameters import Value
 
 # An environment variable for each engine: which program it was that told its version, and the version.

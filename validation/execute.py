@@ -8,8 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from dembark.validation.errors import DembarkError, Interrupted
-from dembark.validation.files import read_json
+from dembark.common.errors import DembarkError, Interrupted
+from dembark.common.files import read_json
 from dembark.validation.jobs import measure_series
 from dembark.validation.plan import Series
 from dembark.validation.progress import Board, Monitor

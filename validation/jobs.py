@@ -16,12 +16,12 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
+from dembark.common.files import read_json, retire, write_json
 from dembark.validation import provenance
 from dembark.validation.campaigns import store
 from dembark.validation.campaigns.folder import FILE as CAMPAIGN_FILE
 from dembark.validation.campaigns.source import Source
-from dembark.validation.errors import DembarkError, Interrupted, Killed, RunError
-from dembark.validation.files import read_json, retire, write_json
 from dembark.validation.plan import PlannedStudy, Run, Series, finished, studies, summary
 from dembark.validation.progress import FileBoard, Monitor, State, watched
 from dembark.validation.simulate import Resources, simulate

@@ -7,13 +7,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from dembark.common.errors import DembarkError, RunError
+from dembark.common.files import read_json, write_json
 from dembark.postproc import DumpError
 from dembark.validation import checks
 from dembark.validation.cases import Study
 from dembark.validation.cases import find as find_case
 from dembark.validation.checks.run import Replica
-from dembark.validation.errors import DembarkError, RunError
-from dembark.validation.files import read_json, write_json
 
 
 def replicas(folder: Path) -> list[Replica]:

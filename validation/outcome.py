@@ -8,9 +8,9 @@ import signal
 from collections.abc import Sequence
 from pathlib import Path
 
+from dembark.common.errors import Killed, RunError
+from dembark.common.files import DISK_FULL, check_impacts, check_times, count_frames
 from dembark.validation.cases import OUTPUTS
-from dembark.validation.errors import Killed, RunError
-from dembark.validation.files import DISK_FULL, check_impacts, check_times, count_frames
 from dembark.validation.parameters import Value
 from dembark.validation.plan import Run
 from dembark.validation.progress import OutputParser

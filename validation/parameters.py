@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from dembark.validation.errors import DembarkError
-from dembark.validation.units import to_si
+from dembark.common.errors import DembarkError
+from dembark.common.units import to_si
 
 Value = float | int | str | None
 UNSET = "auto"

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dembark.common.errors import DembarkError
+from dembark.common.files import read_json
 from dembark.validation import engines
 from dembark.validation.cases import ENGINES, Case, Study, discover
 from dembark.validation.engines import Engine
-from dembark.validation.errors import DembarkError
-from dembark.validation.files import read_json
 from dembark.validation.parameters import Value, pick
 from dembark.validation.resolve import for_replica, portable, resolve
 

@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from dembark.validation.files import read_json
+from dembark.common.files import read_json
 
 INTERVAL = 10.0
 _COLOURS = {"running": "cyan", "finished": "green", "kept": "green", "failed": "bold red", "stopped": "yellow", "waiting": "dim"}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
+from dembark.common.errors import DembarkError
 from dembark.validation.cases import Case
-from dembark.validation.errors import DembarkError
 from dembark.validation.parameters import Value, checked, nearest, pick
 
 UNLIMITED = 1e300

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from dembark.validation.files import read_json, write_json
+from dembark.common.files import read_json, write_json
 from dembark.validation.plan import Run
 
 # What the decks call their states; docs/restarts.md has the format of the mark beside each.

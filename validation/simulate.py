@@ -17,10 +17,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
+from dembark.common.files import DISK_FULL, disk_error, move_into_place, sweep, write_json
 from dembark.validation import outcome, provenance, restarts
 from dembark.validation.claim import claim
-from dembark.validation.errors import DembarkError, Interrupted, Killed, RunError
-from dembark.validation.files import DISK_FULL, disk_error, move_into_place, sweep, write_json
 from dembark.validation.plan import Run, deck_files, finished
 from dembark.validation.process import chunks, running
 from dembark.validation.progress import Board, OutputParser

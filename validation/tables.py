@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from dembark.validation.errors import DembarkError
+from dembark.common.errors import DembarkError
 from dembark.validation.parameters import nearest
 
 Types = type | tuple[type, ...]

@@ -15,10 +15,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from dembark.common.errors import DembarkError, Interrupted
+from dembark.common.files import lock, read_json
 from dembark.validation.campaigns.source import Source
 from dembark.validation.engines import end_with_parent
-from dembark.validation.errors import DembarkError, Interrupted
-from dembark.validation.files import lock, read_json
 from dembark.validation.jobs import (
     PROGRESS_VARIABLE,
     build_report,

@@ -5,7 +5,7 @@ import json
 import pytest
 from benchmarks import dump_parsing
 from benchmarks.dump_parsing import SUBJECTS, Sample, measure, rows, write_dump
-from dembark.validation.errors import DembarkError
+from dembark.common.errors import DembarkError
 
 
 def test_every_reader_finds_the_sum_that_was_written(tmp_path):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from benchmarks import lcp, run
-from dembark.validation.errors import DembarkError
+from dembark.common.errors import DembarkError
 
 
 def row(solver: str, contacts: int, **facts: object) -> dict[str, object]:

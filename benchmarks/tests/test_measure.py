@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks.measure import HERE, Comparison, Sample, Subject, read_log, spread
 from benchmarks.run import markdown, main
-from dembark.validation.errors import RunError
+from dembark.common.errors import RunError
 
 LOG = """Loop time of 3.5 on 1 procs for 1000 steps with 20 atoms, finish time X
 Pair  time (%) = 2.5 (80)

@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks import mpi_scaling
 from benchmarks.mpi_scaling import Point, bed_of, main, markdown, planned, rows, tiled
-from dembark.validation.errors import DembarkError
+from dembark.common.errors import DembarkError
 
 BED = """settled bed
 

@@ -7,8 +7,8 @@ import re
 from pathlib import Path
 
 import pytest
+from dembark.common.errors import DembarkError
 from dembark.validation import engines
-from dembark.validation.errors import DembarkError
 
 SCRIPT = """
 mat = O.materials.append(ViscElCapMat(young=1e6, poisson=0.3, density=2500, frictionAngle=0, kn=1e3, cn=0.0, ks=0.0, cs=0.0,

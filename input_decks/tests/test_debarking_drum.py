@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmarks.drum_resume import FILES, Started, compare
+from dembark.common.errors import DembarkError
 from dembark.postproc import GrainsDump, read_times
 from dembark.validation.checks import debarking_drum
-from dembark.validation.errors import DembarkError
 
 CASE = Path(__file__).resolve().parents[1] / "debarking_drum"
 ENGINES = ("liggghts", "yade")

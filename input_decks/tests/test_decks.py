@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dembark.common.errors import DembarkError
 from dembark.postproc import ContactsDump, GrainsDump, read_times
 from dembark.validation import engines
 from dembark.validation.checks import column_collapse
 from dembark.validation.checks.run import Replica
-from dembark.validation.errors import DembarkError
 
 ROOT = Path(__file__).resolve().parents[1]
 WALLS = {"silo": ("side", "base"), "plane_silo": ("left", "right", "base"), "plug_flow": ("left", "right", "base"),

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dembark.common.errors import DembarkError
 from dembark.postproc import read_times
 from dembark.validation import engines
 from dembark.validation.checks import liquid_exchange
 from dembark.validation.checks.run import Replica
-from dembark.validation.errors import DembarkError
 
 CASE = Path(__file__).resolve().parents[1] / "liquid_exchange"
 with (CASE / "case.toml").open("rb") as file:

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dembark.common.errors import DembarkError
+from dembark.common.files import check_impacts, check_times, count_frames
 from dembark.validation import engines
 from dembark.validation.cases import find
 from dembark.validation.checks.logs import LogRun, read
 from dembark.validation.checks.run import Replica
-from dembark.validation.errors import DembarkError
-from dembark.validation.files import check_impacts, check_times, count_frames
 
 ROOT = Path(__file__).resolve().parents[1]
 CASES = ("log_pair", "log_cradle", "log_pile")

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dembark.common.errors import DembarkError, Killed
+from dembark.common.files import check_times, count_frames, read_json
 from dembark.postproc import ContactsDump, GrainsDump, read_times
 from dembark.validation import engines, restarts
 from dembark.validation.cases import find
-from dembark.validation.errors import DembarkError, Killed
-from dembark.validation.files import check_times, count_frames, read_json
 from dembark.validation.plan import Run, series
 from dembark.validation.progress import Board
 from dembark.validation.simulate import Resources, simulate

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dembark.common.errors import DembarkError
+from dembark.common.files import check_times, count_frames
 from dembark.postproc import GrainsDump
 from dembark.validation import engines
 from dembark.validation.checks.impact_exact import impacts, stepped
 from dembark.validation.checks.run import Replica
 from dembark.validation.checks.single_contact import Flight, read
-from dembark.validation.errors import DembarkError
-from dembark.validation.files import check_times, count_frames
 
 ROOT = Path(__file__).resolve().parents[1] / "single_contact"
 CASE = tomllib.loads((ROOT / "case.toml").read_text(encoding="utf-8"))

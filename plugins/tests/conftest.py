@@ -12,7 +12,7 @@ from rig import liggghts_driver, python_driver, yade_driver
 from rig.motion import Motion
 from rig.scenarios import SCENARIOS
 
-from dembark.validation.errors import DembarkError
+from dembark.common.errors import DembarkError
 
 
 class Motions:

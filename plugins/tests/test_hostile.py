@@ -9,7 +9,7 @@ from rig import liggghts_driver, python_driver, walls, yade_driver
 from rig.motion import QUANTITIES, deviation
 from rig.scenarios import ALL_OF_IT, STILL, Grain, Material, Path, Scenario
 
-from dembark.validation.errors import DembarkError
+from dembark.common.errors import DembarkError
 
 R = 5e-3
 # Down by 0.1 mm and sideways beyond the slip distance, and up again to 0.9 mm.

@@ -10,7 +10,7 @@ from rig.motion import deviation
 from rig.scenarios import ALL_OF_IT, SCENARIOS, Grain, Path, Scenario
 from rig.walls import CYLINDER, FLOOR, Surface
 
-from dembark.validation.errors import DembarkError
+from dembark.common.errors import DembarkError
 
 TOLERANCE = 1e-9
 

@@ -15,13 +15,13 @@ from dataclasses import dataclass, fields
 from typing import ClassVar
 
 import numpy as np
+from dembark.common.errors import DembarkError
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.postproc.fields.grid import Grid, check_periods
 from dembark.postproc.fields.sums import full_tensor, ratio, symmetric_parts
 from dembark.postproc.grains import GrainFrame, cell
 from dembark.postproc.spheres import volume
-from dembark.validation.errors import DembarkError
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from dembark import _fields
+from dembark.common.errors import DembarkError
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.fields import sums as column
 from dembark.postproc.fields.carried import Contacts, Grains
@@ -15,7 +16,6 @@ from dembark.postproc.fields.grid import Grid, check_periods
 from dembark.postproc.fields.kernels import Kernel
 from dembark.postproc.fields.sums import FieldSums
 from dembark.postproc.grains import GrainFrame
-from dembark.validation.errors import DembarkError
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from dembark import _fields
+from dembark.common.errors import DembarkError
 from dembark.postproc.fields.carried import Contacts, Grains
 from dembark.postproc.fields.grid import Grid, periodic_images
 from dembark.postproc.fields.kernels import NAMES, Kernel, ball_shares, cumulative, line_nodes, unit_gauss
 from dembark.postproc.grains import GrainFrame, cell
-from dembark.validation.errors import DembarkError
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from dembark.common.errors import DembarkError
 from dembark.postproc.grains import GrainFrame, cell
-from dembark.validation.errors import DembarkError
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]

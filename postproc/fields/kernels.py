@@ -15,8 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from dembark.common.errors import DembarkError
 from dembark.postproc.fields.grid import Grid
-from dembark.validation.errors import DembarkError
 from numpy.typing import NDArray
 from scipy.special import erf
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from dembark.common.errors import DembarkError
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.fields.cells import CellAverage, CellTotals, cell_grid, cell_totals
 from dembark.postproc.fields.coarse_graining import coarse_grain
@@ -23,7 +24,6 @@ from dembark.postproc.walls import Inclusion, wall_contacts
 from dembark.postproc.walls.run import begin, check_inclusions, check_outputs, choose_walls, recorders_of, source_lines, wall_lines
 from dembark.postproc.walls.stress import WallStress
 from dembark.postproc.words import WallWord, counts, length, near, span
-from dembark.validation.errors import DembarkError
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -10,9 +10,9 @@ from operator import add
 from typing import ClassVar
 
 import numpy as np
+from dembark.common.errors import DembarkError
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import Kernel
-from dembark.validation.errors import DembarkError
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

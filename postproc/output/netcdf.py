@@ -14,12 +14,12 @@ from typing import Any
 import h5netcdf
 import numpy as np
 import xarray
+from dembark.common.errors import DembarkError
+from dembark.common.files import disk_error
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.output.whole import Labelled, WholeFile
 from dembark.postproc.walls.peaks import Histogram
 from dembark.postproc.walls.stress import COMPONENTS, WallStress
-from dembark.validation.errors import DembarkError
-from dembark.validation.files import disk_error
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

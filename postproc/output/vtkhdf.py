@@ -14,12 +14,12 @@ from typing import Any, Self
 
 import h5py
 import numpy as np
+from dembark.common.errors import DembarkError
+from dembark.common.files import disk_error
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.output.whole import Labelled, WholeFile
 from dembark.postproc.walls.stress import COMPONENTS, WallStress
-from dembark.validation.errors import DembarkError
-from dembark.validation.files import disk_error
 from numpy.typing import NDArray
 
 Array = NDArray[Any]

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from dembark.common.errors import DembarkError
+from dembark.common.files import disk_error
 from dembark.postproc.fields.grid import Grid
-from dembark.validation.errors import DembarkError
-from dembark.validation.files import disk_error
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from dembark.common.errors import DembarkError
 from dembark.postproc.fields.cells import cell_average, cell_grid, cell_totals
 from dembark.postproc.fields.grid import Grid
-from dembark.validation.errors import DembarkError
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from packings import cubic_lattice, fcc_lattice, grain_frame, packing_at_rest, random_frame

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from dembark.common.errors import DembarkError
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.fields.coarse_graining import WallContacts, coarse_grain, interpolate
 from dembark.postproc.fields.face_stress import face_stress
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import NAMES, Kernel
 from dembark.postproc.fields.sums import Fields, moving_average
-from dembark.validation.errors import DembarkError
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from packings import contact_frame, cubic_lattice, fcc_lattice, grain_frame, packing_at_rest, random_frame

@@ -7,11 +7,11 @@ import json
 import numpy as np
 import pytest
 import xarray
+from dembark.common.errors import DembarkError
 from dembark.postproc.cli import progress
 from dembark.postproc.fields import run as field_run
 from dembark.postproc.words import counts, frame_numbers, length, parse_wall, span
 from dembark.validation.cli import main
-from dembark.validation.errors import DembarkError
 from dumps import contacts_text, grains_text, write_times
 from hypothesis import given
 from hypothesis import strategies as st

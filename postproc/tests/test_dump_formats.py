@@ -4,9 +4,9 @@ import shutil
 
 import numpy as np
 import pytest
+from dembark.common.errors import DembarkError
 from dembark.postproc import ContactsDump, DumpError, GrainsDump, open_dump, universe
 from dembark.validation import engines
-from dembark.validation.errors import DembarkError
 from dumps import contacts_text
 
 COLUMNS = "id type x y z ix iy iz vx vy vz radius mass fx fy fz omegax omegay omegaz".split()

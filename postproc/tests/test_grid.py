@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from dembark.common.errors import DembarkError
 from dembark.postproc.fields.grid import Grid, periodic_images
-from dembark.validation.errors import DembarkError
 from packings import grain_frame
 
 

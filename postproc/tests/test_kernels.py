@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from dembark.common.errors import DembarkError
 from dembark.postproc.fields.deposit import point_shares
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import NAMES, Kernel, cumulative, line_nodes
 from dembark.postproc.spheres import slice_volumes, volume
-from dembark.validation.errors import DembarkError
 
 
 @pytest.mark.parametrize("name", NAMES)

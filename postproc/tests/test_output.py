@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray
+from dembark.common.errors import DembarkError, RunError
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.output import (
@@ -24,7 +25,6 @@ from dembark.postproc.output import (
 from dembark.postproc.walls import CylinderWall, MeshWall, Motion, PlaneWall
 from dembark.postproc.walls.patches import cylinder_patches, mesh_patches, plane_patches
 from dembark.postproc.walls.stress import wall_stress
-from dembark.validation.errors import DembarkError, RunError
 from scenes import frame_of
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline

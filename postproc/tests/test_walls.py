@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from dembark.common.errors import DembarkError
 from dembark.postproc import ContactsDump, DumpError, GrainsDump, read_times
 from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, Motion, PlaneWall, into_box, wall_contacts
 from dembark.postproc.walls.mesh import TriangleTree, nearest_on_triangles, read_stl
@@ -11,7 +12,6 @@ from dembark.postproc.walls.patches import box_patches, cylinder_patches, inclus
 from dembark.postproc.walls.peaks import Blocks, Histogram, PeakFinder
 from dembark.postproc.walls.stress import wall_stress
 from dembark.validation import cases, engines
-from dembark.validation.errors import DembarkError
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scenes import contacts_of, frame_of

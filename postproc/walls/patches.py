@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from dembark.common.errors import DembarkError
 from dembark.postproc.grains import GrainFrame, cell
 from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, PlaneWall, Wall
-from dembark.validation.errors import DembarkError
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from dembark.common.errors import DembarkError
 from dembark.postproc.dumptext import DumpError
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.history import read_times
@@ -18,7 +19,6 @@ from dembark.postproc.sources import Reading, Source, open_source
 from dembark.postproc.walls import Inclusion
 from dembark.postproc.walls.stress import WallRecorder, WallStress
 from dembark.postproc.words import WallWord, frame_numbers, length, parse_wall, plain
-from dembark.validation.errors import DembarkError
 
 Attributes = Mapping[str, str | float | int]
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from dembark.common.errors import DembarkError
 from dembark.postproc.walls.mesh import TriangleTree, read_stl
-from dembark.validation.errors import DembarkError
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

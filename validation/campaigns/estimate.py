@@ -12,11 +12,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from dembark.common.errors import DembarkError, Interrupted
 from dembark.validation import engines
 from dembark.validation.campaigns.expand import Plan
 from dembark.validation.campaigns.rates import Rate, Rates
 from dembark.validation.campaigns.sizes import size_text
-from dembark.validation.errors import DembarkError, Interrupted
 from dembark.validation.plan import Run, Series
 from dembark.validation.process import chunks, running
 from dembark.validation.progress import OutputParser

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from dembark.common.errors import DembarkError
 from dembark.validation import engines
 from dembark.validation.campaigns.spec import CampaignSpec, RunResources, SweepSpec
 from dembark.validation.cases import ENGINES
-from dembark.validation.errors import DembarkError
 from dembark.validation.parameters import Value, checked, pick
 from dembark.validation.plan import Series, series
 from dembark.validation.resolve import merged, resolve

@@ -12,12 +12,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from dembark.common.errors import DembarkError
+from dembark.common.files import read_json, write_json, write_whole
 from dembark.validation import provenance
 from dembark.validation.campaigns.expand import Plan
 from dembark.validation.campaigns.spec import read
 from dembark.validation.cases import deck_root
-from dembark.validation.errors import DembarkError
-from dembark.validation.files import read_json, write_json, write_whole
 
 FILE = "campaign.toml"
 FACTS = "campaign.json"

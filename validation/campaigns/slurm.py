@@ -18,10 +18,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from dembark.common.errors import DembarkError, Interrupted
 from dembark.validation.campaigns.profiles import ExecutorProfile
 from dembark.validation.campaigns.spec import RunResources
 from dembark.validation.engines import mpi_launcher
-from dembark.validation.errors import DembarkError, Interrupted
 
 _COMMANDS = ("sbatch", "squeue", "scancel", "scontrol")
 _ATTEMPTS, _TRIES, _PAUSE = 12, 4, 10.0

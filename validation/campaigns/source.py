@@ -8,10 +8,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from dembark.common.errors import DembarkError
 from dembark.validation.campaigns.expand import Plan
 from dembark.validation.campaigns.expand import plan as plan_of
 from dembark.validation.campaigns.spec import RunResources, read
-from dembark.validation.errors import DembarkError
 from dembark.validation.plan import Series
 from dembark.validation.plan import campaign as of_profile
 

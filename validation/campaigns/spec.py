@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from dembark.common.errors import DembarkError
 from dembark.validation.campaigns import sizes
 from dembark.validation.cases import ENGINES, Case, deck_root, discover, find
-from dembark.validation.errors import DembarkError
 from dembark.validation.expressions import Expression
 from dembark.validation.parameters import Value, checked, nearest, pick
 from dembark.validation.tables import TableReader, load_toml

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from dembark.common.errors import DembarkError
+from dembark.common.files import read_json
 from dembark.validation.campaigns import folder, store, submit
 from dembark.validation.campaigns.estimate import wall_clock
-from dembark.validation.errors import DembarkError
-from dembark.validation.files import read_json
 from dembark.validation.jobs import progress_folder
 from dembark.validation.progress import State, headline, watched
 

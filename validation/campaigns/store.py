@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
+from dembark.common.errors import DembarkError, RunError
+from dembark.common.files import disk_error, read_json, write_whole
 from dembark.validation.campaigns.schema import KEYS, TABLES, VERSION, statements
-from dembark.validation.errors import DembarkError, RunError
-from dembark.validation.files import disk_error, read_json, write_whole
 from dembark.validation.parameters import pick
 from dembark.validation.plan import Run, Series, finished, studies
 

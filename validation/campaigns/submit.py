@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 
+from dembark.common.errors import DembarkError
+from dembark.common.files import lock, read_json, write_json
 from dembark.validation.campaigns import folder, profiles, slurm, store
 from dembark.validation.campaigns.estimate import Estimate, estimates
 from dembark.validation.campaigns.expand import Plan
@@ -15,8 +17,6 @@ from dembark.validation.campaigns.folder import Options
 from dembark.validation.campaigns.rates import Rates
 from dembark.validation.campaigns.sizes import size_text
 from dembark.validation.campaigns.source import Source
-from dembark.validation.errors import DembarkError
-from dembark.validation.files import lock, read_json, write_json
 from dembark.validation.workflow import Outcome, Way, here, perform
 
 ESTIMATES = ".estimates.json"

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
-from dembark.validation.errors import RunError
+from dembark.common.errors import RunError
 
 
 def find(case: str, folder: Path | None = None) -> ModuleType:

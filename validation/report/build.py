@@ -10,9 +10,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from dembark.common.errors import RunError
+from dembark.common.files import disk_error, write_json, write_whole
 from dembark.postproc import DumpError
-from dembark.validation.errors import RunError
-from dembark.validation.files import disk_error, write_json, write_whole
 from dembark.validation.report import cross_section, fields, figures, numbers, pictures, verification
 from dembark.validation.report.gather import Page, gather, studies
 from dembark.validation.verification.item import Item

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from dembark.common.files import read_json
 from dembark.postproc import GrainFrame, GrainsDump
 from dembark.postproc.dumptext import TextDump
-from dembark.validation.files import read_json
 from dembark.validation.report.figures import engine_name
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection

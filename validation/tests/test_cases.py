@@ -6,12 +6,12 @@ import math
 from pathlib import Path
 
 import pytest
+from dembark.common.errors import DembarkError
+from dembark.common.units import to_si
 from dembark.validation import cases
 from dembark.validation.cases import discover, find, load
-from dembark.validation.errors import DembarkError
 from dembark.validation.expressions import Expression
 from dembark.validation.resolve import for_replica, portable, resolve, settings
-from dembark.validation.units import to_si
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -9,9 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from dembark.common.files import read_json
 from dembark.validation import cases, engines
 from dembark.validation.cli import main
-from dembark.validation.files import read_json
 
 Dembark = Callable[..., "subprocess.CompletedProcess[str]"]
 

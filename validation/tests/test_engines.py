@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from dembark.common.errors import Interrupted, RunError
+from dembark.common.files import read_json
 from dembark.validation import cases, engines, provenance
 from dembark.validation.cases import find
-from dembark.validation.errors import Interrupted, RunError
-from dembark.validation.files import read_json
 from dembark.validation.plan import Run, series
 from dembark.validation.progress import Board
 from dembark.validation.simulate import Resources, simulate

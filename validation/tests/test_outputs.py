@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from dembark.common.errors import DembarkError, RunError
+from dembark.common.files import check_impacts
 from dembark.validation import cases, outcome
-from dembark.validation.errors import DembarkError, RunError
-from dembark.validation.files import check_impacts
 from hypothesis import given
 from hypothesis import strategies as st
 

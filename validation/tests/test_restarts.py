@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
+from dembark.common.files import read_json
 from dembark.validation import cases, claim, engines, restarts, simulate
 from dembark.validation.cases import find
-from dembark.validation.errors import DembarkError, Interrupted, Killed, RunError
-from dembark.validation.files import read_json
 from dembark.validation.plan import Run, series
 from dembark.validation.progress import Board
 from dembark.validation.simulate import Resources

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from dembark.common.files import read_json
 from dembark.validation import cases
-from dembark.validation.files import read_json
 from dembark.validation.jobs import variants
 from dembark.validation.plan import campaign, studies
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from dembark.common.errors import DembarkError
 from dembark.validation import engines
-from dembark.validation.errors import DembarkError
 
 HERE = Path(__file__).parent
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from dembark.validation.errors import DembarkError
+from dembark.common.errors import DembarkError
 from dembark.validation.parameters import nearest
 
 # Names the preamble to the jobs, whose commands read it first (see the Snakefile).

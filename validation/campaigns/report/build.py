@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from dembark.common.errors import RunError
+from dembark.common.files import disk_error, write_whole
 from dembark.validation.campaigns.report import against as other
 from dembark.validation.campaigns.report import figures, tables
 from dembark.validation.campaigns.report.gather import Campaign, gather
 from dembark.validation.campaigns.report.sweeps import Point, Sweep, numerical_errors, words
-from dembark.validation.errors import RunError
-from dembark.validation.files import disk_error, write_whole
 from dembark.validation.report import figures as shared
 from dembark.validation.report.build import embed, environment, machine, style, write_pdf
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dembark.common.files import read_json
 from dembark.validation.campaigns import store
 from dembark.validation.campaigns.report.sweeps import Point, Sweep
-from dembark.validation.files import read_json
 
 _FACTS = ("dirty", "host", "cpu", "started", "ranks", "threads")
 

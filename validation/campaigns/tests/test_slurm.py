@@ -15,10 +15,10 @@ from pathlib import Path
 import pytest
 from slurm_cluster import Cluster
 
+from dembark.common.errors import DembarkError, Interrupted
 from dembark.validation import engines
 from dembark.validation.campaigns import profiles, slurm
 from dembark.validation.campaigns.spec import RunResources
-from dembark.validation.errors import DembarkError, Interrupted
 
 SLURM = profiles.find("slurm")
 LONG = ["--time=1", "--output=/dev/null", "--wrap=sleep 60"]

@@ -15,8 +15,8 @@ import pytest
 from harness import decks, environment, stand_in, wait_for  # noqa: F401
 from slurm_cluster import Cluster
 
+from dembark.common.files import read_json
 from dembark.validation.campaigns import profiles, slurm
-from dembark.validation.files import read_json
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 

@@ -15,10 +15,10 @@ from pathlib import Path
 import pytest
 from slurm_cluster import Cluster
 
+from dembark.common.errors import DembarkError
+from dembark.common.files import read_json
 from dembark.validation import cases, engines, restarts
 from dembark.validation.campaigns import profiles, slurm
-from dembark.validation.errors import DembarkError
-from dembark.validation.files import read_json
 
 pytestmark = pytest.mark.slow
 

@@ -8,10 +8,10 @@ import time
 from pathlib import Path
 
 import pytest
+from dembark.common.files import lock
 from dembark.validation.campaigns import folder
 from dembark.validation.campaigns.status import look
 from dembark.validation.campaigns.submit import ESTIMATES
-from dembark.validation.files import lock
 from dembark.validation.progress import FileBoard, State, headline, state_table, watched
 
 CAMPAIGN = '[campaign]\nname = "boxes"\nprofile = "quick"\n'

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dembark.common.errors import DembarkError, RunError
 from dembark.validation.campaigns import store
 from dembark.validation.campaigns.rates import ANY_CASE, MEASURED, Rates
 from dembark.validation.campaigns.schema import KEYS, TABLES, VERSION
-from dembark.validation.errors import DembarkError, RunError
 from dembark.validation.plan import Series, campaign
 from harness import decks, stand_in  # noqa: F401
 

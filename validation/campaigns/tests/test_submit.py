@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from dembark.common.files import lock, read_json
 from dembark.validation.campaigns import store
 from dembark.validation.campaigns.estimate import wall_clock
 from dembark.validation.campaigns.status import look
 from dembark.validation.cli import main
-from dembark.validation.files import lock, read_json
 from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")

@@ -6,6 +6,7 @@ import types
 
 import numpy as np
 import pytest
+from dembark.common.errors import RunError
 from dembark.physics import capillary_force
 from dembark.validation.checks import find
 from dembark.validation.checks.column import _wall_pull, janssen, two_parameter
@@ -13,7 +14,6 @@ from dembark.validation.checks.filling import apparent_mass_with_onset
 from dembark.validation.checks.quantity import Quantity, judge
 from dembark.validation.checks.vessel import Cylinder
 from dembark.validation.compare import compare, pair
-from dembark.validation.errors import RunError
 from dembark.validation.metrics import measure
 from dembark.validation.statistics import Estimate
 from synthetic import DIAMETER, plug_flow, silo

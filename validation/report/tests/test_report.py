@@ -9,10 +9,10 @@ import types
 import numpy as np
 import pytest
 import xarray
+from dembark.common.errors import RunError
 from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.validation import report
 from dembark.validation.compare import compare
-from dembark.validation.errors import RunError
 from dembark.validation.metrics import measure
 from dembark.validation.report import fields, figures, numbers, pictures
 from dembark.validation.report.build import _fields, overview

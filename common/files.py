@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from dembark.validation.errors import DembarkError, RunError
+from dembark.common.errors import DembarkError, RunError
 
 DISK_FULL = "the disk is full"
 _TIMESTEP = b"ITEM: TIMESTEP\n"

@@ -7,8 +7,8 @@ import os
 from pathlib import Path
 
 import pytest
-from dembark.validation.errors import DembarkError, RunError
-from dembark.validation.files import check_times, count_frames, lock, move_into_place, read_json, retire, sweep, write_json
+from dembark.common.errors import DembarkError, RunError
+from dembark.common.files import check_times, count_frames, lock, move_into_place, read_json, retire, sweep, write_json
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -73,7 +73,7 @@ def test_json_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
 
 
 def test_writing_to_a_full_disk_says_so() -> None:
-    from dembark.validation.files import disk_error
+    from dembark.common.files import disk_error
 
     with Path("/dev/full").open("w") as full, pytest.raises(OSError) as caught:
         full.write("x" * 100000)

@@ -6,7 +6,7 @@ import math
 from functools import cache
 from typing import TYPE_CHECKING
 
-from dembark.validation.errors import DembarkError
+from dembark.common.errors import DembarkError
 
 if TYPE_CHECKING:
     import pint
