@@ -7,10 +7,13 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "compute_reduce.h"
 #include "domain.h"
+#include "dump.h"
 #include "error.h"
 #include "memory.h"
 #include "modify.h"
+#include "output.h"
 #include "update.h"
 
 #include "fix_mesh_surface.h"
@@ -25,13 +28,24 @@ namespace {
 
 constexpr int local_columns = 13;
 
+/// What a compute reduce is made from, which it does not tell.
+struct Reduced : ComputeReduce {
+  static bool names(const ComputeReduce &compute, const char *id) {
+    for (int k = 0; k < compute.*(&Reduced::nvalues); ++k) {
+      const char *source = (compute.*(&Reduced::ids))[k];
+      if (source && std::strcmp(source, id) == 0) return true;
+    }
+    return false;
+  }
+};
+
 std::vector<std::string> words(int narg, char **arg) { return std::vector<std::string>(arg + std::min(3, narg), arg + narg); }
 
 }  // namespace
 
 FixLcpImpact::FixLcpImpact(LAMMPS *lmp, int narg, char **arg)
     : Fix(lmp, narg, arg), last_step_(-1), last_dt_(0.0), clock_time_(0.0), clock_step_(0), record_kept_(-1), me_(comm->me),
-      local_capacity_(0) {
+      local_capacity_(0), local_always_(true) {
   if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag || !atom->torque_flag)
     refuse("atoms have no radius, mass, spin or torque of their own; use atom_style granular (or sphere)");
   if (!atom->tag_enable) refuse("atoms have no numbers; use atom_modify id yes");
@@ -99,6 +113,7 @@ void FixLcpImpact::init() {
   find_meshes();
   if (!system_ || update->dt != last_dt_) build_system();
   open_record();
+  find_local_readers();
 }
 
 void FixLcpImpact::reset_dt() { build_system(); }
@@ -151,6 +166,23 @@ void FixLcpImpact::find_meshes() {
   }
 }
 
+/// Styles that may read the local array in any step; dumps tell their steps.
+void FixLcpImpact::find_local_readers() {
+  local_always_ = false;
+  for (int i = 0; i < modify->ncompute; ++i) {
+    const ComputeReduce *reduce = dynamic_cast<ComputeReduce *>(modify->compute[i]);
+    local_always_ = local_always_ || (reduce && Reduced::names(*reduce, id));
+  }
+  for (int i = 0; i < modify->nfix; ++i) local_always_ = local_always_ || std::strncmp(modify->fix[i]->style, "ave/histo", 9) == 0;
+}
+
+bool FixLcpImpact::local_is_read() const {
+  if (local_always_) return true;
+  for (int i = 0; i < output->ndump; ++i)
+    if (output->next_dump[i] == update->ntimestep && std::strncmp(output->dump[i]->style, "local", 5) == 0) return true;
+  return false;
+}
+
 void FixLcpImpact::open_record() {
   if (options_.impacts_file.empty() || !record_name_.empty()) return;
   record_name_ = options_.impacts_file;
@@ -192,10 +224,13 @@ void FixLcpImpact::post_force(int) {
   gather_meshes(update->dt);
   solve(1.0);
   apply();
-  fill_local();
+  if (local_is_read()) fill_local();
 }
 
-void FixLcpImpact::post_run() { take_snapshot(); }
+void FixLcpImpact::post_run() {
+  take_snapshot();
+  fill_local();
+}
 
 void FixLcpImpact::solve(double kick) {
   force_.assign(bodies_.size(), Vec());

@@ -59,6 +59,8 @@ class FixLcpImpact : public Fix {
   double inertia_factor() const;
   void solve(double kick);
   void apply();
+  void find_local_readers();
+  bool local_is_read() const;
   void fill_local();
   const std::vector<dembark::impact::ContactResult> &results() const;
   void take_snapshot();
@@ -97,6 +99,7 @@ class FixLcpImpact : public Fix {
   std::string record_name_;
   long long record_kept_;  // bytes, from a restart file; -1: none
   int me_, local_capacity_;
+  bool local_always_;  // something besides dumps may read the local array
 };
 
 }  // namespace LAMMPS_NS
