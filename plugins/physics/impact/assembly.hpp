@@ -2,7 +2,7 @@
 //
 //   A = diag(1 / (s + c/tau)) + h tau^2 G^T M'^-1 G,
 //
-// s the stiffness of both springs in series, M' the response masses, G the normals. Its pattern is kept while the list of contacts
+// s the stiffness of both springs in series, M' the response masses, G the normals. Its pattern is kept while the list of rows
 // stays as it is.
 #pragma once
 
@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "candidates.hpp"
 #include "types.hpp"
 
 namespace dembark {
@@ -30,8 +31,10 @@ struct Row {
   Vec3<double> normal{}, point_velocity{}, place{};
   const PairLaw* law = nullptr;
   double stiffness = 0.0;            ///< s, N/m, both springs in series
+  double viscous = 0.0;              ///< c / tau, N/m
+  double compliance = 0.0;           ///< 1 / (s + c/tau), m/N
   double arm_a = 0.0, arm_b = 0.0;   ///< m, from the centres to the contact
-  double radius = 0.0;               ///< m, R* = r_a r_b / (r_a + r_b)
+  double radius = 0.0;               ///< m, R* = r_a r_b / (r_a + r_b), where friction asks for it
 };
 
 class Assembly {
@@ -41,16 +44,17 @@ class Assembly {
   const Eigen::SparseMatrix<double>& matrix() const { return matrix_; }
 
   /// Takes the contacts of a step. Throws std::invalid_argument with one line about the contact that is wrong.
-  void update(const std::vector<Body>& bodies, const std::vector<Contact>& contacts, const Settings& settings) {
-    const bool same = in_order(contacts);
-    if (!same) sort(contacts);
-    rows_.resize(contacts.size());
-    bool same_pattern = same && bodies_ == bodies.size();
+  void update(const std::vector<Body>& bodies, const std::vector<Contact>& contacts, const std::vector<Sorted>& sorted,
+              const Settings& settings) {
+    const std::size_t pairs = settings.materials.size() * settings.materials.size();
+    if (springs_.size() != pairs || dt_ != settings.dt) springs_.assign(pairs, Springs());
+    dt_ = settings.dt;
+    bool same_pattern = rows_.size() == sorted.size() && bodies_ == bodies.size();
+    rows_.resize(sorted.size());
     for (std::size_t i = 0; i < rows_.size(); ++i) {
-      const Contact& c = contacts[order_[i]];
       Row& r = rows_[i];
       const int a = r.a, b = r.b;
-      fill(bodies, c, settings, r);
+      fill(bodies, contacts[std::size_t(sorted[i].contact)], settings, r);
       same_pattern = same_pattern && a == r.a && b == r.b;
     }
     if (same_pattern) return;
@@ -58,16 +62,15 @@ class Assembly {
     stale_ = true;
   }
 
-  /// Forgets the order and the pattern.
+  /// Forgets the rows and the pattern.
   void clear() {
     rows_.clear();
-    order_.clear();
     bodies_ = std::numeric_limits<std::size_t>::max();
   }
 
-  /// Values of A. bodies: with 1/m' as `inverse` (1/kg); scale: h tau^2 (s^2); compliance: 1 / (s + c/tau) of each row, m/N.
+  /// Values of A. bodies: with 1/m' as `inverse` (1/kg); scale: h tau^2 (s^2).
   template <class Sums>
-  void assemble(const std::vector<Sums>& bodies, double scale, const std::vector<double>& compliance) {
+  void assemble(const std::vector<Sums>& bodies, double scale) {
     if (stale_) build_pattern(bodies_);
     double* value = matrix_.valuePtr();
     const int *outer = matrix_.outerIndexPtr(), *inner = matrix_.innerIndexPtr();
@@ -75,7 +78,7 @@ class Assembly {
       const Row& r = rows_[i];
       for (int p = outer[i]; p < outer[i + 1]; ++p) {
         const int code = shared_[p];
-        if (code < 0) value[p] = compliance[i] + scale * (bodies[r.a].inverse + (r.b >= 0 ? bodies[r.b].inverse : 0.0));
+        if (code < 0) value[p] = r.compliance + scale * (bodies[r.a].inverse + (r.b >= 0 ? bodies[r.b].inverse : 0.0));
         else {
           const double entry = scale * bodies[code >> 1].inverse * dot(r.normal, rows_[inner[p]].normal);
           value[p] = code & 1 ? -entry : entry;
@@ -85,56 +88,42 @@ class Assembly {
   }
 
  private:
-  using Key = std::pair<std::int64_t, std::int64_t>;
-  static constexpr int most_runs = 16;
-  static bool turned(const Contact& c) { return c.b >= 0 && c.key_b < c.key_a; }
-  static Key key(const Contact& c) { return turned(c) ? Key(c.key_b, c.key_a) : Key(c.key_a, c.key_b); }
+  /// What the contacts of two materials have in common.
+  struct Springs {
+    double wall = -1.0;  ///< N/m, stiffness of the wall it was made for; 0 for pairs of bodies
+    double share = 0.0, stiffness = 0.0, viscous = 0.0, compliance = 0.0;  ///< of a in the compliance of both; see Row
+  };
 
-  bool in_order(const std::vector<Contact>& contacts) const {
-    if (contacts.size() != order_.size() || rows_.size() != order_.size()) return false;
-    for (std::size_t i = 0; i < order_.size(); ++i)
-      if (key(contacts[order_[i]]) != Key(rows_[i].key_a, rows_[i].key_b)) return false;
-    return true;
+  static Springs springs_of(const Contact& c, int a, int side, const PairLaw& law, const Settings& settings) {
+    const bool wall = c.b < 0;
+    const double soft_a = 1.0 / settings.materials[std::size_t(a)].stiffness;
+    const double soft_b = 1.0 / (wall ? c.wall_stiffness : settings.materials[std::size_t(side)].stiffness);
+    if (!(soft_b >= 0.0) || std::isinf(soft_b)) throw std::invalid_argument(name_of(c) + ": the wall's stiffness must be > 0 N/m");
+    Springs s;
+    s.wall = wall ? c.wall_stiffness : 0.0;
+    s.share = soft_a / (soft_a + soft_b);
+    s.stiffness = 1.0 / (soft_a + soft_b);
+    s.viscous = law.contact_damping / settings.dt;
+    s.compliance = 1.0 / (s.stiffness + s.viscous);
+    return s;
   }
 
-  void sort(const std::vector<Contact>& contacts) {
-    keyed_.resize(contacts.size());
-    for (std::size_t i = 0; i < keyed_.size(); ++i) keyed_[i] = {key(contacts[i]), int(i)};
-    // Pairs come sorted, and so do the contacts of each wall: a few ascending runs are merged.
-    int runs = 0;
-    for (auto from = keyed_.begin(), end = from; from != keyed_.end(); from = end) {
-      if (++runs > most_runs) {
-        std::sort(keyed_.begin(), keyed_.end());
-        break;
-      }
-      end = std::is_sorted_until(from, keyed_.end());
-      if (from != keyed_.begin()) std::inplace_merge(keyed_.begin(), from, end);
-    }
-    order_.resize(keyed_.size());
-    for (std::size_t i = 0; i < keyed_.size(); ++i) {
-      order_[i] = keyed_[i].second;
-      if (i && keyed_[i - 1].first == keyed_[i].first)
-        throw std::invalid_argument(name(contacts[order_[i]]) + ": the same two keys come twice; every contact needs its own");
-    }
-  }
-
-  static std::string name(const Contact& c) { return "contact of " + std::to_string(c.key_a) + " and " + std::to_string(c.key_b); }
-
-  static void fill(const std::vector<Body>& bodies, const Contact& c, const Settings& settings, Row& r) {
+  void fill(const std::vector<Body>& bodies, const Contact& c, const Settings& settings, Row& r) {
     const int count = int(bodies.size()), materials = int(settings.materials.size());
     if (c.a < 0 || c.a >= count || c.b >= count || c.a == c.b)
-      throw std::invalid_argument(name(c) + ": bodies " + std::to_string(c.a) + " and " + std::to_string(c.b) + " are not two of " +
+      throw std::invalid_argument(name_of(c) + ": bodies " + std::to_string(c.a) + " and " + std::to_string(c.b) + " are not two of " +
                                   std::to_string(count));
-    if (c.key_a < 0 || (c.b >= 0) != (c.key_b >= 0)) throw std::invalid_argument(name(c) + ": keys of bodies are >= 0, keys of walls < 0");
+    if (c.key_a < 0 || (c.b >= 0) != (c.key_b >= 0))
+      throw std::invalid_argument(name_of(c) + ": keys of bodies are >= 0, keys of walls < 0");
     if (std::max(std::abs(c.key_a), std::abs(c.key_b)) > (std::int64_t(1) << 53))
-      throw std::invalid_argument(name(c) + ": keys must stay below 2^53");
+      throw std::invalid_argument(name_of(c) + ": keys must stay below 2^53");
     if (!(std::isfinite(c.gap) && std::abs(dot(c.normal, c.normal) - 1.0) < 1e-6))
-      throw std::invalid_argument(name(c) + ": the gap must be finite and the normal a unit vector");
+      throw std::invalid_argument(name_of(c) + ": the gap must be finite and the normal a unit vector");
     const bool turn = turned(c), wall = c.b < 0;
     const Body& first = bodies[c.a];
     const int material_b = wall ? c.wall_material : bodies[c.b].material;
     if (first.material < 0 || first.material >= materials || material_b < 0 || material_b >= materials)
-      throw std::invalid_argument(name(c) + ": materials " + std::to_string(first.material) + " and " +
+      throw std::invalid_argument(name_of(c) + ": materials " + std::to_string(first.material) + " and " +
                                   std::to_string(material_b) + " are not below " + std::to_string(materials));
     r.a = turn ? c.b : c.a;
     r.b = turn ? c.a : c.b;
@@ -145,18 +134,21 @@ class Assembly {
     r.point_velocity = wall ? c.point_velocity : Vec3<double>{};
     const Body& a = bodies[r.a];
     const int side = wall ? c.wall_material : bodies[r.b].material;
-    const double soft_a = 1.0 / settings.materials[a.material].stiffness;
-    const double soft_b = 1.0 / (wall ? c.wall_stiffness : settings.materials[side].stiffness);
-    if (!(soft_b >= 0.0) || std::isinf(soft_b)) throw std::invalid_argument(name(c) + ": the wall's stiffness must be > 0 N/m");
-    r.law = &settings.pairs[std::size_t(a.material) * materials + side];
-    r.stiffness = 1.0 / (soft_a + soft_b);
+    const std::size_t pair = std::size_t(a.material) * std::size_t(materials) + std::size_t(side);
+    r.law = &settings.pairs[pair];
+    Springs& springs = springs_[pair];
+    if (springs.wall != (wall ? c.wall_stiffness : 0.0)) springs = springs_of(c, a.material, side, *r.law, settings);
+    r.stiffness = springs.stiffness;
+    r.viscous = springs.viscous;
+    r.compliance = springs.compliance;
     // The two lever arms add up to the distance of the centres, which keeps the angular momentum; each boundary gives way by its own
     // compliance.
-    const double share = soft_a / (soft_a + soft_b), other = wall ? 0.0 : bodies[r.b].radius;
+    const double share = springs.share, other = wall ? 0.0 : bodies[r.b].radius;
     r.arm_a = a.radius + share * c.gap;
     r.arm_b = wall ? 0.0 : other + (1.0 - share) * c.gap;
     r.place = a.position - r.arm_a * r.normal;
-    r.radius = wall || a.radius == 0.0 ? a.radius : a.radius * other / (a.radius + other);
+    if (r.law->friction.interface_shear_strength < unlimited_strength)
+      r.radius = wall || a.radius == 0.0 ? a.radius : a.radius * other / (a.radius + other);
   }
 
   void build_pattern(std::size_t bodies) {
@@ -206,8 +198,9 @@ class Assembly {
   }
 
   std::vector<Row> rows_;
-  std::vector<std::pair<Key, int>> keyed_;
-  std::vector<int> order_, start_, fill_, list_, inner_, shared_;
+  std::vector<Springs> springs_;  ///< of each pair of materials, made where needed
+  double dt_ = 0.0;
+  std::vector<int> start_, fill_, list_, inner_, shared_;
   std::size_t bodies_ = std::numeric_limits<std::size_t>::max();
   bool stale_ = true;  ///< the pattern is made when it is needed
   Eigen::SparseMatrix<double> matrix_;

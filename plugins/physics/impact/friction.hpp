@@ -34,13 +34,14 @@ inline double friction_area(const Row& row, double normal_force) {
 inline Vec3<double> friction_sweep(const Row& row, double normal_force, double response, const Vec3<double>& velocity,
                                    const Vec3<double>& last, const Vec3<double>& start, double dt, double kick,
                                    FrictionState<double>& state) {
-  const double ratio = row.law->tangential_stiffness_ratio, k = ratio * row.stiffness, viscous = ratio * row.law->contact_damping / dt;
-  const double inertia = kick * dt * dt * response, soft = (k + viscous) / (1.0 + (k + viscous) * inertia);
-  state.displacement = start * (-1.0 / soft);
+  const double ratio = row.law->tangential_stiffness_ratio, inertia = kick * dt * dt * response;
+  const double give = row.compliance / ratio, soft = 1.0 / (give + inertia);  // 1 / K, k'
+  state.displacement = start * -(give + inertia);
   const Vec3<double> effective = velocity - (inertia / dt) * (last - start);
-  const Vec3<double> force =
-      friction_step(row.law->friction, normal_force, soft, 0.0, friction_area(row, normal_force), effective, dt, state);
-  state.displacement = (force + (viscous / k) * start) * (-1.0 / (k + viscous));
+  const bool limited = row.law->friction.interface_shear_strength < unlimited_strength;
+  const double area = limited ? friction_area(row, normal_force) : 0.0;
+  const Vec3<double> force = friction_step(row.law->friction, normal_force, soft, 0.0, area, effective, dt, state);
+  state.displacement = (force + (row.viscous / row.stiffness) * start) * -give;
   return force;
 }
 

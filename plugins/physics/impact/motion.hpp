@@ -20,6 +20,7 @@ struct BodyResponse {
   double spin_inverse = 0.0;  ///< 1/I, 1/(kg m^2)
   double damping = 0.0;       ///< lambda if it acts in this step, N s/m
   Vec3<double> free{};        ///< f - lambda v, N
+  Vec3<double> torque{};      ///< N m
 };
 
 /// Sums over the contacts of a body, in parts that are cleared and read together: the loops over them cost what their memory does.
@@ -30,9 +31,15 @@ struct NormalSum {
 struct TangentialSum {
   Vec3<double> force{}, torque{};  ///< N, N m
 };
-/// v' - v (m/s) and omega' - omega (rad/s), all forces as they are.
-struct Change {
+/// m/s and rad/s.
+struct Velocity {
   Vec3<double> velocity{}, spin{};
+};
+
+/// What friction reads of a body: v', omega', and its response shared out among the contacts that carry a force.
+struct Moved {
+  Vec3<double> velocity{}, spin{};      ///< m/s, rad/s
+  double inverse = 0.0, spin_inverse = 0.0;  ///< 1/kg, 1/(kg m^2)
 };
 
 class Motion {
@@ -40,7 +47,7 @@ class Motion {
   std::vector<BodyResponse> response;
   std::vector<NormalSum> normal;
   std::vector<TangentialSum> tangential;
-  std::vector<Change> change;  ///< see move()
+  std::vector<Velocity> change;    ///< v' - v, omega' - omega; see move()
   std::vector<int> damped;  ///< bodies with lambda > 0, in the order of the contacts
 
   /// Begins a step; `bodies` must outlive it. Throws std::invalid_argument with one line about the body that is wrong.
@@ -51,11 +58,12 @@ class Motion {
     normal.assign(bodies.size(), NormalSum());
     tangential.assign(bodies.size(), TangentialSum());
     change.resize(bodies.size());
+    moved_.resize(bodies.size());
     acceleration_.resize(bodies.size());
     damped.clear();
     for (std::size_t b = 0; b < bodies.size(); ++b) {
       check(bodies[b]);
-      response[b] = {1.0 / bodies[b].mass, 1.0 / bodies[b].inertia, 0.0, bodies[b].force};
+      response[b] = {1.0 / bodies[b].mass, 1.0 / bodies[b].inertia, 0.0, bodies[b].force, bodies[b].torque};
     }
   }
 
@@ -100,33 +108,42 @@ class Motion {
   double gap_acceleration(const Row& r) const {
     return dot(r.normal, r.b >= 0 ? acceleration_[r.a] - acceleration_[r.b] : acceleration_[r.a]);
   }
-  /// Response (1/kg) of the contact to a tangential force, the bodies shared out among their active contacts.
+  /// Response (1/kg) of the contact to a tangential force, the bodies shared out among their active contacts; after move().
   double tangential_response(const Row& r) const {
-    const BodyResponse& a = response[r.a];
-    const double w = normal[r.a].active * (a.inverse + r.arm_a * r.arm_a * a.spin_inverse);
+    const Moved& a = moved_[std::size_t(r.a)];
+    const double w = a.inverse + r.arm_a * r.arm_a * a.spin_inverse;
     if (r.b < 0) return w;
-    const BodyResponse& b = response[r.b];
-    return w + normal[r.b].active * (b.inverse + r.arm_b * r.arm_b * b.spin_inverse);
+    const Moved& b = moved_[std::size_t(r.b)];
+    return w + (b.inverse + r.arm_b * r.arm_b * b.spin_inverse);
   }
 
-  /// Takes all forces over, for surface_velocity.
+  /// Takes all forces over; what surface_velocity reads are v' and omega' then.
   void move() {
     for (std::size_t b = 0; b < response.size(); ++b) {
       const BodyResponse& s = response[b];
       change[b].velocity = (interval_ * s.inverse) * (s.free + tangential[b].force + normal[b].force);
-      change[b].spin = (interval_ * s.spin_inverse) * ((*bodies_)[b].torque + tangential[b].torque);
+      change[b].spin = (interval_ * s.spin_inverse) * (s.torque + tangential[b].torque);
+      const double contacts = normal[b].active;
+      moved_[b] = {(*bodies_)[b].velocity + change[b].velocity, (*bodies_)[b].spin + change[b].spin, contacts * s.inverse,
+                   contacts * s.spin_inverse};
+    }
+  }
+  /// Velocities `part` of the way from v to v'; after move().
+  void go_back(double part) {
+    for (std::size_t b = 0; b < moved_.size(); ++b) {
+      moved_[b].velocity = (*bodies_)[b].velocity + part * change[b].velocity;
+      moved_[b].spin = (*bodies_)[b].spin + part * change[b].spin;
     }
   }
 
-  /// Velocity of the surface of a relative to that of b (m/s), `part` of the way from v to v'.
-  Vec3<double> surface_velocity(const Row& r, double part) const {
-    const Body& a = (*bodies_)[r.a];
-    Vec3<double> v = a.velocity + part * change[r.a].velocity;
-    Vec3<double> spin = r.arm_a * (a.spin + part * change[r.a].spin);
+  /// Velocity of the surface of a relative to that of b (m/s), as move() or go_back() left the bodies.
+  Vec3<double> surface_velocity(const Row& r) const {
+    const Moved& a = moved_[std::size_t(r.a)];
+    Vec3<double> v = a.velocity, spin = r.arm_a * a.spin;
     if (r.b >= 0) {
-      const Body& b = (*bodies_)[r.b];
-      v -= b.velocity + part * change[r.b].velocity;
-      spin += r.arm_b * (b.spin + part * change[r.b].spin);
+      const Moved& b = moved_[std::size_t(r.b)];
+      v -= b.velocity;
+      spin += r.arm_b * b.spin;
     } else {
       v -= r.point_velocity;
     }
@@ -155,6 +172,7 @@ class Motion {
 
   const std::vector<Body>* bodies_ = nullptr;
   std::vector<Vec3<double>> acceleration_;  ///< m/s^2, by all forces but the normal ones; see accelerate()
+  std::vector<Moved> moved_;                ///< see move()
   double interval_ = 0.0;
 };
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -54,25 +54,85 @@ struct Totals {
 
 class Records {
  public:
-  /// Memory before and after the step, in the order of the rows.
-  std::vector<Memory> before, now;
+  /// Memory after the step, in the order of the rows.
+  std::vector<Memory> now;
   Totals totals_before, totals;
   /// Bodies (ids) of contacts that were active and are not among the candidates any more.
   std::vector<std::int64_t> lost_bodies;
 
-  /// Begins a step with these rows. `again`: the last step once more, from the same state.
-  void begin(const std::vector<Row>& rows, bool again) {
-    again_ = again;
-    lost_bodies.clear();
-    if (again) totals = totals_before;
-    else {
-      totals_before = totals;
-      before.swap(now);
+  /// Memory before the step of row i.
+  const Memory& before(std::size_t i) const { return from_[i] >= 0 ? prior_[std::size_t(from_[i])] : blank_; }
+  /// The same, to be changed.
+  Memory& remember(std::size_t i) {
+    if (from_[i] < 0) {
+      from_[i] = int(prior_.size());
+      prior_.emplace_back();
     }
-    bool same = rows.size() == keys_.size();
-    for (std::size_t i = 0; same && i < rows.size(); ++i) same = keys_[i] == Key(rows[i].key_a, rows[i].key_b);
-    if (!same) match(rows);
-    now.resize(rows.size());
+    return prior_[std::size_t(from_[i])];
+  }
+
+  /// Begins a step. `again`: the last step once more, from the same state.
+  void begin(bool again) {
+    again_ = again;
+    cursor_ = 0;
+    if (again) {
+      totals = totals_before;
+      now.clear();
+      for (std::size_t i = 0; i < keys_.size(); ++i) now.push_back(before(i));
+      prior_.swap(now);
+      prior_keys_ = keys_;
+      return;
+    }
+    totals_before = totals;
+    prior_.swap(now);
+    prior_keys_.swap(keys_);
+  }
+
+  /// Where something is remembered of a contact, or -1; fast while keys ascend from call to call.
+  int recall(const Key& key) {
+    const std::size_t n = prior_keys_.size();
+    if (cursor_ > 0 && !(prior_keys_[cursor_ - 1] < key)) cursor_ = 0;
+    for (int step = 0; cursor_ < n && prior_keys_[cursor_] < key; ++cursor_)
+      if (++step > 8) {
+        const auto from = prior_keys_.begin() + std::ptrdiff_t(cursor_);
+        cursor_ = std::size_t(std::lower_bound(from, prior_keys_.end(), key) - prior_keys_.begin());
+        break;
+      }
+    return cursor_ < n && prior_keys_[cursor_] == key && !prior_[cursor_].idle() ? int(cursor_) : -1;
+  }
+
+  /// The rows of the step, with what `recall` said about each.
+  void take(const std::vector<Sorted>& sorted, const std::vector<Row>& rows) {
+    lost_bodies.clear();
+    keys_.resize(sorted.size());
+    from_.resize(sorted.size());
+    now.resize(sorted.size());
+    left_.assign(prior_keys_.size(), 1);
+    for (std::size_t i = 0; i < sorted.size(); ++i) {
+      keys_[i] = sorted[i].key;
+      from_[i] = sorted[i].memory;
+      if (from_[i] >= 0) left_[std::size_t(from_[i])] = 0;
+    }
+    orphans_.clear();
+    for (std::size_t o = 0; o < left_.size(); ++o)
+      if (left_[o] && prior_[o].elastic != 0.0) orphans_.push_back(o);
+    if (orphans_.empty()) return;
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      if (rows[i].b < 0 && from_[i] < 0) inherit(i, rows[i]);
+    for (const std::size_t o : orphans_) {
+      if (!left_[o] || !prior_[o].active) continue;
+      lost_bodies.push_back(prior_keys_[o].first);
+      if (prior_keys_[o].second >= 0) lost_bodies.push_back(prior_keys_[o].second);
+    }
+  }
+
+  /// Books what memories held that no row has taken.
+  void book_lost() {
+    for (const std::size_t o : orphans_) {
+      if (!left_[o]) continue;
+      totals.dissipated += prior_[o].elastic;
+      if (prior_[o].active) finish(prior_keys_[o].first, prior_keys_[o].second, prior_[o]);
+    }
   }
 
   /// The impact of `memory` is over. What the springs still hold then (contact damping lets go before they are straight, friction) is
@@ -100,7 +160,7 @@ class Records {
     for (std::size_t i = 0; i < keys_.size(); ++i) {
       out.push_back(double(keys_[i].first));
       out.push_back(double(keys_[i].second));
-      Memory m = before[i], n = now[i];
+      Memory m = before(i), n = now[i];
       m.each(put);
       n.each(put);
     }
@@ -124,7 +184,9 @@ class Records {
     totals_before.each(get);
     totals.each(get);
     keys_.assign(n, Key());
-    before.assign(n, Memory());
+    prior_.assign(n, Memory());
+    from_.resize(n);
+    std::iota(from_.begin(), from_.end(), 0);
     now.assign(n, Memory());
     finished_.assign(f, Impact());
     for (std::size_t i = 0; i < n; ++i) {
@@ -132,15 +194,13 @@ class Records {
       get(a);
       get(b);
       keys_[i] = Key(std::int64_t(a), std::int64_t(b));
-      before[i].each(get);
+      prior_[i].each(get);
       now[i].each(get);
     }
     for (Impact& i : finished_) each(i, get);
   }
 
  private:
-  using Key = std::pair<std::int64_t, std::int64_t>;
-
   template <class Visit>
   static void each(Impact& f, Visit visit) {
     double a = double(f.a), b = double(f.b);
@@ -153,59 +213,34 @@ class Records {
       visit(*p);
   }
 
-  /// Carries the memory over to a new list of contacts; both lists are sorted by their keys.
-  void match(const std::vector<Row>& rows) {
-    scratch_.assign(rows.size(), Memory());
-    orphans_.clear();
-    fresh_.clear();
-    std::size_t k = 0;
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      const Key key(rows[i].key_a, rows[i].key_b);
-      while (k < keys_.size() && keys_[k] < key) orphans_.push_back(k++);
-      if (k < keys_.size() && keys_[k] == key) scratch_[i] = before[k++];
-      else if (rows[i].b < 0) fresh_.push_back(i);
-    }
-    while (k < keys_.size()) orphans_.push_back(k++);
-    for (const std::size_t i : fresh_) inherit(rows[i], scratch_[i]);
-    for (const std::size_t o : orphans_) {
-      if (o == taken || before[o].elastic == 0.0) continue;
-      const Memory& m = before[o];
-      totals.dissipated += m.elastic;
-      if (!m.active) continue;
-      finish(keys_[o].first, keys_[o].second, m);
-      lost_bodies.push_back(keys_[o].first);
-      if (keys_[o].second >= 0) lost_bodies.push_back(keys_[o].second);
-    }
-    keys_.resize(rows.size());
-    for (std::size_t i = 0; i < rows.size(); ++i) keys_[i] = Key(rows[i].key_a, rows[i].key_b);
-    before.swap(scratch_);
-  }
-
   /// A body that rolls from one feature of a wall to the next keeps its contact: the new one takes the memory of the one that has gone
   /// and points nearly the same way.
-  void inherit(const Row& row, Memory& memory) {
-    std::size_t best = taken;
+  void inherit(std::size_t i, const Row& row) {
+    int best = -1;
     double closest = 0.9;
-    for (std::size_t& o : orphans_) {
-      if (o == taken || keys_[o].first != row.key_a || keys_[o].second >= 0 || before[o].elastic == 0.0) continue;
-      if (wall_number(keys_[o].second) != wall_number(row.key_b)) continue;
-      const double along = dot(before[o].normal, row.normal);
+    for (const std::size_t o : orphans_) {
+      const Key& key = prior_keys_[o];
+      if (!left_[o] || key.first != row.key_a || key.second >= 0 || wall_number(key.second) != wall_number(row.key_b)) continue;
+      const double along = dot(prior_[o].normal, row.normal);
       if (along > closest) {
         closest = along;
-        best = std::size_t(&o - orphans_.data());
+        best = int(o);
       }
     }
-    if (best == taken) return;
-    memory = before[orphans_[best]];
-    orphans_[best] = taken;
+    if (best < 0) return;
+    from_[i] = best;
+    left_[std::size_t(best)] = 0;
   }
 
-  static constexpr std::size_t taken = std::numeric_limits<std::size_t>::max();
   bool again_ = false;
-  std::vector<Key> keys_;
-  std::vector<Memory> scratch_;
-  std::vector<std::size_t> orphans_, fresh_;
+  std::vector<Key> keys_, prior_keys_;  ///< of the rows of the step, and of the one before
+  std::vector<Memory> prior_;           ///< memory before the step; see from_
+  std::vector<int> from_;               ///< of each row its place there, -1: nothing is remembered
+  std::size_t cursor_ = 0;              ///< see recall()
+  std::vector<char> left_;              ///< memories that no row has taken
+  std::vector<std::size_t> orphans_;
   std::vector<Impact> finished_;
+  Memory blank_;
 };
 
 }  // namespace impact

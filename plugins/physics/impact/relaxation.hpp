@@ -22,15 +22,15 @@ namespace impact {
 /// w = q + A z with A = diag(compliance) + scale G^T M'^-1 G; see system.hpp.
 class Relaxation {
  public:
-  /// The rows of a step. bodies: with 1/m' as `inverse`; scale: h tau^2 (s^2); compliance: m/N, of each row.
-  void prepare(const std::vector<Row>& rows, const std::vector<BodyResponse>& bodies, double scale, const std::vector<double>& compliance) {
+  /// The rows of a step, which must outlive its solves. bodies: with 1/m' as `inverse`; scale: h tau^2 (s^2).
+  void prepare(const std::vector<Row>& rows, const std::vector<BodyResponse>& bodies, double scale) {
     planar_ = find_plane(rows);
-    if (planar_) flat_.prepare(rows, bodies, scale, compliance, axes_);
-    else spatial_.prepare(rows, bodies, scale, compliance, axes_);
+    if (planar_) flat_.prepare(rows, bodies, scale, axes_);
+    else spatial_.prepare(rows, bodies, scale, axes_);
   }
 
   /// Solves from the z given; leaves z and w, and in `certificate` what LcpCertificate::worst is, from scales that are no larger than those
-  /// defined there. False: not converged, z and w are of no use.
+  /// defined there. False: not converged.
   bool solve(const Eigen::VectorXd& q, double tolerance, Eigen::VectorXd& z, Eigen::VectorXd& w, double& certificate) {
     const double share = lcp::rounding_share(tolerance);
     return planar_ ? flat_.solve(q, share, z, w, certificate) : spatial_.solve(q, share, z, w, certificate);
@@ -43,150 +43,198 @@ class Relaxation {
   template <int Width>
   class Lines {
    public:
-    void prepare(const std::vector<Row>& rows, const std::vector<BodyResponse>& bodies, double scale, const std::vector<double>& compliance,
-                 const Component* axes) {
-      lines_.resize(rows.size());
+    void prepare(const std::vector<Row>& rows, const std::vector<BodyResponse>& bodies, double scale, const Component* axes) {
+      rows_ = &rows;
+      bodies_ = &bodies;
+      scale_ = scale;
+      axes_ = axes;
+      built_ = false;
       shift_.resize(bodies.size() + 1);  // walls are the last, which never moves
-      for (std::size_t i = 0; i < rows.size(); ++i) {
-        const Row& r = rows[i];
-        Line& l = lines_[i];
-        l.a = r.a;
-        l.b = r.b >= 0 ? r.b : int(bodies.size());
-        const double of_a = scale * bodies[std::size_t(r.a)].inverse, of_b = r.b >= 0 ? scale * bodies[std::size_t(r.b)].inverse : 0.0;
-        Vector n = Vector::Zero();
-        for (int k = 0; k < std::min(Width, 3); ++k) n[k] = r.normal.*axes[k];
-        l.normal = n;
-        l.on_a = of_a * n;
-        l.on_b = of_b * n;
-        l.compliance = compliance[i];
-        l.diagonal = compliance[i] + of_a + of_b;
-        l.inverse = 1.0 / l.diagonal;
-        l.root = std::sqrt(l.diagonal);
-      }
     }
 
     bool solve(const Eigen::VectorXd& q, double share, Eigen::VectorXd& z, Eigen::VectorXd& w, double& certificate) {
-      near_.clear();
+      if (!built_) build(q, z);
       double largest = 0.0;
-      for (std::size_t i = 0; i < lines_.size(); ++i) {
-        const double x = q[Eigen::Index(i)];
-        if (x < 0.0) largest = std::max(largest, x * x * lines_[i].inverse);
-        if (x < 0.0 || z[Eigen::Index(i)] > 0.0) near_.push_back(int(i));
+      for (Line& l : lines_) {
+        l.q = q[l.row];
+        const double push = std::max(-l.q, 0.0);
+        largest = std::max(largest, push * push * l.inverse);
       }
       floor_ = std::numeric_limits<double>::epsilon() / share * std::sqrt(largest);
-      interleave();
-      gather(z);
+      for (std::size_t i = 0; i < near_; ++i) start(i, z[lines_[i].row]);
+      gather();
       double last = std::numeric_limits<double>::infinity();
-      for (int sweep = 1, fresh = 1; sweep <= most_sweeps; ++sweep, ++fresh) {
-        const double step = relax(q, z);
+      for (int sweep = 0; sweep < blind_sweeps; ++sweep) {
+        relax<false>();
+        if (sweep == 1) widen();
+      }
+      for (int sweep = blind_sweeps + 1, fresh = blind_sweeps; sweep <= most_sweeps; ++sweep, ++fresh) {
+        const double step = relax<true>();
         if (fresh > 3 && step > slowest * last) return false;
         last = step;
-        if (sweep == 2 && widen(q)) fresh = 0;
         if (step > 30.0 * share) continue;  // the residual is what the next sweep's steps would be
-        gather(z);
-        if (judge(q, share, z, w, certificate)) return true;
-        if (widen(q)) fresh = 0;
+        gather();
+        if (widen()) fresh = 0;
+        else if (judge(share, w, certificate)) {
+          for (std::size_t i = 0; i < near_; ++i) z[lines_[i].row] = visits_[i].z;
+          for (std::size_t i = near_; i < lines_.size(); ++i) z[lines_[i].row] = 0.0;
+          return true;
+        }
       }
       return false;
     }
 
    private:
     using Vector = Eigen::Matrix<double, Width, 1>;
-    static constexpr int most_sweeps = 30;
+    static constexpr int most_sweeps = 30, blind_sweeps = 4;  ///< none has been seen to do with so few
     static constexpr double slowest = 0.3;  ///< of the size of a sweep's steps over that of the last one
+    static constexpr std::size_t parts = 8;
 
+    /// A row of the problem.
     struct Line {
-      Vector normal, on_a, on_b;  ///< unit; response of the bodies to a unit force, m/N
-      double compliance, diagonal, inverse, root;
-      int a, b;
+      Vector normal;      ///< unit
+      double of_a, of_b;  ///< response of the bodies to a unit force, m/N
+      double compliance, inverse, q;
+      int a, b, row;
     };
 
-    /// Contacts that follow each other in the list share bodies, and each would wait for the last one: four parts of the list take turns.
-    void interleave() {
-      const std::size_t n = near_.size(), part = (n + 3) / 4;
+    /// What a sweep reads of a row and changes, in the order of visiting: the step leads to z = keep z - q - pull (shift_a - shift_b).
+    struct Visit {
+      Vector pull, on_a, on_b;  ///< the normal over the row's diagonal; response of the bodies, m/N
+      double keep, q, z;        ///< share of the bodies in the diagonal; q over it, N; N
+      double base;              ///< N, what steps are compared with, but for z
+      Vector *a, *b;            ///< shifts of the bodies
+    };
+
+    /// Rows that may carry a force come first. Contacts that follow each other share bodies, and each would wait for the last one: eight
+    /// parts of the list take turns.
+    void build(const Eigen::VectorXd& q, const Eigen::VectorXd& z) {
+      built_ = true;
       order_.clear();
+      far_.clear();
+      for (int i = 0; i < int(rows_->size()); ++i) (q[i] < 0.0 || z[i] > 0.0 ? order_ : far_).push_back(i);
+      near_ = order_.size();
+      lines_.resize(rows_->size());
+      visits_.resize(rows_->size());
+      const std::size_t part = (near_ + parts - 1) / parts;
+      std::size_t at = 0;
       for (std::size_t i = 0; i < part; ++i)
-        for (std::size_t k = i; k < n; k += part) order_.push_back(near_[k]);
+        for (std::size_t k = i; k < near_; k += part) set(at++, order_[k]);
+      for (const int k : far_) set(at++, k);
+    }
+
+    void set(std::size_t i, int row) {
+      const Row& r = (*rows_)[std::size_t(row)];
+      Line& l = lines_[i];
+      l.row = row;
+      l.a = r.a;
+      l.b = r.b >= 0 ? r.b : int(bodies_->size());
+      l.of_a = scale_ * (*bodies_)[std::size_t(r.a)].inverse;
+      l.of_b = r.b >= 0 ? scale_ * (*bodies_)[std::size_t(r.b)].inverse : 0.0;
+      l.normal.setZero();
+      for (int c = 0; c < std::min(Width, 3); ++c) l.normal[c] = r.normal.*axes_[c];
+      l.compliance = r.compliance;
+      l.inverse = 1.0 / (l.compliance + l.of_a + l.of_b);
+      if (i < near_) place(i);
+    }
+
+    /// The constant part of a visit.
+    void place(std::size_t i) {
+      const Line& l = lines_[i];
+      Visit& v = visits_[i];
+      v.pull = l.inverse * l.normal;
+      v.on_a = l.of_a * l.normal;
+      v.on_b = l.of_b * l.normal;
+      v.keep = (l.of_a + l.of_b) * l.inverse;
+      v.a = &shift_[std::size_t(l.a)];
+      v.b = &shift_[std::size_t(l.b)];
+    }
+
+    /// What this solve makes of it; z: where it begins.
+    void start(std::size_t i, double z) {
+      const Line& l = lines_[i];
+      Visit& v = visits_[i];
+      v.q = l.q * l.inverse;
+      v.z = z;
+      v.base = std::fabs(v.q) + floor_ * std::sqrt(l.inverse);
     }
 
     /// Positions of the bodies after the step under the forces z alone.
-    void gather(const Eigen::VectorXd& z) {
+    void gather() {
       for (Vector& s : shift_) s.setZero();
-      for (const int i : near_) {
-        const Line& l = lines_[std::size_t(i)];
-        const double force = z[i];
-        shift_[std::size_t(l.a)] += force * l.on_a;
-        shift_[std::size_t(l.b)] -= force * l.on_b;
+      for (std::size_t i = 0; i < near_; ++i) {
+        const Visit& v = visits_[i];
+        *v.a += v.z * v.on_a;
+        *v.b -= v.z * v.on_b;
       }
     }
 
     double gap(const Line& l) const { return l.normal.dot(shift_[std::size_t(l.a)] - shift_[std::size_t(l.b)]); }
 
-    /// One sweep; the largest step, in units of the row's own scale.
-    double relax(const Eigen::VectorXd& q, Eigen::VectorXd& z) {
+    /// One sweep; the largest step, in units of the row's own scale, where it is measured.
+    template <bool Measured>
+    double relax() {
       double most = 0.0;
-      for (const int i : order_) {
-        const Line& l = lines_[std::size_t(i)];
-        const double old = z[i], next = std::max(old - (q[i] + l.compliance * old + gap(l)) * l.inverse, 0.0), step = next - old;
-        shift_[std::size_t(l.a)] += step * l.on_a;
-        shift_[std::size_t(l.b)] -= step * l.on_b;
-        z[i] = next;
-        const double size = std::fabs(step) * l.diagonal, scale = std::fabs(q[i]) + l.diagonal * next + floor_ * l.root;
-        if (size > most * scale) most = size / scale;
+      Visit* const end = visits_.data() + near_;
+      for (Visit* v = visits_.data(); v != end; ++v) {
+        const double old = v->z, free = v->keep * old - (v->q + v->pull.dot(*v->a - *v->b)), next = free > 0.0 ? free : 0.0;
+        const double step = next - old;
+        *v->a += step * v->on_a;
+        *v->b -= step * v->on_b;
+        v->z = next;
+        if (Measured) {
+          const double size = std::fabs(step), scale = v->base + next;
+          if (size > most * scale) most = size / scale;
+        }
       }
       return most;
     }
 
-    /// Rows that are pushed together by others join the list; false when there are none.
-    bool widen(const Eigen::VectorXd& q) {
-      const std::size_t before = near_.size();
-      std::size_t next = 0;
-      for (std::size_t i = 0; i < lines_.size(); ++i) {
-        if (next < before && near_[next] == int(i)) ++next;
-        else if (q[Eigen::Index(i)] + gap(lines_[i]) < 0.0) near_.push_back(int(i));
+    /// Rows that are pushed together by others join the sweeps; false when there are none.
+    bool widen() {
+      const std::size_t before = near_;
+      for (std::size_t i = near_; i < lines_.size(); ++i) {
+        if (!(lines_[i].q + gap(lines_[i]) < 0.0)) continue;
+        std::swap(lines_[i], lines_[near_]);
+        place(near_);
+        start(near_++, 0.0);
       }
-      if (near_.size() == before) return false;
-      std::inplace_merge(near_.begin(), near_.begin() + std::ptrdiff_t(before), near_.end());
-      interleave();
+      return near_ > before;
+    }
+
+    /// w, and whether all conditions hold to rounding; those of the rows that no sweep visits do.
+    bool judge(double share, Eigen::VectorXd& w, double& certificate) {
+      double largest = 0.0, low = 0.0, product = 0.0, worst = 0.0;
+      for (std::size_t i = 0; i < near_; ++i) {
+        const Line& l = lines_[i];
+        const double z = visits_[i].z, whole = gap(l), own = (l.of_a + l.of_b) * z, give = l.compliance * z;
+        const double s = std::fabs(l.q) + own + give + std::fabs(whole - own);
+        const double opening = l.q + give + whole, below = std::max(-opening, 0.0);
+        const double beyond = std::max((z > 0.0 ? std::fabs(opening) : below) - share * s, 0.0);
+        largest = std::max(largest, s * s * l.inverse);
+        worst = std::max(worst, beyond * beyond * l.inverse);
+        low = std::max(low, below * below * l.inverse);
+        product += z * opening;
+        w[l.row] = z > 0.0 ? 0.0 : std::max(opening, 0.0);
+      }
+      constexpr double everywhere = std::numeric_limits<double>::epsilon();
+      if (!std::isfinite(product) || worst > everywhere * everywhere * largest) return false;
+      for (std::size_t i = near_; i < lines_.size(); ++i) w[lines_[i].row] = lines_[i].q + gap(lines_[i]);
+      certificate = largest > 0.0 ? std::max(std::sqrt(low / largest), std::fabs(product) / largest) : 0.0;
       return true;
     }
 
-    /// w, and whether all conditions hold to rounding.
-    bool judge(const Eigen::VectorXd& q, double share, const Eigen::VectorXd& z, Eigen::VectorXd& w, double& certificate) {
-      const std::size_t n = lines_.size();
-      scale_.resize(n);
-      double largest = 0.0, low = 0.0, product = 0.0;
-      for (std::size_t i = 0; i < n; ++i) {
-        const Eigen::Index k = Eigen::Index(i);
-        const Line& l = lines_[i];
-        const double whole = gap(l), others = whole - (l.diagonal - l.compliance) * z[k];
-        const double s = std::fabs(q[k]) + l.diagonal * z[k] + std::fabs(others);
-        w[k] = q[k] + l.compliance * z[k] + whole;
-        scale_[i] = s;
-        largest = std::max(largest, s * s * l.inverse);
-        if (w[k] < 0.0) low = std::max(low, w[k] * w[k] * l.inverse);
-        product += z[k] * w[k];
-      }
-      bool good = true;
-      const double everywhere = std::numeric_limits<double>::epsilon() * std::sqrt(largest);
-      for (std::size_t i = 0; i < n; ++i) {
-        const Eigen::Index k = Eigen::Index(i);
-        const double limit = share * scale_[i] + everywhere * lines_[i].root;
-        if (!(z[k] > 0.0 ? std::fabs(w[k]) <= limit : w[k] >= -limit)) {
-          good = false;
-        } else if (z[k] > 0.0 || w[k] < 0.0) {
-          w[k] = 0.0;
-        }
-      }
-      if (good) certificate = largest > 0.0 ? std::max(std::sqrt(low / largest), std::fabs(product) / largest) : 0.0;
-      return good;
-    }
-
+    const std::vector<Row>* rows_ = nullptr;
+    const std::vector<BodyResponse>* bodies_ = nullptr;
+    const Component* axes_ = nullptr;
+    double scale_ = 0.0;
+    bool built_ = false;    ///< in this step
     std::vector<Line, Eigen::aligned_allocator<Line>> lines_;
+    std::vector<Visit, Eigen::aligned_allocator<Visit>> visits_;
     std::vector<Vector, Eigen::aligned_allocator<Vector>> shift_;
-    std::vector<int> near_, order_;  ///< rows that may carry a force, as they come and as they are visited
-    std::vector<double> scale_;
-    double floor_ = 0.0;  ///< of a row's scale, over its root: steps below the last digit of the largest row are none
+    std::vector<int> order_, far_;
+    std::size_t near_ = 0;  ///< so many lines, the first, may carry a force
+    double floor_ = 0.0;    ///< of a row's scale, over its root: steps below the last digit of the largest row are none
   };
 
   /// Whether all normals lie in one coordinate plane, as those of logs in cross-section; axes_ begins with its axes then.

@@ -27,12 +27,14 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "assembly.hpp"
+#include "candidates.hpp"
 #include "friction.hpp"
 #include "motion.hpp"
 #include "records.hpp"
@@ -75,8 +77,10 @@ class System {
     weight_ = again ? weight_ : kick;
     h_ = theta * kick + (1.0 - theta) * (1.0 - kick);
     g_ = theta * kick - (1.0 - theta) * (1.0 - kick);
-    assembly_.update(bodies, contacts, settings_);
-    records_.begin(assembly_.rows(), again);
+    records_.begin(again);
+    candidates_.take(contacts, [&](const Key& key) { return records_.recall(key); });
+    assembly_.update(bodies, contacts, candidates_.sorted(), settings_);
+    records_.take(candidates_.sorted(), assembly_.rows());
     const bool first = !stepped_;
     stepped_ = true;
     time_ = time;
@@ -85,10 +89,11 @@ class System {
     if (first) deform_overlaps();
     set_rows();
     solve();
+    motion_.move();
     if (friction_acts())
-      for (int sweep = 0; sweep < settings_.friction_sweeps; ++sweep) {
-        if (!sweep_friction()) break;
+      for (int sweep = 0; sweep < settings_.friction_sweeps && sweep_friction(); ++sweep) {
         solve();
+        motion_.move();
       }
     finish(bodies, force, torque);
     return report_;
@@ -141,7 +146,7 @@ class System {
     const auto damp = [&](int b) { motion_.damp(b, settings_.materials[bodies[b].material].damping, response); };
     const std::vector<Row>& rows = assembly_.rows();
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      if (!records_.before[i].active) continue;
+      if (!records_.before(i).active) continue;
       damp(rows[i].a);
       if (rows[i].b >= 0) damp(rows[i].b);
     }
@@ -156,28 +161,29 @@ class System {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const double overlap = -rows[i].gap;
       if (!(overlap > 0.0)) continue;
-      records_.before[i].deformation = overlap;
-      records_.before[i].elastic = 0.5 * rows[i].stiffness * overlap * overlap;
+      records_.remember(i).deformation = overlap;
+      records_.remember(i).elastic = 0.5 * rows[i].stiffness * overlap * overlap;
     }
   }
 
   void set_rows() {
     const std::vector<Row>& rows = assembly_.rows();
     const std::size_t n = rows.size();
-    compliance_.resize(n);
     active_.resize(n);
     start_.resize(n);
     tangential_.resize(n);
     offset_.resize(Eigen::Index(n));
     q_.resize(Eigen::Index(n));
+    normal_.resize(Eigen::Index(n));
+    opening_.resize(Eigen::Index(n));
     for (std::size_t i = 0; i < n; ++i) {
       const Row& r = rows[i];
-      const Memory& before = records_.before[i];
-      const double viscous = r.law->contact_damping / settings_.dt;
-      compliance_[i] = 1.0 / (r.stiffness + viscous);
+      const Memory& before = records_.before(i);
       offset_[Eigen::Index(i)] =
-          r.gap + (2.0 * settings_.theta - 1.0) * settings_.dt * motion_.gap_rate(r) + viscous * compliance_[i] * before.deformation;
+          r.gap + (2.0 * settings_.theta - 1.0) * settings_.dt * motion_.gap_rate(r) + r.viscous * r.compliance * before.deformation;
       active_[i] = before.active;
+      // Where to begin: the contact force as if the spring were at rest.
+      normal_[Eigen::Index(i)] = before.active ? r.stiffness * before.deformation : 0.0;
       start_[i] = {};
       if (before.active && r.law->friction.static_friction > 0.0) {
         start_[i] = -tangential_stiffness(r) * rotate_to_plane(before.friction.displacement, r.normal, motion_.twist(r, settings_.dt));
@@ -187,9 +193,7 @@ class System {
     }
     assembled_ = false;
     relaxes_ = settings_.lcp.method == LcpMethod::automatic && n > few;
-    if (relaxes_) relaxation_.prepare(rows, motion_.response, h_ * settings_.dt * settings_.dt, compliance_);
-    normal_.setZero(Eigen::Index(n));
-    opening_.resize(Eigen::Index(n));
+    if (relaxes_) relaxation_.prepare(rows, motion_.response, h_ * settings_.dt * settings_.dt);
   }
 
   static double tangential_stiffness(const Row& r) { return r.law->tangential_stiffness_ratio * r.stiffness; }
@@ -207,8 +211,10 @@ class System {
     if (!relaxes_) solve_exactly();
     for (std::size_t i = 0; i < rows.size(); ++i) {
       double& force = normal_[Eigen::Index(i)];
-      active_[i] = force > 0.0;
-      if (active_[i]) motion_.add_normal(rows[i], force);
+      const bool acts = force > 0.0;
+      report_.pivots += relaxes_ && acts != (active_[i] != 0);
+      active_[i] = acts;
+      if (acts) motion_.add_normal(rows[i], force);
       else force = 0.0;
     }
   }
@@ -218,12 +224,11 @@ class System {
     double certificate = 0.0;
     if (!relaxation_.solve(q_, settings_.lcp.tolerance, normal_, opening_, certificate)) return false;
     report_.certificate = std::max(report_.certificate, certificate);
-    for (std::size_t i = 0; i < active_.size(); ++i) report_.pivots += (normal_[Eigen::Index(i)] > 0.0) != (active_[i] != 0);
     return true;
   }
 
   void solve_exactly() {
-    if (!assembled_) assembly_.assemble(motion_.response, h_ * settings_.dt * settings_.dt, compliance_);
+    if (!assembled_) assembly_.assemble(motion_.response, h_ * settings_.dt * settings_.dt);
     assembled_ = true;
     LcpOptions options = settings_.lcp;
     options.check_input = false;  // symmetric by construction, positive definite for finite stiffness
@@ -238,7 +243,7 @@ class System {
   bool friction_acts() const {
     const std::vector<Row>& rows = assembly_.rows();
     for (std::size_t i = 0; i < rows.size(); ++i)
-      if ((active_[i] || records_.before[i].active) && rows[i].law->friction.static_friction > 0.0) return true;
+      if ((active_[i] || records_.before(i).active) && rows[i].law->friction.static_friction > 0.0) return true;
     return false;
   }
 
@@ -248,24 +253,27 @@ class System {
     trial_.resize(rows.size());
     friction_.resize(rows.size());
     bool changed = false;
-    motion_.move();
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const Row& r = rows[i];
-      trial_[i] = {};
-      friction_[i] = {};
+      FrictionState<double>& state = friction_[i];
+      Vec3<double> force{};
+      state = {};
       if (active_[i] && r.law->friction.static_friction > 0.0) {
-        friction_[i] = records_.before[i].friction;
-        Vec3<double> velocity = motion_.surface_velocity(r, 1.0);
+        state.slip = records_.before(i).friction.slip;
+        Vec3<double> velocity = motion_.surface_velocity(r);
         velocity -= dot(velocity, r.normal) * r.normal;
-        trial_[i] = friction_sweep(r, normal_[Eigen::Index(i)], motion_.tangential_response(r), velocity, tangential_[i], start_[i],
-                                   settings_.dt, kick_, friction_[i]);
+        force = friction_sweep(r, normal_[Eigen::Index(i)], motion_.tangential_response(r), velocity, tangential_[i], start_[i],
+                               settings_.dt, kick_, state);
       }
-      changed = changed || trial_[i].x != tangential_[i].x || trial_[i].y != tangential_[i].y || trial_[i].z != tangential_[i].z;
+      const Vec3<double>& last = tangential_[i];
+      changed = changed || force.x != last.x || force.y != last.y || force.z != last.z;
+      trial_[i] = force;
     }
     if (!changed) return false;
     tangential_.swap(trial_);
     motion_.clear_tangential();
-    for (std::size_t i = 0; i < rows.size(); ++i) motion_.add_tangential(rows[i], tangential_[i]);
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      if (active_[i]) motion_.add_tangential(rows[i], tangential_[i]);
     return true;
   }
 
@@ -275,10 +283,11 @@ class System {
     const double length = weight_ * settings_.dt;       // s, the stretch of time this step stands for
     const double middle = 1.0 - 0.5 * weight_ / kick_;  // where its mean velocity lies between v (0) and v' (1)
     Totals& totals = records_.totals;
-    motion_.move();
     report_.contacts = int(rows.size());
+    records_.book_lost();
+    motion_.go_back(middle);
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      const Memory& before = records_.before[i];
+      const Memory& before = records_.before(i);
       Memory& now = records_.now[i];
       if (!active_[i] && before.idle()) {
         if (!now.idle()) now = Memory();
@@ -291,14 +300,16 @@ class System {
       if (active_[i] && r.law->friction.static_friction > 0.0) now.friction = friction_[i];
       now.active = active_[i];
       now.normal = r.normal;
-      now.deformation = (n + r.law->contact_damping / settings_.dt * before.deformation) * compliance_[i];
+      now.deformation = (n + r.viscous * before.deformation) * r.compliance;
+      // Below the last digit of the gap, what is left of it acts on nothing any more.
+      if (!now.active && now.deformation < std::numeric_limits<double>::epsilon() * std::abs(r.gap)) now.deformation = 0.0;
       now.elastic = 0.5 * r.stiffness * now.deformation * now.deformation +
                     0.5 * tangential_stiffness(r) * dot(now.friction.displacement, now.friction.displacement);
       report_.elastic_energy += now.elastic;
 
       // What the bodies (and the wall) put into the contact and its springs do not hold is lost.
       const Vec3<double> on_a = n * r.normal + tangential_[i];
-      const double lost = -length * dot(on_a, motion_.surface_velocity(r, middle)) - (now.elastic - before.elastic);
+      const double lost = -length * dot(on_a, motion_.surface_velocity(r)) - (now.elastic - before.elastic);
       totals.dissipated += lost;
       if (now.active && !before.active) {
         totals.impacts_begun += 1.0;
@@ -348,6 +359,7 @@ class System {
   }
 
   Settings settings_;
+  Candidates candidates_;
   Assembly assembly_;
   Records records_;
   Motion motion_;
@@ -358,7 +370,6 @@ class System {
   bool stepped_ = false;
   bool relaxes_ = false, assembled_ = false;  ///< in this step
   std::vector<char> active_;
-  std::vector<double> compliance_;
   std::vector<Vec3<double>> start_, tangential_, trial_;
   Eigen::VectorXd offset_, q_, normal_, opening_;
   std::vector<FrictionState<double>> friction_;
