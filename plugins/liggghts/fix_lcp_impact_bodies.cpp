@@ -135,11 +135,8 @@ void FixLcpImpact::find_contacts() {
   contacts_.clear();
   if (bodies_.empty()) return;
   double wall_speed = 0.0;
-  for (std::size_t w = 0; w < mesh_.size(); ++w) {
-    wall_speed = std::max(wall_speed, mesh_[w].speed());
-    const ImpactWall &wall = options_.walls[w];
-    if (wall.shape == ImpactWall::cylinder) wall_speed = std::max(wall_speed, std::abs(wall.omega) * wall.radius);
-  }
+  // The surface of a cylinder that turns moves along itself, not towards anything.
+  for (const dembark_liggghts::ImpactMesh &mesh : mesh_) wall_speed = std::max(wall_speed, mesh.speed());
   const double reach = dembark::impact::default_reach(bodies_, update->dt, wall_speed);
 
   const bool periodic = domain->xperiodic || domain->yperiodic || domain->zperiodic;

@@ -59,7 +59,7 @@ void addShape(const Body& body, std::size_t place, const impact::Wall& common, c
 		if ((state.angVel - drum.omega * round->axis).norm() > 1e-9 * state.angVel.norm())
 			fail(where + ": body " + std::to_string(id) + " turns about another axis than its own; make angVel parallel to CylinderWall.axis");
 		shapes.drums.push_back(drum);
-		shapes.speed = std::max(shapes.speed, double(state.vel.norm()) + std::abs(drum.omega) * drum.radius);
+		shapes.speed = std::max(shapes.speed, double(state.vel.norm()));  // turning, its surface moves along itself
 	} else if (const auto* facet = dynamic_cast<const Facet*>(body.shape.get())) {
 		impact::Triangle triangle;
 		triangle.id = static_cast<std::int64_t>(place);

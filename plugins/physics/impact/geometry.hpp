@@ -20,7 +20,7 @@ namespace impact {
 
 /// A reach (m) that is safe for one step dt (s): twice the way that the two fastest bodies close in it, free and by the forces that are
 /// known, and never less than a hundredth of the smallest radius, so that the list of candidates seldom changes.
-/// `wall_speed` (m/s): the fastest wall surface.
+/// `wall_speed` (m/s): the fastest that a wall surface moves towards anything.
 inline double default_reach(const std::vector<Body>& bodies, double dt, double wall_speed = 0.0) {
   double speed2 = 0.0, acceleration2 = 0.0, radius = std::numeric_limits<double>::infinity();
   for (const Body& b : bodies) {
@@ -105,7 +105,8 @@ class PairFinder {
       const double touch = a.radius + b.radius, far = touch + reach, square = dot(separation, separation);
       if (square > far * far) continue;
       const double distance = std::sqrt(square);
-      Contact c;
+      contacts.emplace_back();
+      Contact& c = contacts.back();
       c.a = pair.first;
       c.b = pair.second;
       c.key_a = a.id;
@@ -113,7 +114,6 @@ class PairFinder {
       c.gap = distance - touch;
       // Coincident centres have no direction; any will do to drive them apart.
       c.normal = distance > 0.0 ? separation * (1.0 / distance) : Vec3<double>{0.0, 1.0, 0.0};
-      contacts.push_back(c);
     }
   }
 
@@ -130,7 +130,7 @@ class PairFinder {
   void build(const std::vector<Body>& bodies, double reach) {
     double largest = 0.0, sum = 0.0;
     for (const Body& b : bodies) largest = std::max(largest, b.radius), sum += b.radius;
-    margin_ = bodies.empty() ? 0.0 : 0.1 * sum / double(bodies.size()) + reach;
+    margin_ = bodies.empty() ? 0.0 : 0.3 * sum / double(bodies.size()) + reach;
     reach_ = 2.0 * reach;
     const double range = 2.0 * largest + reach_ + margin_;
     grid_.build(bodies, range);

@@ -118,7 +118,7 @@ class Scene {
   void find_contacts() {
     double speed = 0.0;
     for (const Plane& p : planes) speed = std::max(speed, norm(p.velocity));
-    for (const Drum& d : drums) speed = std::max(speed, norm(d.velocity) + std::abs(d.omega) * d.radius);
+    for (const Drum& d : drums) speed = std::max(speed, norm(d.velocity));  // turning, its surface moves along itself
     const double far = reach > 0.0 ? reach : default_reach(bodies_, system_.settings().dt, speed);
     pairs_.find(bodies_, far, contacts_);
     for (const Plane& p : planes) plane_contacts(bodies_, p, far, contacts_);
