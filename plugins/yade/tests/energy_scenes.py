@@ -144,16 +144,16 @@ def box_gate():
 
 
 def drum():
-    """Grains in a drum that turns and drifts along its axis, one of them held and carried around, one held along one axis only."""
+    """Grains in a drum that turns and drifts along its axis, one of them carried along, one lowered at a fixed speed."""
     shape = Body()
     shape.shape, shape.state.blockedDOFs = CylinderWall(radius=0.02, axis=(0, 1, 0)), "xyzXYZ"
     shape.state.vel, shape.state.angVel = Vector3(0, 0.02, 0), Vector3(0, 12, 0)
     sites = dembark.lattice((4, 3, 4), (0.0055,) * 3, (-0.011, -0.008, -0.011))
     grains = [grain((x, y, z), r) for x, y, z, r in dembark.column(sites, 40, 0.005, 0.1, 3, 0.0001)]
-    held, guided = grain((0, 0.0, -0.0174), R, (0.05, 0, 0), fixed=True), grain((0.0005, 0.0165, 0.001), R, (0, -0.2, 0))
-    guided.state.blockedDOFs = "yX"
+    held, guided = grain((0, 0.0, -0.0174), R, (0.05, 0, 0), fixed=True), grain((0.0005, 0, 0.0165), R, (0, 0, -0.2))
+    guided.state.blockedDOFs = "zX"
     account = scene_with([shape, held, guided, *grains], gravity=(0, 0, -9.81), step=1e-5)
-    O.run(3000, True)
+    O.run(6000, True)
     return account.energies()
 
 
@@ -272,7 +272,7 @@ def set_in_a_step():
     kick = PyRunner(iterPeriod=7, command="O.forces.addF(0, (0, 0, 1e-3))")
     account = scene_with([grain((0, 0, 0), R, (0, 0, 0.1)), grain((1, 0, 0))], between=[kick])
     O.engines = [*O.engines, PyRunner(iterPeriod=10, command="O.bodies[1].state.vel += Vector3(0.01, 0, 0)")]
-    O.run(95, True)
+    O.run(92, True)
     return account.energies()
 
 

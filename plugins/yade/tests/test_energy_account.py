@@ -229,11 +229,12 @@ def test_numbers_belong_to_the_last_step_that_is_over(found):
 
 
 def test_velocities_set_and_forces_added_behind_the_account_are_told(found):
-    """One grain gets 13 kicks of 1 mN for 2 us beside its 0.1 m/s, the other nine times 0.01 m/s."""
+    """One grain gets 13 kicks of 1 mN for 2 us beside its 0.1 m/s, the last in the last step; the other nine times 0.01 m/s."""
     energies = found["set_in_a_step"]
     assert_balanced(energies)
     kicked = 0.1 + 13 * 1e-3 * 2e-6 / mass(R)
     assert energies["imposed"] == pytest.approx(0.5 * mass(R) * (kicked**2 - 0.1**2 + 0.09**2), rel=1e-9)
+    assert energies["kinetic"] == pytest.approx(0.5 * mass(R) * (kicked**2 + 0.09**2), rel=1e-12)
     assert energies["other"] == 0.0
 
 
