@@ -212,18 +212,6 @@ def test_local_array_and_vector(tmp_path):
         assert found.last[:, 10:13] == pytest.approx(force + weight, abs=1e-6 * np.abs(force).max())
 
 
-def test_local_array_for_others_than_dumps(tmp_path):
-    """compute reduce finds the contacts of its step, in steps in which nothing is dumped."""
-    run(tmp_path / "dump", pile(steps=3000, extra=["dump here all local 1000 local.dump f_hits[7]", 'dump_modify here format "%.17g"']))
-    run(tmp_path / "sum", pile(steps=3000, extra=["compute sum all reduce sum f_hits[7]",
-                                                  "fix sums all ave/time 1000 1 1000 c_sum file sums.txt"]))
-    steps, rows = read_dump(tmp_path / "dump" / "local.dump")
-    sums = {int(step): total for step, total in np.loadtxt(tmp_path / "sum" / "sums.txt")}
-    wanted = {int(step): float(np.sum(found)) for step, found in zip(steps, rows, strict=True)}
-    assert len({round(total, 3) for total in wanted.values()}) > 2
-    assert {step: sums[step] for step in wanted} == pytest.approx(wanted, rel=1e-5)
-
-
 def test_beside_pair_forces(tmp_path):
     """A pair style for other atoms: excluded from each other's neighbour lists, the logs feel nothing of it."""
     pair = "\n".join([
