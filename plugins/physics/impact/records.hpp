@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <numeric>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -75,7 +76,9 @@ class Records {
   void begin(bool again) {
     again_ = again;
     cursor_ = 0;
+    kept_totals_ = {totals_before, totals};
     if (again) {
+      kept_ = now;
       totals = totals_before;
       now.clear();
       for (std::size_t i = 0; i < keys_.size(); ++i) now.push_back(before(i));
@@ -84,6 +87,19 @@ class Records {
       return;
     }
     totals_before = totals;
+    prior_.swap(now);
+    prior_keys_.swap(keys_);
+  }
+
+  /// Takes begin() back.
+  void cancel() {
+    std::tie(totals_before, totals) = kept_totals_;
+    if (again_) {
+      now.swap(kept_);
+      from_.resize(keys_.size());
+      std::iota(from_.begin(), from_.end(), 0);
+      return;
+    }
     prior_.swap(now);
     prior_keys_.swap(keys_);
   }
@@ -235,6 +251,8 @@ class Records {
   bool again_ = false;
   std::vector<Key> keys_, prior_keys_;  ///< of the rows of the step, and of the one before
   std::vector<Memory> prior_;           ///< memory before the step; see from_
+  std::vector<Memory> kept_;            ///< for cancel()
+  std::pair<Totals, Totals> kept_totals_;
   std::vector<int> from_;               ///< of each row its place there, -1: nothing is remembered
   std::size_t cursor_ = 0;              ///< see recall()
   std::vector<char> left_;              ///< memories that no row has taken

@@ -64,7 +64,7 @@ class System {
 
   /// Adds the forces (N) and torques (N m) of the contacts, body damping included, to `force` and `torque`, in the order of the bodies.
   /// time: s, of this step. kick: see above, in (0, 1]. A call with the time of the last one does that step again, from the state
-  /// before it: histories, totals and records count it once.
+  /// before it: histories, totals and records count it once. Wrong bodies or contacts leave the system as it was.
   const StepReport& step(const std::vector<Body>& bodies, const std::vector<Contact>& contacts, double time, double kick,
                          std::vector<Vec3<double>>& force, std::vector<Vec3<double>>& torque) {
     if (!(kick > 0.0 && kick <= 1.0)) throw std::invalid_argument("kick must be > 0 and <= 1, not " + std::to_string(kick));
@@ -73,19 +73,26 @@ class System {
                                   std::to_string(force.size()) + " and " + std::to_string(torque.size()));
     const double theta = settings_.theta;
     const bool again = stepped_ && time == time_;
+    motion_.begin(bodies, settings_.dt, kick);
+    records_.begin(again);
+    try {
+      candidates_.take(contacts, [&](const Key& key) { return records_.recall(key); });
+      assembly_.update(bodies, contacts, candidates_.sorted(), settings_);
+    } catch (...) {
+      records_.cancel();
+      assembly_.clear();
+      throw;
+    }
+    records_.take(candidates_.sorted(), assembly_.rows());
     kick_ = kick;
     weight_ = again ? weight_ : kick;
     h_ = theta * kick + (1.0 - theta) * (1.0 - kick);
     g_ = theta * kick - (1.0 - theta) * (1.0 - kick);
-    records_.begin(again);
-    candidates_.take(contacts, [&](const Key& key) { return records_.recall(key); });
-    assembly_.update(bodies, contacts, candidates_.sorted(), settings_);
-    records_.take(candidates_.sorted(), assembly_.rows());
     const bool first = !stepped_;
     stepped_ = true;
     time_ = time;
     report_ = StepReport();
-    set_bodies(bodies);
+    damp_bodies(bodies);
     if (first) deform_overlaps();
     set_rows();
     solve();
@@ -140,8 +147,7 @@ class System {
   /// So many contacts cost nothing to solve exactly.
   static constexpr std::size_t few = 12;
 
-  void set_bodies(const std::vector<Body>& bodies) {
-    motion_.begin(bodies, settings_.dt, kick_);
+  void damp_bodies(const std::vector<Body>& bodies) {
     const double response = g_ * settings_.dt;
     const auto damp = [&](int b) { motion_.damp(b, settings_.materials[bodies[b].material].damping, response); };
     const std::vector<Row>& rows = assembly_.rows();

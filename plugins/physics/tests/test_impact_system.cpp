@@ -180,6 +180,35 @@ TEST_CASE("contacts in any order and either way round") {
   CHECK_THROWS_WITH(one.step(bodies, contacts, 9, 1.0, f1, t1), Catch::Contains("the same two keys come twice"));
 }
 
+TEST_CASE("a step that is refused leaves no trace, be it a new one or one done again") {
+  const std::vector<Body> bodies = crowd(80);
+  std::vector<Contact> contacts;
+  find_pairs(bodies, 0.1, contacts);
+  for (Contact& c : contacts) c.gap -= 0.02;
+  std::vector<Contact> twice = contacts, skew = contacts;
+  twice.push_back(contacts[0]);
+  skew.back().normal.x += 0.5;
+  std::vector<Body> lost = bodies;
+  lost.back().position.x = NAN;
+  System one(three_materials(1e-4, 1.0, 0.4, 100.0, 50.0)), two(three_materials(1e-4, 1.0, 0.4, 100.0, 50.0));
+  std::vector<Vec3<double>> f1(bodies.size()), t1(bodies.size()), f2 = f1, t2 = f1;
+  const auto refuse = [&](double time) {
+    CHECK_THROWS_AS(one.step(bodies, twice, time, 0.5, f1, t1), std::invalid_argument);
+    CHECK_THROWS_AS(one.step(bodies, skew, time, 0.5, f1, t1), std::invalid_argument);
+    CHECK_THROWS_AS(one.step(lost, contacts, time, 0.5, f1, t1), std::invalid_argument);
+    CHECK(same_bits(one.state(), two.state()));
+  };
+  for (const double time : {0.0, 0.0, 1.0, 1.0, 2.0}) {
+    refuse(time);
+    one.step(bodies, contacts, time, 1.0, f1, t1);
+    two.step(bodies, contacts, time, 1.0, f2, t2);
+    refuse(time);
+  }
+  REQUIRE(one.report().active > 5);
+  CHECK(same_bits(one.state(), two.state()));
+  CHECK(std::memcmp(f1.data(), f2.data(), f1.size() * sizeof f1[0]) == 0);
+}
+
 TEST_CASE("saved and restored, it goes on bit for bit") {
   const Settings s = three_materials(1e-4, 0.7, 0.4, 100.0, 50.0);
   const std::vector<Body> bodies = crowd(80);

@@ -142,7 +142,7 @@ def test_state_goes_on_bit_for_bit(theta):
     one.run(2.0, 1e-4, every=1000)
     two.restore(one.state(), 1e-4)
     a, b = (s.run(0.2, 1e-4, every=10) for s in (one, two))
-    assert a.report["active"].max() > 5
+    assert a.report["active"].max() > 3
     np.testing.assert_array_equal(a.position, b.position)
     np.testing.assert_array_equal(a.dissipated_energy, b.dissipated_energy)
     assert a.impacts == b.impacts
