@@ -255,7 +255,8 @@ TEST_CASE("a step done again, with the velocity of the full step and half a kick
     std::vector<Vec3<double>> force(bodies.size()), torque(bodies.size());
     const StepReport again = scene.system().step(bodies, contacts, scene.time(), 0.5, force, torque);
     CHECK(again.impacts_begun == first.impacts_begun);
-    CHECK_THAT(again.impulse_sum, WithinRel(first.impulse_sum, 1e-12));
+    // Counted twice, it would be more by the impulse of a step.
+    CHECK_THAT(again.impulse_sum, WithinAbs(first.impulse_sum, 1e-6 * first.peak_force * 1e-4));
     CHECK_THAT(again.dissipated_energy, WithinRel(first.dissipated_energy, 1e-4));
     for (std::size_t i = 0; i < before.size(); ++i) {
       CHECK_THAT(scene.system().contacts()[i].normal_force, WithinAbs(before[i].normal_force, 2e-3 * first.peak_force));
