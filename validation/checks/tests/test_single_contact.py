@@ -9,7 +9,7 @@ import pytest
 from dembark.validation.checks import impact_exact, single_contact
 from dembark.validation.checks.impact_exact import exact, hertz_force, impacts, partial_slip, sliding_throughout, stepped
 from dembark.validation.checks.single_contact import Flight
-from hypothesis import given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 CASE = tomllib.loads((Path(__file__).resolve().parents[3] / "input_decks/single_contact/case.toml").read_text(encoding="utf-8"))
@@ -25,10 +25,12 @@ def patch(one, after):
 
 @settings(max_examples=5, deadline=None)
 @given(e=st.floats(0.1, 1.0), poisson=st.floats(0.0, 0.5), youngs=st.floats(6.0, 12.0), speed=st.floats(-2.0, 2.0))
+@example(e=1.0, poisson=0.0, youngs=7.0, speed=1.0)
 def test_head_on_the_restitution_coefficient_comes_out(e, poisson, youngs, speed):
     """Whatever the material: the damping is made for it."""
     p = parameters("test_2", restitution=e, poisson_ratio_a=poisson, youngs_modulus_a=10.0**youngs, speed=10.0**speed)
     one = impacts(p)
+    assume((one.peak_overlap < 0.5 * one.radius).all())  # a grain whose centre goes through the plate does not come back
     after = exact(one, 200)
     np.testing.assert_allclose(after.normal / one.closing, e, atol=2e-7)
     assert after.slide.tolist() == after.spin.tolist() == [0.0, 0.0]
