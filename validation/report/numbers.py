@@ -34,8 +34,10 @@ def with_interval(value: float | None, interval: Sequence[float] | None) -> str:
     return text if scale == 1.0 else f"({text})·10{str(power).translate(_SUPERSCRIPTS)}"
 
 
-def compact(value: float) -> str:
-    """A parameter without needless zeros."""
+def compact(value: float | str | None) -> str:
+    """A parameter without needless zeros; words as they are."""
+    if value is None or isinstance(value, str):
+        return value or "not set"
     text = f"{value:.6g}"
     if "e" in text:
         mantissa, power = text.split("e")

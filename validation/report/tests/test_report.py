@@ -190,7 +190,7 @@ def test_value_has_the_digits_of_its_interval(value, interval, text):
     assert numbers.with_interval(value, interval) == text
 
 
-@pytest.mark.parametrize(("value", "text"), [(1e300, "1·10³⁰⁰"), (0.005, "0.005"), (60, "60"), (5e6, "5·10⁶")])
+@pytest.mark.parametrize(("value", "text"), [(1e300, "1·10³⁰⁰"), (0.005, "0.005"), (60, "60"), (5e6, "5·10⁶"), ("exact", "exact"), (None, "not set")])
 def test_parameters_without_needless_zeros(value, text):
     assert numbers.compact(value) == text
 
