@@ -57,7 +57,10 @@ for *place, radius in dembark.column(sites, p.grain_count, p.grain_diameter, p.g
     O.bodies.append(body)
 
 # --- walls: `Wall` is unbounded, which a periodic collider cannot sort; boxes far larger than the cell do the same ---------
-far, thick = 1e3 * p.grain_diameter, p.grain_diameter
+far, thick = 1e6 * p.grain_diameter, p.grain_diameter
+# The collider looks for pairs along x, from a body's lower end to its upper one, within one period. So the base's ends must almost meet
+# there, with a gap that no grain fits into; or a grain just above the base in a restart, or later, would never be found.
+floor = 0.5 * (2001 * O.cell.size[0] - 0.5 * p.grain_diameter)
 
 
 def plane(centre: tuple[float, float, float], extents: tuple[float, float, float]) -> int:
@@ -67,7 +70,7 @@ def plane(centre: tuple[float, float, float], extents: tuple[float, float, float
 
 walls = {
     "back": plane((-thick, 0, 0), (thick, far, far)),
-    "base": plane((0, 0, -thick), (far, far, thick)),
+    "base": plane((0, 0, -thick), (floor, far, thick)),
     "gate": plane((p.column_width + thick, 0, 0), (thick, far, far)),
 }
 

@@ -77,8 +77,8 @@ for number, index in enumerate(sites, start=1):
     volume += 4 / 3 * math.pi * body.shape.radius**3
 
 # --- walls -------------------------------------------------------------------------------------------------------------
-# `Wall` is unbounded, which a periodic collider cannot sort; boxes far larger than the cell do the same.
-far, thick = 1e3 * p.grain_diameter, p.grain_diameter
+# `Wall` is unbounded, which a periodic collider cannot sort; boxes that reach far beyond the cell and all that grains travel do the same.
+far, thick = 1e6 * p.grain_diameter, p.grain_diameter
 
 
 def plane(centre: tuple[float, float, float], extents: tuple[float, float, float]) -> int:

@@ -73,8 +73,11 @@ for number, index in enumerate(sites, start=1):
     O.bodies.append(body)
 
 # --- walls: they move in their own planes, so their shape stays --------------------------------------------------------
-# `Wall` is unbounded, which a periodic collider cannot sort; boxes far larger than the cell do the same.
-far, thick = 1e3 * p.grain_diameter, p.grain_diameter
+# `Wall` is unbounded, which a periodic collider cannot sort; boxes that reach far beyond the cell and all that grains travel do the same.
+far, thick = 1e6 * p.grain_diameter, p.grain_diameter
+# The collider looks for pairs along x, from a body's lower end to its upper one, within one period. So the base's ends must almost meet
+# there, with a gap that no grain fits into; or a grain just above the base in a restart, or later, would never be found.
+floor = 0.5 * (2001 * O.cell.size[0] - 0.5 * p.grain_diameter)
 
 
 def plane(centre: tuple[float, float, float], extents: tuple[float, float, float], speed: float) -> int:
@@ -87,7 +90,7 @@ def plane(centre: tuple[float, float, float], extents: tuple[float, float, float
 walls = {
     "left": plane((-thick, 0, 0), (thick, far, far), p.wall_speed),
     "right": plane((p.silo_width + thick, 0, 0), (thick, far, far), p.wall_speed),
-    "base": plane((0, 0, -thick), (far, far, thick), 0.0),
+    "base": plane((0, 0, -thick), (floor, far, thick), 0.0),
 }
 
 weight = (0, 0, -p.gravity)

@@ -97,6 +97,18 @@ def both(case: str, engine: str, base: Path, values: dict[str, Any], ranks: int 
     return whole, broken, broken.kill_after(steps // 2)
 
 
+@pytest.mark.parametrize(("case", "values"), [
+    ("plug_flow", PLUG | {"grain_count": 120}), ("column_collapse", COLUMN),
+    ("plane_silo", {"grain_count": 120, "silo_width": 0.03, "slab_depth": 0.024, "settle_time": 0.1, "measure_time": 0.05, "frames": 3})])
+def test_no_grain_falls_through_the_base_after_a_restart(case: str, values: dict[str, Any], tmp_path: Path) -> None:
+    """Pairs that nearly touch are found anew whenever YADE goes on from a state, also those with a base that is larger than the period."""
+    deck = Deck(case, "yade", tmp_path / "run", values | {"restart_every": 80})
+    deck.run()
+    radius = 0.5 * 0.005
+    for frame in GrainsDump(deck.folder / "grains.dump"):
+        assert frame.positions[:, 2].min() > -0.05 * 0.2 - 2 * radius
+
+
 @pytest.mark.parametrize(("case", "engine", "ranks", "values"), [
     ("silo", "liggghts", 1, SILO), ("silo", "yade", 1, SILO), ("plug_flow", "liggghts", 2, PLUG),
     ("gravity_channel", "liggghts", 2, CHANNEL), ("gravity_channel", "yade", 1, CHANNEL), ("log_pile", "liggghts", 1, PILE),
