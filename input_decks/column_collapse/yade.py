@@ -58,9 +58,7 @@ for *place, radius in dembark.column(sites, p.grain_count, p.grain_diameter, p.g
 
 # --- walls: `Wall` is unbounded, which a periodic collider cannot sort; boxes far larger than the cell do the same ---------
 far, thick = 1e6 * p.grain_diameter, p.grain_diameter
-# The collider looks for pairs along x, from a body's lower end to its upper one, within one period. So the base's ends must almost meet
-# there, with a gap that no grain fits into; or a grain just above the base in a restart, or later, would never be found.
-floor = 0.5 * (2001 * O.cell.size[0] - 0.5 * p.grain_diameter)
+floor = dembark.spanning(p.grain_diameter)
 
 
 def plane(centre: tuple[float, float, float], extents: tuple[float, float, float]) -> int:

@@ -75,9 +75,7 @@ for number, index in enumerate(sites, start=1):
 # --- walls: they move in their own planes, so their shape stays --------------------------------------------------------
 # `Wall` is unbounded, which a periodic collider cannot sort; boxes that reach far beyond the cell and all that grains travel do the same.
 far, thick = 1e6 * p.grain_diameter, p.grain_diameter
-# The collider looks for pairs along x, from a body's lower end to its upper one, within one period. So the base's ends must almost meet
-# there, with a gap that no grain fits into; or a grain just above the base in a restart, or later, would never be found.
-floor = 0.5 * (2001 * O.cell.size[0] - 0.5 * p.grain_diameter)
+floor = dembark.spanning(p.grain_diameter)
 
 
 def plane(centre: tuple[float, float, float], extents: tuple[float, float, float], speed: float) -> int:

@@ -7,7 +7,6 @@
 
 #include "atom.h"
 #include "comm.h"
-#include "compute_reduce.h"
 #include "domain.h"
 #include "dump.h"
 #include "error.h"
@@ -27,17 +26,6 @@ using dembark_liggghts::ImpactWall;
 namespace {
 
 constexpr int local_columns = 13;
-
-/// What a compute reduce is made from, which it does not tell.
-struct Reduced : ComputeReduce {
-  static bool names(const ComputeReduce &compute, const char *id) {
-    for (int k = 0; k < compute.*(&Reduced::nvalues); ++k) {
-      const char *source = (compute.*(&Reduced::ids))[k];
-      if (source && std::strcmp(source, id) == 0) return true;
-    }
-    return false;
-  }
-};
 
 std::vector<std::string> words(int narg, char **arg) { return std::vector<std::string>(arg + std::min(3, narg), arg + narg); }
 
@@ -169,10 +157,6 @@ void FixLcpImpact::find_meshes() {
 /// Styles that may read the local array in any step; dumps tell their steps.
 void FixLcpImpact::find_local_readers() {
   local_always_ = false;
-  for (int i = 0; i < modify->ncompute; ++i) {
-    const ComputeReduce *reduce = dynamic_cast<ComputeReduce *>(modify->compute[i]);
-    local_always_ = local_always_ || (reduce && Reduced::names(*reduce, id));
-  }
   for (int i = 0; i < modify->nfix; ++i) local_always_ = local_always_ || std::strncmp(modify->fix[i]->style, "ave/histo", 9) == 0;
 }
 

@@ -430,6 +430,15 @@ class HistoryWriter:
             print(O.iter, f"{O.time:.6g}", f"{energy:.6g}", flush=True)
 
 
+def spanning(diameter):
+    """Half the length (m) along x, in a periodic cell, of a box that is to be a plane, larger than the period; `diameter`: mean one of the grains.
+
+    After a restart YADE's collider looks for pairs along x, from a body's lower end to its upper one, within one period. So the ends of the
+    box must almost meet there, with a gap that no grain fits into; or a grain just above it would never be found.
+    """
+    return 0.5 * (2001 * O.cell.size[0] - 0.5 * diameter)
+
+
 def energies():
     """All energies (J) of the scene's EnergyAccount by name, at the end of the last step that is over: see its keys() for the names."""
     # A scene that was loaded has engines of its own.
