@@ -62,7 +62,7 @@ class Case:
     def text(self, *, head: str | None = None, run: str | None = None, ranks: int = 1, dump: str = "logs.dump") -> str:
         gravity = f"fix weight all gravity {self.gravity!r} vector 0 -1 0" if self.gravity else ""
         return "\n".join([
-            "units si", f"dimension {self.dimension}", "atom_style granular", "atom_modify map array sort 0 0.0", f"boundary {self.boundary}", "newton off",
+            f"log {log_name(dump)}", "units si", f"dimension {self.dimension}", "atom_style granular", "atom_modify map array sort 0 0.0", f"boundary {self.boundary}", "newton off",
             "communicate single vel yes", f"processors {ranks} 1 1", self.head() if head is None else head, "neighbor 0.05 bin",
             "neigh_modify delay 0", self.before, gravity, f"fix hits all lcp/impact {self.words}", self.after, "fix motion all nve/sphere",
             f"timestep {self.time_step!r}", *self.extra,
@@ -87,7 +87,7 @@ class Result:
     def __init__(self, case: Case, done: Run, dump: str) -> None:
         self.case, self.folder, self.output = case, done.folder, done.output
         self.steps, self.frames = read_dump(done.folder / dump)
-        self.vectors = thermo(done.output)
+        self.vectors = thermo((done.folder / log_name(dump)).read_text(errors="replace"))
 
     @property
     def last(self) -> NDArray[np.float64]:
@@ -114,8 +114,13 @@ class Result:
         return np.loadtxt(self.folder / file, ndmin=2)
 
 
+def log_name(dump: str) -> str:
+    """The engine's log beside the frames: what several ranks print may lose lines on its way through mpirun."""
+    return f"{dump}.log"
+
+
 def thermo(output: str) -> NDArray[np.float64]:
-    """The vectors of the fix of every line of thermo output."""
+    """The vectors of the fix of every line of thermo output in a log."""
     rows = []
     reading = False
     for line in output.splitlines():
