@@ -221,8 +221,11 @@ void FixLcpImpact::solve(double kick) {
   torque_.assign(bodies_.size(), Vec());
   const double time = clock_time_ + double(update->ntimestep - clock_step_) * update->dt;
   try {
-    find_contacts();
-    report_ = system_->step(bodies_, contacts_, time, kick, force_, torque_);
+    double wall_speed = 0.0;
+    // The surface of a cylinder that turns moves along itself, not towards anything.
+    for (const dembark_liggghts::ImpactMesh &mesh : mesh_) wall_speed = std::max(wall_speed, mesh.speed());
+    const auto search = [this](double reach, std::vector<dembark::impact::Contact> &contacts) { find_contacts(reach, contacts); };
+    report_ = system_->step(bodies_, search, wall_speed, time, kick, force_, torque_);
   } catch (const std::exception &e) {
     refuse(e.what());
   }
@@ -270,6 +273,6 @@ double FixLcpImpact::compute_vector(int i) {
 }
 
 double FixLcpImpact::memory_usage() {
-  return double(bodies_.size() * (sizeof(Body) + 4 * sizeof(Vec)) + contacts_.size() * sizeof(dembark::impact::Contact) +
+  return double(bodies_.size() * (sizeof(Body) + 4 * sizeof(Vec)) + std::size_t(report_.contacts) * sizeof(dembark::impact::Contact) +
                 std::size_t(local_capacity_) * local_columns * sizeof(double));
 }

@@ -54,7 +54,7 @@ class FixLcpImpact : public Fix {
   void read_atom(int i, double *row) const;
   void gather_bodies();
   void gather_meshes(double dt);
-  void find_contacts();
+  void find_contacts(double reach, std::vector<dembark::impact::Contact> &contacts);
   void add_periodic_images(double reach, std::vector<dembark::impact::Body> &bodies, std::vector<int> &origin);
   double inertia_factor() const;
   void solve(double kick);
@@ -79,7 +79,6 @@ class FixLcpImpact : public Fix {
   std::vector<double> own_row_, all_row_;
   std::vector<std::size_t> order_;
   std::vector<Vec> force_, torque_;  // of the contacts, on bodies_
-  std::vector<dembark::impact::Contact> contacts_;
   std::vector<dembark::impact::ContactResult> results_;  // of the step of a restart file
   dembark::impact::PairFinder pairs_;
 

@@ -131,14 +131,8 @@ void FixLcpImpact::add_periodic_images(double reach, std::vector<Body> &bodies, 
   }
 }
 
-void FixLcpImpact::find_contacts() {
-  contacts_.clear();
+void FixLcpImpact::find_contacts(double reach, std::vector<Contact> &contacts) {
   if (bodies_.empty()) return;
-  double wall_speed = 0.0;
-  // The surface of a cylinder that turns moves along itself, not towards anything.
-  for (const dembark_liggghts::ImpactMesh &mesh : mesh_) wall_speed = std::max(wall_speed, mesh.speed());
-  const double reach = dembark::impact::default_reach(bodies_, update->dt, wall_speed);
-
   const bool periodic = domain->xperiodic || domain->yperiodic || domain->zperiodic;
   std::vector<Body> with_images;
   std::vector<int> origin;
@@ -152,11 +146,11 @@ void FixLcpImpact::find_contacts() {
   const std::vector<Body> &all = images ? with_images : bodies_;
   const int own = int(bodies_.size());
 
-  pairs_.find(all, reach, contacts_);
+  pairs_.find(all, reach, contacts);
   if (images) {
     // A contact across a boundary is found from both sides; that whose first body is no image stays.
-    contacts_.erase(std::remove_if(contacts_.begin(), contacts_.end(), [own](const Contact &c) { return c.a >= own; }), contacts_.end());
-    for (Contact &c : contacts_) c.b = origin[std::size_t(c.b)];
+    contacts.erase(std::remove_if(contacts.begin(), contacts.end(), [own](const Contact &c) { return c.a >= own; }), contacts.end());
+    for (Contact &c : contacts) c.b = origin[std::size_t(c.b)];
   }
   const int types = int(options_.stiffness.size());
   double Vec::*const axes[3] = {&Vec::x, &Vec::y, &Vec::z};
@@ -172,7 +166,7 @@ void FixLcpImpact::find_contacts() {
       plane.normal = Vec();
       plane.normal.*axes[wall.axis] = wall.free_above ? 1.0 : -1.0;
       plane.point.*axes[wall.axis] = wall.position;
-      dembark::impact::plane_contacts(bodies_, plane, reach, contacts_);
+      dembark::impact::plane_contacts(bodies_, plane, reach, contacts);
     } else if (wall.shape == ImpactWall::cylinder) {
       dembark::impact::Drum drum;
       static_cast<dembark::impact::Wall &>(drum) = common;
@@ -182,15 +176,15 @@ void FixLcpImpact::find_contacts() {
       drum.point.*axes[wall.axis == 2 ? 1 : 2] = wall.centre[1];
       drum.radius = wall.radius;
       drum.omega = wall.omega;
-      dembark::impact::cylinder_contacts(bodies_, drum, reach, contacts_);
+      dembark::impact::cylinder_contacts(bodies_, drum, reach, contacts);
     } else {
       // Without images: at the end of a mesh that goes through to a periodic boundary they would touch an edge that is none.
-      const std::size_t from = contacts_.size();
-      mesh_[w].contacts(bodies_, common, reach, contacts_);
+      const std::size_t from = contacts.size();
+      mesh_[w].contacts(bodies_, common, reach, contacts);
       if (!mesh_[w].velocity_known())  // better no relative motion than a wrong one, which the springs would remember
-        for (std::size_t k = from; k < contacts_.size(); ++k) {
-          const Body &b = bodies_[std::size_t(contacts_[k].a)];
-          contacts_[k].point_velocity = b.velocity - b.radius * cross(b.spin, contacts_[k].normal);
+        for (std::size_t k = from; k < contacts.size(); ++k) {
+          const Body &b = bodies_[std::size_t(contacts[k].a)];
+          contacts[k].point_velocity = b.velocity - b.radius * cross(b.spin, contacts[k].normal);
         }
     }
   }

@@ -25,15 +25,6 @@ using log_impact::plain;
 
 namespace log_impact {
 
-/// The bodies of a wall as the model's shapes.
-struct WallShapes {
-	std::vector<impact::Plane>    planes;
-	std::vector<bool>             twoSided;
-	std::vector<impact::Drum>     drums;
-	std::vector<impact::Triangle> triangles;
-	double                        speed = 0.0;  // of the fastest point of a surface
-};
-
 void addShape(const Body& body, std::size_t place, const impact::Wall& common, const std::string& where, WallShapes& shapes) {
 	const State&     state = *body.state;
 	const Body::id_t id    = body.getId();
@@ -87,56 +78,57 @@ long shownId(std::int64_t key) { return key >= 0 ? static_cast<long>(key) : -1 -
 
 }  // namespace log_impact
 
-void LogImpact::findContacts(Gathered& all) {
-	std::vector<log_impact::WallShapes> walls(wallList.size());
-	std::vector<impact::Wall>           common(wallList.size());
-	double                              speed = 0.0;
+void LogImpact::gatherWalls(Gathered& all) {
+	all.walls.resize(wallList.size());
 	for (std::size_t w = 0; w < wallList.size(); ++w) {
 		const LogWall&    wall  = *wallList[w];
 		const std::string where = log_impact::wallName(w, wall);
 		if (!(wall.stiffness > 0.0)) fail(where + ".stiffness is not set; give the local stiffness of the wall in N/m");
 		if (wall.bodies.empty()) fail(where + ".bodies is empty; give the ids of the bodies that are the wall");
-		common[w].id        = impact::wall_key(static_cast<std::int64_t>(w));
-		common[w].material  = static_cast<int>(all.materials.size() + w);
-		common[w].stiffness = wall.stiffness;
+		impact::Wall& common = all.walls[w].common;
+		common.id        = impact::wall_key(static_cast<std::int64_t>(w));
+		common.material  = static_cast<int>(all.materials.size() + w);
+		common.stiffness = wall.stiffness;
 		for (std::size_t k = 0; k < wall.bodies.size(); ++k) {
 			if (!scene->bodies->exists(wall.bodies[k])) fail(where + ".bodies: body " + std::to_string(wall.bodies[k]) + " does not exist");
-			log_impact::addShape(*Body::byId(wall.bodies[k], scene), k, common[w], where, walls[w]);
+			log_impact::addShape(*Body::byId(wall.bodies[k], scene), k, common, where, all.walls[w]);
 		}
-		if (wall.bodies.size() > 1 && walls[w].triangles.size() != wall.bodies.size())
+		if (wall.bodies.size() > 1 && all.walls[w].triangles.size() != wall.bodies.size())
 			fail(where + ".bodies: a wall of several bodies must be all Facet; make each Wall and CylinderWall a wall of its own");
-		speed = std::max(speed, walls[w].speed);
+		all.wallSpeed = std::max(all.wallSpeed, all.walls[w].speed);
 	}
-	const double reach = impact::default_reach(all.bodies, scene->dt, speed);
-	pairs.find(all.bodies, reach, all.contacts);
-	for (std::size_t w = 0; w < walls.size(); ++w) {
-		for (std::size_t k = 0; k < walls[w].planes.size(); ++k) {
-			impact::Plane plane = walls[w].planes[k];
-			if (!walls[w].twoSided[k]) {
-				impact::plane_contacts(all.bodies, plane, reach, all.contacts);
+}
+
+void LogImpact::findContacts(const Gathered& all, double reach, std::vector<impact::Contact>& contacts) {
+	pairs.find(all.bodies, reach, contacts);
+	for (const log_impact::WallShapes& shapes : all.walls) {
+		for (std::size_t k = 0; k < shapes.planes.size(); ++k) {
+			impact::Plane plane = shapes.planes[k];
+			if (!shapes.twoSided[k]) {
+				impact::plane_contacts(all.bodies, plane, reach, contacts);
 				continue;
 			}
 			// Both sides are solid: each log meets the side that its centre is on.
 			for (int side = 0; side < 2; ++side, plane.normal = -plane.normal) {
-				const auto before = static_cast<std::ptrdiff_t>(all.contacts.size());
-				impact::plane_contacts(all.bodies, plane, reach, all.contacts);
+				const auto before = static_cast<std::ptrdiff_t>(contacts.size());
+				impact::plane_contacts(all.bodies, plane, reach, contacts);
 				const auto beyond = [&](const impact::Contact& c) { return c.gap <= -all.bodies[c.a].radius; };
-				all.contacts.erase(std::remove_if(all.contacts.begin() + before, all.contacts.end(), beyond), all.contacts.end());
+				contacts.erase(std::remove_if(contacts.begin() + before, contacts.end(), beyond), contacts.end());
 			}
 		}
-		for (const auto& drum : walls[w].drums) impact::cylinder_contacts(all.bodies, drum, reach, all.contacts);
-		if (!walls[w].triangles.empty()) triangles.find(all.bodies, common[w], walls[w].triangles, reach, all.contacts);
+		for (const auto& drum : shapes.drums) impact::cylinder_contacts(all.bodies, drum, reach, contacts);
+		if (!shapes.triangles.empty()) triangles.find(all.bodies, shapes.common, shapes.triangles, reach, contacts);
 	}
 	const auto held = [&](int i) { return i < 0 || std::isinf(all.bodies[i].mass); };
 	const auto idle = [&](const impact::Contact& c) { return held(c.a) && held(c.b); };
-	all.contacts.erase(std::remove_if(all.contacts.begin(), all.contacts.end(), idle), all.contacts.end());
+	contacts.erase(std::remove_if(contacts.begin(), contacts.end(), idle), contacts.end());
 	if (all.axis < 0) return;
 	const auto partner = [&](const impact::Contact& c) {
 		if (c.b >= 0) return "log " + std::to_string(c.key_b);
 		const auto number = static_cast<std::size_t>(impact::wall_number(c.key_b));
 		return log_impact::wallName(number, *wallList[number]);
 	};
-	for (const auto& c : all.contacts)
+	for (const auto& c : contacts)
 		if (std::abs(eigen(c.normal)[all.axis]) > 1e-9)
 			fail("LogImpact: log " + std::to_string(c.key_a) + " meets " + partner(c) + " out of the plane it moves in; put all logs at one " +
 			     "xyz"[all.axis] + " and walls upright to that plane");
@@ -146,12 +138,13 @@ void LogImpact::action() {
 	check(*scene);
 	Gathered all;
 	gather(all);
-	findContacts(all);
+	gatherWalls(all);
 	const bool first = steps == 0 && velocityAtStart;
 	std::vector<::dembark::Vec3<double>> force(all.bodies.size()), torque(all.bodies.size());
 	try {
 		prepare(all);
-		report(system->step(all.bodies, all.contacts, scene->time, first ? 0.5 : 1.0, force, torque));
+		const auto search = [&](double reach, std::vector<impact::Contact>& contacts) { findContacts(all, reach, contacts); };
+		report(system->step(all.bodies, search, all.wallSpeed, scene->time, first ? 0.5 : 1.0, force, torque));
 	} catch (const std::invalid_argument& error) {
 		fail(std::string("LogImpact, step ") + std::to_string(scene->iter) + ": " + error.what());
 	}

@@ -36,7 +36,7 @@ REGISTER_SERIALIZABLE(LogWall);
 class LogImpact : public GlobalEngine {
 public:
 	virtual ~LogImpact() = default;
-	struct Gathered;  // the logs and candidates of one step
+	struct Gathered;  // the logs and walls of one step
 	void action() override;
 	void postLoad(LogImpact&);
 	void preSave(LogImpact&);
@@ -101,7 +101,8 @@ public:
 private:
 	void check(const Scene&) const;
 	void gather(Gathered&);
-	void findContacts(Gathered&);
+	void gatherWalls(Gathered&);
+	void findContacts(const Gathered&, double reach, std::vector<::dembark::impact::Contact>&);
 	void prepare(const Gathered&);
 	void writeImpacts();
 	void report(const ::dembark::impact::StepReport&);

@@ -8,12 +8,27 @@
 
 namespace yade {
 
-/// The logs and candidates of one step.
+namespace log_impact {
+
+/// The bodies of a wall as the model's shapes.
+struct WallShapes {
+	::dembark::impact::Wall                  common;
+	std::vector<::dembark::impact::Plane>    planes;
+	std::vector<bool>                        twoSided;
+	std::vector<::dembark::impact::Drum>     drums;
+	std::vector<::dembark::impact::Triangle> triangles;
+	double                                   speed = 0.0;  // of the fastest point of a surface
+};
+
+}  // namespace log_impact
+
+/// The logs and walls of one step.
 struct LogImpact::Gathered {
 	std::vector<::dembark::impact::Body>    bodies;     // in the order of their ids; held spheres have infinite mass
-	std::vector<::dembark::impact::Contact> contacts;
 	std::vector<int>                        materials;  // ids of YADE, increasing; the index is that of the model
 	int                                     axis = -1;  // blocked translation of all logs that move
+	std::vector<log_impact::WallShapes>     walls;
+	double                                  wallSpeed = 0.0;
 };
 
 namespace log_impact {

@@ -117,7 +117,7 @@ class Assembly {
       throw std::invalid_argument(name_of(c) + ": keys of bodies are >= 0, keys of walls < 0");
     if (std::max(std::abs(c.key_a), std::abs(c.key_b)) > (std::int64_t(1) << 53))
       throw std::invalid_argument(name_of(c) + ": keys must stay below 2^53");
-    if (!(std::isfinite(c.gap) && std::abs(dot(c.normal, c.normal) - 1.0) < 1e-6))
+    if (!(std::isfinite(c.gap) && std::abs(dot(c.normal, c.normal) - 1.0) < unit_tolerance))
       throw std::invalid_argument(name_of(c) + ": the gap must be finite and the normal a unit vector");
     const bool turn = turned(c), wall = c.b < 0;
     const Body& first = bodies[c.a];

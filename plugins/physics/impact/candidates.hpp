@@ -33,14 +33,17 @@ class Candidates {
  public:
   const std::vector<Sorted>& sorted() const { return sorted_; }
 
-  /// recall(key): index of what is remembered of a contact, or -1. Throws std::invalid_argument with one line where two contacts have the
-  /// same keys.
-  template <class Recall>
-  void take(const std::vector<Contact>& contacts, Recall recall) {
-    sorted_.resize(contacts.size());
+  /// Those of which something is remembered or that `screening` finds near. recall(key): index of what is remembered of a contact, or -1.
+  /// Throws std::invalid_argument with one line where two contacts have the same keys.
+  template <class Screen, class Recall>
+  void take(const std::vector<Contact>& contacts, Screen& screening, Recall recall) {
+    sorted_.clear();
     for (std::size_t i = 0; i < contacts.size(); ++i) {
       const Key key = key_of(contacts[i]);
-      sorted_[i] = {key, int(i), recall(key)};
+      const int memory = recall(key);
+      if (memory < 0 && !screening.near(i)) continue;
+      screening.keep(i);
+      sorted_.push_back({key, int(i), memory});
     }
     sort();
     for (std::size_t i = 1; i < sorted_.size(); ++i)

@@ -18,7 +18,7 @@
 namespace dembark {
 namespace impact {
 
-/// A reach (m) that is safe for one step dt (s): twice the way that the two fastest bodies close in it, free and by the forces that are
+/// The reach (m) to begin a step dt (s) with: a little more than what the two fastest bodies close in it, free and by the forces that are
 /// known, and never less than a hundredth of the smallest radius, so that the list of candidates seldom changes.
 /// `wall_speed` (m/s): the fastest that a wall surface moves towards anything.
 inline double default_reach(const std::vector<Body>& bodies, double dt, double wall_speed = 0.0) {
@@ -29,7 +29,8 @@ inline double default_reach(const std::vector<Body>& bodies, double dt, double w
     radius = std::min(radius, b.radius);
   }
   if (bodies.empty()) return 0.0;
-  return std::max(2.0 * dt * (2.0 * std::sqrt(speed2) + wall_speed) + 4.0 * dt * dt * std::sqrt(acceleration2), 0.01 * radius);
+  const double closing = dt * (2.0 * std::sqrt(speed2) + wall_speed) + 2.0 * dt * dt * std::sqrt(acceleration2);
+  return std::max(reach_factor * closing, 0.01 * radius);
 }
 
 /// Bodies sorted into the cells of a dense grid whose edge is at least `cell` (m); a body lies in the cell of its centre.
@@ -130,8 +131,11 @@ class PairFinder {
   void build(const std::vector<Body>& bodies, double reach) {
     double largest = 0.0, sum = 0.0;
     for (const Body& b : bodies) largest = std::max(largest, b.radius), sum += b.radius;
-    margin_ = bodies.empty() ? 0.0 : 0.3 * sum / double(bodies.size()) + reach;
-    reach_ = 2.0 * reach;
+    // Where bodies move by a good part of their size, no list lasts longer than a step: then no margin is worth its pairs.
+    const double margin = bodies.empty() ? 0.0 : 0.3 * sum / double(bodies.size());
+    const bool lasting = reach < margin;
+    margin_ = lasting ? margin + reach : 0.0;
+    reach_ = lasting ? 2.0 * reach : reach;
     const double range = 2.0 * largest + reach_ + margin_;
     grid_.build(bodies, range);
     pairs_.clear();

@@ -65,6 +65,7 @@ class Motion {
       check(bodies[b]);
       response[b] = {1.0 / bodies[b].mass, 1.0 / bodies[b].inertia, 0.0, bodies[b].force, bodies[b].torque};
     }
+    accelerate();
   }
 
   /// Body damping lambda (N s/m) acts on body b; stretch: g tau (s).
@@ -96,7 +97,8 @@ class Motion {
   }
 
   /// Rate of the gap (m/s) with the velocities v.
-  double gap_rate(const Row& r) const {
+  template <class Pair>
+  double gap_rate(const Pair& r) const {
     return dot(r.normal, (*bodies_)[r.a].velocity - (r.b >= 0 ? (*bodies_)[r.b].velocity : r.point_velocity));
   }
   /// Takes the forces but the normal ones over, for gap_acceleration.
@@ -105,8 +107,19 @@ class Motion {
       acceleration_[b] = response[b].inverse * (response[b].free + tangential[b].force);
   }
   /// Acceleration of the gap (m/s^2) by all forces but the normal ones.
-  double gap_acceleration(const Row& r) const {
+  template <class Pair>
+  double gap_acceleration(const Pair& r) const {
     return dot(r.normal, r.b >= 0 ? acceleration_[r.a] - acceleration_[r.b] : acceleration_[r.a]);
+  }
+  /// What a body adds to the change of its gaps (m): rate (s) times v, and scale (s^2) times the acceleration by all forces; after move().
+  Vec3<double> shift(std::size_t b, double rate, double scale) const {
+    return rate * (*bodies_)[b].velocity + (scale / interval_) * change[b].velocity;
+  }
+  /// As gap_acceleration, by all forces; after move().
+  template <class Pair>
+  double whole_gap_acceleration(const Pair& r) const {
+    const Vec3<double> gain = r.b >= 0 ? change[r.a].velocity - change[r.b].velocity : change[r.a].velocity;
+    return dot(r.normal, gain) / interval_;
   }
   /// Response (1/kg) of the contact to a tangential force, the bodies shared out among their active contacts; after move().
   double tangential_response(const Row& r) const {

@@ -77,6 +77,7 @@ class Records {
     again_ = again;
     cursor_ = 0;
     kept_totals_ = {totals_before, totals};
+    kept_from_ = from_;
     if (again) {
       kept_ = now;
       totals = totals_before;
@@ -91,11 +92,13 @@ class Records {
     prior_keys_.swap(keys_);
   }
 
-  /// Takes begin() back.
+  /// Takes begin() and take() back.
   void cancel() {
     std::tie(totals_before, totals) = kept_totals_;
+    from_.swap(kept_from_);
     if (again_) {
       now.swap(kept_);
+      keys_ = prior_keys_;
       from_.resize(keys_.size());
       std::iota(from_.begin(), from_.end(), 0);
       return;
@@ -117,12 +120,11 @@ class Records {
     return cursor_ < n && prior_keys_[cursor_] == key && !prior_[cursor_].idle() ? int(cursor_) : -1;
   }
 
-  /// The rows of the step, with what `recall` said about each.
+  /// The rows of the step, with what `recall` said about each; may be called again with more of them.
   void take(const std::vector<Sorted>& sorted, const std::vector<Row>& rows) {
     lost_bodies.clear();
     keys_.resize(sorted.size());
     from_.resize(sorted.size());
-    now.resize(sorted.size());
     left_.assign(prior_keys_.size(), 1);
     for (std::size_t i = 0; i < sorted.size(); ++i) {
       keys_[i] = sorted[i].key;
@@ -142,8 +144,9 @@ class Records {
     }
   }
 
-  /// Books what memories held that no row has taken.
-  void book_lost() {
+  /// The rows are those of the step: makes room for what they will remember, and books what memories held that no row has taken.
+  void settle() {
+    now.resize(keys_.size());
     for (const std::size_t o : orphans_) {
       if (!left_[o]) continue;
       totals.dissipated += prior_[o].elastic;
@@ -253,6 +256,7 @@ class Records {
   std::vector<Memory> prior_;           ///< memory before the step; see from_
   std::vector<Memory> kept_;            ///< for cancel()
   std::pair<Totals, Totals> kept_totals_;
+  std::vector<int> kept_from_;          ///< likewise
   std::vector<int> from_;               ///< of each row its place there, -1: nothing is remembered
   std::size_t cursor_ = 0;              ///< see recall()
   std::vector<char> left_;              ///< memories that no row has taken

@@ -2,8 +2,8 @@
 //
 // Where impacts are resolved in time (omega tau well below 1) the springs give way far more than the bodies do in a step, and a change of
 // one force hardly reaches the next contact: each sweep gains one or two digits. The residual is then pushed down to the rounding that
-// a factor would leave as well, and only such an answer is accepted; what converges slowly is left to the exact solver. Nothing is carried
-// from step to step, so a run that is resumed repeats to the last bit.
+// a factor would leave as well, and only such an answer is accepted; what converges slowly is left to elimination.hpp, for which a few
+// sweeps find most of the active set. Nothing is carried from step to step, so a run that is resumed repeats to the last bit.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,10 +29,13 @@ class Relaxation {
     else spatial_.prepare(rows, bodies, scale, axes_);
   }
 
+  /// Forces between the sweeps of friction, from the z given: to four digits of each row's own scale, or as near as a few sweeps come.
+  void approach(const Eigen::VectorXd& q, Eigen::VectorXd& z) { planar_ ? flat_.approach(q, z) : spatial_.approach(q, z); }
+
   /// Solves from the z given; leaves z and w, and in `certificate` what LcpCertificate::worst is, from scales that are no larger than those
-  /// defined there. False: not converged.
-  bool solve(const Eigen::VectorXd& q, double tolerance, Eigen::VectorXd& z, Eigen::VectorXd& w, double& certificate) {
-    const double share = lcp::rounding_share(tolerance);
+  /// defined there. False: not converged; z is then a guess of the solution.
+  /// share: of what is added up in a row, that is rounding.
+  bool solve(const Eigen::VectorXd& q, double share, Eigen::VectorXd& z, Eigen::VectorXd& w, double& certificate) {
     return planar_ ? flat_.solve(q, share, z, w, certificate) : spatial_.solve(q, share, z, w, certificate);
   }
 
@@ -53,48 +56,55 @@ class Relaxation {
     }
 
     bool solve(const Eigen::VectorXd& q, double share, Eigen::VectorXd& z, Eigen::VectorXd& w, double& certificate) {
-      if (!built_) build(q, z);
-      double largest = 0.0;
-      for (Line& l : lines_) {
-        l.q = q[l.row];
-        const double push = std::max(-l.q, 0.0);
-        largest = std::max(largest, push * push * l.inverse);
-      }
-      floor_ = std::numeric_limits<double>::epsilon() / share * std::sqrt(largest);
-      for (std::size_t i = 0; i < near_; ++i) start(i, z[lines_[i].row]);
-      gather();
-      double last = std::numeric_limits<double>::infinity();
+      start(q, share, z);
       for (int sweep = 0; sweep < blind_sweeps; ++sweep) {
         relax<false>();
         if (sweep == 1) widen();
       }
-      for (int sweep = blind_sweeps + 1, fresh = blind_sweeps; sweep <= most_sweeps; ++sweep, ++fresh) {
-        const double step = relax<true>();
-        if (fresh > 3 && step > slowest * last) return false;
-        last = step;
-        if (step > 30.0 * share) continue;  // the residual is what the next sweep's steps would be
+      double first = 0.0;  // size of the steps at the begin of the count
+      for (int sweep = blind_sweeps, count = 0; sweep < most_sweeps; ++sweep, ++count) {
+        const double step = relax<true>(), enough = 30.0 * share;
+        if (count == 0) first = step;
+        if (step > enough) {
+          if (count > 2 && !(step < first && count * std::log(enough / step) > worth_sweeps * std::log(step / first))) break;
+          continue;  // the residual is what the next sweep's steps would be
+        }
         gather();
-        if (widen()) fresh = 0;
+        if (widen()) count = -1;
         else if (judge(share, w, certificate)) {
-          for (std::size_t i = 0; i < near_; ++i) z[lines_[i].row] = visits_[i].z;
-          for (std::size_t i = near_; i < lines_.size(); ++i) z[lines_[i].row] = 0.0;
+          store(z);
           return true;
         }
       }
+      widen();
+      for (int sweep = 0; sweep < guess_sweeps; ++sweep) relax<false>();
+      store(z);
       return false;
+    }
+
+    void approach(const Eigen::VectorXd& q, Eigen::VectorXd& z) {
+      start(q, 1e-12, z);
+      relax<false>();
+      relax<false>();
+      widen();
+      for (int sweep = 0; sweep < approach_sweeps && relax<true>() > close; ++sweep) continue;
+      store(z);
     }
 
    private:
     using Vector = Eigen::Matrix<double, Width, 1>;
-    static constexpr int most_sweeps = 30, blind_sweeps = 4;  ///< none has been seen to do with so few
-    static constexpr double slowest = 0.3;  ///< of the size of a sweep's steps over that of the last one
+    static constexpr int most_sweeps = 90, blind_sweeps = 4;  ///< none has been seen to do with so few
+    static constexpr double worth_sweeps = 40.0;  ///< so many that are still to come cost more than elimination
+    static constexpr int guess_sweeps = 30;    ///< more, once it is clear that they do not converge soon
+    static constexpr int approach_sweeps = 10;
+    static constexpr double close = 1e-4;      ///< of a row's own scale: where approach() stops
     static constexpr std::size_t parts = 8;
 
     /// A row of the problem.
     struct Line {
       Vector normal;      ///< unit
       double of_a, of_b;  ///< response of the bodies to a unit force, m/N
-      double compliance, inverse, q;
+      double compliance, inverse, root, q;  ///< root: of inverse
       int a, b, row;
     };
 
@@ -135,6 +145,7 @@ class Relaxation {
       for (int c = 0; c < std::min(Width, 3); ++c) l.normal[c] = r.normal.*axes_[c];
       l.compliance = r.compliance;
       l.inverse = 1.0 / (l.compliance + l.of_a + l.of_b);
+      l.root = std::sqrt(l.inverse);
       if (i < near_) place(i);
     }
 
@@ -150,13 +161,31 @@ class Relaxation {
       v.b = &shift_[std::size_t(l.b)];
     }
 
+    void start(const Eigen::VectorXd& q, double share, const Eigen::VectorXd& z) {
+      if (!built_) build(q, z);
+      double largest = 0.0;
+      for (Line& l : lines_) {
+        l.q = q[l.row];
+        const double push = std::max(-l.q, 0.0);
+        largest = std::max(largest, push * push * l.inverse);
+      }
+      floor_ = std::numeric_limits<double>::epsilon() / share * std::sqrt(largest);
+      for (std::size_t i = 0; i < near_; ++i) start(i, z[lines_[i].row]);
+      gather();
+    }
+
+    void store(Eigen::VectorXd& z) const {
+      for (std::size_t i = 0; i < near_; ++i) z[lines_[i].row] = visits_[i].z;
+      for (std::size_t i = near_; i < lines_.size(); ++i) z[lines_[i].row] = 0.0;
+    }
+
     /// What this solve makes of it; z: where it begins.
     void start(std::size_t i, double z) {
       const Line& l = lines_[i];
       Visit& v = visits_[i];
       v.q = l.q * l.inverse;
       v.z = z;
-      v.base = std::fabs(v.q) + floor_ * std::sqrt(l.inverse);
+      v.base = std::fabs(v.q) + floor_ * l.root;
     }
 
     /// Positions of the bodies after the step under the forces z alone.

@@ -20,7 +20,7 @@ class Scene {
  public:
   std::vector<Plane> planes;
   std::vector<Drum> drums;
-  double reach = 0.0;  ///< m, of the search for candidates; 0 = default_reach
+  double reach = 0.0;  ///< m, of the search for candidates; 0 = as large as the motion asks for
   bool row = false;    ///< bodies along x that never change places: contacts between neighbours by number, and with the planes only
 
   Scene(Settings settings, std::vector<Body> bodies) : system_(std::move(settings)), bodies_(std::move(bodies)) {
@@ -42,13 +42,15 @@ class Scene {
 
   /// Contact forces of the moment. Asking twice changes nothing.
   const StepReport& forces() {
-    contacts_.clear();
-    if (row) row_contacts();
-    else find_contacts();
     force_.assign(bodies_.size(), {});
     torque_.assign(bodies_.size(), {});
     const double kick = count_ == 0 ? 0.5 : 1.0, dt = system_.settings().dt;
-    const StepReport& report = system_.step(bodies_, contacts_, time(), kick, force_, torque_);
+    contacts_.clear();
+    if (row) row_contacts();
+    else if (reach > 0.0) find_contacts(reach, contacts_);
+    const auto search = [this](double far, std::vector<Contact>& contacts) { find_contacts(far, contacts); };
+    const StepReport& report = row || reach > 0.0 ? system_.step(bodies_, contacts_, time(), kick, force_, torque_)
+                                                  : system_.step(bodies_, search, wall_speed(), time(), kick, force_, torque_);
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       const Body& b = bodies_[i];
       velocity_[i] = b.velocity;
@@ -115,14 +117,17 @@ class Scene {
   }
 
  private:
-  void find_contacts() {
+  double wall_speed() const {
     double speed = 0.0;
     for (const Plane& p : planes) speed = std::max(speed, norm(p.velocity));
     for (const Drum& d : drums) speed = std::max(speed, norm(d.velocity));  // turning, its surface moves along itself
-    const double far = reach > 0.0 ? reach : default_reach(bodies_, system_.settings().dt, speed);
-    pairs_.find(bodies_, far, contacts_);
-    for (const Plane& p : planes) plane_contacts(bodies_, p, far, contacts_);
-    for (const Drum& d : drums) cylinder_contacts(bodies_, d, far, contacts_);
+    return speed;
+  }
+
+  void find_contacts(double far, std::vector<Contact>& contacts) {
+    pairs_.find(bodies_, far, contacts);
+    for (const Plane& p : planes) plane_contacts(bodies_, p, far, contacts);
+    for (const Drum& d : drums) cylinder_contacts(bodies_, d, far, contacts);
   }
 
   void row_contacts() {

@@ -18,8 +18,11 @@
 // becomes 1/(s + c/tau), and B gets the deformation delta_last c / (s tau + c) that is still there.
 //
 // Friction is solved in turn with N: N with the last friction forces in f; friction from N; N again with the friction forces in f,
-// and so on. The last solve is that of N, so D is that of the motion that happens. With LcpMethod::automatic each solve is tried by
-// relaxation first (relaxation.hpp) and made by LcpSolver where that does not reach rounding fast.
+// and so on. The last solve is that of N, so D is that of the motion that happens. With LcpMethod::automatic the last one is tried by
+// relaxation (relaxation.hpp) and made by elimination.hpp, or LcpSolver, where that does not reach rounding; those before it, which
+// only tell friction its limits, are relaxed to four digits. The other methods solve all of them exactly.
+//
+// Candidates that would stay open anyway are not solved for, and looked at again afterwards (screening.hpp).
 //
 // Results do not depend on the order in which bodies and contacts are given.
 #pragma once
@@ -27,6 +30,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -36,9 +40,11 @@
 #include "assembly.hpp"
 #include "candidates.hpp"
 #include "friction.hpp"
+#include "geometry.hpp"
 #include "motion.hpp"
+#include "normal_forces.hpp"
 #include "records.hpp"
-#include "relaxation.hpp"
+#include "screening.hpp"
 #include "types.hpp"
 
 namespace dembark {
@@ -62,52 +68,39 @@ class System {
     settings_.dt = dt;
   }
 
+  /// Appends all candidates with gap <= reach (m) to `contacts`.
+  using Search = std::function<void(double reach, std::vector<Contact>& contacts)>;
+
   /// Adds the forces (N) and torques (N m) of the contacts, body damping included, to `force` and `torque`, in the order of the bodies.
   /// time: s, of this step. kick: see above, in (0, 1]. A call with the time of the last one does that step again, from the state
   /// before it: histories, totals and records count it once. Wrong bodies or contacts leave the system as it was.
+  /// search: asked again with a larger reach where the motion that comes out could have closed gaps beyond the first. wall_speed (m/s):
+  /// the fastest that a wall surface moves towards anything.
+  const StepReport& step(const std::vector<Body>& bodies, const Search& search, double wall_speed, double time, double kick,
+                         std::vector<Vec3<double>>& force, std::vector<Vec3<double>>& torque) {
+    begin(bodies, kick, force, torque);
+    double reach = default_reach(bodies, settings_.dt, wall_speed);
+    found_.clear();
+    search(reach, found_);
+    return run(bodies, found_, time, force, torque, [&] {
+      const double swept = 1.1 * screening_.swept(motion_, wall_speed);
+      if (swept <= reach) return false;
+      reach = swept;
+      found_.clear();
+      search(reach, found_);
+      return true;
+    });
+  }
+
+  /// The same with all candidates as given.
   const StepReport& step(const std::vector<Body>& bodies, const std::vector<Contact>& contacts, double time, double kick,
                          std::vector<Vec3<double>>& force, std::vector<Vec3<double>>& torque) {
-    if (!(kick > 0.0 && kick <= 1.0)) throw std::invalid_argument("kick must be > 0 and <= 1, not " + std::to_string(kick));
-    if (force.size() != bodies.size() || torque.size() != bodies.size())
-      throw std::invalid_argument(std::to_string(bodies.size()) + " bodies need as many forces and torques, not " +
-                                  std::to_string(force.size()) + " and " + std::to_string(torque.size()));
-    const double theta = settings_.theta;
-    const bool again = stepped_ && time == time_;
-    motion_.begin(bodies, settings_.dt, kick);
-    records_.begin(again);
-    try {
-      candidates_.take(contacts, [&](const Key& key) { return records_.recall(key); });
-      assembly_.update(bodies, contacts, candidates_.sorted(), settings_);
-    } catch (...) {
-      records_.cancel();
-      assembly_.clear();
-      throw;
-    }
-    records_.take(candidates_.sorted(), assembly_.rows());
-    kick_ = kick;
-    weight_ = again ? weight_ : kick;
-    h_ = theta * kick + (1.0 - theta) * (1.0 - kick);
-    g_ = theta * kick - (1.0 - theta) * (1.0 - kick);
-    const bool first = !stepped_;
-    stepped_ = true;
-    time_ = time;
-    report_ = StepReport();
-    damp_bodies(bodies);
-    if (first) deform_overlaps();
-    set_rows();
-    solve();
-    motion_.move();
-    if (friction_acts())
-      for (int sweep = 0; sweep < settings_.friction_sweeps && sweep_friction(); ++sweep) {
-        solve();
-        motion_.move();
-      }
-    finish(bodies, force, torque);
-    return report_;
+    begin(bodies, kick, force, torque);
+    return run(bodies, contacts, time, force, torque, [] { return false; });
   }
 
   const StepReport& report() const { return report_; }
-  /// Of the last step, sorted by (key_a, key_b).
+  /// Of the last step, sorted by (key_a, key_b): the candidates that were solved for. The others are open.
   const std::vector<ContactResult>& contacts() const {
     const std::vector<Row>& rows = assembly_.rows();
     results_.resize(rows.size());
@@ -144,8 +137,63 @@ class System {
   }
 
  private:
-  /// So many contacts cost nothing to solve exactly.
-  static constexpr std::size_t few = 12;
+  void begin(const std::vector<Body>& bodies, double kick, const std::vector<Vec3<double>>& force, const std::vector<Vec3<double>>& torque) {
+    if (!(kick > 0.0 && kick <= 1.0)) throw std::invalid_argument("kick must be > 0 and <= 1, not " + std::to_string(kick));
+    if (force.size() != bodies.size() || torque.size() != bodies.size())
+      throw std::invalid_argument(std::to_string(bodies.size()) + " bodies need as many forces and torques, not " +
+                                  std::to_string(force.size()) + " and " + std::to_string(torque.size()));
+    motion_.begin(bodies, settings_.dt, kick);
+    kick_ = kick;
+    h_ = settings_.theta * kick + (1.0 - settings_.theta) * (1.0 - kick);
+    g_ = settings_.theta * kick - (1.0 - settings_.theta) * (1.0 - kick);
+  }
+
+  /// widen(): gets more candidates where there may be any.
+  template <class Widen>
+  const StepReport& run(const std::vector<Body>& bodies, const std::vector<Contact>& contacts, double time, std::vector<Vec3<double>>& force,
+                        std::vector<Vec3<double>>& torque, Widen widen) {
+    const bool again = stepped_ && time == time_;
+    const StepReport last = report_;
+    records_.begin(again);
+    try {
+      report_ = StepReport();
+      do {
+        screening_.begin(contacts, motion_, (2.0 * settings_.theta - 1.0) * settings_.dt, h_ * settings_.dt * settings_.dt);
+        do solve_contacts(bodies, contacts);
+        while (screening_.missed(contacts, motion_));
+      } while (widen());
+      report_.contacts = int(contacts.size());
+    } catch (...) {
+      records_.cancel();
+      assembly_.clear();
+      report_ = last;
+      throw;
+    }
+    weight_ = again ? weight_ : kick_;
+    stepped_ = true;
+    time_ = time;
+    finish(bodies, force, torque);
+    return report_;
+  }
+
+  /// Forces of the contacts that are near, and the motion of the bodies with them.
+  void solve_contacts(const std::vector<Body>& bodies, const std::vector<Contact>& contacts) {
+    candidates_.take(contacts, screening_, [&](const Key& key) { return records_.recall(key); });
+    assembly_.update(bodies, contacts, candidates_.sorted(), settings_);
+    records_.take(candidates_.sorted(), assembly_.rows());
+    damp_bodies(bodies);
+    if (!stepped_) deform_overlaps();
+    set_rows();
+    bool friction = has_friction();
+    for (int sweep = 0;; ++sweep) {
+      const bool last = !friction || sweep == settings_.friction_sweeps;
+      solve(last);
+      motion_.move();
+      if (last) return;
+      friction = sweep_friction();
+      if (!friction && !solver_.approaches()) return;  // nothing has changed since the last solve, which was exact
+    }
+  }
 
   void damp_bodies(const std::vector<Body>& bodies) {
     const double response = g_ * settings_.dt;
@@ -174,6 +222,7 @@ class System {
 
   void set_rows() {
     const std::vector<Row>& rows = assembly_.rows();
+    motion_.clear_tangential();
     const std::size_t n = rows.size();
     active_.resize(n);
     start_.resize(n);
@@ -197,15 +246,13 @@ class System {
       }
       tangential_[i] = start_[i];
     }
-    assembled_ = false;
-    relaxes_ = settings_.lcp.method == LcpMethod::automatic && n > few;
-    if (relaxes_) relaxation_.prepare(rows, motion_.response, h_ * settings_.dt * settings_.dt);
+    solver_.prepare(assembly_, motion_, h_ * settings_.dt * settings_.dt, settings_.lcp);
   }
 
   static double tangential_stiffness(const Row& r) { return r.law->tangential_stiffness_ratio * r.stiffness; }
 
   /// The normal forces, with the friction forces as they are.
-  void solve() {
+  void solve(bool last) {
     const std::vector<Row>& rows = assembly_.rows();
     motion_.clear_normal();
     if (rows.empty()) return;
@@ -213,43 +260,14 @@ class System {
     motion_.accelerate();
     for (std::size_t i = 0; i < rows.size(); ++i)
       q_[Eigen::Index(i)] = offset_[Eigen::Index(i)] + scale * motion_.gap_acceleration(rows[i]);
-    relaxes_ = relaxes_ && relax();
-    if (!relaxes_) solve_exactly();
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      double& force = normal_[Eigen::Index(i)];
-      const bool acts = force > 0.0;
-      report_.pivots += relaxes_ && acts != (active_[i] != 0);
-      active_[i] = acts;
-      if (acts) motion_.add_normal(rows[i], force);
-      else force = 0.0;
-    }
-  }
-
-  /// False where it does not converge fast; the other solves of the step are not tried then.
-  bool relax() {
-    double certificate = 0.0;
-    if (!relaxation_.solve(q_, settings_.lcp.tolerance, normal_, opening_, certificate)) return false;
-    report_.certificate = std::max(report_.certificate, certificate);
-    return true;
-  }
-
-  void solve_exactly() {
-    if (!assembled_) assembly_.assemble(motion_.response, h_ * settings_.dt * settings_.dt);
-    assembled_ = true;
-    LcpOptions options = settings_.lcp;
-    options.check_input = false;  // symmetric by construction, positive definite for finite stiffness
-    const LcpResult& result = solver_.solve(assembly_.matrix(), q_, options, &active_);
-    normal_ = result.z;
-    opening_ = result.w;
-    report_.pivots += result.pivots;
-    report_.block_steps += result.block_steps;
-    report_.certificate = std::max(report_.certificate, result.certificate.worst());
-  }
-
-  bool friction_acts() const {
-    const std::vector<Row>& rows = assembly_.rows();
+    solver_.solve(assembly_, motion_, q_, last, active_, normal_, opening_, report_);
     for (std::size_t i = 0; i < rows.size(); ++i)
-      if ((active_[i] || records_.before(i).active) && rows[i].law->friction.static_friction > 0.0) return true;
+      if (active_[i]) motion_.add_normal(rows[i], normal_[Eigen::Index(i)]);
+  }
+
+  bool has_friction() const {
+    for (const Row& r : assembly_.rows())
+      if (r.law->friction.static_friction > 0.0) return true;
     return false;
   }
 
@@ -289,8 +307,7 @@ class System {
     const double length = weight_ * settings_.dt;       // s, the stretch of time this step stands for
     const double middle = 1.0 - 0.5 * weight_ / kick_;  // where its mean velocity lies between v (0) and v' (1)
     Totals& totals = records_.totals;
-    report_.contacts = int(rows.size());
-    records_.book_lost();
+    records_.settle();
     motion_.go_back(middle);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const Memory& before = records_.before(i);
@@ -365,16 +382,16 @@ class System {
   }
 
   Settings settings_;
+  Screening screening_;
   Candidates candidates_;
   Assembly assembly_;
   Records records_;
   Motion motion_;
-  Relaxation relaxation_;
-  LcpSolver solver_;
+  NormalForces solver_;
   StepReport report_;
+  std::vector<Contact> found_;  ///< by the search of the step
   double time_ = 0.0, kick_ = 1.0, weight_ = 1.0, h_ = 1.0, g_ = 1.0;
   bool stepped_ = false;
-  bool relaxes_ = false, assembled_ = false;  ///< in this step
   std::vector<char> active_;
   std::vector<Vec3<double>> start_, tangential_, trial_;
   Eigen::VectorXd offset_, q_, normal_, opening_;

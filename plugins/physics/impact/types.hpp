@@ -68,6 +68,12 @@ struct Contact {
   double wall_stiffness = std::numeric_limits<double>::infinity();  ///< walls: s_w, N/m
 };
 
+/// Gaps are looked at that the free motion times this closes, for forces of other contacts close gaps as well.
+constexpr double reach_factor = 2.0;
+
+/// By how much the square of a unit normal may differ from 1.
+constexpr double unit_tolerance = 1e-6;
+
 struct Material {
   double stiffness = 1e7;  ///< s, N/m, > 0, of one body at its boundary (a wall brings its own with each contact)
   double damping = 0.0;    ///< lambda, N s/m, >= 0: body damping, on the absolute velocity while the body is in contact

@@ -261,7 +261,7 @@ class ImpactSystem:
     walls : Plane and Drum objects
     theta, damping, contact_damping : as in ImpactChain
     friction_sweeps : friction and normal forces are computed in turn so many times a step
-    reach : m, gap up to which a pair is a candidate; 0 = chosen from the velocities
+    reach : m, gap up to which a pair is a candidate; 0 = as large as the motion of each step asks for
     """
 
     def __init__(self, mass: ArrayLike, radius: ArrayLike, position: ArrayLike, velocity: ArrayLike | None = None, *,
@@ -334,8 +334,8 @@ class ImpactSystem:
         return self._scene.run(duration, dt, every, self._dimension, [])
 
     def contacts(self) -> list[dict[str, object]]:
-        """Candidates at the last instant: a, b (as in Impact), gap (m), normal_force (N), opening (m), tangential (N, on a), normal
-        (towards a), place (m)."""
+        """What the last instant was solved for: contacts with a force now or before, and pairs that the free motion could close. Of each
+        a, b (as in Impact), gap (m), normal_force (N), opening (m), tangential (N, on a), normal (towards a), place (m)."""
         rows = self._scene.begun().contacts()  # type: ignore[attr-defined]
         return [{"a": int(r[0]), "b": int(r[1]), "gap": float(r[2]), "normal_force": float(r[3]), "opening": float(r[4]),
                  "tangential": r[5:8].copy(), "normal": r[8:11].copy(), "place": r[11:14].copy()} for r in rows]
