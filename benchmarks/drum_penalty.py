@@ -11,7 +11,10 @@ given as omega tau, omega = sqrt(log stiffness / mass of the thinnest log), the 
 - `turning`: friction, damping, the drum turns. Moment of the drum, kinetic energy and largest force on a log, means over four revolutions;
   the reference is the mean of both laws without numerical loss at the two smallest steps.
 
-Cost is the engine's processor time for a second of simulated time.
+- `many`: the same turning drum with 1000 logs, in a drum as large and as fast as gives the same filling and Froude number; with logs of the
+  given stiffness and of one 16 times as large.
+
+Cost is the engine's processor time for a second of simulated time, in a run of its own that writes nothing.
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ import resource
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +41,9 @@ STIFFNESS, SHELL, DAMPING, GRAVITY, SPEED = 1e7, 5e7, 3000.0, 9.81, 1.2
 STEPS = (0.05, 0.1, 0.2, 0.5, 1.0, 1.9, 4.0)
 LARGE_STEPS = (0.1, 0.2, 0.5, 1.0, 1.9, 4.0, 8.0, 16.0)  # of the turning drum
 REVOLUTIONS = 5  # of it, the first of which is left out
+MANY, STIFFER = 1000, 16.0
+MANY_STEPS = {"penalty": (0.2, 0.5, 1.0, 1.9), "theta 1": (0.2, 1.0, 2.0, 4.0, 8.0, 16.0), "theta 0.5": (0.2, 1.0, 4.0)}
+MANY_STIFF_STEPS = {"penalty": (1.0,), "theta 1": (32.0, 64.0)}  # as long as those of 0.25, 8 and 16 above
 LAWS = {"theta 1": "fix lcp/impact, θ = 1", "theta 0.5": "fix lcp/impact, θ = ½", "penalty": "hooke/stiffness"}
 TOLERANCE = 0.1
 
@@ -75,19 +81,25 @@ def logs(count: int = LOGS) -> tuple[Array, Array, float]:
     return np.array(inside), diameters, radius
 
 
-def highest_frequency() -> float:
-    """omega (rad/s) that the steps are given in."""
-    return math.sqrt(STIFFNESS / (0.25 * math.pi * DENSITY * LOW**2))
+def highest_frequency(stiffer: float = 1.0) -> float:
+    """omega (rad/s) that the steps are given in, of logs that are so many times as stiff."""
+    return math.sqrt(stiffer * STIFFNESS / (0.25 * math.pi * DENSITY * LOW**2))
 
 
-def deck(law: str, step: float, seconds: float, rows: int, *, turning: bool, count: int = LOGS) -> str:
+def drum_speed(count: int) -> float:
+    """rad/s: the Froude number of the drum of 60 logs."""
+    return SPEED * math.sqrt(logs()[2] / logs(count)[2])
+
+
+def deck(law: str, step: float, seconds: float, rows: int, *, turning: bool, count: int = LOGS, stiffer: float = 1.0) -> str:
     """The deck of one run that writes `rows` rows: time, kinetic, potential and elastic energy, moment of the shell, largest force.
 
     The drum's axis is z: the engine's own cylinders do not turn about y.
     """
     places, diameters, radius = logs(count)
-    every = max(1, math.ceil(seconds / step / rows))
-    friction, damping, speed = (0.4, DAMPING, SPEED) if turning else (0.0, 0.0, 0.0)
+    every = max(1, math.ceil(seconds / step / max(rows, 1)))
+    friction, damping, speed = (0.4, DAMPING * math.sqrt(stiffer), drum_speed(count)) if turning else (0.0, 0.0, 0.0)
+    log, shell = stiffer * STIFFNESS, stiffer * SHELL
     lines = ["units si", "atom_style granular", "atom_modify map array sort 0 0.0", "boundary f f f", "newton off",
              "communicate single vel yes",
              f"region domain block {-1.1 * radius} {1.1 * radius} {-1.1 * radius} {1.1 * radius} -0.2 0.2 units box", "create_box 2 domain",
@@ -97,7 +109,7 @@ def deck(law: str, step: float, seconds: float, rows: int, *, turning: bool, cou
                   f"set atom {number} diameter {float(diameter)!r} density {1.5 * DENSITY / float(diameter)!r}"]
     weight = f"fix weight all gravity {GRAVITY} vector 0 -1 0"
     if law == "penalty":
-        pair, wall = 0.5 * STIFFNESS, STIFFNESS * SHELL / (STIFFNESS + SHELL)
+        pair, wall = 0.5 * log, log * shell / (log + shell)
 
         def table(of_pair: float, of_wall: float) -> str:
             return f"peratomtypepair 2 {of_pair!r} {of_wall!r} {of_wall!r} {of_wall!r}"
@@ -109,14 +121,17 @@ def deck(law: str, step: float, seconds: float, rows: int, *, turning: bool, cou
                   "pair_style gran model hooke/stiffness tangential history absolute_damping on tangential_damping off limitForce on",
                   "pair_coeff * *", weight,
                   "fix shell all wall/gran model hooke/stiffness tangential history primitive type 2 zcylinder "
-                  f"{radius!r} 0 0 shear x {speed} absolute_damping on tangential_damping off limitForce on"]
+                  f"{radius!r} 0 0 shear x {speed!r} absolute_damping on tangential_damping off limitForce on"]
         elastic = "0"
     else:
-        lines += [weight, f"fix hits all lcp/impact stiffness {STIFFNESS} {STIFFNESS} contact_damping {damping} theta {law.split()[1]} "
+        lines += [weight, f"fix hits all lcp/impact stiffness {log} {log} contact_damping {damping} theta {law.split()[1]} "
                   f"friction {friction} tangential_ratio {1 / 3.5!r} inertia sphere "
-                  f"wall cylinder shell z 0 0 {radius!r} stiffness {SHELL} friction {1.5 * friction} omega {speed}"]
+                  f"wall cylinder shell z 0 0 {radius!r} stiffness {shell} friction {1.5 * friction} omega {speed!r}"]
         elastic = "f_hits[7]"
-    lines += ["fix motion all nve/sphere", "compute own all property/atom radius omegaz tqz mass",
+    lines.append("fix motion all nve/sphere")
+    if rows == 0:
+        return "\n".join([*lines, f"thermo {every}", "thermo_modify lost error norm no", f"run {every}", "print finished"]) + "\n"
+    lines += ["compute own all property/atom radius omegaz tqz mass",
               "variable spin atom 0.2*c_own[4]*c_own[1]^2*c_own[2]^2", f"variable height atom c_own[4]*{GRAVITY}*y",
               f"variable moment atom x*(fy+c_own[4]*{GRAVITY})-y*fx+c_own[3]", "variable size atom sqrt(fx^2+fy^2)",
               "compute moving all ke", "compute sums all reduce sum v_spin v_height", "compute shell all reduce sum v_moment",
@@ -143,22 +158,31 @@ def overlap_energy(folder: Path, count: int = LOGS) -> Array:
     return np.array(found)
 
 
-def run(law: str, turn: float, seconds: float, rows: int, *, turning: bool, count: int = LOGS) -> dict[str, Any]:
-    """One run: its rows, and the processor time of a simulated second; `failed` holds the engine's last word when it did not end."""
+def spent_by(words: str, folder: Path) -> tuple[float, str | None]:
+    """Processor time (s) of a run of this deck, and the engine's last word when it did not end."""
     engine = engines.find("liggghts")
-    step = turn / highest_frequency()
+    (folder / "drum.in").write_text(words)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    done = subprocess.run([str(engine.executable), "-in", "drum.in", "-log", "none"], cwd=folder, env=engine.environment(), text=True,
+                          errors="replace", capture_output=True, stdin=subprocess.DEVNULL, check=False)
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    if done.returncode or "finished" not in done.stdout:
+        return spent, "".join([line for line in (done.stdout + done.stderr).splitlines() if "ERROR" in line][-1:]) or "no word"
+    return spent, None
+
+
+def run(law: str, turn: float, seconds: float, rows: int, *, turning: bool, count: int = LOGS, stiffer: float = 1.0) -> dict[str, Any]:
+    """One run: its rows, and the processor time of a simulated second; `failed` holds the engine's last word when it did not end."""
+    step = turn / highest_frequency(stiffer)
     with tempfile.TemporaryDirectory(prefix="dembark-penalty-") as name:
         folder = Path(name)
-        (folder / "drum.in").write_text(deck(law, step, seconds, rows, turning=turning, count=count))
-        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-        done = subprocess.run([str(engine.executable), "-in", "drum.in", "-log", "none"], cwd=folder, env=engine.environment(), text=True,
-                              errors="replace", capture_output=True, stdin=subprocess.DEVNULL, check=False)
-        spent = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-        if done.returncode or "finished" not in done.stdout:
-            return {"failed": [line for line in (done.stdout + done.stderr).splitlines() if "ERROR" in line][-1:]}
+        _, failed = spent_by(deck(law, step, seconds, rows, turning=turning, count=count, stiffer=stiffer), folder)
+        if failed:
+            return {"failed": failed}
         time, kinetic, potential, elastic, moment, force = np.loadtxt(folder / "rows.txt").T
-        if law == "penalty":
+        if law == "penalty" and not turning:
             elastic = overlap_energy(folder, count)
+        spent, _ = spent_by(deck(law, step, float(time[-1]), 0, turning=turning, count=count, stiffer=stiffer), folder)
     return {"time": time, "kinetic": kinetic, "potential": potential, "elastic": elastic, "moment": moment, "force": force,
             "cost": spent / float(time[-1]), "cost_of_a_step": spent / float(time[-1]) * step}
 
@@ -176,24 +200,38 @@ def closed(law: str, turn: float) -> dict[str, Any]:
             "cost": found["cost"], "cost_of_a_step": found["cost_of_a_step"]}
 
 
-def turning(law: str, turn: float) -> dict[str, Any]:
+def turning(law: str, turn: float, *, count: int = LOGS, stiffer: float = 1.0, revolutions: int = REVOLUTIONS) -> dict[str, Any]:
     """Means and 95 % half-widths, from blocks of half a revolution."""
-    found = run(law, turn, 2.0 * math.pi * REVOLUTIONS / SPEED, 100 * REVOLUTIONS, turning=True)
+    entry: dict[str, Any] = {"law": law, "turn": turn, "stiffer": stiffer}
+    found = run(law, turn, 2.0 * math.pi * revolutions / drum_speed(count), 100 * revolutions, turning=True, count=count, stiffer=stiffer)
     if "failed" in found:
-        return {"law": law, "turn": turn, **found}
-    entry: dict[str, Any] = {"law": law, "turn": turn, "cost": found["cost"], "cost_of_a_step": found["cost_of_a_step"]}
+        return {**entry, **found}
+    entry |= {"cost": found["cost"], "cost_of_a_step": found["cost_of_a_step"]}
     for name in ("moment", "kinetic", "force"):
-        blocks = found[name][100:].reshape(2 * (REVOLUTIONS - 1), -1).mean(axis=1)
+        blocks = found[name][100:].reshape(2 * (revolutions - 1), -1).mean(axis=1)
         entry[name] = [float(blocks.mean()), student(len(blocks) - 1) * float(blocks.std(ddof=1)) / math.sqrt(len(blocks))]
     return entry
 
 
+def many(report: Callable[[dict[str, Any]], None]) -> list[dict[str, Any]]:
+    """The turning drum with 1000 logs."""
+    found = []
+    for stiffer, steps in ((1.0, MANY_STEPS), (STIFFER, MANY_STIFF_STEPS)):
+        for law, turns in steps.items():
+            for turn in turns:
+                found.append(turning(law, turn, count=MANY, stiffer=stiffer, revolutions=4))
+                report(found[-1])
+    return found
+
+
 def cost(count: int, turn: float = 0.2, seconds: float = 1.5, rounds: int = 3) -> list[dict[str, Any]]:
     """Processor time of a step with `count` logs that fall into a turning drum and settle, medians over rounds in turn; `ratio` to the penalty law."""
+    step = turn / highest_frequency()
     spent: dict[str, list[float]] = {law: [] for law in LAWS}
-    for _ in range(rounds):
-        for law in LAWS:
-            spent[law].append(run(law, turn, seconds, 10, turning=True, count=count)["cost_of_a_step"])
+    with tempfile.TemporaryDirectory(prefix="dembark-penalty-") as name:
+        for _ in range(rounds):
+            for law in LAWS:
+                spent[law].append(spent_by(deck(law, step, seconds, 0, turning=True, count=count), Path(name))[0] / seconds * step)
     middle = {law: float(np.median(values)) for law, values in spent.items()}
     return [{"law": law, "logs": count, "turn": turn, "cost_of_a_step": middle[law], "ratio": middle[law] / middle["penalty"],
              "range": [min(values), max(values)]} for law, values in spent.items()]
@@ -201,7 +239,8 @@ def cost(count: int, turn: float = 0.2, seconds: float = 1.5, rounds: int = 3) -
 
 def reference_of(entries: Sequence[dict[str, Any]], name: str) -> tuple[float, float]:
     """Mean and half-width of `name` at the two smallest steps of the two laws without numerical loss."""
-    chosen = [one[name] for one in entries if one["law"] != "theta 1" and one["turn"] in LARGE_STEPS[:2] and "failed" not in one]
+    small = sorted({one["turn"] for one in entries})[:2]
+    chosen = [one[name] for one in entries if one["law"] != "theta 1" and one["turn"] in small and "failed" not in one]
     return float(np.mean([mean for mean, _ in chosen])), math.hypot(*(half for _, half in chosen)) / len(chosen)
 
 
@@ -218,33 +257,49 @@ def usable(entries: Sequence[dict[str, Any]], references: dict[str, tuple[float,
     return largest
 
 
+def judge(runs: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]]:
+    """The largest usable step of each law, for motion and for forces."""
+    return {law: {what: usable([one for one in runs if one["law"] == law], {name: reference_of(runs, name) for name in names})
+                  for what, names in (("motion", ("moment", "kinetic")), ("forces", ("force",)))} for law in LAWS}
+
+
 def conclude(found: dict[str, Any]) -> None:
     """Add the largest usable steps to `found`."""
-    runs = found["turning"]
-    found["usable"] = {}
-    for law in LAWS:
-        own = [one for one in runs if one["law"] == law]
-        found["usable"][law] = {what: usable(own, {name: reference_of(runs, name) for name in names})
-                                for what, names in (("motion", ("moment", "kinetic")), ("forces", ("force",)))}
+    found["usable"] = judge(found["turning"])
+    found["usable_many"] = judge([one for one in found["many"] if one["stiffer"] == 1.0])
+
+
+def cells(entry: dict[str, Any] | None, decimals: int = 0) -> list[str]:
+    """Moment, kinetic energy, largest force, microseconds per step and processor time per second of a turning drum."""
+    if entry is None:
+        return ["–"] * 5
+    if "failed" in entry:
+        return ["lost logs"] * 3 + ["–"] * 2
+    return [f"{mean:.{decimals}f} ± {half:.{decimals}f}" for mean, half in (entry[name] for name in ("moment", "kinetic", "force"))] + [
+        f"{1e6 * entry['cost_of_a_step']:.0f}", f"{entry['cost']:.2g}"]
 
 
 def markdown(found: dict[str, Any]) -> str:
-    """The table of the guide."""
+    """The first table of the guide."""
     lines = ["| ωτ | law | energy error of 1 s, nothing lost | moment (N m) | kinetic energy (J) | largest force (N) | µs per step "
              "| s per simulated second |", "|---|---|---|---|---|---|---|---|"]
     for turn in sorted({*STEPS, *LARGE_STEPS}):
         for law, label in LAWS.items():
-            closed_one = next((one for one in found["closed"] if one["law"] == law and one["turn"] == turn), None)
-            turning_one = next((one for one in found["turning"] if one["law"] == law and one["turn"] == turn), None)
-            error = "–" if closed_one is None else "lost logs" if closed_one["error"] is None else f"{closed_one['error']:.2g}"
-            if turning_one is None:
-                cells = ["–"] * 5
-            elif "failed" in turning_one:
-                cells = ["lost logs"] * 3 + ["–"] * 2
-            else:
-                cells = [f"{mean:.0f} ± {half:.0f}" for mean, half in (turning_one[name] for name in ("moment", "kinetic", "force"))]
-                cells += [f"{1e6 * turning_one['cost_of_a_step']:.0f}", f"{turning_one['cost']:.2g}"]
-            lines.append(f"| {turn:g} | {label} | {error} | " + " | ".join(cells) + " |")
+            still = next((one for one in found["closed"] if one["law"] == law and one["turn"] == turn), None)
+            moving = next((one for one in found["turning"] if one["law"] == law and one["turn"] == turn), None)
+            error = "–" if still is None else "lost logs" if still["error"] is None else f"{still['error']:.2g}"
+            lines.append(f"| {turn:g} | {label} | {error} | " + " | ".join(cells(moving)) + " |")
+    return "\n".join(lines)
+
+
+def markdown_many(found: dict[str, Any]) -> str:
+    """The second: 1000 logs."""
+    lines = ["| stiffness | ωτ | law | moment (kN m) | kinetic energy (kJ) | largest force (kN) | µs per step | s per simulated second |",
+             "|---|---|---|---|---|---|---|---|"]
+    for one in found["many"]:
+        scaled = one if "failed" in one else {**one, **{name: [1e-3 * value for value in one[name]] for name in ("moment", "kinetic", "force")}}
+        name = "as above" if one["stiffer"] == 1.0 else f"× {one['stiffer']:g}"
+        lines.append(f"| {name} | {one['turn']:g} | {LAWS[one['law']]} | " + " | ".join(cells(scaled, 2)) + " |")
     return "\n".join(lines)
 
 
@@ -301,6 +356,7 @@ def main(words: list[str]) -> int:
             for turn in LARGE_STEPS:
                 found["turning"].append(turning(law, turn))
                 print(json.dumps(found["turning"][-1]), flush=True)
+        found["many"] = many(lambda entry: print(json.dumps(entry), flush=True))
     else:
         found = json.loads(options.out.read_text(encoding="utf-8"))
     conclude(found)

@@ -1,4 +1,4 @@
-"""The parts of the drum's benchmark that need no engine."""
+"""The drum's benchmark."""
 
 import math
 
@@ -53,9 +53,32 @@ def test_both_decks_have_the_same_stiffness():
     assert "run 10000\n" in words and "run 10000\n" in fix
 
 
+def test_many_logs_turn_at_the_same_froude_number_and_stiffer_ones_keep_their_damping_ratio():
+    count = 400
+    froude = [drum_penalty.drum_speed(n) ** 2 * drum_penalty.logs(n)[2] for n in (drum_penalty.LOGS, count)]
+    assert froude[0] == pytest.approx(froude[1])
+    assert drum_penalty.drum_speed(drum_penalty.LOGS) == drum_penalty.SPEED
+    soft, stiff = (drum_penalty.deck("theta 1", 1e-4, 1.0, 0, turning=True, count=count, stiffer=by) for by in (1.0, 4.0))
+    for word, factor in (("stiffness", 4.0), ("contact_damping", 2.0)):
+        a, b = (float(words.split(f"{word} ")[1].split()[0]) for words in (soft, stiff))
+        assert b == pytest.approx(factor * a)
+    assert drum_penalty.highest_frequency(4.0) == pytest.approx(2.0 * drum_penalty.highest_frequency())
+    assert "dump" not in soft and "compute" not in soft and "run 10000\n" in soft  # what is timed writes nothing
+
+
+def test_a_run_that_fails_says_why(tmp_path):
+    spent, failed = drum_penalty.spent_by("units si\nrun 1\n", tmp_path)
+    assert spent > 0.0 and "ERROR" in failed
+
+
+def test_cells_of_a_run_that_lost_its_logs():
+    assert drum_penalty.cells({"failed": "ERROR"})[:3] == ["lost logs"] * 3
+    assert drum_penalty.cells(None) == ["–"] * 5
+
+
 def test_usable_step_ends_at_the_first_that_is_wrong():
     def entry(turn, value, half=1.0):
-        return {"turn": turn, "moment": [value, half]} if value else {"turn": turn, "failed": ["lost"]}
+        return {"turn": turn, "moment": [value, half]} if value else {"turn": turn, "failed": "lost"}
 
     reference = {"moment": (100.0, 1.0)}
     rows = [entry(0.1, 100.0), entry(0.5, 108.0), entry(1.0, 130.0), entry(2.0, 100.0)]
