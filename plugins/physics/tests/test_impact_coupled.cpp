@@ -3,21 +3,19 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <cstring>
 #include <memory>
 #include <random>
 #include <set>
 #include <vector>
 
-#include "dembark/impact/scene.hpp"
+#include "impact_scenes.hpp"
 
 using namespace dembark;
 using namespace dembark::impact;
+using namespace impact_scenes;
 using Catch::WithinAbs;
 
 namespace {
-
-constexpr double g = 9.81;
 
 Settings two_materials(double dt, double theta, double mu, double contact_damping = 0.0) {
   Settings s;
@@ -53,23 +51,9 @@ std::vector<Body> lattice(int columns, int rows, double gap, bool tilted, unsign
   return bodies;
 }
 
-std::unique_ptr<Scene> crowd(double dt, double theta, double mu, int n = 80) {
-  std::mt19937 random(7);
-  std::uniform_real_distribution<double> unit(-1.0, 1.0);
-  std::vector<Body> bodies;
-  while (int(bodies.size()) < n) {
-    Body b;
-    b.id = std::int64_t(bodies.size()) * 3 + 1;
-    b.radius = 0.06 + 0.02 * unit(random);
-    b.mass = 4000 * b.radius * b.radius;
-    b.inertia = cylinder_inertia(b.mass, b.radius);
-    b.position = {0.93 * unit(random), 0.93 * unit(random), 0};
-    b.velocity = {3 * unit(random), 3 * unit(random), 0};
-    b.force = {0, -b.mass * g, 0};
-    bool free = norm(b.position) + b.radius < 0.99;
-    for (const Body& o : bodies) free = free && norm(o.position - b.position) > o.radius + b.radius + 0.002;
-    if (free) bodies.push_back(b);
-  }
+std::unique_ptr<Scene> crowd_in_a_drum(double dt, double theta, double mu) {
+  std::vector<Body> bodies = crowd(80);
+  for (Body& b : bodies) b.material = 0;
   auto scene = std::make_unique<Scene>(two_materials(dt, theta, mu), bodies);
   Drum drum;
   drum.material = 1;
@@ -79,9 +63,18 @@ std::unique_ptr<Scene> crowd(double dt, double theta, double mu, int n = 80) {
   return scene;
 }
 
-bool same_bits(const std::vector<double>& a, const std::vector<double>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
-}
+/// The same step by two systems.
+struct Both {
+  StepReport report[2];
+  std::vector<Vec3<double>> force[2], torque[2];
+  Both(System& one, System& two, const std::vector<Body>& bodies, const std::vector<Contact>& contacts) {
+    for (int k = 0; k < 2; ++k) {
+      force[k].resize(bodies.size());
+      torque[k].resize(bodies.size());
+      report[k] = (k ? two : one).step(bodies, contacts, 0.0, 1.0, force[k], torque[k]);
+    }
+  }
+};
 
 /// Entries that the elimination of symmetric sets of neighbours adds, in the given order.
 std::size_t fill_in(std::vector<std::set<int>> neighbours, const std::vector<int>& order) {
@@ -128,10 +121,8 @@ TEST_CASE("relaxation and the exact solver find the same forces, in the plane an
       System relaxing(settings);
       settings.lcp.method = LcpMethod::block;
       System exact(settings);
-      std::vector<Vec3<double>> force[2], torque[2];
-      for (int k = 0; k < 2; ++k) force[k].resize(bodies.size()), torque[k].resize(bodies.size());
-      const StepReport a = relaxing.step(bodies, contacts, 0.0, 1.0, force[0], torque[0]);
-      const StepReport b = exact.step(bodies, contacts, 0.0, 1.0, force[1], torque[1]);
+      const Both both(relaxing, exact, bodies, contacts);
+      const StepReport &a = both.report[0], &b = both.report[1];
       CHECK(a.contacts > 100);
       CHECK(a.active > 30);
       CHECK(a.active == b.active);
@@ -145,7 +136,7 @@ TEST_CASE("relaxation and the exact solver find the same forces, in the plane an
         CHECK(std::fabs(relaxing.contacts()[i].normal_force - exact.contacts()[i].normal_force) < close * b.peak_force);
         if (mu == 0.0) CHECK(std::fabs(relaxing.contacts()[i].opening - exact.contacts()[i].opening) < 1e-15);
       }
-      for (std::size_t i = 0; i < bodies.size(); ++i) CHECK(norm(force[0][i] - force[1][i]) < close * b.peak_force);
+      for (std::size_t i = 0; i < bodies.size(); ++i) CHECK(norm(both.force[0][i] - both.force[1][i]) < close * b.peak_force);
     }
 }
 
@@ -159,14 +150,12 @@ TEST_CASE("strongly coupled contacts: elimination finds the forces of the block 
       System eliminating(settings);
       settings.lcp.method = LcpMethod::block;
       System exact(settings);
-      std::vector<Vec3<double>> force[2], torque[2];
-      for (int k = 0; k < 2; ++k) force[k].resize(bodies.size()), torque[k].resize(bodies.size());
-      const StepReport a = eliminating.step(bodies, contacts, 0.0, 1.0, force[0], torque[0]);
-      const StepReport b = exact.step(bodies, contacts, 0.0, 1.0, force[1], torque[1]);
+      const Both both(eliminating, exact, bodies, contacts);
+      const StepReport &a = both.report[0], &b = both.report[1];
       CHECK(b.active > 60);
       CHECK(a.active == b.active);
       CHECK(a.certificate < 1e-14);
-      for (std::size_t i = 0; i < bodies.size(); ++i) CHECK(norm(force[0][i] - force[1][i]) < 1e-10 * b.peak_force);
+      for (std::size_t i = 0; i < bodies.size(); ++i) CHECK(norm(both.force[0][i] - both.force[1][i]) < 1e-10 * b.peak_force);
     }
 }
 
@@ -271,7 +260,7 @@ TEST_CASE("the order of elimination: no fill on trees, not much more than minimu
 
 TEST_CASE("candidates beyond those that can close change nothing, to the last bit") {
   for (const double dt : {2e-4, 5e-3}) {
-    const auto few_owner = crowd(dt, 1.0, 0.4), all_owner = crowd(dt, 1.0, 0.4);
+    const auto few_owner = crowd_in_a_drum(dt, 1.0, 0.4), all_owner = crowd_in_a_drum(dt, 1.0, 0.4);
     Scene &few = *few_owner, &all = *all_owner;
     all.reach = 3.0;
     for (int i = 0; i < 300; ++i) {
@@ -289,7 +278,7 @@ TEST_CASE("candidates beyond those that can close change nothing, to the last bi
 
 TEST_CASE("no pair closes unseen, however large the step") {
   for (const double dt : {1e-3, 2e-2}) {
-    const auto owner = crowd(dt, 1.0, 0.3);
+    const auto owner = crowd_in_a_drum(dt, 1.0, 0.3);
     Scene& scene = *owner;
     int seen = 0;
     double closest = 0.0;

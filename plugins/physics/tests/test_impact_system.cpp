@@ -7,38 +7,15 @@
 #include <random>
 #include <vector>
 
-#include "dembark/impact/scene.hpp"
+#include "impact_scenes.hpp"
 
 using namespace dembark;
 using namespace dembark::impact;
+using namespace impact_scenes;
 using Catch::WithinAbs;
 using Catch::WithinRel;
 
 namespace {
-
-constexpr double g = 9.81;
-
-/// Logs of unequal size in a drum, thrown about; two materials and one of the drum.
-std::vector<Body> crowd(int n, unsigned seed = 7) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> unit(-1.0, 1.0);
-  std::vector<Body> bodies;
-  while (int(bodies.size()) < n) {
-    Body b;
-    b.id = std::int64_t(bodies.size()) * 3 + 1;
-    b.radius = 0.06 + 0.02 * unit(random);
-    b.mass = 4000 * b.radius * b.radius;
-    b.inertia = cylinder_inertia(b.mass, b.radius);
-    b.material = int(bodies.size()) % 2;
-    b.position = {0.93 * unit(random), 0.93 * unit(random), 0};
-    b.velocity = {3 * unit(random), 3 * unit(random), 0};
-    b.force = {0, -b.mass * g, 0};
-    bool free = norm(b.position) + b.radius < 0.99;
-    for (const Body& o : bodies) free = free && norm(o.position - b.position) > o.radius + b.radius + 0.002;
-    if (free) bodies.push_back(b);
-  }
-  return bodies;
-}
 
 Settings three_materials(double dt, double theta, double mu, double damping = 0.0, double contact_damping = 0.0) {
   Settings s;
@@ -65,10 +42,6 @@ Drum shell(double omega) {
 
 Contact closest(const std::vector<Contact>& contacts) {
   return *std::min_element(contacts.begin(), contacts.end(), [](const Contact& a, const Contact& b) { return a.gap < b.gap; });
-}
-
-bool same_bits(const std::vector<double>& a, const std::vector<double>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
 }
 
 }  // namespace
