@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -67,6 +68,30 @@ class BodyGrid {
     for (std::size_t c = 1; c < start_.size(); ++c) start_[c] += start_[c - 1];
     fill_.assign(start_.begin(), start_.end() - 1);
     for (std::size_t i = 0; i < n; ++i) member_[fill_[cell_of_[i]]++] = int(i);
+  }
+
+  /// Calls visit(i, j) once for each two bodies in the same cell or in cells that touch.
+  template <class Visit>
+  void pairs(Visit visit) const {
+    for (int z = 0; z < count_[2]; ++z)
+      for (int y = 0; y < count_[1]; ++y)
+        for (int x = 0; x < count_[0]; ++x) {
+          const std::size_t cell = index(x, y, z);
+          const int from = start_[cell], to = start_[cell + 1];
+          if (from == to) continue;
+          for (int k = from; k < to; ++k)
+            for (int l = k + 1; l < to; ++l) visit(member_[k], member_[l]);
+          // The half of the cells around that come later; those of a row lie side by side.
+          const auto row = [&](int begin, int yy, int zz) {
+            if (yy < 0 || yy >= count_[1] || zz >= count_[2]) return;
+            const int first = start_[index(std::max(begin, 0), yy, zz)], last = start_[index(std::min(x + 1, count_[0] - 1), yy, zz) + 1];
+            for (int k = from; k < to; ++k)
+              for (int l = first; l < last; ++l) visit(member_[k], member_[l]);
+          };
+          if (x + 1 < count_[0]) row(x + 1, y, z);
+          row(x - 1, y + 1, z);
+          for (int yy = y - 1; yy <= y + 1; ++yy) row(x - 1, yy, z + 1);
+        }
   }
 
   /// Calls visit(body index) for all bodies whose centre may lie in the box.
@@ -138,18 +163,21 @@ class PairFinder {
     reach_ = lasting ? 2.0 * reach : reach;
     const double range = 2.0 * largest + reach_ + margin_;
     grid_.build(bodies, range);
-    pairs_.clear();
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const Body& a = bodies[i];
-      const Vec3<double> box{range, range, range};
-      grid_.in_box(a.position - box, a.position + box, [&](int j) {
-        const Body& b = bodies[j];
-        if (!(a.id < b.id)) return;
-        const Vec3<double> d = a.position - b.position;
-        const double far = a.radius + b.radius + reach_ + margin_;
-        if (dot(d, d) <= far * far) pairs_.emplace_back(int(i), j);
-      });
-    }
+    found_.clear();
+    start_.assign(bodies.size() + 1, 0);
+    grid_.pairs([&](int i, int j) {
+      if (bodies[i].id == bodies[j].id) return;  // a body and its image across a periodic boundary
+      if (bodies[i].id > bodies[j].id) std::swap(i, j);
+      const Body &a = bodies[i], &b = bodies[j];
+      const Vec3<double> d = a.position - b.position;
+      const double far = a.radius + b.radius + reach_ + margin_;
+      if (dot(d, d) > far * far) return;
+      found_.emplace_back(i, j);
+      ++start_[std::size_t(i) + 1];
+    });
+    std::partial_sum(start_.begin(), start_.end(), start_.begin());
+    pairs_.resize(found_.size());
+    for (const auto& pair : found_) pairs_[std::size_t(start_[std::size_t(pair.first)]++)] = pair;
     const auto before = [&](const auto& p, const auto& q) {
       const auto pa = bodies[p.first].id, qa = bodies[q.first].id;
       return pa != qa ? pa < qa : bodies[p.second].id < bodies[q.second].id;
@@ -164,7 +192,8 @@ class PairFinder {
   }
   BodyGrid grid_;
   std::vector<Body> reference_;
-  std::vector<std::pair<int, int>> pairs_;
+  std::vector<std::pair<int, int>> pairs_, found_;
+  std::vector<int> start_;
   double reach_ = 0.0, margin_ = 0.0;
 };
 

@@ -65,7 +65,6 @@ class Motion {
       check(bodies[b]);
       response[b] = {1.0 / bodies[b].mass, 1.0 / bodies[b].inertia, 0.0, bodies[b].force, bodies[b].torque};
     }
-    accelerate();
   }
 
   /// Body damping lambda (N s/m) acts on body b; stretch: g tau (s).

@@ -158,6 +158,8 @@ class System {
     try {
       report_ = StepReport();
       do {
+        motion_.clear_tangential();
+        motion_.accelerate();
         screening_.begin(contacts, motion_, (2.0 * settings_.theta - 1.0) * settings_.dt, h_ * settings_.dt * settings_.dt);
         do solve_contacts(bodies, contacts);
         while (screening_.missed(contacts, motion_));

@@ -258,7 +258,7 @@ TEST_CASE("the order of elimination: no fill on trees, not much more than minimu
   CHECK(double(fill_in(neighbours, arranged(rows, bodies.size()))) < 1.3 * double(fill_in(neighbours, general)));
 }
 
-TEST_CASE("candidates beyond those that can close change nothing, to the last bit") {
+TEST_CASE("candidates beyond those that can close change nothing") {
   for (const double dt : {2e-4, 5e-3}) {
     const auto few_owner = crowd_in_a_drum(dt, 1.0, 0.4), all_owner = crowd_in_a_drum(dt, 1.0, 0.4);
     Scene &few = *few_owner, &all = *all_owner;
