@@ -14,7 +14,8 @@ given as omega tau, omega = sqrt(log stiffness / mass of the thinnest log), the 
 - `many`: the same turning drum with 1000 logs, in a drum as large and as fast as gives the same filling and Froude number; with logs of the
   given stiffness and of one 16 times as large.
 
-Cost is the engine's processor time for a second of simulated time, in a run of its own that writes nothing.
+Cost is the engine's processor time for a second of simulated time, in runs of their own that write nothing: the fall of the logs and the
+first turn, medians of three rounds in which all laws and steps take turns. `--prices` measures it again.
 """
 
 from __future__ import annotations
@@ -172,7 +173,7 @@ def spent_by(words: str, folder: Path) -> tuple[float, str | None]:
 
 
 def run(law: str, turn: float, seconds: float, rows: int, *, turning: bool, count: int = LOGS, stiffer: float = 1.0) -> dict[str, Any]:
-    """One run: its rows, and the processor time of a simulated second; `failed` holds the engine's last word when it did not end."""
+    """The rows of one run; `failed` holds the engine's last word when it did not end."""
     step = turn / highest_frequency(stiffer)
     with tempfile.TemporaryDirectory(prefix="dembark-penalty-") as name:
         folder = Path(name)
@@ -182,9 +183,7 @@ def run(law: str, turn: float, seconds: float, rows: int, *, turning: bool, coun
         time, kinetic, potential, elastic, moment, force = np.loadtxt(folder / "rows.txt").T
         if law == "penalty" and not turning:
             elastic = overlap_energy(folder, count)
-        spent, _ = spent_by(deck(law, step, float(time[-1]), 0, turning=turning, count=count, stiffer=stiffer), folder)
-    return {"time": time, "kinetic": kinetic, "potential": potential, "elastic": elastic, "moment": moment, "force": force,
-            "cost": spent / float(time[-1]), "cost_of_a_step": spent / float(time[-1]) * step}
+    return {"time": time, "kinetic": kinetic, "potential": potential, "elastic": elastic, "moment": moment, "force": force}
 
 
 def closed(law: str, turn: float) -> dict[str, Any]:
@@ -196,8 +195,7 @@ def closed(law: str, turn: float) -> dict[str, Any]:
     begin = float((0.25 * math.pi * DENSITY * diameters**2 * GRAVITY * places[:, 1]).sum())
     change = found["kinetic"] + found["potential"] + found["elastic"] - begin
     freed = begin - float(found["potential"].min())
-    return {"law": law, "turn": turn, "error": float(np.abs(change).max() / freed), "change": float(change[-1] / freed),
-            "cost": found["cost"], "cost_of_a_step": found["cost_of_a_step"]}
+    return {"law": law, "turn": turn, "error": float(np.abs(change).max() / freed), "change": float(change[-1] / freed)}
 
 
 def turning(law: str, turn: float, *, count: int = LOGS, stiffer: float = 1.0, revolutions: int = REVOLUTIONS) -> dict[str, Any]:
@@ -206,7 +204,6 @@ def turning(law: str, turn: float, *, count: int = LOGS, stiffer: float = 1.0, r
     found = run(law, turn, 2.0 * math.pi * revolutions / drum_speed(count), 100 * revolutions, turning=True, count=count, stiffer=stiffer)
     if "failed" in found:
         return {**entry, **found}
-    entry |= {"cost": found["cost"], "cost_of_a_step": found["cost_of_a_step"]}
     for name in ("moment", "kinetic", "force"):
         blocks = found[name][100:].reshape(2 * (revolutions - 1), -1).mean(axis=1)
         entry[name] = [float(blocks.mean()), student(len(blocks) - 1) * float(blocks.std(ddof=1)) / math.sqrt(len(blocks))]
@@ -224,17 +221,28 @@ def many(report: Callable[[dict[str, Any]], None]) -> list[dict[str, Any]]:
     return found
 
 
-def cost(count: int, turn: float = 0.2, seconds: float = 1.5, rounds: int = 3) -> list[dict[str, Any]]:
-    """Processor time of a step with `count` logs that fall into a turning drum and settle, medians over rounds in turn; `ratio` to the penalty law."""
-    step = turn / highest_frequency()
-    spent: dict[str, list[float]] = {law: [] for law in LAWS}
+def price(entries: Sequence[dict[str, Any]], seconds: float, *, turning: bool, count: int, rounds: int = 3) -> None:
+    """Add to each entry of a run that ended `cost` (s for a simulated second), its range, and `cost_of_a_step` (s)."""
+    spent: list[list[float]] = [[] for _ in entries]
     with tempfile.TemporaryDirectory(prefix="dembark-penalty-") as name:
         for _ in range(rounds):
-            for law in LAWS:
-                spent[law].append(spent_by(deck(law, step, seconds, 0, turning=True, count=count), Path(name))[0] / seconds * step)
-    middle = {law: float(np.median(values)) for law, values in spent.items()}
-    return [{"law": law, "logs": count, "turn": turn, "cost_of_a_step": middle[law], "ratio": middle[law] / middle["penalty"],
-             "range": [min(values), max(values)]} for law, values in spent.items()]
+            for entry, values in zip(entries, spent, strict=True):
+                if "failed" not in entry:
+                    stiffer = entry.get("stiffer", 1.0)
+                    step = entry["turn"] / highest_frequency(stiffer)
+                    words = deck(entry["law"], step, seconds, 0, turning=turning, count=count, stiffer=stiffer)
+                    values.append(spent_by(words, Path(name))[0] / seconds)
+    for entry, values in zip(entries, spent, strict=True):
+        if values:
+            step = entry["turn"] / highest_frequency(entry.get("stiffer", 1.0))
+            entry |= {"cost": float(np.median(values)), "cost_range": [min(values), max(values)], "cost_of_a_step": float(np.median(values)) * step}
+
+
+def prices(found: dict[str, Any]) -> None:
+    """The cost of everything in `found`."""
+    price(found["closed"], 1.0, turning=False, count=LOGS)
+    price(found["turning"], 5.0, turning=True, count=LOGS)
+    price(found["many"], 5.0, turning=True, count=MANY)
 
 
 def reference_of(entries: Sequence[dict[str, Any]], name: str) -> tuple[float, float]:
@@ -337,13 +345,9 @@ def main(words: list[str]) -> int:
     parser.add_argument("--out", type=Path, default=Path("docs/figures/drum_penalty.json"))
     parser.add_argument("--figure", type=Path, default=Path("docs/figures/drum_penalty.png"))
     parser.add_argument("--redraw", action="store_true", help="only judge and draw what --out holds")
-    parser.add_argument("--cost", type=int, metavar="LOGS", help="only measure what a step costs with so many logs, and print it")
+    parser.add_argument("--prices", action="store_true", help="only measure again what the runs of --out cost")
     options = parser.parse_args(words)
-    if options.cost:
-        for entry in cost(options.cost):
-            print(json.dumps(entry))
-        return 0
-    if not options.redraw:
+    if not (options.redraw or options.prices):
         fine = (*np.geomspace(0.01, 0.2, 8), *np.linspace(0.3, 2.0, 18))
         found: dict[str, Any] = {"logs": LOGS, "omega": highest_frequency(), "pair": [], "closed": [], "turning": []}
         for law in LAWS:
@@ -359,6 +363,8 @@ def main(words: list[str]) -> int:
         found["many"] = many(lambda entry: print(json.dumps(entry), flush=True))
     else:
         found = json.loads(options.out.read_text(encoding="utf-8"))
+    if not options.redraw:
+        prices(found)
     conclude(found)
     options.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     draw(found, options.figure)
