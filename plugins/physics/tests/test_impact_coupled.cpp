@@ -351,3 +351,24 @@ TEST_CASE("a body that is knocked on reaches the next one within the step") {
   CHECK_THROWS_WITH(system.step(logs, contacts, 0.0, 1.0, force, torque), Catch::Contains("twice"));
   CHECK(same_bits(system.state(), before));
 }
+
+TEST_CASE("bodies that fly apart are searched for what lies beyond the first reach") {
+  Settings s;
+  s.dt = 1e-2;
+  std::vector<Body> logs(3);
+  const double at[3] = {0.0, 0.18, 0.385};  // the first two overlap by 20 mm; nothing moves yet, so the search begins with 1 mm
+  for (int i = 0; i < 3; ++i) {
+    logs[std::size_t(i)].id = i;
+    logs[std::size_t(i)].mass = 10.0;
+    logs[std::size_t(i)].radius = 0.1;
+    logs[std::size_t(i)].position = {at[i], 0, 0};
+  }
+  REQUIRE(default_reach(logs, s.dt) < 2e-3);
+  Scene scene(s, logs);
+  scene.forces();
+  REQUIRE(scene.system().contacts().size() == 2);
+  const ContactResult beyond = scene.system().contacts()[1];
+  CHECK(beyond.normal_force > 0.0);
+  scene.advance();
+  CHECK_THAT(scene.bodies()[2].position.x - scene.bodies()[1].position.x, WithinAbs(0.2 - beyond.normal_force / 5e6, 1e-12));
+}
