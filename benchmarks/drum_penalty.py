@@ -14,8 +14,8 @@ given as omega tau, omega = sqrt(log stiffness / mass of the thinnest log), the 
 - `many`: the same turning drum with 1000 logs, in a drum as large and as fast as gives the same filling and Froude number; with logs of the
   given stiffness and of one 16 times as large.
 
-Cost is the engine's processor time for a second of simulated time, in runs of their own that write nothing: the fall of the logs and the
-first turn, medians of three rounds in which all laws and steps take turns. `--prices` measures it again.
+Cost is the engine's processor time for a second of simulated time, in runs of their own that write nothing, less the start of the engine:
+the fall of the logs and the first turn, medians of three rounds in which all laws and steps take turns. `--prices` measures it again.
 """
 
 from __future__ import annotations
@@ -230,12 +230,14 @@ def price(entries: Sequence[dict[str, Any]], seconds: float, *, turning: bool, c
                 if "failed" not in entry:
                     stiffer = entry.get("stiffer", 1.0)
                     step = entry["turn"] / highest_frequency(stiffer)
-                    words = deck(entry["law"], step, seconds, 0, turning=turning, count=count, stiffer=stiffer)
-                    values.append(spent_by(words, Path(name))[0] / seconds)
+                    decks = [deck(entry["law"], step, until, 0, turning=turning, count=count, stiffer=stiffer) for until in (seconds, 0.0)]
+                    whole, start = (spent_by(words, Path(name))[0] for words in decks)
+                    values.append((whole - start) / seconds)
     for entry, values in zip(entries, spent, strict=True):
         if values:
             step = entry["turn"] / highest_frequency(entry.get("stiffer", 1.0))
-            entry |= {"cost": float(np.median(values)), "cost_range": [min(values), max(values)], "cost_of_a_step": float(np.median(values)) * step}
+            middle = float(np.median(values))
+            entry |= {"cost": middle, "cost_range": [min(values), max(values)], "cost_of_a_step": middle * step}
 
 
 def prices(found: dict[str, Any]) -> None:
@@ -305,9 +307,9 @@ def markdown_many(found: dict[str, Any]) -> str:
     lines = ["| stiffness | ωτ | law | moment (kN m) | kinetic energy (kJ) | largest force (kN) | µs per step | s per simulated second |",
              "|---|---|---|---|---|---|---|---|"]
     for one in found["many"]:
-        scaled = one if "failed" in one else {**one, **{name: [1e-3 * value for value in one[name]] for name in ("moment", "kinetic", "force")}}
+        means = {name: [1e-3 * value for value in one[name]] for name in ("moment", "kinetic", "force") if name in one}
         name = "as above" if one["stiffer"] == 1.0 else f"× {one['stiffer']:g}"
-        lines.append(f"| {name} | {one['turn']:g} | {LAWS[one['law']]} | " + " | ".join(cells(scaled, 2)) + " |")
+        lines.append(f"| {name} | {one['turn']:g} | {LAWS[one['law']]} | " + " | ".join(cells({**one, **means}, 2)) + " |")
     return "\n".join(lines)
 
 
