@@ -24,6 +24,17 @@ def test_table_is_that_of_the_data(found: dict[str, Any]) -> None:
     assert page.split("<!-- drum_penalty.py -->\n")[1].split("\n<!-- end -->")[0] == drum_penalty.markdown(found)
 
 
+def test_table_of_many_logs_is_that_of_the_data_and_so_are_the_largest_steps(found: dict[str, Any]) -> None:
+    page = (ROOT / "docs/log_impact_guide.md").read_text(encoding="utf-8")
+    assert page.split("<!-- drum_penalty.py, many -->\n")[1].split("\n<!-- end -->")[0] == drum_penalty.markdown_many(found)
+    found = dict(found)
+    drum_penalty.conclude(found)
+    assert found["usable_many"] == {"theta 1": {"motion": 8.0, "forces": 0.2}, "theta 0.5": {"motion": 4.0, "forces": 1.0},
+                                    "penalty": {"motion": 1.0, "forces": 1.0}}
+    cost = {(one["law"], one["turn"]): one.get("cost") for one in found["many"] if one["stiffer"] == 1.0}
+    assert f"{cost['theta 1', 8.0]:.2f} and {cost['penalty', 1.0]:.2f} s for 1000" in page
+
+
 def test_data_of_the_pair_are_those_of_the_code(found: dict[str, Any]) -> None:
     for entry in found["pair"][::7]:
         assert drum_penalty.restitution(entry["turn"], entry["law"]) == pytest.approx((entry["mean"], entry["half_range"]), rel=1e-9, abs=1e-12)
