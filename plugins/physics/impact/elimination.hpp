@@ -99,7 +99,7 @@ class Elimination {
       measure(q, z, w);
       double worst = 0.0;
       for (const int i : chosen_) worst = std::max(worst, size_[std::size_t(i)] > 0.0 ? std::fabs(w[i]) / size_[std::size_t(i)] : 0.0);
-      if (worst <= 0.05 * share) break;
+      if (worst <= 0.25 * share) break;  // a quarter of what counts as rounding
     }
   }
 
