@@ -7,7 +7,6 @@
 #include "comm.h"
 #include "domain.h"
 #include "neighbor.h"
-#include "update.h"
 
 #include "fix_lcp_impact.h"
 

@@ -27,6 +27,11 @@ class Elimination {
     bodies_ = &bodies;
     scale_ = scale;
     size_.resize(rows.size());
+    own_.resize(rows.size());
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const Row& r = rows[i];
+      own_[i] = r.compliance + scale * (body(r.a).inverse + (r.b >= 0 ? body(r.b).inverse : 0.0));
+    }
     for (int step = 0; step < most_steps; ++step) {
       try {
         factorise(active);
@@ -47,7 +52,6 @@ class Elimination {
   static constexpr int most_steps = 12;
 
   const BodyResponse& body(int b) const { return (*bodies_)[std::size_t(b)]; }
-  double diagonal(const Row& r) const { return r.compliance + scale_ * (body(r.a).inverse + (r.b >= 0 ? body(r.b).inverse : 0.0)); }
 
   /// A of the active set in the order of elimination: of each column the entries above the diagonal, and it.
   void factorise(const std::vector<char>& active) {
@@ -77,7 +81,7 @@ class Elimination {
         next_[2 * k + std::size_t(side)] = last;
         last = int(2 * k) + side;
       }
-      diagonal_[k] = diagonal(r);
+      diagonal_[k] = own_[std::size_t(chosen_[k])];
       column_.push_back(int(k));
       value_.push_back(diagonal_[k]);
     }
@@ -113,7 +117,7 @@ class Elimination {
     }
     for (std::size_t i = 0; i < rows_->size(); ++i) {
       const Row& r = (*rows_)[i];
-      const double force = z[Eigen::Index(i)], own = diagonal(r) * force;
+      const double force = z[Eigen::Index(i)], own = own_[i] * force;
       const double whole = dot(r.normal, r.b >= 0 ? shift_[std::size_t(r.a)] - shift_[std::size_t(r.b)] : shift_[std::size_t(r.a)]);
       const double others = whole - (own - r.compliance * force);
       w[Eigen::Index(i)] = q[Eigen::Index(i)] + r.compliance * force + whole;
@@ -124,11 +128,11 @@ class Elimination {
   /// Exchanges all rows that break their condition by more than rounding; false where none does.
   bool exchange(double share, std::vector<char>& active, const Eigen::VectorXd& z, const Eigen::VectorXd& w) const {
     double largest = 0.0;
-    for (std::size_t i = 0; i < size_.size(); ++i) largest = std::max(largest, size_[i] * size_[i] / diagonal((*rows_)[i]));
+    for (std::size_t i = 0; i < size_.size(); ++i) largest = std::max(largest, size_[i] * size_[i] / own_[i]);
     largest = std::numeric_limits<double>::epsilon() * std::sqrt(largest);
     bool found = false;
     for (std::size_t i = 0; i < size_.size(); ++i) {
-      const double own = diagonal((*rows_)[i]), value = active[i] ? z[Eigen::Index(i)] * own : w[Eigen::Index(i)];
+      const double own = own_[i], value = active[i] ? z[Eigen::Index(i)] * own : w[Eigen::Index(i)];
       if (!(value < 0.0) || value >= -(share * size_[i] + largest * std::sqrt(own))) continue;
       active[i] ^= 1;
       found = true;
@@ -141,7 +145,7 @@ class Elimination {
     double largest = 0.0, low = 0.0, product = 0.0;
     for (std::size_t i = 0; i < size_.size(); ++i) {
       double &force = z[Eigen::Index(i)], &opening = w[Eigen::Index(i)];
-      const double own = diagonal((*rows_)[i]), below = std::max(-opening, 0.0);
+      const double own = own_[i], below = std::max(-opening, 0.0);
       force = active[i] ? std::max(force, 0.0) : 0.0;
       largest = std::max(largest, size_[i] * size_[i] / own);
       low = std::max(low, below * below / own);
@@ -159,6 +163,7 @@ class Elimination {
   std::vector<int> chosen_;  ///< rows of the active set in the order of elimination
   std::vector<int> start_, column_, last_, next_;
   std::vector<double> value_, diagonal_, right_, gain_;
+  std::vector<double> own_;   ///< m/N, of each row its diagonal of A
   std::vector<double> size_;  ///< m, of the terms that add up to w
   std::vector<char> all_;
   std::vector<Vec3<double>> shift_;

@@ -13,7 +13,6 @@
 #include <limits>
 #include <vector>
 
-#include "../lcp/blocks.hpp"
 #include "motion.hpp"
 
 namespace dembark {
