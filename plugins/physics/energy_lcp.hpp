@@ -9,8 +9,8 @@
 //              Technology 10 (2013). Ties go to the lower index. The paper proves no end: a set that comes back hands over to
 //              least index, and LcpResult::guarded says so.
 //   block      Exchange all violated indices at once, J. J. Judice & F. M. Pires, Computers & Operations Research 21 (1994) 587.
-//              A few sweeps of Gauss-Seidel guess the first set unless one is given. When the number of violations stalls, energy
-//              pivots take over and least index if they stall, too.
+//              A few sweeps of Gauss-Seidel guess the first set unless one is given. When the number of violations stalls, descent of
+//              the energy finds another (lcp/descent.hpp); then energy pivots take over and least index if they stall, too.
 //   murty      Least index, K. G. Murty, Opsearch 11 (1974) 138: ends for certain, may take many pivots.
 //   pgs        Projected Gauss-Seidel, to the tolerance.
 //   automatic  energy on small islands, block on large ones.

@@ -2,34 +2,28 @@
 // Research 21 (1994) 587), with a guard that makes it end.
 #pragma once
 
+#include "descent.hpp"
 #include "single_pivots.hpp"
 #include "updated_factor.hpp"
 
 namespace dembark::lcp {
 
-/// Sweeps of projected Gauss-Seidel from z >= 0, in place; `w` is work space. They lower the energy z^T M z / 2 + q^T z always.
-template <class Matrix>
-inline void gauss_seidel_sweep(const Matrix& m, const std::vector<double>& q, std::vector<double>& z) {
-  for (Index i = 0; i < m.n; ++i) {
-    double& x = z[std::size_t(i)];
-    const double next = x - (q[std::size_t(i)] + m.column_times(i, z.data())) / m.diagonal(i);
-    x = next > 0.0 ? next : 0.0;
-  }
-}
-
-template <class Matrix, class Factor>
+/// WayOn: gives u.active another set to begin from, where block pivots stall.
+template <class Matrix, class Factor, class WayOn = Descent<Matrix>>
 class BlockPivots {
  public:
-  /// Pivot from u.active. When the number of violations has not reached a new least value for `patience` steps, single pivots are made
-  /// until it does: by the energy criterion, and by least index when that returns to a set that it left or takes too long. The least
-  /// value falls with every return to block steps and least index alone ends, so the whole does.
-  /// hand_over: return at the first stall instead (outcome.guarded says so), for a caller with a cheaper way of single pivots.
+  /// Pivot from u.active. When the number of violations has not reached a new least value for `patience` steps, they begin again
+  /// elsewhere, once. After that single pivots are made until it does: by the energy criterion, and by least index when that returns to
+  /// a set that it left or takes too long. The least value falls with every return to block steps and least index alone ends, so the
+  /// whole does.
+  /// hand_over: return instead of single pivots (outcome.guarded says so), for a caller with a cheaper way of single pivots.
   Outcome run(const Matrix& m, Unknowns& u, const LcpOptions& options, bool hand_over) {
     constexpr int patience = 4;
     const double share = rounding_share(options.tolerance);
     Outcome outcome;
     Index least = std::numeric_limits<Index>::max();
     int stalled = 0;
+    bool elsewhere = false;
     Index singles = 0;  // 0: block steps; otherwise single pivots since the stall
     std::unordered_set<std::uint64_t> seen;
     std::uint64_t key = 0;
@@ -48,6 +42,12 @@ class BlockPivots {
         singles = 0;
       } else if (singles == 0 && ++stalled > patience) {
         outcome.guarded = true;
+        if (!elsewhere) {
+          elsewhere = true;
+          way_on_.run(m, u);
+          stalled = 0;
+          continue;
+        }
         if (hand_over) break;
         singles = 1;
         seen = {key = 0};
@@ -132,6 +132,7 @@ class BlockPivots {
     return best;
   }
 
+  WayOn way_on_;
   UpdatedFactor<Factor> factor_;
   std::vector<double> right_;
   std::vector<Index> violations_;

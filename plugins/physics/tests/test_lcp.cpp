@@ -210,7 +210,7 @@ TEST_CASE("a factor with changes solves like a fresh one") {
   }
 }
 
-TEST_CASE("block steps that go round hand over to single pivots and say so") {
+TEST_CASE("block steps that go round begin elsewhere, then hand over to single pivots, and say so") {
   Matrix M(5, 5);
   M << 79, 6, 38, -5, 28, 6, 118, 11, 83, -82, 38, 11, 66, -3, 4, -5, 83, -3, 88, -37, 28, -82, 4, -37, 99;
   Vector q(5);
@@ -223,14 +223,20 @@ TEST_CASE("block steps that go round hand over to single pivots and say so") {
   CHECK(r.guarded);
   CHECK(violation(M, q, r) < 1e-14);
 
-  // The same on the sparse side: the guard there works on factors alone.
+  CHECK(r.pivots == 0);
+  CHECK(r.block_steps > 4);
+
+  // Single pivots, where there is no other place to begin from: on the sparse side, where they work on factors alone.
+  struct Nowhere {
+    void run(const lcp::SparseBlock&, lcp::Unknowns&) {}
+  };
   const Eigen::SparseMatrix<double> S = sparse(M);
   const Vector diagonal = M.diagonal();
   const lcp::SparseBlock block{5, S.outerIndexPtr(), S.innerIndexPtr(), S.valuePtr(), diagonal.data()};
   lcp::Unknowns u;
   u.resize(5);
   for (std::size_t i = 0; i < 5; ++i) u.q[i] = q[Eigen::Index(i)], u.root[i] = std::sqrt(diagonal[Eigen::Index(i)]), u.active[i] = start[i];
-  lcp::BlockPivots<lcp::SparseBlock, lcp::SparseFactor> steps;
+  lcp::BlockPivots<lcp::SparseBlock, lcp::SparseFactor, Nowhere> steps;
   const lcp::Outcome outcome = steps.run(block, u, options, false);
   CHECK(outcome.guarded);
   CHECK(outcome.pivots > 0);
