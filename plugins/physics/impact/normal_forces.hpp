@@ -42,7 +42,7 @@ class NormalForces {
     } else if (!relaxation_.solve(q, share, z, w, certificate)) {
       flag(z, active);
       const bool found = elimination_.solve(assembly.rows(), motion.response, scale_, share, q, active, z, w, certificate, report.block_steps);
-      if (!found) return solve_exactly(assembly, motion, q, active, z, w, report);
+      if (!found && !relaxation_.finish(share, z, w, certificate)) return solve_exactly(assembly, motion, q, active, z, w, report);
     }
     flag(z, active);
     for (std::size_t i = 0; i < active.size(); ++i) report.pivots += active[i] != before_[i];

@@ -1,31 +1,32 @@
-// The normal forces of weakly coupled contacts, by projected Gauss-Seidel on the bodies instead of a matrix.
+// The normal forces of a step by projected Gauss-Seidel and conjugate gradients, on the bodies instead of a matrix.
 //
 // Where impacts are resolved in time (omega tau well below 1) the springs give way far more than the bodies do in a step, and a change of
-// one force hardly reaches the next contact: each sweep gains one or two digits. The residual is then pushed down to the rounding that
-// a factor would leave as well, and only such an answer is accepted; what converges slowly is left to elimination.hpp, for which a few
-// sweeps find most of the active set. Nothing is carried from step to step, so a run that is resumed repeats to the last bit.
+// one force hardly reaches the next contact: each sweep gains one or two digits. Where it does reach, the sweeps still find which contacts
+// carry a force, and conjugate gradients find how much, in turn, after J. L. Morales, J. Nocedal & M. Smelyanskiy, Numerische Mathematik
+// 111 (2008) 251. The residual is pushed down to the rounding that a factor would leave as well, and only such an answer is accepted.
+// Nothing is carried from step to step, so a run that is resumed repeats to the last bit.
 #pragma once
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <limits>
 #include <vector>
 
+#include "conjugate.hpp"
+#include "lines.hpp"
 #include "motion.hpp"
 
 namespace dembark {
 namespace impact {
 
-/// w = q + A z with A = diag(compliance) + scale G^T M'^-1 G; see system.hpp.
+/// w = q + A z, w >= 0, z >= 0, z w = 0; A as in lines.hpp.
 class Relaxation {
  public:
   /// The rows of a step, which must outlive its solves. bodies: with 1/m' as `inverse`; scale: h tau^2 (s^2).
   void prepare(const std::vector<Row>& rows, const std::vector<BodyResponse>& bodies, double scale) {
     planar_ = find_plane(rows);
-    if (planar_) flat_.prepare(rows, bodies, scale, axes_);
-    else spatial_.prepare(rows, bodies, scale, axes_);
+    if (planar_) flat_.lines.prepare(rows, bodies, scale, axes_);
+    else spatial_.lines.prepare(rows, bodies, scale, axes_);
   }
 
   /// Forces between the sweeps of friction, from the z given: to four digits of each row's own scale, or as near as a few sweeps come.
@@ -34,242 +35,107 @@ class Relaxation {
   /// Solves from the z given; leaves z and w, and in `certificate` what LcpCertificate::worst is, from scales that are no larger than those
   /// defined there. False: not converged; z is then a guess of the solution.
   /// share: of what is added up in a row, that is rounding.
+  /// Gives up where a factor of the contacts that carry a force would take less time.
   bool solve(const Eigen::VectorXd& q, double share, Eigen::VectorXd& z, Eigen::VectorXd& w, double& certificate) {
     return planar_ ? flat_.solve(q, share, z, w, certificate) : spatial_.solve(q, share, z, w, certificate);
   }
 
- private:
-  using Component = double Vec3<double>::*;
+  /// Goes on where the last solve() gave up, however long it takes.
+  bool finish(double share, Eigen::VectorXd& z, Eigen::VectorXd& w, double& certificate) {
+    return planar_ ? flat_.finish(share, z, w, certificate) : spatial_.finish(share, z, w, certificate);
+  }
 
-  /// Width: components that are kept of each vector, 2 or 4 (the last one zero).
+ private:
   template <int Width>
-  class Lines {
-   public:
-    void prepare(const std::vector<Row>& rows, const std::vector<BodyResponse>& bodies, double scale, const Component* axes) {
-      rows_ = &rows;
-      bodies_ = &bodies;
-      scale_ = scale;
-      axes_ = axes;
-      built_ = false;
-      shift_.resize(bodies.size() + 1);  // walls are the last, which never moves
+  struct Solver {
+    Lines<Width> lines;
+
+    void approach(const Eigen::VectorXd& q, Eigen::VectorXd& z) {
+      lines.start(q, 1e-12, z);
+      lines.template relax<false>();
+      lines.template relax<false>();
+      lines.widen();
+      for (int sweep = 0; sweep < approach_sweeps && lines.template relax<true>() > close; ++sweep) continue;
+      lines.store(z);
     }
 
     bool solve(const Eigen::VectorXd& q, double share, Eigen::VectorXd& z, Eigen::VectorXd& w, double& certificate) {
-      start(q, share, z);
-      for (int sweep = 0; sweep < blind_sweeps; ++sweep) {
-        relax<false>();
-        if (sweep == 1) widen();
-      }
-      double first = 0.0;  // size of the steps at the begin of the count
-      for (int sweep = blind_sweeps, count = 0; sweep < most_sweeps; ++sweep, ++count) {
-        const double step = relax<true>(), enough = 30.0 * share;
-        if (count == 0) first = step;
-        if (step > enough) {
-          if (count > 2 && !(step < first && count * std::log(enough / step) > worth_sweeps * std::log(step / first))) break;
-          continue;  // the residual is what the next sweep's steps would be
-        }
-        gather();
-        if (widen()) count = -1;
-        else if (judge(share, w, certificate)) {
-          store(z);
-          return true;
-        }
-      }
-      widen();
-      for (int sweep = 0; sweep < guess_sweeps; ++sweep) relax<false>();
-      store(z);
-      return false;
+      lines.start(q, share, z);
+      const bool solved = sweep(share, w, certificate) || descend(share, worth_steps, w, certificate);
+      lines.store(z);
+      return solved;
     }
 
-    void approach(const Eigen::VectorXd& q, Eigen::VectorXd& z) {
-      start(q, 1e-12, z);
-      relax<false>();
-      relax<false>();
-      widen();
-      for (int sweep = 0; sweep < approach_sweeps && relax<true>() > close; ++sweep) continue;
-      store(z);
+    bool finish(double share, Eigen::VectorXd& z, Eigen::VectorXd& w, double& certificate) {
+      const bool solved = descend(share, std::numeric_limits<double>::max(), w, certificate);
+      lines.store(z);
+      return solved;
     }
 
    private:
-    using Vector = Eigen::Matrix<double, Width, 1>;
     static constexpr int most_sweeps = 90, blind_sweeps = 4;  ///< none has been seen to do with so few
-    static constexpr double worth_sweeps = 40.0;  ///< so many that are still to come cost more than elimination
-    static constexpr int guess_sweeps = 30;    ///< more, once it is clear that they do not converge soon
+    static constexpr double worth_sweeps = 40.0;  ///< so many that are still to come cost more than conjugate gradients
     static constexpr int approach_sweeps = 10;
-    static constexpr double close = 1e-4;      ///< of a row's own scale: where approach() stops
-    static constexpr std::size_t parts = 8;
+    static constexpr double close = 1e-4;         ///< of a row's own scale: where approach() stops
+    static constexpr int most_faces = 300, most_steps = 10000;
+    static constexpr double worth_steps = 80.0;   ///< so many that are still to come cost more than a factor
+    static constexpr int face_sweeps = 3;
+    static constexpr double fall = 0.2;          ///< of the residual, while the face still changes
 
-    /// A row of the problem.
-    struct Line {
-      Vector normal;      ///< unit
-      double of_a, of_b;  ///< response of the bodies to a unit force, m/N
-      double compliance, inverse, root, q;  ///< root: of inverse
-      int a, b, row;
-    };
-
-    /// What a sweep reads of a row and changes, in the order of visiting: the step leads to z = keep z - q - pull (shift_a - shift_b).
-    struct Visit {
-      Vector pull, on_a, on_b;  ///< the normal over the row's diagonal; response of the bodies, m/N
-      double keep, q, z;        ///< share of the bodies in the diagonal; q over it, N; N
-      double base;              ///< N, what steps are compared with, but for z
-      Vector *a, *b;            ///< shifts of the bodies
-    };
-
-    /// Rows that may carry a force come first. Contacts that follow each other share bodies, and each would wait for the last one: eight
-    /// parts of the list take turns.
-    void build(const Eigen::VectorXd& q, const Eigen::VectorXd& z) {
-      built_ = true;
-      order_.clear();
-      far_.clear();
-      for (int i = 0; i < int(rows_->size()); ++i) (q[i] < 0.0 || z[i] > 0.0 ? order_ : far_).push_back(i);
-      near_ = order_.size();
-      lines_.resize(rows_->size());
-      visits_.resize(rows_->size());
-      const std::size_t part = (near_ + parts - 1) / parts;
-      std::size_t at = 0;
-      for (std::size_t i = 0; i < part; ++i)
-        for (std::size_t k = i; k < near_; k += part) set(at++, order_[k]);
-      for (const int k : far_) set(at++, k);
-    }
-
-    void set(std::size_t i, int row) {
-      const Row& r = (*rows_)[std::size_t(row)];
-      Line& l = lines_[i];
-      l.row = row;
-      l.a = r.a;
-      l.b = r.b >= 0 ? r.b : int(bodies_->size());
-      l.of_a = scale_ * (*bodies_)[std::size_t(r.a)].inverse;
-      l.of_b = r.b >= 0 ? scale_ * (*bodies_)[std::size_t(r.b)].inverse : 0.0;
-      l.normal.setZero();
-      for (int c = 0; c < std::min(Width, 3); ++c) l.normal[c] = r.normal.*axes_[c];
-      l.compliance = r.compliance;
-      l.inverse = 1.0 / (l.compliance + l.of_a + l.of_b);
-      l.root = std::sqrt(l.inverse);
-      if (i < near_) place(i);
-    }
-
-    /// The constant part of a visit.
-    void place(std::size_t i) {
-      const Line& l = lines_[i];
-      Visit& v = visits_[i];
-      v.pull = l.inverse * l.normal;
-      v.on_a = l.of_a * l.normal;
-      v.on_b = l.of_b * l.normal;
-      v.keep = (l.of_a + l.of_b) * l.inverse;
-      v.a = &shift_[std::size_t(l.a)];
-      v.b = &shift_[std::size_t(l.b)];
-    }
-
-    void start(const Eigen::VectorXd& q, double share, const Eigen::VectorXd& z) {
-      if (!built_) build(q, z);
-      double largest = 0.0;
-      for (Line& l : lines_) {
-        l.q = q[l.row];
-        const double push = std::max(-l.q, 0.0);
-        largest = std::max(largest, push * push * l.inverse);
+    /// Projected Gauss-Seidel; false where it converges slowly.
+    bool sweep(double share, Eigen::VectorXd& w, double& certificate) {
+      for (int sweep = 0; sweep < blind_sweeps; ++sweep) {
+        lines.template relax<false>();
+        if (sweep == 1) lines.widen();
       }
-      floor_ = std::numeric_limits<double>::epsilon() / share * std::sqrt(largest);
-      for (std::size_t i = 0; i < near_; ++i) start(i, z[lines_[i].row]);
-      gather();
-    }
-
-    void store(Eigen::VectorXd& z) const {
-      for (std::size_t i = 0; i < near_; ++i) z[lines_[i].row] = visits_[i].z;
-      for (std::size_t i = near_; i < lines_.size(); ++i) z[lines_[i].row] = 0.0;
-    }
-
-    /// What this solve makes of it; z: where it begins.
-    void start(std::size_t i, double z) {
-      const Line& l = lines_[i];
-      Visit& v = visits_[i];
-      v.q = l.q * l.inverse;
-      v.z = z;
-      v.base = std::fabs(v.q) + floor_ * l.root;
-    }
-
-    /// Positions of the bodies after the step under the forces z alone.
-    void gather() {
-      for (Vector& s : shift_) s.setZero();
-      for (std::size_t i = 0; i < near_; ++i) {
-        const Visit& v = visits_[i];
-        *v.a += v.z * v.on_a;
-        *v.b -= v.z * v.on_b;
-      }
-    }
-
-    double gap(const Line& l) const { return l.normal.dot(shift_[std::size_t(l.a)] - shift_[std::size_t(l.b)]); }
-
-    /// One sweep; the largest step, in units of the row's own scale, where it is measured.
-    template <bool Measured>
-    double relax() {
-      double most = 0.0;
-      Visit* const end = visits_.data() + near_;
-      for (Visit* v = visits_.data(); v != end; ++v) {
-        const double old = v->z, free = v->keep * old - (v->q + v->pull.dot(*v->a - *v->b)), next = free > 0.0 ? free : 0.0;
-        const double step = next - old;
-        *v->a += step * v->on_a;
-        *v->b -= step * v->on_b;
-        v->z = next;
-        if (Measured) {
-          const double size = std::fabs(step), scale = v->base + next;
-          if (size > most * scale) most = size / scale;
+      double first = 0.0;  // size of the steps at the begin of the count
+      for (int sweep = blind_sweeps, count = 0; sweep < most_sweeps; ++sweep, ++count) {
+        const double step = lines.template relax<true>(), enough = 30.0 * share;
+        if (count == 0) first = step;
+        if (step > enough) {
+          if (count > 2 && !(step < first && count * std::log(enough / step) > worth_sweeps * std::log(step / first))) return false;
+          continue;  // the residual is what the next sweep's steps would be
         }
+        lines.gather();
+        if (lines.widen()) count = -1;
+        else if (lines.judge(share, w, certificate)) return true;
       }
-      return most;
+      return false;
     }
 
-    /// Rows that are pushed together by others join the sweeps; false when there are none.
-    bool widen() {
-      const std::size_t before = near_;
-      for (std::size_t i = near_; i < lines_.size(); ++i) {
-        if (!(lines_[i].q + gap(lines_[i]) < 0.0)) continue;
-        std::swap(lines_[i], lines_[near_]);
-        place(near_);
-        start(near_++, 0.0);
+    /// Conjugate gradients on the face that sweeps find, until both agree; false where more than `worth` steps are still to come.
+    bool descend(double share, double worth, Eigen::VectorXd& w, double& certificate) {
+      lines.widen();
+      conjugate.take_face(lines);
+      bool same = false;
+      for (int face = 0, steps = 0; face < most_faces && steps < most_steps; ++face) {
+        lines.gather();
+        const double before = lines.energy();
+        const bool soon = conjugate.solve(lines, {same ? 0.0 : fall, 0.05 * share, most_steps - steps, worth});
+        steps += conjugate.steps();
+        // Forces that are cut off may cost more than the others have gained.
+        for (double part = 1.0;; part *= 0.5) {
+          const bool cut = conjugate.apply(lines, part);
+          lines.gather();
+          if (!cut || part < 1e-3 || lines.energy() < before) break;
+        }
+        const bool wider = lines.widen();
+        if (same && !soon) return false;
+        if (same && !wider && lines.judge(share, w, certificate)) return true;
+        for (int sweep = 0; sweep < face_sweeps; ++sweep) lines.template relax<false>();
+        same = conjugate.take_face(lines) && !wider;
       }
-      return near_ > before;
+      return false;
     }
 
-    /// w, and whether all conditions hold to rounding; those of the rows that no sweep visits do.
-    bool judge(double share, Eigen::VectorXd& w, double& certificate) {
-      double largest = 0.0, low = 0.0, product = 0.0, worst = 0.0;
-      for (std::size_t i = 0; i < near_; ++i) {
-        const Line& l = lines_[i];
-        const double z = visits_[i].z, whole = gap(l), own = (l.of_a + l.of_b) * z, give = l.compliance * z;
-        const double s = std::fabs(l.q) + own + give + std::fabs(whole - own);
-        const double opening = l.q + give + whole, below = std::max(-opening, 0.0);
-        const double beyond = std::max((z > 0.0 ? std::fabs(opening) : below) - share * s, 0.0);
-        largest = std::max(largest, s * s * l.inverse);
-        worst = std::max(worst, beyond * beyond * l.inverse);
-        low = std::max(low, below * below * l.inverse);
-        product += z * opening;
-        w[l.row] = z > 0.0 ? 0.0 : std::max(opening, 0.0);
-      }
-      constexpr double everywhere = std::numeric_limits<double>::epsilon();
-      if (!std::isfinite(product) || worst > everywhere * everywhere * largest) return false;
-      for (std::size_t i = near_; i < lines_.size(); ++i) w[lines_[i].row] = lines_[i].q + gap(lines_[i]);
-      certificate = largest > 0.0 ? std::max(std::sqrt(low / largest), std::fabs(product) / largest) : 0.0;
-      return true;
-    }
-
-    const std::vector<Row>* rows_ = nullptr;
-    const std::vector<BodyResponse>* bodies_ = nullptr;
-    const Component* axes_ = nullptr;
-    double scale_ = 0.0;
-    bool built_ = false;    ///< in this step
-    std::vector<Line, Eigen::aligned_allocator<Line>> lines_;
-    std::vector<Visit, Eigen::aligned_allocator<Visit>> visits_;
-    std::vector<Vector, Eigen::aligned_allocator<Vector>> shift_;
-    std::vector<int> order_, far_;
-    std::size_t near_ = 0;  ///< so many lines, the first, may carry a force
-    double floor_ = 0.0;    ///< of a row's scale, over its root: steps below the last digit of the largest row are none
+    ConjugateGradients<Width> conjugate;
   };
 
   /// Whether all normals lie in one coordinate plane, as those of logs in cross-section; axes_ begins with its axes then.
   bool find_plane(const std::vector<Row>& rows) {
     bool used[3] = {false, false, false};
     for (const Row& r : rows) used[0] |= r.normal.x != 0.0, used[1] |= r.normal.y != 0.0, used[2] |= r.normal.z != 0.0;
-    static constexpr Component all[3] = {&Vec3<double>::x, &Vec3<double>::y, &Vec3<double>::z};
+    static constexpr Lines<2>::Component all[3] = {&Vec3<double>::x, &Vec3<double>::y, &Vec3<double>::z};
     int out = 0;
     while (out < 3 && used[out]) ++out;
     for (int k = 0, at = 0; k < 3; ++k)
@@ -278,9 +144,9 @@ class Relaxation {
   }
 
   bool planar_ = false;
-  Component axes_[3] = {};
-  Lines<2> flat_;
-  Lines<4> spatial_;
+  Lines<2>::Component axes_[3] = {};
+  Solver<2> flat_;
+  Solver<4> spatial_;
 };
 
 }  // namespace impact

@@ -109,6 +109,54 @@ std::vector<int> arranged(const std::vector<Row>& rows, std::size_t bodies) {
   return order;
 }
 
+/// A problem of its own: the neighbours of a lattice, every gap by chance, the last body a wall.
+struct Problem {
+  std::vector<Row> rows;
+  std::vector<BodyResponse> response;
+  double scale;  ///< s^2
+  Eigen::VectorXd q;
+  const double share = lcp::rounding_share(1e-12);
+  static constexpr double compliance = 2e-7;
+
+  Problem(int side, double scale_, bool tilted, unsigned seed) : scale(scale_) {
+    const std::vector<Body> bodies = lattice(side, side, 1e-4, tilted, seed);
+    response.resize(bodies.size());
+    for (std::size_t b = 0; b < bodies.size(); ++b) response[b].inverse = 1.0 / bodies[b].mass;
+    std::vector<Contact> contacts;
+    find_pairs(bodies, 1e-3, contacts);
+    for (const Contact& c : contacts) {
+      Row r;
+      r.a = c.a, r.b = c.b == int(bodies.size()) - 1 ? -1 : c.b, r.normal = c.normal, r.compliance = compliance;
+      rows.push_back(r);
+    }
+    std::mt19937 random(seed + 1000);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    q.resize(Eigen::Index(rows.size()));
+    for (double& gap : q) gap = 1e-4 * (unit(random) - 0.5);
+  }
+
+  Eigen::MatrixXd matrix() const {
+    Eigen::MatrixXd m = compliance * Eigen::MatrixXd::Identity(q.size(), q.size());
+    for (Eigen::Index i = 0; i < q.size(); ++i)
+      for (Eigen::Index j = 0; j < q.size(); ++j) {
+        const Row &r = rows[std::size_t(i)], &o = rows[std::size_t(j)];
+        for (const auto& [one, sign_one] : {std::pair(r.a, 1.0), std::pair(r.b, -1.0)})
+          for (const auto& [two, sign_two] : {std::pair(o.a, 1.0), std::pair(o.b, -1.0)})
+            if (one >= 0 && one == two) m(i, j) += scale * response[std::size_t(one)].inverse * sign_one * sign_two * dot(r.normal, o.normal);
+      }
+    return m;
+  }
+
+  /// The conditions of the problem, which has one solution.
+  void check(const Eigen::VectorXd& z, const Eigen::VectorXd& w, double certificate) const {
+    CHECK(certificate < 1e-14);
+    CHECK(z.minCoeff() >= 0.0);
+    CHECK(w.minCoeff() >= 0.0);
+    CHECK(z.cwiseProduct(w).cwiseAbs().maxCoeff() == 0.0);
+    CHECK((matrix() * z + q - w).norm() <= 1e-12 * q.norm());
+  }
+};
+
 }  // namespace
 
 TEST_CASE("relaxation and the exact solver find the same forces, in the plane and out of it") {
@@ -161,48 +209,18 @@ TEST_CASE("strongly coupled contacts: elimination finds the forces of the block 
 
 TEST_CASE("elimination from any set finds the solution of the solver, or says that it has not") {
   std::mt19937 random(2);
-  std::uniform_real_distribution<double> unit(-1.0, 1.0);
   int solved = 0;
   for (int trial = 0; trial < 30; ++trial) {
-    const std::vector<Body> bodies = lattice(6, 6, 1e-4, trial % 2 == 1, unsigned(trial));
-    std::vector<BodyResponse> response(bodies.size());
-    for (std::size_t b = 0; b < bodies.size(); ++b) response[b].inverse = 1.0 / bodies[b].mass;
-    std::vector<Contact> contacts;
-    find_pairs(bodies, 1e-3, contacts);
-    std::vector<Row> rows;
-    for (const Contact& c : contacts) {
-      Row r;
-      r.a = c.a, r.b = c.b, r.normal = c.normal, r.compliance = 2e-7;
-      rows.push_back(r);
-      if (c.b == int(bodies.size()) - 1) rows.back().b = -1;
-    }
-    const Eigen::Index n = Eigen::Index(rows.size());
-    const double scale = 1e-4;
-    Eigen::VectorXd q(n), z(n), w(n);
-    Eigen::MatrixXd m = Eigen::MatrixXd::Zero(n, n);
-    std::vector<char> active(rows.size());
-    for (Eigen::Index i = 0; i < n; ++i) {
-      q[i] = 1e-4 * (unit(random) - 0.5);
-      active[std::size_t(i)] = trial % 3 == 0 ? 0 : trial % 3 == 1 ? q[i] < 0.0 : random() % 2 != 0;
-      for (Eigen::Index j = 0; j < n; ++j) {
-        const Row &r = rows[std::size_t(i)], &o = rows[std::size_t(j)];
-        for (const auto& [one, sign_one] : {std::pair(r.a, 1.0), std::pair(r.b, -1.0)})
-          for (const auto& [two, sign_two] : {std::pair(o.a, 1.0), std::pair(o.b, -1.0)})
-            if (one >= 0 && one == two) m(i, j) += scale * response[std::size_t(one)].inverse * sign_one * sign_two * dot(r.normal, o.normal);
-      }
-      m(i, i) += 2e-7;
-    }
+    const Problem p(6, 1e-4, trial % 2 == 1, unsigned(trial));
+    std::vector<char> active(p.rows.size());
+    for (std::size_t i = 0; i < active.size(); ++i)
+      active[i] = trial % 3 == 0 ? 0 : trial % 3 == 1 ? p.q[Eigen::Index(i)] < 0.0 : random() % 2 != 0;
+    Eigen::VectorXd z(p.q.size()), w(p.q.size());
     double certificate = 1.0;
     int steps = 0;
-    Elimination elimination;
-    if (!elimination.solve(rows, response, scale, lcp::rounding_share(1e-12), q, active, z, w, certificate, steps)) continue;
+    if (!Elimination().solve(p.rows, p.response, p.scale, p.share, p.q, active, z, w, certificate, steps)) continue;
     ++solved;
-    LcpSolver solver;
-    const LcpResult& result = solver.solve(m, q);
-    CHECK(certificate < 1e-14);
-    CHECK((z - result.z).norm() <= 1e-10 * result.z.norm());
-    CHECK((w - result.w).norm() <= 1e-10 * q.norm());
-    for (Eigen::Index i = 0; i < n; ++i) CHECK((z[i] > 0.0) == (result.z[i] > 0.0));
+    p.check(z, w, certificate);
   }
   CHECK(solved > 25);
   // A matrix without compliance and with more contacts than the bodies can move is singular: refused, not solved wrongly.
@@ -215,6 +233,70 @@ TEST_CASE("elimination from any set finds the solution of the solver, or says th
   double certificate = 0.0;
   int steps = 0;
   CHECK_FALSE(Elimination().solve(rows, response, 1.0, 1e-14, q, active, z, w, certificate, steps));
+}
+
+TEST_CASE("sweeps and conjugate gradients find the solution of the solver, however strongly contacts are coupled") {
+  int unaided = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    const double scale = std::pow(10.0, trial / 5 - 4);  // (omega tau)^2 = scale / (mass compliance): 25 ... 2.5e8
+    const Problem p(trial % 4 < 2 ? 6 : 12, scale, trial % 2 == 1, unsigned(trial));
+    Eigen::VectorXd z = Eigen::VectorXd::Zero(p.q.size()), w(p.q.size());
+    if (trial % 3 > 0) z = p.q.cwiseMax(0.0) * (trial % 3 == 1 ? 1e6 : 1e9);  // begins far off
+    double certificate = 1.0;
+    Relaxation relaxation;
+    relaxation.prepare(p.rows, p.response, p.scale);
+    const bool soon = relaxation.solve(p.q, p.share, z, w, certificate);
+    unaided += soon;
+    CAPTURE(trial, scale, soon);
+    REQUIRE((soon || relaxation.finish(p.share, z, w, certificate)));
+    p.check(z, w, certificate);
+    // And the solver for any matrix, which goes the same way where block pivots stall, from dense and from sparse columns.
+    const Eigen::MatrixXd m = p.matrix();
+    const Eigen::SparseMatrix<double> sparse = m.sparseView();
+    for (const bool dense : {true, false}) {
+      LcpSolver solver;
+      LcpOptions options;
+      options.method = trial % 2 ? LcpMethod::block : LcpMethod::automatic;
+      const LcpResult& result = dense ? solver.solve(m, p.q, options) : solver.solve(sparse, p.q, options);
+      CHECK(result.status == LcpStatus::solved);
+      CHECK(result.pivots + result.block_steps < 100);
+      CHECK((z - result.z).norm() <= 1e-10 * result.z.norm());
+      for (Eigen::Index i = 0; i < z.size(); ++i) CHECK((z[i] > 0.0) == (result.z[i] > 0.0));
+    }
+  }
+  CHECK(unaided > 10);
+}
+
+TEST_CASE("descent where block pivots stall: a dense island, solved as the published rule solves it") {
+  const Problem p(12, 10.0, false, 26);
+  const Eigen::MatrixXd m = p.matrix();
+  const Eigen::MatrixXd full = m + 1e-9 * Eigen::MatrixXd::Ones(m.rows(), m.cols());  // no zeros: taken as dense
+  LcpSolver solver, pivots;
+  LcpOptions options;
+  options.method = LcpMethod::block;
+  const LcpResult& result = solver.solve(full, p.q, options);
+  CHECK(result.guarded);
+  CHECK(result.pivots == 0);
+  CHECK(result.certificate.worst() < 1e-14);
+  options.method = LcpMethod::energy;
+  const LcpResult& published = pivots.solve(full, p.q, options);
+  CHECK(published.pivots > 100);
+  CHECK((result.z - published.z).norm() <= 1e-9 * published.z.norm());
+}
+
+TEST_CASE("equal logs packed tightly and a long step, where pivots take turns without end") {
+  const std::vector<Body> bodies = lattice(20, 20, 1e-6, false, 7);
+  std::vector<Contact> contacts;
+  find_pairs(bodies, 2e-2, contacts);
+  for (const double dt : {0.05, 0.2, 1.0}) {
+    System system(two_materials(dt, 1.0, 0.0));
+    std::vector<Vec3<double>> force(bodies.size()), torque(bodies.size());
+    const StepReport& report = system.step(bodies, contacts, 0.0, 1.0, force, torque);
+    CHECK(report.active > 300);
+    CHECK(report.certificate < 1e-14);
+    CHECK(report.block_steps < 13);  // block pivots alone exchange the set a thousand times
+    for (const ContactResult& c : system.contacts()) CHECK((c.normal_force >= 0.0 && c.opening >= 0.0 && c.normal_force * c.opening == 0.0));
+  }
 }
 
 TEST_CASE("the order of elimination: no fill on trees, not much more than minimum degree on a lattice") {

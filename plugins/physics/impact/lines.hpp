@@ -1,0 +1,222 @@
+// The rows of a step packed for sweeps over them: what is read and changed of each row lies together, in an order in which rows do not
+// wait for their neighbours. The matrix is never formed: rows act on each other by the shifts of their bodies.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "motion.hpp"
+
+namespace dembark {
+namespace impact {
+
+/// w = q + A z with A = diag(compliance) + scale G^T M'^-1 G; see system.hpp.
+/// Width: components that are kept of each vector, 2 or 4 (the last one zero).
+template <int Width>
+class Lines {
+ public:
+  using Vector = Eigen::Matrix<double, Width, 1>;
+  using Component = double Vec3<double>::*;
+
+  /// A row of the problem.
+  struct Line {
+    Vector normal;      ///< unit
+    double of_a, of_b;  ///< response of the bodies to a unit force, m/N
+    double compliance, inverse, root, q;  ///< inverse: 1 over the diagonal; root: of it
+    int a, b, row;
+  };
+
+  /// What a sweep reads of a row and changes, in the order of visiting: the step leads to z = keep z - q - pull (shift_a - shift_b).
+  struct Visit {
+    Vector pull, on_a, on_b;  ///< the normal over the row's diagonal; response of the bodies, m/N
+    double keep, q, z;        ///< share of the bodies in the diagonal; q over it, N; N
+    double base;              ///< N, what steps are compared with, but for z
+    Vector *a, *b;            ///< shifts of the bodies
+  };
+
+  /// The rows of a step, which must outlive its solves. bodies: with 1/m' as `inverse`; scale: h tau^2 (s^2); axes: three components, of
+  /// which the first `Width` are kept.
+  void prepare(const std::vector<Row>& rows, const std::vector<BodyResponse>& bodies, double scale, const Component* axes) {
+    rows_ = &rows;
+    bodies_ = &bodies;
+    scale_ = scale;
+    axes_ = axes;
+    built_ = false;
+    shift_.resize(bodies.size() + 1);  // walls are the last, which never moves
+  }
+
+  /// Begins a solve with the forces z. share: of what is added up in a row, that is rounding.
+  void start(const Eigen::VectorXd& q, double share, const Eigen::VectorXd& z) {
+    if (!built_) build(q, z);
+    double largest = 0.0;
+    for (Line& l : lines_) {
+      l.q = q[l.row];
+      const double push = std::max(-l.q, 0.0);
+      largest = std::max(largest, push * push * l.inverse);
+    }
+    floor_ = std::numeric_limits<double>::epsilon() / share * std::sqrt(largest);
+    for (std::size_t i = 0; i < near_; ++i) start(i, z[lines_[i].row]);
+    gather();
+  }
+
+  void store(Eigen::VectorXd& z) const {
+    for (std::size_t i = 0; i < near_; ++i) z[lines_[i].row] = visits_[i].z;
+    for (std::size_t i = near_; i < lines_.size(); ++i) z[lines_[i].row] = 0.0;
+  }
+
+  /// So many lines, the first, may carry a force and are swept over.
+  std::size_t near() const { return near_; }
+  std::size_t bodies() const { return shift_.size(); }
+  const Line& line(std::size_t i) const { return lines_[i]; }
+  double force(std::size_t i) const { return visits_[i].z; }
+  void set_force(std::size_t i, double z) { visits_[i].z = z; }
+  /// What the forces minimise (J), 1/2 z A z + q z; after gather().
+  double energy() const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < near_; ++i) sum += visits_[i].z * (lines_[i].q + opening(i));
+    return 0.5 * sum;
+  }
+  /// D (m) under the forces as gather() or the sweeps left the bodies.
+  double opening(std::size_t i) const { return lines_[i].q + lines_[i].compliance * visits_[i].z + gap(lines_[i]); }
+
+  /// Positions of the bodies after the step under the forces alone.
+  void gather() {
+    for (Vector& s : shift_) s.setZero();
+    for (std::size_t i = 0; i < near_; ++i) {
+      const Visit& v = visits_[i];
+      *v.a += v.z * v.on_a;
+      *v.b -= v.z * v.on_b;
+    }
+  }
+
+  /// One sweep of projected Gauss-Seidel; the largest step, in units of the row's own scale, where it is measured.
+  template <bool Measured>
+  double relax() {
+    double most = 0.0;
+    Visit* const end = visits_.data() + near_;
+    for (Visit* v = visits_.data(); v != end; ++v) {
+      const double old = v->z, free = v->keep * old - (v->q + v->pull.dot(*v->a - *v->b)), next = free > 0.0 ? free : 0.0;
+      const double step = next - old;
+      *v->a += step * v->on_a;
+      *v->b -= step * v->on_b;
+      v->z = next;
+      if (Measured) {
+        const double size = std::fabs(step), scale = v->base + next;
+        if (size > most * scale) most = size / scale;
+      }
+    }
+    return most;
+  }
+
+  /// Rows that are pushed together by others join the sweeps; false when there are none.
+  bool widen() {
+    const std::size_t before = near_;
+    for (std::size_t i = near_; i < lines_.size(); ++i) {
+      if (!(lines_[i].q + gap(lines_[i]) < 0.0)) continue;
+      std::swap(lines_[i], lines_[near_]);
+      place(near_);
+      start(near_++, 0.0);
+    }
+    return near_ > before;
+  }
+
+  /// w, and whether all conditions hold to rounding; those of the rows that no sweep visits do. After gather() and widen().
+  bool judge(double share, Eigen::VectorXd& w, double& certificate) {
+    double largest = 0.0, low = 0.0, product = 0.0, worst = 0.0;
+    for (std::size_t i = 0; i < near_; ++i) {
+      const Line& l = lines_[i];
+      const double z = visits_[i].z, whole = gap(l), own = (l.of_a + l.of_b) * z, give = l.compliance * z;
+      const double s = std::fabs(l.q) + own + give + std::fabs(whole - own);
+      const double opening = l.q + give + whole, below = std::max(-opening, 0.0);
+      const double beyond = std::max((z > 0.0 ? std::fabs(opening) : below) - share * s, 0.0);
+      largest = std::max(largest, s * s * l.inverse);
+      worst = std::max(worst, beyond * beyond * l.inverse);
+      low = std::max(low, below * below * l.inverse);
+      product += z * opening;
+      w[l.row] = z > 0.0 ? 0.0 : std::max(opening, 0.0);
+    }
+    constexpr double everywhere = std::numeric_limits<double>::epsilon();
+    if (!std::isfinite(product) || worst > everywhere * everywhere * largest) return false;
+    for (std::size_t i = near_; i < lines_.size(); ++i) w[lines_[i].row] = lines_[i].q + gap(lines_[i]);
+    certificate = largest > 0.0 ? std::max(std::sqrt(low / largest), std::fabs(product) / largest) : 0.0;
+    return true;
+  }
+
+ private:
+  static constexpr std::size_t parts = 8;
+
+  /// Rows that may carry a force come first. Contacts that follow each other share bodies, and each would wait for the last one: eight
+  /// parts of the list take turns.
+  void build(const Eigen::VectorXd& q, const Eigen::VectorXd& z) {
+    built_ = true;
+    order_.clear();
+    far_.clear();
+    for (int i = 0; i < int(rows_->size()); ++i) (q[i] < 0.0 || z[i] > 0.0 ? order_ : far_).push_back(i);
+    near_ = order_.size();
+    lines_.resize(rows_->size());
+    visits_.resize(rows_->size());
+    const std::size_t part = (near_ + parts - 1) / parts;
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < part; ++i)
+      for (std::size_t k = i; k < near_; k += part) set(at++, order_[k]);
+    for (const int k : far_) set(at++, k);
+  }
+
+  void set(std::size_t i, int row) {
+    const Row& r = (*rows_)[std::size_t(row)];
+    Line& l = lines_[i];
+    l.row = row;
+    l.a = r.a;
+    l.b = r.b >= 0 ? r.b : int(bodies_->size());
+    l.of_a = scale_ * (*bodies_)[std::size_t(r.a)].inverse;
+    l.of_b = r.b >= 0 ? scale_ * (*bodies_)[std::size_t(r.b)].inverse : 0.0;
+    l.normal.setZero();
+    for (int c = 0; c < std::min(Width, 3); ++c) l.normal[c] = r.normal.*axes_[c];
+    l.compliance = r.compliance;
+    l.inverse = 1.0 / (l.compliance + l.of_a + l.of_b);
+    l.root = std::sqrt(l.inverse);
+    if (i < near_) place(i);
+  }
+
+  /// The constant part of a visit.
+  void place(std::size_t i) {
+    const Line& l = lines_[i];
+    Visit& v = visits_[i];
+    v.pull = l.inverse * l.normal;
+    v.on_a = l.of_a * l.normal;
+    v.on_b = l.of_b * l.normal;
+    v.keep = (l.of_a + l.of_b) * l.inverse;
+    v.a = &shift_[std::size_t(l.a)];
+    v.b = &shift_[std::size_t(l.b)];
+  }
+
+  /// What this solve makes of it; z: where it begins.
+  void start(std::size_t i, double z) {
+    const Line& l = lines_[i];
+    Visit& v = visits_[i];
+    v.q = l.q * l.inverse;
+    v.z = z;
+    v.base = std::fabs(v.q) + floor_ * l.root;
+  }
+
+  double gap(const Line& l) const { return l.normal.dot(shift_[std::size_t(l.a)] - shift_[std::size_t(l.b)]); }
+
+  const std::vector<Row>* rows_ = nullptr;
+  const std::vector<BodyResponse>* bodies_ = nullptr;
+  const Component* axes_ = nullptr;
+  double scale_ = 0.0;
+  bool built_ = false;    ///< in this step
+  std::vector<Line, Eigen::aligned_allocator<Line>> lines_;
+  std::vector<Visit, Eigen::aligned_allocator<Visit>> visits_;
+  std::vector<Vector, Eigen::aligned_allocator<Vector>> shift_;
+  std::vector<int> order_, far_;
+  std::size_t near_ = 0;
+  double floor_ = 0.0;    ///< of a row's scale, over its root: steps below the last digit of the largest row are none
+};
+
+}  // namespace impact
+}  // namespace dembark
