@@ -198,12 +198,15 @@ class FieldSums:
         if not axes:
             return result
         mass = grains[..., MASS, None, None]
-        spread = ratio(full_tensor(grains[..., SPREAD]), mass[..., 0, 0]) - centre[..., :, None] * centre[..., None, :]
+        moment = ratio(full_tensor(grains[..., SPREAD]), mass[..., 0, 0])
+        spread = moment - centre[..., :, None] * centre[..., None, :]
         shear = ratio(grains[..., SHEAR].reshape(*self.grid.shape, 3, 3), mass[..., 0, 0]) - mean[..., :, None] * centre[..., None, :]
         spread, shear = spread[..., axes, :][..., axes], shear[..., axes]
         seen = np.isfinite(spread).all(axis=(-2, -1))
-        # In a dense packing the spread is at least the kernel's variance; a millionth of it is what round-off leaves.
-        seen[seen] = np.linalg.eigvalsh(spread[seen])[:, 0] > 1e-6 * self.kernel.variance
+        # In a dense packing the spread is at least the kernel's variance. A millionth of it is what round-off leaves, or, of kernels that
+        # are narrow beside the cells, the last digits of the moment that the square of the centre was taken off.
+        rounding = 1e-12 * np.trace(moment[seen], axis1=-2, axis2=-1)
+        seen[seen] = np.linalg.eigvalsh(spread[seen])[:, 0] > np.maximum(1e-6 * self.kernel.variance, rounding)
         result[...] = np.nan
         found = np.zeros((int(seen.sum()), 3, 3))
         found[..., axes] = np.swapaxes(np.linalg.solve(spread[seen], np.swapaxes(shear[seen], -1, -2)), -1, -2)
