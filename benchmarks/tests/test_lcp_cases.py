@@ -51,3 +51,13 @@ def test_small_measurement(tmp_path):
     text = (tmp_path / "lcp.md").read_text(encoding="utf-8")
     assert "| coupled | 10 | dembark energy |" in text
     assert {path.name for path in tmp_path.iterdir()} == {"lcp.csv", "lcp.json", "lcp.md", "lcp.png"}
+
+
+@pytest.mark.parametrize("compliance", [1e-3, 1e-5, 1e-7, 1e-9])
+def test_networks_that_are_rigid_against_a_step_need_no_single_pivots(compliance):
+    """Far beyond the stiffness that is measured: block pivots stall there."""
+    problem = network(800, compliance=compliance)
+    result = solve_lcp(problem.M, problem.q)
+    assert (result.status, result.pivots) == ("solved", 0)
+    assert result.block_steps < 100
+    assert certificate(problem, result.z) < 1e-12

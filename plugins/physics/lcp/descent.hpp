@@ -28,23 +28,20 @@ class Descent {
   void run(const Matrix& m, Unknowns& u) {
     for (double& z : u.z) z = std::max(z, 0.0);
     bool same = false;
-    for (int face = 0; face < most_faces; ++face) {
+    for (Index face = 0; face < m.n + least_faces; ++face) {
       for (int sweep = 0; sweep < 3; ++sweep) gauss_seidel_sweep(m, u.q, u.z);
       same = take(u);
       const double before = energy(m, u);
-      minimise(m, u, same ? close : fall);
+      const bool reached = minimise(m, u, same ? close : fall);
       begin_ = u.z;
-      bool cut = false;
-      for (double part = 1.0;; part *= 0.5) {
-        cut = apply(u, part);
-        if (!cut || part < 1e-3 || energy(m, u) < before) break;
-      }
-      if (same && !cut) return;
+      const bool cut = apply(u, 1.0);
+      if (same && reached && !cut) return;
+      for (double part = 0.5; cut && part > 1e-3 && !(energy(m, u) < before); part *= 0.5) apply(u, part);
     }
   }
 
  private:
-  static constexpr int most_faces = 300;
+  static constexpr Index least_faces = 300;  ///< so many and as many as unknowns are looked at
   static constexpr double fall = 0.2, close = 1e-8;  ///< of the residual: while the face changes, and after that
 
   /// The face of the positive entries; whether it is the last one.
@@ -67,9 +64,9 @@ class Descent {
     return 0.5 * sum;
   }
 
-  /// The step on the face that brings its residual down to `goal` of what it is, by conjugate gradients scaled with the diagonal; less
-  /// where it clearly leads below 0.
-  void minimise(const Matrix& m, const Unknowns& u, double goal) {
+  /// The step on the face that brings its residual down to `goal` of what it is, by conjugate gradients scaled with the diagonal. False
+  /// where it is less, for it clearly leads below 0.
+  bool minimise(const Matrix& m, const Unknowns& u, double goal) {
     const std::size_t n = u.z.size();
     step_.assign(n, 0.0), direction_.assign(n, 0.0), residual_.assign(n, 0.0), image_.resize(n);
     double square = 0.0, share = 0.0;
@@ -98,8 +95,9 @@ class Descent {
       }
       share = next / square;
       square = next;
-      if (turn % 8 == 7 && lowest(u) < -2.0 * std::sqrt(square)) return;
+      if (turn % 8 == 7 && lowest(u) < -2.0 * std::sqrt(square)) return false;
     }
+    return square <= enough;
   }
 
   /// The least unknown after the step, in units of the residual.

@@ -225,7 +225,7 @@ def test_degenerate(method):
 
 
 def test_rules_that_stall_are_guarded():
-    """Block steps that go round in a circle hand over to single pivots, and say so."""
+    """Block steps that go round in a circle begin elsewhere, and say so."""
     M = np.array(CYCLE_M)  # noqa: N806
     q = np.array(CYCLE_Q)
     result = solve_lcp(M, q, method="block", start=CYCLE_START)
