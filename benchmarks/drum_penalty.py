@@ -12,7 +12,7 @@ given as omega tau, omega = sqrt(log stiffness / mass of the thinnest log), the 
   the reference is the mean of both laws without numerical loss at the two smallest steps.
 
 - `many`: the same turning drum with 1000 logs, in a drum as large and as fast as gives the same filling and Froude number; with logs of the
-  given stiffness and of one 16 times as large.
+  given stiffness, and 16 and 64 times as stiff.
 
 Cost is the engine's processor time for a second of simulated time, in runs of their own that write nothing, less the start of the engine:
 the fall of the logs and the first turn, medians of three rounds in which all laws and steps take turns. `--prices` measures it again.
@@ -27,7 +27,7 @@ import resource
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,10 +42,16 @@ STIFFNESS, SHELL, DAMPING, GRAVITY, SPEED = 1e7, 5e7, 3000.0, 9.81, 1.2
 STEPS = (0.05, 0.1, 0.2, 0.5, 1.0, 1.9, 4.0)
 LARGE_STEPS = (0.1, 0.2, 0.5, 1.0, 1.9, 4.0, 8.0, 16.0)  # of the turning drum
 REVOLUTIONS = 5  # of it, the first of which is left out
-MANY, STIFFER = 1000, 16.0
-MANY_STEPS = {"penalty": (0.2, 0.5, 1.0, 1.9), "theta 1": (0.2, 1.0, 2.0, 4.0, 8.0, 16.0), "theta 0.5": (0.2, 1.0, 4.0)}
-MANY_STIFF_STEPS = {"penalty": (1.0,), "theta 1": (32.0, 64.0)}  # as long as those of 0.25, 8 and 16 above
+MANY = 1000
+SKIN = 0.08  # m, of the neighbour lists: the penalty law's cheapest at its largest step; the fix costs the same with any
 LAWS = {"theta 1": "fix lcp/impact, θ = 1", "theta 0.5": "fix lcp/impact, θ = ½", "penalty": "hooke/stiffness"}
+MANY_LAWS = {**LAWS, "theta 1 sweeps 5": "fix lcp/impact, θ = 1, 5 sweeps of friction"}
+MANY_STEPS = {  # of 1000 logs, by their stiffness; 8 of the first is as long as 32 and 64 of the others
+    1.0: {"penalty": (0.2, 0.5, 1.0, 1.9), "theta 1": (0.2, 1.0, 2.0, 4.0, 8.0, 16.0), "theta 0.5": (0.2, 1.0, 4.0),
+          "theta 1 sweeps 5": (8.0, 16.0, 32.0)},
+    16.0: {"penalty": (1.0,), "theta 1": (32.0, 64.0), "theta 1 sweeps 5": (32.0, 64.0)},
+    64.0: {"penalty": (1.0,), "theta 1": (64.0, 128.0), "theta 1 sweeps 5": (64.0, 128.0)},
+}
 TOLERANCE = 0.1
 
 
@@ -104,7 +110,7 @@ def deck(law: str, step: float, seconds: float, rows: int, *, turning: bool, cou
     lines = ["units si", "atom_style granular", "atom_modify map array sort 0 0.0", "boundary f f f", "newton off",
              "communicate single vel yes",
              f"region domain block {-1.1 * radius} {1.1 * radius} {-1.1 * radius} {1.1 * radius} -0.2 0.2 units box", "create_box 2 domain",
-             "neighbor 0.02 bin", "neigh_modify delay 0", f"timestep {step!r}"]
+             f"neighbor {SKIN} bin", "neigh_modify delay 0", f"timestep {step!r}"]
     for number, ((x, y), diameter) in enumerate(zip(places, diameters, strict=True), 1):
         lines += [f"create_atoms 1 single {float(x)!r} {float(y)!r} 0 units box",
                   f"set atom {number} diameter {float(diameter)!r} density {1.5 * DENSITY / float(diameter)!r}"]
@@ -125,7 +131,7 @@ def deck(law: str, step: float, seconds: float, rows: int, *, turning: bool, cou
                   f"{radius!r} 0 0 shear x {speed!r} absolute_damping on tangential_damping off limitForce on"]
         elastic = "0"
     else:
-        lines += [weight, f"fix hits all lcp/impact stiffness {log} {log} contact_damping {damping} theta {law.split()[1]} "
+        lines += [weight, f"fix hits all lcp/impact stiffness {log} {log} contact_damping {damping} {law} "
                   f"friction {friction} tangential_ratio {1 / 3.5!r} inertia sphere "
                   f"wall cylinder shell z 0 0 {radius!r} stiffness {shell} friction {1.5 * friction} omega {speed!r}"]
         elastic = "f_hits[7]"
@@ -213,7 +219,7 @@ def turning(law: str, turn: float, *, count: int = LOGS, stiffer: float = 1.0, r
 def many(report: Callable[[dict[str, Any]], None]) -> list[dict[str, Any]]:
     """The turning drum with 1000 logs."""
     found = []
-    for stiffer, steps in ((1.0, MANY_STEPS), (STIFFER, MANY_STIFF_STEPS)):
+    for stiffer, steps in MANY_STEPS.items():
         for law, turns in steps.items():
             for turn in turns:
                 found.append(turning(law, turn, count=MANY, stiffer=stiffer, revolutions=4))
@@ -250,7 +256,7 @@ def prices(found: dict[str, Any]) -> None:
 def reference_of(entries: Sequence[dict[str, Any]], name: str) -> tuple[float, float]:
     """Mean and half-width of `name` at the two smallest steps of the two laws without numerical loss."""
     small = sorted({one["turn"] for one in entries})[:2]
-    chosen = [one[name] for one in entries if one["law"] != "theta 1" and one["turn"] in small and "failed" not in one]
+    chosen = [one[name] for one in entries if one["law"] in ("theta 0.5", "penalty") and one["turn"] in small and "failed" not in one]
     return float(np.mean([mean for mean, _ in chosen])), math.hypot(*(half for _, half in chosen)) / len(chosen)
 
 
@@ -267,16 +273,16 @@ def usable(entries: Sequence[dict[str, Any]], references: dict[str, tuple[float,
     return largest
 
 
-def judge(runs: Sequence[dict[str, Any]]) -> dict[str, dict[str, float | None]]:
+def judge(runs: Sequence[dict[str, Any]], laws: Iterable[str]) -> dict[str, dict[str, float | None]]:
     """The largest usable step of each law, for motion and for forces."""
     return {law: {what: usable([one for one in runs if one["law"] == law], {name: reference_of(runs, name) for name in names})
-                  for what, names in (("motion", ("moment", "kinetic")), ("forces", ("force",)))} for law in LAWS}
+                  for what, names in (("motion", ("moment", "kinetic")), ("forces", ("force",)))} for law in laws}
 
 
 def conclude(found: dict[str, Any]) -> None:
     """Add the largest usable steps to `found`."""
-    found["usable"] = judge(found["turning"])
-    found["usable_many"] = judge([one for one in found["many"] if one["stiffer"] == 1.0])
+    found["usable"] = judge(found["turning"], LAWS)
+    found["usable_many"] = judge([one for one in found["many"] if one["stiffer"] == 1.0], MANY_LAWS)
 
 
 def cells(entry: dict[str, Any] | None, decimals: int = 0) -> list[str]:
@@ -309,7 +315,7 @@ def markdown_many(found: dict[str, Any]) -> str:
     for one in found["many"]:
         means = {name: [1e-3 * value for value in one[name]] for name in ("moment", "kinetic", "force") if name in one}
         name = "as above" if one["stiffer"] == 1.0 else f"× {one['stiffer']:g}"
-        lines.append(f"| {name} | {one['turn']:g} | {LAWS[one['law']]} | " + " | ".join(cells({**one, **means}, 2)) + " |")
+        lines.append(f"| {name} | {one['turn']:g} | {MANY_LAWS[one['law']]} | " + " | ".join(cells({**one, **means}, 2)) + " |")
     return "\n".join(lines)
 
 
@@ -347,9 +353,10 @@ def main(words: list[str]) -> int:
     parser.add_argument("--out", type=Path, default=Path("docs/figures/drum_penalty.json"))
     parser.add_argument("--figure", type=Path, default=Path("docs/figures/drum_penalty.png"))
     parser.add_argument("--redraw", action="store_true", help="only judge and draw what --out holds")
+    parser.add_argument("--many", action="store_true", help="of the runs of --out only those with 1000 logs again, and all prices")
     parser.add_argument("--prices", action="store_true", help="only measure again what the runs of --out cost")
     options = parser.parse_args(words)
-    if not (options.redraw or options.prices):
+    if not (options.redraw or options.prices or options.many):
         fine = (*np.geomspace(0.01, 0.2, 8), *np.linspace(0.3, 2.0, 18))
         found: dict[str, Any] = {"logs": LOGS, "omega": highest_frequency(), "pair": [], "closed": [], "turning": []}
         for law in LAWS:
@@ -362,9 +369,10 @@ def main(words: list[str]) -> int:
             for turn in LARGE_STEPS:
                 found["turning"].append(turning(law, turn))
                 print(json.dumps(found["turning"][-1]), flush=True)
-        found["many"] = many(lambda entry: print(json.dumps(entry), flush=True))
     else:
         found = json.loads(options.out.read_text(encoding="utf-8"))
+    if options.many or not (options.redraw or options.prices):
+        found["many"] = many(lambda entry: print(json.dumps(entry), flush=True))
     if not options.redraw:
         prices(found)
     conclude(found)
