@@ -248,7 +248,7 @@ def price(entries: Sequence[dict[str, Any]], seconds: float, *, turning: bool, c
 
 def prices(found: dict[str, Any]) -> None:
     """The cost of everything in `found`."""
-    price(found["closed"], 1.0, turning=False, count=LOGS)
+    price(found["closed"], 5.0, turning=False, count=LOGS)
     price(found["turning"], 5.0, turning=True, count=LOGS)
     price(found["many"], 5.0, turning=True, count=MANY)
 
