@@ -356,7 +356,8 @@ def main(words: list[str]) -> int:
     parser.add_argument("--many", action="store_true", help="of the runs of --out only those with 1000 logs again, and all prices")
     parser.add_argument("--prices", action="store_true", help="only measure again what the runs of --out cost")
     options = parser.parse_args(words)
-    if not (options.redraw or options.prices or options.many):
+    anew = not (options.redraw or options.prices or options.many)
+    if anew:
         fine = (*np.geomspace(0.01, 0.2, 8), *np.linspace(0.3, 2.0, 18))
         found: dict[str, Any] = {"logs": LOGS, "omega": highest_frequency(), "pair": [], "closed": [], "turning": []}
         for law in LAWS:
@@ -371,7 +372,7 @@ def main(words: list[str]) -> int:
                 print(json.dumps(found["turning"][-1]), flush=True)
     else:
         found = json.loads(options.out.read_text(encoding="utf-8"))
-    if options.many or not (options.redraw or options.prices):
+    if anew or options.many:
         found["many"] = many(lambda entry: print(json.dumps(entry), flush=True))
     if not options.redraw:
         prices(found)

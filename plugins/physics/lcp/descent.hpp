@@ -27,10 +27,9 @@ class Descent {
   /// Leaves in u.active the set that was found, from the positive entries of u.z: a guess that block pivots have to prove.
   void run(const Matrix& m, Unknowns& u) {
     for (double& z : u.z) z = std::max(z, 0.0);
-    bool same = false;
     for (Index face = 0; face < m.n + least_faces; ++face) {
       for (int sweep = 0; sweep < 3; ++sweep) gauss_seidel_sweep(m, u.q, u.z);
-      same = take(u);
+      const bool same = take(u);
       const double before = energy(m, u);
       const bool reached = minimise(m, u, same ? close : fall);
       begin_ = u.z;

@@ -221,6 +221,11 @@ TEST_CASE("elimination from any set finds the solution of the solver, or says th
     if (!Elimination().solve(p.rows, p.response, p.scale, p.share, p.q, active, z, w, certificate, steps)) continue;
     ++solved;
     p.check(z, w, certificate);
+    LcpSolver solver;
+    const LcpResult& result = solver.solve(p.matrix(), p.q);
+    CHECK((z - result.z).norm() <= 1e-10 * result.z.norm());
+    CHECK((w - result.w).norm() <= 1e-10 * p.q.norm());
+    for (Eigen::Index i = 0; i < z.size(); ++i) CHECK((z[i] > 0.0) == (result.z[i] > 0.0));
   }
   CHECK(solved > 25);
   // A matrix without compliance and with more contacts than the bodies can move is singular: refused, not solved wrongly.
