@@ -26,7 +26,7 @@ packages=(
 # YADE: what its build and its Python need; a group's own YADE brings its own.
 if [ -z "${YADE_PREFIX:-}" ]; then
   packages+=(
-    libboost-all-dev libgts-dev libloki-dev libbz2-dev zlib1g-dev libxi-dev freeglut3-dev libxmu-dev bzip2
+    libboost-all-dev libgts-dev libloki-dev libbz2-dev zlib1g-dev libxi-dev freeglut3-dev libxmu-dev bzip2 libsqlite3-dev
     python3-numpy python3-matplotlib python3-ipython python3-pygraphviz python3-tk python3-mpmath python3-pil python3-xlib
     python3-future python3-sphinx
   )
