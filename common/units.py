@@ -1,8 +1,12 @@
-"""Numbers as users write them: `0.02`, `20 mm`, `30 deg`, `5e6 Pa`; returned in the SI unit that a parameter declares."""
+"""Numbers as users write them: `0.02`, `20 mm`, `30 deg`, `1/2`; returned in the SI unit that a parameter declares.
+
+What counts as a number is decided here and nowhere else. The unit library alone would take `0,3` for 0, `4.5.6` for 2.7 and `9 81` for 729.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -10,6 +14,16 @@ from dembark.common.errors import DembarkError
 
 if TYPE_CHECKING:
     import pint
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+# A number or a fraction of two, then a unit, in which a digit can only be part of a power.
+_VALUE = re.compile(rf"\s*(?P<number>{_NUMBER}(?:\s*/\s*{_NUMBER})?)\s*\*?\s*(?P<unit>[^\W\d].*|[%°].*|)\s*")
+_IN_UNIT = re.compile(r"(?:[^\W\d]+\d?|[%°]|(?:\^|\*\*)\s*\(?[-+]?\d+(?:\.\d+)?\)?|[*/·()]|\s+)*")
+_POWER = re.compile(r"([^\W\d]+)(\d)")
+_EXAMPLES = {"m": "4 mm", "m^2": "4 mm^2", "m^3": "0.08 mm^3", "s": "2 ms", "m/s": "2 cm/s", "m/s^2": "9.81 m/s^2", "kg": "2 g",
+             "kg/m^3": "2.5 g/cm^3", "Pa": "5 MPa", "Pa*s": "1 mPa*s", "N": "2 mN", "N/m": "72 mN/m", "rad": "20 deg", "rad/s": "14 rpm",
+             "1": "0.3"}
+
 
 @cache
 def _registry() -> pint.UnitRegistry:
@@ -34,28 +48,72 @@ def known_unit(unit: str) -> bool:
     return True
 
 
-def to_si(text: str, unit: str) -> float:
-    """Value of `text` in `unit` (`1` = dimensionless); a plain number is already in that unit.
+def example(unit: str) -> str:
+    """A value in `unit` as a user may write it: `'4 mm'` for m, `0.3` for `1`."""
+    return _EXAMPLES["1"] if unit == "1" else repr(_EXAMPLES.get(unit, f"5 {unit}"))
 
-    Angles count as a dimension of their own: `30 deg` is refused where a plain ratio is wanted.
-    Raises DembarkError when the text is no number, has an unknown unit or one of another dimension.
+
+def refuse_comma(text: str, name: str = "") -> None:
+    """DembarkError when the number `text` has a comma; `name` is what it was given for."""
+    if "," in text:
+        right = f"write the decimal point: {text.strip().replace(',', '.')}"
+        if text.count(",") > 1 or "." in text:
+            right = f"write a decimal point and nothing between thousands: {example('1')} or 1000.5"
+        raise DembarkError(f"{name}: {text!r} has a comma; {right}" if name else f"{text!r} has a comma; {right}")
+
+
+def finite(value: float, name: str = "", text: str = "") -> float:
+    """`value`, given for `name` as `text`, when it is finite; DembarkError for nan, inf and what is too large for a number (1e400)."""
+    if math.isfinite(value):
+        return value
+    raise DembarkError(f"{name} = {text or value}: give a finite number" if name else f"{text or str(value)!r}: give a finite number")
+
+
+def to_si(text: str, unit: str, name: str = "") -> float:
+    """Value of `text` in `unit` (`1` = dimensionless); a plain number is already in that unit. `name` is what it was given for.
+
+    Angles count as a dimension of their own: `30 deg` is refused where a plain ratio is wanted. Raises DembarkError when the text is no
+    finite number, has a comma, an unknown unit or one of another dimension, or when it is a unit without a number.
     """
+    refuse_comma(text, name)
     try:
-        return float(text)
+        return finite(float(text), name, text.strip())
     except ValueError:
         pass
-    wanted = "a plain number" if unit == "1" else f"a number in {unit} or with a unit that converts to {unit}"
+    head = f"{name}: " if name else ""
+    shown = repr(text.strip())
+    match = _VALUE.fullmatch(text)
+    if match is None or not _IN_UNIT.fullmatch(match["unit"]):
+        if _IN_UNIT.fullmatch(text.strip()) and text.strip() and known_unit(text.strip()) and unit != "1":
+            raise DembarkError(f"{name} = {text.strip()}: give a number with it, e.g. {example(unit)}" if name else
+                               f"{shown} is a unit without a number; give e.g. {example(unit)}")
+        kind = "plain number" if unit == "1" else "number, with or without a unit"
+        raise DembarkError(f"{head}{shown} is no {kind}; give e.g. {example(unit)}")
+    value = _converted(match["number"], match["unit"].strip(), unit, head, shown)
+    return finite(value, name, text.strip())
+
+
+def _converted(number: str, given: str, unit: str, head: str, shown: str) -> float:
+    first, _, second = number.partition("/")
     try:
-        quantity = _registry().Quantity(text)
+        factor = float(first) / (float(second) if second else 1.0)
+    except ZeroDivisionError:
+        raise DembarkError(f"{head}{shown} divides by zero; give e.g. {example(unit)}") from None
+    import pint
+
+    try:
+        quantity = _registry().Quantity(factor, given)
         target = _registry().Unit("" if unit == "1" else unit)
         # 15 digits: 72 mN/m shall be the same input as 0.072 N/m.
-        magnitude = float(f"{quantity.to(target).magnitude:.15g}")
-        same_angle = quantity.unitless or _angle_power(quantity) == _angle_power(1 * target)
-    except Exception as error:  # pint raises its own kinds and those of Python's tokeniser
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise DembarkError(f"{text!r} is no value here ({reason})", f"wanted is {wanted}") from None
-    if not same_angle:
-        raise DembarkError(f"{text!r} mixes up angles and plain ratios", f"wanted is {wanted}")
-    if math.isnan(magnitude):
-        raise DembarkError(f"{text!r} is not a number", f"wanted is {wanted}")
-    return magnitude
+        value = float(f"{quantity.to(target).magnitude:.15g}")
+    except pint.UndefinedUnitError:
+        # People write m3 where the library wants m^3.
+        mended = _POWER.sub(r"\1^\2", given)
+        right = f"write the power with ^: '{number} {mended}'" if mended != given and known_unit(mended) else f"give e.g. {example(unit)}"
+        raise DembarkError(f"{head}unknown unit {given!r} in {shown}; {right}") from None
+    except Exception:  # the library raises its own kinds and those of Python's tokeniser
+        raise DembarkError(f"{head}cannot convert {shown} to {'a plain number' if unit == '1' else unit}; "
+                           f"give e.g. {example(unit)}") from None
+    if not quantity.unitless and _angle_power(quantity) != _angle_power(1 * target):
+        raise DembarkError(f"{head}{shown} mixes up angles and plain ratios; give e.g. {example(unit)}")
+    return value

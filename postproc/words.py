@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from dembark.common.errors import DembarkError
-from dembark.common.units import to_si
+from dembark.common.units import finite, to_si
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.sources import Reading
 from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, Motion, PlaneWall, Wall
@@ -28,13 +28,7 @@ _KINDS: Mapping[str, tuple[str, ...]] = {
 
 def number(text: str, unit: str, what: str) -> float:
     """`text` in `unit` (SI), with or without a unit of its own; DembarkError naming `what`."""
-    try:
-        value = to_si(text, unit)
-    except DembarkError as error:
-        raise DembarkError(str(error), f"in {what}") from None
-    if not np.isfinite(value):
-        raise DembarkError(f"{text!r} is not finite", f"in {what}")
-    return value
+    return to_si(text, unit, what)
 
 
 def length(text: str, diameter: float, what: str) -> float:
@@ -47,7 +41,7 @@ def length(text: str, diameter: float, what: str) -> float:
 
 def _place(text: str, diameter: float, what: str) -> float:
     match = _DIAMETERS.fullmatch(text)
-    return float(match.group(1)) * diameter if match else number(text, "m", what)
+    return finite(float(match.group(1)), what, text) * diameter if match else number(text, "m", what)
 
 
 def counts(text: str) -> tuple[int, int, int]:

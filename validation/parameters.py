@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import difflib
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from dembark.common.errors import DembarkError
-from dembark.common.units import to_si
+from dembark.common.units import finite, to_si
 
 Value = float | int | str | None
 UNSET = "auto"
@@ -65,19 +64,16 @@ def checked(parameter: Parameter, value: Value) -> Value:
         if value not in parameter.values:
             raise DembarkError(f"{parameter.name} = {value!r} is not allowed", f"allowed are {parameter.range}")
         return value
-    if isinstance(value, str):
-        try:
-            value = to_si(value, parameter.unit)
-        except DembarkError as error:
-            raise DembarkError(f"{parameter.name}: {error}") from None
-    if math.isnan(value):
-        raise DembarkError(f"{parameter.name} is not a number", f"wanted is a {parameter.type}")
+    if isinstance(value, str) and not (value == "inf" == str(parameter.value)):
+        value = to_si(value, parameter.unit, parameter.name)
+    value = float(value) if parameter.type == "float" else value
+    # Only a case itself may mean "unlimited", by an infinite default; nan differs from everything.
+    if value != parameter.value or parameter.type == "int":
+        finite(value, parameter.name)
     if parameter.type == "int":
-        if not math.isfinite(value) or value != int(value):
+        if value != int(value):
             raise DembarkError(f"{parameter.name} = {value!r} is not a whole number", parameter.range)
         value = int(value)
-    else:
-        value = float(value)
     low = parameter.min is not None and (value <= parameter.min if parameter.exclusive_min else value < parameter.min)
     high = parameter.max is not None and (value >= parameter.max if parameter.exclusive_max else value > parameter.max)
     if low or high:

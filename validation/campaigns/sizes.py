@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 
 from dembark.common.errors import DembarkError
+from dembark.common.units import refuse_comma
 
 _TIMES = {"s": 1.0, "sec": 1.0, "min": 60.0, "h": 3600.0, "hour": 3600.0, "hours": 3600.0, "d": 86400.0, "day": 86400.0, "days": 86400.0}
 _SIZES = {"kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12, "KiB": 2.0**10, "MiB": 2.0**20, "GiB": 2.0**30, "TiB": 2.0**40}
@@ -24,8 +25,15 @@ def _total(text: str, units: Mapping[str, float]) -> float:
     return total
 
 
+def _refuse_decimal_comma(text: str) -> None:
+    # A comma between two durations is another mistake.
+    if re.search(r"\d,\d", text):
+        refuse_comma(text)
+
+
 def seconds(text: str) -> float:
     """A positive duration in s, of a text such as `90 s`, `10 min`, `2 h 30 min`, `1 d`; DembarkError when it is none."""
+    _refuse_decimal_comma(text)
     try:
         return _total(text, _TIMES)
     except ValueError:
@@ -35,6 +43,7 @@ def seconds(text: str) -> float:
 
 def size(text: str) -> float:
     """A positive amount of memory in bytes, of a text such as `800 MB`, `1.5 GB`, `2 GiB`; DembarkError when it is none."""
+    _refuse_decimal_comma(text)
     try:
         return _total(text, _SIZES)
     except ValueError:

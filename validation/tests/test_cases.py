@@ -47,10 +47,20 @@ def test_order_of_overrides(decks: Path) -> None:
     ("grain_diameter=3 furlongz", ["furlongz"]),
     ("grain_diameter=0", ["out of range", "> 0"]),
     ("grain_diameter=-1 mm", ["out of range", "> 0"]),
-    ("grain_diameter=nan", ["not a number"]),
+    ("grain_diameter=nan", ["grain_diameter = nan: give a finite number"]),
+    ("grain_diameter=1e400", ["grain_diameter = 1e400: give a finite number"]),
+    ("grain_diameter=4,5 mm", ["grain_diameter: '4,5 mm' has a comma; write the decimal point: 4.5 mm"]),
+    ("grain_diameter=1,234.5", ["has a comma"]),
+    ("grain_diameter=1'000", ["grain_diameter: \"1'000\" is no number"]),
+    ("grain_diameter=4.5.6", ["'4.5.6' is no number"]),
+    ("grain_diameter=4 5 mm", ["'4 5 mm' is no number"]),
+    ("grain_diameter=mm", ["grain_diameter = mm: give a number with it, e.g. '4 mm'"]),
+    ("grain_diameter=4 kg", ["cannot convert '4 kg' to m; give e.g. '4 mm'"]),
+    ("grain_count=1,000", ["grain_count: '1,000' has a comma"]),
+    ("strength=-inf", ["strength = -inf: give a finite number"]),
     ("grain_diameter=auto", ["must have a value"]),
     ("grain_count=2.5", ["whole number"]),
-    ("grain_count=inf", ["whole number"]),
+    ("grain_count=inf", ["grain_count = inf: give a finite number"]),
     ("contact_angle=95 deg", ["out of range"]),
     ("static_friction=30 deg", ["angles"]),
     ("behaviour=explode", ["allowed are", "truncate"]),
@@ -138,11 +148,13 @@ def test_seeds_of_replicas_differ_and_the_first_is_the_decks_own(decks: Path) ->
 
 def test_infinity_becomes_a_number_that_json_and_the_engines_can_carry(decks: Path) -> None:
     assert portable(resolve(find("box")))["strength"] == 1e300
+    # Where the case itself has no limit, its word for that may be written.
+    assert portable(resolve(find("box"), changes=settings(["strength=inf"])))["strength"] == 1e300
 
 
 @pytest.mark.parametrize(("text", "unit", "value"), [
     ("20 mm", "m", 0.02), ("72 mN/m", "N/m", 0.072), ("5 MPa", "Pa", 5e6), ("30 deg", "rad", math.pi / 6), ("5 %", "1", 0.05),
-    ("1/2", "1", 0.5), ("20 degC", "K", 293.15), ("0.3", "m", 0.3)])
+    ("1/2", "1", 0.5), ("2.5 g/cm^3", "kg/m^3", 2500.0), ("9.81 m s^-2", "m/s^2", 9.81), ("-4*mm", "m", -0.004), ("20°", "rad", math.pi / 9), ("20 degC", "K", 293.15), ("0.3", "m", 0.3)])
 def test_units(text: str, unit: str, value: float) -> None:
     assert to_si(text, unit) == pytest.approx(value, rel=1e-15)
 
