@@ -24,6 +24,8 @@ _KINDS: Mapping[str, tuple[str, ...]] = {
     "mesh": ("file", "unit", "velocity", "since", "by"),
     "inclusion": ("ids", "surface", "radius", "axis", "around", "along", "patch"),
 }
+# Units of length that STL files come in, in m.
+STL_UNITS = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 
 
 def number(text: str, unit: str, what: str) -> float:
@@ -99,10 +101,11 @@ def reading(time_step: str | None, density: str | None, columns: str | None, con
 
 @dataclass(frozen=True)
 class WallWord:
-    """A wall as the user wrote it, and how its patches are made for a frame."""
+    """A wall as the user wrote it, how its patches are made for a frame, and the unit (m) that the file of a mesh was read in."""
 
     wall: Wall | Inclusion
     patches: Callable[[GrainFrame, float], Patches]
+    unit: float = 1.0
 
 
 def plain(wall: Wall) -> WallWord:
@@ -153,7 +156,7 @@ class _Builder:
 
         def patches(frame: GrainFrame, size: float) -> Patches:
             return _patches(wall, frame, sizes.get("patch", size), spans, numbers, self.options.get("by", "triangle"))
-        return WallWord(wall, patches)
+        return WallWord(wall, patches, self._unit() if self.kind == "mesh" else 1.0)
 
     def _vector(self, key: str, unit: str, default: tuple[float, float, float]) -> tuple[float, float, float]:
         text = self.options.get(key)
@@ -192,9 +195,13 @@ class _Builder:
     def _mesh(self) -> MeshWall:
         if self.options.get("by", "triangle") not in ("triangle", "group"):
             raise DembarkError(f"patches by {self.options['by']!r}", f"in {self.where}", "they are by triangle or by group")
+        return MeshWall.from_stl(self.name, Path(self._needed("file")), scale=self._unit(), motion=self._motion())
+
+    def _unit(self) -> float:
         unit = self.options.get("unit", "m")
-        scale = length(f"1 {unit}", self.diameter, f"{self.where}, unit")
-        return MeshWall.from_stl(self.name, Path(self._needed("file")), scale=scale, motion=self._motion())
+        if unit not in (*STL_UNITS, "d"):
+            raise DembarkError(f"unit={unit}", f"in {self.where}", f"it must be {', '.join(STL_UNITS)} or d (mean diameters)")
+        return STL_UNITS.get(unit, self.diameter)
 
     def _inclusion(self) -> Inclusion:
         ids: list[int] = []

@@ -21,7 +21,7 @@ from dembark.postproc.output.vtkhdf import FieldsVtkhdf, GrainsVtkhdf
 from dembark.postproc.output.whole import Selection
 from dembark.postproc.sources import Reading, Source
 from dembark.postproc.walls import Inclusion, wall_contacts
-from dembark.postproc.walls.run import begin, check_inclusions, check_outputs, choose_walls, recorders_of, source_lines, wall_lines
+from dembark.postproc.walls.run import begin, check_inclusions, check_meshes, check_outputs, choose_walls, recorders_of, source_lines, wall_lines
 from dembark.postproc.walls.stress import WallStress
 from dembark.postproc.words import WallWord, counts, length, near, span
 from numpy.typing import NDArray
@@ -103,6 +103,7 @@ class FieldJob:
         kernel = None if words.cells else Kernel(words.kernel, length(words.width, diameter, "--width"))
         walls = choose_walls(words.walls, source, first, diameter)
         check_inclusions(walls, source)
+        check_meshes(walls, source, first)
         if words.cells and source.contacts is None:
             raise DembarkError("cell averages need contacts", f"{words.source} has none", "name their dump with --contacts")
         grid = _grid([first, source.grains[numbers[-1]]], words, diameter, kernel.reach if kernel else 0.0)

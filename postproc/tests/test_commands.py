@@ -132,11 +132,16 @@ def test_walls_of_a_run(run, capsys):
     assert (run.parent / "w.vtkhdf").is_file()
 
 
-def test_several_walls_and_an_inclusion(run, capsys):
-    corner = np.array([[0.0, 0.0, 0.0], [0.04, 0.0, 0.0], [0.04, 0.04, 0.0], [0.0, 0.04, 0.0]])
-    facets = "".join("facet normal 0 0 1\nouter loop\n" + "".join("vertex {:g} {:g} {:g}\n".format(*(1e3 * corner[n])) for n in three) +
+def square(path, side, height=0.0):
+    """Text STL of a square from the origin on, two triangles."""
+    corner = side * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]) + [0.0, 0.0, height]
+    facets = "".join("facet normal 0 0 1\nouter loop\n" + "".join("vertex {:g} {:g} {:g}\n".format(*corner[n]) for n in three) +
                      "endloop\nendfacet\n" for three in ((0, 1, 2), (0, 2, 3)))
-    (run / "base.stl").write_text(f"solid base\n{facets}endsolid base\n")
+    path.write_text(f"solid base\n{facets}endsolid base\n")
+
+
+def test_several_walls_and_an_inclusion(run, capsys):
+    square(run / "base.stl", 40.0)
     assert main(["walls", "run", "--wall", "base:mesh:file=run/base.stl:unit=mm:by=group",
                  "--wall", "stone:inclusion:ids=2-3:surface=cylinder", "--vtkhdf", "w.vtkhdf", "--out", "w.nc"]) == 0
     said = capsys.readouterr().out
@@ -152,6 +157,28 @@ def test_several_walls_and_an_inclusion(run, capsys):
 def test_a_wall_in_the_wrong_place_raises_a_doubt(run, capsys):
     assert main(["walls", "run", "--wall", "base:plane:origin=0,0,-30mm", "--out", "w.nc"]) == 0
     assert "is it where the simulation had it?" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("unit", ["m", "um"])
+def test_an_stl_in_another_unit_is_refused_with_those_that_fit(run, capsys, unit):
+    """Both commands, before any file is made: the loads of a mesh a thousand times too large would be nonsense."""
+    square(run / "base.stl", 40.0)
+    wall = f"base:mesh:file=run/base.stl:unit={unit}"
+    for words in (["walls", "run", "--out", "w.nc"], ["fields", "run", "--out", "f.nc"]):
+        assert main([*words, "--wall", wall]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and "--wall base" in error and "with unit=cm or unit=mm or unit=in it fits" in error
+        assert [path.name for path in run.parent.iterdir()] == ["run"]
+        assert main([*words, "--wall", wall.replace(f"unit={unit}", "unit=mm")]) == 0
+        for path in run.parent.glob("*.nc"):
+            path.unlink()
+        capsys.readouterr()
+
+
+def test_a_mesh_that_fits_in_no_unit_is_refused(run, capsys):
+    square(run / "base.stl", 40.0, height=-500.0)
+    assert main(["walls", "run", "--out", "w.nc", "--wall", "base:mesh:file=run/base.stl:unit=mm"]) == 2
+    assert "the grains that feel it are 101 to 101 radii away from it" in (error := capsys.readouterr().err) and "fits" not in error
 
 
 def test_a_cut_off_frame_is_left_out_and_told(run, capsys):
@@ -170,7 +197,17 @@ MISTAKES = [
     (["fields", "run", "--out", "f.nc", "--vtkhdf", "f.nc"], "named twice"),
     (["fields", "run", "--out", "f.nc", "--kernel", "gausian"], "gaussian"),
     (["fields", "run", "--out", "f.nc", "--width", "0d"], "'0d' is no length"),
-    (["fields", "run", "--out", "f.nc", "--width", "1.5 kg"], "--width"),
+    (["fields", "run", "--out", "f.nc", "--width", "1.5 kg"], "--width: cannot convert '1.5 kg' to m; give e.g. '4 mm'"),
+    (["fields", "run", "--out", "f.nc", "--width", "4,5 mm"], "--width: '4,5 mm' has a comma; write the decimal point: 4.5 mm"),
+    (["fields", "run", "--out", "f.nc", "--width", "1,5d"], "write the decimal point: 1.5d"),
+    (["fields", "run", "--out", "f.nc", "--width", "1e999d"], "--width = 1e999d: give a finite number"),
+    (["fields", "run", "--out", "f.nc", "--width", "mm"], "--width = mm: give a number with it"),
+    (["fields", "run", "--out", "f.nc", "--spacing", "0,5d"], "--spacing: '0,5d' has a comma"),
+    (["fields", "run", "--out", "f.nc", "--density", "2,5 g/cm^3"], "write the decimal point: 2.5 g/cm^3"),
+    (["fields", "run", "--out", "f.nc", "--density", "2500 kg/m3"], "write the power with ^: '2500 kg/m^3'"),
+    (["fields", "run", "--out", "f.nc", "--time-step", "1,5e-5"], "write the decimal point: 1.5e-5"),
+    (["fields", "run", "--out", "f.nc", "--time-step", "nan"], "--time-step = nan: give a finite number"),
+    (["fields", "run", "--out", "f.nc", "--threads", "1,5"], "--threads"),
     (["fields", "run", "--out", "f.nc", "--width", "wide"], "--width"),
     (["fields", "run", "--out", "f.nc", "--grid", "64,64"], "64,64,64"),
     (["fields", "run", "--out", "f.nc", "--grid", "0"], "--grid"),
@@ -209,6 +246,10 @@ MISTAKES = [
     (["walls", "run", "--wall", "stone:inclusion:ids=999"], "grain 999"),
     (["walls", "run/grains.dump", "--wall", "stone:inclusion:ids=9"], "--contacts"),
     (["walls", "run", "--patch", "nothing"], "--patch"),
+    (["walls", "run", "--patch", "2,5d"], "--patch: '2,5d' has a comma"),
+    (["walls", "run", "--wall", "base:cylinder:radius=2,5cm"], "write the decimal point: 2.5cm"),
+    (["walls", "run", "--wall", "base:plane:since=0,1"], "since: '0,1' has a comma"),
+    (["walls", "run", "--wall", "base:mesh:file=run/base.stl:unit=furlongs"], "unit=furlongs, in --wall base, it must be m, dm, cm, mm, um, in, ft or d"),
     (["walls", "run", "--plot", "run/run.json"], "name a folder"),
     (["walls", "empty", "--out", "w.nc"], "no grains.dump"),
 ]
@@ -290,7 +331,7 @@ def test_lengths_grids_and_ranges():
     assert counts("64") == (64, 64, 64) and counts("1, 2,3") == (1, 2, 3)
     assert span("-1d,5mm", 0.01, "x") == pytest.approx((-0.01, 0.005))
     for text in ("-1d", "inf", "nan", "0", "d"):
-        with pytest.raises(DembarkError, match="in x"):
+        with pytest.raises(DembarkError, match=r"(in |^)x\b"):
             length(text, 1.0, "x")
 
 

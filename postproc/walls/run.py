@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +16,9 @@ from dembark.postproc.output.netcdf import write_wall_netcdf
 from dembark.postproc.output.vtkhdf import write_vtkhdf_wall
 from dembark.postproc.output.whole import WholeFile
 from dembark.postproc.sources import Reading, Source, open_source
-from dembark.postproc.walls import Inclusion
+from dembark.postproc.walls import Inclusion, MeshWall
 from dembark.postproc.walls.stress import WallRecorder, WallStress
-from dembark.postproc.words import WallWord, frame_numbers, length, parse_wall, plain
+from dembark.postproc.words import STL_UNITS, WallWord, frame_numbers, length, parse_wall, plain
 
 Attributes = Mapping[str, str | float | int]
 
@@ -26,6 +26,10 @@ Attributes = Mapping[str, str | float | int]
 _SERIES_LIMIT = 400_000_000
 # Distances of the contact points from the grains' centres, over the radius, that raise doubts about the wall's place.
 _DOUBTFUL = (0.7, 1.3)
+# A mesh is in another unit or place when it is larger than so many boxes of grains, or half of those that feel it are farther than so
+# many radii.
+_ROOMS = 50.0
+_FAR = 2.0
 
 
 @dataclass
@@ -53,6 +57,7 @@ class WallJob:
             known = ", ".join(first.wall_forces) or "none"
             raise DembarkError("no wall is given", f"walls in the dump: {known}", "add --wall, such as side:cylinder:radius=25mm")
         check_inclusions(chosen, source)
+        check_meshes(chosen, source, first)
         check_outputs(out, vtkhdf, plot=plot)
         return cls(source, numbers, diameter, chosen, length(patch, diameter, "--patch"), out, vtkhdf, plot)
 
@@ -111,6 +116,38 @@ def check_inclusions(words: Iterable[WallWord], source: Source) -> None:
     for word in words:
         if isinstance(word.wall, Inclusion) and source.contacts is None:
             raise DembarkError(f"the load of {word.wall.name} needs contacts", f"{source.path} has none", "name their dump with --contacts")
+
+
+def check_meshes(words: Iterable[WallWord], source: Source, frame: GrainFrame) -> None:
+    """DembarkError when a mesh cannot be what the grains of `frame` feel: its file was in another unit, or it was elsewhere."""
+    time = source.time(frame.step)
+    for word in words:
+        if not isinstance(word.wall, MeshWall):
+            continue
+        wall = word.wall.at(time)
+        doubt = _misfit(wall, frame)
+        if not doubt:
+            continue
+        # The mesh as it is, and as it would be in other units: factors between any two of them.
+        factors = {name: unit / word.unit for name, unit in STL_UNITS.items()}
+        fits = [name for name, factor in factors.items() if not _misfit(replace(wall, triangles=wall.triangles * factor), frame)]
+        size = " x ".join(f"{1e3 * extent:.4g}" for extent in np.ptp(wall.triangles.reshape(-1, 3), axis=0))
+        right = f"with unit={' or unit='.join(fits)} it fits" if fits else "give the unit of the file, and where the simulation had it"
+        raise DembarkError(f"the mesh is {size} mm, and {doubt}", f"in --wall {wall.name}", right)
+
+
+def _misfit(wall: MeshWall, frame: GrainFrame) -> str:
+    """Why the mesh cannot be the wall that grains feel, '' when it can."""
+    corners = wall.triangles.reshape(-1, 3)
+    room = max(np.ptp(frame.wrapped, axis=0).max(), (frame.high - frame.low).max(), 2.0 * frame.radii.max())
+    if np.ptp(corners, axis=0).max() > _ROOMS * room:
+        return f"the box of the grains only {1e3 * room:.4g} mm wide"
+    felt = np.linalg.norm(frame.wall_forces[wall.name], axis=1) > 0.0
+    if not felt.any():
+        return ""
+    centres = frame.wrapped[felt]
+    away = np.linalg.norm(wall.places(centres).points - centres, axis=1) / frame.radii[felt]
+    return f"the grains that feel it are {away.min():.3g} to {away.max():.3g} radii away from it" if np.median(away) > _FAR else ""
 
 
 def check_outputs(*files: Path | None, plot: Path | None) -> None:
