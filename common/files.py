@@ -62,7 +62,7 @@ def read_json(path: Path) -> dict[str, Any] | None:
 def disk_error(error: OSError, path: Path) -> RunError:
     """One line for an operating system error while writing to `path`."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return RunError(DISK_FULL, f"writing {path}", "free some space and start again; finished runs are kept")
+        return RunError(DISK_FULL, f"writing {path}", "free some space and start again; what is finished is kept")
     return RunError(f"cannot write {path}", error.strerror or str(error))
 
 

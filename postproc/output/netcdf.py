@@ -17,7 +17,7 @@ import xarray
 from dembark.common.errors import DembarkError
 from dembark.common.files import disk_error
 from dembark.postproc.fields.grid import Grid
-from dembark.postproc.output.whole import Labelled, WholeFile
+from dembark.postproc.output.whole import Labelled, SteadyFile, WholeFile
 from dembark.postproc.walls.peaks import Histogram
 from dembark.postproc.walls.stress import COMPONENTS, WallStress
 from numpy.typing import NDArray
@@ -55,33 +55,36 @@ def write_netcdf(path: str | Path, fields: Labelled | Iterable[tuple[float, Labe
 
 def write_wall_netcdf(path: str | Path, walls: Iterable[WallStress], attributes: Attributes | None = None) -> Path:
     """Write wall loads, a group for each wall by its name: `xarray.open_dataset(path, group="side")`; returns the path."""
-    with WholeFile(path) as part:
-        with h5netcdf.File(part, "w") as file:
-            file.attrs.update({"Conventions": "CF-1.11", **(attributes or {})})
-        add_walls(part, walls)
+    with FieldsNetcdf(path, attributes, without_fields=True) as file:
+        file.add_walls(walls)
     return Path(path)
 
 
-def add_walls(path: Path, walls: Iterable[WallStress]) -> None:
-    """Add a group for each wall to an existing file; `wall_<name>` for one that is called like a field."""
-    with h5netcdf.File(path, "r") as file:
-        taken = {*file.variables, *file.dimensions}
+def _write_walls(file: Any, walls: Iterable[WallStress]) -> None:
+    """Add a group for each wall; `wall_<name>` for one that is called like a field."""
+    taken = {*file.variables, *file.dimensions}
     for stress in walls:
         name = stress.wall.name
-        wall_dataset(stress).to_netcdf(path, mode="a", group=f"wall_{name}" if name in taken else name, engine="h5netcdf")
+        group = file.create_group(f"wall_{name}" if name in taken else name)
+        wall_dataset(stress).dump_to_store(xarray.backends.H5NetCDFStore(group))
 
 
 class FieldsNetcdf:
-    """A NetCDF file that grows by one time with each `add`; leaving the `with` block makes it whole, an error removes it."""
+    """A NetCDF file that grows by one time with each `add`; leaving the `with` block makes it whole, an error removes it.
 
-    def __init__(self, path: str | Path, attributes: Attributes | None = None) -> None:
+    `without_fields`: it may hold walls alone.
+    """
+
+    def __init__(self, path: str | Path, attributes: Attributes | None = None, without_fields: bool = False) -> None:
         self._whole = WholeFile(path)
         try:
-            self._file: Any = h5netcdf.File(self._whole.part, "w")
+            self._part = SteadyFile(self._whole.part)
         except OSError as error:
             raise disk_error(error, self._whole.path) from None
+        self._file: Any = h5netcdf.File(self._part, "w")
         self._file.attrs.update({"Conventions": "CF-1.11", **(attributes or {})})
         self._count = 0
+        self._may_be_empty = without_fields
         self._grid: Grid | None = None
         self._walls: list[WallStress] = []
 
@@ -101,6 +104,7 @@ class FieldsNetcdf:
             self._file.variables["time_bounds"][self._count] = (time, time) if span is None else span
             for name, values in arrays.items():
                 self._file.variables[name][self._count] = values
+            self._part.check()
         except OSError as error:
             raise disk_error(error, self._whole.path) from None
         self._count += 1
@@ -132,13 +136,20 @@ class FieldsNetcdf:
             variable.attrs.update(_attributes(fields, name))
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self._whole.settle(self._finish if kind is None else self._file.close, kind is None)
+        self._whole.settle(self._finish if kind is None else self._close, kind is None)
+
+    def _close(self) -> None:
+        self._file.close()
+        self._part.close()
 
     def _finish(self) -> None:
-        self._file.close()
-        if self._count == 0:
-            raise DembarkError(f"nothing to write to {self._whole.path}", "there is no field of any time")
-        add_walls(self._whole.part, self._walls)
+        try:
+            if self._count == 0 and not self._may_be_empty:
+                raise DembarkError(f"nothing to write to {self._whole.path}", "there is no field of any time")
+            _write_walls(self._file, self._walls)
+        finally:
+            self._close()
+        self._part.check()
 
 
 _TIME = {"units": "s", "long_name": "simulated time, middle of the averaged span", "axis": "T", "standard_name": "time",

@@ -18,7 +18,7 @@ from dembark.common.errors import DembarkError
 from dembark.common.files import disk_error
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.grains import GrainFrame
-from dembark.postproc.output.whole import Labelled, WholeFile
+from dembark.postproc.output.whole import Labelled, SteadyFile, WholeFile
 from dembark.postproc.walls.stress import COMPONENTS, WallStress
 from numpy.typing import NDArray
 
@@ -37,9 +37,10 @@ class _Vtkhdf:
     def __init__(self, path: str | Path, kind: str, attributes: Attributes | None) -> None:
         self._whole = WholeFile(path)
         try:
-            self._file = h5py.File(self._whole.part, "w")
+            self._part = SteadyFile(self._whole.part)
         except OSError as error:
             raise disk_error(error, self._whole.path) from None
+        self._file = h5py.File(self._part, "w")
         self._root = self._file.create_group("VTKHDF", track_order=True)
         self._root.attrs["Version"] = np.array([2, 2], np.int64)
         self._root.attrs.create("Type", kind.encode("ascii"), dtype=h5py.string_dtype("ascii", len(kind)))
@@ -62,6 +63,7 @@ class _Vtkhdf:
         begin = data.shape[0]
         data.resize(begin + len(rows), axis=0)
         data[begin:] = rows
+        self._part.check()
         return begin
 
     def _note(self, name: str, value: Any) -> None:
@@ -97,13 +99,18 @@ class _Vtkhdf:
                     self._steps[f"FieldDataSizes/{name}"] = np.tile(np.array([1, len(data)], np.int64), (count, 1))
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self._whole.settle(self._close if kind is None else self._file.close, kind is None)
+        self._whole.settle(self._close if kind is None else self._end, kind is None)
 
     def _close(self) -> None:
         try:
             self._finish()
         finally:
-            self._file.close()
+            self._end()
+        self._part.check()
+
+    def _end(self) -> None:
+        self._file.close()
+        self._part.close()
 
 
 class FieldsVtkhdf(_Vtkhdf):
@@ -158,7 +165,7 @@ class _PolyVtkhdf(_Vtkhdf):
     def __init__(self, path: str | Path, attributes: Attributes | None = None) -> None:
         super().__init__(path, "PolyData", attributes)
 
-    def _part(self, points: Array, topology: str, cells: Array) -> None:
+    def _polygons(self, points: Array, topology: str, cells: Array) -> None:
         """Append one part: `points` (n, 3) and `cells` (c, k) of one kind."""
         self._append("NumberOfPoints", np.array([len(points)], np.int64))
         self._append("Points", points.astype(float))
@@ -192,7 +199,7 @@ class GrainsVtkhdf(_PolyVtkhdf):
             part, point, cell = (self._root[name].shape[0] if self._times else 0 for name in begins)
             count = len(frame.ids)
             # The reader goes astray behind a part without cells: a frame without grains gets a cell without points.
-            self._part(frame.wrapped, "Vertices", np.arange(count)[:, None] if count else np.zeros((1, 0), np.int64))
+            self._polygons(frame.wrapped, "Vertices", np.arange(count)[:, None] if count else np.zeros((1, 0), np.int64))
             for name, (column, unit) in arrays.items():
                 self._note(f"PointDataOffsets/{name}", self._append(f"PointData/{name}", column))
                 self._units[name] = unit
@@ -254,7 +261,7 @@ def _write_wall(file: _PolyVtkhdf, stress: WallStress) -> None:
         constant |= {f"{name}_{component}": (values[owners, column], "Pa") for column, component in enumerate(COMPONENTS)}
     steps = range(len(stress.times)) if stress.series is not None else range(len(stress.times) - 1, len(stress.times))
     moves = bool(stress.displacements.any())
-    file._part(patches.vertices + stress.displacements[steps[0]], "Polygons", patches.cells)
+    file._polygons(patches.vertices + stress.displacements[steps[0]], "Polygons", patches.cells)
     for name, (values, _) in constant.items():
         file._append(f"CellData/{name}", values)
     for number, step in enumerate(steps):

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from dembark.common.errors import DembarkError
 from dembark.common.files import disk_error
 from dembark.postproc.fields.grid import Grid
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer as Buffer
+    from _typeshed import WriteableBuffer
 
 Array = NDArray[np.float64]
 
@@ -57,6 +62,61 @@ class Selection:
             if name not in there:
                 raise DembarkError(f"there is no {name}", "the dumps do not hold what it needs", f"there are {', '.join(there)}")
         return {name: there[name] for name in self.names}
+
+
+class SteadyFile(io.FileIO):
+    """The file `part` for the HDF5 library to write into. The library cannot recover from an error: it would crash when it is closed.
+
+    So the first error is kept for `check()` to raise, and what is written from then on stays in memory, from where it is read again.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        """OSError when the file cannot be made."""
+        super().__init__(path, "w+")
+        self._error: OSError | None = None
+        self._unwritten: list[tuple[int, bytes]] = []
+
+    def write(self, data: Buffer) -> int:
+        """Write all of `data`."""
+        rest, place = memoryview(data).cast("B"), self.tell()
+        size = len(rest)
+        try:
+            while rest and not self._error:
+                written = super().write(rest) or 0
+                rest, place = rest[written:], place + written
+        except OSError as error:
+            self._error = error
+        if rest:
+            self._unwritten.append((place, bytes(rest)))
+            self.seek(place + len(rest))
+        return size
+
+    def readinto(self, buffer: WriteableBuffer) -> int:
+        """Read as if everything had been written."""
+        place, view = self.tell(), memoryview(buffer).cast("B")
+        got = super().readinto(view) or 0
+        if not self._unwritten:
+            return got
+        view[got:] = bytes(len(view) - got)
+        for begin, data in self._unwritten:
+            low, high = max(begin, place), min(begin + len(data), place + len(view))
+            if low < high:
+                view[low - place : high - place] = data[low - begin : high - begin]
+        self.seek(place + len(view))
+        return len(view)
+
+    def truncate(self, size: int | None = None) -> int:
+        """As of any file; the library reserves room with it."""
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self._error = self._error or error
+            return size or 0
+
+    def check(self) -> None:
+        """Raise the first error."""
+        if self._error:
+            raise self._error
 
 
 class WholeFile:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import json
+import resource
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -179,6 +182,38 @@ def test_a_mesh_that_fits_in_no_unit_is_refused(run, capsys):
     square(run / "base.stl", 40.0, height=-500.0)
     assert main(["walls", "run", "--out", "w.nc", "--wall", "base:mesh:file=run/base.stl:unit=mm"]) == 2
     assert "the grains that feel it are 101 to 101 radii away from it" in (error := capsys.readouterr().err) and "fits" not in error
+
+
+@contextmanager
+def files_no_larger_than(size):
+    """Writing beyond `size` (bytes) fails, as on a full disk."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize("words", [
+    ["fields", "run", "--width", "0.5d", "--out", "f.nc"], ["fields", "run", "--width", "0.5d", "--average", "1", "--out", "f.nc"],
+    ["fields", "run", "--width", "0.5d", "--vtkhdf", "f.vtkhdf"],
+    ["fields", "run", "--width", "0.5d", "--average", "1", "--grains", "g.vtkhdf", "--vtkhdf", "f.vtkhdf"], ["walls", "run", "--patch", "0.1d", "--out", "w.nc"],
+    ["walls", "run", "--patch", "0.1d", "--vtkhdf", "w.vtkhdf"]], ids=lambda words: " ".join(words[:1] + words[-4:]))
+def test_a_full_disk_gets_one_line_and_leaves_nothing(run, words, capsys):
+    """Wherever the writing ends: in the header, in the fields, in the groups of the walls."""
+    for size in (0, 10_000, 40_000):
+        with files_no_larger_than(size):
+            code = main(words)
+        gc.collect()
+        error = capsys.readouterr().err
+        left = sorted(path.name for path in run.parent.iterdir())
+        if code == 0:
+            assert size == 40_000 and not error
+            break
+        assert code == 1 and error.count("\n") == 1 and error.startswith("dembark: cannot write") and "File too large" in error
+        assert left == ["run"]
+    assert main(words) == 0
 
 
 def test_a_cut_off_frame_is_left_out_and_told(run, capsys):
