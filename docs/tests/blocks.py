@@ -1,0 +1,143 @@
+"""The blocks of README.md and docs/*.md: where they stand, what they are, and what is run in their place.
+
+A block is fenced, or indented by four spaces. Fenced ones say what they are; of indented ones the first word tells.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+SHELL = {"dembark", "make", "liggghts-dembark", "yade", "python", ".venv/bin/python", "snakemake", "mkdir", "cd", "cp", "export", "module"}
+LIGGGHTS = {"pair_style", "fix", "compute", "dump", "thermo_style", "wall", "resume_state", "if", "region", "run"}
+# What a line of a page's "Syntax" has and no command that can be run.
+TEMPLATE = re.compile(r"\bID\b|\bBASE\b|\bvalues? \.\.\.|\bNAME\b")
+MATHEMATICS = re.compile(r"[=≥≤√·]|<=|>=")
+
+
+@dataclass(frozen=True)
+class Block:
+    """One block: its page, the line it begins in, its kind, and its text without indentation."""
+
+    page: str
+    line: int
+    kind: str
+    text: str
+
+    @property
+    def place(self) -> str:
+        """Page and line, as a test's name."""
+        return f"{self.page}:{self.line}"
+
+
+def blocks(*kinds: str) -> list[Block]:
+    """All blocks of these kinds (all kinds when none is named), in the order of the pages."""
+    return [block for page in PAGES for block in _of_page(page) if not kinds or block.kind in kinds]
+
+
+def _of_page(page: Path) -> list[Block]:
+    name, lines = str(page.relative_to(ROOT)), page.read_text(encoding="utf-8").split("\n")
+    found, number = [], 0
+    while number < len(lines):
+        first = number
+        if lines[number].startswith("```"):
+            number = lines.index("```", first + 1)
+            kind = lines[first][3:].strip()
+            found.append(Block(name, first + 2, {"sh": "shell", "lammps": "deck"}.get(kind, kind), "\n".join(lines[first + 1:number]) + "\n"))
+        elif lines[number].startswith("    ") and (number == 0 or not lines[number - 1].strip()):
+            while number < len(lines) and (lines[number].startswith("    ") or not lines[number].strip()):
+                number += 1
+            text = "\n".join(line[4:] for line in lines[first:number]).rstrip() + "\n"
+            found.append(Block(name, first + 1, _kind(text), text))
+            continue
+        number += 1
+    return found
+
+
+def _kind(text: str) -> str:
+    """What an indented block is."""
+    lines = text.splitlines()
+    word = lines[0].split()[0]
+    if word in SHELL:
+        return "shell"
+    if word in LIGGGHTS:
+        return "syntax" if TEMPLATE.search(text) else "LIGGGHTS fragment"
+    if all(line.startswith(("dembark: ", "LCP: ")) for line in lines):
+        return "output"
+    if all(line.startswith("results/") for line in lines):
+        return "listing"
+    if _is_python(text):
+        return "YADE fragment"
+    return "formula" if MATHEMATICS.search(text) else "unknown"
+
+
+def _is_python(text: str) -> bool:
+    try:
+        return bool(ast.parse(text).body)
+    except SyntaxError:
+        return False
+
+
+def logical_lines(text: str, continuation: str) -> list[str]:
+    """Lines without comments, those that end with `continuation` joined to the next."""
+    joined: list[str] = []
+    going_on = False
+    for line in text.splitlines():
+        line = re.sub(r"\s+#.*|^#.*", "", line).rstrip()
+        ends, line = line.endswith(continuation), line.removesuffix(continuation).strip()
+        if going_on:
+            joined[-1] += f" {line}"
+        elif line:
+            joined.append(line)
+        going_on = ends
+    return joined
+
+
+def commands(text: str) -> list[list[str]]:
+    """The words of each command of a shell block; `&&` separates commands."""
+    words = [part.split() if "$(" in part else shlex.split(part) for line in logical_lines(text, "\\") for part in line.split("&&")]
+    return [each for each in words if each]
+
+
+# What is run in place of a command as it is printed: pattern, replacement, and why.
+SUBSTITUTES = (
+    (r"(dembark run silo --engine (?:liggghts|yade) .*)", r"\1 --set replicas=1", "one packing in place of two"),
+    (r"--grid 64,64,64", "--grid 16,16,16", "a hundredth of the cells"),
+    (r"dembark (submit|run) silo-small\b", r"dembark \1 tiny.toml", "one run of 100 grains in place of eight: a campaign with report takes minutes"),
+    (r"(liggghts-dembark -in \S+/silo/liggghts.in) -var restart_every 5000(.*)",
+     r"\1 -var restart_every 500\2 -var grain_count 60 -var settle_time 0.05 -var measure_time 0.02", "60 grains for 0.07 s in place of 2200 for 1 s"),
+    (r"(dembark yade -n -x \S+/silo/yade.py) restart_every=5000(.*)",
+     r"\1 restart_every=500\2 grain_count=60 settle_time=0.05 measure_time=0.02", "60 grains for 0.07 s in place of 2200 for 1 s"),
+    (r"(python -m benchmarks\.\w+.*)", r"\1 --help", "benchmarks measure for minutes to an hour; their options are checked"),
+    (r"(dembark validate) --results .*", r"\1 --help", "validation/report/tests build the report, validation/tests run the workflow"),
+    (r"--config campaign=friction.toml", "--dry-run --config campaign=tiny.toml", "the submitted campaign has run the same rules"),
+)
+
+# Commands that are not run here: pattern, and why. Their subcommands, options and targets are checked all the same.
+NOT_RUN = (
+    (r"make .*|cd \$HOME/LIGGGHTS-PUBLIC/src.*", "builds or runs everything; `make -n` must know the target and the variables"),
+    (r"dembark submit .*--executor.*|dembark (status|resume) /scratch/.*",
+     "needs a cluster; validation/campaigns/tests/test_slurm_campaign.py runs it on a Slurm of its own"),
+    (r"module load .*|sinfo .*|sacctmgr .*|srun .*", "programs of a cluster"),
+    (r"export (?!DEMBARK_DECKS).*", "one's own engines and modules; test_names.py looks the variables up in the code"),
+    (r".*pytest .*--slow.*", "starts a Slurm as root and takes minutes; the folder exists"),
+)
+
+
+def replaced(command: str) -> tuple[str, str]:
+    """The command that is run in place of `command`, and why; the command itself and nothing when it is run as it stands."""
+    for pattern, replacement, why in SUBSTITUTES:
+        if re.search(pattern, command):
+            return re.sub(pattern, replacement, command), why
+    return command, ""
+
+
+def not_run(command: str) -> str:
+    """Why a command is not run here; empty for those that are."""
+    return next((why for pattern, why in NOT_RUN if re.fullmatch(pattern, command)), "")
