@@ -131,6 +131,20 @@ def joint_half(one: float, other: float) -> float:
     return combined([one, other])
 
 
+def joint_limit(one: float, other: float, count_one: float, count_other: float, confidence: float) -> float:
+    """Half-width of the interval of the same difference for another `confidence`, when `one` and `other` are Student's 95 % half-widths
+    over `count_one` and `count_other` values (two or more; inf: known exactly how they scatter).
+
+    B. L. Welch, Biometrika 34 (1947) 28: the variances add, and the degrees of freedom are between the smaller of both and their sum.
+    """
+    degrees = (count_one - 1.0, count_other - 1.0)
+    squares = [(half / student(degree)) ** 2 for half, degree in zip((one, other), degrees, strict=True)]
+    if not sum(squares) > 0.0:
+        return 0.0
+    common = sum(squares) ** 2 / max(sum(square**2 / degree for square, degree in zip(squares, degrees, strict=True)), 1e-300)
+    return student(common, confidence) * math.sqrt(sum(squares))
+
+
 def steady_start(series: Array, batch: int = 5) -> int:
     """Index from which `series` is steady, by MSER-5 and Geweke's test; len(series) when there is no steady part.
 

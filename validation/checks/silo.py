@@ -14,6 +14,7 @@ contributes the force of its bridge. Dry grains have a = 0.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -25,7 +26,7 @@ from dembark.validation.checks.quantity import Quantity
 from dembark.validation.checks.run import Replica, pooled, profile, resampled, time_blocks
 from dembark.validation.checks.vessel import overlap
 from dembark.validation.references import CAMBAU, JANSSEN, LANDRY, WALKER
-from dembark.validation.statistics import Estimate, block_mean
+from dembark.validation.statistics import Estimate, block_mean, over_replicas
 
 REFERENCES = (JANSSEN, LANDRY, CAMBAU, WALKER)
 TOLERANCE = 0.10
@@ -104,8 +105,8 @@ def results(columns: Sequence[Column], length: str, across: str) -> tuple[list[Q
         return Estimate(found.value * factor, found.half * factor, found.basis)
 
     def known(values: list[float]) -> Estimate:
-        mean = float(np.mean(values))
-        return Estimate(mean, float(np.ptp(values)) / 2.0, "range of the packings")
+        # Within a packing nothing says how much it differs from others.
+        return over_replicas([Estimate(value, math.inf, "only other packings tell how far this varies") for value in values])
 
     zero, wet = Estimate(0.0, 0.0), bool(columns[0].adhesion.any())
     field = over("field_error")

@@ -10,6 +10,7 @@ from dembark.validation.statistics import (
     correlation_time,
     jackknife,
     joint_half,
+    joint_limit,
     over_replicas,
     replica_mean,
     scatter,
@@ -65,6 +66,18 @@ def test_pooling_below_three_replicas_keeps_their_own_intervals():
 
 def test_joint_interval_adds_in_quadrature():
     assert joint_half(3.0, 4.0) == 5.0
+
+
+@pytest.mark.parametrize("counts", [(3, 3), (3, 10), (5, 5)])
+def test_joint_limit_is_exceeded_as_often_as_it_says(counts):
+    random = np.random.default_rng(10)
+    tables = [random.standard_normal((4000, count)) * scale for count, scale in zip(counts, (1.0, 2.0), strict=True)]
+    means = [[replica_mean(row) for row in table] for table in tables]
+    beyond = [abs(one.value - other.value) > joint_limit(one.half, other.half, *counts, 0.95) for one, other in zip(*means, strict=True)]
+    assert 0.03 <= np.mean(beyond) <= 0.06
+    assert joint_limit(1.0, 1.0, 5, 5, 0.999) > joint_limit(1.0, 1.0, 5, 5, 0.95)
+    assert joint_limit(1.96, 0.0, math.inf, math.inf, 0.95) == pytest.approx(1.96, rel=1e-4)
+    assert joint_limit(0.0, 0.0, 3, 3, 0.99) == 0.0
 
 
 @pytest.mark.parametrize("length", [50, 120])
