@@ -1,4 +1,4 @@
-"""The documentation is true: its snippets run, its links exist, its table is that of the data."""
+"""The documentation is true: its Python, complete decks and C++ run, its links exist, its tables are those of the data."""
 
 from __future__ import annotations
 
@@ -11,21 +11,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from blocks import PAGES, ROOT, Block, blocks
 from dembark.validation.engines import call
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "input_decks").glob("*/README.md")])
+LINKING = [*PAGES, *sorted((ROOT / "input_decks").glob("*/README.md"))]
 FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
-
-
-def blocks(kind: str) -> list[object]:
-    """All fenced blocks of one kind, as test parameters named by page and number."""
-    found = []
-    for page in PAGES:
-        texts = [text for words, text in FENCE.findall(page.read_text(encoding="utf-8")) if words.strip() == kind]
-        found += [pytest.param(text, id=f"{page.relative_to(ROOT)}-{number}") for number, text in enumerate(texts, 1)]
-    return found
 
 
 def program(*places: Path | None) -> Path:
@@ -42,7 +33,7 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", head.lower()).strip().replace(" ", "-") for head in heads}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize("page", LINKING, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_exist(page: Path) -> None:
     missing = []
     for link in LINK.findall(FENCE.sub("", page.read_text(encoding="utf-8"))):
@@ -55,11 +46,14 @@ def test_links_exist(page: Path) -> None:
     assert not missing
 
 
-@pytest.mark.parametrize("text", blocks("python"))
-def test_python_snippet(text: str, tmp_path: Path) -> None:
-    (tmp_path / "snippet.py").write_text(text, encoding="utf-8")
+@pytest.mark.parametrize("block", blocks("python"), ids=lambda block: block.place)
+def test_python_snippet(block: Block, tmp_path: Path) -> None:
+    (tmp_path / "snippet.py").write_text(block.text, encoding="utf-8")
     result = subprocess.run([sys.executable, "-W", "error", "snippet.py"], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
     assert result.returncode == 0, result.stderr
+    following = next((other for other in blocks() if other.page == block.page and other.line > block.line), None)
+    if following is not None and following.kind == "output":
+        assert result.stdout == following.text
 
 
 def run_lammps(text: str, folder: Path) -> list[list[float]]:
@@ -71,14 +65,14 @@ def run_lammps(text: str, folder: Path) -> list[list[float]]:
     return [[float(word) for word in line.split()] for line in result.stdout.splitlines() if re.fullmatch(r"[\s\d.e+-]+", line) and line.strip()]
 
 
-@pytest.mark.parametrize("text", blocks("lammps"))
-def test_complete_deck(text: str, tmp_path: Path) -> None:
-    assert text.startswith("# Complete deck")
-    assert run_lammps(text, tmp_path)
+@pytest.mark.parametrize("block", blocks("deck"), ids=lambda block: block.place)
+def test_complete_deck(block: Block, tmp_path: Path) -> None:
+    assert block.text.startswith("# Complete deck")
+    assert run_lammps(block.text, tmp_path)
 
 
 def test_decks_show_what_their_pages_say(tmp_path: Path) -> None:
-    drag, pull = (next(text for words, text in FENCE.findall((ROOT / f"docs/{page}.md").read_text(encoding="utf-8")) if words == "lammps")
+    drag, pull = (next(block.text for block in blocks("deck") if block.page == f"docs/{page}.md")
                   for page in ("liggghts_tangential_finnie_rabinowicz", "liggghts_cohesion_capillary"))
     ratios = [row[3] for row in run_lammps(drag, tmp_path)][1:]
     assert 0.5 < ratios[0] < 0.6 and ratios == sorted(ratios, reverse=True)
@@ -88,24 +82,12 @@ def test_decks_show_what_their_pages_say(tmp_path: Path) -> None:
     assert max(held) < 0.4968e-3 < max(gap for _, gap, _ in rows)
 
 
-@pytest.mark.parametrize("text", blocks("python yade"))
-def test_yade_script(text: str, tmp_path: Path) -> None:
-    engine = program(ROOT / "build/yade-overlay/bin/yade")
-    (tmp_path / "script.py").write_text(text, encoding="utf-8")
-    environment = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV", "DISPLAY", "YADE_PREFIX")}
-    environment["PATH"] = "/usr/bin:" + environment.get("PATH", "")
-    result = call([engine, "-n", "-x", "script.py"], tmp_path, environment, timeout=300)
-    assert result.returncode == 0, result.stderr
-    said = {"LogImpact": "impacts: ", "CapillaryLiquid": "all liquid: 1e-09", "EnergyAccount": "balance: True"}
-    assert next((line for name, line in said.items() if f"{name}(" in text), "bridges: 1") in result.stdout
-
-
-@pytest.mark.parametrize("text", blocks("cpp"))
-def test_cpp_snippet(text: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("block", blocks("cpp"), ids=lambda block: block.place)
+def test_cpp_snippet(block: Block, tmp_path: Path) -> None:
     compiler = shutil.which("c++")
     if compiler is None:
         pytest.skip("no C++ compiler")
-    (tmp_path / "main.cpp").write_text(text, encoding="utf-8")
+    (tmp_path / "main.cpp").write_text(block.text, encoding="utf-8")
     (tmp_path / "dembark").symlink_to(ROOT / "plugins/physics")
     eigen = shlex.split(subprocess.run(["pkg-config", "--cflags", "eigen3"], check=True, capture_output=True, text=True).stdout)
     subprocess.run([compiler, "-std=c++17", "-I.", *eigen, "main.cpp", "-o", "main"], cwd=tmp_path, check=True, timeout=300)
