@@ -1,0 +1,182 @@
+"""Names in README.md and docs/*.md are those of the code: modules, commands, options, styles, keywords, classes, variables, files."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from functools import cache
+
+import typer
+from blocks import PAGES, ROOT, blocks, commands, logical_lines
+from dembark.postproc import cli as postproc
+from dembark.validation import cli
+
+TEXTS = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page in PAGES}
+ALL = "\n".join(TEXTS.values())
+# Words in backticks, outside of fenced blocks.
+SPANS = sorted({span for text in TEXTS.values() for span in re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```$", "", text, flags=re.M | re.S))})
+PLACES = ("benchmarks", "build", "common", "docs", "input_decks", "packaging", "plugins", "postproc", "validation")
+# What a build makes; the test runs without it.
+BUILT = ("build/",)
+
+
+@cache
+def code(*folders: str) -> str:
+    """The source of these folders, tests left out."""
+    files = (path for folder in folders for path in sorted((ROOT / folder).rglob("*")))
+    kinds = {".py", ".h", ".hpp", ".cpp", ".sh", ".txt", ".cmake", ""}
+    return "\n".join(path.read_text(encoding="utf-8", errors="replace") for path in files
+                     if path.is_file() and path.suffix in kinds and "tests" not in path.parts)
+
+
+def rows(text: str, *head: str) -> list[str]:
+    """First cells of the rows of the tables in `text` whose first column has one of these heads."""
+    found, wanted = [], False
+    before = ""
+    for line in text.splitlines():
+        cell = line.split("|")[1].strip() if line.startswith("|") else ""
+        if line.startswith("|") and not before.startswith("|"):
+            wanted = cell in head
+        elif wanted and cell.startswith("`"):
+            found.append(cell)
+        before = line
+    return found
+
+
+def test_modules_and_what_is_in_them() -> None:
+    inside = (ROOT / "plugins/yade/python/dembark.py").read_text(encoding="utf-8")
+    missing = []
+    for name in sorted(set(re.findall(r"\bdembark(?:\.[A-Za-z_]\w*)+", ALL))):
+        short = name.split(".")[1]
+        if re.search(rf"^(?:def|class) {short}\b", inside, re.MULTILINE) or re.search(rf"\b{name}\.(?:json|mplstyle|md)\b", ALL):
+            continue
+        if not exists(name):
+            missing.append(name)
+    assert not missing
+
+
+def exists(name: str) -> bool:
+    """Whether a dotted name is a module, or something in one."""
+    parts = name.split(".")
+    for length in range(len(parts), 0, -1):
+        try:
+            found: object = importlib.import_module(".".join(parts[:length]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[length:]:
+            if not hasattr(found, part):
+                return False
+            found = getattr(found, part)
+        return True
+    return False
+
+
+def test_table_of_modules_for_fields() -> None:
+    table = re.findall(r"^\| ((?:`[\w.]+`(?:, )?)+) \| (.*) \|$", TEXTS["docs/fields.md"].split("| module | what |")[1].split("\n\n")[0], re.MULTILINE)
+    assert len(table) > 5
+    for modules, what in table:
+        full = [name if name.startswith("dembark") else f"dembark.postproc{name}" for name in re.findall(r"`([\w.]+)`", modules)]
+        known = [importlib.import_module(name) for name in full]
+        for name in re.findall(r"`([A-Za-z_][\w.]*)`", what):
+            parts = name.split(".")
+            classes = [one for module in known for one in vars(module).values() if isinstance(one, type)]
+            found = next((getattr(holder, parts[0]) for holder in (*known, *classes) if hasattr(holder, parts[0])), None)
+            assert found is not None and all(hasattr(found, part) for part in parts[1:]), f"{name} in {', '.join(full)}"
+
+
+@cache
+def subcommands() -> dict[str, set[str]]:
+    """The commands of `dembark` with their options."""
+    found = {}
+    for app in (cli.app, postproc.app):
+        for name, command in typer.main.get_command(app).commands.items():
+            found[name] = {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)} | {"--help"}
+    return found
+
+
+def test_commands_and_options_exist() -> None:
+    given = [words for span in SPANS if re.match(r"dembark [a-z]", span) for words in commands(span.replace("…", ""))]
+    given += [words for block in blocks("shell") for line in logical_lines(block.text, "\\") for words in commands(line)]
+    wrong = [" ".join(words[:2]) for words in given if words[0] == "dembark" and words[1] not in subcommands()]
+    wrong += [f"dembark {words[1]} {word}" for words in given if words[0] == "dembark" and words[1] not in ("yade", *wrong)
+              for word in words[2:] if word.startswith("--") and word.partition("=")[0] not in subcommands().get(words[1], set())]
+    assert not wrong
+
+
+def test_table_of_options() -> None:
+    named = {option for cell in rows(TEXTS["docs/fields.md"], "option") for option in re.findall(r"`(--[a-z-]+)`", cell)}
+    assert named <= subcommands()["fields"] | subcommands()["walls"]
+    assert {option for option in subcommands()["fields"] if option.startswith("--")} - named == {"--help"}
+
+
+def test_options_in_the_text_exist() -> None:
+    benchmarks = code("benchmarks") + code("packaging") + (ROOT / "conftest.py").read_text(encoding="utf-8")
+    known = set().union(*subcommands().values()) | set(re.findall(r'"(--[a-z-]+)"', benchmarks))
+    # Words of other programs: of Slurm, Snakemake and srun.
+    known |= {"--ntasks", "--cpus-per-task", "--mem", "--time", "--test-only", "--mpi", "--me", "--format", "--slow"}
+    unknown = {option for span in SPANS for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", span)} - known
+    assert not unknown
+
+
+def test_targets_of_make_exist() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    targets = set(re.findall(r"^([a-z-]+):", makefile, re.MULTILINE))
+    named = {word for span in SPANS if span.startswith("make ") for word in span.split()[1:2]} - {"auto"}
+    assert named and named <= targets
+
+
+def test_variables_of_the_environment_exist() -> None:
+    known = code("validation", "common", "postproc", "packaging", "plugins") + (ROOT / "Makefile").read_text(encoding="utf-8")
+    named = set(re.findall(r"\b(?:DEMBARK|YADE|LIGGGHTS)_[A-Z_]+\b", ALL)) - {"LIGGGHTS_PUBLIC"}
+    assert {name for name in named if name not in known} == set()
+    # What a user may set is told.
+    read = set(re.findall(r"environ(?:\.get\(|\[)\"(DEMBARK_[A-Z_]+)\"", code("validation", "postproc"))) - {"DEMBARK_PREAMBLE", "DEMBARK_PROGRESS"}
+    assert read <= named
+
+
+def test_files_exist() -> None:
+    paths = [span for span in SPANS if re.fullmatch(rf"(?:{'|'.join(PLACES)})/[\w./-]+", span) and not span.startswith(BUILT)]
+    assert len(paths) > 15
+    assert [path for path in paths if not (ROOT / path).exists()] == []
+
+
+def test_readme_names_every_style() -> None:
+    main = (ROOT / "plugins/liggghts/main.cpp").read_text(encoding="utf-8")
+    headers = code("plugins/liggghts")
+    styles = {f"fix {name}" for name in re.findall(r'fixes\["([\w/]+)"\]', main)} | set(re.findall(r'command_map|CommandTable\(\)\)\)\)\["(\w+)"\]', main))
+    styles |= {f"tangential {name}" for name in re.findall(r"^TANGENTIAL_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
+    styles |= {f"cohesion {name}" for name in re.findall(r"^COHESION_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
+    table = {name for cell in rows(TEXTS["README.md"], "style") for name in re.findall(r"`([^`]+)`", cell)}
+    assert len(styles - {""}) == 7 and table == styles - {""}
+
+
+def test_readme_and_pages_name_every_class_of_yade() -> None:
+    plugin = re.findall(r"YADE_PLUGIN\(\((.*)\)\);", code("plugins/yade"))
+    names = {name for line in plugin for name in line.split(")(")}
+    assert len(names) > 10
+    # What writes the dumps of dembark's decks is no class for users.
+    assert {name for name in names if name not in ALL} == {"DembarkSnapshot"}
+
+
+def test_keywords_of_liggghts_exist() -> None:
+    source = code("plugins/liggghts", "plugins/physics")
+    for page, text in TEXTS.items():
+        if page.startswith("docs/liggghts_"):
+            cells = rows(text, "keyword", "property", "name")
+            names = [name for cell in cells for name in re.findall(r"`(\w+)`", cell) if not name.startswith("_")]
+            assert [name for name in names if f'"{name}"' not in source] == [], page
+    registered = re.findall(r'register(?:OnOff|_choice|DoubleSetting)\((?:settings, )?"(\w+)"', source)
+    assert len(registered) >= 4
+    told = {name for text in TEXTS.values() for cell in rows(text, "keyword") for name in re.findall(r"`(\w+)`", cell)}
+    assert set(registered) <= told
+
+
+def test_quantities_exist() -> None:
+    names = {name for cell in rows(TEXTS["docs/validation.md"], "quantity") for name in re.findall(r"`([a-z_0-9…]+)`", cell)}
+    # Names of cases, studies and variants stand in the same column.
+    names -= {"log_pair", "log_cradle", "log_pile", "width", "step", "liquid_content"}
+    # An f-string may have anything in the place of its values; `_a` stands for the material that ends a name.
+    texts = {re.sub(r"\{[^}]*\}", "\0", text) for text in re.findall(r'f?"([^"\n]+)"', code("validation/checks"))}
+    known = [re.compile(re.escape(text).replace("\0", ".+")) for text in texts if re.search(r"[a-z]{3}", text) and " " not in text]
+    wrong = [name for name in names if not any(text.fullmatch(name.replace("…", "x") + end) for text in known for end in ("", "_a"))]
+    assert len(names) > 60 and not wrong
