@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import math
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from dembark.common.errors import DembarkError
@@ -20,17 +20,35 @@ _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
 _FUNCTIONS: dict[str, Callable[..., Any]] = {"min": min, "max": max, "abs": abs, "sqrt": math.sqrt}
 
 
+class _Unset(Exception):
+    """A value that is needed is not set."""
+
+
+def _outside_first(node: ast.AST) -> set[str]:
+    """Names in `node` that are not within a call of `first`."""
+    if isinstance(node, ast.Name):
+        return {node.id}
+    parts: list[ast.AST] = list(ast.iter_child_nodes(node))
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        parts = [] if node.func.id == "first" else list(node.args)
+    return set().union(*(_outside_first(part) for part in parts))
+
+
 class Expression:
     """A parsed condition, e.g. `kinetic_friction <= static_friction or grain_count < 100`."""
 
     def __init__(self, text: str) -> None:
-        """Parse `text`; raises DembarkError for anything but arithmetic, comparisons, and/or/not and min, max, abs, sqrt."""
+        """Parse `text`; DembarkError for anything but arithmetic, comparisons, and/or/not, min, max, abs, sqrt and first.
+
+        `first(a, b)` is the first of its values that is set.
+        """
         self.text = text
         try:
             self._body = ast.parse(text, mode="eval").body
         except SyntaxError:
             raise DembarkError(f"{text!r} is no expression") from None
         self.names = frozenset(self._names(self._body))
+        self._needed = frozenset(_outside_first(self._body))
 
     def _names(self, node: ast.AST) -> set[str]:
         match node:
@@ -48,19 +66,29 @@ class Expression:
                 parts = [left, *others]
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in _FUNCTIONS:
                 parts = list(args)
+            case ast.Call(func=ast.Name(id="first"), args=args, keywords=[]) if args:
+                parts = list(args)
             case _:
                 raise DembarkError(f"{self.text!r} holds something other than arithmetic and comparisons")
         return set().union(*(self._names(part) for part in parts))
 
     def __call__(self, values: Mapping[str, Any]) -> Any:
-        """Result for `values`; None when a parameter that it names has no value, because then there is nothing to hold."""
-        if any(values.get(name) is None for name in self.names):
+        """Result for `values`; None when a parameter that it names has no value, because then there is nothing to hold.
+
+        Within `first(...)` one value is enough.
+        """
+        if any(values.get(name) is None for name in self._needed):
             return None
-        return self._value(self._body, values)
+        try:
+            return self._value(self._body, values)
+        except _Unset:
+            return None
 
     def _value(self, node: ast.AST, values: Mapping[str, Any]) -> Any:
         match node:
             case ast.Name(id=name):
+                if values.get(name) is None:
+                    raise _Unset
                 return values[name]
             case ast.Constant(value=value):
                 return value
@@ -74,6 +102,16 @@ class Expression:
             case ast.Compare(left=left, ops=ops, comparators=others):
                 sides = [self._value(side, values) for side in (left, *others)]
                 return all(_COMPARE[type(op)](a, b) for op, a, b in zip(ops, sides, sides[1:], strict=False))
+            case ast.Call(func=ast.Name(id="first"), args=args):
+                return self._first(args, values)
             case ast.Call(func=ast.Name(id=name), args=args):
                 return _FUNCTIONS[name](*(self._value(arg, values) for arg in args))
         raise AssertionError(f"unchecked node {node!r}")
+
+    def _first(self, nodes: Sequence[ast.AST], values: Mapping[str, Any]) -> Any:
+        for node in nodes:
+            try:
+                return self._value(node, values)
+            except _Unset:
+                continue
+        raise _Unset

@@ -57,7 +57,7 @@ def resolve(case: Case, profile: str | None = None, variant: str | None = None,
         except (ArithmeticError, ValueError, TypeError) as error:
             raise DembarkError(f"{constraint.expression.text!r} cannot be evaluated", where, str(error)) from None
         if holds is not None and not holds:
-            given = ", ".join(f"{name} = {values[name]}" for name in sorted(constraint.expression.names))
+            given = ", ".join(f"{name} = {values[name]}" for name in sorted(constraint.expression.names) if values[name] is not None)
             raise DembarkError(constraint.message, f"{given} {where}", f"wanted is {constraint.expression.text}")
     return values
 

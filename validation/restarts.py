@@ -102,5 +102,6 @@ def remember(work: Path, what: Attempts) -> None:
 
 def clear(work: Path) -> None:
     """Take away what only an unfinished run needs."""
-    for path in (*work.glob(f"{BASE}.*"), work / _ATTEMPTS):
+    # LIGGGHTS writes a restart file of its own when it is told to stop.
+    for path in (*work.glob(f"{BASE}.*"), *work.glob("restart_forced_liggghts_*.data"), work / _ATTEMPTS):
         path.unlink(missing_ok=True)

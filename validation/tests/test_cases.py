@@ -165,6 +165,30 @@ def test_a_length_in_millimetres_is_a_thousandth(value: float) -> None:
     assert to_si(repr(value), "m") == value
 
 
+def test_the_first_value_that_is_set_counts() -> None:
+    condition = Expression("kinetic <= min(first(static, grain), first(static, wall))")
+    assert condition.names == {"kinetic", "static", "grain", "wall"}
+    assert condition({"kinetic": 0.4, "static": None, "grain": 0.5, "wall": 0.3}) is False
+    assert condition({"kinetic": 0.4, "static": 0.5, "grain": 0.5, "wall": 0.3}) is True
+    assert condition({"kinetic": None, "static": 0.5, "grain": 0.5, "wall": 0.3}) is None
+    assert condition({"kinetic": 0.4}) is None
+    assert Expression("kinetic > 1 and static > 1")({"kinetic": 0.5}) is None
+
+
+@pytest.mark.parametrize("case", ["silo", "column_collapse", "gravity_channel", "plane_silo", "plug_flow"])
+def test_a_kinetic_friction_above_the_static_one_is_refused_with_defaults_and_variants(case: str) -> None:
+    """The static friction may be that of grains and walls: given, by default or by a variant."""
+    one = find(case)
+    for name in one.variants:
+        values = resolve(one, "quick", name)
+        least = values["static_friction"] or min(values["grain_friction"], values["wall_friction"])
+        assert resolve(one, "quick", name, {"kinetic_friction": least})["kinetic_friction"] == least
+        with pytest.raises(DembarkError, match="kinetic friction exceeds the static one"):
+            resolve(one, "quick", name, {"kinetic_friction": 1.01 * least})
+    with pytest.raises(DembarkError, match="youngs_modulus = 5e\\+09 Pa is out of range, allowed is >= 5e\\+06 and <= 1e\\+09"):
+        resolve(one, "quick", None, settings(["youngs_modulus=5 GPa"]))
+
+
 @given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
 def test_expressions_agree_with_python(a: float, b: float) -> None:
     values = {"a": a, "b": b}
