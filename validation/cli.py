@@ -16,20 +16,49 @@ from dembark.validation.campaigns import cli as campaigns
 if TYPE_CHECKING:
     from dembark.validation.workflow import Outcome
 
-app = typer.Typer(name="dembark", help="Granular contact laws and their validation, in LIGGGHTS and YADE.",
+_ABOUT = """Granular contact laws and their validation, in LIGGGHTS and YADE.
+
+Your own cases: set DEMBARK_DECKS to the folder that holds their folders; it counts instead of the shipped input_decks."""
+
+app = typer.Typer(name="dembark", help=_ABOUT,
                   pretty_exceptions_enable=False, rich_markup_mode=None, context_settings={"help_option_names": ["-h", "--help"]})
 
 _SET = 'Change a key; repeat for more. A unit may follow: --set "grain_diameter=4 mm".'
 _OUT = "Folder for the results; default: results/<profile>/<case>/<variant>/<engine>; needed with --set."
 
+_INTERVAL = "Wall time between the states that an interrupted run goes on from: '10 min', or none; default: 10 min."
+
 Profile = Annotated[str, typer.Option(help="Size of the runs: quick, standard, full, ...")]
+Strict = Annotated[bool, typer.Option("--strict", help="End with exit code 1 when a check failed.")]
 Results = Annotated[Path, typer.Option(help="Folder of all results; a profile's own are in a folder below it.")]
 
 
 def _console() -> Console:
-    # Piped into a file, a table shall not be squeezed into 80 columns.
+    # Piped into a file, a table shall not be squeezed into 80 columns, unless COLUMNS says so.
     console = Console(highlight=False)
-    return console if console.is_terminal else Console(highlight=False, width=200)
+    return console if console.is_terminal or os.environ.get("COLUMNS", "").isdecimal() else Console(highlight=False, width=200)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from dembark.validation import provenance
+
+        facts = provenance.commit()
+        changed = ", with changes" if facts["dirty"] else ""
+        print(f"dembark {provenance.package_version('dembark')}" + (f" (commit {facts['commit'][:12]}{changed})" if facts["commit"] else ""))
+        raise typer.Exit
+
+
+@app.callback()
+def _common(version: Annotated[bool, typer.Option("--version", is_eager=True, callback=_show_version,
+                                                  help="Show the version, and the commit of a checkout.")] = False) -> None:
+    """Options that need no command."""
+
+
+def _strictly(failed: int, strict: bool) -> None:
+    """RunError when checks failed and that is to count."""
+    if failed and strict:
+        raise RunError(f"{failed} checks failed" if failed > 1 else "1 check failed", "--strict makes this an error")
 
 
 @app.command("cases")
@@ -62,9 +91,11 @@ def run(
     threads: Annotated[int, typer.Option(min=1, help="Threads for each run.")] = 1,
     jobs: Annotated[int | None, typer.Option(min=1, help="Replicas at a time; default: as many as fit the cores.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace results of other inputs once the new ones are finished.")] = False,
+    restart_interval: Annotated[str | None, typer.Option(metavar="TIME", help=_INTERVAL)] = None,
+    strict: Strict = False,
 ) -> None:
     """Run a case in one engine, measure it and show each quantity beside its reference."""
-    from dembark.validation import engines, show
+    from dembark.validation import checks, engines, restarts, show
     from dembark.validation.cases import ENGINES, find
     from dembark.validation.execute import execute
     from dembark.validation.jobs import cancelled_by_signal
@@ -77,19 +108,42 @@ def run(
     changes = settings(change or ())
     chosen = variant if variant is not None else next(iter(one.variants))
     pick(engine, ENGINES, "engine", "in --engine")
+    if engine == "yade" and ranks > 1:
+        raise DembarkError(f"--ranks {ranks} with YADE", "", "use --threads: YADE runs in one process")
+    interval = _interval(restart_interval)
     # Everything the user wrote is checked before an engine is looked for.
     resolve(one, profile, chosen, changes)
     if out is None and changes:
         raise DembarkError("--out is missing", "with --set the run is not the one of the profile", "name a folder for its results")
+    checks.find(one.name, one.folder)
     planned = series(one, chosen, profile, engines.find(engine), changes)
+    if restart_interval is not None and not restarts.supported(planned.runs[0]):
+        raise DembarkError(f"--restart-interval {restart_interval}", f"{one.deck(engine)} writes no states to go on from",
+                           "leave it out; see docs/restarts.md for what a deck needs")
     folder = (out or Path("results") / profile / planned.place).resolve()
-    metrics = execute(planned, folder, cancelled_by_signal(), Resources(ranks, threads), jobs, force)
+    metrics = execute(planned, folder, cancelled_by_signal(), Resources(ranks, threads, interval), jobs, force)
     console = _console()
     console.print(show.quantity_table(metrics))
+    for line in show.open_lines(metrics):
+        console.print(line, markup=False, soft_wrap=True)
     failed = sum(quantity.get("verdict") == "fail" for quantity in metrics.get("quantities", []))
     if failed:
         console.print(f"{failed} CHECKS FAILED" if failed > 1 else "1 CHECK FAILED", style="bold red")
     console.print(str(folder / "metrics.json"), markup=False, soft_wrap=True)
+    _strictly(failed, strict)
+
+
+def _interval(text: str | None) -> float:
+    """Wall time (s) between states of a run, 0 for none."""
+    from dembark.validation.campaigns.sizes import seconds
+    from dembark.validation.simulate import Resources
+
+    if text is None:
+        return Resources.restart_interval
+    try:
+        return 0.0 if text == "none" else seconds(text)
+    except DembarkError as error:
+        raise DembarkError(f"--restart-interval: {error}", "or none") from None
 
 
 @app.command()
@@ -99,6 +153,7 @@ def validate(
     results: Results = Path("results"),
     case: Annotated[list[str] | None, typer.Option(help="Only this case; repeat for more.")] = None,
     engine: Annotated[list[str] | None, typer.Option(help="Only this engine.")] = None,
+    strict: Strict = False,
 ) -> None:
     """Run all cases of a profile in both engines and build the report; finished runs are kept."""
     from dembark.validation.jobs import cancelled_by_signal
@@ -106,6 +161,7 @@ def validate(
 
     outcome = workflow(profile, cancelled_by_signal(), cores, results, tuple(case or ()), tuple(engine or ()))
     show_outcome(outcome, "the validation", "start again: what is finished is kept")
+    _strictly(outcome.failed_checks, strict)
 
 
 def show_outcome(outcome: Outcome, what: str, advice: str) -> None:

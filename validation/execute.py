@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -48,7 +49,8 @@ def execute(one: Series, out: Path, cancel: threading.Event, resources: Resource
     board = Board([run.name for run in one.runs])
     at_once = jobs or max(1, (os.cpu_count() or 1) // (resources.ranks * resources.threads))
     problems: list[DembarkError] = []
-    with Monitor(board.states), ThreadPoolExecutor(at_once) as pool:
+    # Why a run failed is told once, at the end.
+    with Monitor(board.states, reasons=False), ThreadPoolExecutor(at_once) as pool:
         futures = [pool.submit(simulate, run, out, board, cancel, resources) for run in one.runs]
         for future in futures:
             try:
@@ -56,5 +58,8 @@ def execute(one: Series, out: Path, cancel: threading.Event, resources: Resource
             except DembarkError as error:
                 problems.append(error)
     if problems:
-        raise next((error for error in problems if isinstance(error, Interrupted)), problems[0])
+        told = next((error for error in problems if isinstance(error, Interrupted)), problems[0])
+        for message in dict.fromkeys(str(error) for error in problems if not isinstance(error, Interrupted) and error is not told):
+            print(f"dembark: {message}", file=sys.stderr)
+        raise told
     return measure_series(out, one.runs)

@@ -18,7 +18,7 @@ from typing import Any
 
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import read_json, retire, write_json
-from dembark.validation import provenance
+from dembark.validation import analysis, provenance
 from dembark.validation.campaigns import store
 from dembark.validation.campaigns.folder import FILE as CAMPAIGN_FILE
 from dembark.validation.campaigns.source import Source
@@ -69,11 +69,13 @@ def measure_series(folder: Path, runs: Iterable[Run]) -> dict[str, Any]:
         raise RunError(f"nothing to measure in {folder}", "none of its runs is finished")
     target.unlink(missing_ok=True)
     try:
-        content = measure(folder)
+        with analysis.warnings_kept() as remarks:
+            content = measure(folder)
     except DembarkError:
         raise
     except Exception as error:  # whatever goes wrong in the analysis is a failed measurement, to be told in one line
-        raise RunError(f"{folder} could not be measured", f"{type(error).__name__}: {error}") from error
+        raise RunError(f"{folder} could not be measured", *analysis.reasons(folder, error, done[0].case)) from error
+    content["remarks"] = [*content.get("remarks", ()), *remarks]
     if "replicas" in content["parameters"]:
         content["parameters"]["replicas"] = len(wanted)  # those of an earlier request for fewer or more are kept, and know its number
     content["measured"] = _now()

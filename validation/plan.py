@@ -11,7 +11,7 @@ from typing import Any
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
-from dembark.validation import engines
+from dembark.validation import checks, engines
 from dembark.validation.cases import ENGINES, Case, Study, discover
 from dembark.validation.engines import Engine
 from dembark.validation.parameters import Value, pick
@@ -133,6 +133,7 @@ def series(case: Case, variant: str, profile: str | None, engine: Engine, change
     pick(engine.name, case.engines, "engine", f"in case {case.name}")
     if not case.deck(engine.name).is_file():
         raise DembarkError(f"{case.deck(engine.name)} is missing", "", f"remove {engine.name} from engines in case.toml or add the deck")
+    checks.require(case.name, case.folder)
     values = portable(resolve(case, profile, variant, changes))
     count = values.get("replicas")
     numbers = range(1, (count if isinstance(count, int) else 1) + 1)

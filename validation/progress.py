@@ -166,7 +166,7 @@ def describe(state: State) -> str:
         case "finished":
             return f"{state.name}: finished in {took}{f' in attempt {state.attempt}' if state.attempt > 1 else ''}"
         case "kept":
-            return f"{state.name}: is finished already, kept"
+            return f"{state.name}: already finished; reusing"
         case "stopped":
             return f"{state.name}: stopped after {took}: {state.message}"
         case "failed":
@@ -207,10 +207,14 @@ def state_table(states: Sequence[State], rows: int | None = None) -> Table:
 
 
 class Monitor:
-    """Shows what `states` returns while the `with` block runs: a live table in a terminal, else lines; `log` gets the lines always."""
+    """Shows what `states` returns while the `with` block runs: a live table in a terminal, else lines; `log` gets the lines always.
+
+    `reasons`: lines of failed and stopped runs say why, which whoever asked may rather do itself.
+    """
 
     def __init__(self, states: Callable[[], list[State]], console: Console | None = None, interval: float = INTERVAL,
-                 log: Path | None = None) -> None:
+                 log: Path | None = None, reasons: bool = True) -> None:
+        self._reasons = reasons
         self._states = states
         self._console = console or Console(file=sys.stderr, highlight=False, soft_wrap=True)
         self._interval = interval
@@ -249,7 +253,8 @@ class Monitor:
             else:
                 continue
             if not self._live:
-                self._console.print(f"dembark: {line}", markup=False)
+                shown = line if self._reasons else line.removesuffix(f": {state.message}")
+                self._console.print(f"dembark: {shown}", markup=False)
             if event:
                 self._note(line)
             self._told[state.name] = (state, now)

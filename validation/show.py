@@ -86,3 +86,13 @@ def quantity_table(metrics: Mapping[str, Any]) -> Table:
             number(quantity.get("reference")), interval(quantity.get("reference_interval")), number(quantity.get("deviation")),
             number(quantity.get("tolerance")), f"[{_COLOURS[verdict]}]{shown}[/]" if verdict in _COLOURS else shown)
     return table
+
+
+def open_lines(metrics: Mapping[str, Any]) -> list[str]:
+    """Why quantities that have a tolerance, or a reason, got neither pass nor fail: a line for each reason."""
+    reasons: dict[str, list[str]] = {}
+    for quantity in metrics.get("quantities", []):
+        reason = str(quantity.get("reason") or "")
+        if quantity.get("verdict") == "info" and reason:
+            reasons.setdefault(reason, []).append(str(quantity.get("label") or quantity.get("name", "")))
+    return [f"info: {', '.join(names)}: {reason}" for reason, names in reasons.items()]

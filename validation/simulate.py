@@ -58,7 +58,7 @@ def simulate(run: Run, out: Path, board: Board, cancel: threading.Event, resourc
         except DembarkError as error:
             # Another attempt may follow; it is not the run that failed.
             state = "stopped" if isinstance(error, Killed | Interrupted) else "failed"
-            board.post(run.name, state=state, ended=time.time(), message=str(error))
+            board.post(run.name, state=state, ended=time.time(), message=str(error).removeprefix(f"{run.name} failed, "))
             raise
         board.post(run.name, state="finished", ended=time.time())
     return target

@@ -9,10 +9,24 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import sys
+import traceback
 from pathlib import Path
 from types import ModuleType
 
-from dembark.common.errors import RunError
+from dembark.common.errors import DembarkError, RunError
+
+
+def place(error: BaseException, file: Path) -> str:
+    """` (checks.py, line 12)`: the last line of `file` on the way to `error`; '' when it was not on it."""
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(file)]
+    return f" ({file.name}, line {lines[-1]})" if lines else ""
+
+
+def require(case: str, folder: Path) -> None:
+    """DembarkError when `case` has no checks: its runs could not be measured. Nothing is imported."""
+    if not (folder / "checks.py").is_file() and not Path(__file__).with_name(f"{case}.py").is_file():
+        raise DembarkError(f"case {case} has no checks", f"there is no {folder / 'checks.py'}",
+                           "add one with quantities(replicas), picture(parameters) and REFERENCES, see docs/cases.md")
 
 
 def find(case: str, folder: Path | None = None) -> ModuleType:
@@ -25,8 +39,13 @@ def find(case: str, folder: Path | None = None) -> ModuleType:
             raise RunError(f"{own} cannot be loaded")
         module = importlib.util.module_from_spec(spec)
         sys.modules[name] = module
-        spec.loader.exec_module(module)
+        try:
+            spec.loader.exec_module(module)
+        except Exception as error:  # the file is the user's: whatever is wrong in it is told in one line
+            raise DembarkError(f"{own} cannot be loaded", f"{type(error).__name__}: {error}{place(error, own)}") from None
+        for name in ("quantities", "picture", "REFERENCES"):
+            if not hasattr(module, name):
+                raise DembarkError(f"{own} has no {name}", "", "the checks of a case are quantities(replicas), picture(parameters), REFERENCES")
         return module
-    if not (Path(__file__).with_name(f"{case}.py")).is_file():
-        raise RunError(f"case {case} has no checks", str(own or ""), "add a checks.py to its folder")
+    require(case, folder or Path("input_decks", case))
     return importlib.import_module(f"{__name__}.{case}")

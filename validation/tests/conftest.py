@@ -118,6 +118,8 @@ def decks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (root / "box" / "case.toml").write_text(CASE)
     for name in ("liggghts.in", "yade.py"):
         (root / "box" / name).write_text("# deck that knows restart_every and resume\n")
+    # What measures stands in for the real thing, too.
+    (root / "box" / "checks.py").write_text("REFERENCES = ()\ndef quantities(replicas): ...\ndef picture(parameters): ...\n")
     monkeypatch.setenv("DEMBARK_DECKS", str(root))
     cases.load.cache_clear()
     return root

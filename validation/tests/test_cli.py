@@ -89,7 +89,7 @@ def test_run_makes_all_replicas_with_their_own_seeds(dembark: Dembark, tmp_path:
     assert done.returncode == 0, done.stderr
     folder = tmp_path / "results/standard/box/dry/yade"
     assert [read_json(folder / f"replica-{k}/run.json")["seed"] for k in (1, 2, 3)] == [7, 8, 9]
-    assert "kept" in dembark("run", "box", "--engine", "yade", "--profile", "standard").stderr
+    assert "already finished; reusing" in dembark("run", "box", "--engine", "yade", "--profile", "standard").stderr
 
 
 def test_more_replicas_keep_those_that_are_there(dembark: Dembark, tmp_path: Path) -> None:

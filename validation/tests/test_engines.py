@@ -113,6 +113,7 @@ def decks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     (folder / "case.toml").write_text(CASE)
     (folder / "liggghts.in").write_text(LIGGGHTS)
     (folder / "yade.py").write_text(YADE)
+    (folder / "checks.py").touch()
     monkeypatch.setenv("DEMBARK_DECKS", str(folder.parent))
     cases.load.cache_clear()
     engines.find.cache_clear()

@@ -1,0 +1,63 @@
+"""What went wrong while results were analysed, for people: the line of the checks, and what of the run is too small to be measured."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TextIO
+
+from dembark.postproc import DumpError, GrainsDump
+from dembark.validation import checks
+from dembark.validation.cases import Case
+
+# Below these numbers most checks have nothing to average over.
+_FEW_GRAINS = 100
+_FEW_FRAMES = 4
+
+
+@contextmanager
+def warnings_kept() -> Iterator[list[str]]:
+    """A list that takes the numerical warnings of the block, as remarks with file and line, instead of the screen."""
+    found: list[str] = []
+
+    def keep(message: Warning | str, category: type[Warning], filename: str, lineno: int, file: TextIO | None = None,
+             line: str | None = None) -> None:
+        if issubclass(category, RuntimeWarning):
+            found.append(f"numerical warning: {message} ({Path(filename).name}, line {lineno})")
+        else:
+            shown(message, category, filename, lineno, file, line)
+
+    with warnings.catch_warnings():
+        # The filters stay as they are: where a warning is to be an error, it is one.
+        shown = warnings.showwarning
+        warnings.showwarning = keep
+        yield found
+
+
+def reasons(folder: Path, error: Exception, case: Case) -> tuple[str, ...]:
+    """Parts of one line about `error`, which the checks of `case` raised for the runs in `folder`: what is too small, error and line."""
+    files = (case.folder / "checks.py", *sorted(Path(checks.__file__).parent.glob("*.py")))
+    own, *shipped = (checks.place(error, file) for file in files)
+    told = f"{type(error).__name__}: {error}{own or next(filter(None, shipped), '')}"
+    small = [too_small(path) for path in sorted(folder.glob("replica-*"))]
+    worst = next(filter(None, small), "")
+    if not worst:
+        return (told,)
+    return (f"the run is too small or too short for its checks: {worst}", "take more grains or frames, or a longer time to settle", f"({told})")
+
+
+def too_small(replica: Path) -> str:
+    """What a finished run has too little of: grains, frames, walls that carry something; '' when nothing is striking."""
+    try:
+        grains = GrainsDump(replica / "grains.dump")
+        last = grains[len(grains) - 1]
+    except (DumpError, IndexError):
+        return ""
+    count, frames = len(last.radii), len(grains)
+    bare = [name for name, force in last.wall_forces.items() if not force.any()]
+    found = [f"{count} grain{'s' * (count != 1)}"] if count < _FEW_GRAINS else []
+    found += [f"{frames} frame{'s' * (frames != 1)}"] if frames < _FEW_FRAMES else []
+    found += [f"nothing presses on the wall {' and '.join(bare)} in the last frame"] if bare else []
+    return ", ".join(found)
