@@ -38,6 +38,7 @@ class Column:
     Sectors (with soft borders) are equivalent by symmetry, so they resample the disorder of the packing: what is measured on those that
     are kept is scaled up to the whole. `normal`, `shear` (frames, bands, sectors): wall forces (N);
     `lift`, `level_lift`: what the wall carries above; `weight_above`, `level_weight` (frames, bands): the grains' weight above;
+    `net_above` (frames, bands): the upward force (N) that accelerates the grains above;
     `adhesion` (frames, bands, sectors): what liquid bridges pull the grains to the wall with (N), so that they press on it with `normal` +
     `adhesion`; `field` (frames, bands): contact stress (Pa); `volume` (frames, bands, sectors): solid volume; `base` (frames,): force on
     the base.
@@ -56,6 +57,7 @@ class Column:
     level_lift: Array
     weight_above: Array
     level_weight: Array
+    net_above: Array
     field: Array
     volume: Array
     base: Array
@@ -185,9 +187,12 @@ class Column:
         return float(self._whole(self.volume, frames, sectors)[inside].sum() / (self.area * np.diff(self.edges)[inside].sum()))
 
     def field_errors(self) -> Array:
-        """Relative deviation (frames,) of the contact-stress field from the balance, over the bands below the uppermost two diameters."""
+        """Relative deviation (frames,) of the contact-stress field from the balance, over the bands below the uppermost two diameters.
+
+        With what accelerates the grains above, the balance holds in each frame, not only in the mean of many.
+        """
         chosen = self.middle < self.height - 2.0 * self.diameter
-        balance = (self.weight_above - self.lift.sum(axis=2)) / self.area
+        balance = (self.weight_above - self.lift.sum(axis=2) + self.net_above) / self.area
         total = balance[:, chosen].sum(axis=1)
         return (self.field[:, chosen].sum(axis=1) - total) / total.mean()
 
@@ -285,6 +290,7 @@ def _frame_rows(
         "level_lift": np.stack([stress.load_above(heights, side[:, 2] * share, edges) for share in shares], axis=1),
         "weight_above": stress.mean_load_above(heights, weights, edges),
         "level_weight": stress.load_above(heights, weights, edges),
+        "net_above": stress.mean_load_above(heights, grains.forces[:, 2], edges),
         "field": field[:, 2, 2],
         "volume": slice_volumes(heights, grains.radii, edges).T @ vessel.volume_shares(place, grains.radii, sectors),
         "base": base[:, 2].sum(),

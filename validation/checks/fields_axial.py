@@ -80,7 +80,10 @@ class Rings:
         points, weights = self.radii[:, None] + half * node, half * weight
         shares = [(self._kernel(order, points, places[:, None, None]) * 2.0 * np.pi * points * weights).sum(axis=2) for order in (0, 1, 2)]
         shares[0][:, -1] += 1.0 - shares[0].sum(axis=1)
-        return CubicSpline(places, np.hstack([*shares, self._kernel(1, self.radial, places[:, None])]))
+        borders = self._kernel(1, self.radial, places[:, None])
+        # Beyond the last ring is nothing that it could flow into.
+        borders[:, -1] = 0.0
+        return CubicSpline(places, np.hstack([*shares, borders]))
 
     def _kernel(self, order: int, radius: Array, source: Array) -> Array:
         scaled = ive(order, radius * source / self.width**2) * np.exp(-0.5 * ((radius - source) / self.width) ** 2)
@@ -96,8 +99,11 @@ class Rings:
         """For sources at the heights (m,): shares (m, l) in the layers, and values (m, l + 1) at their borders in 1/m."""
         distance = (self.vertical - source[:, None]) / self.width
         below = ndtr(distance)
+        density = np.exp(-0.5 * distance**2) / (np.sqrt(2.0 * np.pi) * self.width)
+        # The outermost layers hold what lies beyond them, so nothing flows through their outer borders.
         below[:, 0], below[:, -1] = 0.0, 1.0
-        return np.diff(below, axis=1), np.exp(-0.5 * distance**2) / (np.sqrt(2.0 * np.pi) * self.width)
+        density[:, [0, -1]] = 0.0
+        return np.diff(below, axis=1), density
 
     @cached_property
     def above(self) -> Array:
