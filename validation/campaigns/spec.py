@@ -106,7 +106,21 @@ def read(path: Path) -> CampaignSpec:
 
     Checked are all keys, types, units, ranges and names, and the conditions of the cases at every point (by `expand.points`).
     """
-    return _Reader(path).campaign(load_toml(path))
+    data = load_toml(path)
+    _refuse_decimal_commas(path)
+    return _Reader(path).campaign(data)
+
+
+def _refuse_decimal_commas(path: Path) -> None:
+    """DembarkError for a list such as `[0,15, 0.3]`: TOML reads three numbers where two were meant."""
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+        bare = re.sub(r"\"[^\"]*\"|'[^']*'|#.*", '""', line)
+        for part in re.findall(r"\[[^\[\]]*\]", bare):
+            tight = re.search(r"\b(\d+),(\d+)\b", part)
+            if tight and re.search(r",\s", part):
+                first, second = tight.groups()
+                raise DembarkError(f"{tight.group()!r} in a list: write {first}.{second}, or {first}, {second} if these are two numbers",
+                                   f"line {number} of {path}")
 
 
 @dataclass

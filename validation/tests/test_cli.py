@@ -84,6 +84,32 @@ def test_run_measures_and_shows_verdicts(dembark: Dembark, tmp_path: Path) -> No
     assert read_json(tmp_path / "o/metrics.json")["parameters"]["grain_diameter"] == 0.004
 
 
+def test_a_failed_check_counts_only_when_asked(dembark: Dembark, tmp_path: Path) -> None:
+    """The wet box fails a check: exit code 0 as ever, 1 with --strict."""
+    words = ("run", "box", "--engine", "liggghts", "--variant", "wet", "--out", "o")
+    first, second = dembark(*words, "--restart-interval", "1 s"), dembark(*words, "--strict")
+    assert (first.returncode, second.returncode) == (0, 1)
+    assert "1 CHECK FAILED" in first.stdout and second.stderr.splitlines()[-1] == "dembark: 1 check failed, --strict makes this an error"
+    # By the fixed rate of restarts, a million particle-steps a second.
+    assert read_json(tmp_path / "o/replica-1/run.json")["restart_every"] == 100_000
+
+
+def test_a_failure_is_told_once(dembark: Dembark) -> None:
+    done = dembark("run", "box", "--engine", "liggghts", "--profile", "standard", "--set", "behaviour=exit", "--out", "o")
+    assert done.returncode == 1
+    for number in (1, 2, 3):
+        assert done.stderr.count(f"replica-{number}.log") == 1
+    assert done.stderr.count("Lost atoms") == 3
+
+
+def test_tables_are_as_wide_as_asked_for_when_piped(dembark: Dembark, environment: dict[str, str]) -> None:
+    widths = []
+    for columns in ("60", "200"):
+        environment["COLUMNS"] = columns
+        widths.append(max(map(len, dembark("cases", "box").stdout.splitlines())))
+    assert widths[0] <= 60 < widths[1] <= 200
+
+
 def test_run_makes_all_replicas_with_their_own_seeds(dembark: Dembark, tmp_path: Path) -> None:
     done = dembark("run", "box", "--engine", "yade", "--profile", "standard")
     assert done.returncode == 0, done.stderr

@@ -1,0 +1,58 @@
+"""What is told when results cannot be measured."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from dembark.validation import analysis, checks, show
+
+HEADER = "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n" \
+    "ITEM: ATOMS id type x y z vx vy vz radius mass f_force_side[1] f_force_side[2] f_force_side[3]\n"
+
+
+def replica(folder: Path, count: int, frames: int, force: float) -> Path:
+    """A run whose grains the wall `side` pushes with `force` (N)."""
+    folder.mkdir(parents=True)
+    lines = "".join(f"{k + 1} 1 0.5 0.5 {0.001 * k} 0 0 0 0.001 1e-5 {force} 0 0\n" for k in range(count))
+    (folder / "grains.dump").write_text("".join(HEADER.format(step=step, count=count) + lines for step in range(frames)))
+    return folder
+
+
+@pytest.mark.parametrize(("count", "frames", "force", "expected"), [
+    (1, 5, 1.0, "1 grain"), (2, 1, 1.0, "2 grains, 1 frame"), (200, 5, 0.0, "nothing presses on the wall side in the last frame"),
+    (200, 5, 1.0, "")])
+def test_what_is_too_small_is_named(tmp_path: Path, count: int, frames: int, force: float, expected: str) -> None:
+    assert analysis.too_small(replica(tmp_path / "replica-1", count, frames, force)) == expected
+
+
+def test_an_error_in_own_checks_is_told_with_its_line(tmp_path: Path) -> None:
+    case = SimpleNamespace(name="mine", folder=tmp_path)
+    (tmp_path / "checks.py").write_text("REFERENCES = ()\ndef picture(parameters): ...\ndef quantities(replicas):\n    return 1 / 0\n")
+    module = checks.find("mine", tmp_path)
+    with pytest.raises(ZeroDivisionError) as caught:
+        module.quantities([])
+    assert analysis.reasons(tmp_path, caught.value, case) == ("ZeroDivisionError: division by zero (checks.py, line 4)",)
+    replica(tmp_path / "replica-1", 1, 2, 1.0)
+    assert analysis.reasons(tmp_path, caught.value, case)[0] == "the run is too small or too short for its checks: 1 grain, 2 frames"
+
+
+def test_numerical_warnings_become_remarks_and_stay_errors_where_they_are(capsys: pytest.CaptureFixture[str]) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        with analysis.warnings_kept() as remarks:
+            np.float64(0.0) / np.float64(0.0)
+        assert len(remarks) == 1 and "invalid value" in remarks[0] and "test_analysis.py, line" in remarks[0]
+        warnings.simplefilter("error")
+        with pytest.raises(RuntimeWarning), analysis.warnings_kept():
+            np.float64(0.0) / np.float64(0.0)
+    assert capsys.readouterr().err == ""
+
+
+def test_open_verdicts_are_told_with_their_reason() -> None:
+    quantities = [{"label": name, "verdict": verdict, "reason": reason} for name, verdict, reason in (
+        ("a", "info", "the run is too short"), ("b", "pass", ""), ("c", "info", "the run is too short"), ("d", "info", ""))]
+    assert show.open_lines({"quantities": quantities}) == ["info: a, c: the run is too short"]

@@ -1,0 +1,151 @@
+"""What users get wrong: one line that says what would be right, before any engine starts, and nothing left behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from dembark.validation import cases, engines
+from dembark.validation.cli import main
+
+HEAD = '[campaign]\nname = "mine"\nprofile = "quick"\n[[sweeps]]\ncase = "silo"\n'
+RUN = ("run", "silo", "--engine", "liggghts", "--out", "out")
+
+SETTINGS = {
+    "wall_friction=0,3": "wall_friction: '0,3' has a comma; write the decimal point: 0.3",
+    "gravity=9,81 m/s^2": "write the decimal point: 9.81 m/s^2",
+    "grain_diameter=4,5mm": "write the decimal point: 4.5mm",
+    "grain_density=2.500,0": "write a decimal point and nothing between thousands",
+    "grain_count=2,200": "grain_count: '2,200' has a comma",
+    "grain_density=2'500": "give e.g. '2.5 g/cm^3'",
+    "grain_density=2 500 kg/m^3": "give e.g. '2.5 g/cm^3'",
+    "wall_friction=0.3.1": "give e.g. 0.3",
+    "wall_friction=0.3 0.4": "give e.g. 0.3",
+    "restitution=nan": "restitution = nan: give a finite number",
+    "cylinder_radius=inf": "cylinder_radius = inf: give a finite number",
+    "cylinder_radius=1e400": "cylinder_radius = 1e400: give a finite number",
+    "cylinder_radius=1e400 mm": "cylinder_radius = 1e400 mm: give a finite number",
+    "grain_count=1e400": "give a finite number",
+    "grain_diameter=mm": "grain_diameter = mm: give a number with it, e.g. '4 mm'",
+    "grain_diameter=4 kg": "cannot convert '4 kg' to m; give e.g. '4 mm'",
+    "grain_diameter=4 mn": "unknown unit 'mn' in '4 mn'; give e.g. '4 mm'",
+    "bridge_volume=1 mm3": "write the power with ^: '1 mm^3'",
+    "wall_friction=20 deg": "mixes up angles and plain ratios; give e.g. 0.3",
+    "grain_diameter=small": "give e.g. '4 mm'",
+    "grain_count=10.5": "is not a whole number, >= 1",
+    "grain_count=0": "allowed is >= 1",
+    "restitution=1.2": "allowed is >= 0.05 and <= 1",
+    "youngs_modulus=5 GPa": "allowed is >= 5e+06 and <= 1e+09",
+    "youngs_modulus=1 kPa": "allowed is >= 5e+06 and <= 1e+09",
+    "kinetic_friction=0.9": "wall_friction = 0.3 in case silo, wanted is kinetic_friction <= min(",
+    "cylinder_radius=1 cm": "wanted is cylinder_radius >= 3 * grain_diameter",
+    "capillary_model=exakt": "allowed are exact | willett",
+    "grain_diametre=4 mm": "did you mean grain_diameter",
+    "grain_diameter": "write --set key=value",
+    "grain_diameter=": "write --set key=value",
+    "frames=1": "allowed is >= 2",
+}
+
+COMMANDS = {
+    "misspelt command": (("runn", "silo"), "Did you mean 'run'"),
+    "misspelt case": (("run", "slio", "--engine", "liggghts"), "did you mean silo?"),
+    "misspelt engine": (("run", "silo", "--engine", "ligghts"), "did you mean liggghts?"),
+    "misspelt profile": ((*RUN, "--profile", "quikc"), "did you mean quick?"),
+    "misspelt variant": ((*RUN, "--variant", "wett"), "did you mean wet"),
+    "misspelt option": ((*RUN, "--threds", "2"), "--threads"),
+    "no engine": (("run", "silo"), "--engine"),
+    "no folder for changes": (("run", "silo", "--engine", "liggghts", "--set", "frames=9"), "name a folder for its results"),
+    "a key twice": ((*RUN, "--set", "frames=9", "--set", "frames=8"), "give each key once"),
+    "no threads": ((*RUN, "--threads", "0"), "greater than or equal to 1"),
+    "threads with a comma": ((*RUN, "--threads", "1,5"), "--threads': Input should be a valid integer"),
+    "ranks of YADE": (("run", "silo", "--engine", "yade", "--out", "out", "--ranks", "2"), "use --threads"),
+    "interval without unit": ((*RUN, "--restart-interval", "10"), '"10 min"'),
+    "interval with a comma": ((*RUN, "--restart-interval", "1,5 h"), "write the decimal point: 1.5 h"),
+    "case of validate": (("validate", "--case", "siol"), "did you mean silo?"),
+    "engine of validate": (("validate", "--engine", "yad"), "did you mean yade?"),
+    "report of nothing": (("report", "--results", "out"), "first, or give --results"),
+    "status of nothing": (("status", "out"), "out"),
+    "unknown campaign": (("submit", "silo-smal", "--out", "out"), "did you mean silo-small"),
+    "fields of nothing": (("fields", "out.dump", "--out", "f.nc"), "out.dump"),
+    "fields nowhere": (("fields", "silo"), "name a file with --out"),
+}
+
+CAMPAIGNS = {
+    "decimal comma": ('grid = { wall_friction = ["0,15", 0.3] }\n', "write the decimal point: 0.15"),
+    "decimal comma in fixed": ('fixed = { gravity = "9,81 m/s^2" }\ngrid = { frames = [9] }\n', "write the decimal point: 9.81 m/s^2"),
+    "decimal comma in a list": ('list = [{ wall_friction = "0,2" }]\n', "write the decimal point: 0.2"),
+    "decimal comma without quotes": ("grid = { wall_friction = [0,15, 0.3] }\n", "'0,15' in a list: write 0.15, or 0, 15"),
+    "decimal comma outside a list": ("fixed = { wall_friction = 0,3 }\n", "cannot be read"),
+    "nan": ("grid = { restitution = [0.5, nan] }\n", "restitution = nan: give a finite number"),
+    "infinite": ("grid = { cylinder_radius = [inf] }\n", "cylinder_radius = inf: give a finite number"),
+    "bare unit": ('grid = { grain_diameter = ["mm"] }\n', "give a number with it, e.g. '4 mm'"),
+    "kinetic above static": ("grid = { kinetic_friction = [0.2, 0.9] }\n", "wanted is kinetic_friction <= min("),
+}
+
+
+@pytest.fixture(autouse=True)
+def nothing_starts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An empty folder, and engines that must not be asked for."""
+    monkeypatch.chdir(tmp_path)
+
+    def never(name: str) -> engines.Engine:
+        pytest.fail(f"{name} was looked for")
+    monkeypatch.setattr(engines, "find", never)
+
+
+def refused(words: tuple[str, ...], expected: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """The command ends with exit code 2 and one line that holds `expected`."""
+    assert main(list(words)) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("dembark: ") and said.err.count("\n") == 1 and "Traceback" not in said.err
+    assert expected in said.err
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_a_wrong_setting_is_refused(setting: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    refused((*RUN, "--set", setting), SETTINGS[setting], capsys)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_wrong_command_is_refused(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    refused(*COMMANDS[name], capsys)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", CAMPAIGNS)
+def test_a_wrong_campaign_is_refused(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text, expected = CAMPAIGNS[name]
+    (tmp_path / "mine.toml").write_text(HEAD + text)
+    refused(("submit", "mine.toml", "--out", "out"), expected, capsys)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
+
+
+@pytest.mark.parametrize(("text", "expected"), [
+    (None, "add one with quantities(replicas)"),
+    ("def quantities(:\n", "SyntaxError"),
+    ("REFERENCES = ()\nimport no_such_module\n", "no_such_module' (checks.py, line 2)"),
+    ("REFERENCES = ()\ndef quantities(replicas): ...\n", "has no picture"),
+])
+def test_missing_or_broken_checks_are_told_before_a_run(text: str | None, expected: str, decks: Path, tmp_path: Path,
+                                                        capsys: pytest.CaptureFixture[str]) -> None:
+    file = decks / "box/checks.py"
+    file.unlink()
+    if text is not None:
+        file.write_text(text)
+    refused(("run", "box", "--engine", "liggghts", "--out", "out"), expected, capsys)
+    assert not (tmp_path / "out").exists()
+
+
+def test_own_decks_that_are_not_there_are_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("DEMBARK_DECKS", "nowhere")
+    cases.load.cache_clear()
+    refused(("cases",), "set it to the folder that holds the case folders", capsys)
+
+
+def test_version_and_help_tell_what_a_first_user_needs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("dembark 0.")
+    assert main(["--help"]) == 0
+    assert "DEMBARK_DECKS" in capsys.readouterr().out
