@@ -152,3 +152,17 @@ def test_a_run_is_read_once(tmp_path):
     read = once(lambda one: calls.append(one) or len(calls))
     assert read(replica) == read(replica) == 1
     assert json.loads((replica.folder / "run.json").read_text())["replica"] == 1
+
+
+@pytest.mark.parametrize("height", [0.01, 0.0118])
+def test_what_flows_through_the_borders_is_what_the_layers_gain(height):
+    """Also in the outermost layers, which hold all that the kernel carries beyond them."""
+    width = 0.005
+    rings = Rings.around(0.02, height, width, 0.5 * width)
+    node, weight = np.polynomial.legendre.leggauss(40)
+    for low, high in ((0.0, 0.5 * width), (height, height + width)):
+        before, after = (rings.along(np.array([place]))[0][0] for place in (low, high))
+        places, weights = low + 0.5 * (high - low) * (node + 1.0), 0.5 * (high - low) * weight
+        flow = weights @ rings.along(places)[1]
+        np.testing.assert_allclose(after - before, -np.diff(flow), rtol=0.0, atol=1e-9)
+    assert (rings.across(np.array([0.019]))[3][:, -1] == 0.0).all()
