@@ -199,6 +199,9 @@ def markdown(rows: list[dict[str, Any]], asked: list[dict[str, Any]], facts: dic
         lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
     lines += ["", "| goal | value | asked | |", "| --- | --- | --- | --- |"]
     lines += [f"| {goal['goal']} | {goal['value']:.3g} | {goal['bound']:g} | {'met' if goal['met'] else 'MISSED'} |" for goal in asked]
+    if not facts["versions"].get("siconos"):
+        lines += ["", "Siconos's methods, and the goals that compare with them, are left out: the system's Python has no Siconos "
+                  "(python3-siconos, not in every release of Debian)."]
     versions = ", ".join(f"{name} {version}" for name, version in facts["versions"].items() if version)
     lines += ["", f"{facts['date']}, {facts['cpu']}, {facts['cores']} cores, load {facts['load']:.1f} before and "
               f"{facts['load_after']:.1f} after, commit {facts['commit'] or 'none'}{' with changes' if facts['dirty'] else ''}, {versions}.", ""]

@@ -38,3 +38,9 @@ def test_nothing_to_draw_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_a_peer_is_left_out_where_one_call_would_take_too_long() -> None:
     assert lcp.expected(row("Siconos lemke", 100), 1000) == pytest.approx(1e3 * 1e-4)
     assert lcp.expected(row("Siconos pgs", 100), 1000) == pytest.approx(1e2 * 1e-4)
+
+
+def test_without_siconos_the_table_says_what_is_left_out():
+    facts = {"clock": "elapsed time", "date": "today", "cpu": "one", "cores": 1, "load": 0.0, "load_after": 0.0, "commit": None, "dirty": False}
+    said = [lcp.markdown([], lcp.goals([]), {**facts, "versions": {"dembark": "1", "siconos": version}}) for version in (None, "4.4.0")]
+    assert "are left out" in said[0] and "python3-siconos" in said[0] and "left out" not in said[1]
