@@ -3,10 +3,12 @@
 #
 #   packaging/system.sh          install what is missing
 #   packaging/system.sh --list   print what is missing, one a line
+#   packaging/system.sh --all    print all that are needed here, one a line
 #
 # With DEMBARK_NO_SYSTEM=1 nothing is looked for: on machines where modules or a group's own builds take the packages' place.
 set -euo pipefail
 [ -z "${DEMBARK_NO_SYSTEM:-}" ] || exit 0
+here=$(cd "$(dirname "$0")" && pwd)
 
 packages=(
   # compilers and build tools
@@ -15,23 +17,31 @@ packages=(
   liggghts libliggghts-dev openmpi-bin libopenmpi-dev
   # Python: the project's virtual environment is made with the system's
   python3 python3-dev python3-venv
-  # Siconos: the peer of the LCP solver in tests and benchmarks
-  python3-siconos python3-scipy
   # a private Slurm, in which the tests of campaigns on a cluster run
   slurm-wlm munge
   # the report: text layout for the PDF, off-screen rendering for the pictures
   libpango-1.0-0 libpangoft2-1.0-0 libharfbuzz-subset0 fonts-dejavu-core
   libegl1 libgl1 libosmesa6 libxrender1 libxcursor1 libxft2 libxinerama1
 )
-# YADE: what its build and its Python need; a group's own YADE brings its own.
-if [ -z "${YADE_PREFIX:-}" ]; then
-  packages+=(
-    libboost-all-dev libgts-dev libloki-dev libbz2-dev zlib1g-dev libxi-dev freeglut3-dev libxmu-dev bzip2 libsqlite3-dev
-    python3-numpy python3-matplotlib python3-ipython python3-pygraphviz python3-tk python3-mpmath python3-pil python3-xlib
-    python3-future python3-sphinx
-  )
+if "$here/yade.sh" --packaged; then
+  # YADE is a package of the distribution: the plugin needs it, and the headers that its classes include. Siconos is no package there.
+  packages+=(yade libboost-dev libmpfr-dev libmpfrc++-dev libmpc-dev python3-numpy)
+else
+  # Siconos: the peer of the LCP solver in tests and benchmarks
+  packages+=(python3-siconos python3-scipy)
+  # YADE: what its build and its Python need; a group's own YADE brings its own.
+  if [ -z "${YADE_PREFIX:-}" ]; then
+    packages+=(
+      libboost-dev libboost-python-dev libboost-thread-dev libboost-filesystem-dev libboost-iostreams-dev libboost-regex-dev
+      libboost-serialization-dev libboost-system-dev libboost-date-time-dev libboost-log-dev libbz2-dev zlib1g-dev libsqlite3-dev bzip2
+      python3-numpy python3-matplotlib python3-ipython python3-pygraphviz python3-tk python3-mpmath python3-pil python3-xlib python3-sphinx
+    )
+  fi
 fi
 
+case ${1:-} in
+  --all) printf '%s\n' "${packages[@]}"; exit 0 ;;
+esac
 if ! command -v dpkg-query >/dev/null; then
   [ "${1:-}" = --list ] && exit 0
   echo "dembark: this is no Debian system; install the equivalents of: ${packages[*]}" >&2
@@ -56,11 +66,27 @@ if [ "$(id -u)" != 0 ]; then
   echo "  sudo apt-get install --no-install-recommends ${missing[*]}" >&2
   exit 1
 fi
-echo "dembark: installing ${#missing[@]} system packages" >&2
 log=$(mktemp)
-if ! { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}"; } >"$log" 2>&1; then
-  tail -5 "$log" >&2
-  echo "dembark: apt-get could not install the system packages; see $log" >&2
+failed() {
+  # apt's own sentence says what is wrong; a package of another release is the commonest.
+  reason=$(grep -m1 '^E: ' "$log" || tail -1 "$log")
+  echo "dembark: apt-get could not install the system packages: ${reason#E: }; see $log (supported are Debian 12 and 13)" >&2
   exit 1
-fi
+}
+apt-get update -qq >"$log" 2>&1 || failed
+size=$(apt-get install --no-install-recommends --print-uris -y -qq "${missing[@]}" 2>/dev/null |
+       awk '{ n++; bytes += $3 } END { if (n) printf ": %d with what they need, %d MB to fetch", n, bytes / 1e6 + 0.5 }' || true)
+echo "dembark: installing ${#missing[@]} system packages$size" >&2
+DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}" >"$log" 2>&1 &
+pid=$! begun=$SECONDS told=$SECONDS
+while kill -0 "$pid" 2>/dev/null; do
+  sleep 1
+  if [ $((SECONDS - told)) -ge 20 ]; then
+    told=$SECONDS
+    total=$(sed -nE 's/^.* ([0-9]+) newly installed.*/\1/p' "$log" | head -1)
+    ready=$(grep -c '^Setting up ' "$log" || true) unpacked=$(grep -c '^Unpacking ' "$log" || true)
+    echo "dembark: system packages: $((SECONDS - begun)) s passed, $unpacked unpacked and $ready set up of ${total:-many}" >&2
+  fi
+done
+wait "$pid" || failed
 rm -f "$log"

@@ -18,7 +18,7 @@ endfunction()
 # YADE's start script has its own prefix built in, twice, and listens to the variable YADE_PREFIX, which for us names the engine
 # below. In the overlay it must find itself.
 file(READ ${PREFIX}/bin/yade script)
-string(REGEX REPLACE "\nsys\\.path\\.insert\\(0,'[^'\n]*'\\)\n"
+string(REGEX REPLACE "\nsys\\.path\\.insert\\([01],'[^'\n]*'\\)\n"
        "\nos.environ['YADE_PREFIX']=os.path.dirname(os.path.dirname(os.path.realpath(__file__)))\nsys.path.insert(0,os.environ['YADE_PREFIX']+'/${SUBDIR}/py')\n"
        patched "${script}")
 if(patched STREQUAL script)
@@ -35,7 +35,10 @@ string(REPLACE "\t\t\t\texcept: # all other exceptions\n"
 \t\t\t\t\tif yade.runtime.opts.exitAfter: sys.exit(1)
 \t\t\t\texcept: # all other exceptions\n" patched "${patched}")
 
-run(cp -rs ${PREFIX} ${fresh})
+# The start script and the folder of the libraries; a prefix such as /usr holds much else.
+get_filename_component(around ${fresh}/${SUBDIR} DIRECTORY)
+file(MAKE_DIRECTORY ${fresh}/bin ${around})
+run(cp -rs ${PREFIX}/${SUBDIR} ${around}/)
 run(cp ${PLUGIN} ${fresh}/${SUBDIR}/)
 # Copies, not links: an overlay keeps working, and keeps one version of library and module, while the checkout changes.
 file(GLOB modules ${MODULES}/*.py)
@@ -43,7 +46,6 @@ foreach(module ${modules})
   run(cp ${module} ${fresh}/${SUBDIR}/py/yade/)
 endforeach()
 
-file(REMOVE ${fresh}/bin/yade)
 file(WRITE ${fresh}/bin/yade "${patched}")
 file(CHMOD ${fresh}/bin/yade PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
 

@@ -1,5 +1,5 @@
 // Capillary models as an engine calls them: names, limits, published closed forms, continuity, bad numbers.
-#include <catch2/catch.hpp>
+#include "catch.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include "dembark/capillary/bridge.hpp"
 
 using namespace dembark::capillary;
-using Catch::Matchers::Contains;
+using Catch::Contains;
 using Catch::Matchers::WithinRel;
 
 namespace {

@@ -1,5 +1,5 @@
 // The exact bridge: single shapes against known surfaces, the table against the equation and against an independent solver.
-#include <catch2/catch.hpp>
+#include "catch.hpp"
 
 #include <algorithm>
 #include <cmath>

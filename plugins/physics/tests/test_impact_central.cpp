@@ -1,5 +1,5 @@
 // Central impacts: the scheme against closed solutions, and what it must conserve.
-#include <catch2/catch.hpp>
+#include "catch.hpp"
 #include <cmath>
 #include <vector>
 

@@ -1,7 +1,7 @@
 // Steps with many coupled contacts: which candidates are solved for, and by which way of solving.
 #include <Eigen/OrderingMethods>
 #include <algorithm>
-#include <catch2/catch.hpp>
+#include "catch.hpp"
 #include <cmath>
 #include <memory>
 #include <random>

@@ -1,18 +1,20 @@
 // Friction on top of the normal forces, against the mechanics of rigid bodies.
-#include <catch2/catch.hpp>
+#include "catch.hpp"
 #include <cmath>
 #include <vector>
 
 #include "dembark/impact/scene.hpp"
+#include "impact_scenes.hpp"
 
 using namespace dembark;
 using namespace dembark::impact;
+using impact_scenes::g;
 using Catch::WithinAbs;
 using Catch::WithinRel;
 
 namespace {
 
-constexpr double g = 9.81, m = 40.0, r = 0.1;
+constexpr double m = 40.0, r = 0.1;
 
 Settings settings(double dt, double mu, double kinetic = -1.0, double theta = 1.0) {
   Settings s;

@@ -1,5 +1,5 @@
 // Candidates: pairs against the double loop, walls against their definition, triangles against the surface they make up.
-#include <catch2/catch.hpp>
+#include "catch.hpp"
 #include <cmath>
 #include <random>
 #include <vector>

@@ -1,5 +1,5 @@
 // Systems of logs: rest, energy in the plane, order, saving, doing a step again, records, bad input.
-#include <catch2/catch.hpp>
+#include "catch.hpp"
 #include <algorithm>
 #include <cmath>
 #include <cstring>

@@ -1,5 +1,5 @@
 // The LCP solver: published examples, conditions on random problems of all kinds, factor updates against fresh factors, refusals.
-#include <catch2/catch.hpp>
+#include "catch.hpp"
 
 #include <random>
 

@@ -1,5 +1,5 @@
 // The rule of carried liquid: shares, simultaneous requests, return; conservation over random sequences of contacts.
-#include <catch2/catch.hpp>
+#include "catch.hpp"
 
 #include <algorithm>
 #include <cmath>

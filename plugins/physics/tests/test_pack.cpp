@@ -1,5 +1,5 @@
 // The laws in packs of contacts give the bits of the scalar laws, lane by lane.
-#include <catch2/catch.hpp>
+#include "catch.hpp"
 
 #include <array>
 #include <random>

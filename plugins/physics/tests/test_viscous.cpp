@@ -1,5 +1,5 @@
 // Viscous force of a bridge: equation of Reynolds, limits, the floor of the gap, and a whole contact that only ever loses energy by it.
-#include <catch2/catch.hpp>
+#include "catch.hpp"
 
 #include <cmath>
 #include <limits>

@@ -1,0 +1,32 @@
+# Included by YADE's own build (CMAKE_PROJECT_Yade_INCLUDE): each library compiles the classes that it owns, and only declares those of
+# the libraries below it. What YADE contains and how its classes are laid out stays as it is.
+include(${DEMBARK_PLUGIN_DIR}/engine_classes.cmake)
+
+function(dembark_declare_for target)
+  get_target_property(folder ${target} SOURCE_DIR)
+  get_target_property(files ${target} SOURCES)
+  set(sources "")
+  foreach(file ${files})
+    get_filename_component(path ${file} ABSOLUTE BASE_DIR ${folder})
+    if(path MATCHES "\\.cpp$" AND EXISTS ${path})
+      list(APPEND sources ${path})
+      string(REGEX REPLACE "\\.cpp$" ".hpp" header ${path})
+      if(EXISTS ${header})
+        list(APPEND sources ${header})
+      endif()
+    endif()
+  endforeach()
+  dembark_declare_engine_classes(HEADER ${CMAKE_BINARY_DIR}/declared_${target}.hpp SOURCE_DIR ${CMAKE_SOURCE_DIR} FOLDERS ${ARGN} SOURCES ${sources})
+  target_compile_options(${target} PRIVATE -include ${CMAKE_BINARY_DIR}/declared_${target}.hpp)
+endfunction()
+
+function(dembark_lighten)
+  dembark_declare_for(pkg_common core)
+  dembark_declare_for(pkg_dem core pkg/common)
+  foreach(target pre_dem wrapper _customConverters _utils)
+    dembark_declare_for(${target} core pkg/common pkg/dem)
+  endforeach()
+  # Wrappers of Eigen's classes for Python: nothing in a simulation's loop runs through them.
+  target_compile_options(_minieigenHP PRIVATE -O1)
+endfunction()
+cmake_language(DEFER CALL dembark_lighten)
