@@ -29,6 +29,8 @@ from dembark.validation.statistics import Estimate, block_mean, combined, studen
 from scipy.special import ndtr
 
 WIDTH = 0.5  # of the kernel, in grain diameters: the layers at the walls stay apart
+# Both are velocities of the same grains; what is allowed is what core_flatness allows for a plug that is flat.
+TOLERANCE = 0.02
 _FIELDS = {
     "velocity": ("1", "downward velocity over that of the plate"),
     "shear_rate": ("1", "rise of the downward velocity along x, times d over the plate's velocity"),
@@ -148,12 +150,10 @@ def measure(replicas: Sequence[Replica], unsteady: str) -> FieldResult:
     flows = [read(replica) for replica in replicas]
     scalars = [_scalars(one) for one in flows]
     agree = pooled(scalars, "difference")
-    tolerance = agree.half if np.isfinite(agree.half) else None
-    verdict = "info" if tolerance is None or unsteady else "pass" if abs(agree.value) <= agree.half else "fail"
     quantities = [
         Quantity("eulerian_lagrangian_difference", "core: Eulerian − Lagrangian velocity, over v₀", "1", agree, reference=Estimate(0.0, 0.0),
-                 absolute=True, tolerance=tolerance, verdict=verdict, reason=unsteady, source="uniform flow", compared=False,
-                 detail="coarse-grained momentum over mass − displacements of grains; passes within its interval"),
+                 absolute=True, tolerance=TOLERANCE, reason=unsteady, source="uniform flow", compared=False,
+                 detail="coarse-grained momentum over mass − displacements of grains"),
         Quantity("shear_rate_max", "largest shear rate, times d / v₀", "1", pooled(scalars, "shear"), reason=unsteady, compared=not unsteady,
                  detail=f"of the profile across the channel, Gaussian kernel of width {WIDTH:g} d, mean of both walls"),
         Quantity("temperature_core", "granular temperature of the core, over v₀²", "1", pooled(scalars, "core"), reason=unsteady,

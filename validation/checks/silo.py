@@ -265,15 +265,18 @@ def study(name: str, points: Sequence[dict[str, Any]], along: str) -> tuple[list
     return filling_study(points, TOLERANCE)
 
 
+def _moving_mean(values: Array) -> Array:
+    """Mean over five bands, over fewer at the ends; one value a band, however short the column is."""
+    # Of two arrays, "same" has the length of the longer one.
+    kernel = np.ones(min(5, len(values)))
+    return np.convolve(values, kernel, "same") / np.convolve(np.ones_like(values), kernel, "same")
+
+
 def _profiles(columns: Sequence[Column], over: Any, stress: str) -> list[dict[str, Any]]:
     first = columns[0]
     place = np.linspace(0.02, 0.98, 40)
 
     everything = [(np.ones(len(one.base), bool), np.ones(one.shear.shape[2], bool)) for one in columns]
-
-    def smooth(values: Array) -> Array:
-        kernel = np.ones(5)
-        return np.convolve(values, kernel, "same") / np.convolve(np.ones_like(values), kernel, "same")
 
     height = float(np.mean([column.height for column in columns]))
     law = janssen(height * (1.0 - place), over("predicted").value, over("hanging").value)
@@ -306,7 +309,7 @@ def _profiles(columns: Sequence[Column], over: Any, stress: str) -> list[dict[st
             stress.replace("σ", "sigma"),
             "Wall normal stress",
             f"{stress} (Pa)",
-            lambda c, f, s: smooth(c.wall(c.normal, f, s)),
+            lambda c, f, s: _moving_mean(c.wall(c.normal, f, s)),
             k * law,
             "K × Janssen",
             moving,
@@ -315,7 +318,7 @@ def _profiles(columns: Sequence[Column], over: Any, stress: str) -> list[dict[st
             "tau",
             "Wall shear stress",
             "τ (Pa)",
-            lambda c, f, s: smooth(c.wall(c.shear, f, s)),
+            lambda c, f, s: _moving_mean(c.wall(c.shear, f, s)),
             friction * (k * law + adhesion),
             "μ_mob (K × Janssen + a)" if adhesion else "K μ_mob × Janssen",
             moving,
@@ -324,7 +327,7 @@ def _profiles(columns: Sequence[Column], over: Any, stress: str) -> list[dict[st
             "mobilisation",
             "Mobilised wall friction",
             f"τ / ({stress} + a)" if adhesion else f"τ / {stress}",
-            lambda c, f, s: smooth(c.wall(c.shear, f, s)) / smooth(c.wall(c.normal, f, s) + c.wall(c.adhesion, f, s)),
+            lambda c, f, s: _moving_mean(c.wall(c.shear, f, s)) / _moving_mean(c.wall(c.normal, f, s) + c.wall(c.adhesion, f, s)),
             np.full_like(place, first.wall_friction),
             "static friction of the wall",
             moving,

@@ -12,6 +12,7 @@ from dembark.validation.checks import find
 from dembark.validation.checks.column import _wall_pull, janssen, two_parameter
 from dembark.validation.checks.filling import apparent_mass_with_onset
 from dembark.validation.checks.quantity import Quantity, judge
+from dembark.validation.checks.silo import _moving_mean
 from dembark.validation.checks.vessel import Cylinder
 from dembark.validation.compare import compare, pair
 from dembark.validation.metrics import measure
@@ -44,6 +45,13 @@ def test_silo_that_follows_janssen_passes(tmp_path):
     } == {"pass"}
     assert abs(found["field_balance_deviation"]["value"]) < 1e-9
     assert json.loads((folder / "metrics.json").read_text()) == content
+
+
+@pytest.mark.parametrize("bands", range(1, 9))
+def test_moving_mean_keeps_one_value_a_band(bands):
+    # A column of 100 grains has four bands, fewer than the mean spans.
+    assert _moving_mean(np.full(bands, 3.0)) == pytest.approx(np.full(bands, 3.0))
+    assert _moving_mean(np.arange(float(bands)))[bands // 2] == pytest.approx(np.arange(bands)[max(0, bands // 2 - 2):bands // 2 + 3].mean())
 
 
 def test_wet_silo_follows_janssen_with_the_adhesion_that_hangs_on_the_wall(tmp_path):
