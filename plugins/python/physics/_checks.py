@@ -18,6 +18,8 @@ def numbers(name: str, value: ArrayLike, unit: str, *, low: float = -np.inf, hig
         bad |= np.isinf(array)
     if bad.any():
         first = array[bad].flat[0]
+        if low == -np.inf and high == np.inf:
+            raise ValueError(f"{name} must be a {'' if infinite else 'finite '}number ({unit}), not {first:g}")
         bound = f"> {low:g}" if low_open else f">= {low:g}" if high == np.inf else f"between {low:g} and {high:g}"
         raise ValueError(f"{name} must be {bound} {unit}{'' if infinite else ' and finite'}, not {first:g}")
     return array
