@@ -1,10 +1,16 @@
-"""`--slow`: tests that build whole engines run only when asked for."""
+"""`--slow`: tests that build whole engines run only when asked for; what all tests share."""
 
 import pytest
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="also run the tests marked slow")
+
+
+@pytest.fixture(autouse=True)
+def _width_is_our_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    # The workers of pytest-xdist have a COLUMNS of their own, which is no user's wish.
+    monkeypatch.delenv("COLUMNS", raising=False)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

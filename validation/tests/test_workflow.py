@@ -49,12 +49,12 @@ def test_all_runs_then_none_again_then_only_what_changed(tmp_path: Path, environ
     made = {path: path.stat().st_mtime_ns for path in results.glob("*/*/*/replica-1/run.json")}
 
     code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
-    assert code == 0 and error.count("kept") == 3 and "started" not in error
+    assert code == 0 and error.count("already finished; reusing") == 3 and "started" not in error
     assert {path: path.stat().st_mtime_ns for path in made} == made
 
     set_default(decks, "wet", "grain_count = 12")
     code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
-    assert code == 0 and error.count("kept") == 2 and error.count("1: finished in") == 1
+    assert code == 0 and error.count("already finished; reusing") == 2 and error.count("1: finished in") == 1
     assert sum(path.stat().st_mtime_ns != before for path, before in made.items()) == 1
     assert read_json(results / "box/wet/liggghts/metrics.json")["parameters"]["grain_count"] == 12
 
@@ -155,7 +155,7 @@ def test_an_interrupted_workflow_goes_on_where_it_was(
     path = decks / "box" / "case.toml"
     path.write_text(path.read_text().replace('behaviour = "hang"\n', ""))
     code, _, error = dembark(tmp_path, environment, "validate")
-    assert code == 0 and error.count("kept") == 2 and error.count("1: finished in") == 1
+    assert code == 0 and error.count("already finished; reusing") == 2 and error.count("1: finished in") == 1
     assert not list(results.glob("**/.replica-1.part-*"))
 
 

@@ -117,7 +117,7 @@ def test_faults_are_tried_again_and_a_changed_file_repeats_nothing(tmp_path: Pat
     (tmp_path / "c.toml").write_text(changed)
     (results / "store.sqlite").unlink()
     code, out, error = dembark(tmp_path, environment, "submit", "c.toml")
-    assert code == 0 and error.count("kept") == 4 and "6 of 6 runs finished" in out, error
+    assert code == 0 and error.count("already finished; reusing") == 4 and "6 of 6 runs finished" in out, error
     assert {path: path.stat().st_mtime_ns for path in made} == made and {run["state"] for run in store.read_runs(results)} == {"finished"}
     assert len(store.read_runs(results)) == 6 and len(store.read_quantities(results)) == 4
     facts = read_json(results / "campaign.json")
