@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -16,9 +17,12 @@ from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, PlaneWall
 from dembark.postproc.walls.peaks import Histogram
 from dembark.postproc.walls.stress import WallStress
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -32,6 +36,8 @@ _SHEAR = {PlaneWall: ("shear along v", "shear along u"), CylinderWall: ("shear a
           MeshWall: ("shear upwards", "shear sideways"), Inclusion: ("shear towards the axis' end", "shear around the axis")}
 _WIDTH = 7.2
 _NUMBERS = "{x:.4g}"
+# Elevation and azimuth (degrees) of two opposite views.
+_VIEWS = ((20.0, -60.0), (-20.0, 120.0))
 
 
 def scalar(fields: Labelled, name: str) -> tuple[Array, str, str]:
@@ -151,22 +157,26 @@ def profile_figure(fields: Labelled, names: Sequence[str], axis: str = "z") -> F
 
 
 def wall_figure(stress: WallStress) -> Figure:
-    """Mean normal and shear stress over the patches, unrolled; the triangles of a mesh are seen along its most even direction."""
+    """Mean normal and shear stress over the patches, unrolled. A flat mesh is seen along the direction in which it is thin; any other
+    one from above and in front, and from the opposite side, so that no triangle of a closed mesh hides behind others in both views."""
+    components = ("normal stress", *_SHEAR[type(stress.wall)])
+    values = np.where(stress.contacts[:, None] > 0, stress.mean[:, :3], np.nan)
     with matplotlib.rc_context(STYLE):
+        if not stress.patches.edges and not _flat(stress):
+            return _solid_figure(stress, components, values)
         figure = Figure(figsize=(_WIDTH, 2.9), layout="constrained")
-        for number, component in enumerate(("normal stress", *_SHEAR[type(stress.wall)])):
+        figure.suptitle(stress.wall.name, fontsize=8.0)
+        for number, component in enumerate(components):
             axes = figure.add_subplot(1, 3, number + 1)
-            values = np.where(stress.contacts > 0, stress.mean[:, number], np.nan)
-            label = f"{stress.wall.name}: {component}"
             if stress.patches.edges:
                 factor = [1e3 if unit == "m" else 180.0 / np.pi for unit in stress.patches.units]
                 spans = [scale * edges for scale, edges in zip(factor, stress.patches.edges, strict=True)]
-                _map(figure, axes, spans, stress.on_grid(values), label, "Pa")
+                _map(figure, axes, spans, stress.on_grid(values[:, number]), component, "Pa")
                 units = ["mm" if unit == "m" else "degrees" for unit in stress.patches.units]
                 axes.set(xlabel=f"{stress.patches.names[0].replace('_', ' ')} / {units[0]}",
                          ylabel=f"{stress.patches.names[1].replace('_', ' ')} / {units[1]}", ylim=_touched(stress, spans[1]))
             else:
-                _mesh_map(figure, axes, stress, values, label)
+                _mesh_map(figure, axes, stress, values[:, number], component)
     return figure
 
 
@@ -178,22 +188,61 @@ def _touched(stress: WallStress, edges: Array) -> tuple[float, float]:
     return float(edges[max(0, rows[0] - 1)]), float(edges[min(len(edges) - 1, rows[-1] + 2)])
 
 
+def _flat(stress: WallStress) -> bool:
+    extent = np.ptp(stress.patches.vertices, axis=0)
+    return bool(extent.min() < 0.05 * extent.max())
+
+
+def _paint(values: Array) -> dict[str, Any]:
+    known = values[np.isfinite(values)]
+    norm = Normalize(*((float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)))
+    return {"array": np.ma.masked_invalid(values), "norm": norm, "edgecolor": "white", "linewidth": 0.2,
+            "cmap": matplotlib.colormaps[_MAP].with_extremes(bad=_EMPTY)}
+
+
+def _colour_bar(figure: Figure, paint: ScalarMappable, axes: Axes | list[Axes], label: str) -> None:
+    # Below the map and with the label at it: beside or above it would cover titles.
+    bar = figure.colorbar(paint, ax=axes, orientation="horizontal", pad=0.03, aspect=25, shrink=0.85)
+    bar.outline.set_linewidth(0.4)
+    bar.ax.tick_params(labelsize=6)
+    bar.ax.xaxis.set_major_formatter(_NUMBERS)
+    bar.locator = MaxNLocator(4)
+    bar.set_label(labelled(label, "Pa"), fontsize=7.0)
+
+
 def _mesh_map(figure: Figure, axes: Axes, stress: WallStress, values: Array, label: str) -> None:
     patches = stress.patches
     # Seen along the direction in which the mesh is thinnest.
     thinnest = int(np.argmin(np.ptp(patches.vertices, axis=0)))
     right, up = (other for other in range(3) if other != thinnest)
-    corners = 1e3 * patches.vertices[patches.cells][:, :, [right, up]]
-    known = values[np.isfinite(values)]
-    norm = Normalize(*((float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)))
-    paint = PolyCollection(corners, array=np.ma.masked_invalid(values[patches.owners]), norm=norm, edgecolor="white", linewidth=0.2,
-                           cmap=matplotlib.colormaps[_MAP].with_extremes(bad=_EMPTY))
+    paint = PolyCollection(1e3 * patches.vertices[patches.cells][:, :, [right, up]], **_paint(values[patches.owners]))
     axes.add_collection(paint)
     axes.autoscale_view()
     axes.set(xlabel=f"{_AXES[right]} / mm", ylabel=f"{_AXES[up]} / mm", aspect="equal")
     axes.grid(False)
-    figure.colorbar(paint, ax=axes, pad=0.02, aspect=22).outline.set_linewidth(0.4)
-    axes.set_title(labelled(label, "Pa"), fontsize=7.5)
+    _colour_bar(figure, paint, axes, label)
+
+
+def _solid_figure(stress: WallStress, components: Sequence[str], values: Array) -> Figure:
+    corners = 1e3 * stress.patches.vertices[stress.patches.cells]
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    figure = Figure(figsize=(_WIDTH, 5.6), layout="constrained")
+    figure.suptitle(f"{stress.wall.name}: from above and in front, and from the opposite side", fontsize=8.0)
+    for column, component in enumerate(components):
+        views = [figure.add_subplot(2, 3, 1 + column + 3 * row, projection="3d") for row in range(2)]
+        for axes, (elevation, azimuth) in zip(views, _VIEWS, strict=True):
+            paint = Poly3DCollection(corners, **_paint(values[stress.patches.owners, column]))
+            axes.add_collection3d(paint)
+            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), xlabel="x / mm", ylabel="y / mm", zlabel="z / mm")
+            axes.set_box_aspect(high - low)
+            axes.view_init(elev=elevation, azim=azimuth)
+            axes.tick_params(labelsize=5, pad=-3)
+            for name, line in zip(_AXES, (axes.xaxis, axes.yaxis, axes.zaxis), strict=True):
+                line.label.set_fontsize(6)
+                line.labelpad = -9
+                axes.locator_params(axis=name, nbins=3)
+        _colour_bar(figure, paint, views, component)
+    return figure
 
 
 def force_figure(stress: WallStress) -> Figure:

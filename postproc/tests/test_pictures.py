@@ -64,6 +64,22 @@ def test_profile_is_the_mean_over_filled_cells(packing):
     assert line.get_xdata()[layer] == pytest.approx(fields.density[:, :, layer][filled[:, :, layer]].mean())
 
 
+def test_a_closed_mesh_is_seen_from_two_opposite_sides(packing):
+    frame, _ = packing
+    low, high = np.array([0.0, 0.0, 0.0]), np.array([4.0, 4.0, 4.0])
+    tetrahedron = np.array([low, [high[0], 0.0, 0.0], [0.0, high[1], 0.0], [0.0, 0.0, high[2]]])
+    mesh = MeshWall("floor", tetrahedron[[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]])
+    figure = plots.wall_figure(wall_stress([frame] * 3, mesh, mesh_patches(mesh)))
+    views = [axes for axes in figure.axes if hasattr(axes, "get_zlim")]
+    assert len(views) == 6 and all(axes.collections[0].get_array().size == 4 for axes in views)
+    sights = {(axes.elev, axes.azim) for axes in views}
+    toward = [np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]) for e, a in np.radians(sorted(sights))]
+    assert len(toward) == 2 and np.abs(toward[0] + toward[1]).max() < 1e-12
+    # Titles would be covered by the colour bars: these carry the names.
+    assert [axes.get_xlabel() for axes in figure.axes if axes.get_label() == "<colorbar>"] == [
+        "normal stress / Pa", "shear upwards / Pa", "shear sideways / Pa"]
+
+
 def test_all_figures_can_be_saved(packing, tmp_path):
     frame, fields = packing
     floor = PlaneWall("floor")

@@ -55,7 +55,7 @@ def _study_panel(axes: Any, sweep: Sweep, along: str, quantity: Mapping[str, Any
             if known:
                 (reference,) = axes.plot(*zip(*known, strict=True), color=_INK, linewidth=0.8, linestyle=_DASHES[1], alpha=0.8, zorder=1)
                 handles.setdefault("reference", reference)
-    axes.set_xlabel(along.replace("_", " "))
+    axes.set_xlabel(sweep.label(along))
     axes.set_title(_title(quantity), fontsize=7.0)
     low, high = sweep.levels(along)[0], sweep.levels(along)[-1]
     if low > 0 and high / low > 20:
@@ -110,7 +110,7 @@ def map_figure(sweep: Sweep, engine: str, quantities: Sequence[Mapping[str, Any]
                 axes.add_patch(matplotlib.patches.Rectangle((column - 0.47, row - 0.47), 0.94, 0.94, fill=False, edgecolor="#b0321e", linewidth=1.4))
             axes.set_xticks(range(len(columns)), [_short(one) for one in columns])
             axes.set_yticks(range(len(rows)), [_short(one) for one in rows])
-            axes.set(xlabel=across.replace("_", " "), ylabel=down.replace("_", " "))
+            axes.set(xlabel=sweep.label(across), ylabel=sweep.label(down))
             axes.set_title(_title(quantity), fontsize=7.0)
         figure.text(0.5, 0.02, engine_name(engine), ha="center", color=colour(engine), fontsize=7.5, weight="bold")
     return figure

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dembark.common.files import read_json
+from dembark.validation import cases
 from dembark.validation.campaigns import store
 from dembark.validation.campaigns.report.sweeps import Point, Sweep
 
@@ -46,7 +47,10 @@ def sweep(case: str, number: int, axes: Sequence[str], points: Mapping[str, Mapp
     """One sweep: `points` = swept values by variant, `contents` = metrics by (case, variant) and engine."""
     found = tuple(Point(values, variant, contents.get((case, variant), {})) for variant, values in points.items())
     named = title or f"{case.replace('_', ' ').capitalize()}: {' × '.join(axis.replace('_', ' ') for axis in axes) or 'one point'}"
-    return Sweep(case, named, tuple(axes), found, f"{case}-{number}")
+    # A case that has gone since leaves its results without units of the axes.
+    known = cases.discover().get(case)
+    units = {axis: known.parameters[axis].unit for axis in axes if known and axis in known.parameters}
+    return Sweep(case, named, tuple(axes), found, f"{case}-{number}", units)
 
 
 def by_point(contents: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], dict[str, Mapping[str, Any]]]:

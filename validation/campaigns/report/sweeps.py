@@ -33,6 +33,12 @@ class Sweep:
     axes: tuple[str, ...]
     points: tuple[Point, ...]
     name: str = field(default="")
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def label(self, axis: str) -> str:
+        """An axis for a figure, with its unit: `wall friction`, `grain diameter / m`."""
+        unit = self.units.get(axis, "1")
+        return axis.replace("_", " ") + ("" if unit == "1" else f" / {unit}" if "/" not in unit else f" / ({unit})")
 
     @property
     def engines(self) -> list[str]:

@@ -53,6 +53,12 @@ def test_a_grid_gives_lines_and_maps() -> None:
     assert len(drawn.axes[0].patches) == 2
 
 
+def test_axes_have_units() -> None:
+    one = sweep("silo", 1, ("wall_friction", "cylinder_radius", "gravity"), {"a": {}}, {})
+    assert [one.label(axis) for axis in one.axes] == ["wall friction", "cylinder radius / m", "gravity / (m/s^2)"]
+    assert sweep("a case that has gone", 1, ("grain_diameter",), {"a": {}}, {}).label("grain_diameter") == "grain diameter"
+
+
 def test_points_that_were_not_measured_leave_gaps() -> None:
     points = {"a": {"wall_friction": 0.2, "wall": "smooth"}, "b": {"wall_friction": 0.4, "wall": "rough"}}
     one = sweep("silo", 1, ("wall_friction", "wall"), points, by_point((content("a", "yade", quantity("k", math.nan), quantity("l", 1.0)),)))
