@@ -23,20 +23,19 @@ packages=(
   libpango-1.0-0 libpangoft2-1.0-0 libharfbuzz-subset0 fonts-dejavu-core
   libegl1 libgl1 libosmesa6 libxrender1 libxcursor1 libxft2 libxinerama1
 )
+# Siconos, the peer of the LCP solver in benchmarks, is no package of Debian 13: what is measured beside it is then left out.
+if [ "$(. /etc/os-release 2>/dev/null; echo "${ID:-}${VERSION_ID:-}")" != debian13 ]; then packages+=(python3-siconos python3-scipy); fi
+# YADE; a group's own brings what it needs.
 if "$here/yade.sh" --packaged; then
-  # YADE is a package of the distribution: the plugin needs it, and the headers that its classes include. Siconos is no package there.
+  # The plugin needs the package, and what its headers include.
   packages+=(yade libboost-dev libmpfr-dev libmpfrc++-dev libmpc-dev python3-numpy)
-else
-  # Siconos: the peer of the LCP solver in tests and benchmarks
-  packages+=(python3-siconos python3-scipy)
-  # YADE: what its build and its Python need; a group's own YADE brings its own.
-  if [ -z "${YADE_PREFIX:-}" ]; then
-    packages+=(
-      libboost-dev libboost-python-dev libboost-thread-dev libboost-filesystem-dev libboost-iostreams-dev libboost-regex-dev
-      libboost-serialization-dev libboost-system-dev libboost-date-time-dev libboost-log-dev libbz2-dev zlib1g-dev libsqlite3-dev bzip2
-      python3-numpy python3-matplotlib python3-ipython python3-pygraphviz python3-tk python3-mpmath python3-pil python3-xlib python3-sphinx
-    )
-  fi
+elif [ -z "${YADE_PREFIX:-}" ]; then
+  # What its build and its Python need.
+  packages+=(
+    libboost-dev libboost-python-dev libboost-thread-dev libboost-filesystem-dev libboost-iostreams-dev libboost-regex-dev
+    libboost-serialization-dev libboost-system-dev libboost-date-time-dev libboost-log-dev libbz2-dev zlib1g-dev libsqlite3-dev bzip2
+    python3-numpy python3-matplotlib python3-ipython python3-pygraphviz python3-tk python3-mpmath python3-pil python3-xlib python3-sphinx
+  )
 fi
 
 case ${1:-} in

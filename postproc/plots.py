@@ -226,7 +226,7 @@ def _mesh_map(figure: Figure, axes: Axes, stress: WallStress, values: Array, lab
 def _solid_figure(stress: WallStress, components: Sequence[str], values: Array) -> Figure:
     corners = 1e3 * stress.patches.vertices[stress.patches.cells]
     low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-    figure = Figure(figsize=(_WIDTH, 5.6), layout="constrained")
+    figure = Figure(figsize=(_WIDTH, 6.6), layout="constrained")
     figure.suptitle(f"{stress.wall.name}: from above and in front, and from the opposite side", fontsize=8.0)
     for column, component in enumerate(components):
         views = [figure.add_subplot(2, 3, 1 + column + 3 * row, projection="3d") for row in range(2)]
@@ -239,7 +239,7 @@ def _solid_figure(stress: WallStress, components: Sequence[str], values: Array) 
             axes.tick_params(labelsize=5, pad=-3)
             for name, line in zip(_AXES, (axes.xaxis, axes.yaxis, axes.zaxis), strict=True):
                 line.label.set_fontsize(6)
-                line.labelpad = -9
+                line.labelpad = -7
                 axes.locator_params(axis=name, nbins=3)
         _colour_bar(figure, paint, views, component)
     return figure
