@@ -79,7 +79,7 @@ doctor: $(BUILD)/.python ## say what is found, what is missing and what to do
 
 test: all $(BUILD)/.physics-tests ## run all tests
 	@$(BUILD)/bin/physics-tests
-	@$(BIN)/python -m pytest --numprocesses $(TEST_JOBS) --dist loadscope $(PYTEST_ARGS)
+	@$(BIN)/python -m pytest --numprocesses $(TEST_JOBS) --dist loadscope --durations 20 $(PYTEST_ARGS)
 
 validate: all ## run the cases in both engines and write the report (PROFILE=quick|standard|full)
 	@$(BIN)/dembark validate --profile $(PROFILE)
