@@ -83,3 +83,43 @@ def test_wrong_set_up_names_the_variable(prefix, tmp_path, given, parts):
     text = " ".join(done.stderr.split())
     assert "dembark: " in text
     assert all(part in text for part in parts), done.stderr
+
+
+def definitions(folder, features, bits=64, mpmath=True):
+    (folder / "py/yade").mkdir(parents=True, exist_ok=True)
+    (folder / "py/yade/config.py").write_text(f"highPrecisionBits         ={bits}\nhighPrecisionMpmath       ={mpmath}\n")
+    (folder / "yade").write_text(f"features,version,debugbuild=' {features}'.split(' '),'2025.2.0',' '\n")
+    (folder / "ask.cmake").write_text(f"cmake_minimum_required(VERSION 3.22)\ninclude({HERE}/definitions.cmake)\n"
+                                      f"dembark_yade_definitions(flags {folder}/source {folder}/yade {folder})\nmessage(\"${{flags}}\")\n")
+    return subprocess.run(["cmake", "-P", folder / "ask.cmake"], capture_output=True, text=True, check=False)
+
+
+def test_a_packaged_yade_is_compiled_for_as_its_features_say(tmp_path):
+    words = definitions(tmp_path, "LOGGER USEFUL_ERRORS OPENMP QT5 MPI FEMLIKE LBMFLOW").stderr.split()
+    assert {"-DYADE_BOOST_LOG", "-DYADE_OPENMP", "-fopenmp", "-DYADE_OPENGL", "-DYADE_MPI", "-DYADE_FEM", "-DYADE_REAL_BIT=64",
+            "-DEIGEN_DONT_ALIGN"} <= set(words)
+    assert not {"-DYADE_SPH", "-DYADE_LS_DEM", "-DYADE_DISABLE_REAL_MULTI_HP"} & set(words)
+    assert "-DYADE_DISABLE_REAL_MULTI_HP" in definitions(tmp_path, "LOGGER", mpmath=False).stderr
+
+
+def test_what_could_change_the_layout_of_classes_unseen_is_not_guessed(tmp_path):
+    assert "-D" not in definitions(tmp_path, "LOGGER NEW_FEATURE").stderr
+    done = definitions(tmp_path, "LOGGER", bits=128)
+    assert done.returncode != 0 and "double precision" in " ".join(done.stderr.split())
+
+
+def test_classes_of_other_folders_are_declared_and_own_ones_defined(tmp_path):
+    for path, text in {"core/Body.hpp": "#pragma once\n", "core/Bare.hpp": "", "pkg/common/Wide.hpp": "#pragma once\n#include <pkg/dem/Own.hpp>\n",
+                       "pkg/dem/Own.hpp": "#pragma once\n", "core/Subdomain.hpp": "#pragma once\n"}.items():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text(text)
+    (tmp_path / "a.cpp").write_text("".join(f"#include <{path}.hpp>\n" for path in (
+        "core/Body", "core/Bare", "pkg/common/Wide", "pkg/dem/Own", "core/Subdomain", "core/Missing")))
+    (tmp_path / "ask.cmake").write_text(f"cmake_minimum_required(VERSION 3.22)\ninclude({HERE}/engine_classes.cmake)\n"
+                                        f"dembark_declare_engine_classes(HEADER {tmp_path}/declared.hpp "
+                                        f"SOURCE_DIR {tmp_path} FOLDERS core pkg/common SOURCES {tmp_path}/a.cpp)\n")
+    subprocess.run(["cmake", "-P", tmp_path / "ask.cmake"], check=True)
+    text = (tmp_path / "declared.hpp").read_text()
+    # Body is declared; the others are no header on their own, lead to classes of the sources, belong to a feature, or are not there.
+    assert [line for line in text.splitlines() if line.startswith(("#include <core", "#include <pkg"))] == ["#include <core/Body.hpp>"]
+    assert text.index("push_macro") < text.index("core/Body.hpp") < text.index("pop_macro")
