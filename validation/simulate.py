@@ -86,6 +86,7 @@ def _run_into(run: Run, target: Path, board: Board, ended: _Ended, used: Resourc
         step, computed = restarts.begin(run, work), True
         record = _execute(run, work, step, board, ended, used)
         restarts.clear(work)
+        _archive(run, work)
         write_json(work / "run.json", record)
         move_into_place(work, target)
         _forget_failure(target)
@@ -109,6 +110,15 @@ def _run_into(run: Run, target: Path, board: Board, ended: _Ended, used: Resourc
     finally:
         if not kept:
             shutil.rmtree(work, ignore_errors=True)
+
+
+def _archive(run: Run, work: Path) -> None:
+    """Copy the deck, the case file and the case's own checks, as they were, into `deck` beside what came of them."""
+    for name in (*deck_files(run.case, run.engine.name), "case.toml", "checks.py"):
+        if (run.case.folder / name).is_file():
+            kept = work / "deck" / name
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(run.case.folder / name, kept)
 
 
 def _going_on(run: Run, work: Path) -> tuple[bool, str]:

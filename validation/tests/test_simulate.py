@@ -52,6 +52,16 @@ def test_a_run_leaves_its_files_and_its_record(tmp_path: Path, engine: str) -> N
     assert passed["strength"] == "1e+300" and passed["seed"] == "7" and "kinetic_friction" not in passed
 
 
+def test_a_result_holds_the_deck_that_made_it(tmp_path: Path, decks: Path, stand_in: Path) -> None:
+    (decks / "box" / "lid").mkdir()
+    (decks / "box" / "lid" / "lid.stl").write_text("solid lid\n")
+    deck, case = (decks / "box" / "liggghts.in").read_text(), (decks / "box" / "case.toml").read_text()
+    folder, _ = run(tmp_path / "out")
+    (decks / "box" / "liggghts.in").write_text("# another deck\n")
+    assert (folder / "deck/liggghts.in").read_text() == deck and (folder / "deck/case.toml").read_text() == case
+    assert (folder / "deck/lid/lid.stl").is_file() and not (folder / "deck/yade.py").exists()
+
+
 def test_a_finished_run_is_not_repeated_unless_an_input_changes(tmp_path: Path, decks: Path, stand_in: Path) -> None:
     out = tmp_path / "out"
     folder, _ = run(out)
@@ -84,7 +94,7 @@ def test_a_finished_run_is_not_repeated_unless_an_input_changes(tmp_path: Path, 
 def test_failures_are_told_in_one_line_and_leave_earlier_results(tmp_path: Path, behaviour: str, words: list[str]) -> None:
     out = tmp_path / "out"
     folder, _ = run(out)
-    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    before = {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     with pytest.raises(RunError) as caught:
         run(out, behaviour=behaviour)
     message, log = str(caught.value), out / "failed" / "replica-1.log"
@@ -92,7 +102,7 @@ def test_failures_are_told_in_one_line_and_leave_earlier_results(tmp_path: Path,
     for word in words:
         assert word in message
     assert "dembark: steps 100" in log.read_text()
-    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    assert {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
     assert not list(out.glob(".*work*"))
     run(out, pause=0.001)
     assert not (out / "failed").exists()
