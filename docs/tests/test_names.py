@@ -111,7 +111,8 @@ def test_table_of_options() -> None:
 
 def test_options_in_the_text_exist() -> None:
     benchmarks = code("benchmarks") + code("packaging") + (ROOT / "conftest.py").read_text(encoding="utf-8")
-    known = set().union(*subcommands().values()) | set(re.findall(r'"(--[a-z-]+)"', benchmarks))
+    common = {option for parameter in typer.main.get_command(cli.app).params for option in parameter.opts}
+    known = common.union(*subcommands().values()) | set(re.findall(r'"(--[a-z-]+)"', benchmarks))
     # Words of other programs: of Slurm, Snakemake and srun.
     known |= {"--ntasks", "--cpus-per-task", "--mem", "--time", "--test-only", "--mpi", "--me", "--format", "--slow"}
     unknown = {option for span in SPANS for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", span)} - known
