@@ -11,7 +11,7 @@ import shutil
 import subprocess
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -86,7 +86,7 @@ def _run_into(run: Run, target: Path, board: Board, ended: _Ended, used: Resourc
         step, computed = restarts.begin(run, work), True
         record = _execute(run, work, step, board, ended, used)
         restarts.clear(work)
-        _archive(run, work)
+        _archive(run, work, record["deck"])
         write_json(work / "run.json", record)
         move_into_place(work, target)
         _forget_failure(target)
@@ -112,9 +112,9 @@ def _run_into(run: Run, target: Path, board: Board, ended: _Ended, used: Resourc
             shutil.rmtree(work, ignore_errors=True)
 
 
-def _archive(run: Run, work: Path) -> None:
-    """Copy the deck, the case file and the case's own checks, as they were, into `deck` beside what came of them."""
-    for name in (*deck_files(run.case, run.engine.name), "case.toml", "checks.py"):
+def _archive(run: Run, work: Path, deck: Iterable[str]) -> None:
+    """Copy the files of the `deck`, the case file and the case's own checks, as they were, into `deck` beside what came of them."""
+    for name in (*deck, "case.toml", "checks.py"):
         if (run.case.folder / name).is_file():
             kept = work / "deck" / name
             kept.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-# dembark_yade_definitions(<out> PREFIX SOURCE_DIR SCRIPT LIBRARY_DIR): the options of the engine's own compilation. YADE's classes change
+# dembark_yade_definitions(<out> <source tree> <start script> <folder of libyade.so>): the options of the engine's own compilation. YADE's classes change
 # their layout with these, so they must be the engine's own: from the build's compile_commands.json where that lies beside the source tree,
 # else from the features that an installed YADE names (Debian's package).
 function(dembark_yade_definitions out source_dir script library_dir)
