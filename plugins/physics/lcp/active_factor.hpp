@@ -164,10 +164,10 @@ class ActiveFactor {
 
   Index n_ = 0, used_ = 0;
   bool removed_ = false;
-  std::vector<Index> order_;                 ///< active indices in the order of the rows
+  std::vector<Index> order_;  ///< active indices in the order of the rows
   std::vector<double> value_, diagonal_, sign_, y_;
-  std::vector<std::vector<double>> rows_;    ///< V and U, one row of length n per active index
-  std::vector<std::vector<double>> lower_;   ///< L
+  std::vector<std::vector<double>> rows_;   ///< V and U, one row of length n per active index
+  std::vector<std::vector<double>> lower_;  ///< L
 };
 
 }  // namespace dembark::lcp

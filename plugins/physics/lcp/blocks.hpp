@@ -57,7 +57,7 @@ struct DenseBlock {
 /// Compressed columns, both triangles, rows ascending.
 struct SparseBlock {
   Index n = 0;
-  const int* start = nullptr;   ///< n + 1
+  const int* start = nullptr;  ///< n + 1
   const int* row = nullptr;
   const double* value = nullptr;
   const double* diagonals = nullptr;

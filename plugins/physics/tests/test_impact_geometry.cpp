@@ -1,8 +1,8 @@
 // Candidates: pairs against the double loop, walls against their definition, triangles against the surface they make up.
-#include "catch.hpp"
 #include <cmath>
 #include <random>
 #include <vector>
+#include "catch.hpp"
 
 #include "dembark/impact/scene.hpp"
 
