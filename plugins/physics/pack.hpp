@@ -56,8 +56,10 @@ struct Pack {
   Lanes lanes;
 
   Pack() = default;
+  // NOLINTBEGIN(google-explicit-constructor): formulas mix packs and plain numbers
   DEMBARK_HOT Pack(const Lanes& given) : lanes(given) {}
   DEMBARK_HOT Pack(double value) : lanes(value - Lanes{}) {}  // in every lane
+  // NOLINTEND(google-explicit-constructor)
 
   DEMBARK_HOT static Pack load(const double* from) {
     Pack p;

@@ -8,6 +8,7 @@
 
 #include "dembark/impact/geometry.hpp"
 #include "dembark/impact/system.hpp"
+#include "dembark/impact/triangles.hpp"
 
 namespace yade {
 

@@ -257,5 +257,3 @@ inline void cylinder_contacts(const std::vector<Body>& bodies, const Drum& drum,
 
 }  // namespace impact
 }  // namespace dembark
-
-#include "triangles.hpp"

@@ -97,7 +97,7 @@ class Lines {
   template <bool Measured>
   double relax() {
     double most = 0.0;
-    Visit* const end = visits_.data() + near_;
+    const Visit* const end = visits_.data() + near_;
     for (Visit* v = visits_.data(); v != end; ++v) {
       const double old = v->z, free = v->keep * old - (v->q + v->pull.dot(*v->a - *v->b)), next = free > 0.0 ? free : 0.0;
       const double step = next - old;

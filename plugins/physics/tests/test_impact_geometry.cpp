@@ -5,6 +5,7 @@
 #include "catch.hpp"
 
 #include "dembark/impact/scene.hpp"
+#include "dembark/impact/triangles.hpp"
 
 using namespace dembark;
 using namespace dembark::impact;
