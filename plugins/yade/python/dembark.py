@@ -280,7 +280,8 @@ def _cut(path, step):
     os.truncate(path, end)
 
 
-def run(steps, restart_every=0, resume=False, outputs=("time.csv", "energies.csv", "grains.dump", "contacts.dump"), base="state", saving=None,
+def run(steps, restart_every=0, resume=False, outputs=("time.csv", "energies.csv", "grains.dump", "contacts.dump"), base="state",
+        saving=None,
         loaded=None):
     """Run the scene until step `steps` is written, and say that it is finished.
 
@@ -378,7 +379,8 @@ class DumpWriter:
     def _frame(self, path, kind, rows, count, columns):
         box = "".join(f"{low:.10g} {high:.10g}\n" for low, high in self.bounds)
         with open(path, "a", encoding="ascii") as file:
-            file.write(f"ITEM: TIMESTEP\n{O.iter}\nITEM: NUMBER OF {kind}\n{count}\nITEM: BOX BOUNDS {self.boundary}\n{box}ITEM: {kind} {columns}\n")
+            file.write(f"ITEM: TIMESTEP\n{O.iter}\nITEM: NUMBER OF {kind}\n{count}\nITEM: BOX BOUNDS {self.boundary}\n{box}")
+            file.write(f"ITEM: {kind} {columns}\n")
             file.write(rows)
 
     def write(self):
@@ -391,7 +393,8 @@ class DumpWriter:
             for axis, word in enumerate(words):
                 length = self.bounds[axis][1] - self.bounds[axis][0]
                 if word == "pp" and abs(length - O.cell.size[axis]) > 1e-9 * length:
-                    fail(f"DumpWriter: bounds of axis {'xyz'[axis]} are {length:g} m apart, the period is {O.cell.size[axis]:g} m; they must be equal")
+                    fail(f"DumpWriter: bounds of axis {'xyz'[axis]} are {length:g} m apart, the period is {O.cell.size[axis]:g} m; "
+                         "they must be equal")
         walls = "".join(f" f_force_{name}[{i}]" for name in self._snapshot.names for i in (1, 2, 3))
         columns = "id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass" + walls
         rows = shot.grainRows()
@@ -431,7 +434,9 @@ class HistoryWriter:
 
 
 def spanning(diameter):
-    """Half the length (m) along x, in a periodic cell, of a box that is to be a plane, larger than the period; `diameter`: mean one of the grains.
+    """Half the length (m) along x, in a periodic cell, of a box that is to be a plane, larger than the period.
+
+    diameter : m, mean one of the grains
 
     After a restart YADE's collider looks for pairs along x, from a body's lower end to its upper one, within one period. So the ends of the
     box must almost meet there, with a gap that no grain fits into; or a grain just above it would never be found.
@@ -501,10 +506,12 @@ class LogWriter:
             state = body.state
             force, torque = O.forces.f(body.id) + state.mass * self.gravity, O.forces.t(body.id)
             # The engine's velocities are half a step behind.
-            velocity = [v if axis in state.blockedDOFs else v + 0.5 * O.dt * f / state.mass for axis, v, f in zip("xyz", state.vel, force)]
+            velocity = [v if axis in state.blockedDOFs else v + 0.5 * O.dt * f / state.mass
+                        for axis, v, f in zip("xyz", state.vel, force, strict=True)]
             spin = [w if axis in state.blockedDOFs else w + 0.5 * O.dt * t / i
-                    for axis, w, t, i in zip("XYZ", state.angVel, torque, state.inertia)]
-            energy += 0.5 * sum(state.mass * v * v for v in velocity) + 0.5 * sum(i * w * w for i, w in zip(state.inertia, spin))
+                    for axis, w, t, i in zip("XYZ", state.angVel, torque, state.inertia, strict=True)]
+            energy += 0.5 * sum(state.mass * v * v for v in velocity)
+            energy += 0.5 * sum(i * w * w for i, w in zip(state.inertia, spin, strict=True))
             rows.append((body.id + 1, 1, *state.pos, 0, 0, 0, *velocity, *spin, *force, body.shape.radius, state.mass))
         self._frame("grains.dump", "ATOMS", rows, "id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass")
         touching = [(a + 1, b + 1 if b >= 0 else b, *normal, gap, force, *friction, *place)
