@@ -134,8 +134,8 @@ def test_variables_of_the_environment_exist() -> None:
     named = set(re.findall(r"\b(?:DEMBARK|YADE|LIGGGHTS)_[A-Z_]+\b", ALL)) - {"LIGGGHTS_PUBLIC"}
     assert {name for name in named if name not in known} == set()
     # What a user may set is told.
-    read = set(re.findall(r"environ(?:\.get\(|\[)\"(DEMBARK_[A-Z_]+)\"", code("validation", "postproc"))) - {"DEMBARK_PREAMBLE",
-                                                                                                             "DEMBARK_PROGRESS"}
+    read = set(re.findall(r"environ(?:\.get\(|\[)\"(DEMBARK_[A-Z_]+)\"", code("validation", "postproc")))
+    read -= {"DEMBARK_PREAMBLE", "DEMBARK_PROGRESS"}
     assert read <= named
 
 
@@ -148,9 +148,8 @@ def test_files_exist() -> None:
 def test_readme_names_every_style() -> None:
     main = (ROOT / "plugins/liggghts/main.cpp").read_text(encoding="utf-8")
     headers = code("plugins/liggghts")
-    styles = {f"fix {name}"
-              for name in re.findall(r'fixes\["([\w/]+)"\]', main)} | set(re.findall(r'command_map|CommandTable\(\)\)\)\)\["(\w+)"\]',
-                                                                                     main))
+    styles = {f"fix {name}" for name in re.findall(r'fixes\["([\w/]+)"\]', main)}
+    styles |= set(re.findall(r'command_map|CommandTable\(\)\)\)\)\["(\w+)"\]', main))
     styles |= {f"tangential {name}" for name in re.findall(r"^TANGENTIAL_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
     styles |= {f"cohesion {name}" for name in re.findall(r"^COHESION_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
     table = {name for cell in rows(TEXTS["README.md"], "style") for name in re.findall(r"`([^`]+)`", cell)}

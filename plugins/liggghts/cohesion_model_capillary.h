@@ -6,7 +6,7 @@
 //
 // Works compiled out of tree into liggghts-dembark and, unchanged, copied into a LIGGGHTS src/ folder.
 #ifdef COHESION_MODEL
-COHESION_MODEL(COHESION_CAPILLARY, capillary, 20)
+COHESION_MODEL(COHESION_CAPILLARY,capillary,20)
 #else
 
 #ifndef COHESION_MODEL_CAPILLARY_H_

@@ -4,7 +4,7 @@
 //
 // Works compiled out of tree into liggghts-dembark and, unchanged, copied into a LIGGGHTS src/ folder.
 #ifdef TANGENTIAL_MODEL
-TANGENTIAL_MODEL(TANGENTIAL_FINNIE_RABINOWICZ, finnie_rabinowicz, 20)
+TANGENTIAL_MODEL(TANGENTIAL_FINNIE_RABINOWICZ,finnie_rabinowicz,20)
 #else
 
 #ifndef TANGENTIAL_MODEL_FINNIE_RABINOWICZ_H_
