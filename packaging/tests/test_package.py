@@ -83,6 +83,7 @@ def test_wheel_holds_all_files_of_the_packages(tmp_path):
 @pytest.mark.slow
 def test_wheel_works_in_an_empty_environment(tmp_path):
     wheel = build(tmp_path / "wheel")
+    assert not [name for name in zipfile.ZipFile(wheel).namelist() if name.endswith(".pth")], "paths of this checkout in the wheel"
     venv.create(tmp_path / "env", with_pip=True)
     python = tmp_path / "env/bin/python"
     subprocess.run([python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-index", "--no-deps", wheel], check=True)
