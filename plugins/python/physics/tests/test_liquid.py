@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -97,6 +99,6 @@ def test_broadcasting_and_scalars():
     (lambda: liquid_bridge(1e-12, 0.0, 1e-3, 1e-3, largest=0.0), "largest must be > 0"),
 ])
 def test_mistakes(call, told):
-    with pytest.raises(ValueError, match=r"\S") as caught:
+    with pytest.raises(ValueError, match=re.escape(told)) as caught:
         call()
-    assert told in str(caught.value) and "\n" not in str(caught.value)
+    assert "\n" not in str(caught.value)
