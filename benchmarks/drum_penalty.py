@@ -33,7 +33,7 @@ from typing import Any
 
 import numpy as np
 from dembark.validation import engines
-from dembark.validation.statistics import student
+from dembark.postproc.statistics import student
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,12 +12,13 @@ import typer
 from rich.console import Console
 
 from dembark.common.errors import DembarkError, RunError
+from dembark.validation import engines
 from dembark.validation.campaigns import cli as campaigns
 
 if TYPE_CHECKING:
     from dembark.validation.workflow import Outcome
 
-_ABOUT = """Granular contact laws and their validation, in LIGGGHTS and YADE.
+_ABOUT = f"""Granular contact laws and their validation, in {engines.titles("and")}.
 
 Your own cases: set DEMBARK_DECKS to the folder that holds their folders; it counts instead of the shipped input_decks."""
 
@@ -82,12 +84,12 @@ def show_cases(case: Annotated[str | None, typer.Argument(help="Show the keys, p
 @app.command()
 def run(
     case: Annotated[str, typer.Argument(help="Name of a case, see 'dembark cases'.")],
-    engine: Annotated[str, typer.Option(help="liggghts or yade.")],
+    engine: Annotated[str, typer.Option(help=f"{' or '.join(engines.names())}.")],
     profile: Profile = "quick",
     variant: Annotated[str | None, typer.Option(help="Variant of the case; default: the first one.")] = None,
     change: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=_SET)] = None,
     out: Annotated[Path | None, typer.Option(help=_OUT)] = None,
-    ranks: Annotated[int, typer.Option(min=1, help="MPI processes for each run (LIGGGHTS).")] = 1,
+    ranks: Annotated[int, typer.Option(min=1, help=f"MPI processes for each run ({engines.titles('and', lambda one: one.ranks)}).")] = 1,
     threads: Annotated[int, typer.Option(min=1, help="Threads for each run.")] = 1,
     jobs: Annotated[int | None, typer.Option(min=1, help="Replicas at a time; default: as many as fit the cores.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace results of other inputs once the new ones are finished.")] = False,
@@ -95,21 +97,20 @@ def run(
     strict: Strict = False,
 ) -> None:
     """Run a case in one engine, measure it and show each quantity beside its reference."""
-    from dembark.validation import checks, engines, restarts, show
-    from dembark.validation.cases import ENGINES, find
+    from dembark.validation import checks, restarts, show
+    from dembark.validation.cases import find
     from dembark.validation.execute import execute
     from dembark.validation.jobs import cancelled_by_signal
-    from dembark.validation.parameters import pick
+    from dembark.validation.case.parameters import pick
     from dembark.validation.plan import series
-    from dembark.validation.resolve import resolve, settings
+    from dembark.validation.case.resolve import resolve, settings
     from dembark.validation.simulate import Resources
 
     one = find(case)
     changes = settings(change or ())
     chosen = variant if variant is not None else next(iter(one.variants))
-    pick(engine, ENGINES, "engine", "in --engine")
-    if engine == "yade" and ranks > 1:
-        raise DembarkError(f"--ranks {ranks} with YADE", "", "use --threads: YADE runs in one process")
+    pick(engine, engines.names(), "engine", "in --engine")
+    engines.facts(engine).check_ranks(ranks)
     interval = _interval(restart_interval)
     # Everything the user wrote is checked before an engine is looked for.
     resolve(one, profile, chosen, changes)
@@ -155,7 +156,7 @@ def validate(
     engine: Annotated[list[str] | None, typer.Option(help="Only this engine.")] = None,
     strict: Strict = False,
 ) -> None:
-    """Run all cases of a profile in both engines and build the report; finished runs are kept."""
+    """Run all cases of a profile in their engines and build the report; finished runs are kept."""
     from dembark.validation.jobs import cancelled_by_signal
     from dembark.validation.workflow import validate as workflow
 
@@ -219,7 +220,7 @@ _PASSED_ON = {"ignore_unknown_options": True, "allow_extra_args": True, "help_op
 
 @app.command(add_help_option=False, context_settings=_PASSED_ON)
 def fields(context: typer.Context) -> None:
-    """Stress, velocity and more on a grid, from dumps of either engine."""
+    """Stress, velocity and more on a grid, from dumps of any engine."""
     from dembark.postproc import cli
 
     raise typer.Exit(cli.run(["fields", *context.args]))
@@ -227,23 +228,29 @@ def fields(context: typer.Context) -> None:
 
 @app.command(add_help_option=False, context_settings=_PASSED_ON)
 def walls(context: typer.Context) -> None:
-    """Stress on walls and inclusions, from dumps of either engine."""
+    """Stress on walls and inclusions, from dumps of any engine."""
     from dembark.postproc import cli
 
     raise typer.Exit(cli.run(["walls", *context.args]))
 
 
-@app.command(add_help_option=False, context_settings=_PASSED_ON)
-def yade(context: typer.Context) -> None:
-    """Start YADE with dembark's laws; all that follows is passed on to it."""
-    from dembark.validation import engines
+def _start(name: str) -> Callable[[typer.Context], None]:
+    """The command that becomes the engine called `name`, with the words given to it."""
+    def start(context: typer.Context) -> None:
+        found = engines.find(name)
+        environment = found.environment()
+        if "DISPLAY" in os.environ:
+            environment["DISPLAY"] = os.environ["DISPLAY"]
+        sys.stdout.flush()
+        os.execve(found.executable, [str(found.executable), *context.args], environment)
 
-    found = engines.find("yade")
-    environment = found.environment()
-    if "DISPLAY" in os.environ:
-        environment["DISPLAY"] = os.environ["DISPLAY"]
-    sys.stdout.flush()
-    os.execve(found.executable, [str(found.executable), *context.args], environment)
+    return start
+
+
+for _facts in map(engines.facts, engines.names()):
+    if _facts.interactive:
+        app.command(_facts.name, add_help_option=False, context_settings=_PASSED_ON,
+                    help=f"Start {_facts.program}; all that follows is passed on to it.")(_start(_facts.name))
 
 
 def main(words: list[str] | None = None) -> int:

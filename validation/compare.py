@@ -15,7 +15,7 @@ from typing import Any
 
 from dembark.common.errors import RunError
 from dembark.common.files import read_json, write_json
-from dembark.validation.statistics import joint_half, joint_limit
+from dembark.postproc.statistics import joint_half, joint_limit
 
 CAP = 0.10
 PACKINGS = 3

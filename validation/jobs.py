@@ -240,7 +240,7 @@ def _study_at(source: Source, place: str) -> PlannedStudy:
 
 
 def step_name(step: str, place: str | Path = "") -> str:
-    """Name under which a step other than a simulation tells its progress: `measure silo dry yade`."""
+    """Name under which a step other than a simulation tells its progress: `measure silo dry <engine>`."""
     return " ".join((step, *Path(place).parts))
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from dembark.common.errors import Killed, RunError
 from dembark.common.files import DISK_FULL, check_impacts, check_times, count_frames
 from dembark.validation.cases import OUTPUTS
-from dembark.validation.parameters import Value
+from dembark.validation.case.parameters import Value
 from dembark.validation.plan import Run
 from dembark.validation.progress import OutputParser
 
@@ -49,9 +49,9 @@ def reason(lines: list[str]) -> str:
     return next((line for line in reversed(spoken) if told.match(line)), spoken[-1] if spoken else "it said nothing")
 
 
-def judge(code: int, parser: OutputParser, work: Path) -> None:
+def judge(run: Run, code: int, parser: OutputParser, work: Path) -> None:
     """Killed or RunError, with the reason, unless the engine ended well and said so."""
-    lines = _tail(work / "engine.log")
+    stop_message, lines = run.engine.facts.stop_message, _tail(work / "engine.log")
     where = f"at step {parser.step} of {parser.steps}" if parser.steps else "before its first step"
     if any("No space left" in line for line in lines):
         raise RunError(DISK_FULL, f"the engine stopped {where}")
@@ -62,7 +62,7 @@ def judge(code: int, parser: OutputParser, work: Path) -> None:
         hint = "by hand or because memory ran out" if number == signal.SIGKILL else ""
         kind = Killed if number in _STOPPED else RunError
         raise kind(f"the engine was killed by {signal.Signals(number).name} {where}", hint)
-    if not parser.finished and any(line.startswith("SIGINT/SIGTERM caught") for line in lines):
+    if stop_message and not parser.finished and any(line.startswith(stop_message) for line in lines):
         raise Killed(f"the engine was told to stop {where}")
     if code:
         raise RunError(f"the engine ended with exit code {code} {where}", reason(lines))

@@ -12,13 +12,13 @@ from typing import Any
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
 from dembark.validation import checks, engines
-from dembark.validation.cases import ENGINES, Case, Study, discover
+from dembark.validation.case.deck import sources
+from dembark.validation.case.folders import discover
+from dembark.validation.case.model import Case, Study
 from dembark.validation.engines import Engine
-from dembark.validation.parameters import Value, pick
-from dembark.validation.resolve import for_replica, portable, resolve
+from dembark.validation.case.parameters import Value, pick
+from dembark.validation.case.resolve import for_replica, portable, resolve
 
-# YADE does about a tenth of the particle-steps per second of LIGGGHTS on one core.
-_RELATIVE_COST = {"liggghts": 1, "yade": 10}
 # A line of grains.dump and two to three of contacts.dump for each grain and frame.
 _BYTES_PER_GRAIN_AND_FRAME = 800
 
@@ -36,7 +36,7 @@ class Run:
 
     @property
     def name(self) -> str:
-        """Short name for people: `silo dry yade 1`."""
+        """Short name for people: case, variant, engine and replica."""
         return f"{self.case.name} {self.variant} {self.engine.name} {self.replica}"
 
     @property
@@ -59,7 +59,7 @@ class Run:
     def inputs(self) -> str:
         """Hash of everything that decides the outcome: parameters, deck and engine, but not where, on how many cores or beside how many replicas."""
         parameters = {key: value for key, value in self.values.items() if key != "replicas"}
-        facts = {"parameters": parameters, "deck": deck_files(self.case, self.engine.name),
+        facts = {"parameters": parameters, "deck": sources(self.case, self.engine.name),
                  "engine": [self.engine.name, self.engine.version, self.engine.identity]}
         return hashlib.sha256(json.dumps(facts, sort_keys=True, allow_nan=False).encode()).hexdigest()
 
@@ -79,7 +79,7 @@ class Series:
     @property
     def cost(self) -> float:
         """Relative cost of one replica, to start the longest first."""
-        return (self.runs[0].particles or 1) * _RELATIVE_COST[self.runs[0].engine.name]
+        return (self.runs[0].particles or 1) * self.runs[0].engine.facts.relative_cost
 
 
 @dataclass(frozen=True)
@@ -110,20 +110,6 @@ def studies(all_series: Iterable[Series]) -> list[PlannedStudy]:
     return found
 
 
-def deck_files(case: Case, engine: str) -> dict[str, str]:
-    """Checksums of the deck of `engine` and of all other files in the case folder that it might include.
-
-    Left out are the case file itself, for what counts of it is passed as parameters and a better sentence in it is no new input,
-    the case's own checks, which look at results only, and its campaigns.
-    """
-    others = {case.deck(name) for name in ENGINES if name != engine}
-    files = (path for path in case.folder.rglob("*") if path.is_file() and path not in others)
-    relative = {path.relative_to(case.folder): path for path in files}
-    return {str(name): hashlib.sha256(path.read_bytes()).hexdigest() for name, path in sorted(relative.items())
-            if name.suffix not in (".md", ".pyc") and str(name) not in ("case.toml", "checks.py")
-            and name.parts[0] not in ("tests", "campaigns") and not any(part.startswith(".") for part in name.parts)}
-
-
 def series(case: Case, variant: str, profile: str | None, engine: Engine, changes: Mapping[str, Value] | None = None,
            name: str | None = None) -> Series:
     """The runs of one case, variant and engine; as many as the parameter `replicas` says (1 when the case has none).
@@ -146,7 +132,7 @@ def campaign(profile: str, only_cases: Sequence[str] = (), only_engines: Sequenc
     for name in only_cases:
         pick(name, cases, "case", "in --case")
     for name in only_engines:
-        pick(name, ENGINES, "engine", "in --engine")
+        pick(name, engines.names(), "engine", "in --engine")
     pick(profile, {name for case in cases.values() for name in case.profiles}, "profile", "in the cases")
     result = [series(case, planned.variant, profile, engines.find(engine), planned.changes(engine))
               for case in cases.values() if not only_cases or case.name in only_cases

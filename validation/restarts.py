@@ -10,15 +10,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from dembark.common.files import read_json, write_json
+from dembark.validation import engines
 from dembark.validation.plan import Run
 
 # What the decks call their states; docs/restarts.md has the format of the mark beside each.
 BASE = "state"
-_SUFFIXES = {"liggghts": "restart", "yade": "yade.gz"}
 _ATTEMPTS = "attempts.json"
-# Particle-steps per second of a core, to turn seconds into steps. Fixed numbers, because lists of neighbours are built anew whenever a
-# state is written: a measured rate would make a run differ in round-off from host to host.
-_RATES = {"liggghts": 1e6, "yade": 1e5}
 
 
 @dataclass(frozen=True)
@@ -36,14 +33,15 @@ class Attempts:
 
 
 def supported(run: Run) -> bool:
-    """Whether the deck knows the words `restart_every` and `resume`."""
+    """Whether the deck writes states to resume from."""
     text = run.case.deck(run.engine.name).read_text(encoding="utf-8", errors="replace")
-    return "restart_every" in text and "resume" in text
+    return any(word in text for word in run.engine.facts.restart_words)
 
 
 def steps_between(run: Run, interval: float, cores: int) -> int:
     """Steps between states for about `interval` (s, 0: none) of wall time on `cores`; the same on every host."""
-    return max(1, round(interval * _RATES[run.engine.name] * cores / max(1, run.particles or 1))) if interval > 0.0 else 0
+    # Lists of neighbours are built anew whenever a state is written: another interval would change the run by round-off.
+    return max(1, round(interval * run.engine.facts.restart_rate * cores / max(1, run.particles or 1))) if interval > 0.0 else 0
 
 
 def _is_whole(path: Path) -> bool:
@@ -60,7 +58,7 @@ def _is_whole(path: Path) -> bool:
 
 def newest(folder: Path, engine: str) -> int | None:
     """Step of the newest state of `engine` in `folder` that is whole; None when there is none."""
-    pattern = re.compile(rf"{BASE}\.(\d+)\.{re.escape(_SUFFIXES[engine])}")
+    pattern = re.compile(rf"{BASE}\.(\d+)\.{re.escape(engines.facts(engine).restart_suffix)}")
     found = {int(match.group(1)): path for path in folder.glob(f"{BASE}.*") if (match := pattern.fullmatch(path.name))}
     return next((step for step in sorted(found, reverse=True) if _is_whole(found[step])), None)
 
@@ -100,8 +98,8 @@ def remember(work: Path, what: Attempts) -> None:
     write_json(work / _ATTEMPTS, asdict(what))
 
 
-def clear(work: Path) -> None:
+def clear(run: Run, work: Path) -> None:
     """Take away what only an unfinished run needs."""
-    # LIGGGHTS writes a restart file of its own when it is told to stop.
-    for path in (*work.glob(f"{BASE}.*"), *work.glob("restart_forced_liggghts_*.data"), work / _ATTEMPTS):
-        path.unlink(missing_ok=True)
+    for pattern in (f"{BASE}.*", *run.engine.facts.leftovers, _ATTEMPTS):
+        for path in work.glob(pattern):
+            path.unlink(missing_ok=True)

@@ -11,7 +11,7 @@ import shutil
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -21,7 +21,9 @@ from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import DISK_FULL, disk_error, move_into_place, sweep, write_json
 from dembark.validation import outcome, provenance, restarts
 from dembark.validation.claim import claim
-from dembark.validation.plan import Run, deck_files, finished
+from dembark.validation.case import deck
+from dembark.validation.case.parameters import Value
+from dembark.validation.plan import Run, finished
 from dembark.validation.process import chunks, running
 from dembark.validation.progress import Board, OutputParser
 
@@ -30,7 +32,7 @@ _RESUMED = re.compile(r"dembark: resumed at step (\d+) (exact|approximate)ly")
 
 @dataclass(frozen=True)
 class Resources:
-    """What a run may use: MPI ranks (LIGGGHTS) and threads; and about how long it computes between states to resume from (s, 0: none)."""
+    """What a run may use: MPI ranks and threads, and about how long it computes between states to resume from (s, 0: none)."""
 
     ranks: int = 1
     threads: int = 1
@@ -84,9 +86,11 @@ def _run_into(run: Run, target: Path, board: Board, ended: _Ended, used: Resourc
                 shutil.rmtree(other)
         outcome.check_room(run, target.parent)
         step, computed = restarts.begin(run, work), True
+        if step is None:
+            deck.write(run.case, run.engine.name, run.values, work)
         record = _execute(run, work, step, board, ended, used)
-        restarts.clear(work)
-        _archive(run, work, record["deck"])
+        restarts.clear(run, work)
+        deck.archive(run.case, work)
         write_json(work / "run.json", record)
         move_into_place(work, target)
         _forget_failure(target)
@@ -110,15 +114,6 @@ def _run_into(run: Run, target: Path, board: Board, ended: _Ended, used: Resourc
     finally:
         if not kept:
             shutil.rmtree(work, ignore_errors=True)
-
-
-def _archive(run: Run, work: Path, deck: Iterable[str]) -> None:
-    """Copy the files of the `deck`, the case file and the case's own checks, as they were, into `deck` beside what came of them."""
-    for name in (*deck, "case.toml", "checks.py"):
-        if (run.case.folder / name).is_file():
-            kept = work / "deck" / name
-            kept.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(run.case.folder / name, kept)
 
 
 def _going_on(run: Run, work: Path) -> tuple[bool, str]:
@@ -149,11 +144,12 @@ def _forget_failure(target: Path) -> None:
 
 def _execute(run: Run, work: Path, step: int | None, board: Board, ended: _Ended, used: Resources) -> dict[str, Any]:
     """One attempt in `work`, from `step` on (None: from the start); the record of the finished run."""
-    words, every = dict(run.values), 0
+    words: dict[str, Value] = {}
+    every = 0
     if restarts.supported(run):
         every = restarts.steps_between(run, used.restart_interval, used.ranks * used.threads)
-        words |= {"restart_every": every} | ({"resume": "yes"} if step is not None else {})
-    command = run.engine.command(run.case.deck(run.engine.name), words, used.ranks, used.threads)
+        words = {"restart_every": every} | ({"resume": "yes"} if step is not None else {})
+    command = run.engine.command(work / run.engine.facts.deck, words, used.ranks, used.threads)
     before = _heard(work, restarts.attempts(work))
     began, clock = datetime.now(UTC), time.monotonic()
     restarts.remember(work, replace(before, attempts=before.attempts + 1, ended=False))
@@ -171,14 +167,14 @@ def _execute(run: Run, work: Path, step: int | None, board: Board, ended: _Ended
         wall = time.monotonic() - clock
         done = _heard(work, replace(before, attempts=before.attempts + 1, wall_time=before.wall_time + wall, ended=False))
         restarts.remember(work, done)
-    outcome.judge(code, parser, work)
+    outcome.judge(run, code, parser, work)
     frames = outcome.check_output(work, run.case.outputs, run.values.get("frames"))
     # The speed of this attempt: of the others nobody knows how many steps were done twice.
     speed = run.particles * (parser.steps - (step or 0)) / wall if run.particles else None
     return {
         "case": run.case.name, "variant": run.variant, "profile": run.profile, "engine": run.engine.name, "replica": run.replica,
-        "parameters": dict(run.values), "seed": run.values.get("seed"), "steps": parser.steps, "time_step": parser.time_step,
-        "frames": frames, "inputs": run.inputs, "deck": deck_files(run.case, run.engine.name), "command": command,
+        "parameters": dict(run.values), "derived": deck.derived(run.case, run.values), "seed": run.values.get("seed"), "steps": parser.steps, "time_step": parser.time_step,
+        "frames": frames, "inputs": run.inputs, "deck": deck.sources(run.case, run.engine.name), "command": command,
         "attempts": done.attempts, "resumed_at": list(done.resumed_at), "resume": done.resume, "restart_every": every,
         "provenance": {**provenance.collect(run.engine), "ranks": used.ranks, "threads": used.threads, "seed": run.values.get("seed"),
                        "started": began.isoformat(timespec="seconds"), "wall_time": done.wall_time, "particle_steps_per_second": speed},

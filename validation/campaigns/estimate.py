@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dembark.common.errors import DembarkError, Interrupted
@@ -70,13 +70,15 @@ def announced(run: Run, cancel: threading.Event) -> tuple[int, float]:
 
 
 def _asked(run: Run) -> Run:
-    """The same run in LIGGGHTS where that is at hand, which starts much faster than YADE; both decks take the same steps."""
-    if run.engine.name == "liggghts" or "liggghts" not in run.case.engines:
-        return run
-    try:
-        return Run(run.case, run.variant, run.profile, engines.find("liggghts"), run.replica, run.values)
-    except DembarkError:
-        return run
+    """The same run in the cheapest engine at hand, which starts fastest, too; all decks of a case take the same steps."""
+    for name in sorted(run.case.engines, key=lambda name: engines.facts(name).relative_cost):
+        if name == run.engine.name:
+            break
+        try:
+            return replace(run, engine=engines.find(name))
+        except DembarkError:
+            continue
+    return run
 
 
 def estimates(plan: Plan, rates: Rates, cancel: threading.Event,

@@ -13,10 +13,9 @@ from typing import Any
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
 from dembark.validation.campaigns.spec import CampaignSpec, RunResources, SweepSpec
-from dembark.validation.cases import ENGINES
-from dembark.validation.parameters import Value, checked, pick
+from dembark.validation.case.parameters import Value, checked, pick
 from dembark.validation.plan import Series, series
-from dembark.validation.resolve import merged, resolve
+from dembark.validation.case.resolve import merged, resolve
 
 LONGEST_NAME = 100
 MOST_RUNS = 20000
@@ -153,7 +152,7 @@ def plan(spec: CampaignSpec, only_cases: Sequence[str] = (), only_engines: Seque
     for name in only_cases:
         pick(name, {sweep.case.name for sweep in spec.sweeps}, "case", f"in {spec.path}")
     for name in only_engines:
-        pick(name, ENGINES, "engine", "in --engine")
+        pick(name, engines.names(), "engine", "in --engine")
     all_points = points(spec)
     found: dict[Path, Series] = {}
     resources: dict[Path, RunResources] = {}

@@ -14,17 +14,15 @@ from typing import Any
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json, write_json, write_whole
-from dembark.validation import provenance
+from dembark.validation import engines, provenance
 from dembark.validation.campaigns.expand import Plan
 from dembark.validation.campaigns.spec import read
-from dembark.validation.cases import deck_root
+from dembark.validation.case.folders import shipped_root
 
 FILE = "campaign.toml"
 FACTS = "campaign.json"
 LOG = "campaign.log"
 LOCK = ".lock"
-# What else says which engines and cases are meant; `resume` takes it over where the shell says nothing.
-_VARIABLES = ("DEMBARK_LIGGGHTS", "DEMBARK_YADE", "DEMBARK_DECKS", "DEMBARK_MPIRUN")
 
 
 @dataclass(frozen=True)
@@ -85,10 +83,15 @@ def options(folder: Path) -> Options:
     return Options(**{key: value for key, value in _last(folder, "options").items() if key in Options.__dataclass_fields__})
 
 
+def _variables() -> list[str]:
+    """What else says which engines and cases are meant; `resume` takes it over where the shell says nothing."""
+    return [*(variable for name in engines.names() for variable in engines.facts(name).variables), "DEMBARK_DECKS", "DEMBARK_MPIRUN"]
+
+
 def restore(folder: Path) -> None:
     """Set the variables for engines and cases as they were at the last submission, unless they are set."""
     for name, value in _last(folder, "environment").items():
-        if name in _VARIABLES:
+        if name in _variables():
             os.environ.setdefault(name, value)
 
 
@@ -99,8 +102,8 @@ def enter(folder: Path, file: Path, plan: Plan, chosen: Options) -> None:
     facts = read_json(folder / FACTS) or {}
     submission: dict[str, Any] = {
         "at": datetime.now(UTC).isoformat(timespec="seconds"), "file": str(file), "sha256": hashlib.sha256(text).hexdigest(),
-        "options": asdict(chosen), "host": socket.gethostname(), "user": _user(), "decks": str(deck_root()),
-        "environment": {name: os.environ[name] for name in _VARIABLES if name in os.environ},
+        "options": asdict(chosen), "host": socket.gethostname(), "user": _user(), "decks": str(shipped_root()),
+        "environment": {name: os.environ[name] for name in _variables() if name in os.environ},
         **provenance.commit(), "versions": versions(plan)}
     write_json(folder / FACTS, {"name": plan.spec.name, "description": plan.spec.description,
                                 "submissions": [*facts.get("submissions", []), submission]})

@@ -19,7 +19,7 @@ from urllib.parse import quote
 from dembark.common.errors import DembarkError, RunError
 from dembark.common.files import disk_error, read_json, write_whole
 from dembark.validation.campaigns.schema import KEYS, TABLES, VERSION, statements
-from dembark.validation.parameters import pick
+from dembark.validation.case.parameters import pick
 from dembark.validation.plan import Run, Series, finished, studies
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from dembark.validation.checks.quantity import Quantity
 from dembark.validation.checks.run import Replica
-from dembark.validation.statistics import Estimate, block_mean, over_replicas
+from dembark.postproc.statistics import Estimate, block_mean, over_replicas
 
 # Sums over thousands of grains in any order, and 15 digits of each number in time.csv.
 ROUND_OFF = 1e-12

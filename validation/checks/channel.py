@@ -9,7 +9,7 @@ import numpy as np
 from dembark.postproc import ContactFrame, GrainFrame, profiles, stress
 from dembark.postproc.spheres import slice_volumes, volume
 from dembark.validation.checks.run import Replica, once, wall_friction
-from dembark.validation.statistics import Estimate, block_mean, steady_start
+from dembark.postproc.statistics import Estimate, block_mean, steady_start
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 

@@ -13,7 +13,7 @@ from dembark.postproc.spheres import slice_volumes
 from dembark.validation.checks import vessel as vessels
 from dembark.validation.checks.run import Replica, kinetic_friction, wall_friction
 from dembark.validation.checks.vessel import Vessel
-from dembark.validation.statistics import Estimate, block_mean
+from dembark.postproc.statistics import Estimate, block_mean
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 

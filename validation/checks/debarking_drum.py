@@ -21,7 +21,7 @@ from dembark.validation.checks.quantity import Quantity, measured
 from dembark.validation.checks.filling import propagated
 from dembark.validation.checks.run import Array, Replica, pooled, profile, resampled, time_blocks
 from dembark.validation.references import KOLESNIKOV
-from dembark.validation.statistics import Estimate
+from dembark.postproc.statistics import Estimate
 from numpy.typing import NDArray
 
 REFERENCES = (KOLESNIKOV,)

@@ -25,7 +25,7 @@ from dembark.validation.checks.channel import Channel
 from dembark.validation.checks.fields_result import FieldResult, labelled, variable
 from dembark.validation.checks.quantity import Quantity
 from dembark.validation.checks.run import Array, Replica, TimeBlocks, pooled, resampled, time_blocks
-from dembark.validation.statistics import Estimate, block_mean, combined, student
+from dembark.postproc.statistics import Estimate, block_mean, combined, student
 from scipy.special import ndtr
 
 WIDTH = 0.5  # of the kernel, in grain diameters: the layers at the walls stay apart

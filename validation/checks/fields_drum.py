@@ -18,7 +18,7 @@ from dembark.validation.checks.debarking_drum import ANGLES, ROWS, contacts_in_w
 from dembark.validation.checks.fields_result import FieldResult, labelled, variable
 from dembark.validation.checks.quantity import Quantity
 from dembark.validation.checks.run import Array, Replica, pooled, resampled, time_blocks
-from dembark.validation.statistics import Estimate
+from dembark.postproc.statistics import Estimate
 from numpy.typing import NDArray
 
 CELLS = 32  # of the map, across the drum

@@ -21,7 +21,7 @@ from dembark.validation.checks.quantity import Quantity
 from dembark.validation.checks.run import Array, Replica, TimeBlocks, pooled, resampled, time_blocks
 from dembark.validation.checks.vessel import Cylinder, overlap
 from dembark.validation.references import JANSSEN
-from dembark.validation.statistics import Estimate, block_mean, combined
+from dembark.postproc.statistics import Estimate, block_mean, combined
 from threadpoolctl import threadpool_limits
 
 # Shares of the filling height that the radial profiles are averaged over.

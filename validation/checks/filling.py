@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from dembark.validation.checks.quantity import Quantity, measured
 from dembark.validation.references import JANSSEN, WALKER
-from dembark.validation.statistics import Estimate, combined
+from dembark.postproc.statistics import Estimate, combined
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 

@@ -19,7 +19,7 @@ from dembark.validation.checks.quantity import Quantity
 from dembark.validation.checks.run import Replica, pooled, profile, resampled, time_blocks, wall_friction
 from dembark.validation.checks.widths import width_study
 from dembark.validation.references import DEBNATH
-from dembark.validation.statistics import Estimate, block_mean
+from dembark.postproc.statistics import Estimate, block_mean
 
 REFERENCES = (DEBNATH,)
 FLATNESS = 0.02

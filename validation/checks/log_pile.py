@@ -12,7 +12,7 @@ from dembark.validation.checks.logs import SAME, LogRun, exact, over_time, read,
 from dembark.validation.checks.quantity import Quantity
 from dembark.validation.checks.run import Replica, profile
 from dembark.validation.references import KOLESNIKOV
-from dembark.validation.statistics import CONFIDENCE, Estimate, block_mean, student
+from dembark.postproc.statistics import CONFIDENCE, Estimate, block_mean, student
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

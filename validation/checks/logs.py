@@ -14,7 +14,7 @@ from dembark.postproc import DumpError
 from dembark.postproc.dumptext import TextDump
 from dembark.validation.checks.quantity import Quantity
 from dembark.validation.checks.run import Replica, profile
-from dembark.validation.statistics import Estimate
+from dembark.postproc.statistics import Estimate
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ from dembark.validation.checks.channel import Array, Channel, read
 from dembark.validation.checks.quantity import Quantity
 from dembark.validation.checks.run import Replica, pooled, profile, resampled, time_blocks
 from dembark.validation.references import DEBNATH
-from dembark.validation.statistics import CONFIDENCE, Estimate, block_mean
+from dembark.postproc.statistics import CONFIDENCE, Estimate, block_mean
 
 REFERENCES = (DEBNATH,)
 FLATNESS = 0.02

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from dembark.validation.statistics import Estimate
+from dembark.postproc.statistics import Estimate
 
 
 @dataclass(frozen=True)

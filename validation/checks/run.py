@@ -11,7 +11,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 from dembark.postproc import ContactsDump, DumpError, GrainsDump, read_times
-from dembark.validation.statistics import ONE_SAMPLE, Estimate, block_count, jackknife, over_replicas
+from dembark.validation import engines
+from dembark.postproc.statistics import ONE_SAMPLE, Estimate, block_count, jackknife, over_replicas
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -50,7 +51,7 @@ class Replica:
     def impacts(self) -> Array:
         """Impacts that have ended, (n, 11): id_a id_b time duration peak_force impulse relative_speed dissipated x y z; SI units.
 
-        Bodies are counted from 1 in either engine; id_b < 0 is a wall. DumpError when the file cannot be read.
+        Bodies are counted from 1; id_b < 0 is a wall. DumpError when the file cannot be read.
         """
         path = self.folder / "impacts.txt"
         try:
@@ -60,8 +61,7 @@ class Replica:
             raise DumpError(f"{path} does not exist") from None
         except ValueError:
             raise DumpError(f"{path}: a line does not hold 11 numbers") from None
-        if self.record["engine"] == "yade":
-            table[:, :2] += table[:, :2] >= 0
+        table[:, :2] += engines.facts(self.record["engine"]).impact_id_offset * (table[:, :2] >= 0)
         return table
 
     def paired_frames(self) -> Any:

@@ -26,7 +26,7 @@ from dembark.validation.checks.quantity import Quantity
 from dembark.validation.checks.run import Replica, pooled, profile, resampled, time_blocks
 from dembark.validation.checks.vessel import overlap
 from dembark.validation.references import CAMBAU, JANSSEN, LANDRY, WALKER
-from dembark.validation.statistics import Estimate, block_mean, over_replicas
+from dembark.postproc.statistics import Estimate, block_mean, over_replicas
 
 REFERENCES = (JANSSEN, LANDRY, CAMBAU, WALKER)
 TOLERANCE = 0.10

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from dembark.validation.checks.quantity import Quantity, measured
 from dembark.validation.references import DEBNATH
-from dembark.validation.statistics import Estimate
+from dembark.postproc.statistics import Estimate
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -13,24 +13,28 @@ from typing import Any
 import matplotlib
 import numpy as np
 from dembark.postproc.style import STYLE
-from dembark.validation.statistics import Scatter, scatter
+from dembark.validation import engines
+from dembark.postproc.statistics import Scatter, scatter
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-# Okabe & Ito's palette, which colour-blind readers can tell apart.
-COLOURS = {"liggghts": "#0072B2", "yade": "#D55E00"}
-MARKERS = {"liggghts": "o", "yade": "s"}
+# For results of engines that are not registered: the rest of the engines' palette.
 _SPARE = ["#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
 
 
 def colour(engine: str) -> str:
     """Colour of an engine in all figures."""
-    return COLOURS.get(engine) or _SPARE[sum(engine.encode()) % len(_SPARE)]
+    return engines.facts(engine).colour if engine in engines.names() else _SPARE[sum(engine.encode()) % len(_SPARE)]
+
+
+def marker(engine: str) -> str:
+    """Marker of an engine in all figures."""
+    return engines.facts(engine).marker if engine in engines.names() else "^"
 
 
 def engine_name(engine: str) -> str:
     """As its makers write it."""
-    return {"liggghts": "LIGGGHTS", "yade": "YADE"}.get(engine, engine)
+    return engines.facts(engine).title if engine in engines.names() else engine
 
 
 def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
@@ -170,14 +174,14 @@ def scatter_figure(groups: Mapping[str, Sequence[tuple[str, float, float, float,
         for key, group in groups.items():
             if not group:
                 continue
-            paint, marker = (colour(key), MARKERS.get(key, "^")) if key != "engines" else ("#009E73", "D")
-            label = "YADE against LIGGGHTS" if key == "engines" else f"{engine_name(key)} against theory"
+            paint, shape = (colour(key), marker(key)) if key != "engines" else ("#009E73", "D")
+            label = "engine against engine" if key == "engines" else f"{engine_name(key)} against theory"
             _, value, reference, value_half, reference_half = (np.array(column) for column in zip(*group, strict=True))
             value, reference, value_half, reference_half = (
                 column.astype(float) for column in (value, reference, value_half, reference_half)
             )
             style = {
-                "fmt": marker,
+                "fmt": shape,
                 "color": paint,
                 "markersize": 3.4,
                 "elinewidth": 0.6,

@@ -10,8 +10,8 @@ from dembark.common.errors import DembarkError
 from dembark.common.units import to_si
 from dembark.validation import cases
 from dembark.validation.cases import discover, find, load
-from dembark.validation.expressions import Expression
-from dembark.validation.resolve import for_replica, portable, resolve, settings
+from dembark.validation.case.expressions import Expression
+from dembark.validation.case.resolve import for_replica, portable, resolve, settings
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -52,7 +52,7 @@ def test_a_mistake_gets_one_line_and_exit_code_2(words: list[str], expected: str
 
 def test_a_missing_engine_gets_the_command_that_makes_it(
         monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    monkeypatch.setattr(engines, "checkout", lambda: tmp_path)
+    monkeypatch.setattr(engines.base, "checkout", lambda: tmp_path)
     monkeypatch.setenv("PATH", "/usr/bin")
     for engine, variable, advice in (("liggghts", "DEMBARK_LIGGGHTS", "make liggghts"), ("yade", "DEMBARK_YADE", "make yade-plugin")):
         monkeypatch.delenv(variable)

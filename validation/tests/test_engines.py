@@ -12,6 +12,7 @@ from dembark.common.errors import Interrupted, RunError
 from dembark.common.files import read_json
 from dembark.validation import cases, engines, provenance
 from dembark.validation.cases import find
+from dembark.validation.engines.liggghts import Liggghts
 from dembark.validation.plan import Run, series
 from dembark.validation.progress import Board
 from dembark.validation.simulate import Resources, simulate
@@ -218,5 +219,5 @@ def test_compiler_flags_are_read_beside_the_build(tmp_path: Path) -> None:
     (tmp_path / "build/engines/CMakeCache.txt").write_text(cache)
     (tmp_path / "build/bin").mkdir()
     (tmp_path / "build/bin/liggghts-dembark").symlink_to(program)
-    engine = engines.Engine("liggghts", tmp_path / "build/bin/liggghts-dembark", "3.8.0", "")
+    engine = Liggghts(tmp_path / "build/bin/liggghts-dembark", "3.8.0", "")
     assert provenance.build_flags(engine) == {"CMAKE_BUILD_TYPE": "Release", "CMAKE_CXX_FLAGS": "-O2 -g"}

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from dembark.validation.checks.quantity import Quantity
-from dembark.validation.statistics import Estimate
+from dembark.postproc.statistics import Estimate
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

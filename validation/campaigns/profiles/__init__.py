@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 
 from dembark.common.errors import DembarkError
-from dembark.validation.parameters import nearest
+from dembark.validation.case.parameters import nearest
 
 # Names the preamble to the jobs, whose commands read it first (see the Snakefile).
 PREAMBLE_VARIABLE = "DEMBARK_PREAMBLE"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from dembark.validation.statistics import joint_half
+from dembark.postproc.statistics import joint_half
 
 # Deterministic quantities have no interval: anything beyond round-off is a change.
 ROUND_OFF = 1e-12

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from dembark.validation.convergence import REFINEMENT, Convergence, convergence, refinement
+from dembark.postproc.convergence import REFINEMENT, Convergence, convergence, refinement
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from dembark.common.errors import DembarkError, Interrupted
 from dembark.validation import engines
 from dembark.validation.campaigns import profiles, slurm
 from dembark.validation.campaigns.spec import RunResources
+from dembark.validation.engines.liggghts import Liggghts
 
 SLURM = profiles.find("slurm")
 LONG = ["--time=1", "--output=/dev/null", "--wrap=sleep 60"]
@@ -93,7 +94,7 @@ def test_the_preamble_sets_the_environment(tmp_path: Path) -> None:
 def test_a_launcher_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     for key, value in {"SLURM_JOB_ID": "1", "SLURM_NODELIST": "n1", "PMI_RANK": "0", "SLURM_CONF": "/c"}.items():
         monkeypatch.setenv(key, value)
-    engine = engines.Engine("liggghts", Path("/bin/lmp"), "", "")
+    engine = Liggghts(Path("/bin/lmp"), "", "")
 
     def known() -> set[str]:
         return {key for key in engine.environment() if key.startswith(("SLURM_", "PMI"))}

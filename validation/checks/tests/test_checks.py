@@ -16,7 +16,7 @@ from dembark.validation.checks.silo import _moving_mean
 from dembark.validation.checks.vessel import Cylinder
 from dembark.validation.compare import compare, pair
 from dembark.validation.metrics import measure
-from dembark.validation.statistics import Estimate, over_replicas
+from dembark.postproc.statistics import Estimate, over_replicas
 from synthetic import DIAMETER, plug_flow, silo
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dembark.common.checkout import checkout
 from dembark.postproc import DumpError
 from dembark.validation import cases
 from dembark.validation.checks import debarking_drum as checks
@@ -19,7 +20,7 @@ PERIOD = 2.0 * np.pi / SPEED
 
 
 def parameters(**changes: Any) -> dict[str, Any]:
-    declared = cases.load(cases.checkout() / "input_decks/debarking_drum/case.toml").parameters
+    declared = cases.load(checkout() / "input_decks/debarking_drum/case.toml").parameters
     return {name: one.value for name, one in declared.items()} | {
         "log_count": LOGS, "revolutions": TURNS, "run_in": RUN_IN, "drum_speed": SPEED, **changes}
 

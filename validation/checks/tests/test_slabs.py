@@ -6,7 +6,7 @@ from dembark.validation.checks.gravity_channel import study
 from dembark.validation.checks.vessel import Cylinder, Slab
 from dembark.validation.checks.widths import common_exponential, exponent
 from dembark.validation.metrics import measure
-from dembark.validation.statistics import Estimate
+from dembark.postproc.statistics import Estimate
 from synthetic_slabs import gravity_channel, plane_silo
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from dembark.validation.convergence import SAFETY, convergence, observed_order, refinement
+from dembark.postproc.convergence import SAFETY, convergence, observed_order, refinement
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dembark.common.errors import DembarkError
-from dembark.validation.parameters import nearest
+from dembark.validation.case.parameters import nearest
 
 Types = type | tuple[type, ...]
 _WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", list: "a list [...]", dict: "a table {...}"}

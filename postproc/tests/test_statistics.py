@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from dembark.validation.statistics import (
+from dembark.postproc.statistics import (
     Estimate,
     block_mean,
     correlation_time,

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Mapping
 
 from dembark.common.errors import DembarkError
-from dembark.validation.cases import Case
-from dembark.validation.parameters import Value, checked, nearest, pick
+from dembark.validation.case.model import Case
+from dembark.validation.case.parameters import Value, checked, nearest, pick
 
 UNLIMITED = 1e300
 

@@ -17,7 +17,9 @@ _UNARY: dict[type[ast.unaryop], Callable[[Any], Any]] = {ast.USub: operator.neg,
 _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge, ast.Eq: operator.eq, ast.NotEq: operator.ne,
 }
-_FUNCTIONS: dict[str, Callable[..., Any]] = {"min": min, "max": max, "abs": abs, "sqrt": math.sqrt}
+_FUNCTIONS: dict[str, Callable[..., Any]] = {"min": min, "max": max, "abs": abs, "sqrt": math.sqrt, "ceil": math.ceil, "floor": math.floor, "round": round,
+                                           "sin": math.sin, "cos": math.cos}
+_CONSTANTS = {"pi": math.pi}
 
 
 class _Unset(Exception):
@@ -27,7 +29,7 @@ class _Unset(Exception):
 def _outside_first(node: ast.AST) -> set[str]:
     """Names in `node` that are not within a call of `first`."""
     if isinstance(node, ast.Name):
-        return {node.id}
+        return {node.id} - _CONSTANTS.keys()
     parts: list[ast.AST] = list(ast.iter_child_nodes(node))
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         parts = [] if node.func.id == "first" else list(node.args)
@@ -38,7 +40,8 @@ class Expression:
     """A parsed condition, e.g. `kinetic_friction <= static_friction or grain_count < 100`."""
 
     def __init__(self, text: str) -> None:
-        """Parse `text`; DembarkError for anything but arithmetic, comparisons, and/or/not, min, max, abs, sqrt and first.
+        """Parse `text`; DembarkError for anything but arithmetic, comparisons, and/or/not, pi, first, and the functions min, max, abs,
+        sqrt, ceil, floor, round, sin and cos.
 
         `first(a, b)` is the first of its values that is set.
         """
@@ -53,7 +56,7 @@ class Expression:
     def _names(self, node: ast.AST) -> set[str]:
         match node:
             case ast.Name(id=name):
-                return {name}
+                return {name} - _CONSTANTS.keys()
             case ast.Constant(value=value) if isinstance(value, (int, float, str)):
                 return set()
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
@@ -86,6 +89,8 @@ class Expression:
 
     def _value(self, node: ast.AST, values: Mapping[str, Any]) -> Any:
         match node:
+            case ast.Name(id=name) if name in _CONSTANTS:
+                return _CONSTANTS[name]
             case ast.Name(id=name):
                 if values.get(name) is None:
                     raise _Unset

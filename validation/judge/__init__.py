@@ -1,0 +1,1 @@
+"""From numbers with intervals to verdicts."""
