@@ -34,6 +34,11 @@ class Estimate:
         return self.value - self.half, self.value + self.half
 
 
+def exact(value: float, half: float = 0.0) -> Estimate:
+    """A number of a run in which nothing is random; `half` is what the time step hides of it."""
+    return Estimate(float(value), half, "none, nothing is random" if half == 0.0 else "the time step")
+
+
 def student(degrees: float, confidence: float = CONFIDENCE) -> float:
     """Two-sided quantile of Student's t distribution."""
     return float(stats.t.ppf(0.5 + 0.5 * confidence, degrees)) if degrees >= 1 else math.inf
