@@ -10,17 +10,25 @@ from typing import Any
 from dembark.common.errors import DembarkError, RunError
 from dembark.common.files import read_json, write_json
 from dembark.postproc import DumpError
-from dembark.validation import checks
+from dembark.postproc.replica import Replica
+from dembark.validation import checks, engines
+from dembark.validation.case import deck
 from dembark.validation.case.folders import find as find_case
 from dembark.validation.case.model import Case, Study
 from dembark.validation.judge import measuring
-from dembark.validation.checks.run import Replica
 
 
 def replicas(folder: Path) -> list[Replica]:
     """Finished replicas of `folder`, in the order of their numbers."""
-    found = [Replica(path.parent, record) for path in folder.glob("replica-*/run.json") if (record := read_json(path)) is not None]
+    found = [Replica(path.parent, _whole(record)) for path in folder.glob("replica-*/run.json") if (record := read_json(path)) is not None]
     return sorted(found, key=lambda one: int(one.record["replica"]))
+
+
+def _whole(record: dict[str, Any]) -> dict[str, Any]:
+    """The record with what those of earlier versions lack: how the engine counts bodies, and the numbers derived from the parameters."""
+    case = None if "derived" in record else _case(record["case"])
+    derived = deck.derived(case, record["parameters"]) if case and (case.derived or (case.folder / "setup.py").is_file()) else {}
+    return {"impact_id_offset": engines.facts(record["engine"]).impact_id_offset, "derived": derived, **record}
 
 
 def measure(run_folder: Path) -> dict[str, Any]:

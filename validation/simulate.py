@@ -173,8 +173,9 @@ def _execute(run: Run, work: Path, step: int | None, board: Board, ended: _Ended
     speed = run.particles * (parser.steps - (step or 0)) / wall if run.particles else None
     return {
         "case": run.case.name, "variant": run.variant, "profile": run.profile, "engine": run.engine.name, "replica": run.replica,
-        "parameters": dict(run.values), "derived": deck.derived(run.case, run.values), "seed": run.values.get("seed"), "steps": parser.steps, "time_step": parser.time_step,
-        "frames": frames, "inputs": run.inputs, "deck": deck.sources(run.case, run.engine.name), "command": command,
+        "parameters": dict(run.values), "derived": deck.derived(run.case, run.values), "seed": run.values.get("seed"),
+        "steps": parser.steps, "time_step": parser.time_step, "impact_id_offset": run.engine.facts.impact_id_offset, "frames": frames,
+        "inputs": run.inputs, "deck": deck.sources(run.case, run.engine.name), "command": command,
         "attempts": done.attempts, "resumed_at": list(done.resumed_at), "resume": done.resume, "restart_every": every,
         "provenance": {**provenance.collect(run.engine), "ranks": used.ranks, "threads": used.threads, "seed": run.values.get("seed"),
                        "started": began.isoformat(timespec="seconds"), "wall_time": done.wall_time, "particle_steps_per_second": speed},

@@ -1,91 +1,14 @@
-"""What the checks of every case share: one replica's files and parameters, time blocks, profiles for the report."""
+"""Names under which checks that are not converted yet know what is common to measuring."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import wraps
-from pathlib import Path
-from typing import Any, TypeVar
+from collections.abc import Mapping
+from typing import Any
 
-import numpy as np
-from dembark.postproc import ContactsDump, DumpError, GrainsDump, read_times
-from dembark.validation import engines
-from dembark.postproc.statistics import ONE_SAMPLE, Estimate, block_count, jackknife, over_replicas
-from numpy.typing import NDArray
+from dembark.postproc.replica import Array, Replica, once
+from dembark.postproc.resampling import TimeBlocks, pooled, profile, resampled, time_blocks
 
-Array = NDArray[np.float64]
-Measured = TypeVar("Measured")
-
-
-@dataclass(frozen=True)
-class Replica:
-    """A finished run: its folder, the record in run.json, and its outputs."""
-
-    folder: Path
-    record: Mapping[str, Any]
-
-    @property
-    def parameters(self) -> Mapping[str, Any]:
-        """Resolved parameters in SI units."""
-        return self.record["parameters"]
-
-    @property
-    def time_step(self) -> float:
-        """Simulated time of one step in s."""
-        return float(self.record["time_step"])
-
-    def grains(self) -> GrainsDump:
-        """Frames of the measuring window."""
-        return GrainsDump(self.folder / "grains.dump")
-
-    def contacts(self) -> ContactsDump:
-        """Contacts of the same frames."""
-        return ContactsDump(self.folder / "contacts.dump")
-
-    def times(self) -> dict[str, Array]:
-        """The whole run, a row an output interval."""
-        return read_times(self.folder / "time.csv")
-
-    def impacts(self) -> Array:
-        """Impacts that have ended, (n, 11): id_a id_b time duration peak_force impulse relative_speed dissipated x y z; SI units.
-
-        Bodies are counted from 1; id_b < 0 is a wall. DumpError when the file cannot be read.
-        """
-        path = self.folder / "impacts.txt"
-        try:
-            rows = [line.split() for line in path.read_text(encoding="ascii").splitlines() if not line.startswith("#")]
-            table = np.array(rows, float).reshape(len(rows), 11)
-        except OSError:
-            raise DumpError(f"{path} does not exist") from None
-        except ValueError:
-            raise DumpError(f"{path}: a line does not hold 11 numbers") from None
-        table[:, :2] += engines.facts(self.record["engine"]).impact_id_offset * (table[:, :2] >= 0)
-        return table
-
-    def paired_frames(self) -> Any:
-        """(grains, contacts) of every frame; DumpError when the two files do not hold the same steps."""
-        grains, contacts = self.grains(), self.contacts()
-        if len(grains) != len(contacts):
-            raise DumpError(f"{self.folder}: grains.dump has {len(grains)} frames, contacts.dump {len(contacts)}")
-        for one, other in zip(grains, contacts, strict=True):
-            if one.step != other.step:
-                raise DumpError(f"{self.folder}: step {one.step} of grains.dump stands beside step {other.step} of contacts.dump")
-            yield one, other
-
-
-def once(read: Callable[[Replica], Measured]) -> Callable[[Replica], Measured]:
-    """`read(replica)`, done once for each Replica object: the quantities of a case and its fields share what was read."""
-
-    @wraps(read)
-    def kept(replica: Replica) -> Measured:
-        found = replica.__dict__.setdefault("_read", {})
-        if read not in found:
-            found[read] = read(replica)
-        return found[read]
-
-    return kept
+__all__ = ["Array", "Replica", "TimeBlocks", "kinetic_friction", "once", "pooled", "profile", "resampled", "time_blocks", "wall_friction"]
 
 
 def wall_friction(parameters: Mapping[str, Any]) -> float:
@@ -100,90 +23,3 @@ def kinetic_friction(parameters: Mapping[str, Any]) -> float:
     if override is not None and override >= 0:
         return float(override)
     return wall_friction(parameters) * float(parameters.get("kinetic_friction_ratio", 1.0))
-
-
-@dataclass(frozen=True)
-class TimeBlocks:
-    """`groups` (frames,): number of the time block of each frame; `single`: the blocks are too correlated to count as several samples."""
-
-    groups: NDArray[np.int64]
-    single: bool
-
-
-def time_blocks(series: Array) -> TimeBlocks:
-    """Time blocks that are long against the correlation of `series` (frames,), or else four that count as a single sample."""
-    blocks = block_count(series, most=10)
-    return TimeBlocks(np.arange(len(series)) * (blocks or 4) // len(series), not blocks)
-
-
-def resampled(
-    measure: Callable[[NDArray[np.bool_], NDArray[np.bool_]], float],
-    frames: TimeBlocks,
-    places: NDArray[np.int64] | None = None,
-    overlap: float = 1.0,
-) -> Estimate:
-    """`measure(keep_frames, keep_places)` with an interval from what varies in time and, with `places`, from place to place.
-
-    `overlap` is what sharing samples leaves of the variance among places. The wider of the two
-    jackknife intervals counts: places stand for the disorder of the packing, which time does not average out, and what is left of the
-    variation in time is in their differences too; blocks of time add what all places do together.
-    """
-    everywhere = np.ones(0 if places is None else len(places), bool)
-    in_time = jackknife(lambda keep: measure(keep, everywhere), frames.groups, name="time blocks")
-    if frames.single:
-        in_time = Estimate(in_time.value, in_time.half * math.sqrt(len(np.unique(frames.groups))), ONE_SAMPLE)
-    if places is None:
-        return in_time
-    always = np.ones(len(frames.groups), bool)
-    in_space = jackknife(lambda keep: measure(always, keep), places, name="sectors or bands")
-    in_space = Estimate(in_space.value, in_space.half / math.sqrt(overlap), in_space.basis)
-    return max(in_time, in_space, key=lambda one: one.half)
-
-
-def pooled(replicas: Sequence[Mapping[str, Estimate]], name: str) -> Estimate:
-    """The quantity `name` over replicas."""
-    return over_replicas([one[name] for one in replicas])
-
-
-def profile(
-    name: str,
-    title: str,
-    along: str,
-    across: str,
-    place: Array,
-    values: Sequence[Array],
-    *,
-    vertical: bool = False,
-    reference: Array | None = None,
-    reference_label: str = "",
-    note: str = "",
-) -> dict[str, Any]:
-    """A profile for figure and CSV: `values` of each replica at the same `place`; the band is Student's interval over replicas (three or
-    more) or the range of two, and absent for one.
-
-    `along` and `across` label the axes of place and value; `vertical` draws the place upwards.
-    """
-    table = np.asarray(values, float)
-    mean = table.mean(axis=0)
-    entry: dict[str, Any] = {
-        "name": name,
-        "title": title,
-        "along": along,
-        "across": across,
-        "vertical": vertical,
-        "place": _numbers(place),
-        "value": _numbers(mean),
-        "note": note,
-    }
-    if len(table) == 2:
-        entry |= {"low": _numbers(table.min(axis=0)), "high": _numbers(table.max(axis=0)), "band": "range of 2 replicas"}
-    elif len(table) > 2:
-        half = np.array([over_replicas([Estimate(value, 0.0) for value in column]).half for column in table.T])
-        entry |= {"low": _numbers(mean - half), "high": _numbers(mean + half), "band": f"95 % interval over {len(table)} replicas"}
-    if reference is not None:
-        entry |= {"reference": _numbers(reference), "reference_label": reference_label}
-    return entry
-
-
-def _numbers(values: Array) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in np.asarray(values)]

@@ -18,7 +18,7 @@ from dembark.validation.case.parameters import pick
 from dembark.validation.checks.quantity import Quantity
 
 if TYPE_CHECKING:
-    from dembark.validation.checks.run import Replica
+    from dembark.postproc.replica import Replica
 
 # Keys of [picture] that are expressions in parameters and derived numbers.
 _NUMBERS = ("scale", "radius", "drum_radius", "drum_speed", "speed")

@@ -257,12 +257,3 @@ def test_touches_are_read_and_foreign_files_refused(tmp_path):
     (tmp_path / "contacts.dump").write_text(head + "a b c\n1 2 3\n")
     with pytest.raises(DumpError, match="3 columns instead of 13"):
         read_touches(tmp_path / "contacts.dump")
-
-
-def test_bodies_are_counted_from_one_in_either_engine(tmp_path):
-    (tmp_path / "impacts.txt").write_text("# a\n0 3 0 0 0 0 0 0 0 0 0\n1 -2 0 0 0 0 0 0 0 0 0\n")
-    assert Replica(tmp_path, {"engine": "yade"}).impacts()[:, :2].tolist() == [[1, 4], [2, -2]]
-    assert Replica(tmp_path, {"engine": "liggghts"}).impacts()[:, :2].tolist() == [[0, 3], [1, -2]]
-    (tmp_path / "impacts.txt").write_text("# a\n0 3 0\n")
-    with pytest.raises(DumpError, match="11 numbers"):
-        Replica(tmp_path, {"engine": "yade"}).impacts()
