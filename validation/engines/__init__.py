@@ -11,12 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 
+from dembark.validation.case.parameters import pick
 from dembark.validation.engines.base import DeckNumber, Engine, EngineFacts, call, end_with_parent, mpi_launcher
 from dembark.validation.engines.liggghts import Liggghts
 from dembark.validation.engines.yade import Yade
-from dembark.validation.case.parameters import pick
 
-__all__ = ["ENGINES", "DeckNumber", "Engine", "EngineFacts", "call", "end_with_parent", "facts", "find", "mpi_launcher", "names", "registered", "titles"]
+__all__ = ["ENGINES", "DeckNumber", "Engine", "EngineFacts", "call", "end_with_parent", "facts", "find", "mpi_launcher", "names", "registered",
+           "titles"]
 
 ENGINES: tuple[type[Engine], ...] = (Liggghts, Yade)
 

@@ -6,7 +6,7 @@ import ast
 import io
 import re
 import tokenize
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pytest
@@ -14,7 +14,7 @@ from dembark.common.checkout import checkout
 from dembark.common.errors import DembarkError
 from dembark.validation import cases, doctor, engines
 from dembark.validation.cli import main
-from dembark.validation.engines import Engine, EngineFacts
+from dembark.validation.engines import DeckNumber, Engine, EngineFacts
 from dembark.validation.case.parameters import Value
 
 NAMED = re.compile("liggghts|yade|lammps", re.IGNORECASE)
@@ -29,6 +29,9 @@ engines = ["stub"]
 value = 10
 type = "int"
 doc = "number of grains"
+[derived]
+steps = "10 * grain_count"
+time_step = "1e-5"
 """
 
 
@@ -139,6 +142,10 @@ class Stub(Engine):
     def locate(cls) -> Path:
         return cls.program
 
+    @classmethod
+    def deck_text(cls, source: str, numbers: Mapping[str, DeckNumber], folders: Sequence[Path]) -> str:
+        return source + "".join(f"{name} {number.value}\n" for name, number in numbers.items())
+
     def command(self, deck: Path, values: Mapping[str, Value], ranks: int = 1, threads: int = 1) -> list[str]:
         self.facts.check_ranks(ranks)
         return [str(self.executable), str(deck)]
@@ -166,6 +173,7 @@ def stub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def test_a_new_engine_is_found_everywhere(stub: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     from dembark.validation.campaigns import rates
+    from dembark.validation.case import deck
     from dembark.validation.plan import series
     from dembark.validation.report import figures
 
@@ -181,6 +189,8 @@ def test_a_new_engine_is_found_everywhere(stub: Path, capsys: pytest.CaptureFixt
         assert expected in capsys.readouterr().err
     with pytest.raises(DembarkError, match=r"stub\.txt is missing"):
         series(cases.find("box"), "default", None, engines.find("stub"))
-    (stub / "stub.txt").touch()
+    (stub / "stub.txt").write_text("deck\n")
     (run,) = series(cases.find("box"), "default", None, engines.find("stub")).runs
     assert run.engine.version == "4.2" and run.engine.command(run.case.deck("stub"), {})[1] == str(stub / "stub.txt")
+    deck.write(run.case, "stub", run.values, stub.parent)
+    assert (stub.parent / "stub.txt").read_text().splitlines()[:2] == ["deck", "grain_count 10"]
