@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 from dembark.common.errors import DembarkError
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 # Multiplication by a prime modulo the number of sites is a permutation.
@@ -31,6 +32,12 @@ class Packing:
     def volume(self) -> float:
         """Volume of all bodies (m^3)."""
         return float(np.pi / 6.0 * (self.diameters**3).sum())
+
+    def joined(self, places: Array, diameter: float, density: float, kind: int) -> Packing:
+        """With bodies of one `diameter` (m), `density` (kg/m^3) and type `kind` at `places` (n, 3) in m after those of this packing."""
+        more = {"diameters": diameter, "densities": density, "types": kind}
+        return replace(self, positions=np.vstack([self.positions, places]),
+                       **{name: np.append(getattr(self, name), np.full(len(places), value)) for name, value in more.items()})
 
     def text(self) -> str:
         """A LAMMPS data file of atom style granular, with all digits: id type diameter density x y z; id vx vy vz wx wy wz."""
@@ -69,31 +76,46 @@ def cylinder(radius: float, spacing: float, low: float, layers: int) -> Array:
     return np.vstack([np.column_stack((plane, np.full(len(plane), low + spacing * k))) for k in range(layers)])
 
 
-def grains(sites: Array, count: int, diameter: float, spread: float, density: float, seed: int, jitter: float, box: Array) -> Packing:
-    """`count` grains on some of the `sites` (n, 3), chosen by `seed`, each shifted by up to `jitter` (m) along each axis.
+def largest(p: SimpleNamespace) -> float:
+    """Diameter (m) of the largest grain."""
+    return float(p.grain_diameter * (1.0 + p.grain_diameter_spread))
 
-    Diameters are uniform in diameter (1 -+ spread). Grains do not touch when sites are further than diameter (1 + spread) + 2 jitter apart.
+
+def grains(p: SimpleNamespace, sites: Array, box: object, count: int | None = None) -> Packing:
+    """`count` (else p.grain_count) grains on some of the `sites` (n, 3), chosen by the seed, each shifted by up to 0.05 d_max along each axis.
+
+    Diameters are uniform within the spread about the mean. Grains do not touch when sites are 1.15 d_max apart.
     DembarkError when there are fewer sites than grains.
     """
-    total = len(sites)
+    total, count = len(sites), p.grain_count if count is None else count
     if count > total:
         raise DembarkError(f"{count} grains have no room", f"the dilute column has {total} sites", "take fewer grains or a larger vessel")
     numbers = np.arange(1, total + 1)
-    kept = numbers[((numbers + seed) * _PRIME) % total < count]
-    place = sites[kept - 1] + jitter * np.column_stack([2.0 * uniform(kept, seed, use) - 1.0 for use in (2, 3, 4)])
-    sizes = diameter * (1.0 + spread * (2.0 * uniform(kept, seed, 1) - 1.0))
-    return Packing(np.asarray(box, float), place, sizes, np.full(count, density), np.ones(count, np.int64))
+    kept = numbers[((numbers + p.seed) * _PRIME) % total < count]
+    shift = np.column_stack([2.0 * uniform(kept, p.seed, use) - 1.0 for use in (2, 3, 4)])
+    sizes = p.grain_diameter * (1.0 + p.grain_diameter_spread * (2.0 * uniform(kept, p.seed, 1) - 1.0))
+    return Packing(np.asarray(box, float), sites[kept - 1] + 0.05 * largest(p) * shift, sizes, np.full(count, p.grain_density),
+                   np.ones(count, np.int64))
 
 
-def slab(width: float, depth: float, count: int, d_max: float, margin: float, foot: float = 0.0) -> tuple[Array, float]:
+def bodies(box: ArrayLike, positions: ArrayLike, radii: ArrayLike, masses: ArrayLike, types: ArrayLike | None = None, type_count: int = 1,
+           velocities: ArrayLike | None = None, spins: ArrayLike | None = None) -> Packing:
+    """Bodies of given `masses` (n,) in kg, which need not be spheres: engines read the density of a sphere of that mass. See Packing."""
+    size, mass = np.broadcast_arrays(np.asarray(radii, float), np.asarray(masses, float))
+    motion = [None if given is None else np.asarray(given, float) for given in (velocities, spins)]
+    kinds = np.ones(len(size), np.int64) if types is None else np.asarray(types, np.int64)
+    return Packing(np.asarray(box, float), np.asarray(positions, float), 2.0 * size, mass / (4.0 / 3.0 * np.pi * size**3), kinds, *motion, type_count)
+
+
+def slab(p: SimpleNamespace, width: float, depth: float, margin: float, foot: float, count: int | None = None) -> tuple[Array, float]:
     """Sites (n, 3) in m of a dilute column in a slab and its height (m): 0 < x < `width` less `margin` at each wall, period `depth` along y.
 
-    Cells are at least 1.15 d_max wide, 1.3 times more than `count`, from z = `foot` on. With a shift of up to 0.05 d_max no two grains
+    Cells are at least 1.15 d_max wide, 1.3 times more than grains, from z = `foot` on. With a shift of up to 0.05 d_max no two grains
     touch, nor does one a wall that is 0.15 d_max or more away from the cells: no engine starts with a candidate contact at a wall.
     """
-    least = 1.15 * d_max
+    least = 1.15 * largest(p)
     n_x, n_y = int((width - 2.0 * margin) / least), int(depth / least)
-    layers = int(np.ceil(1.3 * count / (n_x * n_y)))
+    layers = int(np.ceil(1.3 * (p.grain_count if count is None else count) / (n_x * n_y)))
     cell = ((width - 2.0 * margin) / n_x, depth / n_y, least)
     return lattice((n_x, n_y, layers), cell, (margin, 0.0, foot)), layers * least
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 
 import numpy as np
-from dembark.input_decks.common.packing import Packing
+from dembark.input_decks.common.packing import Packing, largest
 from numpy.typing import NDArray
 
 Number = float | int | str
@@ -20,7 +20,7 @@ class Setup:
     """What a deck needs beside the parameters of its case.
 
     `steps` of `time_step` (s); `packing`: the bodies at the start; `numbers`: derived values by name, which the decks of all engines use;
-    `meshes`: triangles (n, 3, 3) in m by name, each written as <name>.stl.
+    `meshes`: triangles (n, 3, 3) in m by name, each written as <name>.stl; `tables`: rows of numbers by name, for decks alone.
     """
 
     steps: int
@@ -28,6 +28,7 @@ class Setup:
     packing: Packing | None = None
     numbers: Mapping[str, Number] = field(default_factory=dict)
     meshes: Mapping[str, Array] = field(default_factory=dict)
+    tables: Mapping[str, tuple[Number, ...]] = field(default_factory=dict)
 
 
 def rayleigh_time(p: SimpleNamespace) -> float:
@@ -48,6 +49,12 @@ def window(start: int, stride: int, frames: int, rows: int = 1000) -> dict[str, 
     return {"first": start + stride, "stride": stride, "steps": steps, "every": max(1, steps // rows)}
 
 
+def strides(duration: float, time_step: float, count: int) -> dict[str, Number]:
+    """Output steps: `count` equal strides that cover `duration` (s), or a little more, in steps of `time_step` (s)."""
+    stride = math.ceil(duration / time_step / count)
+    return {"stride": stride, "steps": stride * count}
+
+
 def friction(p: SimpleNamespace) -> dict[str, Number]:
     """Static and kinetic coefficients of grains and walls; `static_friction` and `kinetic_friction` replace all where they are set."""
     grain, wall = (p.grain_friction, p.wall_friction) if p.static_friction is None else (p.static_friction, p.static_friction)
@@ -62,5 +69,17 @@ def liquid(p: SimpleNamespace) -> dict[str, Number]:
     little later at a wall. A wall asks for half of a grain's liquid; foreseen is that the largest grain owns twice as much as at the start.
     """
     content = getattr(p, "liquid_content", 0.0)
-    largest = content * math.pi / 6.0 * (p.grain_diameter * (1.0 + p.grain_diameter_spread)) ** 3 if content > 0.0 else p.bridge_volume
-    return {"wet": int(largest > 0.0), "carried": int(content > 0.0), "reach": 1.3 * (1.0 + 0.5 * p.contact_angle) * largest ** (1.0 / 3.0)}
+    volume = content * math.pi / 6.0 * largest(p) ** 3 if content > 0.0 else p.bridge_volume
+    return {"wet": int(volume > 0.0), "carried": int(content > 0.0), "reach": 1.3 * (1.0 + 0.5 * p.contact_angle) * volume ** (1.0 / 3.0)}
+
+
+def contacts(p: SimpleNamespace, skin: float = 0.1) -> dict[str, Number]:
+    """What the contacts of a deck need: friction, liquid, and the neighbour search's skin: `skin` mean diameters beyond all bridges."""
+    wet = liquid(p)
+    return {**friction(p), **wet, "skin": skin * p.grain_diameter + wet["reach"]}
+
+
+def rectangle(corner: Sequence[float], first: Sequence[float], second: Sequence[float]) -> Array:
+    """Two triangles (2, 3, 3) in m of the parallelogram from `corner` along the sides `first` and `second`; their normal is first x second."""
+    a, u, v = (np.asarray(x, float) for x in (corner, first, second))
+    return np.array([[a, a + u, a + u + v], [a, a + u + v, a + v]])

@@ -124,6 +124,7 @@ def _files(case: Case, engine: str, values: Mapping[str, Value], setup: Setup) -
         raise DembarkError(f"{source} cannot be read", error.strerror or str(error), f"add the deck, or take {engine} from engines in case.toml") from None
     known: dict[str, Value] = {**values, **setup.numbers, "steps": setup.steps, "time_step": setup.time_step}
     numbers = {name: engines.DeckNumber(_plain(value), _meaning(case, name)) for name, value in known.items() if name != "replicas"}
+    numbers |= {name: engines.DeckNumber(tuple(map(_plain, row))) for name, row in setup.tables.items()}
     try:
         deck = kind.deck_text(text, numbers, [source.parent, package_root() / "common" / engine])
     except jinja2.TemplateError as error:

@@ -77,9 +77,9 @@ class EngineFacts:
 
 @dataclass(frozen=True)
 class DeckNumber:
-    """A number or word of a deck (None: not set) and what it is, in words; derived ones have none."""
+    """A number or word of a deck (None: not set), or a table of them, and what it is, in words; derived ones have none."""
 
-    value: Value
+    value: Value | tuple[Value, ...]
     meaning: str = ""
 
 

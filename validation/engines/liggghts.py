@@ -80,13 +80,14 @@ class Liggghts(Engine):
         environment = jinja2.Environment(loader=jinja2.FileSystemLoader([str(folder) for folder in folders]), undefined=jinja2.StrictUndefined,
                                          variable_start_string="<<", variable_end_string=">>", trim_blocks=True, lstrip_blocks=True,
                                          keep_trailing_newline=True, autoescape=False)
-        given = {name: number for name, number in numbers.items() if number.value is not None}
+        # Tables are for the template; a variable holds one number.
+        given = texts({name: number.value for name, number in numbers.items() if not isinstance(number.value, tuple)})
         width = max((len(name) for name in given), default=0)
-        lines = [f"variable {name:{width}} index {texts({name: number.value})[name]}" + (f" # {number.meaning}" if number.meaning else "")
-                 for name, number in given.items()]
+        lines = [f"variable {name:{width}} index {text}" + (f" # {numbers[name].meaning}" if numbers[name].meaning else "")
+                 for name, text in given.items()]
         body = environment.from_string(source).render({name: number.value for name, number in numbers.items()})
         # The opening comment of the source stays on top.
-        top = re.match(r"(?:#.*\n)*", body)
+        top = re.match(r"(?:#.*\n)*", source)
         head = top.group() if top else ""
         return head + "\n".join([f"# {DECK_NOTE}", *lines]) + "\n\n" + body[len(head):].lstrip("\n")
 

@@ -3,15 +3,17 @@
 The files have the schema of the LIGGGHTS decks. Standard library only; SI units.
 """
 
-from yade.dembark.logs import LogWriter, drum, log
+from yade.dembark.frames import FrameWriter
+from yade.dembark.logs import LogWriter, drum, log, log_loop, logs
 from yade.dembark.report import announce, fail, finish
 from yade.dembark.scene import (
-    Recorder, contact_loop, engine_loop, grains, materials, packing, pairs, parameters, plane, spanning,
+    Recorder, box, contact_loop, engine_loop, grains, materials, packing, pairs, parameters, periodic, plane,
 )
-from yade.dembark.states import options, run
+from yade.dembark.states import options, run, table
 from yade.dembark.writers import DumpWriter, EnergyWriter, HistoryWriter, energies
 
 __all__ = [
-    "DumpWriter", "EnergyWriter", "HistoryWriter", "LogWriter", "Recorder", "announce", "contact_loop", "drum", "energies", "engine_loop",
-    "fail", "finish", "grains", "log", "materials", "options", "packing", "pairs", "parameters", "plane", "run", "spanning",
+    "DumpWriter", "EnergyWriter", "FrameWriter", "HistoryWriter", "LogWriter", "Recorder", "announce", "box", "contact_loop", "drum",
+    "energies", "engine_loop", "fail", "finish", "grains", "log", "log_loop", "logs", "materials", "options", "packing", "pairs",
+    "parameters", "periodic", "plane", "run", "table",
 ]
