@@ -75,15 +75,15 @@ def declared(case: Case, name: str) -> tuple[Declared, str]:
 
 
 def _joined(one: Declared, part: str, name: str, value: Value) -> Quantity:
-    if one.tolerance == "bound" and value.bound is None:
+    if one.tolerance == "bound" and value.bound is None and value.reference is not None and not value.reason:
         raise DembarkError(f"quantity {name} is declared with tolerance = \"bound\"", "", "give bound=... in its Value")
     if value.bound is not None and one.tolerance != "bound":
         raise DembarkError(f"quantity {name} has a bound", "its tolerance is not the word \"bound\"", "take the bound away or declare it")
-    tolerance = value.bound if one.tolerance == "bound" else one.tolerance
+    tolerance = None if value.reference is None else value.bound if one.tolerance == "bound" else one.tolerance
     return Quantity(
         name=name, label=one.label.replace("*", part), unit=one.unit, estimate=value.estimate, reference=value.reference,
         tolerance=None if tolerance is None else float(tolerance), absolute=one.absolute, deviation_half=value.half, source=one.source,
-        detail=value.detail or one.detail or one.why, reason=value.reason, verdict=value.verdict, compared=one.compared,
+        detail=value.detail or one.detail or one.why, reason=value.reason, verdict=value.verdict, compared=one.compared and value.compared,
         agreement=None if one.agreement is None else one.agreement * value.scale)
 
 
@@ -103,3 +103,8 @@ def references(case: Case) -> list[dict[str, str]]:
     """The publications that the case names."""
     known = _citations()
     return [known[pick(name, known, "reference", f"[case] of {case.folder / 'case.toml'}")] for name in case.references]
+
+
+def statements(case: Case) -> list[str]:
+    """What the publications of the case are cited for, a sentence each."""
+    return [f"{one['short']}: {one['statement']}" for one in references(case) if one["statement"]]
