@@ -17,7 +17,8 @@ _PRIME = 15485863
 @dataclass(frozen=True)
 class Packing:
     """Bodies at the time zero: `box` (3, 2) in m, `positions` (n, 3) in m, `diameters` (n,) in m, `densities` (n,) in kg/m^3, `types` (n,)
-    counted from 1; `velocities` (n, 3) in m/s and `spins` (n, 3) in rad/s where they are not zero; `type_count` where more types are needed."""
+    counted from 1; `velocities` (n, 3) in m/s and `spins` (n, 3) in rad/s where they are not zero; `type_count` if more
+    types are needed."""
 
     box: Array
     positions: Array
@@ -45,7 +46,8 @@ class Packing:
         lines += [f"{low:.17g} {high:.17g} {axis}lo {axis}hi" for axis, (low, high) in zip("xyz", self.box, strict=True)]
         lines += ["", "Atoms", ""]
         rows = np.column_stack((self.diameters, self.densities, self.positions))
-        lines += [f"{number} {kind} " + " ".join(f"{x:.17g}" for x in row) for number, (kind, row) in enumerate(zip(self.types, rows, strict=True), 1)]
+        bodies = enumerate(zip(self.types, rows, strict=True), 1)
+        lines += [f"{number} {kind} " + " ".join(f"{x:.17g}" for x in row) for number, (kind, row) in bodies]
         if self.velocities is not None or self.spins is not None:
             zero = np.zeros_like(self.positions)
             motion = np.column_stack((zero if self.velocities is None else self.velocities, zero if self.spins is None else self.spins))
@@ -66,7 +68,7 @@ def lattice(counts: tuple[int, int, int], cell: tuple[float, float, float], orig
 
 
 def cylinder(radius: float, spacing: float, low: float, layers: int) -> Array:
-    """Points (n, 3) in m of a cubic lattice of `spacing` (m) within `radius` (m) of the z axis, in `layers` layers from z = `low` (m) on."""
+    """Points (n, 3) in m of a cubic lattice of `spacing` (m) within `radius` (m) of the z axis, in `layers` from z = `low` (m) on."""
     reach = int(np.ceil(radius / spacing))
     side = spacing * np.arange(-reach, reach + 1)
     y, x = np.meshgrid(side, side, indexing="ij")
@@ -82,7 +84,7 @@ def largest(p: SimpleNamespace) -> float:
 
 
 def grains(p: SimpleNamespace, sites: Array, box: object, count: int | None = None) -> Packing:
-    """`count` (else p.grain_count) grains on some of the `sites` (n, 3), chosen by the seed, each shifted by up to 0.05 d_max along each axis.
+    """`count` (else p.grain_count) grains on some of the `sites` (n, 3), chosen by the seed, each shifted by up to 0.05 d_max an axis.
 
     Diameters are uniform within the spread about the mean. Grains do not touch when sites are 1.15 d_max apart.
     DembarkError when there are fewer sites than grains.
@@ -104,11 +106,12 @@ def bodies(box: ArrayLike, positions: ArrayLike, radii: ArrayLike, masses: Array
     size, mass = np.broadcast_arrays(np.asarray(radii, float), np.asarray(masses, float))
     motion = [None if given is None else np.asarray(given, float) for given in (velocities, spins)]
     kinds = np.ones(len(size), np.int64) if types is None else np.asarray(types, np.int64)
-    return Packing(np.asarray(box, float), np.asarray(positions, float), 2.0 * size, mass / (4.0 / 3.0 * np.pi * size**3), kinds, *motion, type_count)
+    density = mass / (4.0 / 3.0 * np.pi * size**3)
+    return Packing(np.asarray(box, float), np.asarray(positions, float), 2.0 * size, density, kinds, *motion, type_count)
 
 
 def slab(p: SimpleNamespace, width: float, depth: float, margin: float, foot: float, count: int | None = None) -> tuple[Array, float]:
-    """Sites (n, 3) in m of a dilute column in a slab and its height (m): 0 < x < `width` less `margin` at each wall, period `depth` along y.
+    """Sites (n, 3) in m of a dilute column in a slab and its height (m): 0 < x < `width` less `margin` at both walls, period `depth` in y.
 
     Cells are at least 1.15 d_max wide, 1.3 times more than grains, from z = `foot` on. With a shift of up to 0.05 d_max no two grains
     touch, nor does one a wall that is 0.15 d_max or more away from the cells: no engine starts with a candidate contact at a wall.

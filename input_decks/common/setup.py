@@ -80,6 +80,6 @@ def contacts(p: SimpleNamespace, skin: float = 0.1) -> dict[str, Number]:
 
 
 def rectangle(corner: Sequence[float], first: Sequence[float], second: Sequence[float]) -> Array:
-    """Two triangles (2, 3, 3) in m of the parallelogram from `corner` along the sides `first` and `second`; their normal is first x second."""
+    """Two triangles (2, 3, 3) in m of the parallelogram at `corner` with the sides `first` and `second`; their normal is first x second."""
     a, u, v = (np.asarray(x, float) for x in (corner, first, second))
     return np.array([[a, a + u, a + u + v], [a, a + u + v, a + v]])

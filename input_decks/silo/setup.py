@@ -6,7 +6,7 @@ import math
 from types import SimpleNamespace
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Setup, friction, liquid, time_step, window
+from dembark.input_decks.common.setup import Setup, contacts, time_step, window
 
 
 def setup(p: SimpleNamespace) -> Setup:
@@ -17,13 +17,10 @@ def setup(p: SimpleNamespace) -> Setup:
     """
     step = time_step(p)
     steps = window(math.ceil(p.settle_time / step), math.ceil(p.measure_time / step / p.frames), p.frames)
-    d_max = p.grain_diameter * (1.0 + p.grain_diameter_spread)
-    spacing, jitter = 1.15 * d_max, 0.05 * d_max
-    inside = p.cylinder_radius - 0.65 * d_max - jitter
+    d_max = packing.largest(p)
+    spacing, low, half = 1.15 * d_max, 0.7 * d_max, p.cylinder_radius + d_max
+    inside = p.cylinder_radius - low
     layers = math.ceil(1.3 * p.grain_count * spacing**2 / (math.pi * inside**2)) + 2
-    low, half = 0.65 * d_max + jitter, p.cylinder_radius + d_max
     box = [(-half, half), (-half, half), (-d_max, low + layers * spacing + 4.0 * d_max)]
-    grains = packing.grains(packing.cylinder(inside, spacing, spacing, layers), p.grain_count, p.grain_diameter, p.grain_diameter_spread,
-                            p.grain_density, p.seed, jitter, box)
-    wet = liquid(p)
-    return Setup(steps["steps"], step, grains, {**steps, **friction(p), **wet, "skin": 0.1 * p.grain_diameter + wet["reach"]})
+    grains = packing.grains(p, packing.cylinder(inside, spacing, spacing, layers), box)
+    return Setup(steps["steps"], step, grains, {**steps, **contacts(p)})

@@ -66,18 +66,27 @@ def grains(material, gravity=(0, 0, 0), mask=1, held=None, path="packing.data"):
     return ids
 
 
-def plane(axis, position, side, material, thickness, mask=1, along=None):
-    """A plane wall across `axis` (0 ... 2) at `position` (m) for periodic scenes, grains on its `side` (+1 or -1): a fixed box; its id.
+def periodic(axes, room):
+    """Make the scene periodic along `axes` (0 ... 2), with the box of the packing as its cell.
 
-    `Wall` is unbounded, which a periodic collider cannot sort; a box of `thickness` (m) that reaches far beyond the cell does the same.
-    `along`: half its length (m) along x, see `spanning`.
+    YADE is periodic in all three directions; along the others the cell is larger by `room` (m) for the walls: nothing closes on itself.
     """
-    extents = [1e6 * thickness] * 3
-    if along is not None:
-        extents[0] = along
-    extents[axis] = thickness
+    O.periodic = True
+    O.cell.setBox(*(high - low + (0.0 if axis in axes else room) for axis, (low, high) in enumerate(box())))
+
+
+def plane(axis, position, side, material, diameter, mask=1):
+    """A plane wall across `axis` (0 ... 2) at `position` (m) in periodic scenes, grains of mean `diameter` (m) on its `side` (+-1); its id.
+
+    `Wall` is unbounded, which a periodic collider cannot sort; a fixed box that reaches far beyond the cell, and all that grains travel,
+    does the same. After a restart YADE's collider looks for pairs along x, from a body's lower end to its upper one, within one period.
+    So the ends of the box must almost meet there, with a gap that no grain fits into; or a grain just above it would never be found.
+    """
+    extents = [1e6 * diameter] * 3
+    extents[0] = 0.5 * (2001 * O.cell.size[0] - 0.5 * diameter)
+    extents[axis] = diameter
     centre = [0.0] * 3
-    centre[axis] = position - side * thickness
+    centre[axis] = position - side * diameter
     return O.bodies.append(utils.box(centre, extents, fixed=True, material=material, mask=mask))
 
 
@@ -126,25 +135,21 @@ def engine_loop(p, loop, bounds, verlet, gravity, liquid=None, account=None, per
 
 
 class Recorder:
-    """Writes what is due at a step: a row of time.csv every p.every steps from step 1 on, a frame of the dumps every p.stride from p.first on."""
+    """Writes what is due at a step: a row of time.csv every p.every steps, a frame of the dumps every p.stride from p.first on.
 
-    def __init__(self, p, walls, bounds=None, boundary="ff ff ff", gravity=(0, 0, 0), glued=None, liquid=None, quiet=False):
-        self.p = p
+    `history`: writer of time.csv other than HistoryWriter; `report`: steps between two lines of progress, by default each row.
+    """
+
+    def __init__(self, p, walls, bounds=None, boundary="ff ff ff", gravity=(0, 0, 0), glued=None, liquid=None, history=None, report=None):
+        self.p, self.report = p, report
         self.dump = DumpWriter(walls=walls, bounds=bounds or box(), boundary=boundary, gravity=gravity)
-        self.history = HistoryWriter(walls=walls, glued=glued, gravity=gravity, path="time.csv", liquid=liquid, progress=not quiet)
+        self.history = history or HistoryWriter(walls=walls, glued=glued, gravity=gravity, liquid=liquid, progress=report is None)
 
     def __call__(self):
         """Once in every step."""
         if O.iter > 0 and O.iter % self.p.every == 0:
             self.history.write()
+        if self.report and O.iter > 0 and O.iter % self.report == 0:
+            print(O.iter, f"{O.time:.6g}", flush=True)
         if O.iter >= self.p.first and (O.iter - self.p.first) % self.p.stride == 0:
             self.dump.write()
-
-
-def spanning(diameter):
-    """Half the length (m) along x, in a periodic cell, of a box that is to be a plane, larger than the period; `diameter`: mean one of the grains.
-
-    After a restart YADE's collider looks for pairs along x, from a body's lower end to its upper one, within one period. So the ends of the
-    box must almost meet there, with a gap that no grain fits into; or a grain just above it would never be found.
-    """
-    return 0.5 * (2001 * O.cell.size[0] - 0.5 * diameter)

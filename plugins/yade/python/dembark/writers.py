@@ -66,7 +66,8 @@ class DumpWriter:
     def _frame(self, path, kind, rows, count, columns):
         box = "".join(f"{low:.10g} {high:.10g}\n" for low, high in self.bounds)
         with open(path, "a", encoding="ascii") as file:
-            file.write(f"ITEM: TIMESTEP\n{O.iter}\nITEM: NUMBER OF {kind}\n{count}\nITEM: BOX BOUNDS {self.boundary}\n{box}ITEM: {kind} {columns}\n")
+            file.write(f"ITEM: TIMESTEP\n{O.iter}\nITEM: NUMBER OF {kind}\n{count}\nITEM: BOX BOUNDS {self.boundary}\n{box}")
+            file.write(f"ITEM: {kind} {columns}\n")
             file.write(rows)
 
     def write(self):
@@ -79,7 +80,8 @@ class DumpWriter:
             for axis, word in enumerate(words):
                 length = self.bounds[axis][1] - self.bounds[axis][0]
                 if word == "pp" and abs(length - O.cell.size[axis]) > 1e-9 * length:
-                    fail(f"DumpWriter: bounds of axis {'xyz'[axis]} are {length:g} m apart, the period is {O.cell.size[axis]:g} m; they must be equal")
+                    fail(f"DumpWriter: bounds of axis {'xyz'[axis]} are {length:g} m apart, the period is {O.cell.size[axis]:g} m; "
+                         "they must be equal")
         walls = "".join(f" f_force_{name}[{i}]" for name in self._snapshot.names for i in (1, 2, 3))
         columns = "id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass" + walls
         rows = shot.grainRows()
@@ -128,13 +130,20 @@ def energies():
 
 
 class EnergyWriter:
-    """Appends lines to energies.csv: step, time and all energies (J) of the EnergyAccount that the scene has or will have, at the end of
-    the step before; with all their digits. It may run anywhere among the engines, and between runs."""
+    """Appends lines to energies.csv: step, time and energies (J) of the EnergyAccount that the scene has or will have, at the end of
+    the step before; with all their digits. It may run anywhere among the engines, and between runs.
 
-    def __init__(self, path="energies.csv"):
-        self._file = table(path, ",".join(["step", "time", *EnergyAccount().keys()]))
+    names : column -> name of its energy, by default all energies
+    more : names of further columns, whose values `more_values()` returns
+    """
+
+    def __init__(self, path="energies.csv", names=None, more=(), more_values=tuple):
+        self._names, self._more_values = names or {name: name for name in EnergyAccount().keys()}, more_values
+        self._file = table(path, ",".join(["step", "time", *self._names, *more]))
 
     def write(self):
         """Append the present state."""
-        self._file.write(",".join([str(O.iter), f"{O.time:.9g}", *(f"{energy:.17g}" for energy in energies().values())]) + "\n")
+        known = energies()
+        numbers = (O.time, *(known[name] for name in self._names.values()), *self._more_values())
+        self._file.write(",".join([str(O.iter), *(f"{x:.17g}" for x in numbers)]) + "\n")
         self._file.flush()
