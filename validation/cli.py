@@ -14,13 +14,15 @@ from rich.console import Console
 from dembark.common.errors import DembarkError, RunError
 from dembark.validation import engines
 from dembark.validation.campaigns import cli as campaigns
+from dembark.validation.case import cli as cases
+from dembark.validation.case import folders
 
 if TYPE_CHECKING:
     from dembark.validation.workflow import Outcome
 
 _ABOUT = f"""Granular contact laws and their validation, in {engines.titles("and")}.
 
-Your own cases: set DEMBARK_DECKS to the folder that holds their folders; it counts instead of the shipped input_decks."""
+Your own cases: 'dembark new-case NAME' writes one, '--cases FOLDER' (before the command) or DEMBARK_CASES finds them beside those that ship."""
 
 app = typer.Typer(name="dembark", help=_ABOUT,
                   pretty_exceptions_enable=False, rich_markup_mode=None, context_settings={"help_option_names": ["-h", "--help"]})
@@ -52,33 +54,19 @@ def _show_version(wanted: bool) -> None:
 
 
 @app.callback()
-def _common(version: Annotated[bool, typer.Option("--version", is_eager=True, callback=_show_version,
-                                                  help="Show the version, and the commit of a checkout.")] = False) -> None:
+def _common(
+    version: Annotated[bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Show the version, and the commit of a checkout.")] = False,
+    own: Annotated[list[Path] | None, typer.Option("--cases", metavar="FOLDER", help="Folder of your own cases; repeat for more.")] = None,
+) -> None:
     """Options that need no command."""
+    for folder in own or ():
+        folders.add_own_root(folder)
 
 
 def _strictly(failed: int, strict: bool) -> None:
     """RunError when checks failed and that is to count."""
     if failed and strict:
         raise RunError(f"{failed} checks failed" if failed > 1 else "1 check failed", "--strict makes this an error")
-
-
-@app.command("cases")
-def show_cases(case: Annotated[str | None, typer.Argument(help="Show the keys, profiles and variants of this case.")] = None) -> None:
-    """List the cases, or everything about one."""
-    from dembark.validation import show
-    from dembark.validation.cases import discover, find
-
-    console = _console()
-    if case is None:
-        console.print(show.case_table(discover().values()))
-        return
-    one = find(case)
-    console.print(f"{one.name}: {one.title}\n{one.description}", markup=False)
-    console.print(show.key_table(one))
-    console.print(show.overrides_table(one))
-    for source in one.source:
-        console.print(f"source: {source}", markup=False)
 
 
 @app.command()
@@ -97,10 +85,11 @@ def run(
     strict: Strict = False,
 ) -> None:
     """Run a case in one engine, measure it and show each quantity beside its reference."""
-    from dembark.validation import checks, restarts, show
+    from dembark.validation import restarts, show
     from dembark.validation.cases import find
     from dembark.validation.execute import execute
     from dembark.validation.jobs import cancelled_by_signal
+    from dembark.validation.judge import measuring
     from dembark.validation.case.parameters import pick
     from dembark.validation.plan import series
     from dembark.validation.case.resolve import resolve, settings
@@ -116,7 +105,7 @@ def run(
     resolve(one, profile, chosen, changes)
     if out is None and changes:
         raise DembarkError("--out is missing", "with --set the run is not the one of the profile", "name a folder for its results")
-    checks.find(one.name, one.folder)
+    measuring.check(one)
     planned = series(one, chosen, profile, engines.find(engine), changes)
     if restart_interval is not None and not restarts.supported(planned.runs[0]):
         raise DembarkError(f"--restart-interval {restart_interval}", f"{one.deck(engine)} writes no states to go on from",
@@ -200,6 +189,7 @@ def make_report(
     _console().print(f"{folder / 'report.html'}\n{folder / 'report.pdf'}", markup=False, soft_wrap=True)
 
 
+cases.register(app)
 campaigns.register(app)
 
 

@@ -50,11 +50,8 @@ def measure(run_folder: Path) -> dict[str, Any]:
     except DumpError as error:
         raise RunError(f"{run_folder} could not be measured", str(error)) from None
     if fields is not None:
-        # Labelled arrays take a second to import, which commands that measure nothing need not wait for.
-        from dembark.validation.checks import fields_result
-
         quantities, remarks = [*quantities, *fields.quantities], [*remarks, *fields.remarks]
-        fields_result.write(run_folder, fields.dataset)
+        _write_fields(run_folder, fields.dataset)
     content = {
         "case": first["case"],
         "variant": first["variant"],
@@ -72,14 +69,19 @@ def measure(run_folder: Path) -> dict[str, Any]:
     return content
 
 
+def _write_fields(run_folder: Path, fields: Any) -> None:
+    # Labelled arrays take a second to import, which commands that measure nothing need not wait for.
+    from dembark.postproc.output import labelled
+
+    labelled.write(run_folder / "fields.nc", fields)
+
+
 def _declared(run_folder: Path, case: Case, runs: list[Replica]) -> dict[str, Any]:
     """Measure by the measure.py of the case, and judge by what its case.toml declares."""
     first = runs[0].record
     found = measuring.measure(case, runs)
     if found.fields is not None:
-        from dembark.validation.checks import fields_result
-
-        fields_result.write(run_folder, found.fields)
+        _write_fields(run_folder, found.fields)
     known = {**first["parameters"], **first.get("derived", {})}
     content = {
         "case": first["case"],
@@ -89,7 +91,7 @@ def _declared(run_folder: Path, case: Case, runs: list[Replica]) -> dict[str, An
         "parameters": {key: value for key, value in first["parameters"].items() if key != "seed"},
         "quantities": [quantity.as_json() for quantity in measuring.quantities(case, found)],
         "profiles": list(found.profiles),
-        "remarks": list(found.remarks),
+        "remarks": [*found.remarks, *measuring.statements(case)],
         "picture": measuring.picture(case, known),
         "references": measuring.references(case),
         "provenance": _provenance(runs),
@@ -113,7 +115,7 @@ def study(planned: Study, folders: Sequence[Path]) -> dict[str, Any]:
     case = _case(first["case"])
     if case and (case.folder / "measure.py").is_file():
         found = measuring.study(case, planned, points)
-        quantities, profiles, remarks = measuring.quantities(case, found), list(found.profiles), list(found.remarks)
+        quantities, profiles, remarks = measuring.quantities(case, found), list(found.profiles), [*found.remarks, *measuring.statements(case)]
         references = measuring.references(case)
     else:
         module = checks.find(first["case"], case.folder if case else None)

@@ -11,8 +11,8 @@ from typing import Any
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
-from dembark.validation import checks, engines
-from dembark.validation.case.deck import sources
+from dembark.validation import engines
+from dembark.validation.case.deck import require_measure, sources
 from dembark.validation.case.folders import discover
 from dembark.validation.case.model import Case, Study
 from dembark.validation.engines import Engine
@@ -119,7 +119,7 @@ def series(case: Case, variant: str, profile: str | None, engine: Engine, change
     pick(engine.name, case.engines, "engine", f"in case {case.name}")
     if not case.deck(engine.name).is_file():
         raise DembarkError(f"{case.deck(engine.name)} is missing", "", f"remove {engine.name} from engines in case.toml or add the deck")
-    checks.require(case.name, case.folder)
+    require_measure(case)
     values = portable(resolve(case, profile, variant, changes))
     count = values.get("replicas")
     numbers = range(1, (count if isinstance(count, int) else 1) + 1)

@@ -82,6 +82,9 @@ def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
 def write(case: Case, engine: str, values: Mapping[str, Value], folder: Path) -> Setup:
     """Write everything that `engine` needs for a run with the parameters `values` into `folder`; returns what was derived."""
     setup = prepare(case, values)
+    for name, path in _companions(case).items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, folder / name)
     for name, content in _files(case, engine, values, setup).items():
         (folder / name).write_bytes(content)
     return setup
@@ -90,6 +93,12 @@ def write(case: Case, engine: str, values: Mapping[str, Value], folder: Path) ->
 @cache
 def _check_sum(path: Path, changed: int) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def require_measure(case: Case) -> None:
+    """DembarkError when `case` has no measure.py: its runs could not be measured. Nothing is imported."""
+    if not (case.folder / "measure.py").is_file():
+        raise DembarkError(f"case {case.name} has no measure.py", str(case.folder), "add one with measure(replicas), see docs/cases.md")
 
 
 def derived(case: Case, values: Mapping[str, Value]) -> dict[str, Value]:
@@ -101,10 +110,19 @@ def derived(case: Case, values: Mapping[str, Value]) -> dict[str, Value]:
 def sources(case: Case, engine: str) -> dict[str, str]:
     """What makes the deck of `engine` beside the parameters: checksums of the files by name, and the expressions of derived numbers."""
     shared = package_root() / "common"
-    files = {path.name: path for path in (case.deck(engine), case.folder / "setup.py") if path.is_file()}
+    files = {path.name: path for path in (case.deck(engine), case.folder / "setup.py") if path.is_file()} | _companions(case)
     files |= {f"common/{path.relative_to(shared)}": path for pattern in ("*.py", f"{engine}/*") for path in shared.glob(pattern)}
     found = {name: _check_sum(path, path.stat().st_mtime_ns) for name, path in sorted(files.items())}
     return found | {f"derived {name}": expression.text for name, expression in case.derived.items()}
+
+
+def _companions(case: Case) -> dict[str, Path]:
+    """Other files of the case folder that decks may read, by their names in it: meshes, tables, what they include."""
+    known = {"case.toml", "setup.py", "measure.py", *(engines.facts(name).deck for name in engines.names())}
+    relative = {path.relative_to(case.folder): path for path in case.folder.rglob("*") if path.is_file()}
+    return {str(name): path for name, path in sorted(relative.items())
+            if str(name) not in known and name.suffix not in (".md", ".pyc") and name.parts[0] not in ("tests", "campaigns", "reference")
+            and not any(part.startswith(".") for part in name.parts)}
 
 
 def archive(case: Case, folder: Path) -> None:

@@ -59,6 +59,8 @@ class EngineFacts:
     leftovers: tuple[str, ...] = ()
     # How the line begins that it writes when a signal makes it stop, if it writes one.
     stop_message: str | None = None
+    # How a deck is run in its folder.
+    by_hand: str = ""
     # MPI processes, threads, and whether it can be started by hand, as 'dembark <name>'.
     ranks: bool = False
     threads: bool = False

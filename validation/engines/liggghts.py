@@ -38,6 +38,7 @@ class Liggghts(Engine):
         variables=("DEMBARK_LIGGGHTS",),
         version_words=("-in", "/dev/null", "-log", "none"),
         version_pattern=r"\(Version (?:LIGGGHTS-PUBLIC )?([^\s,)]+)",
+        by_hand="liggghts-dembark -in liggghts.in",
         restart_suffix="restart",
         restart_words=("restart_every", '"run.in"'),
         # A restart file of its own, when it is told to stop.

@@ -22,6 +22,7 @@ class Yade(Engine):
         variables=("DEMBARK_YADE",),
         version_words=("--version",),
         version_pattern=r"[Yy]ade version:?\s*(\S+)",
+        by_hand="dembark yade -n -x yade.py",
         restart_suffix="yade.gz",
         restart_words=("dembark.run(",),
         impact_id_offset=1,

@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from dembark.common.errors import DembarkError, RunError
@@ -24,12 +25,6 @@ if TYPE_CHECKING:
 _NUMBERS = ("scale", "radius", "drum_radius", "drum_speed", "speed")
 
 
-def require(case: Case) -> None:
-    """DembarkError when `case` has no measure.py: its runs could not be measured. Nothing is imported."""
-    if not (case.folder / "measure.py").is_file():
-        raise DembarkError(f"case {case.name} has no measure.py", str(case.folder), "add one with measure(replicas), see docs/cases.md")
-
-
 def measure(case: Case, replicas: Sequence[Replica]) -> Measurement:
     """What measure(replicas) of the case returns; DembarkError or RunError in one line for whatever goes wrong in it."""
     return _call(case, "measure", lambda function: function(replicas))
@@ -40,17 +35,28 @@ def study(case: Case, planned: Study, points: Sequence[Mapping[str, Any]]) -> Me
     return _call(case, "study", lambda function: function(planned.name, points, planned.along))
 
 
-def _call(case: Case, name: str, call: Callable[[Callable[..., Any]], Any]) -> Measurement:
-    require(case)
+def check(case: Case) -> ModuleType:
+    """The measure.py of the case, loaded; DembarkError, with file and line, when it is missing or cannot be loaded."""
+    deck.require_measure(case)
     path = case.folder / "measure.py"
     module = deck.load_module(path, f"dembark_measure_{case.name}")
-    function = getattr(module, name, None)
-    if function is None:
-        raise DembarkError(f"{path} has no function {name}", "", "measure(replicas) and, for studies, study(name, points, along); see docs/cases.md")
+    for name in ("measure", *(["study"] if case.studies else [])):
+        if not callable(getattr(module, name, None)):
+            raise DembarkError(f"{path} has no function {name}", "", "it needs measure(replicas) and, with [studies], study(name, points, along)")
+    return module
+
+
+def _call(case: Case, name: str, call: Callable[[Callable[..., Any]], Any]) -> Measurement:
+    path, module = case.folder / "measure.py", check(case)
     try:
-        found = call(function)
+        found = call(getattr(module, name))
     except DumpError as error:
         raise RunError(f"a run of case {case.name} could not be measured", str(error)) from None
+    except Exception as error:
+        # The caller of `measure` knows the runs and says what of them is too small.
+        if name == "measure" or isinstance(error, DembarkError):
+            raise
+        raise deck.failed(path, error) from error
     if not isinstance(found, Measurement):
         raise DembarkError(f"{name} of {path} returned {type(found).__name__}", "", "return a Measurement, see docs/cases.md")
     return found

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from dembark.common.errors import Interrupted, RunError
 from dembark.common.files import read_json
-from dembark.validation import cases, engines, provenance
+from dembark.validation import engines, provenance
+from dembark.validation.case import folders
 from dembark.validation.cases import find
 from dembark.validation.engines.liggghts import Liggghts
 from dembark.validation.plan import Run, series
@@ -39,12 +40,11 @@ doc = "steps of 1e-5 s"
 value = 2
 type = "int"
 doc = "frames"
+[derived]
+time_step = "1e-5"
 """
 
 LIGGGHTS = """
-variable gravity index 9.81
-variable steps index 1000
-variable frames index 2
 variable stride equal ${steps}/${frames}
 atom_style granular
 units si
@@ -84,12 +84,11 @@ print "dembark: finished"
 """
 
 YADE = """
-import sys
-values = dict(gravity=9.81, steps=1000, frames=2)
-values.update((k, float(v)) for k, v in (word.split("=", 1) for word in sys.argv[1:]))
-steps, frames = int(values["steps"]), int(values["frames"])
+from types import SimpleNamespace
+p = dembark.parameters()
+steps, frames = p.steps, p.frames
 ids = [O.bodies.append(sphere((x, 0, 0), 0.05)) for x in (0, 0.5)]
-O.engines = [ForceResetter(), NewtonIntegrator(gravity=(0, 0, -values["gravity"]), damping=0)]
+O.engines = [ForceResetter(), NewtonIntegrator(gravity=(0, 0, -p.gravity), damping=0)]
 O.dt = 1e-5
 print(f"dembark: steps {steps} time_step {O.dt}")
 with open("time.csv", "w") as times, open("grains.dump", "w") as grains, open("contacts.dump", "w") as contacts:
@@ -114,9 +113,9 @@ def decks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     (folder / "case.toml").write_text(CASE)
     (folder / "liggghts.in").write_text(LIGGGHTS)
     (folder / "yade.py").write_text(YADE)
-    (folder / "checks.py").touch()
+    (folder / "measure.py").touch()
     monkeypatch.setenv("DEMBARK_DECKS", str(folder.parent))
-    cases.load.cache_clear()
+    folders.load.cache_clear()
     engines.find.cache_clear()
     yield
     engines.find.cache_clear()

@@ -58,8 +58,9 @@ def test_a_result_holds_the_deck_that_made_it(tmp_path: Path, decks: Path, stand
     deck, case = (decks / "box" / "liggghts.in").read_text(), (decks / "box" / "case.toml").read_text()
     folder, _ = run(tmp_path / "out")
     (decks / "box" / "liggghts.in").write_text("# another deck\n")
-    assert (folder / "deck/liggghts.in").read_text() == deck and (folder / "deck/case.toml").read_text() == case
-    assert (folder / "deck/lid/lid.stl").is_file() and not (folder / "deck/yade.py").exists()
+    assert deck in (folder / "liggghts.in").read_text() and (folder / "case/case.toml").read_text() == case
+    assert "variable grain_count      index 10 # number of grains" in (folder / "liggghts.in").read_text()
+    assert (folder / "lid/lid.stl").is_file() and not (folder / "yade.py").exists()
 
 
 def test_a_finished_run_is_not_repeated_unless_an_input_changes(tmp_path: Path, decks: Path, stand_in: Path) -> None:
@@ -69,9 +70,9 @@ def test_a_finished_run_is_not_repeated_unless_an_input_changes(tmp_path: Path, 
     assert run(out) == (folder, "kept")
     case = decks / "box" / "case.toml"
     case.write_text(case.read_text().replace("Grains in a box.", "Better words."))
-    (decks / "box" / "yade.py").write_text("# the other engine's deck\n")
+    (decks / "box" / "yade.py").write_text("# the other engine's deck\np = dembark.parameters()\n")
     (decks / "box" / "README.md").write_text("words\n")
-    (decks / "box" / "checks.py").write_text("# looks at results only\n")
+    (decks / "box" / "measure.py").write_text("# looks at results only\n")
     assert run(out) == (folder, "kept")
     assert (folder / "run.json").stat().st_mtime_ns == made
     assert run(out, grain_diameter="6 mm")[1] == "finished"
