@@ -23,6 +23,7 @@ class Value:
     scale : what the declared agreement of engines is multiplied with, in the unit of the value
     reason : why the quantity cannot be decided
     verdict : pass or fail by another rule than the tolerance, told in `detail`
+    compared : False where engines are not compared in it for what was measured
     """
 
     estimate: Estimate
@@ -33,6 +34,7 @@ class Value:
     reason: str = ""
     verdict: str = ""
     detail: str = ""
+    compared: bool = True
 
 
 @dataclass(frozen=True)
