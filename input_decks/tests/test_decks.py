@@ -1,4 +1,4 @@
-"""The decks of every case of grains use its parameters, start from the same grains in both engines, and write what readers expect."""
+"""The decks of every case of grains start from the same grains in both engines, and write what readers expect."""
 
 from __future__ import annotations
 
@@ -10,16 +10,9 @@ import numpy as np
 import pytest
 from dembark.common.errors import DembarkError
 from dembark.postproc import ContactsDump, GrainsDump, read_times
-from dembark.validation import engines
-from dembark.validation.case import deck
-from dembark.validation.case.folders import find
-from dembark.validation.case.model import Case
-from dembark.validation.case.parameters import Parameter, Value
-from dembark.validation.case.resolve import merged, portable
 from dembark.validation.checks import column_collapse
 from dembark.validation.checks.run import Replica
 
-SCENE = Path(__file__).resolve().parents[2] / "plugins/yade/python/dembark/scene.py"
 WALLS = {"silo": ("side", "base"), "plane_silo": ("left", "right", "base"), "plug_flow": ("left", "right", "base"),
          "gravity_channel": ("left", "right"), "column_collapse": ("back", "base", "gate")}
 # Columns of time.csv, where they are not the forces of the walls.
@@ -46,44 +39,6 @@ CHANGES: dict[str, dict[str, Any]] = {"dry": {}, "wet": {"bridge_volume": 8e-11}
 VARIANTS = {"silo": ("dry", "wet"), "plane_silo": ("dry", "wet"), "plug_flow": ("dry", "wet", "rough"), "gravity_channel": ("dry", "wet"),
             "column_collapse": ("dry", "viscous")}
 RUNS = [(case, engine, variant) for case in CASES for engine in ("liggghts", "yade") for variant in VARIANTS[case]]
-
-# How many packings there are is the harness's: a deck makes one.
-HARNESS_ONLY = {"replicas"}
-# What parameters of the liquid need to do anything.
-LIQUID = {"bridge_volume": 8e-11, "liquid_viscosity": 0.01}
-# Where a deck uses a number, and where the numbers at its top end.
-USE = {"liggghts": (r"\$\{NAME\}", "\n\n"), "yade": (r'\bp\.NAME\b|"NAME"', "\n)\n")}
-
-
-def other(parameter: Parameter, value: Value) -> Value:
-    """Another value that the parameter may have."""
-    if parameter.values:
-        return next(word for word in parameter.values if word != value)
-    if value is None or parameter.name == "liquid_content":
-        return 0.004
-    return value + 1 if isinstance(value, int) else 0.9 * value  # type: ignore[operator]
-
-
-def inputs(case: Case, engine: str, values: dict[str, Value], folder: Path) -> dict[str, str]:
-    """What the engine reads: all files of a run's folder, but of the numbers at the top of the deck only those that are used."""
-    deck.write(case, engine, values, folder)
-    texts = {path.name: path.read_text(encoding="utf-8") for path in folder.iterdir()}
-    name, (use, end) = engines.facts(engine).deck, USE[engine]
-    head, body = texts[name].split(end, 1)
-    body += SCENE.read_text(encoding="utf-8") if engine == "yade" else ""
-    numbers = {match.group(1): match.group() for match in re.finditer(r"^(?:variable| {3}) +(\w+).*", head, re.MULTILINE)}
-    return texts | {name: body} | {key: line for key, line in numbers.items() if re.search(use.replace("NAME", key), body)}
-
-
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("engine", ["liggghts", "yade"])
-def test_every_parameter_changes_the_input(case: str, engine: str, tmp_path: Path) -> None:
-    found = find(case)
-    values = portable(merged(found, None, None, TINY[case] | {key: value for key, value in LIQUID.items() if key in found.parameters}))
-    before = inputs(found, engine, values, tmp_path)
-    for name in found.parameters.keys() - HARNESS_ONLY:
-        changed = values | {name: other(found.parameters[name], values[name])}
-        assert inputs(found, engine, changed, tmp_path) != before, name
 
 
 @pytest.fixture(scope="module")
