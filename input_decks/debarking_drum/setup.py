@@ -39,6 +39,8 @@ def setup(p: SimpleNamespace) -> Setup:
                            "take less or thinner logs")
     diameters = p.log_diameter_min + span * (packing.rank(n, p.seed) + 0.5) / n
     box = [(-1.1 * radius, 1.1 * radius), (-0.5 * spacing, 0.5 * spacing), (-1.1 * radius, 1.1 * radius)]
-    logs = packing.bodies(box, sites[:n], 0.5 * diameters, line_density * diameters**2)
+    masses = line_density * diameters**2
+    logs = packing.bodies(box, sites[:n], 0.5 * diameters, masses)
+    numbers = {"logs": n, "inner_radius": radius, "load_weight": p.gravity * masses.sum()}
     return Setup(steps, period / (ROWS * every), logs,
-                 {"logs": n, "inner_radius": radius, "every": every, "stride": stride, "first": steps - stride * (p.frames - 1)})
+                 {**numbers, "every": every, "stride": stride, "first": steps - stride * (p.frames - 1)})

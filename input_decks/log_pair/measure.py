@@ -25,8 +25,8 @@ def pair(p: Mapping[str, Any]) -> Pair:
     """The bodies of a run with parameters `p`; a wall has no mass, radius or velocity of its own, and is met head on."""
     wall = p["target"] == "wall"
     mass, radius, speed, offset = (math.inf, 0.0, 0.0, 0.0) if wall else (p["mass_2"], p["radius_2"], p["velocity_2"], p["offset"])
-    return Pair((p["mass_1"], mass), 1.0 / (1.0 / p["stiffness_1"] + 1.0 / p["stiffness_2"]), p["radius_1"] + radius, (p["velocity_1"], speed),
-                offset, p["damping"], p["contact_damping"])
+    stiffness = 1.0 / (1.0 / p["stiffness_1"] + 1.0 / p["stiffness_2"])
+    return Pair((p["mass_1"], mass), stiffness, p["radius_1"] + radius, (p["velocity_1"], speed), offset, p["damping"], p["contact_damping"])
 
 
 def measure(replicas: Sequence[Replica]) -> Measurement:
