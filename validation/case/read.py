@@ -60,7 +60,7 @@ class CaseReader(TableReader):
         derived = self.derived(data.get("derived", {}), parameters)
         quantities = self.merged("quantities", data.get("quantities", {}), groups)
         variants = self.changes("variants", data.get("variants", {"default": {}}), parameters)
-        profiles = self.changes("profiles", data.get("profiles", {}), parameters)
+        profiles = self.changes("profiles", data.get("profiles", {"quick": {}}), parameters)
         return Case(
             name=head["name"], title=head["title"], description=head.get("description", "").strip(), source=tuple(head.get("source", ())),
             engines=tuple(head["engines"]), folder=self.path.parent, parameters=parameters, profiles=profiles, variants=variants,

@@ -59,7 +59,7 @@ def test_a_result_holds_the_deck_that_made_it(tmp_path: Path, decks: Path, stand
     folder, _ = run(tmp_path / "out")
     (decks / "box" / "liggghts.in").write_text("# another deck\n")
     assert deck in (folder / "liggghts.in").read_text() and (folder / "case/case.toml").read_text() == case
-    assert "variable grain_count      index 10 # number of grains" in (folder / "liggghts.in").read_text()
+    assert "variable grain_count     index 10 # number of grains" in (folder / "liggghts.in").read_text()
     assert (folder / "lid/lid.stl").is_file() and not (folder / "yade.py").exists()
 
 
