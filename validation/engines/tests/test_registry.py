@@ -160,7 +160,7 @@ def stub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     folder = tmp_path / "decks/box"
     folder.mkdir(parents=True)
     (folder / "case.toml").write_text(CASE)
-    (folder / "checks.py").write_text("REFERENCES = ()\ndef quantities(replicas): ...\ndef picture(parameters): ...\n")
+    (folder / "measure.py").write_text("def measure(replicas): ...\n")
     monkeypatch.setattr(Stub, "program", program)
     monkeypatch.setattr(engines, "ENGINES", (*engines.ENGINES, Stub))
     monkeypatch.setenv("DEMBARK_DECKS", str(folder.parent))
