@@ -10,7 +10,6 @@ from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.validation.checks import fields_axial as axial
 from dembark.validation.checks.fields_axial import Rings
 from dembark.validation.checks.fields_channel import free_grains
-from dembark.validation.checks.fields_drum import Impacts, _along_shell, _scalars
 from dembark.validation.checks.fields_result import labelled, variable, write
 from dembark.validation.checks.run import once
 from dembark.validation.metrics import measure, replicas
@@ -64,28 +63,6 @@ def test_channel_gives_back_velocity_slope_and_temperature(tmp_path):
     due = 0.2 * np.exp(-2.0 / 2.0) * found["core_velocity"]["value"]
     assert np.interp(2.0, place, fields.shear_rate_profile.values) == pytest.approx(due, rel=0.1)
     assert np.interp(18.0, place, fields.shear_rate_profile.values) == pytest.approx(-due, rel=0.1)
-
-
-def drum_impacts(angle, lost, quarters=8):
-    count = len(angle)
-    return Impacts(np.zeros((count, 2)), np.asarray(angle, float), np.full(count, 1e3), np.asarray(lost, float),
-                   np.arange(count) % quarters, np.arange(count) % 2 == 0, float(np.sum(lost)), np.full(quarters, 2.0 * np.sum(lost) / quarters), 10.0)
-
-
-def test_drum_shares_and_direction():
-    random = np.random.default_rng(2)
-    one = drum_impacts(60.0 + random.normal(0.0, 5.0, 4000), np.ones(4000))
-    found = _scalars(one)
-    assert found["share"].value == pytest.approx(0.5)
-    assert found["shell"].value == pytest.approx(0.5)
-    assert found["angle"].value == pytest.approx(60.0, abs=0.5)
-
-
-def test_drum_power_along_the_shell_adds_up_to_what_is_lost_there():
-    one = drum_impacts(np.linspace(-179.0, 179.0, 400), np.linspace(0.0, 2.0, 400))
-    patch = 0.3
-    total = sum(cell.value for cell in _along_shell(one, patch)) * patch * one.duration
-    assert total == pytest.approx(one.lost[one.shell].sum(), rel=1e-12)
 
 
 @settings(max_examples=25, deadline=None)
