@@ -75,6 +75,7 @@ def new_case(
     folder: Annotated[Path, typer.Option("--in", help="Folder of your cases; the case gets a folder of its name in it.")] = Path(),
 ) -> None:
     """Write a small case that runs, to start your own from."""
+    from dembark.validation import engines
     from dembark.validation.case.folders import package_root, shipped_root
 
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
@@ -89,4 +90,4 @@ def new_case(
             (target / path.name).write_text(path.read_text(encoding="utf-8").replace("NAME", name), encoding="utf-8")
     except OSError as error:
         raise DembarkError(f"cannot write to {target}", error.strerror or str(error)) from None
-    print(f"{target} is a case now. Run it: dembark --cases {folder} run {name} --engine liggghts --out results-{name}")
+    print(f"{target} is a case now. Run it: dembark --cases {folder} run {name} --engine {engines.names()[0]} --out results-{name}")
