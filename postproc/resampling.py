@@ -57,40 +57,25 @@ def pooled(replicas: Sequence[Mapping[str, Estimate]], name: str) -> Estimate:
 
 
 def profile(
-    name: str,
-    title: str,
-    along: str,
-    across: str,
-    place: Array,
-    values: Sequence[Array],
-    *,
-    vertical: bool = False,
-    reference: Array | None = None,
-    reference_label: str = "",
-    note: str = "",
+    name: str, title: str, along: str, across: str, place: Array, values: Sequence[Array], *, half: Array | None = None,
+    vertical: bool = False, reference: Array | None = None, reference_label: str = "", note: str = "",
 ) -> dict[str, Any]:
     """A profile for figure and CSV: `values` of each replica at the same `place`; the band is Student's interval over replicas (three or
-    more) or the range of two, and absent for one.
+    more), the range of two, or for one the half-widths `half` of its 95 % intervals, where all are known.
 
     `along` and `across` label the axes of place and value; `vertical` draws the place upwards.
     """
     table = np.asarray(values, float)
     mean = table.mean(axis=0)
-    entry: dict[str, Any] = {
-        "name": name,
-        "title": title,
-        "along": along,
-        "across": across,
-        "vertical": vertical,
-        "place": _numbers(place),
-        "value": _numbers(mean),
-        "note": note,
-    }
-    if len(table) == 2:
+    entry: dict[str, Any] = {"name": name, "title": title, "along": along, "across": across, "vertical": vertical, "place": _numbers(place),
+                             "value": _numbers(mean), "note": note}
+    if half is not None and np.isfinite(half).all():
+        entry |= {"low": _numbers(mean - half), "high": _numbers(mean + half), "band": "95 % interval"}
+    elif len(table) == 2:
         entry |= {"low": _numbers(table.min(axis=0)), "high": _numbers(table.max(axis=0)), "band": "range of 2 replicas"}
     elif len(table) > 2:
-        half = np.array([over_replicas([Estimate(value, 0.0) for value in column]).half for column in table.T])
-        entry |= {"low": _numbers(mean - half), "high": _numbers(mean + half), "band": f"95 % interval over {len(table)} replicas"}
+        spread = np.array([over_replicas([Estimate(value, 0.0) for value in column]).half for column in table.T])
+        entry |= {"low": _numbers(mean - spread), "high": _numbers(mean + spread), "band": f"95 % interval over {len(table)} replicas"}
     if reference is not None:
         entry |= {"reference": _numbers(reference), "reference_label": reference_label}
     return entry

@@ -21,5 +21,5 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
     found = silo.measured([read(replica) for replica in replicas], "W", "x", replicas[0].derived)
     return replace(found, remarks=[
         *found.remarks,
-        f"The slab is a period of {given['slab_depth'] / given['grain_diameter']:.1f} d, so that grains pack in three dimensions; a layer one grain "
-        "deep would need walls in front and behind, which carry weight too, or grains that are held in a plane."])
+        f"The slab is a period of {given['slab_depth'] / given['grain_diameter']:.1f} d, so that grains pack in three dimensions; a layer "
+        "one grain deep would need walls in front and behind, which carry weight too, or grains that are held in a plane."])

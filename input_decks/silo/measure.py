@@ -16,6 +16,7 @@ from dembark.postproc.instruments.column import read
 from dembark.postproc.instruments.liquid import liquid_values
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.replica import Replica
+from dembark.postproc.resampling import profile
 from dembark.postproc.statistics import Estimate
 from dembark.postproc.studies import measured, propagated
 
@@ -31,12 +32,14 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
 def study(name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
     """The apparent mass of the fillings `points` against Janssen's law for the base, M_app = M_sat (1 - exp(-M / M_sat))."""
     points = sorted(points, key=lambda point: measured(point, "filled_mass").value)
-    mass, shares = np.array([measured(point, "filled_mass").value for point in points]), [measured(point, "apparent_mass_ratio") for point in points]
+    mass = np.array([measured(point, "filled_mass").value for point in points])
+    shares = [measured(point, "apparent_mass_ratio") for point in points]
     apparent, halves = mass * [one.value for one in shares], mass * [one.half for one in shares]
     # Mass of a piece of the column as high as the radius.
     per_radius = mass[-1] / measured(points[-1], "filling_height").value
     predicted, top = measured(points[-1], "janssen_length_predicted"), float(apparent.max())
-    fitted = propagated(lambda values: janssen.fitted_length(mass, values, values.max()) / per_radius, apparent, halves, "the apparent masses")
+    fitted = propagated(lambda values: janssen.fitted_length(mass, values, values.max()) / per_radius, apparent, halves,
+                        "the apparent masses")
     pair = janssen.fitted_pair(mass, apparent, [(top, 0.02 * top), (top, 0.3 * top)], ((0.05 * top, 50.0 * top), (0.0, 0.95 * top)), top)
     law = janssen.stress(mass, predicted.value * per_radius)
     gain = Estimate(janssen.gain(mass, apparent, fitted.value * per_radius, pair), 0.0)
@@ -46,11 +49,7 @@ def study(name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measure
         "filling_two_parameter_gain": Value(gain, detail=f"with it λ is {pair[0] / per_radius:.2f} R and the zone holds {pair[1]:.3g} kg; "
                                                          f"{len(points)} fillings"),
     }
-    known = bool(np.isfinite(halves).all())
-    curve = {
-        "name": "apparent_mass", "title": "Apparent mass", "along": "filled mass (kg)", "across": "force on the base / g (kg)", "vertical": False,
-        "place": mass.tolist(), "value": apparent.tolist(), "note": "", "reference": law.tolist(), "reference_label": "Janssen, nothing fitted",
-        "low": (apparent - halves).tolist() if known else None, "high": (apparent + halves).tolist() if known else None, "band": "95 % interval",
-    }
-    return Measurement(values, [curve], ["Each point is a packing of its own, filled by rain to that height, with the wall creeping upward, so that "
-                                         "all have the same history."])
+    curve = profile("apparent_mass", "Apparent mass", "filled mass (kg)", "force on the base / g (kg)", mass, [apparent], half=halves,
+                    reference=law, reference_label="Janssen, nothing fitted")
+    return Measurement(values, [curve], ["Each point is a packing of its own, filled by rain to that height, with the wall creeping "
+                                         "upward, so that all have the same history."])

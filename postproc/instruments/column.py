@@ -1,8 +1,8 @@
 """A silo as measured: forces and stresses over height bands and sectors of the walls, and what Janssen's law makes of them.
 
-Everything is defined at the wall: the cross-section and the solid fraction count the volume up to it, although the grains' centres keep half
-a diameter off. K is the wall's normal stress over the mean sigma_zz of the cross-section, mu_mob the wall's shear over its normal stress, both
-measured in the lower half, without the lowest diameter, where the base orders the packing.
+Everything is defined at the wall: the cross-section and the solid fraction count the volume up to it, although the grains' centres keep
+half a diameter off. K is the wall's normal stress over the mean sigma_zz of the cross-section, mu_mob the wall's shear over its normal
+stress, both measured in the lower half, without the lowest diameter, where the base orders the packing.
 
 Wet grains are also pulled to the wall by their liquid bridges, with a stress a that adds to the pressure in the contacts but not to the
 wall's net normal stress. Janssen's balance d sigma / dh = rho_b g - 2 tau / R with tau = mu_mob (K sigma + a) then gives the same law with
@@ -33,8 +33,8 @@ Bridges = Callable[[Array], Array]
 class Column:
     """One replica: arrays over frames, height bands (or the levels between them) and sectors of the walls, in SI units.
 
-    Sectors (with soft borders) are equivalent by symmetry, so they resample the disorder of the packing: what is measured on those that
-    are kept is scaled up to the whole. (frames, bands, sectors): wall forces `normal`, `shear` and `adhesion`, the pull of liquid bridges to
+    Sectors (with soft borders) are equivalent by symmetry, so they resample the disorder of the packing: what is measured on those that are
+    kept is scaled up to the whole. (frames, bands, sectors): wall forces `normal`, `shear` and `adhesion`, the pull of liquid bridges to
     the wall (N); solid `volume` (m3). (frames, bands): the walls' `lift` and the grains' weight `weight_above`, and the upward force
     `net_above` that accelerates the grains above (N); contact stress `field` (Pa). (frames, levels, ...): `level_lift`, by sectors too, and
     `level_weight`. (frames,): force `base` on the base (N).
@@ -197,7 +197,8 @@ def wall_bridges(values: Mapping[str, Any]) -> Bridges | None:
         return None
 
     def pull(radii: Array) -> Array:
-        # A bridge to the wall takes half of what a grain carries, or less when others came first; its force at touching hardly depends on it.
+        # A bridge to the wall takes half of what a grain carries, or less when others came first; its force at touching hardly depends on
+        # that.
         volume = 0.5 * content * 4.0 / 3.0 * np.pi * radii**3 if content > 0.0 else own
         return np.asarray(capillary_force(radii, np.inf, 0.0, volume, float(values["surface_tension"]), float(values["contact_angle"]),
                                           model=str(values["capillary_model"])))

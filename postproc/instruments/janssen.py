@@ -1,7 +1,7 @@
 """Janssen's law of the stresses in a silo, and its fits to measured stresses.
 
-sigma_zz = w lambda (1 - exp(-h / lambda)) at the depth h below the surface for the specific weight w (N/m3) and the decay length lambda (m).
-With the filled mass for h, the apparent mass for sigma_zz and w = 1 it is the law of the mass that the base feels.
+sigma_zz = w lambda (1 - exp(-h / lambda)) at the depth h below the surface for the specific weight w (N/m3) and the decay length lambda
+(m). With the filled mass for h, the apparent mass for sigma_zz and w = 1 it is the law of the mass that the base feels.
 """
 
 from __future__ import annotations

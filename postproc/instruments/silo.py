@@ -93,14 +93,14 @@ def _remarks(columns: Sequence[Column], over: Mapping[str, Estimate], wet: bool,
               else "Spheres roll along a smooth wall instead of sliding, which keeps the shear below Coulomb's limit.")
     if wet:
         share = 1.0 - over["_hanging_weight"].value / float(np.mean([column.weight for column in columns]))
-        manner += (f" Liquid bridges pull the grains to the wall with {over['wall_adhesion'].value:.3g} Pa; the friction of that pull alone "
-                   f"carries {share:.0%} of the weight, and Janssen's law is taken with what is left of it.")
-    remarks = [f"The wall carries {limits} friction (μ_mob = {mobilised:.3f}; static {static:g}, kinetic {kinetic:g}). {manner} Janssen's law is "
-               "therefore checked with the measured mobilisation; with the static coefficient in its place λ would come out shorter by the "
-               "first of these shares."]
+        manner += (f" Liquid bridges pull the grains to the wall with {over['wall_adhesion'].value:.3g} Pa; the friction of that pull "
+                   f"alone carries {share:.0%} of the weight, and Janssen's law is taken with what is left of it.")
+    remarks = [f"The wall carries {limits} friction (μ_mob = {mobilised:.3f}; static {static:g}, kinetic {kinetic:g}). {manner} Janssen's "
+               "law is therefore checked with the measured mobilisation; with the static coefficient in its place λ would come out shorter "
+               "by the first of these shares."]
     if len(columns) < 3:
-        remarks.append("With fewer than three packings the intervals come from time blocks and from sectors of the walls within the packing; "
-                       "what varies from packing to packing as a whole is not in them.")
+        remarks.append("With fewer than three packings the intervals come from time blocks and from sectors of the walls within the "
+                       "packing; what varies from packing to packing as a whole is not in them.")
     return remarks
 
 

@@ -118,8 +118,9 @@ class _Janssen:
         measured = over_replicas([block_mean(one.section[:, worst]) for one in silos])
         known = propagated(lambda values: float(self(heights, values)[worst]) / measured.value - 1.0, self.values, self.halves)
         half = combined([known.half, (1.0 + known.value) * measured.half / measured.value])
-        told = f"mean over the cross-section, at the worst height (z = {heights[worst] / diameter:.1f} d); law with measured K, μ_mob, ρ_b, nothing fitted"
-        return Value(Estimate(abs(known.value), half, f"propagated from K, μ_mob and σ_zz; {measured.basis}"), Estimate(0.0, 0.0), detail=told)
+        found = Estimate(abs(known.value), half, f"propagated from K, μ_mob and σ_zz; {measured.basis}")
+        return Value(found, Estimate(0.0, 0.0), detail="mean over the cross-section, at the worst height "
+                     f"(z = {heights[worst] / diameter:.1f} d); law with measured K, μ_mob, ρ_b, nothing fitted")
 
 
 def measured(replicas: Sequence[Replica], known: Mapping[str, Value]) -> Measurement:
@@ -155,13 +156,16 @@ def _dataset(silos: Sequence[Silo], law: _Janssen, diameter: float, gravity: flo
     ratio = [[over_replicas([one.k(1 + band, slice(ring, ring + 1)) for one in silos]) for ring in range(len(rings.radii))]
              for band in range(len(BANDS))]
     wall = np.mean([one.wall for one in silos], axis=0)
-    variables = {f"stress_{part}": variable(both, fields.mean(part, rings), "Pa", f"{name}, compression positive") for part, name in _STRESSES.items()}
+    borders = {"radius": rings.radial, "height": rings.vertical}
+    variables = {f"stress_{part}": variable(both, fields.mean(part, rings), "Pa", f"{name}, compression positive")
+                 for part, name in _STRESSES.items()}
     variables |= {
         "density": variable(both, fields.mean("mass", rings), "kg m-3", "bulk density"),
         "solid_fraction": variable(both, fields.mean("volume", rings), "1", "volume of grains per volume"),
         "coverage": variable(both, rings.coverage, "1", "part of the kernel that lies inside the vessel"),
         "wall_force": variable(both, fields.mean("wall", rings), "N m-3", "upward force density of walls on grains"),
-        "unbalanced": variable(both, fields.unbalanced(rings, gravity), "N m-3", "walls less weight less divergence of the vertical stresses"),
+        "unbalanced": variable(both, fields.unbalanced(rings, gravity), "N m-3",
+                               "walls less weight less divergence of the vertical stresses"),
         "net_force": variable(both, fields.mean("net", rings), "N m-3", "upward force density that accelerates grains"),
         **with_interval("stress_zz_section", high, stress, "Pa", "vertical stress, mean over the cross-section"),
         "janssen": variable(high, law(rings.heights), "Pa", "vertical stress by Janssen's law, nothing fitted"),
@@ -169,10 +173,11 @@ def _dataset(silos: Sequence[Silo], law: _Janssen, diameter: float, gravity: flo
         "wall_shear": variable(high, wall[:, 1], "Pa", "upward shear stress of the wall"),
         **with_interval("k_profile", ("band", "radius"), ratio, "1", "sigma_rr over sigma_zz"),
         "band_bounds": variable(("band", "bounds"), np.array(BANDS) * law.height, "m", "heights between which k_profile is averaged"),
-        "radius_bounds": variable(("radius", "bounds"), np.stack([rings.radial[:-1], rings.radial[1:]], axis=1), "m", "borders of the rings"),
-        "height_bounds": variable(("height", "bounds"), np.stack([rings.vertical[:-1], rings.vertical[1:]], axis=1), "m", "borders of the layers"),
+        **{f"{name}_bounds": variable((name, "bounds"), np.stack([edges[:-1], edges[1:]], axis=1), "m",
+                                      f"borders of the {'rings' if name == 'radius' else 'layers'}") for name, edges in borders.items()},
     }
     coordinates = {"radius": variable(["radius"], rings.radii, "m", "distance from the axis"),
                    "height": variable(high, rings.heights, "m", "height above the base")}
     return labelled(variables, coordinates, kind="silo", kernel="gaussian", width=rings.width, averaged="around the axis and over frames",
-                    frames=fields.frames, replicas=len(silos), vessel_radius=rings.radius, filling_height=law.height, grain_diameter=diameter)
+                    frames=fields.frames, replicas=len(silos), vessel_radius=rings.radius, filling_height=law.height,
+                    grain_diameter=diameter)

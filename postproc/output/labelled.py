@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,8 +22,10 @@ def variable(dimensions: Sequence[str], values: NDArray[Any], units: str, name: 
 
 def with_interval(key: str, dimensions: Sequence[str], estimates: Sequence[Any], units: str, name: str) -> dict[str, Variable]:
     """The variable `key` from (nested sequences of) estimates, and beside it `<key>_half`, the half-width of its 95 % interval."""
-    values, halves = (np.vectorize(lambda one, part=part: getattr(one, part), otypes=[float])(np.array(estimates, object)) for part in ("value", "half"))
-    return {key: variable(dimensions, values, units, name), f"{key}_half": variable(dimensions, halves, units, "half-width of its 95 % interval")}
+    table = np.array(estimates, object)
+    values, halves = (np.vectorize(operator.attrgetter(part), otypes=[float])(table) for part in ("value", "half"))
+    return {key: variable(dimensions, values, units, name),
+            f"{key}_half": variable(dimensions, halves, units, "half-width of its 95 % interval")}
 
 
 def labelled(variables: Mapping[str, Any], coordinates: Mapping[str, Any], **attributes: str | float) -> xarray.Dataset:
