@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from dembark.validation import engines
 from dembark.validation.cases import deck_root
-from dembark.validation.restarts import newest
+from dembark.validation.runs.restarts import newest
 
 FILES = ("time.csv", "impacts.txt", "grains.dump")
 DEFAULTS: dict[str, Any] = {"run_in": 0, "restart_every": 16100}

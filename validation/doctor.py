@@ -13,7 +13,7 @@ from pathlib import Path
 from dembark.common.errors import DembarkError
 from dembark.validation import cases, engines, provenance
 
-_PACKAGES = ("numpy", "scipy", "MDAnalysis", "snakemake", "snakemake-executor-plugin-slurm", "typer", "rich", "pint", "jinja2", "matplotlib",
+_PACKAGES = ("numpy", "scipy", "MDAnalysis", "filelock", "typer", "rich", "pint", "jinja2", "matplotlib",
              "weasyprint", "pyvista", "xarray", "h5netcdf", "h5py")
 
 

@@ -17,11 +17,11 @@ import pytest
 from dembark.common.errors import DembarkError, Killed
 from dembark.common.files import check_times, count_frames, read_json
 from dembark.postproc import ContactsDump, GrainsDump, read_times
-from dembark.validation import engines, restarts
+from dembark.validation import engines
 from dembark.validation.cases import find
-from dembark.validation.plan import Run, series
-from dembark.validation.progress import Board
-from dembark.validation.simulate import Resources, simulate
+from dembark.validation.runs import restarts
+from dembark.validation.runs.plan import Resources, Run, series
+from dembark.validation.runs.simulate import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
 OUTPUTS = ("time.csv", "grains.dump", "contacts.dump", "impacts.txt")
@@ -178,7 +178,7 @@ def test_harness_resumes_what_was_ended_from_outside(engine: str, number: int, t
 
     def attempt() -> None:
         try:
-            simulate(one, tmp_path, Board(), threading.Event(), used)
+            simulate(one, tmp_path, threading.Event(), used)
         except Killed as error:
             caught.append(error)
 
@@ -190,7 +190,8 @@ def test_harness_resumes_what_was_ended_from_outside(engine: str, number: int, t
     os.kill(engine_in(work), number)
     thread.join(60)
     assert len(caught) == 1 and "it goes on from step" in str(caught[0])
-    folder = simulate(one, tmp_path, Board(), threading.Event(), used)
+    assert simulate(one, tmp_path, threading.Event(), used)
+    folder = tmp_path / "replica-1"
     record = read_json(folder / "run.json")
     assert record and record["attempts"] == 2 and record["resume"] == "exact" and len(record["resumed_at"]) == 1
     assert count_frames(folder / "grains.dump", "ATOMS") == SILO["frames"]

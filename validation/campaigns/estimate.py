@@ -17,9 +17,9 @@ from dembark.validation import engines
 from dembark.validation.campaigns.expand import Plan
 from dembark.validation.campaigns.rates import Rate, Rates
 from dembark.validation.campaigns.sizes import size_text
-from dembark.validation.plan import Run, Series
-from dembark.validation.process import chunks, running
-from dembark.validation.progress import OutputParser
+from dembark.validation.runs.plan import Run, Series
+from dembark.validation.runs.process import chunks, running
+from dembark.validation.runs.progress import OutputParser
 
 _PATIENCE = 60.0
 
@@ -60,7 +60,7 @@ def announced(run: Run, cancel: threading.Event) -> tuple[int, float]:
         for chunk in chunks(process):
             if cancel.is_set():
                 raise Interrupted("interrupted")
-            parser.hear(chunk)
+            parser.feed(chunk)
             if parser.steps or time.monotonic() > deadline:
                 break
     if not parser.steps:

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 from dembark.common.errors import DembarkError, RunError
 from dembark.common.files import check_impacts
-from dembark.validation import cases, outcome
+from dembark.validation import cases
+from dembark.validation.runs import outcome
 from hypothesis import given
 from hypothesis import strategies as st
 

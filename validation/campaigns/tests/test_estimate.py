@@ -10,7 +10,7 @@ from dembark.common.errors import DembarkError, Interrupted
 from dembark.validation import engines
 from dembark.validation.campaigns.estimate import announced
 from dembark.validation.cases import discover, find
-from dembark.validation.plan import series
+from dembark.validation.runs.plan import series
 from dembark.validation.resolve import resolve
 from harness import decks, stand_in  # noqa: F401
 

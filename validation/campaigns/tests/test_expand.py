@@ -9,7 +9,7 @@ from dembark.common.errors import DembarkError
 from dembark.validation.campaigns.expand import LONGEST_NAME, plan, points, variant_name
 from dembark.validation.campaigns.source import Source
 from dembark.validation.campaigns.spec import read
-from dembark.validation.plan import campaign
+from dembark.validation.runs.plan import campaign
 from harness import decks, stand_in  # noqa: F401
 from hypothesis import given
 from hypothesis import strategies as st

@@ -12,7 +12,7 @@ from dembark.common.files import lock
 from dembark.validation.campaigns import folder
 from dembark.validation.campaigns.status import look
 from dembark.validation.campaigns.submit import ESTIMATES
-from dembark.validation.progress import FileBoard, State, headline, state_table, watched
+from dembark.validation.runs.progress import FileBoard, State, headline, state_table, watched
 
 CAMPAIGN = '[campaign]\nname = "boxes"\nprofile = "quick"\n'
 

@@ -12,8 +12,8 @@ import pytest
 from dembark.common.errors import DembarkError, RunError
 from dembark.validation.campaigns import store
 from dembark.validation.campaigns.rates import ANY_CASE, MEASURED, Rates
-from dembark.validation.campaigns.schema import KEYS, TABLES, VERSION
-from dembark.validation.plan import Series, campaign
+from dembark.validation.runs.schema import KEYS, TABLES, VERSION
+from dembark.validation.runs.plan import Series, campaign
 from harness import decks, stand_in  # noqa: F401
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")

@@ -12,7 +12,7 @@ import pytest
 from dembark.common.errors import DembarkError
 from dembark.validation.campaigns import report
 from dembark.validation.campaigns.report.gather import gather
-from dembark.validation.campaigns.schema import TABLES, VERSION, statements
+from dembark.validation.runs.schema import TABLES, VERSION, statements
 from dembark.validation.campaigns.store import path_of
 
 FRICTIONS, RADII = (0.2, 0.4, 0.8), (0.02, 0.04)

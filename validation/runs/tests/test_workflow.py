@@ -13,7 +13,7 @@ import pytest
 from dembark.common.files import read_json
 from dembark.validation import cases
 from dembark.validation.jobs import variants
-from dembark.validation.plan import campaign, studies
+from dembark.validation.runs.plan import campaign, studies
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
