@@ -32,7 +32,7 @@ TABLES: dict[str, dict[str, str]] = {
         "resumed_from_step": "INTEGER", "step": "INTEGER", "resume": "TEXT", "ranks": "INTEGER",
         "threads": "INTEGER", "particles": "INTEGER", "steps": "INTEGER", "time_step": "REAL", "estimated_time": "REAL", "wall_time": "REAL",
         "particle_steps_per_second": "REAL", "commit_hash": "TEXT",
-        "dirty": "INTEGER", "cpu": "TEXT", "started": "TEXT", "folder": "TEXT NOT NULL"},
+        "dirty": "INTEGER", "cpu": "TEXT", "started": "TEXT", "folder": "TEXT"},
     "steps": {"campaign": "TEXT NOT NULL", "name": "TEXT NOT NULL", "kind": "TEXT NOT NULL", **_STATE, "inputs": "TEXT"},
     "quantities": {
         **_PLACE, "engine": "TEXT NOT NULL", **_VALUE, "basis": "TEXT", "deviation_half_width": "REAL", "compared": "INTEGER",
