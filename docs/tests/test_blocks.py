@@ -113,8 +113,6 @@ def run(words: list[str], capture: pytest.CaptureFixture[str]) -> None:
         elif program == "dembark":
             found("yade")
             words[0] = str(Path(sys.executable).with_name("dembark"))
-        elif program == "snakemake":
-            words[:1] = [sys.executable, "-m", "snakemake", "--quiet", "all"]
         elif program == "python":
             words[0] = sys.executable
         done = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False)
@@ -166,6 +164,12 @@ def test_toml(block: Block, tmp_path: Path) -> None:
             path.with_name(deck).touch()
         path.write_text(block.text)
         assert cases.load(path).name == name
+    elif "[commands]" in block.text:
+        from dembark.validation.runs import site
+
+        path = tmp_path / "site.toml"
+        path.write_text(block.text)
+        assert site.read(path).commands["submit"]
     else:
         from dembark.validation.campaigns.spec import read
 
@@ -177,7 +181,6 @@ def test_toml(block: Block, tmp_path: Path) -> None:
 @pytest.mark.parametrize("block", blocks("listing"), ids=lambda block: block.place)
 def test_listing(block: Block) -> None:
     code = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "validation").rglob("*.py"))
-    code += (ROOT / "validation/Snakefile").read_text(encoding="utf-8")
     names = {name for name in re.findall(r"[\w-]+\.(?:json|toml|log|sqlite|html|pdf)\b", block.text)}
     assert names and not {name for name in names if name not in code and name.removesuffix(".pdf") + ".html" not in code}
 

@@ -25,7 +25,10 @@ _ELSEWHERE = {"runs", "campaigns", "tests"}
 
 @dataclass(frozen=True)
 class Step:
-    """`call(*arguments)` makes `target` of `sources`, after all runs and steps called `needs` have ended; `place` is its folder."""
+    """`call(*arguments)` makes `target` of `sources`, after all runs and steps called `needs` have ended; `place` is its folder.
+
+    `wanted`: hash of the inputs of runs, which tells a result that is to be measured from one of earlier inputs.
+    """
 
     name: str
     kind: str
@@ -35,10 +38,11 @@ class Step:
     sources: tuple[Path, ...]
     call: Callable[..., object]
     arguments: tuple[Any, ...]
+    wanted: str = ""
 
     def inputs(self) -> str:
         """Hash of the contents of its sources, and of the code that reads them."""
-        total = hashlib.sha256(_code(self.kind == "report").encode())
+        total = hashlib.sha256((_code(self.kind == "report") + self.wanted).encode())
         for path in self.sources:
             total.update(path.read_bytes() if path.is_file() else b"missing")
         return total.hexdigest()
@@ -63,7 +67,8 @@ def steps(plan: Plan, results: Path) -> list[Step]:
     for one in plan.series:
         folder, own = results / one.place, one.runs[0].case.folder / "checks.py"
         found.append(Step(name("measure", one.place), "measure", one.place, tuple(run.name for run in one.runs), folder / "metrics.json",
-                          (own, *(folder / run.folder_name / "run.json" for run in one.runs)), measure_series, (folder, one.runs)))
+                          (own, *(folder / run.folder_name / "run.json" for run in one.runs)), measure_series, (folder, one.runs),
+                          "".join(run.inputs for run in one.runs)))
     for planned in studies(plan.series):
         parts = tuple(results / one.place / "metrics.json" for one in planned.series)
         found.append(Step(name("study", planned.place), "study", planned.place, tuple(name("measure", one.place) for one in planned.series),
