@@ -24,7 +24,7 @@ from dembark.validation.case import deck
 from dembark.validation.case.folders import find
 from dembark.validation.case.parameters import Value
 from dembark.validation.case.resolve import portable, resolve, settings
-from dembark.validation.restarts import newest
+from dembark.validation.runs.restarts import newest
 
 FILES = ("time.csv", "impacts.txt", "grains.dump")
 DEFAULTS: dict[str, Value] = {"run_in": 0}

@@ -18,7 +18,7 @@ from dembark.validation.case import cli as cases
 from dembark.validation.case import folders
 
 if TYPE_CHECKING:
-    from dembark.validation.workflow import Outcome
+    from dembark.validation.runs.perform import Outcome
 
 _ABOUT = f"""Granular contact laws and their validation, in {engines.titles("and")}.
 
@@ -85,15 +85,15 @@ def run(
     strict: Strict = False,
 ) -> None:
     """Run a case in one engine, measure it and show each quantity beside its reference."""
-    from dembark.validation import restarts, show
-    from dembark.validation.cases import find
-    from dembark.validation.execute import execute
-    from dembark.validation.jobs import cancelled_by_signal
-    from dembark.validation.judge import measuring
+    from dembark.validation import show
+    from dembark.validation.case.folders import find
     from dembark.validation.case.parameters import pick
-    from dembark.validation.plan import series
     from dembark.validation.case.resolve import resolve, settings
-    from dembark.validation.simulate import Resources
+    from dembark.validation.judge import measuring
+    from dembark.validation.runs import restarts
+    from dembark.validation.runs.job import cancelled_by_signal
+    from dembark.validation.runs.perform import perform_series
+    from dembark.validation.runs.plan import Resources, series
 
     one = find(case)
     changes = settings(change or ())
@@ -111,7 +111,8 @@ def run(
         raise DembarkError(f"--restart-interval {restart_interval}", f"{one.deck(engine)} writes no states to go on from",
                            "leave it out; see docs/restarts.md for what a deck needs")
     folder = (out or Path("results") / profile / planned.place).resolve()
-    metrics = execute(planned, folder, cancelled_by_signal(), Resources(ranks, threads, interval), jobs, force)
+    used = Resources(ranks, threads, restart_interval=interval)
+    metrics = perform_series(planned, folder, cancelled_by_signal(), used, jobs, force)
     console = _console()
     console.print(show.quantity_table(metrics))
     for line in show.open_lines(metrics):
@@ -123,13 +124,12 @@ def run(
     _strictly(failed, strict)
 
 
-def _interval(text: str | None) -> float:
-    """Wall time (s) between states of a run, 0 for none."""
+def _interval(text: str | None) -> float | None:
+    """Wall time (s) between states of a run, 0 for none; None when it is not said."""
     from dembark.validation.campaigns.sizes import seconds
-    from dembark.validation.simulate import Resources
 
     if text is None:
-        return Resources.restart_interval
+        return None
     try:
         return 0.0 if text == "none" else seconds(text)
     except DembarkError as error:
@@ -146,10 +146,10 @@ def validate(
     strict: Strict = False,
 ) -> None:
     """Run all cases of a profile in their engines and build the report; finished runs are kept."""
-    from dembark.validation.jobs import cancelled_by_signal
-    from dembark.validation.workflow import validate as workflow
+    from dembark.validation.runs import perform
+    from dembark.validation.runs.job import cancelled_by_signal
 
-    outcome = workflow(profile, cancelled_by_signal(), cores, results, tuple(case or ()), tuple(engine or ()))
+    outcome = perform.validate(profile, cancelled_by_signal(), cores, results, tuple(case or ()), tuple(engine or ()))
     show_outcome(outcome, "the validation", "start again: what is finished is kept")
     _strictly(outcome.failed_checks, strict)
 
@@ -178,7 +178,7 @@ def make_report(
     results: Results = Path("results"),
 ) -> None:
     """Build the report of a profile or a campaign again from the results that are there."""
-    from dembark.validation.jobs import build_report
+    from dembark.validation.runs.steps import build_report
 
     folder = directory.resolve() if directory else results.resolve() / profile
     if directory and not any(folder.glob("*/*/*/metrics.json")):

@@ -14,7 +14,7 @@ from dembark.common.errors import DembarkError
 from dembark.validation import engines, provenance
 from dembark.validation.case import folders
 
-_PACKAGES = ("numpy", "scipy", "MDAnalysis", "snakemake", "snakemake-executor-plugin-slurm", "typer", "rich", "pint", "jinja2", "matplotlib",
+_PACKAGES = ("numpy", "scipy", "MDAnalysis", "filelock", "typer", "rich", "pint", "jinja2", "matplotlib",
              "weasyprint", "pyvista", "xarray", "h5netcdf", "h5py")
 
 

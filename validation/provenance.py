@@ -64,7 +64,7 @@ def collect(engine: Engine) -> dict[str, Any]:
     return {
         **commit(),
         "versions": {"dembark": package_version("dembark"), engine.name: engine.version, "python": platform.python_version(),
-                     **{name: package_version(name) for name in ("numpy", "scipy", "MDAnalysis", "snakemake")}},
+                     **{name: package_version(name) for name in ("numpy", "scipy", "MDAnalysis")}},
         "engine": str(engine.executable), "engine_identity": engine.identity, "flags": build_flags(engine),
         "host": socket.gethostname(), "os": platform.platform(), "cpu": cpu(), "cores": os.cpu_count(),
     }

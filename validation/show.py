@@ -8,7 +8,7 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
-from dembark.validation.cases import Case
+from dembark.validation.case.model import Case
 from dembark.validation.doctor import Finding
 
 _COLOURS = {"pass": "green", "fail": "bold red", "info": "dim"}

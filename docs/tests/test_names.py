@@ -113,8 +113,8 @@ def test_options_in_the_text_exist() -> None:
     benchmarks = code("benchmarks") + code("packaging") + (ROOT / "conftest.py").read_text(encoding="utf-8")
     common = {option for parameter in typer.main.get_command(cli.app).params for option in parameter.opts}
     known = common.union(*subcommands().values()) | set(re.findall(r'"(--[a-z-]+)"', benchmarks))
-    # Words of other programs: of Slurm, Snakemake and srun.
-    known |= {"--ntasks", "--cpus-per-task", "--mem", "--time", "--test-only", "--mpi", "--me", "--format", "--slow"}
+    # Words of other programs: of Slurm and srun.
+    known |= {"--ntasks", "--cpus-per-task", "--mem", "--time", "--test-only", "--mpi", "--me", "--format", "--slow", "--nodes"}
     unknown = {option for span in SPANS for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", span)} - known
     assert not unknown
 
@@ -131,7 +131,7 @@ def test_variables_of_the_environment_exist() -> None:
     named = set(re.findall(r"\b(?:DEMBARK|YADE|LIGGGHTS)_[A-Z_]+\b", ALL)) - {"LIGGGHTS_PUBLIC"}
     assert {name for name in named if name not in known} == set()
     # What a user may set is told.
-    read = set(re.findall(r"environ(?:\.get\(|\[)\"(DEMBARK_[A-Z_]+)\"", code("validation", "postproc"))) - {"DEMBARK_PREAMBLE", "DEMBARK_PROGRESS"}
+    read = set(re.findall(r"environ(?:\.get\(|\[)\"(DEMBARK_[A-Z_]+)\"", code("validation", "postproc")))
     assert read <= named
 
 

@@ -16,10 +16,11 @@ import pytest
 from dembark.common.errors import DembarkError, Killed
 from dembark.common.files import check_times, count_frames, read_json
 from dembark.postproc import ContactsDump, GrainsDump, read_times
-from dembark.validation import engines, plan, restarts
-from dembark.validation.cases import find
-from dembark.validation.progress import Board
-from dembark.validation.simulate import Resources, simulate
+from dembark.validation import engines
+from dembark.validation.case.folders import find
+from dembark.validation.runs import plan, restarts
+from dembark.validation.runs.plan import Resources
+from dembark.validation.runs.simulate import simulate
 
 OUTPUTS = ("time.csv", "grains.dump", "contacts.dump", "impacts.txt")
 SILO = {"grain_count": 120, "cylinder_radius": 0.018, "settle_time": 0.15, "measure_time": 0.05, "frames": 5, "bridge_volume": 8e-11,
@@ -176,7 +177,7 @@ def test_harness_resumes_what_was_ended_from_outside(engine: str, number: int, t
 
     def attempt() -> None:
         try:
-            simulate(one, tmp_path, Board(), threading.Event(), used)
+            simulate(one, tmp_path, threading.Event(), used)
         except Killed as error:
             caught.append(error)
 
@@ -188,7 +189,8 @@ def test_harness_resumes_what_was_ended_from_outside(engine: str, number: int, t
     os.kill(engine_in(work), number)
     thread.join(60)
     assert len(caught) == 1 and "it goes on from step" in str(caught[0])
-    folder = simulate(one, tmp_path, Board(), threading.Event(), used)
+    assert simulate(one, tmp_path, threading.Event(), used)
+    folder = tmp_path / "replica-1"
     record = read_json(folder / "run.json")
     assert record and record["attempts"] == 2 and record["resume"] == "exact" and len(record["resumed_at"]) == 1
     assert count_frames(folder / "grains.dump", "ATOMS") == SILO["frames"]

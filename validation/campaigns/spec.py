@@ -11,13 +11,13 @@ from typing import Any
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
 from dembark.validation.campaigns import sizes
+from dembark.validation.case.expressions import Expression
 from dembark.validation.case.folders import discover, files, find
 from dembark.validation.case.model import Case
-from dembark.validation.case.expressions import Expression
 from dembark.validation.case.parameters import Value, checked, nearest, pick
 from dembark.validation.case.tables import TableReader, load_toml
+from dembark.validation.runs.plan import RETRIES, Resources
 
-RETRIES = 3
 MEASURE = "measure"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 _PER_RUN = {"ranks": int, "threads": int, "memory": str, "time": str, "restart_interval": str}
@@ -25,23 +25,6 @@ _MEASURING = {"memory": str, "time": str}
 _SWEEP = {"case": str, "name": str, "title": str, "profile": str, "variant": str, "variants": list, "engines": list, "grid": dict,
           "list": list, "fixed": dict, "derived": dict, "replicas": int, "resources": dict}
 _CAMPAIGN = {"name": str, "description": str, "profile": str, "engines": list, "replicas": int, "retries": int}
-
-
-@dataclass(frozen=True)
-class RunResources:
-    """What a run of an engine may use: MPI ranks and threads; and memory (bytes), time of an attempt (s) and wall time between restart
-    files (s), where None leaves the choice to the system."""
-
-    ranks: int = 1
-    threads: int = 1
-    memory: float | None = None
-    time: float | None = None
-    restart_interval: float | None = None
-
-    @property
-    def cores(self) -> int:
-        """Cores of one run."""
-        return self.ranks * self.threads
 
 
 @dataclass(frozen=True)
@@ -63,7 +46,7 @@ class SweepSpec:
     fixed: Mapping[str, Value]
     derived: Mapping[str, Expression]
     replicas: int | None
-    resources: Mapping[str, RunResources]
+    resources: Mapping[str, Resources]
 
     @property
     def label(self) -> str:
@@ -80,7 +63,7 @@ class CampaignSpec:
     description: str
     retries: int
     sweeps: tuple[SweepSpec, ...]
-    measure: RunResources | None = None
+    measure: Resources | None = None
 
 
 def shipped() -> dict[str, Path]:
@@ -132,7 +115,7 @@ class _Defaults:
     profile: str | None
     engines: tuple[str, ...] | None
     replicas: int | None
-    resources: dict[str, RunResources] = field(default_factory=dict)
+    resources: dict[str, Resources] = field(default_factory=dict)
 
 
 class _Reader(TableReader):
@@ -151,7 +134,7 @@ class _Reader(TableReader):
         self.least("campaign", head, "retries", 0)
         tables = data.get("resources", {})
         defaults = _Defaults(head.get("profile"), self.engines("campaign", head, engines.names()), head.get("replicas"),
-                             self.resources("resources", tables, {name: RunResources() for name in engines.names()}, measuring=True))
+                             self.resources("resources", tables, {name: Resources() for name in engines.names()}, measuring=True))
         sweeps = tuple(self.sweep(number, entry, defaults) for number, entry in enumerate(data["sweeps"], start=1))
         measure = self.measuring(tables[MEASURE]) if MEASURE in tables else None
         return CampaignSpec(self.path, head["name"], head.get("description", "").strip(), head.get("retries", RETRIES), sweeps, measure)
@@ -306,8 +289,8 @@ class _Reader(TableReader):
         except DembarkError as error:
             raise self.fail(table, str(error)) from None
 
-    def resources(self, table: str, data: Mapping[str, Any], base: Mapping[str, RunResources],
-                  measuring: bool = False) -> dict[str, RunResources]:
+    def resources(self, table: str, data: Mapping[str, Any], base: Mapping[str, Resources],
+                  measuring: bool = False) -> dict[str, Resources]:
         """Resources of each engine: keys of `data` count for all engines, its tables for one; `base` are the defaults."""
         self.table(data, table, _PER_RUN | dict.fromkeys((*engines.names(), *((MEASURE,) if measuring else ())), dict))
         common = {key: value for key, value in data.items() if key in _PER_RUN}
@@ -333,13 +316,13 @@ class _Reader(TableReader):
         except DembarkError as error:
             raise self.fail(table, str(error)) from None
 
-    def fitting(self, table: str, engine: str, found: RunResources) -> None:
+    def fitting(self, table: str, engine: str, found: Resources) -> None:
         facts = engines.facts(engine)
         if found.ranks > 1 and not facts.ranks:
             raise self.fail(table, f"ranks = {found.ranks} for {engine}", f"use threads: {facts.one_process}")
         if found.time is not None and found.restart_interval is not None and found.restart_interval >= found.time:
             raise self.fail(table, "restart_interval is not shorter than time", "a run that is ended must have written a restart file")
 
-    def measuring(self, data: Mapping[str, Any]) -> RunResources:
+    def measuring(self, data: Mapping[str, Any]) -> Resources:
         self.table(data, f"resources.{MEASURE}", _MEASURING)
-        return replace(RunResources(), **self.checked_resources(f"resources.{MEASURE}", data))
+        return replace(Resources(), **self.checked_resources(f"resources.{MEASURE}", data))

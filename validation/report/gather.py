@@ -9,7 +9,8 @@ from typing import Any
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
-from dembark.validation.cases import STUDY_PREFIX, Case, discover
+from dembark.validation.case.folders import discover
+from dembark.validation.case.model import STUDY_PREFIX, Case
 
 # Parameters of the method, not of the physics: results that depend on them do so by numerical error.
 NUMERICAL = {"time_step_fraction": "time step", "time_step": "time step", "youngs_modulus": "stiffness"}

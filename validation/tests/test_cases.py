@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from dembark.common.errors import DembarkError
 from dembark.common.units import to_si
-from dembark.validation import cases
-from dembark.validation.cases import discover, find, load
+from dembark.validation.case import folders
+from dembark.validation.case.folders import discover, find, load
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.resolve import for_replica, portable, resolve, settings
 from hypothesis import given
@@ -21,7 +21,7 @@ def edited(decks: Path, old: str, new: str) -> Path:
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new, 1))
-    cases.load.cache_clear()
+    folders.load.cache_clear()
     return path
 
 

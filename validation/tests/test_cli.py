@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 from dembark.common.files import read_json
-from dembark.validation import cases, engines
+from dembark.validation import engines
+from dembark.validation.case import folders
 from dembark.validation.cli import main
 
 Dembark = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -71,7 +72,7 @@ def test_cases_shows_every_key(capsys: pytest.CaptureFixture[str]) -> None:
     assert "box" in capsys.readouterr().out
     assert main(["cases", "box"]) == 0
     shown = capsys.readouterr().out
-    for key in cases.find("box").parameters.values():
+    for key in folders.find("box").parameters.values():
         assert key.name in shown and key.doc in shown
     assert "not set" in shown and "> 0" in shown and "dry (liggghts, yade)" in shown
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dembark.common.files import read_json
-from dembark.validation import cases
+from dembark.validation.case import folders
 from dembark.validation.campaigns import store
 from dembark.validation.campaigns.report.sweeps import Point, Sweep
 
@@ -48,7 +48,7 @@ def sweep(case: str, number: int, axes: Sequence[str], points: Mapping[str, Mapp
     found = tuple(Point(values, variant, contents.get((case, variant), {})) for variant, values in points.items())
     named = title or f"{case.replace('_', ' ').capitalize()}: {' × '.join(axis.replace('_', ' ') for axis in axes) or 'one point'}"
     # A case that has gone since leaves its results without units of the axes.
-    known = cases.discover().get(case)
+    known = folders.discover().get(case)
     units = {axis: known.parameters[axis].unit for axis in axes if known and axis in known.parameters}
     return Sweep(case, named, tuple(axes), found, f"{case}-{number}", units)
 

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 from dembark.common.checkout import checkout
 from dembark.common.errors import DembarkError
-from dembark.validation import cases, doctor, engines
+from dembark.validation import doctor, engines
+from dembark.validation.case import folders
 from dembark.validation.cli import main
 from dembark.validation.engines import DeckNumber, Engine, EngineFacts
 from dembark.validation.case.parameters import Value
@@ -165,7 +166,7 @@ def stub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setattr(engines, "ENGINES", (*engines.ENGINES, Stub))
     monkeypatch.setenv("DEMBARK_DECKS", str(folder.parent))
     monkeypatch.setenv("DEMBARK_TOLD_BY_STUB", "")
-    cases.load.cache_clear()
+    folders.load.cache_clear()
     engines.find.cache_clear()
     yield folder
     engines.find.cache_clear()
@@ -174,7 +175,7 @@ def stub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def test_a_new_engine_is_found_everywhere(stub: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     from dembark.validation.campaigns import rates
     from dembark.validation.case import deck
-    from dembark.validation.plan import series
+    from dembark.validation.runs.plan import series
     from dembark.validation.report import figures
 
     assert main(["cases"]) == 0 and "stub" in capsys.readouterr().out
@@ -188,9 +189,9 @@ def test_a_new_engine_is_found_everywhere(stub: Path, capsys: pytest.CaptureFixt
         assert main(["run", "box", *words]) == 2
         assert expected in capsys.readouterr().err
     with pytest.raises(DembarkError, match=r"stub\.txt is missing"):
-        series(cases.find("box"), "default", None, engines.find("stub"))
+        series(folders.find("box"), "default", None, engines.find("stub"))
     (stub / "stub.txt").write_text("deck\n")
-    (run,) = series(cases.find("box"), "default", None, engines.find("stub")).runs
+    (run,) = series(folders.find("box"), "default", None, engines.find("stub")).runs
     assert run.engine.version == "4.2" and run.engine.command(run.case.deck("stub"), {})[1] == str(stub / "stub.txt")
     deck.write(run.case, "stub", run.values, stub.parent)
     assert (stub.parent / "stub.txt").read_text().splitlines()[:2] == ["deck", "grain_count 10"]

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import sqlite3
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +10,8 @@ import pytest
 from dembark.common.errors import DembarkError
 from dembark.validation.campaigns import report
 from dembark.validation.campaigns.report.gather import gather
-from dembark.validation.campaigns.schema import TABLES, VERSION, statements
 from dembark.validation.campaigns.store import path_of
+from dembark.validation.runs import schema
 
 FRICTIONS, RADII = (0.2, 0.4, 0.8), (0.02, 0.04)
 
@@ -40,14 +38,9 @@ def fill(folder: Path, commit: str = "a" * 40, shift: float = 0.0, measured: str
                 rows["quantities"].append({**common, "name": "k", "label": "K_ratio", "unit": "1", "value": value, "low": value - 1e-3,
                                            "high": value + 1e-3, "reference": value * 1.02, "deviation": -0.02, "deviation_kind": "relative",
                                            "tolerance": 0.1, "verdict": "pass", "basis": "", "compared": 1})
-    with closing(sqlite3.connect(path_of(folder))) as connection, connection:
-        for statement in statements():
-            connection.execute(statement)
-        connection.execute(f"PRAGMA user_version = {VERSION}")
+    with schema.writing(path_of(folder)) as connection:
         for table, entries in rows.items():
-            columns = list(TABLES[table])
-            connection.executemany(f"INSERT OR REPLACE INTO {table} VALUES ({', '.join('?' * len(columns))})",
-                                   [[entry.get(column) for column in columns] for entry in entries])
+            schema.put(connection, table, entries)
     return folder
 
 

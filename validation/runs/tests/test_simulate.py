@@ -13,28 +13,31 @@ from pathlib import Path
 import pytest
 from dembark.common.errors import DembarkError, Interrupted, RunError
 from dembark.common.files import read_json
-from dembark.validation import cases, engines, outcome, simulate
-from dembark.validation.cases import find
-from dembark.validation.plan import Run, series
-from dembark.validation.progress import Board
+from dembark.validation import engines
+from dembark.validation.case import folders
+from dembark.validation.case.folders import find
+from dembark.validation.runs import outcome, simulate
+from dembark.validation.runs.plan import Run, series
 
 FindPid = Callable[[Path], int]
 Lives = Callable[[int], bool]
 Command = tuple[subprocess.Popen[str], Path]
+
+from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
 
 def plan(engine: str = "liggghts", **changes: object) -> Run:
     engines.find.cache_clear()
-    cases.load.cache_clear()
+    folders.load.cache_clear()
     return series(find("box"), "dry", "quick", engines.find(engine), changes).runs[0]
 
 
 def run(out: Path, engine: str = "liggghts", cancel: threading.Event | None = None, **changes: object) -> tuple[Path, str]:
-    board, one = Board(), plan(engine, **changes)
-    folder = simulate.simulate(one, out, board, cancel or threading.Event())
-    return folder, board.states()[0].state
+    one = plan(engine, **changes)
+    made = simulate.simulate(one, out, cancel or threading.Event())
+    return out / one.folder_name, "finished" if made else "kept"
 
 
 @pytest.mark.parametrize("engine", ["liggghts", "yade"])

@@ -11,8 +11,10 @@ from pathlib import Path
 
 from dembark.common.files import read_json, write_json
 from dembark.validation import engines
-from dembark.validation.plan import Run
+from dembark.validation.runs.plan import Run
 
+# Wall time (s) between states unless another one is asked for.
+INTERVAL = 600.0
 # What the decks call their states; docs/restarts.md has the format of the mark beside each.
 BASE = "state"
 _ATTEMPTS = "attempts.json"

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import read_json
-from dembark.validation import cases, claim, engines, restarts, simulate
-from dembark.validation.cases import find
-from dembark.validation.plan import Run, series
-from dembark.validation.progress import Board
-from dembark.validation.simulate import Resources
+from dembark.validation import engines
+from dembark.validation.case import folders
+from dembark.validation.case.folders import find
+from dembark.validation.runs import restarts, simulate
+from dembark.validation.runs.plan import Resources, Run, series
+from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
 
 # The stand-in has ten grains and a hundred steps; this is a state every twenty of them.
 OFTEN = Resources(restart_interval=2e-4)
@@ -27,15 +26,15 @@ pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
 def plan(engine: str = "liggghts", **changes: object) -> Run:
     engines.find.cache_clear()
-    cases.load.cache_clear()
+    folders.load.cache_clear()
     return series(find("box"), "dry", "quick", engines.find(engine), changes).runs[0]
 
 
 def run(below: Path, engine: str = "liggghts", used: Resources = OFTEN, **changes: object) -> dict[str, object]:
     if engine == "yade":
         used = Resources(restart_interval=10 * used.restart_interval)
-    folder = simulate.simulate(plan(engine, **changes), below / "out", Board(), threading.Event(), used)
-    record = read_json(folder / "run.json")
+    simulate.simulate(plan(engine, **changes), below / "out", threading.Event(), used)
+    record = read_json(below / "out/replica-1/run.json")
     assert record
     return record
 
@@ -116,7 +115,7 @@ def test_interruption_says_where_the_run_goes_on(tmp_path: Path, engine_pid: Cal
 
     def work_on() -> None:
         try:
-            simulate.simulate(plan(behaviour="hang"), tmp_path / "out", Board(), cancel, OFTEN)
+            simulate.simulate(plan(behaviour="hang"), tmp_path / "out", cancel, OFTEN)
         except Interrupted as error:
             caught.append(str(error))
 
@@ -132,12 +131,12 @@ def test_interruption_says_where_the_run_goes_on(tmp_path: Path, engine_pid: Cal
 
 def test_killed_harness_leaves_what_the_next_attempt_needs(tmp_path: Path, engine_pid: Callable[[Path], int], lives: Callable[[int], bool],
                                                            wait_for: Callable[..., object]) -> None:
-    text = ("import sys, threading; from pathlib import Path; from dembark.validation import simulate, engines; "
-            "from dembark.validation.cases import find; from dembark.validation.plan import series; "
-            "from dembark.validation.progress import Board; "
+    text = ("import sys, threading; from pathlib import Path; from dembark.validation import engines; "
+            "from dembark.validation.runs import simulate; "
+            "from dembark.validation.cases import find; from dembark.validation.runs.plan import series; "
             "one = series(find('box'), 'dry', 'quick', engines.find('liggghts'), {'behaviour': 'hang'}).runs[0]; "
             "used = simulate.Resources(restart_interval=2e-4); "
-            f"simulate.simulate(one, Path({str(tmp_path / 'out')!r}), Board(), threading.Event(), used)")
+            f"simulate.simulate(one, Path({str(tmp_path / 'out')!r}), threading.Event(), used)")
     process = subprocess.Popen([sys.executable, "-c", text])
     pid = engine_pid(tmp_path)
     wait_for(lambda: (work(tmp_path) / "state.40.restart.crc").exists())
@@ -174,66 +173,3 @@ def test_what_is_remembered_of_attempts_may_be_damaged(tmp_path: Path) -> None:
     for text in ("", "[]", "{}", '{"attempts": 1}', '{"resumed_at": 1, "x": 2}'):
         (tmp_path / "attempts.json").write_text(text)
         assert restarts.attempts(tmp_path) == restarts.Attempts()
-
-
-# --- the lock ----------------------------------------------------------------------------------------------------------
-
-def elsewhere(path: Path, key: str) -> None:
-    """A lock as a process of another host writes it."""
-    path.write_text(json.dumps({"key": key, "host": "another-host", "pid": 1, "beat": time.time()}) + "\n")
-
-
-@pytest.fixture
-def beating(tmp_path: Path) -> Iterator[Path]:
-    """A lock that a process of another host keeps alive."""
-    path, end = tmp_path / "lock", threading.Event()
-
-    def beat() -> None:
-        while not end.wait(0.05):
-            elsewhere(path, "theirs")
-
-    elsewhere(path, "theirs")
-    thread = threading.Thread(target=beat)
-    thread.start()
-    yield path
-    end.set()
-    thread.join()
-
-
-def test_lock_of_a_live_process_of_another_host_is_respected(beating: Path) -> None:
-    with pytest.raises(DembarkError, match="taken"), claim.claim(beating, "taken", threading.Event(), beat=0.1, dead_after=5.0):
-        pass
-
-
-def test_lock_of_a_dead_process_of_another_host_is_taken(tmp_path: Path) -> None:
-    path = tmp_path / "lock"
-    elsewhere(path, "theirs")
-    with claim.claim(path, "taken", threading.Event(), beat=0.1, dead_after=0.3) as lost:
-        content = read_json(path)
-        assert content and content["key"] != "theirs" and not lost.is_set()
-    assert path.read_text() == ""
-
-
-def test_holder_learns_that_its_lock_was_taken(tmp_path: Path, wait_for: Callable[..., object]) -> None:
-    path = tmp_path / "lock"
-    with claim.claim(path, "taken", threading.Event(), beat=0.05) as lost:
-        wait_for(lambda: elsewhere(path, "theirs") or lost.is_set())
-    assert json.loads(path.read_text())["key"] == "theirs"
-
-
-def test_waiting_for_a_lock_can_be_interrupted(tmp_path: Path) -> None:
-    cancel = threading.Event()
-    cancel.set()
-    elsewhere(tmp_path / "lock", "theirs")
-    with pytest.raises(Interrupted), claim.claim(tmp_path / "lock", "taken", cancel):
-        pass
-
-
-def test_lock_where_the_file_system_has_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(claim, "_flock", lambda handle: None)
-    never = threading.Event()
-    with claim.claim(tmp_path / "lock", "taken", never, beat=0.1):
-        with pytest.raises(DembarkError, match="taken"), claim.claim(tmp_path / "lock", "taken", never, beat=0.1):
-            pass
-    with claim.claim(tmp_path / "lock", "taken", never, beat=0.1):
-        pass

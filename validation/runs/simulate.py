@@ -19,51 +19,40 @@ from typing import Any
 
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import DISK_FULL, disk_error, move_into_place, sweep, write_json
-from dembark.validation import outcome, provenance, restarts
-from dembark.validation.claim import claim
+from dembark.common.lock import lock
+from dembark.validation import provenance
 from dembark.validation.case import deck
 from dembark.validation.case.parameters import Value
-from dembark.validation.plan import Run, finished
-from dembark.validation.process import chunks, running
-from dembark.validation.progress import Board, OutputParser
+from dembark.validation.runs import outcome, restarts
+from dembark.validation.runs.plan import Resources, Run, finished
+from dembark.validation.runs.process import chunks, running
+from dembark.validation.runs.progress import OutputParser
 
 _RESUMED = re.compile(r"dembark: resumed at step (\d+) (exact|approximate)ly")
 
 
-@dataclass(frozen=True)
-class Resources:
-    """What a run may use: MPI ranks and threads, and about how long it computes between states to resume from (s, 0: none)."""
-
-    ranks: int = 1
-    threads: int = 1
-    restart_interval: float = 600.0
+# Called with what changed: step, steps, time_step, attempt, resumed_from.
+Tell = Callable[..., None]
 
 
-def simulate(run: Run, out: Path, board: Board, cancel: threading.Event, resources: Resources | None = None) -> Path:
-    """Run `run` into `out/replica-<k>` unless its finished result stands there already; returns that folder.
+def quiet(**facts: object) -> None:
+    """A `Tell` for callers that need no progress."""
+
+
+def simulate(run: Run, out: Path, cancel: threading.Event, used: Resources | None = None, tell: Tell = quiet) -> bool:
+    """Run `run` into `out/replica-<k>`; False when its finished result stands there already.
 
     Until the run is finished and checked, an earlier result in that folder stays as it is. When it fails, RunError says why
     in one line and the engine's log is kept in `out/failed`. `cancel` ends the engine and raises Interrupted. A run that was cancelled
     or killed goes on from its last state when it is simulated again with the same inputs.
     """
     target = out / run.folder_name
-    used = resources or Resources()
-    with claim(out / f".{run.folder_name}.lock", f"{target} is being computed by another process", cancel) as lost:
+    with lock(out / f".{run.folder_name}.lock", f"{target} is being computed by another process", cancel) as lost:
         sweep(target)
         if finished(target, run):
-            board.post(run.name, state="kept")
-            return target
-        began = time.time()
-        board.post(run.name, state="running", started=began)
-        try:
-            _run_into(run, target, board, _Ended(cancel, lost), used)
-        except DembarkError as error:
-            # Another attempt may follow; it is not the run that failed.
-            state = "stopped" if isinstance(error, Killed | Interrupted) else "failed"
-            board.post(run.name, state=state, ended=time.time(), message=str(error).removeprefix(f"{run.name} failed, "))
-            raise
-        board.post(run.name, state="finished", ended=time.time())
-    return target
+            return False
+        _run_into(run, target, tell, _Ended(cancel, lost), used or Resources())
+    return True
 
 
 @dataclass(frozen=True)
@@ -77,7 +66,7 @@ class _Ended:
         return self.cancel.is_set() or self.lost.is_set()
 
 
-def _run_into(run: Run, target: Path, board: Board, ended: _Ended, used: Resources) -> None:
+def _run_into(run: Run, target: Path, tell: Tell, ended: _Ended, used: Resources) -> None:
     work = restarts.work_folder(run, target)
     computed = kept = False
     try:
@@ -88,7 +77,7 @@ def _run_into(run: Run, target: Path, board: Board, ended: _Ended, used: Resourc
         step, computed = restarts.begin(run, work), True
         if step is None:
             deck.write(run.case, run.engine.name, run.values, work)
-        record = _execute(run, work, step, board, ended, used)
+        record = _execute(run, work, step, tell, ended, used)
         restarts.clear(run, work)
         deck.archive(run.case, work)
         write_json(work / "run.json", record)
@@ -142,30 +131,31 @@ def _forget_failure(target: Path) -> None:
         kept.rmdir()
 
 
-def _execute(run: Run, work: Path, step: int | None, board: Board, ended: _Ended, used: Resources) -> dict[str, Any]:
+def _execute(run: Run, work: Path, step: int | None, tell: Tell, ended: _Ended, used: Resources) -> dict[str, Any]:
     """One attempt in `work`, from `step` on (None: from the start); the record of the finished run."""
     words: dict[str, Value] = {}
     every = 0
     if restarts.supported(run):
-        every = restarts.steps_between(run, used.restart_interval, used.ranks * used.threads)
+        interval = restarts.INTERVAL if used.restart_interval is None else used.restart_interval
+        every = restarts.steps_between(run, interval, used.cores)
         words = {"restart_every": every} | ({"resume": "yes"} if step is not None else {})
     command = run.engine.command(work / run.engine.facts.deck, words, used.ranks, used.threads)
-    before = _heard(work, restarts.attempts(work))
+    before = _with_log(work, restarts.attempts(work))
     began, clock = datetime.now(UTC), time.monotonic()
     restarts.remember(work, replace(before, attempts=before.attempts + 1, ended=False))
     parser = OutputParser()
-    board.post(run.name, attempt=before.attempts + 1, resumed_from=step or 0)
+    tell(attempt=before.attempts + 1, resumed_from=step or 0)
 
-    def news() -> None:
-        board.post(run.name, step=parser.step, steps=parser.steps, time_step=parser.time_step)
+    def update() -> None:
+        tell(step=parser.step, steps=parser.steps, time_step=parser.time_step)
 
     try:
         with running(command, work, run.engine.environment(used.threads)) as process:
-            _listen(process, work, parser, news, ended)
+            _listen(process, work, parser, update, ended)
             code = process.wait()
     finally:
         wall = time.monotonic() - clock
-        done = _heard(work, replace(before, attempts=before.attempts + 1, wall_time=before.wall_time + wall, ended=False))
+        done = _with_log(work, replace(before, attempts=before.attempts + 1, wall_time=before.wall_time + wall, ended=False))
         restarts.remember(work, done)
     outcome.judge(run, code, parser, work)
     frames = outcome.check_output(work, run.case.outputs, run.values.get("frames"))
@@ -182,8 +172,8 @@ def _execute(run: Run, work: Path, step: int | None, board: Board, ended: _Ended
     }
 
 
-def _heard(work: Path, told: restarts.Attempts) -> restarts.Attempts:
-    """The same with what the engine's log says of the last attempt, unless that was heard when it ended: a killed harness hears nothing."""
+def _with_log(work: Path, told: restarts.Attempts) -> restarts.Attempts:
+    """The same with what the engine's log says of the last attempt, unless that was read when it ended: a killed harness reads nothing."""
     if told.ended or not (work / "engine.log").is_file():
         return replace(told, ended=True)
     with (work / "engine.log").open(encoding="utf-8", errors="replace") as log:
@@ -195,7 +185,7 @@ def _heard(work: Path, told: restarts.Attempts) -> restarts.Attempts:
     return replace(told, resumed_at=(*told.resumed_at, int(found.group(1))), resume="approximate" if approximate else "exact", ended=True)
 
 
-def _listen(process: subprocess.Popen[bytes], work: Path, parser: OutputParser, news: Callable[[], None],
+def _listen(process: subprocess.Popen[bytes], work: Path, parser: OutputParser, update: Callable[[], None],
             ended: _Ended) -> None:
     looked = time.monotonic()
     with (work / "engine.log").open("wb", buffering=0) as log:
@@ -206,5 +196,5 @@ def _listen(process: subprocess.Popen[bytes], work: Path, parser: OutputParser, 
                 looked = time.monotonic()
                 outcome.check_disk(work)
             log.write(chunk)
-            if parser.hear(chunk):
-                news()
+            if parser.feed(chunk):
+                update()

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
@@ -18,40 +17,12 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from dembark.common.files import read_json
+from dembark.validation.runs.table import State
 
 INTERVAL = 10.0
-_COLOURS = {"running": "cyan", "finished": "green", "kept": "green", "failed": "bold red", "stopped": "yellow", "waiting": "dim"}
+_COLOURS = {"running": "cyan", "finished": "green", "failed": "bold red", "stopped": "yellow", "queued": "dim", "waiting": "dim"}
 _STEPS = re.compile(r"dembark: steps (\d+) time_step (\S+)")
 _STEP = re.compile(r"\s*(\d+)\s+[-+]?(?:\d|\.\d|nan|inf)")
-
-
-@dataclass(frozen=True)
-class State:
-    """State of a run: waiting, running, finished, kept (nothing to do), failed, or stopped from outside, to be started again; times in s,
-    `started` as seconds since 1970.
-
-    `attempt` counts the starts of a run that was ended from outside, `resumed_from` is the step where the present one went on.
-    """
-
-    name: str
-    state: str = "waiting"
-    step: int = 0
-    steps: int = 0
-    time_step: float = 0.0
-    started: float = 0.0
-    ended: float = 0.0
-    message: str = ""
-    attempt: int = 1
-    resumed_from: int = 0
-
-    @property
-    def left(self) -> float | None:
-        """Expected remaining seconds; None before there is a rate to tell it from."""
-        done = self.step - self.resumed_from
-        if self.state != "running" or done <= 0 or not self.steps:
-            return None
-        return (time.time() - self.started) * (self.steps - self.step) / done
 
 
 class OutputParser:
@@ -61,13 +32,13 @@ class OutputParser:
         self.steps, self.step, self.time_step, self.finished = 0, 0, 0.0, False
         self._unfinished = b""
 
-    def hear(self, chunk: bytes) -> bool:
-        """Take some bytes of the output, lines or parts of them; True when they brought news."""
+    def feed(self, chunk: bytes) -> bool:
+        """Take some bytes of the output, lines or parts of them; True when something changed."""
         *lines, self._unfinished = (self._unfinished + chunk).split(b"\n")
-        return any([self.feed(line.decode(errors="replace")) for line in lines])
+        return any([self.read(line.decode(errors="replace")) for line in lines])
 
-    def feed(self, line: str) -> bool:
-        """Take one line; True when it brought news."""
+    def read(self, line: str) -> bool:
+        """Take one line; True when something changed."""
         announced = _STEPS.match(line)
         if announced:
             self.steps, self.time_step = int(announced.group(1)), float(announced.group(2))
@@ -92,68 +63,9 @@ def duration(seconds: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60} min"
 
 
-class Board:
-    """The states of runs in this process; safe to use from several threads."""
-
-    def __init__(self, names: Sequence[str] = ()) -> None:
-        self._states = {name: State(name) for name in names}
-        self._guard = threading.Lock()
-
-    def post(self, name: str, **news: str | int | float) -> None:
-        """Change the state of run `name`."""
-        with self._guard:
-            self._states[name] = replace(self._states.get(name, State(name)), **news)  # type: ignore[arg-type]
-
-    def states(self) -> list[State]:
-        """All states, in the order in which the runs became known."""
-        with self._guard:
-            return list(self._states.values())
-
-
-class FileBoard(Board):
-    """A board whose news also go to one small file a run in `folder`, for a process that watches the jobs of a workflow."""
-
-    def __init__(self, folder: Path) -> None:
-        super().__init__()
-        self._folder = folder
-        self._written = 0.0
-
-    def post(self, name: str, **news: str | int | float) -> None:
-        super().post(name, **news)
-        if not news.keys() & {"state", "attempt"} and time.monotonic() - self._written < 1.0:
-            return
-        self._written = time.monotonic()
-        try:
-            path = self._folder / (name.replace(" ", "-") + ".json")
-            part = path.with_suffix(".part")
-            part.write_text(json.dumps(asdict(self._states[name])), encoding="utf-8")
-            part.replace(path)
-        except OSError:
-            # Telling the progress is never worth a run: a full disk is reported by what needs the space.
-            pass
-
-
-def watched(folder: Path, names: Sequence[str]) -> Callable[[], list[State]]:
-    """A function that gives the states of the runs `names` as their jobs wrote them to `folder`; what did not change is not read again."""
-    paths = {name: folder / (name.replace(" ", "-") + ".json") for name in names}
-    known: dict[str, tuple[int, State]] = {}
-
-    def state(name: str) -> State:
-        try:
-            changed = paths[name].stat().st_mtime_ns
-        except OSError:
-            return State(name)
-        if name not in known or known[name][0] != changed:
-            content = read_json(paths[name])
-            known[name] = (changed, State(**content) if content else State(name))
-        return known[name][1]
-
-    return lambda: [state(name) for name in names]
-
-
 def describe(state: State) -> str:
     """One plain line about a run."""
-    took = duration(state.ended - state.started)
+    took = duration(state.ended - state.began)
     match state.state:
         case "running" if state.steps:
             eta = "" if state.left is None else f", about {duration(state.left)} left"
@@ -165,8 +77,6 @@ def describe(state: State) -> str:
             return f"{state.name}: started"
         case "finished":
             return f"{state.name}: finished in {took}{f' in attempt {state.attempt}' if state.attempt > 1 else ''}"
-        case "kept":
-            return f"{state.name}: already finished; reusing"
         case "stopped":
             return f"{state.name}: stopped after {took}: {state.message}"
         case "failed":
@@ -176,7 +86,7 @@ def describe(state: State) -> str:
 
 def headline(states: Sequence[State]) -> str:
     """`3 of 12 done, 2 running, 6 waiting, 1 failed`; a stopped run waits to be started again."""
-    same = {"kept": "finished", "stopped": "waiting"}
+    same = {"queued": "waiting", "stopped": "waiting"}
     count = Counter(same.get(state.state, state.state) for state in states)
     return f"{count['finished']} of {len(states)} done, {count['running']} running, {count['waiting']} waiting, {count['failed']} failed"
 
@@ -190,7 +100,7 @@ def state_table(states: Sequence[State], rows: int | None = None) -> Table:
                   pad_edge=False)
     shown = list(states)
     if rows is not None and len(states) > rows:
-        order = ("running", "failed", "stopped", "waiting", "finished", "kept")
+        order = ("running", "failed", "stopped", "queued", "waiting", "finished")
         first = sorted(range(len(states)), key=lambda index: (order.index(states[index].state), -states[index].ended, index))
         shown = [states[index] for index in sorted(first[:max(1, rows - 1)])]
     for state in shown:
@@ -198,7 +108,7 @@ def state_table(states: Sequence[State], rows: int | None = None) -> Table:
         done = state.steps if state.state == "finished" else state.step
         step = f"{100 * done // state.steps} % of {state.steps}" if state.steps else ""
         simulated = f"{done * state.time_step:.3g} s of {state.steps * state.time_step:.3g} s" if state.steps else ""
-        left = duration(state.left) if state.left is not None else duration(state.ended - state.started) if state.ended else ""
+        left = duration(state.left) if state.left is not None else duration(state.ended - state.began) if state.ended else ""
         word = f"{state.state}, attempt {state.attempt}" if state.attempt > 1 else state.state
         table.add_row(state.name, f"[{_COLOURS[state.state]}]{word}[/]", step, simulated, left)
     if len(shown) < len(states):
@@ -209,18 +119,17 @@ def state_table(states: Sequence[State], rows: int | None = None) -> Table:
 class Monitor:
     """Shows what `states` returns while the `with` block runs: a live table in a terminal, else lines; `log` gets the lines always.
 
+    `event` is to be called with each state that changes.
+
     `reasons`: lines of failed and stopped runs say why, which whoever asked may rather do itself.
     """
 
     def __init__(self, states: Callable[[], list[State]], console: Console | None = None, interval: float = INTERVAL,
                  log: Path | None = None, reasons: bool = True) -> None:
-        self._reasons = reasons
-        self._states = states
+        self._states, self._interval, self._log, self._reasons = states, interval, log, reasons
         self._console = console or Console(file=sys.stderr, highlight=False, soft_wrap=True)
-        self._interval = interval
-        self._log = log
         self._end = threading.Event()
-        self._told: dict[str, tuple[State, float]] = {}
+        self._shown: dict[str, tuple[State, float]] = {}
         self._live: Live | None = None
         self._thread = threading.Thread(target=self._watch, daemon=True)
 
@@ -228,6 +137,10 @@ class Monitor:
         if self._console.is_terminal:
             self._live = Live(get_renderable=self._table, console=self._console, refresh_per_second=2)
             self._live.start()
+        for state in self._states():
+            if state.state == "finished" and state.kind == "run":
+                self._print(f"{state.name}: already finished; reusing", state)
+            self._shown[state.name] = (state, time.monotonic())
         self._thread.start()
         return self
 
@@ -236,36 +149,39 @@ class Monitor:
         self._thread.join()
         if self._live:
             self._live.stop()
-        self._tell()
 
     def _watch(self) -> None:
         while not self._end.wait(min(0.5, self._interval)):
-            self._tell()
+            self._update()
 
-    def _tell(self) -> None:
+    def event(self, state: State) -> None:
+        """Tell that `state` has changed."""
+        self._shown[state.name] = (state, time.monotonic())
+        if state.state not in ("waiting", "queued"):
+            self._print(describe(replace(state, steps=0)), state)
+
+    def _update(self) -> None:
         now = time.monotonic()
         for state in self._states():
-            before, when = self._told.get(state.name, (State(state.name), 0.0))
-            if (state.state, state.attempt, state.message) != (before.state, before.attempt, before.message):
-                event, line = True, describe(replace(state, steps=0))
+            before, when = self._shown.setdefault(state.name, (state, now))
+            if state.state == "running" and state.attempt > max(1, before.attempt):
+                self._print(describe(replace(state, steps=0)), state)
             elif state.state == "running" and state.steps and now - when >= self._interval:
-                event, line = False, describe(state)
+                self._print(describe(state), state, event=False)
             else:
                 continue
-            if not self._live:
-                shown = line if self._reasons else line.removesuffix(f": {state.message}")
-                self._console.print(f"dembark: {shown}", markup=False)
-            if event:
-                self._note(line)
-            self._told[state.name] = (state, now)
+            self._shown[state.name] = (state, now)
 
-    def _note(self, line: str) -> None:
-        if self._log:
+    def _print(self, line: str, state: State, event: bool = True) -> None:
+        if not self._live:
+            shown = line if self._reasons else line.removesuffix(f": {state.message}")
+            self._console.print(f"dembark: {shown}", markup=False)
+        if event and self._log:
             try:
                 with self._log.open("a", encoding="utf-8") as file:
                     file.write(f"{datetime.now().astimezone().isoformat(timespec='seconds')} {line}\n")
             except OSError:
-                self._log = None  # as for the board: a full disk is reported by what needs the space
+                self._log = None  # telling the progress is never worth a run: a full disk is reported by what needs the space
 
     def _table(self) -> Table:
         return state_table(self._states(), max(3, self._console.height - 4))

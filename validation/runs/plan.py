@@ -1,11 +1,11 @@
-"""Which runs there are: one run = case, variant, profile, engine and replica with all its numbers, known by a hash of its inputs."""
+"""What there is to do: one run = case, variant, profile, engine and replica with all its numbers, known by a hash of its inputs; and plans."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,8 @@ from dembark.validation.engines import Engine
 from dembark.validation.case.parameters import Value, pick
 from dembark.validation.case.resolve import for_replica, portable, resolve
 
+# How often a run that was ended from outside is started again.
+RETRIES = 3
 # A line of grains.dump and two to three of contacts.dump for each grain and frame.
 _BYTES_PER_GRAIN_AND_FRAME = 800
 
@@ -83,6 +85,23 @@ class Series:
 
 
 @dataclass(frozen=True)
+class Resources:
+    """What a run may use: MPI ranks (LIGGGHTS) and threads; memory (bytes), time of an attempt (s) and about how long it computes between
+    states to resume from (s, 0: none), where None leaves the choice to the system."""
+
+    ranks: int = 1
+    threads: int = 1
+    memory: float | None = None
+    time: float | None = None
+    restart_interval: float | None = None
+
+    @property
+    def cores(self) -> int:
+        """Cores of one run."""
+        return self.ranks * self.threads
+
+
+@dataclass(frozen=True)
 class PlannedStudy:
     """A study of one engine: the series of its variants, in the study's order."""
 
@@ -94,6 +113,28 @@ class PlannedStudy:
         """Folder below results/<profile>: <case>/study-<name>/<engine>."""
         first = self.series[0].place
         return first.parent.parent / self.study.folder_name / first.name
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that belongs into one results folder: a profile, or a campaign, and its series with the longest first.
+
+    `resources` are those of a series' runs by its place, `measure` those of a measurement that is to be a job of its own; `facts` go into
+    runs.json, `words` tell a job on another host which plan it belongs to. `whole`: nothing was left out of it by choice.
+    """
+
+    label: str
+    series: tuple[Series, ...]
+    facts: Mapping[str, Any]
+    words: tuple[str, ...]
+    resources: Mapping[Path, Resources] = field(default_factory=dict)
+    retries: int = RETRIES
+    measure: Resources | None = None
+    whole: bool = True
+
+    def of(self, one: Series) -> Resources:
+        """What each run of a series may use."""
+        return self.resources.get(one.place, Resources())
 
 
 def studies(all_series: Iterable[Series]) -> list[PlannedStudy]:
@@ -149,17 +190,9 @@ def finished(folder: Path, run: Run) -> bool:
     return record is not None and record.get("inputs") == run.inputs
 
 
-def summary(all_series: Iterable[Series], results: Path, messages: Mapping[str, str]) -> list[dict[str, Any]]:
-    """One entry a run: finished or not (`messages` = reasons by name of the run), and where; for the report."""
-    entries = []
-    for one in all_series:
-        for run in one.runs:
-            folder = results / one.place / run.folder_name
-            done = finished(folder, run)
-            other = (folder / "run.json").is_file()
-            changed = "its result is of other inputs: a parameter, the deck or the engine changed" if other else ""
-            entries.append({"case": run.case.name, "variant": run.variant, "engine": run.engine.name, "replica": run.replica,
-                            "folder": str(one.place / run.folder_name), "inputs": run.inputs,
-                            "state": "finished" if done else "failed" if run.name in messages else "missing",
-                            "message": "" if done else messages.get(run.name, changed)})
-    return entries
+def variants(all_series: Sequence[Series]) -> dict[Path, list[Series | PlannedStudy]]:
+    """Series, and studies, by the folder of their case and variant; those with more than one are compared."""
+    groups: dict[Path, list[Series | PlannedStudy]] = {}
+    for one in (*all_series, *studies(all_series)):
+        groups.setdefault(one.place.parent, []).append(one)
+    return groups
