@@ -133,7 +133,7 @@ def test_killed_harness_leaves_what_the_next_attempt_needs(tmp_path: Path, engin
                                                            wait_for: Callable[..., object]) -> None:
     text = ("import sys, threading; from pathlib import Path; from dembark.validation import engines; "
             "from dembark.validation.runs import simulate; "
-            "from dembark.validation.cases import find; from dembark.validation.runs.plan import series; "
+            "from dembark.validation.case.folders import find; from dembark.validation.runs.plan import series; "
             "one = series(find('box'), 'dry', 'quick', engines.find('liggghts'), {'behaviour': 'hang'}).runs[0]; "
             "used = simulate.Resources(restart_interval=2e-4); "
             f"simulate.simulate(one, Path({str(tmp_path / 'out')!r}), threading.Event(), used)")
