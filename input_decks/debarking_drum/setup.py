@@ -31,7 +31,8 @@ def setup(p: SimpleNamespace) -> Setup:
 
     spacing = 1.02 * p.log_diameter_max
     reach, rise = math.ceil(radius / spacing), math.sqrt(3.0) * spacing
-    k, i, shift = (axis.ravel() for axis in np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1), [0.0, 0.5], indexing="ij"))
+    numbers = np.arange(-reach, reach + 1)
+    k, i, shift = (axis.ravel() for axis in np.meshgrid(numbers, numbers, [0.0, 0.5], indexing="ij"))
     sites = np.column_stack(((i + shift) * spacing, np.zeros(len(k)), k * rise + shift * rise))
     sites = sites[np.hypot(sites[:, 0], sites[:, 2]) <= radius - 0.52 * p.log_diameter_max]
     if len(sites) < n:
@@ -41,6 +42,6 @@ def setup(p: SimpleNamespace) -> Setup:
     box = [(-1.1 * radius, 1.1 * radius), (-0.5 * spacing, 0.5 * spacing), (-1.1 * radius, 1.1 * radius)]
     masses = line_density * diameters**2
     logs = packing.bodies(box, sites[:n], 0.5 * diameters, masses)
-    numbers = {"logs": n, "inner_radius": radius, "load_weight": p.gravity * masses.sum()}
-    return Setup(steps, period / (ROWS * every), logs,
-                 {**numbers, "every": every, "stride": stride, "first": steps - stride * (p.frames - 1)})
+    return Setup(steps, period / (ROWS * every), logs, {
+        "logs": n, "inner_radius": radius, "load_weight": p.gravity * masses.sum(),
+        "every": every, "stride": stride, "first": steps - stride * (p.frames - 1)})

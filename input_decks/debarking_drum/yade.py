@@ -10,8 +10,8 @@ weight = (0, 0, -p.gravity)
 dembark.logs([O.materials.append(FrictMat(label="wood"))], axis="y")
 drum = O.bodies.append(dembark.drum((0, 0, 0), p.inner_radius, axis="y", omega=p.drum_speed))
 O.engines = dembark.log_loop(
-    LogImpact(stiffness=p.log_stiffness, contactDamping=p.contact_damping, theta=p.theta, friction=p.friction, tangentialRatio=p.tangential_ratio,
-              velocityAtStart=True, impactsFile="impacts.txt", label="hits",
+    LogImpact(stiffness=p.log_stiffness, contactDamping=p.contact_damping, theta=p.theta, friction=p.friction,
+              tangentialRatio=p.tangential_ratio, velocityAtStart=True, impactsFile="impacts.txt", label="hits",
               walls=[dict(bodies=[drum], stiffness=p.shell_stiffness, friction=p.shell_friction, name="shell")]),
     "record()", gravity=weight)
 

@@ -24,6 +24,7 @@ def setup(p: SimpleNamespace) -> Setup:
                      np.ones(5, np.int64), type_count=1)
     wet = p.liquid_content * 4.0 / 3.0 * math.pi * (0.5 * diameters) ** 3 * [1, 0, 0, 1, 0]
     # No bridge holds a cubic metre: that is no limit.
-    numbers = {**output, "end": end, "reach": p.amplitude * p.grain_diameter, "skin": 0.5 * p.grain_diameter, "largest_bridge": p.max_bridge or 1.0}
+    numbers = {**output, "end": end, "reach": p.amplitude * p.grain_diameter, "skin": 0.5 * p.grain_diameter,
+               "largest_bridge": p.max_bridge or 1.0}
     return Setup(output["steps"], p.time_step, grains, numbers,
                  tables={"periods": tuple(p.period * part for part in (1.0, 1.37, 0.83, 1.61, 1.13)), "volumes": tuple(wet.tolist())})

@@ -41,7 +41,8 @@ def record() -> None:
     # A scene that was loaded has engines of its own.
     books = next(one for one in O.engines if isinstance(one, CapillaryLiquid))
     energy = sum(0.5 * O.bodies[k].state.mass * O.bodies[k].state.vel.squaredNorm() for k in grains)
-    numbers = (O.time, energy, books.inGrains(), books.inBridges(), books.onWalls(), books.lost, books.bridgeCount(), *map(books.volume, grains))
+    numbers = (O.time, energy, books.inGrains(), books.inBridges(), books.onWalls(), books.lost, books.bridgeCount(),
+               *map(books.volume, grains))
     history.write(",".join([str(O.iter), *(f"{x:.17g}" for x in numbers)]) + "\n")
     history.flush()
     print(O.iter, f"{O.time:.6g}", f"{energy:.6g}", flush=True)
@@ -55,7 +56,8 @@ O.engines = [
     InteractionLoop(
         [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
         [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
-            restitution=0.5, staticFriction=0, kineticFriction=0, criticalSlipDistance=0, contactAngle=p.contact_angle, surfaceTension=0.072)],
+            restitution=0.5, staticFriction=0, kineticFriction=0, criticalSlipDistance=0, contactAngle=p.contact_angle,
+            surfaceTension=0.072)],
         [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(capillaryModel="willett", carriedLiquid=True)]),
     liquid,
     PyRunner(command="record()", iterPeriod=p.stride, initRun=True),

@@ -17,5 +17,6 @@ def setup(p: SimpleNamespace) -> Setup:
     places[:, 0] = np.arange(p.log_count) * spacing
     velocities[0, 0] = p.velocity
     reach = p.log_count * spacing + 2.0 * p.velocity * output["steps"] * p.time_step + 1.0
-    logs = packing.bodies([(-reach, reach), (-1.0, 1.0), (-1.0, 1.0)], places, np.full(p.log_count, p.radius), p.mass, velocities=velocities)
+    box = [(-reach, reach), (-1.0, 1.0), (-1.0, 1.0)]
+    logs = packing.bodies(box, places, np.full(p.log_count, p.radius), p.mass, velocities=velocities)
     return Setup(output["steps"], p.time_step, logs, output)

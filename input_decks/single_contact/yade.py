@@ -18,7 +18,8 @@ for kind, diameter, _, place, velocity, spin in dembark.packing():
     sphere.state.vel, sphere.state.angVel = velocity, spin
     O.bodies.append(sphere)
 if p.partner == "plane":
-    O.bodies.append([utils.wall((0, 0, 0), axis=2, sense=1, material=O.materials[partner], mask=1 << m) for m, partner in enumerate(partners)])
+    for m, partner in enumerate(partners):
+        O.bodies.append(utils.wall((0, 0, 0), axis=2, sense=1, material=O.materials[partner], mask=1 << m))
 
 rebound = [(materials[m * levels + k], partners[m], value) for m in (0, 1) for k, value in enumerate(p.restitutions)]
 writer = dembark.FrameWriter()

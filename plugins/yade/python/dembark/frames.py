@@ -14,7 +14,10 @@ def spheres():
 
 
 def motion(body, gravity=(0.0, 0.0, 0.0)):
-    """Force (N, with the weight), velocity (m/s) and angular velocity (rad/s) at the time of the positions: YADE's own are half a step behind."""
+    """Force (N, with the weight), velocity (m/s) and angular velocity (rad/s) at the time of the positions.
+
+    YADE's own velocities are half a step behind.
+    """
     state = body.state
     force, torque = O.forces.f(body.id) + state.mass * Vector3(*gravity), O.forces.t(body.id)
     velocity = [v if axis in state.blockedDOFs else v + 0.5 * O.dt * f / state.mass for axis, v, f in zip("xyz", state.vel, force)]
@@ -47,7 +50,7 @@ class FrameWriter:
             file.writelines(" ".join(f"{x:.17g}" for x in row) + "\n" for row in rows)
 
     def frame(self):
-        """Append the present state to grains.dump; to be called between forces and motion, where positions and forces are of the same time."""
+        """Append the present state to grains.dump; call it between forces and motion, where positions and forces are of the same time."""
         rows = []
         for body in spheres():
             force, velocity, spin = motion(body, self.gravity)
@@ -55,7 +58,7 @@ class FrameWriter:
         self._frame("grains.dump", "ATOMS", rows, "id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass")
 
     def row(self, *values):
-        """Append a row with the `values` of all columns to time.csv, after step 0, and print `<step> <time> <kinetic energy>` for whoever watches."""
+        """Append a row with the `values` of all columns to time.csv, after step 0; print step, time and energy for whoever watches."""
         if O.iter == 0:
             return
         energy = 0.0
