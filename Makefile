@@ -17,9 +17,9 @@ TEST_JOBS ?= $(shell nproc)
 physics_sources := $(shell find plugins/physics plugins/python postproc/native -type f -not -name '*.pyc' -not -name '*.py')
 liggghts_sources := $(shell find plugins/liggghts -type f -not -path '*/tests/*') $(filter-out %/tests/%,$(filter plugins/physics/%,$(physics_sources)))
 yade_sources := $(shell find plugins/yade -type f -not -path '*/tests/*' -not -name '*.pyc') $(filter-out %/tests/%,$(filter plugins/physics/%,$(physics_sources)))
-python_files := $(shell find plugins/python common postproc validation input_decks -type f -not -name '*.pyc' -not -path '*/tests/*')
+headers := $(filter %.hpp,$(filter-out %/tests/%,$(filter plugins/physics/%,$(physics_sources))))
 
-.PHONY: all help system liggghts yade-engine yade-plugin yade test validate bench doctor figures install-liggghts clean
+.PHONY: all help system liggghts yade-engine yade-plugin yade lint tidy stubs wheel test validate bench doctor figures install-liggghts clean
 
 all: $(BUILD)/.python $(BUILD)/.liggghts $(BUILD)/.yade ## set up and build everything
 
@@ -36,7 +36,7 @@ $(VENV)/.complete: packaging/requirements.lock | system
 	  $(BIN)/pip install --disable-pip-version-check --progress-bar off --use-pep517 --require-hashes --requirement packaging/requirements.lock
 	@touch $@
 
-# Everything is compiled once; the Python package is an editable install whose compiled part comes from the same headers.
+# Everything is compiled once; the Python package is an editable install: compiled modules from the same headers, Python files as they are.
 engines := cmake -G Ninja -S . -B $(BUILD)/engines -DDEMBARK_PYTHON=OFF -- ninja -C $(BUILD)/engines -j $(JOBS)
 
 $(BUILD)/.liggghts: CMakeLists.txt $(liggghts_sources) | system
@@ -53,7 +53,7 @@ $(BUILD)/.physics-tests: CMakeLists.txt $(physics_sources) | system
 	@mkdir -p $(BUILD)/bin && ln -sf ../engines/bin/physics-tests $(BUILD)/bin/
 	@touch $@
 
-$(BUILD)/.python: pyproject.toml CMakeLists.txt $(python_files) $(filter-out %/tests/%,$(physics_sources)) $(VENV)/.complete
+$(BUILD)/.python: pyproject.toml CMakeLists.txt $(filter-out %/tests/%,$(physics_sources)) $(VENV)/.complete
 	@echo "dembark: installing the Python package into $(VENV)" >&2
 	@PATH=$(CURDIR)/$(BIN):$$PATH packaging/build.py --name "Python package" --log $(BUILD)/python.log --resume make -- \
 	  $(BIN)/pip install --disable-pip-version-check --no-deps --no-build-isolation --editable .
@@ -76,6 +76,29 @@ yade: all ## start YADE with dembark's classes (ARGS=...)
 
 doctor: $(BUILD)/.python ## say what is found, what is missing and what to do
 	@$(BIN)/dembark doctor
+
+lint: $(VENV)/.complete ## check the sources: rules, types, layout
+	@$(BIN)/ruff check
+	@$(BIN)/mypy
+	@git ls-files '*.c' '*.cpp' '*.hpp' '*.h' | xargs $(BIN)/clang-format --dry-run -Werror
+	@$(MAKE) tidy
+
+# One translation unit holds all headers.
+$(BUILD)/.tidy: .clang-tidy $(headers) $(VENV)/.complete | system
+	@mkdir -p $(BUILD)/lint && ln -sfn $(CURDIR)/plugins/physics $(BUILD)/lint/dembark
+	@printf '#include "%s"\n' $(headers:plugins/physics/%=dembark/%) > $(BUILD)/lint/headers.cpp
+	@$(BIN)/clang-tidy --config-file=.clang-tidy --quiet $(BUILD)/lint/headers.cpp -- -std=c++17 -I$(BUILD)/lint -isystem /usr/include/eigen3
+	@touch $@
+
+tidy: $(BUILD)/.tidy
+
+stubs: $(BUILD)/.python ## write the types of the compiled modules into dembark/ anew
+	@for name in _physics _fields _dumps; do $(BIN)/python -m nanobind.stubgen --quiet --module dembark.$$name --output-file dembark/$$name.pyi; done
+
+wheel: $(VENV)/.complete | system ## build the wheel of a release into build/dist
+	@PATH=$(CURDIR)/$(BIN):$$PATH packaging/build.py --name wheel --log $(BUILD)/wheel.log --resume "make wheel" -- \
+	  $(BIN)/pip wheel --disable-pip-version-check --no-deps --no-build-isolation --config-settings=build-dir=$(BUILD)/wheel \
+	  --wheel-dir $(BUILD)/dist .
 
 test: all $(BUILD)/.physics-tests ## run all tests
 	@$(BUILD)/bin/physics-tests

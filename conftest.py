@@ -1,5 +1,7 @@
 """`--slow`: tests that build whole engines run only when asked for; what all tests share."""
 
+# Before pytest takes the folder packaging/ for this library.
+import packaging.version  # noqa: F401
 import pytest
 
 

@@ -1,4 +1,5 @@
-/* Lets an engine's own timers count processor time instead of elapsed time, so that other work on the machine does not enter: loaded before MPI. */
+/* Lets an engine's own timers count processor time instead of elapsed time, so that other work on the machine does not enter; loaded
+ * before MPI. */
 #include <time.h>
 
 double MPI_Wtime(void) {

@@ -32,9 +32,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.validation import engines
 from dembark.postproc.statistics import student
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 LOGS, LOW, HIGH, DENSITY, FILLING = 60, 0.10, 0.25, 850.0, 0.3
@@ -127,13 +128,13 @@ def deck(law: str, step: float, seconds: float, rows: int, *, turning: bool, cou
                   f"fix p5 all property/global coefficientFriction {table(friction, 1.5 * friction)}",
                   "pair_style gran model hooke/stiffness tangential history absolute_damping on tangential_damping off limitForce on",
                   "pair_coeff * *", weight,
-                  "fix shell all wall/gran model hooke/stiffness tangential history primitive type 2 zcylinder "
-                  f"{radius!r} 0 0 shear x {speed!r} absolute_damping on tangential_damping off limitForce on"]
+                  ("fix shell all wall/gran model hooke/stiffness tangential history primitive type 2 zcylinder "
+                   f"{radius!r} 0 0 shear x {speed!r} absolute_damping on tangential_damping off limitForce on")]
         elastic = "0"
     else:
-        lines += [weight, f"fix hits all lcp/impact stiffness {log} {log} contact_damping {damping} {law} "
-                  f"friction {friction} tangential_ratio {1 / 3.5!r} inertia sphere "
-                  f"wall cylinder shell z 0 0 {radius!r} stiffness {shell} friction {1.5 * friction} omega {speed!r}"]
+        lines += [weight, (f"fix hits all lcp/impact stiffness {log} {log} contact_damping {damping} {law} "
+                          f"friction {friction} tangential_ratio {1 / 3.5!r} inertia sphere "
+                          f"wall cylinder shell z 0 0 {radius!r} stiffness {shell} friction {1.5 * friction} omega {speed!r}")]
         elastic = "f_hits[7]"
     lines.append("fix motion all nve/sphere")
     if rows == 0:
@@ -297,8 +298,8 @@ def cells(entry: dict[str, Any] | None, decimals: int = 0) -> list[str]:
 
 def markdown(found: dict[str, Any]) -> str:
     """The first table of the guide."""
-    lines = ["| ωτ | law | energy error of 1 s, nothing lost | moment (N m) | kinetic energy (J) | largest force (N) | µs per step "
-             "| s per simulated second |", "|---|---|---|---|---|---|---|---|"]
+    lines = [("| ωτ | law | energy error of 1 s, nothing lost | moment (N m) | kinetic energy (J) | largest force (N) | µs per step "
+              "| s per simulated second |"), "|---|---|---|---|---|---|---|---|"]
     for turn in sorted({*STEPS, *LARGE_STEPS}):
         for law, label in LAWS.items():
             still = next((one for one in found["closed"] if one["law"] == law and one["turn"] == turn), None)

@@ -1,4 +1,4 @@
-"""Kills a run of the debarking drum a little after half-way, lets it go on from its last saved state, and compares it with a run that was left alone.
+"""Kills a run of the debarking drum a little after half-way and lets it go on from its last saved state; compares it with one left alone.
 
     python -m benchmarks.drum_resume [--engine liggghts|yade] [--restart-every steps] [--out result.json] [key=value ...]
 
@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from dembark.validation import engines
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find

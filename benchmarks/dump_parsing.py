@@ -22,13 +22,14 @@ from pathlib import Path
 
 import MDAnalysis
 import numpy as np
+from MDAnalysis.coordinates.LAMMPS import DumpReader
+from rich.console import Console
+from rich.table import Table
+
 from benchmarks.measure import spread
 from dembark.common.errors import DembarkError
 from dembark.common.files import write_json
 from dembark.postproc import GrainsDump, TextDump, universe
-from MDAnalysis.coordinates.LAMMPS import DumpReader
-from rich.console import Console
-from rich.table import Table
 
 ROOT = Path(__file__).resolve().parents[1]
 COLUMNS = "id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass"
@@ -73,38 +74,46 @@ def _blocks(path: Path) -> Iterator[str]:
 
 
 def by_text_dump(path: Path) -> float:
+    """The reader of whole files."""
     return sum(float(raw.values[:, 2].sum()) for raw in TextDump(path))
 
 
 def by_stream(path: Path) -> float:
+    """The reader that holds one frame at a time."""
     return sum(float(raw.values[:, 2].sum()) for raw in TextDump(path, stream=True))
 
 
 def by_grains_dump(path: Path) -> float:
+    """Frames of grains, with positions made absolute and units known."""
     return sum(float(frame.positions[:, 0].sum()) for frame in GrainsDump(path))
 
 
 def by_universe(path: Path) -> float:
+    """dembark's reader inside MDAnalysis."""
     return sum(float(step.positions[:, 0].astype(float).sum()) for step in universe(path).trajectory)
 
 
 def by_mdanalysis(path: Path) -> float:
+    """MDAnalysis's own reader, which takes positions only."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return sum(float(step.positions[:, 0].astype(float).sum()) for step in DumpReader(str(path)))
 
 
 def by_mdanalysis_columns(path: Path) -> float:
+    """MDAnalysis's own reader with all columns."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return sum(float(step.positions[:, 0].astype(float).sum()) for step in DumpReader(str(path), additional_columns=True))
 
 
 def by_loadtxt(path: Path) -> float:
+    """numpy.loadtxt, frame by frame."""
     return sum(float(np.loadtxt(io.StringIO(block))[:, 2].sum()) for block in _blocks(path))
 
 
 def by_fromstring(path: Path) -> float:
+    """numpy.fromstring, frame by frame."""
     return sum(float(np.fromstring(block, sep=" ").reshape(-1, len(COLUMNS.split()))[:, 2].sum()) for block in _blocks(path))
 
 
@@ -179,7 +188,8 @@ def rows(samples: dict[str, list[Sample]], megabytes: float) -> list[dict[str, o
     return found
 
 
-HEADS = ["reader", "elapsed / s", "MB/s", "times as fast", "processor / s", "times as fast (processor)", "peak memory / MB", f"goal {GOAL:g} x"]
+HEADS = ["reader", "elapsed / s", "MB/s", "times as fast", "processor / s", "times as fast (processor)", "peak memory / MB",
+         f"goal {GOAL:g} x"]
 
 
 def texts(row: dict) -> list[str]:
@@ -194,6 +204,7 @@ def texts(row: dict) -> list[str]:
 
 
 def parsed(words: list[str] | None) -> argparse.Namespace:
+    """The options of the command line; ends the program when one is wrong."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.dump_parsing", description=__doc__.splitlines()[0])
     parser.add_argument("--grains", type=int, default=50000, help="grains in a frame (default %(default)s)")
     parser.add_argument("--frames", type=int, default=3, help="frames (default %(default)s)")

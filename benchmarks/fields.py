@@ -15,6 +15,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +78,8 @@ def row(backend: str, kernel: str, width: float, threads: int, samples: Sequence
     wall = statistics.median(walls)
     return {
         "backend": backend, "kernel": kernel, "width": width, "threads": threads, "contacts": contacts, "wall": wall,
-        "wall_min": min(walls), "processor": statistics.median(processors), "microseconds_per_contact": 1e6 * wall / contacts, "samples": len(samples),
+        "wall_min": min(walls), "processor": statistics.median(processors), "microseconds_per_contact": 1e6 * wall / contacts,
+        "samples": len(samples),
     }  # fmt: skip
 
 
@@ -93,10 +95,10 @@ def measure(
         how = {"kernel": kernel, "width": width * DIAMETER}
         for threads in sorted({1, len(os.sched_getaffinity(0))}):
             say(f"{kernel}, {width:g} d, compiled on {threads}")
-            samples = [timed(lambda: coarse_grain(grains, contacts, grid, threads=threads, **how)) for _ in range(rounds)]
+            samples = [timed(partial(coarse_grain, grains, contacts, grid, threads=threads, **how)) for _ in range(rounds)]
             rows.append(row("native", kernel, width, threads, samples, len(contacts.ids)))
         say(f"{kernel}, {width:g} d, numpy on {len(few_contacts.ids)} contacts")
-        samples = [timed(lambda: coarse_grain(few_grains, few_contacts, grid, backend="numpy", **how))]
+        samples = [timed(partial(coarse_grain, few_grains, few_contacts, grid, backend="numpy", **how))]
         rows.append(row("numpy", kernel, width, 1, samples, len(few_contacts.ids)))
     return rows
 
@@ -104,11 +106,9 @@ def measure(
 def table(rows: Sequence[dict[str, Any]]) -> str:
     """The rows as Markdown."""
     lines = ["| kernel | width / d | by | threads | contacts | wall s | processor s | us a contact |", "|---|---|---|---|---|---|---|---|"]
-    for one in rows:
-        lines.append(
-            f"| {one['kernel']} | {one['width']:g} | {one['backend']} | {one['threads']} | {one['contacts']} | {one['wall']:.2f} | "
-            f"{one['processor']:.2f} | {one['microseconds_per_contact']:.2f} |"
-        )
+    lines += [
+        f"| {one['kernel']} | {one['width']:g} | {one['backend']} | {one['threads']} | {one['contacts']} | {one['wall']:.2f} | "
+        f"{one['processor']:.2f} | {one['microseconds_per_contact']:.2f} |" for one in rows]
     return "\n".join(lines)
 
 
@@ -128,7 +128,8 @@ def main(words: Sequence[str] | None = None) -> int:
         rows = measure(given.edge, given.cells, CASES, given.rounds, given.part, lambda line: print(line, file=sys.stderr))
         facts = {
             "grains": given.edge**3, "contacts": 3 * given.edge**3, "cells": given.cells**3, "cpu": cpu(),
-            "cores": len(os.sched_getaffinity(0)), "instruction_set": _fields.instruction_set(), "load": load, "load_after": os.getloadavg()[0], **commit(),
+            "cores": len(os.sched_getaffinity(0)), "instruction_set": _fields.instruction_set(), "load": load,
+            "load_after": os.getloadavg()[0], **commit(),
             "version": package_version("dembark"), "peak_memory_bytes": 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
             "date": datetime.now(UTC).isoformat(timespec="seconds"),
         }  # fmt: skip

@@ -22,7 +22,7 @@ from benchmarks.lcp_cases import Problem, certificate, coupled, network, sequenc
 from dembark.common.errors import DembarkError, RunError
 from dembark.common.files import write_json
 from dembark.physics import LcpResult, LcpSolver, solve_lcp
-from dembark.validation.provenance import cpu, commit, package_version
+from dembark.validation.provenance import commit, cpu, package_version
 
 HERE = Path(__file__).parent
 SYSTEM_PYTHON = "/usr/bin/python3"
@@ -200,11 +200,12 @@ def markdown(rows: list[dict[str, Any]], asked: list[dict[str, Any]], facts: dic
     lines += ["", "| goal | value | asked | |", "| --- | --- | --- | --- |"]
     lines += [f"| {goal['goal']} | {goal['value']:.3g} | {goal['bound']:g} | {'met' if goal['met'] else 'MISSED'} |" for goal in asked]
     if not facts["versions"].get("siconos"):
-        lines += ["", "Siconos's methods, and the goals that compare with them, are left out: the system's Python has no Siconos "
-                  "(python3-siconos, not in every release of Debian)."]
+        lines += ["", ("Siconos's methods, and the goals that compare with them, are left out: the system's Python has no Siconos "
+                       "(python3-siconos, not in every release of Debian).")]
     versions = ", ".join(f"{name} {version}" for name, version in facts["versions"].items() if version)
-    lines += ["", f"{facts['date']}, {facts['cpu']}, {facts['cores']} cores, load {facts['load']:.1f} before and "
-              f"{facts['load_after']:.1f} after, commit {facts['commit'] or 'none'}{' with changes' if facts['dirty'] else ''}, {versions}.", ""]
+    lines += ["", (f"{facts['date']}, {facts['cpu']}, {facts['cores']} cores, load {facts['load']:.1f} before and "
+                   f"{facts['load_after']:.1f} after, commit {facts['commit'] or 'none'}{' with changes' if facts['dirty'] else ''}, "
+                   f"{versions}."), ""]
     return "\n".join(lines)
 
 
@@ -224,10 +225,10 @@ def steps_of(row: dict[str, Any]) -> float:
 
 def plot(rows: list[dict[str, Any]], path: Path) -> None:
     """Time, and below it the steps that it took, against the number of contacts."""
-    import matplotlib  # noqa: PLC0415
+    import matplotlib
 
     matplotlib.use("Agg")
-    from matplotlib import pyplot as plt  # noqa: PLC0415
+    from matplotlib import pyplot as plt
 
     cases = [case for case in ("coupled", "network, stored dense", "network, sparse") if any(row["case"] == case for row in rows)]
     solvers = list(dict.fromkeys(row["solver"] for row in rows if row["case"] in cases))

@@ -16,6 +16,7 @@ METHODS = {"lemke": (numerics.SICONOS_LCP_LEMKE, numerics.lcp_lexicolemke),
 
 
 def main(path, wall, names):
+    """Solve the stored problem by each of the named methods, timed; prints JSON."""
     with np.load(path) as stored:
         matrix, right = stored["M"], stored["q"]
     clock = time.perf_counter if wall else time.process_time

@@ -48,6 +48,7 @@ class Comparison:
     goals: dict[str, float] = field(default_factory=dict)
 
     def run(self, rounds: int, say: Callable[[str], None]) -> None:
+        """Take a sample of each subject in each of `rounds`."""
         for turn in range(rounds):
             # Every second round runs backwards, so that a machine that slows down steadily favours nobody.
             for subject in self.subjects if turn % 2 == 0 else reversed(self.subjects):
@@ -78,15 +79,16 @@ def spread(values: Sequence[float]) -> dict[str, float]:
 
 def read_log(text: str) -> Sample:
     """The last run in a LIGGGHTS log; RunError when there is none."""
-    loops = re.findall(r"^Loop time of (\S+) on ", text, re.M)
-    pairs = re.findall(r"^Pair  time \(%\) = (\S+) ", text, re.M)
+    loops = re.findall(r"^Loop time of (\S+) on ", text, re.MULTILINE)
+    pairs = re.findall(r"^Pair  time \(%\) = (\S+) ", text, re.MULTILINE)
     if not loops or len(loops) != len(pairs):
-        errors = re.findall(r"^ERROR.*$", text, re.M)
+        errors = re.findall(r"^ERROR.*$", text, re.MULTILINE)
         raise RunError("LIGGGHTS did not finish a timed run", errors[-1] if errors else "its log holds no timings")
     return Sample(float(loops[-1]), float(pairs[-1]))
 
 
 def stock_liggghts() -> Path:
+    """The stock engine; DembarkError when there is none."""
     found = os.environ.get("STOCK_LIGGGHTS") or shutil.which("liggghts")
     if not found:
         raise DembarkError("stock liggghts not found", "on PATH", "install Debian's package liggghts or set STOCK_LIGGGHTS")
@@ -117,7 +119,7 @@ def liggghts_sample(program: Path, bed: Path, variables: dict[str, object], envi
         log = folder / "log"
         text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else done.stdout + done.stderr
         if done.returncode:
-            text = re.sub(r"^Loop time.*$", "", text, flags=re.M)
+            text = re.sub(r"^Loop time.*$", "", text, flags=re.MULTILINE)
         return read_log(text)
 
 
@@ -125,7 +127,8 @@ def yade_sample(engine: Engine, bed: Path, law: str, relax: int, steps: int) -> 
     """One timed run of yade_bed.py with contact law `law` (`stock` or `dembark`)."""
     words = [str(engine.executable), "-j1", "-n", "-x", str(HERE / "yade_bed.py")]
     with tempfile.TemporaryDirectory(prefix="dembark-bench-") as name:
-        done = _call([*words, f"bed={bed}", f"law={law}", f"relax={relax}", f"steps={steps}", "samples=1"], Path(name), engine.environment())
+        done = _call([*words, f"bed={bed}", f"law={law}", f"relax={relax}", f"steps={steps}", "samples=1"], Path(name),
+                     engine.environment())
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
     if done.returncode or not lines:
         last = (done.stderr or done.stdout).strip().splitlines()[-1:] or ["it says nothing"]
@@ -154,7 +157,8 @@ def settled_bed(cache: Path, count: int, say: Callable[[str], None]) -> Path:
         rows = dump.read_text(encoding="utf-8").splitlines()[9:]
     if len(rows) != count:
         raise RunError(f"only {len(rows)} of {count} spheres are in the settled bed")
-    lines = ["settled bed", "", f"{count} atoms", "1 atom types", "", "0 0.1 xlo xhi", "0 0.1 ylo yhi", "-0.005 0.5 zlo zhi", "", "Atoms", ""]
+    lines = ["settled bed", "", f"{count} atoms", "1 atom types", "", "0 0.1 xlo xhi", "0 0.1 ylo yhi", "-0.005 0.5 zlo zhi", "", "Atoms",
+             ""]
     for row in rows:
         number, *place = row.split()
         lines.append(f"{number} 1 {DIAMETER} 2500 {' '.join(place)}")

@@ -115,6 +115,7 @@ def _pinned(cores: int) -> list[str]:
 
 
 def say(line: str) -> None:
+    """Tell on stderr what goes on."""
     print(f"dembark: {line}", file=sys.stderr, flush=True)
 
 
@@ -160,6 +161,7 @@ def markdown(points: Iterable[Point], facts: dict[str, object]) -> str:
 
 
 def parsed(words: list[str] | None) -> argparse.Namespace:
+    """The options of the command line; ends the program when one is wrong."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.mpi_scaling", description=__doc__)
     cores = len(os.sched_getaffinity(0))
     parser.add_argument("--grains", type=int, nargs="+", default=[2500, 20000], help="2500, 20000, or 20000 times a square")

@@ -13,7 +13,14 @@ from rich.table import Table
 
 from benchmarks import lcp
 from benchmarks.measure import (
-    HERE, Comparison, Subject, clock_library, liggghts_sample, settled_bed, stock_liggghts, yade_sample,
+    HERE,
+    Comparison,
+    Subject,
+    clock_library,
+    liggghts_sample,
+    settled_bed,
+    stock_liggghts,
+    yade_sample,
 )
 from dembark.common.errors import DembarkError
 from dembark.common.files import write_json
@@ -24,6 +31,7 @@ ROOT = HERE.parent
 
 
 def say(line: str) -> None:
+    """Tell on stderr what goes on."""
     print(f"dembark: {line}", file=sys.stderr, flush=True)
 
 
@@ -77,12 +85,13 @@ HEADS = ["comparison", "models", "pair time / s", "pair ratio", "loop time / s",
 
 
 def markdown(rows: list[dict], facts: dict) -> str:
+    """The table of all rows and what it was measured with."""
     table = ["| " + " | ".join(HEADS) + " |", "|" + " --- |" * len(HEADS)]
     table += ["| " + " | ".join(texts(row)) + " |" for row in rows]
     return "\n".join([
         "# Cost of dembark's styles beside the stock ones", "",
-        f"{facts['grains']} settled spheres of {facts['diameter']} m; {facts['clock']}; median (least-greatest) of {facts['rounds']} rounds in turn; "
-        "ratios to the reference of the same round.", "", *table, "",
+        (f"{facts['grains']} settled spheres of {facts['diameter']} m; {facts['clock']}; "
+         f"median (least-greatest) of {facts['rounds']} rounds in turn; ratios to the reference of the same round."), "", *table, "",
         f"{facts['date']}, {facts['cpu']}, {facts['cores']} cores, load {facts['load']:.1f} before and {facts['load_after']:.1f} after, "
         f"commit {facts['commit'] or 'none'}{' with changes' if facts['dirty'] else ''}, " +
         ", ".join(f"{name} {version}" for name, version in facts["versions"].items() if version) + ".", "",
@@ -90,10 +99,12 @@ def markdown(rows: list[dict], facts: dict) -> str:
 
 
 def parsed(words: list[str] | None) -> argparse.Namespace:
+    """The options of the command line; ends the program when one is wrong."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.run", description=__doc__)
     parser.add_argument("--rounds", type=int, default=5, help="samples of each combination (default %(default)s)")
     parser.add_argument("--count", type=int, default=20000, help="spheres in the bed (default %(default)s)")
-    parser.add_argument("--steps", type=int, default=400, help="steps of a timed run of LIGGGHTS; a quarter of it in YADE (default %(default)s)")
+    parser.add_argument("--steps", type=int, default=400,
+                        help="steps of a timed run of LIGGGHTS; a quarter of it in YADE (default %(default)s)")
     parser.add_argument("--relax", type=int, default=1000, help="steps before it, in which histories build up (default %(default)s)")
     parser.add_argument("--only", choices=["dry", "wet", "yade", "lcp"], action="append", help="leave the other comparisons out")
     parser.add_argument("--redraw", action="store_true", help="with --only lcp: measure nothing, draw docs/figures/lcp_scaling from --out")

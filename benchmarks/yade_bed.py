@@ -13,15 +13,12 @@ diameter, friction, kinetic, restitution = 0.005, 0.5, 0.4, 0.5
 width = float(options.get("width", 0.1))  # of the square base (m)
 relax, steps, samples = (int(options[key]) for key in ("relax", "steps", "samples"))
 
-positions = []
 with open(options["bed"], encoding="utf-8") as bed:
     rows = iter(bed)
     for line in rows:
         if line.startswith("Atoms"):
             break
-    for line in rows:
-        if line.strip():
-            positions.append(tuple(float(word) for word in line.split()[4:7]))
+    positions = [tuple(float(word) for word in line.split()[4:7]) for line in rows if line.strip()]
 
 O.dt = 2e-5
 O.periodic = True

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from dembark.common.errors import DembarkError
 
@@ -26,15 +26,15 @@ _EXAMPLES = {"m": "4 mm", "m^2": "4 mm^2", "m^3": "0.08 mm^3", "s": "2 ms", "m/s
 
 
 @cache
-def _registry() -> pint.UnitRegistry:
+def _registry() -> pint.UnitRegistry[float]:
     # Loaded on first use: plain numbers, the common case, shall not wait for it.
     import pint
 
     return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
 
 
-def _angle_power(quantity: pint.Quantity) -> float:
-    return dict(quantity.to_root_units().unit_items()).get("radian", 0)
+def _angle_power(quantity: pint.Quantity[float]) -> float:
+    return cast("float", dict(quantity.to_root_units().unit_items()).get("radian", 0))
 
 
 def known_unit(unit: str) -> bool:
@@ -43,7 +43,7 @@ def known_unit(unit: str) -> bool:
         return True
     try:
         _registry().Unit(unit)
-    except Exception:  # the parser of unit texts raises many kinds, none of which means anything else here
+    except Exception:  # noqa: BLE001 (the parser of unit texts raises many kinds, none of which means anything else here)
         return False
     return True
 
@@ -111,7 +111,7 @@ def _converted(number: str, given: str, unit: str, head: str, shown: str) -> flo
         mended = _POWER.sub(r"\1^\2", given)
         right = f"write the power with ^: '{number} {mended}'" if mended != given and known_unit(mended) else f"give e.g. {example(unit)}"
         raise DembarkError(f"{head}unknown unit {given!r} in {shown}; {right}") from None
-    except Exception:  # the library raises its own kinds and those of Python's tokeniser
+    except Exception:  # noqa: BLE001 (the library raises its own kinds and those of Python's tokeniser)
         raise DembarkError(f"{head}cannot convert {shown} to {'a plain number' if unit == '1' else unit}; "
                            f"give e.g. {example(unit)}") from None
     if not quantity.unitless and _angle_power(quantity) != _angle_power(1 * target):

@@ -77,7 +77,7 @@ def markdown(rows: list[list[str]]) -> str:
 def main() -> None:
     """Solve for the grid and write the file."""
     FILE.parent.mkdir(exist_ok=True)
-    with open(FILE, "w", newline="", encoding="ascii") as file:
+    with FILE.open("w", newline="", encoding="ascii") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(HEADER)
         for angle in ANGLES:

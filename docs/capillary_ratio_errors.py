@@ -2,8 +2,8 @@
 
 The law for equal spheres of R = 2 R* (the approximation of Derjaguin) is what tables and formulas made for equal spheres can do; it is
 compared with `exact`, which takes the spheres as they are. `exact` is compared with dembark.physics.young_laplace. Run as a script it
-solves for the reference, some minutes, writes figures/capillary_ratio_reference.csv and figures/capillary_ratio_errors.csv beside it and prints the
-tables of the page.
+solves for the reference, some minutes, writes figures/capillary_ratio_reference.csv and figures/capillary_ratio_errors.csv beside it and
+prints the tables of the page.
 """
 
 from __future__ import annotations
@@ -88,7 +88,8 @@ def table() -> str:
 def law_table() -> str:
     """`exact`: largest deviation from the reference in per cent for the same page."""
     reference = read_reference()
-    lines = ["| radii | " + " | ".join("touching" if s == 0.0 else f"{s:g} of rupture" for s in REFERENCE_SHARES) + " | rupture |", "|" + "---|" * 7]
+    lines = ["| radii | " + " | ".join("touching" if s == 0.0 else f"{s:g} of rupture" for s in REFERENCE_SHARES) + " | rupture |",
+             "|" + "---|" * 7]
     for ratio in RATIOS:
         errors = np.array([law_errors(row) for row in reference if row[0] == ratio])
         lines.append("| " + " | ".join([_name(ratio), *(_percent(column) for column in errors.T)]) + " |")
@@ -96,7 +97,7 @@ def law_table() -> str:
 
 
 def _write(name: str, header: Sequence[str], rows: Iterable[Sequence[float]]) -> None:
-    with open(FOLDER / name, "w", newline="", encoding="ascii") as file:
+    with (FOLDER / name).open("w", newline="", encoding="ascii") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows([f"{value:.8g}" for value in row] for row in rows)
@@ -118,7 +119,8 @@ def main() -> None:
     """Solve for the reference, write the files, print the tables."""
     FOLDER.mkdir(exist_ok=True)
     _write("capillary_ratio_reference.csv",
-           ("radius_ratio", "contact_angle_deg", "volume_over_R3", "rupture_over_R", *(f"force_{s:g}" for s in REFERENCE_SHARES), "force_at_rupture"),
+           ("radius_ratio", "contact_angle_deg", "volume_over_R3", "rupture_over_R", *(f"force_{s:g}" for s in REFERENCE_SHARES),
+            "force_at_rupture"),
            (reference_row(ratio, angle, volume) for ratio in RATIOS for angle in ANGLES for volume in REFERENCE_VOLUMES))
     write_errors()
     print(table(), law_table(), sep="\n")

@@ -15,6 +15,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.face_stress import face_stress
 from dembark.postproc.fields.grid import Grid

@@ -54,7 +54,8 @@ def friction() -> None:
 
     slip = np.linspace(0.0, 6e-5, 200)
     for distance in (5e-6, 1e-5, 2e-5):
-        weakening.plot(1e6 * slip, law(critical_slip_distance=distance).friction_coefficient(slip), label=rf"$s_c$ = {1e6 * distance:.0f} µm")
+        weakening.plot(1e6 * slip, law(critical_slip_distance=distance).friction_coefficient(slip),
+                       label=rf"$s_c$ = {1e6 * distance:.0f} µm")
     weakening.set(xlabel="slip s (µm)", ylabel=r"$\mu(s)$", ylim=(0.35, 0.65), title="Rabinowicz: friction falls with slip")
 
     path = np.linspace(0.0, 4e-5, 400)
@@ -78,7 +79,8 @@ def capillary() -> None:
     volume, theta = 1e-2, 0.0
     for model in CAPILLARY_MODELS:
         gaps = np.linspace(0.0, rupture_distance(volume, theta, 1.0, 1.0, model=model), 200)
-        left.plot(gaps, capillary_force(1.0, 1.0, gaps, volume, 1.0, theta, model=model), label=model, linewidth=2.0 if model == "exact" else 1.0)
+        left.plot(gaps, capillary_force(1.0, 1.0, gaps, volume, 1.0, theta, model=model), label=model,
+                  linewidth=2.0 if model == "exact" else 1.0)
     points = np.linspace(0.0, rupture_gap(volume, theta), 9)
     left.plot(points, [bridge(volume, gap, theta).force for gap in points], "k.", markersize=4, label="independent solution")
     left.set(xlabel="gap S / R", ylabel=r"F / ($\gamma R$)", title=r"V = 0.01 R³, $\theta$ = 0")
@@ -106,7 +108,8 @@ def error_map() -> None:
         for angle, axis in zip(capillary_errors.ANGLES, row, strict=True):
             chosen = (columns["contact_angle_deg"] == angle) & (columns["gap_over_rupture"] < 1.0)
             percent = 100.0 * columns[model][chosen].reshape(len(volumes), len(shares))
-            drawn = axis.pcolormesh(volumes, shares, np.where(percent <= -100.0, np.nan, percent).T, cmap="RdBu_r", norm=norm, shading="nearest")
+            drawn = axis.pcolormesh(volumes, shares, np.where(percent <= -100.0, np.nan, percent).T, cmap="RdBu_r", norm=norm,
+                                    shading="nearest")
             axis.set_facecolor("0.75")
             axis.set_xscale("log")
             worst = np.abs(percent[percent > -100.0]).max()
@@ -128,7 +131,8 @@ def ratio_map() -> None:
     for ratio, row in zip(ratios, axes, strict=True):
         for angle, axis in zip(angles, row, strict=True):
             force, end = capillary_ratio_errors.effective_radius_errors(ratio, angle)
-            drawn = axis.pcolormesh(capillary_ratio_errors.VOLUMES, capillary_ratio_errors.SHARES, 100.0 * force.T, cmap="RdBu_r", norm=norm,
+            drawn = axis.pcolormesh(capillary_ratio_errors.VOLUMES, capillary_ratio_errors.SHARES, 100.0 * force.T, cmap="RdBu_r",
+                                    norm=norm,
                                     shading="nearest")
             axis.set_xscale("log")
             name = "wall" if ratio == 0.0 else f"radii 1:{1.0 / ratio:.0f}"

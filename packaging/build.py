@@ -3,9 +3,9 @@
 
     packaging/build.py --name YADE --log build.log [--resume "make ..."] -- cmake ... -- ninja ...
 
-Steps are separated by `--`. Their output goes into the log. `-j 0` of ninja becomes as many jobs as cores and memory allow (3 GB a compiler).
-The estimate is what the machine has shown: the time passed, over the share of the work that is done. What a step of ninja weighs beside
-the others was measured once (build_weights.txt); how fast this machine is was not.
+Steps are separated by `--`. Their output goes into the log. `-j 0` of ninja becomes as many jobs as cores and memory allow (3 GB a
+compiler). The estimate is what the machine has shown: the time passed, over the share of the work that is done. What a step of ninja
+weighs beside the others was measured once (build_weights.txt); how fast this machine is was not.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ CAUSES = (
     (re.compile(r"No space left on device"), "free some space"),
     (re.compile(r"(Killed signal terminated program|virtual memory exhausted|cannot allocate memory|out of memory)", re.IGNORECASE),
      "the compiler ran out of memory: close other programs, or build with JOBS=1"),
-    (re.compile(r"fatal error: \S+: No such file or directory"), "a header is missing: run 'make system', which installs the packages that the build needs"),
+    (re.compile(r"fatal error: \S+: No such file or directory"),
+     "a header is missing: run 'make system', which installs the packages that the build needs"),
     (re.compile(r"cannot find -l\S+|Could NOT find|not found \(missing:|Could not find a package configuration file"),
      "a library is missing: run 'make system', which installs the packages that the build needs"),
     (re.compile(r"CMake Error: The source .* does not match the source"), "the checkout was moved: run 'make clean', then make again"),
@@ -53,14 +54,14 @@ def cause(log: Path) -> str:
     """The first real error in a log, and what to do about it, in one line."""
     lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
     for number, line in enumerate(lines):
-        for pattern, advice in CAUSES:
+        for pattern, hint in CAUSES:
             if pattern.search(line):
-                found = line.strip()
+                found, advice = line.strip(), hint
                 if found.startswith("CMake Error"):
                     # CMake puts the reason into the indented lines below.
                     rest = [text.strip() for text in lines[number + 1:number + 6] if text.startswith("  ")]
                     found = " ".join([found, *rest])
-                    advice = next((hint for known, hint in CAUSES if hint and known.search(found)), advice)
+                    advice = next((better for known, better in CAUSES if better and known.search(found)), hint)
                 return "; ".join(part for part in (" ".join(found.split())[:400], advice) if part)
     last = next((line.strip() for line in reversed(lines) if line.strip()), "no output")
     return last[:400]
@@ -77,6 +78,7 @@ class Progress:
         self.count = self.total = 0
 
     def weigh(self, text: str) -> float:
+        """Cost of the step of ninja with this text."""
         return next((weight for pattern, weight in self.weights if pattern.search(text)), 1.0)
 
     def expect(self, steps: list[str]) -> None:
@@ -85,10 +87,12 @@ class Progress:
         self.done, self.base, self.count, self.total = 0.0, time.monotonic(), 0, len(steps)
 
     def step(self, text: str) -> None:
+        """A step is done."""
         self.done += self.weigh(text)
         self.count += 1
 
     def tell(self) -> None:
+        """Write the line, if it is time for one."""
         now = time.monotonic()
         if now - self.told < (1.0 if self.live else TELL_EVERY):
             return
@@ -103,6 +107,7 @@ class Progress:
         print(f"\r\033[K{words}" if self.live else words, end="" if self.live else "\n", file=sys.stderr, flush=True)
 
     def end(self) -> None:
+        """Clear the line of a terminal."""
         if self.live:
             print("\r\033[K", end="", file=sys.stderr, flush=True)
 
@@ -165,8 +170,8 @@ def main() -> int:
             return 130
         if code:
             progress.end()
-            print(f"dembark: {given.name} did not build: {cause(given.log)}; all output is in {given.log}, '{given.resume}' goes on where it was",
-                  file=sys.stderr)
+            print(f"dembark: {given.name} did not build: {cause(given.log)}; all output is in {given.log}, "
+                  f"'{given.resume}' goes on where it was", file=sys.stderr)
             return 1
     progress.end()
     return 0

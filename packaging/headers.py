@@ -3,9 +3,9 @@
 
     packaging/headers.py [--packages FILE] FOLDER_OR_LIST ...
 
-A FOLDER is one that ninja built in: it keeps what each compilation included. A LIST is a file with one header a line. FILE holds the packages,
-one a line, in the place of those that system.sh names. A machine that has grown holds packages which a new one lacks; a build that uses
-one of them works here and fails there.
+A FOLDER is one that ninja built in: it keeps what each compilation included. A LIST is a file with one header a line. FILE holds the
+packages, one a line, in the place of those that system.sh names. A machine that has grown holds packages which a new one lacks; a build
+that uses one of them works here and fails there.
 """
 
 from __future__ import annotations
@@ -87,7 +87,8 @@ def main() -> int:
              subprocess.run([here / "system.sh", "--all"], capture_output=True, text=True, check=True).stdout)
     missing = foreign(given.places, named.split())
     for package, path in missing.items():
-        print(f"dembark: the build includes {path} of package {package}, which packaging/system.sh does not name; add it there", file=sys.stderr)
+        print(f"dembark: the build includes {path} of package {package}, which packaging/system.sh does not name; add it there",
+              file=sys.stderr)
     return 1 if missing else 0
 
 

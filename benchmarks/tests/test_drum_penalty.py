@@ -37,7 +37,7 @@ def test_energy_in_overlaps(tmp_path):
     """Two logs 1 mm into each other, one of them 2 mm into the shell."""
     _, _, radius = drum_penalty.logs()
     x = radius - 0.1 + 0.002
-    frame = f"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n2\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
+    frame = "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n2\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
     frame += f"ITEM: ATOMS id x y radius \n1 {x!r} 0 0.1\n2 {x - 0.199!r} 0 0.1\n"
     (tmp_path / "logs.dump").write_text(2 * frame)
     pair, wall = 5e6, 1e7 * 5e7 / 6e7

@@ -3,6 +3,7 @@
 import json
 
 import pytest
+
 from benchmarks import dump_parsing
 from benchmarks.dump_parsing import SUBJECTS, Sample, measure, rows, write_dump
 from dembark.common.errors import DembarkError

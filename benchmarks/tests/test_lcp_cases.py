@@ -43,7 +43,8 @@ def test_goals_are_ratios_of_medians():
     found = {goal["goal"]: (round(goal["value"], 9), goal["met"]) for goal in goals(rows)}
     assert found == {"coupled, 800: auto faster than Siconos's Lemke by": (15.0, True),
                      "coupled, 800: auto faster than Siconos's PGS by": (2.5, True),
-                     "coupled, 800: energy faster than Siconos's Lemke by": (1.5, False), "warm step of 1000 contacts, checked, s": (5e-4, True)}
+                     "coupled, 800: energy faster than Siconos's Lemke by": (1.5, False),
+                     "warm step of 1000 contacts, checked, s": (5e-4, True)}
 
 
 def test_small_measurement(tmp_path):

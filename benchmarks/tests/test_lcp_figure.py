@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 import pytest
+
 from benchmarks import lcp, run
 from dembark.common.errors import DembarkError
 
@@ -41,6 +42,7 @@ def test_a_peer_is_left_out_where_one_call_would_take_too_long() -> None:
 
 
 def test_without_siconos_the_table_says_what_is_left_out():
-    facts = {"clock": "elapsed time", "date": "today", "cpu": "one", "cores": 1, "load": 0.0, "load_after": 0.0, "commit": None, "dirty": False}
+    facts = {"clock": "elapsed time", "date": "today", "cpu": "one", "cores": 1, "load": 0.0, "load_after": 0.0, "commit": None,
+             "dirty": False}
     said = [lcp.markdown([], lcp.goals([]), {**facts, "versions": {"dembark": "1", "siconos": version}}) for version in (None, "4.4.0")]
     assert "are left out" in said[0] and "python3-siconos" in said[0] and "left out" not in said[1]

@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.measure import HERE, Comparison, Sample, Subject, read_log, spread
-from benchmarks.run import markdown, main
+from benchmarks.run import main, markdown
 from dembark.common.errors import RunError
 
 LOG = """Loop time of 3.5 on 1 procs for 1000 steps with 20 atoms, finish time X
@@ -17,7 +17,9 @@ def test_last_run_of_a_log():
     assert read_log(LOG) == Sample(loop=1.25, pair=0.75)
 
 
-@pytest.mark.parametrize(("text", "what"), [("", "no timings"), ("ERROR: lost atoms (x.cpp:1)\n", "lost atoms"), (LOG + "Loop time of 9 on 1 procs", "no timings")])
+@pytest.mark.parametrize(("text", "what"),
+                         [("", "no timings"), ("ERROR: lost atoms (x.cpp:1)\n", "lost atoms"),
+                          (LOG + "Loop time of 9 on 1 procs", "no timings")])
 def test_log_without_timings(text, what):
     with pytest.raises(RunError, match=what):
         read_log(text)

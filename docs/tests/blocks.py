@@ -49,7 +49,8 @@ def _of_page(page: Path) -> list[Block]:
         if lines[number].startswith("```"):
             number = lines.index("```", first + 1)
             kind = lines[first][3:].strip()
-            found.append(Block(name, first + 2, {"sh": "shell", "lammps": "deck"}.get(kind, kind), "\n".join(lines[first + 1:number]) + "\n"))
+            found.append(Block(name, first + 2, {"sh": "shell", "lammps": "deck"}.get(kind, kind),
+                               "\n".join(lines[first + 1:number]) + "\n"))
         elif lines[number].startswith("    ") and (number == 0 or not lines[number - 1].strip()):
             while number < len(lines) and (lines[number].startswith("    ") or not lines[number].strip()):
                 number += 1
@@ -88,9 +89,9 @@ def logical_lines(text: str, continuation: str) -> list[str]:
     """Lines without comments, those that end with `continuation` joined to the next."""
     joined: list[str] = []
     going_on = False
-    for line in text.splitlines():
-        line = re.sub(r"\s+#.*|^#.*", "", line).rstrip()
-        ends, line = line.endswith(continuation), line.removesuffix(continuation).strip()
+    for written in text.splitlines():
+        bare = re.sub(r"\s+#.*|^#.*", "", written).rstrip()
+        ends, line = bare.endswith(continuation), bare.removesuffix(continuation).strip()
         if going_on:
             joined[-1] += f" {line}"
         elif line:
@@ -109,9 +110,11 @@ def commands(text: str) -> list[list[str]]:
 SUBSTITUTES = (
     (r"(dembark run silo --engine (?:liggghts|yade) .*)", r"\1 --set replicas=1", "one packing in place of two"),
     (r"--grid 64,64,64", "--grid 16,16,16", "a hundredth of the cells"),
-    (r"dembark (submit|run) silo-small\b", r"dembark \1 tiny.toml", "one run of 100 grains in place of eight: a campaign with report takes minutes"),
+    (r"dembark (submit|run) silo-small\b", r"dembark \1 tiny.toml",
+     "one run of 100 grains in place of eight: a campaign with report takes minutes"),
     (r"(liggghts-dembark -in \S+/silo/liggghts.in) -var restart_every 5000(.*)",
-     r"\1 -var restart_every 500\2 -var grain_count 60 -var settle_time 0.05 -var measure_time 0.02", "60 grains for 0.07 s in place of 2200 for 1 s"),
+     r"\1 -var restart_every 500\2 -var grain_count 60 -var settle_time 0.05 -var measure_time 0.02",
+     "60 grains for 0.07 s in place of 2200 for 1 s"),
     (r"(dembark yade -n -x \S+/silo/yade.py) restart_every=5000(.*)",
      r"\1 restart_every=500\2 grain_count=60 settle_time=0.05 measure_time=0.02", "60 grains for 0.07 s in place of 2200 for 1 s"),
     (r"(python -m benchmarks\.\w+.*)", r"\1 --help", "benchmarks measure for minutes to an hour; their options are checked"),

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from blocks import NOT_RUN, ROOT, SUBSTITUTES, Block, blocks, commands, logical_lines, not_run, replaced
+
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
 from dembark.validation.case import folders
@@ -39,7 +40,8 @@ RUNNERS = {
     "python": "test_docs.py", "cpp": "test_docs.py", "deck": "test_docs.py", "sql": "validation/campaigns/tests/test_docs.py",
     "py": "validation/campaigns/tests/test_docs.py", "python yade": "test_yade_blocks.py", "YADE fragment": "test_yade_blocks.py",
     "LIGGGHTS fragment": "test_liggghts_blocks.py", "syntax": "test_liggghts_blocks.py", "python grains.bin": "test_liggghts_blocks.py",
-    "output": "test_liggghts_blocks.py, test_docs.py", "toml": "test_toml", "shell": "test_shell", "file": "test_shell", "listing": "test_listing",
+    "output": "test_liggghts_blocks.py, test_docs.py", "toml": "test_toml", "shell": "test_shell", "file": "test_shell",
+    "listing": "test_listing",
 }
 SHELL_PAGES = list(dict.fromkeys(block.page for block in blocks("shell")))
 
@@ -69,7 +71,8 @@ def user(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.chdir(checkout)
     home = checkout / "home"
     home.mkdir(exist_ok=True)
-    for key, value in {"HOME": str(home), "PWD": str(checkout), "XDG_CACHE_HOME": os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache"))}.items():
+    for key, value in {"HOME": str(home), "PWD": str(checkout),
+                       "XDG_CACHE_HOME": os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache"))}.items():
         monkeypatch.setenv(key, value)
     before = os.environ.get("DEMBARK_DECKS")
     yield checkout
@@ -87,16 +90,16 @@ def write_files(page: str) -> None:
         if block.page == page and "/" in block.kind:
             path = Path(block.kind.split()[1])
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(block.text)
+            path.write_text(block.text, encoding="utf-8")
 
 
 def run(words: list[str], capture: pytest.CaptureFixture[str]) -> None:
     """Run one command as a shell would; AssertionError with what it said when it fails."""
-    words = [os.path.expandvars(os.path.expanduser(word)) for word in words]
+    words = [os.path.expandvars(Path(word).expanduser() if word.startswith("~") else word) for word in words]
     program, *rest = words
     if program == "cd":
         os.chdir(rest[0])
-        os.environ["PWD"] = os.getcwd()
+        os.environ["PWD"] = str(Path.cwd())
     elif program == "mkdir":
         Path(rest[-1]).mkdir(parents="-p" in rest)
     elif program == "export":
@@ -182,7 +185,7 @@ def test_toml(block: Block, tmp_path: Path) -> None:
 @pytest.mark.parametrize("block", blocks("listing"), ids=lambda block: block.place)
 def test_listing(block: Block) -> None:
     code = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "validation").rglob("*.py"))
-    names = {name for name in re.findall(r"[\w-]+\.(?:json|toml|log|sqlite|html|pdf)\b", block.text)}
+    names = set(re.findall(r"[\w-]+\.(?:json|toml|log|sqlite|html|pdf)\b", block.text))
     assert names and not {name for name in names if name not in code and name.removesuffix(".pdf") + ".html" not in code}
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from blocks import PAGES, ROOT, Block, blocks
+
 from dembark.validation.engines import call
 
 LINKING = [*PAGES, *sorted((ROOT / "input_decks").glob("*/README.md"))]
@@ -49,7 +50,8 @@ def test_links_exist(page: Path) -> None:
 @pytest.mark.parametrize("block", blocks("python"), ids=lambda block: block.place)
 def test_python_snippet(block: Block, tmp_path: Path) -> None:
     (tmp_path / "snippet.py").write_text(block.text, encoding="utf-8")
-    result = subprocess.run([sys.executable, "-W", "error", "snippet.py"], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
+    result = subprocess.run([sys.executable, "-W", "error", "snippet.py"], cwd=tmp_path, capture_output=True, text=True, timeout=300,
+                            check=False)
     assert result.returncode == 0, result.stderr
     following = next((other for other in blocks() if other.page == block.page and other.line > block.line), None)
     if following is not None and following.kind == "output":
@@ -58,11 +60,13 @@ def test_python_snippet(block: Block, tmp_path: Path) -> None:
 
 def run_lammps(text: str, folder: Path) -> list[list[float]]:
     """Rows of numbers that liggghts-dembark prints for a deck."""
-    engine = program(Path(os.environ["DEMBARK_LIGGGHTS"]) if "DEMBARK_LIGGGHTS" in os.environ else None, ROOT / "build/bin/liggghts-dembark")
+    engine = program(Path(os.environ["DEMBARK_LIGGGHTS"]) if "DEMBARK_LIGGGHTS" in os.environ else None,
+                     ROOT / "build/bin/liggghts-dembark")
     (folder / "deck.in").write_text(text, encoding="utf-8")
     result = call([engine, "-in", "deck.in", "-log", "none"], folder, timeout=300)
     assert result.returncode == 0, result.stdout[-2000:] + result.stderr
-    return [[float(word) for word in line.split()] for line in result.stdout.splitlines() if re.fullmatch(r"[\s\d.e+-]+", line) and line.strip()]
+    return [[float(word) for word in line.split()] for line in result.stdout.splitlines()
+            if re.fullmatch(r"[\s\d.e+-]+", line) and line.strip()]
 
 
 @pytest.mark.parametrize("block", blocks("deck"), ids=lambda block: block.place)

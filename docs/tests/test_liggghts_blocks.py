@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from blocks import ROOT, Block, blocks, logical_lines
+
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
 
@@ -86,7 +87,8 @@ def deck(lines: list[str]) -> str:
         return LOGS.format(types=types) + mesh + "\n".join(lines) + "\nfix motion all nve/sphere\nrun 20\n"
     given = {match.group(1) for line in lines if (match := re.match(r"fix \S+ all property/global (\w+)", line))}
     head = [line for line in lines if "property/global" in line]
-    head += [f"fix default{n} all property/global {name} {value}" for n, (name, value) in enumerate(PROPERTIES.items()) if name not in given]
+    head += [f"fix default{n} all property/global {name} {value}" for n, (name, value) in enumerate(PROPERTIES.items())
+             if name not in given]
     head += [next((line for line in lines if line.startswith("pair_style")), PAIR_STYLE), "pair_coeff * *", "timestep 1e-6"]
     rest = [line for line in lines if "property/global" not in line and not line.startswith("pair_style")]
     if not any(line.startswith("run") for line in rest):
@@ -95,7 +97,8 @@ def deck(lines: list[str]) -> str:
     return GRAINS + "\n".join([*head, *mesh, "fix motion all nve/sphere", *rest]) + "\n"
 
 
-FRAGMENTS = [*blocks("LIGGGHTS fragment"), *(Block("more", number, "LIGGGHTS fragment", line) for number, line in enumerate(MORE.split("\n")) if line)]
+FRAGMENTS = [*blocks("LIGGGHTS fragment"),
+             *(Block("more", number, "LIGGGHTS fragment", line) for number, line in enumerate(MORE.split("\n")) if line)]
 
 
 @pytest.mark.parametrize("block", FRAGMENTS, ids=lambda block: block.place)

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
+
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
 

@@ -8,6 +8,7 @@ from functools import cache
 
 import typer
 from blocks import PAGES, ROOT, blocks, commands, logical_lines
+
 from dembark.postproc import cli as postproc
 from dembark.validation import cli
 from dembark.validation.case.folders import discover
@@ -15,7 +16,8 @@ from dembark.validation.case.folders import discover
 TEXTS = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page in PAGES}
 ALL = "\n".join(TEXTS.values())
 # Words in backticks, outside of fenced blocks.
-SPANS = sorted({span for text in TEXTS.values() for span in re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```$", "", text, flags=re.M | re.S))})
+SPANS = sorted({span for text in TEXTS.values()
+                for span in re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL))})
 PLACES = ("benchmarks", "build", "common", "docs", "input_decks", "packaging", "plugins", "postproc", "validation")
 # What a build makes; the test runs without it.
 BUILT = ("build/",)
@@ -73,7 +75,8 @@ def exists(name: str) -> bool:
 
 
 def test_table_of_modules_for_fields() -> None:
-    table = re.findall(r"^\| ((?:`[\w.]+`(?:, )?)+) \| (.*) \|$", TEXTS["docs/fields.md"].split("| module | what |")[1].split("\n\n")[0], re.MULTILINE)
+    table = re.findall(r"^\| ((?:`[\w.]+`(?:, )?)+) \| (.*) \|$", TEXTS["docs/fields.md"].split("| module | what |")[1].split("\n\n")[0],
+                       re.MULTILINE)
     assert len(table) > 5
     for modules, what in table:
         full = [name if name.startswith("dembark") else f"dembark.postproc{name}" for name in re.findall(r"`([\w.]+)`", modules)]
@@ -145,7 +148,9 @@ def test_files_exist() -> None:
 def test_readme_names_every_style() -> None:
     main = (ROOT / "plugins/liggghts/main.cpp").read_text(encoding="utf-8")
     headers = code("plugins/liggghts")
-    styles = {f"fix {name}" for name in re.findall(r'fixes\["([\w/]+)"\]', main)} | set(re.findall(r'command_map|CommandTable\(\)\)\)\)\["(\w+)"\]', main))
+    styles = {f"fix {name}"
+              for name in re.findall(r'fixes\["([\w/]+)"\]', main)} | set(re.findall(r'command_map|CommandTable\(\)\)\)\)\["(\w+)"\]',
+                                                                                     main))
     styles |= {f"tangential {name}" for name in re.findall(r"^TANGENTIAL_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
     styles |= {f"cohesion {name}" for name in re.findall(r"^COHESION_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
     table = {name for cell in rows(TEXTS["README.md"], "style") for name in re.findall(r"`([^`]+)`", cell)}

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from dembark.validation.engines import call
 
 STOCK = shutil.which("liggghts")
@@ -223,7 +224,8 @@ def bed(steps: str) -> str:
     radius = 0.0025
     rng = np.random.default_rng(1)
     lines = [f"create_atoms 1 single {x!r} {y!r} {z!r} units box" for x, y, z in
-             (np.array([[i, j, k] for i in range(3) for j in range(3) for k in range(3)]) * 0.00495 - 0.005 + rng.uniform(-1e-5, 1e-5, (27, 3))).tolist()]
+             (np.array([[i, j, k] for i in range(3) for j in range(3) for k in range(3)]) * 0.00495 - 0.005
+              + rng.uniform(-1e-5, 1e-5, (27, 3))).tolist()]
     return scene(radius) + "\n".join(lines) + f"""
 set group all density 2500 diameter {2 * radius}
 {MATERIAL}

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import nbformat
 import pytest
-from dembark.validation import engines
 from nbclient import NotebookClient
+
+from dembark.validation import engines
 
 NOTEBOOKS = sorted((Path(__file__).resolve().parents[1] / "tutorials").glob("*.ipynb"))
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from blocks import PAGES, ROOT, Block, blocks
+
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
 

@@ -13,12 +13,16 @@ sys.path.insert(0, str(HERE))
 import build  # noqa: E402  (a script beside this folder, no package)
 
 LOGS = {
-    "header": ("[1/3] Building CXX object a.o\npy/_libVersions.cpp:21:10: fatal error: sqlite3.h: No such file or directory\n   21 | #include\n"
-               "compilation terminated.\nninja: build stopped: subcommand failed.", ("sqlite3.h", "run 'make system'")),
-    "error": ("warning: something\nIn file included from b.hpp:2:\na.cpp:7:3: error: 'x' was not declared in this scope\na.cpp:9:1: error: y", ("a.cpp:7:3",)),
+    "header": (("[1/3] Building CXX object a.o\n"
+                "py/_libVersions.cpp:21:10: fatal error: sqlite3.h: No such file or directory\n   21 | #include\n"
+                "compilation terminated.\nninja: build stopped: subcommand failed."),
+               ("sqlite3.h", "run 'make system'")),
+    "error": (("warning: something\nIn file included from b.hpp:2:\n"
+               "a.cpp:7:3: error: 'x' was not declared in this scope\na.cpp:9:1: error: y"), ("a.cpp:7:3",)),
     "memory": ("g++: fatal error: Killed signal terminated program cc1plus\ncompilation terminated.", ("Killed", "JOBS=1")),
     "disk": ("fatal error: error writing to /tmp/x.s: No space left on device", ("No space left", "free some space")),
-    "cmake": ("-- Looking\nCMake Error at CMakeLists.txt:205 (find_package):\n  Could NOT find Eigen3 (missing: EIGEN3_DIR)\n\nCall Stack", ("Eigen3", "make system")),
+    "cmake": ("-- Looking\nCMake Error at CMakeLists.txt:205 (find_package):\n  Could NOT find Eigen3 (missing: EIGEN3_DIR)\n\nCall Stack",
+              ("Eigen3", "make system")),
     "link": ("/usr/bin/ld: cannot find -lliggghts: No such file", ("-lliggghts", "make system")),
     "nothing": ("", ("no output",)),
 }

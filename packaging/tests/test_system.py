@@ -18,7 +18,7 @@ def test_yade_is_a_package_or_has_what_its_build_includes():
     assert {"g++", "libliggghts-dev", "python3-venv", "libboost-dev"} <= packages
     assert "yade" in packages or {"libsqlite3-dev", "libboost-python-dev"} <= packages
     # What does not exist on Debian 13 is not asked for there.
-    assert ("python3-siconos" in packages) == ('VERSION_ID="13"' not in Path("/etc/os-release").read_text())
+    assert ("python3-siconos" in packages) == ('VERSION_ID="13"' not in Path("/etc/os-release").read_text(encoding="utf-8"))
 
 
 def test_a_group_with_its_own_yade_needs_none_of_it(tmp_path):

@@ -6,7 +6,7 @@
 //
 // Works compiled out of tree into liggghts-dembark and, unchanged, copied into a LIGGGHTS src/ folder.
 #ifdef COHESION_MODEL
-COHESION_MODEL(COHESION_CAPILLARY,capillary,20)
+COHESION_MODEL(COHESION_CAPILLARY, capillary, 20)
 #else
 
 #ifndef COHESION_MODEL_CAPILLARY_H_
@@ -58,7 +58,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
   const LAMMPS_NS::FixWallGran* wall_ = nullptr;
   dembark_liggghts::EnergyBooks* books_ = nullptr;
   dembark::capillary::ViscousLiquid liquid_;
-  std::vector<PairLiquid> pairs_;  // one a pair of types, row by row
+  std::vector<PairLiquid> pairs_;                                                   // one a pair of types, row by row
   std::map<double, std::shared_ptr<const dembark::capillary::BridgeForce>> built_;  // by mean contact angle
 
   static double bridge_radius(const SurfacesCloseData& d) { return d.is_wall ? 2.0 * d.radi : 2.0 * d.radi * d.radj / d.radsum; }
@@ -70,7 +70,8 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
       i_forces.delta_F[k] -= scale * force * normal[k];
       if (!d.is_wall) j_forces.delta_F[k] += force * normal[k];
     }
-    if (books_) account(dembark::ContactPart::capillary, d, normal, -force * dembark::Vec3<double>{normal[0], normal[1], normal[2]}, 0.0, 0.0);
+    if (books_)
+      account(dembark::ContactPart::capillary, d, normal, -force * dembark::Vec3<double>{normal[0], normal[1], normal[2]}, 0.0, 0.0);
   }
 
   // What the liquid resists with, of a bridge of `volume` at `gap`. The engine sets velocities of surfaces for touching pairs only.
@@ -97,8 +98,8 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     if (books_) account(dembark::ContactPart::liquid_viscous, d, normal, force, arm_i, arm_j);
   }
 
-  DEMBARK_COLD void account(dembark::ContactPart part, const SurfacesCloseData& d, const double* normal, const dembark::Vec3<double>& force, double arm_i,
-                            double arm_j) const {
+  DEMBARK_COLD void account(dembark::ContactPart part, const SurfacesCloseData& d, const double* normal, const dembark::Vec3<double>& force,
+                            double arm_i, double arm_j) const {
     books_->add(part, d, {normal[0], normal[1], normal[2]}, force, arm_i, arm_j);
   }
 
@@ -106,7 +107,9 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     const double limit = dembark::capillary::viscous_time_step(liquid_, radius, effective_mass);
     if (update->dt <= limit) return;
     char line[256];
-    snprintf(line, sizeof line, "cohesion capillary: with viscous_liquid on a bridge between these grains needs a time step <= %.3g s, not %g s, or a larger minimumGap",
+    snprintf(line, sizeof line,
+             "cohesion capillary: with viscous_liquid on a bridge between these grains needs a time step <= %.3g s, not %g s, or a larger "
+             "minimumGap",
              limit, update->dt);
     error->one(FLERR, line);
   }
@@ -115,11 +118,14 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
   double find_owner(dembark_liggghts::PropertyReader& read, double largest_radius) {
     owner_ = static_cast<LAMMPS_NS::FixCapillaryLiquid*>(modify->find_fix_style("capillary/liquid", 0));
     if (!carried_) {
-      if (owner_) read.fail("fix capillary/liquid is there, but liquid is not carried; write 'carried_liquid on' after the models, or leave the fix out");
+      if (owner_)
+        read.fail(
+            "fix capillary/liquid is there, but liquid is not carried; write 'carried_liquid on' after the models, or leave the fix out");
       return 0.0;
     }
     if (!owner_) read.fail("carried_liquid on needs the liquid: fix ID all capillary/liquid content C");
-    if (read.given("bridgeVolume")) read.fail("bridgeVolume is given, but with carried_liquid on a bridge takes its volume from the grains; leave one of them out");
+    if (read.given("bridgeVolume"))
+      read.fail("bridgeVolume is given, but with carried_liquid on a bridge takes its volume from the grains; leave one of them out");
     wall_ = dynamic_cast<LAMMPS_NS::FixWallGran*>(host_);
     owner_->place(wall_, offset_, imbalance_);
     return owner_->likely_bridge(largest_radius < 1e10 ? largest_radius : 0.0);
@@ -145,10 +151,8 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
   void give_back(const SurfacesCloseData& d) const {
     if (!d.computeflag || !d.shearupdate || !owner_->collecting()) return;
     double *const bridge = d.contact_history + offset_, &imbalance = d.contact_history[imbalance_];
-    if (d.is_wall)
-      owner_->broke_wall(d.i, owner_->wall_number(wall_), bridge[0], imbalance);
-    else
-      owner_->broke(d.i, d.j, bridge[0], imbalance);
+    if (d.is_wall) owner_->broke_wall(d.i, owner_->wall_number(wall_), bridge[0], imbalance);
+    else owner_->broke(d.i, d.j, bridge[0], imbalance);
     bridge[0] = bridge[1] = imbalance = 0.0;
   }
 
@@ -178,7 +182,8 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     surface_tension_ = read.scalar("surfaceTension");
     if (!(surface_tension_ >= 0.0 && surface_tension_ < INFINITY)) read.fail("surfaceTension (N/m) must be >= 0 and finite");
     liquid_.viscosity = viscous_ ? read.scalar("liquidViscosity") : read.scalar("liquidViscosity", 0.0);
-    if (!viscous_ && liquid_.viscosity != 0.0) read.fail("liquidViscosity is given, but viscous forces are off; write 'viscous_liquid on' after the models, or leave it out");
+    if (!viscous_ && liquid_.viscosity != 0.0)
+      read.fail("liquidViscosity is given, but viscous forces are off; write 'viscous_liquid on' after the models, or leave it out");
     if (viscous_) liquid_.minimum_gap = read.scalar("minimumGap");
     if (const char* wrong = liquid_.error()) read.fail(std::string("liquidViscosity, minimumGap: ") + wrong);
     const double r_min = registry.min_radius(), r_max = registry.max_radius();
@@ -188,14 +193,18 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
       for (int j = 1; j < types_; ++j) {
         PairLiquid& pair = pairs_[i * types_ + j];
         pair.volume = carried_ ? 0.0 : read.per_pair("bridgeVolume", i, j);
-        if (!(pair.volume >= 0.0 && pair.volume < INFINITY)) read.fail("bridgeVolume (m^3) must be >= 0 and finite (types " + std::to_string(i) + "-" + std::to_string(j) + ")");
+        if (!(pair.volume >= 0.0 && pair.volume < INFINITY))
+          read.fail("bridgeVolume (m^3) must be >= 0 and finite (types " + std::to_string(i) + "-" + std::to_string(j) + ")");
         const double angle = 0.5 * (read.per_type("contactAngle", i) + read.per_type("contactAngle", j));
-        if (!(angle >= 0.0 && angle <= 0.5 * dembark::pi)) read.fail("contactAngle is in radians (stock models take degrees) and must lie in 0...pi/2; the mean of types " + std::to_string(i) + " and " + std::to_string(j) + " is " + std::to_string(angle));
+        if (!(angle >= 0.0 && angle <= 0.5 * dembark::pi))
+          read.fail("contactAngle is in radians (stock models take degrees) and must lie in 0...pi/2; the mean of types " +
+                    std::to_string(i) + " and " + std::to_string(j) + " is " + std::to_string(angle));
         std::shared_ptr<const dembark::capillary::BridgeForce>& force = built_[angle];
         if (!force) force = std::make_shared<const dembark::capillary::BridgeForce>(model, angle);
         pair.force = force;
         if (r_min > 0.0 && r_max < 1e10 && pair.volume > largest_ratio * r_max * r_max * r_max)
-          read.fail("bridgeVolume (m^3) of types " + std::to_string(i) + "-" + std::to_string(j) + " is " + std::to_string(pair.volume / (r_max * r_max * r_max)) +
+          read.fail("bridgeVolume (m^3) of types " + std::to_string(i) + "-" + std::to_string(j) + " is " +
+                    std::to_string(pair.volume / (r_max * r_max * r_max)) +
                     " cubes of the largest radius; a bridge between grains has at most a few, give its volume in m^3");
         if (r_min > 0.0 && r_max < 1e10)
           for (const double r : {r_min, r_max})
@@ -207,7 +216,8 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
   }
 
   /// Attraction (N) of a touching pair; its bridge forms now if it has none, unless it must not be stored (`update_history`).
-  double touching_force(double* contact_history, int itype, int jtype, double radius_i, double radius_j, double size, bool update_history, bool primitive_wall = false) const {
+  double touching_force(double* contact_history, int itype, int jtype, double radius_i, double radius_j, double size, bool update_history,
+                        bool primitive_wall = false) const {
     const PairLiquid& pair = pairs_[itype * types_ + jtype];
     double* const history = contact_history + offset_;
     double volume = history[0];
@@ -245,8 +255,9 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
       ask(sidata);
       return;
     }
-    const double attraction = touching_force(sidata.contact_history, sidata.itype, sidata.jtype, sidata.radi, other_radius(sidata), sidata.is_wall ? sidata.radi : sidata.radsum,
-                                             sidata.computeflag && sidata.shearupdate, sidata.is_wall && !sidata.mesh);
+    const double attraction = touching_force(sidata.contact_history, sidata.itype, sidata.jtype, sidata.radi, other_radius(sidata),
+                                             sidata.is_wall ? sidata.radi : sidata.radsum, sidata.computeflag && sidata.shearupdate,
+                                             sidata.is_wall && !sidata.mesh);
     pull(sidata, attraction, sidata.en, i_forces, j_forces);
     if (!liquid_.on() || !(volume > 0.0)) return;
     if (dry) check_time_step(bridge_radius(sidata), sidata.meff);

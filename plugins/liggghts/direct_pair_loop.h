@@ -28,8 +28,9 @@
 namespace dembark_liggghts {
 
 template <int Cohesion>
-using DirectStyle = LIGGGHTS::ContactModels::GranStyle<LIGGGHTS::ContactModels::HERTZ, LIGGGHTS::ContactModels::TANGENTIAL_FINNIE_RABINOWICZ, Cohesion,
-                                                       LIGGGHTS::ContactModels::ROLLING_OFF, LIGGGHTS::ContactModels::SURFACE_DEFAULT>;
+using DirectStyle =
+    LIGGGHTS::ContactModels::GranStyle<LIGGGHTS::ContactModels::HERTZ, LIGGGHTS::ContactModels::TANGENTIAL_FINNIE_RABINOWICZ, Cohesion,
+                                       LIGGGHTS::ContactModels::ROLLING_OFF, LIGGGHTS::ContactModels::SURFACE_DEFAULT>;
 template <int Cohesion>
 using DirectModel = LIGGGHTS::ContactModels::ContactModel<DirectStyle<Cohesion>>;
 template <int Cohesion>
@@ -38,15 +39,15 @@ using StockLoop = LIGGGHTS::PairStyles::Granular<DirectModel<Cohesion>>;
 // The models are private to the loop and to each other; an explicit instantiation may name a private member.
 template <int Cohesion>
 struct ModelsOfLoop {
-  typedef DirectModel<Cohesion> StockLoop<Cohesion>::*type;
+  typedef DirectModel<Cohesion> StockLoop<Cohesion>::* type;
 };
 template <int Cohesion>
 struct TangentialOfModels {
-  typedef LIGGGHTS::ContactModels::TangentialModel<LIGGGHTS::ContactModels::TANGENTIAL_FINNIE_RABINOWICZ> DirectModel<Cohesion>::*type;
+  typedef LIGGGHTS::ContactModels::TangentialModel<LIGGGHTS::ContactModels::TANGENTIAL_FINNIE_RABINOWICZ> DirectModel<Cohesion>::* type;
 };
 template <int Cohesion>
 struct CohesionOfModels {
-  typedef LIGGGHTS::ContactModels::CohesionModel<Cohesion> DirectModel<Cohesion>::*type;
+  typedef LIGGGHTS::ContactModels::CohesionModel<Cohesion> DirectModel<Cohesion>::* type;
 };
 template <class Tag, typename Tag::type Member>
 struct OpenMember {
@@ -66,7 +67,8 @@ template struct OpenMember<TangentialOfModels<capillary>, &DirectModel<capillary
 template struct OpenMember<CohesionOfModels<dry>, &DirectModel<dry>::cohesionModel>;
 template struct OpenMember<CohesionOfModels<capillary>, &DirectModel<capillary>::cohesionModel>;
 
-/// The engine's `Granular<...>` for this combination, with a loop of its own for the plain step. `Cohesion`: COHESION_OFF or COHESION_CAPILLARY.
+/// The engine's `Granular<...>` for this combination, with a loop of its own for the plain step. `Cohesion`: COHESION_OFF or
+/// COHESION_CAPILLARY.
 template <int Cohesion>
 class DirectPairLoop : public StockLoop<Cohesion> {
   typedef StockLoop<Cohesion> Stock;
@@ -87,9 +89,10 @@ class DirectPairLoop : public StockLoop<Cohesion> {
 
   bool plain_step(LAMMPS_NS::PairGran* pair, int eflag, int vflag, int addflag) const {
     const LAMMPS_NS::Atom* atom = lmp_->atom;
-    return plain_settings_ && !eflag && !vflag && !(pair->cpl() && addflag) && pair->computeflag() && pair->listgranhistory && !pair->storeContactForces() &&
-           !pair->storeContactForcesStress() && !pair->storeSumDelta() && !pair->store_sum_normal_force() && !pair->fr_pair() && atom->rmass &&
-           lmp_->force->nktv2p == 1.0 && atom->sphere_flag && !atom->shapetype_flag && lmp_->modify->n_fixes_style("insert/stream/predefined") == 0;
+    return plain_settings_ && !eflag && !vflag && !(pair->cpl() && addflag) && pair->computeflag() && pair->listgranhistory &&
+           !pair->storeContactForces() && !pair->storeContactForcesStress() && !pair->storeSumDelta() && !pair->store_sum_normal_force() &&
+           !pair->fr_pair() && atom->rmass && lmp_->force->nktv2p == 1.0 && atom->sphere_flag && !atom->shapetype_flag &&
+           lmp_->modify->n_fixes_style("insert/stream/predefined") == 0;
   }
 
   static Vec3 vector(const double* v) { return {v[0], v[1], v[2]}; }
@@ -105,8 +108,8 @@ class DirectPairLoop : public StockLoop<Cohesion> {
     for (int i = 1; i < types_; ++i)
       for (int j = 1; j < types_; ++j) {
         const dembark::FinnieRabinowicz& law = friction().law(i, j);
-        laws_[i * types_ + j] = {youngs_modulus_[i][j], shear_modulus_[i][j], damping_factor_[i][j], law.static_friction, law.kinetic_friction,
-                                law.interface_shear_strength, dembark::kept_slip(law, dt), 0.0};
+        laws_[i * types_ + j] = {youngs_modulus_[i][j], shear_modulus_[i][j],         damping_factor_[i][j],       law.static_friction,
+                                 law.kinetic_friction,  law.interface_shear_strength, dembark::kept_slip(law, dt), 0.0};
         linear = linear && law.presliding == dembark::Presliding::linear;
       }
     return linear;
@@ -118,7 +121,8 @@ class DirectPairLoop : public StockLoop<Cohesion> {
     // What is no number never sticks in a pack: pairs without a normal end up here.
     if (!(in.normal[0] == in.normal[0])) loop.friction().refuse_coincidence(block.grain[k], block.partner[k]);
     const Vec3 t = loop.friction().step(block.history[k], type[block.grain[k]], type[block.partner[k]], vector(in.normal), vector(in.spin),
-                                        vector(in.velocity), in.normal_force, in.stiffness, in.damping, in.radius_overlap, loop.dt_, loop.update_history_);
+                                        vector(in.velocity), in.normal_force, in.stiffness, in.damping, in.radius_overlap, loop.dt_,
+                                        loop.update_history_);
     force[0] = t.x;
     force[1] = t.y;
     force[2] = t.z;

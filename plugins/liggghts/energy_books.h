@@ -60,7 +60,8 @@ class EnergyBooks {
   void add(const Contact& d, const Vec3& normal, const dembark::ContactParts& parts, double arm_i, double arm_j) {
     using dembark::ContactPart;
     if (!d.computeflag) return;
-    for (const ContactPart part : {ContactPart::normal_elastic, ContactPart::normal_viscous, ContactPart::tangential_elastic, ContactPart::tangential_viscous})
+    for (const ContactPart part :
+         {ContactPart::normal_elastic, ContactPart::normal_viscous, ContactPart::tangential_elastic, ContactPart::tangential_viscous})
       add(part, d, normal, parts[part], arm_i, arm_j);
     const double share = d.is_wall ? d.area_ratio : std::size_t(d.j) < loads_.size() ? 1.0 : 0.5;
     normal_stored += share * parts.normal_stored;

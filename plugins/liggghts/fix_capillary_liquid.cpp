@@ -106,8 +106,7 @@ void FixCapillaryLiquid::parse(int narg, char **arg) {
         if (other.id == wall.id) refuse("wall " + wall.id + " is given twice");
       walls_.push_back(wall);
       k += 5;
-    } else
-      refuse("keyword '" + word + "' is unknown; there are content, volume, share, return, max_bridge, wall");
+    } else refuse("keyword '" + word + "' is unknown; there are content, volume, share, return, max_bridge, wall");
   }
 }
 
@@ -199,8 +198,7 @@ void FixCapillaryLiquid::grant_all() {
   std::vector<double> mine(1 + 2 * n, 0.0), all(1 + 2 * n, 0.0);
   for (const Request &r : requests_) {
     demands_.add(std::size_t(r.i), share_(r.radius_i, r.radius_j));
-    if (r.j < 0)
-      mine[1 + n + r.wall] += walls_[r.wall].share;
+    if (r.j < 0) mine[1 + n + r.wall] += walls_[r.wall].share;
     else {
       mine[0] = 1.0;
       if (r.j < atom->nlocal) demands_.add(std::size_t(r.j), share_(r.radius_j, r.radius_i));
@@ -228,8 +226,7 @@ void FixCapillaryLiquid::grant_all() {
 void FixCapillaryLiquid::form(const Request &r) {
   const double given_i = share_(r.radius_i, r.radius_j) * grants_[r.i];
   capillary::NewBridge<double> bridge;
-  if (r.j < 0)
-    bridge = capillary::form_wall_bridge(given_i, wall_grants_[r.wall], walls_[r.wall].part, return_, largest_);
+  if (r.j < 0) bridge = capillary::form_wall_bridge(given_i, wall_grants_[r.wall], walls_[r.wall].part, return_, largest_);
   else {
     // Both owners have to see the contact in the same step.
     if (grants_[r.j] < 0.0) return;

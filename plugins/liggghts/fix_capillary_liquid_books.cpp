@@ -99,10 +99,8 @@ void FixCapillaryLiquid::rearrange(const std::vector<Wall> &walls) {
     book(i)[0] = from[0];
     for (std::size_t b = 0; b < before.size(); ++b) {
       const auto found = std::find_if(walls_.begin(), walls_.end(), [&](const Wall &wall) { return wall.id == before[b].id; });
-      if (found != walls_.end())
-        book(i)[1 + (found - walls_.begin())] = from[1 + b];
-      else if (from[1 + b] != 0.0)
-        liquid()[i] += from[1 + b];
+      if (found != walls_.end()) book(i)[1 + (found - walls_.begin())] = from[1 + b];
+      else if (from[1 + b] != 0.0) liquid()[i] += from[1 + b];
     }
   }
   wall_returned_.assign(walls_.size(), 0.0);
@@ -113,8 +111,8 @@ void FixCapillaryLiquid::setup_pre_force(int) {
   requests_.clear();
   for (Wall &wall : walls_)
     if (!wall.fix->is_mesh_wall())
-      wall.history = static_cast<FixPropertyAtom *>(
-          modify->find_fix_property(("history_" + wall.id).c_str(), "property/atom", "vector", 0, 0, style));
+      wall.history =
+          static_cast<FixPropertyAtom *>(modify->find_fix_property(("history_" + wall.id).c_str(), "property/atom", "vector", 0, 0, style));
   after_new_list(false);
 }
 
@@ -215,8 +213,7 @@ void FixCapillaryLiquid::count_all() {
   bigint mine = atom->nlocal, grains = 0;
   MPI_Allreduce(&mine, &grains, 1, MPI_LMP_BIGINT, MPI_SUM, world);
   const double missing = reference_ - now;
-  if (atoms_ < 0)
-    reference_ = now;
+  if (atoms_ < 0) reference_ = now;
   else if (grains < atoms_) {
     lost_ += missing;
     reference_ = now;

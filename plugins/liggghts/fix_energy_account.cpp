@@ -251,9 +251,9 @@ double FixEnergyAccount::compute_vector(int n) {
   const double balance = all.kinetic - all.first_kinetic - all.work[all_forces] - all.imposed;
   const double scale = all.first_kinetic + sizes + std::abs(all.work[gravity]) + std::abs(other) + std::abs(all.imposed);
   const double step_error = all.work[0] + all.normal_stored - all.first_stored;
-  const double values[] = {all.kinetic, all.first_kinetic, all.work[gravity], all.work[0], all.work[1], all.work[2], all.work[3],
-                           all.work[4], all.work[5], all.work[walls], other, all.imposed, balance, all.normal_stored,
-                           all.tangential_stored, step_error, scale};
+  const double values[] = {all.kinetic, all.first_kinetic, all.work[gravity],     all.work[0],     all.work[1], all.work[2],
+                           all.work[3], all.work[4],       all.work[5],           all.work[walls], other,       all.imposed,
+                           balance,     all.normal_stored, all.tangential_stored, step_error,      scale};
   return values[n];
 }
 

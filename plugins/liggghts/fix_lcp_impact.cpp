@@ -32,8 +32,15 @@ std::vector<std::string> words(int narg, char **arg) { return std::vector<std::s
 }  // namespace
 
 FixLcpImpact::FixLcpImpact(LAMMPS *lmp, int narg, char **arg)
-    : Fix(lmp, narg, arg), last_step_(-1), last_dt_(0.0), clock_time_(0.0), clock_step_(0), record_kept_(-1), me_(comm->me),
-      local_capacity_(0), local_always_(true) {
+    : Fix(lmp, narg, arg),
+      last_step_(-1),
+      last_dt_(0.0),
+      clock_time_(0.0),
+      clock_step_(0),
+      record_kept_(-1),
+      me_(comm->me),
+      local_capacity_(0),
+      local_always_(true) {
   if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag || !atom->torque_flag)
     refuse("atoms have no radius, mass, spin or torque of their own; use atom_style granular (or sphere)");
   if (!atom->tag_enable) refuse("atoms have no numbers; use atom_modify id yes");
@@ -129,8 +136,8 @@ void FixLcpImpact::build_system() {
 
 /// The contact forces have to know all others, so fixes that add forces come first.
 void FixLcpImpact::check_order() {
-  const char *const observers[] = {"lcp/impact", "enforce2d", "store/force", "store/state", "property/", "ave/", "print", "mesh/",
-                                   "move/mesh"};
+  const char *const observers[] = {"lcp/impact", "enforce2d", "store/force", "store/state", "property/",
+                                   "ave/",       "print",     "mesh/",       "move/mesh"};
   const int mine = modify->find_fix(id);
   for (int i = mine + 1; i < modify->nfix; ++i) {
     if (!(modify->fmask[i] & POST_FORCE)) continue;
@@ -257,18 +264,23 @@ void FixLcpImpact::fill_local() {
   size_local_rows = 0;
   for (const dembark::impact::ContactResult &c : all) {
     if (!(c.normal_force > 0.0) || !mine[std::size_t(c.a)]) continue;
-    const double row[local_columns] = {
-        double(c.key_a), double(dembark_liggghts::outer_id(c.key_b)), c.normal.x, c.normal.y, c.normal.z, c.gap, c.normal_force,
-        c.tangential.x, c.tangential.y, c.tangential.z, c.place.x, c.place.y, c.place.z};
+    const double row[local_columns] = {double(c.key_a), double(dembark_liggghts::outer_id(c.key_b)),
+                                       c.normal.x,      c.normal.y,
+                                       c.normal.z,      c.gap,
+                                       c.normal_force,  c.tangential.x,
+                                       c.tangential.y,  c.tangential.z,
+                                       c.place.x,       c.place.y,
+                                       c.place.z};
     std::copy(row, row + local_columns, array_local[size_local_rows++]);
   }
 }
 
 double FixLcpImpact::compute_vector(int i) {
   const dembark::impact::StepReport &r = report_;
-  const double values[13] = {double(r.contacts), double(r.active), double(r.impacts_begun), r.peak_force, r.impulse_sum,
-                             r.dissipated_energy, r.elastic_energy, double(r.pivots), double(r.block_steps), double(r.pivots_total),
-                             r.certificate, r.worst_certificate, r.peak_force_so_far};
+  const double values[13] = {double(r.contacts),    double(r.active),       double(r.impacts_begun), r.peak_force,
+                             r.impulse_sum,         r.dissipated_energy,    r.elastic_energy,        double(r.pivots),
+                             double(r.block_steps), double(r.pivots_total), r.certificate,           r.worst_certificate,
+                             r.peak_force_so_far};
   return values[i];
 }
 

@@ -4,7 +4,7 @@
 // LIGGGHTS and the model. It holds no physics.
 #ifdef FIX_CLASS
 
-FixStyle(lcp/impact,FixLcpImpact)
+FixStyle(lcp / impact, FixLcpImpact)
 
 #else
 
@@ -78,7 +78,7 @@ class FixLcpImpact : public Fix {
   std::vector<int> own_atom_, own_body_;
   std::vector<double> own_row_, all_row_;
   std::vector<std::size_t> order_;
-  std::vector<Vec> force_, torque_;  // of the contacts, on bodies_
+  std::vector<Vec> force_, torque_;                      // of the contacts, on bodies_
   std::vector<dembark::impact::ContactResult> results_;  // of the step of a restart file
   dembark::impact::PairFinder pairs_;
 
@@ -87,7 +87,7 @@ class FixLcpImpact : public Fix {
 
   // What the forces of the last step were computed for: a set-up that finds it again takes those forces.
   bigint last_step_;
-  std::vector<double> last_bodies_;            // tag, position, velocity, spin at the end of the step
+  std::vector<double> last_bodies_;  // tag, position, velocity, spin at the end of the step
   std::vector<Vec> last_force_, last_torque_;
   double last_dt_;
   // Time of a step: the engine's own clock does not survive a restart with another time step.

@@ -32,8 +32,25 @@ void FixLcpImpact::read_atom(int i, double *row) const {
   // The engine turns a torque into spin with its own inertia; what the model is told has the same effect with the inertia of a log.
   const double scale = inertia_factor() / engine_inertia(*domain);
   const double *x = atom->x[i], *v = atom->v[i], *w = atom->omega[i], *f = atom->f[i], *t = atom->torque[i];
-  const double numbers[width] = {double(atom->tag[i]), double(atom->type[i]), atom->rmass[i], atom->radius[i], x[0], x[1], x[2], v[0], v[1],
-                                 v[2], w[0], w[1], w[2], f[0], f[1], f[2], t[0] * scale, t[1] * scale, t[2] * scale};
+  const double numbers[width] = {double(atom->tag[i]),
+                                 double(atom->type[i]),
+                                 atom->rmass[i],
+                                 atom->radius[i],
+                                 x[0],
+                                 x[1],
+                                 x[2],
+                                 v[0],
+                                 v[1],
+                                 v[2],
+                                 w[0],
+                                 w[1],
+                                 w[2],
+                                 f[0],
+                                 f[1],
+                                 f[2],
+                                 t[0] * scale,
+                                 t[1] * scale,
+                                 t[2] * scale};
   std::copy(numbers, numbers + width, row);
 }
 
@@ -48,7 +65,7 @@ void FixLcpImpact::gather_bodies() {
     own_row_.resize(n * width);
     for (std::size_t k = 0; k < n; ++k) read_atom(own_atom_[k], &own_row_[k * width]);
     const int count = int(own_row_.size());
-    std::vector<int> counts(std::size_t(comm->nprocs)), offsets(std::size_t(comm->nprocs), 0);
+    std::vector<int> counts(std::size_t(comm->nprocs)), offsets(std::size_t(comm -> nprocs), 0);
     MPI_Allgather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, world);
     for (int r = 1; r < comm->nprocs; ++r) offsets[r] = offsets[r - 1] + counts[r - 1];
     all_row_.resize(std::size_t(offsets.back() + counts.back()));

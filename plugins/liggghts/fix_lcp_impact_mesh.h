@@ -5,7 +5,7 @@
 
 #include <mpi.h>
 
-#include "dembark/impact/geometry.hpp"
+#include "dembark/impact/triangles.hpp"
 
 namespace LAMMPS_NS {
 class FixMeshSurface;

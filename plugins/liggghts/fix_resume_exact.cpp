@@ -149,8 +149,8 @@ void FixResumeExact::setup(int) {
   // Output of the step of the state was written before the state.
   for (int k = 0; k < output->ndump; ++k) output->last_dump[k] = update->ntimestep;
   if (comm->me == 0 && screen)
-    fprintf(screen, "dembark: resumed at step " BIGINT_FORMAT " %s%s\n", update->ntimestep, why.empty() ? "exactly" : "approximately: ",
-            why.c_str());
+    fprintf(screen, "dembark: resumed at step " BIGINT_FORMAT " %s%s\n", update->ntimestep,
+            why.empty() ? "exactly" : "approximately: ", why.c_str());
   kept_.clear();
   kept_.shrink_to_fit();
   state_step_ = -1;
@@ -290,7 +290,7 @@ void FixResumeExact::write_restart(FILE *file) {
   std::vector<double> mine, all;
   save(mine);
   int count = int(mine.size());
-  std::vector<int> counts(std::size_t(comm->nprocs), 0), offsets(std::size_t(comm->nprocs), 0);
+  std::vector<int> counts(std::size_t(comm->nprocs), 0), offsets(std::size_t(comm -> nprocs), 0);
   MPI_Allgather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, world);
   std::int64_t total = 0;
   for (std::size_t r = 0; r < counts.size(); ++r) {

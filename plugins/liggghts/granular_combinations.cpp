@@ -41,8 +41,8 @@ std::string available() {
     return name;
   };
   const auto add = [&](const char* normal, const char* tangential, const char* cohesion, const char* rolling, const char* surface) {
-    std::string& of_normal = groups["tangential " + word(tangential, "TANGENTIAL_") + " cohesion " + word(cohesion, "COHESION_") + " surface " +
-                                    word(surface, "SURFACE_")][word(normal, "NORMAL_")];
+    std::string& of_normal = groups["tangential " + word(tangential, "TANGENTIAL_") + " cohesion " + word(cohesion, "COHESION_") +
+                                    " surface " + word(surface, "SURFACE_")][word(normal, "NORMAL_")];
     of_normal += (of_normal.empty() ? "" : "|") + word(rolling, "ROLLING_");
   };
 #define GRAN_MODEL(normal, tangential, cohesion, rolling, surface) add(#normal, #tangential, #cohesion, #rolling, #surface);
@@ -52,7 +52,8 @@ std::string available() {
   for (const auto& [rest, normals] : groups) {
     std::map<std::string, std::string> same;  // normal models by their rolling models
     for (const auto& [normal, rollings] : normals) same[rollings] += (same[rollings].empty() ? "" : "|") + normal;
-    for (const auto& [rollings, names] : same) line += (line.empty() ? "" : "; ") + ("model " + names + " " + rest) + " rolling_friction " + rollings;
+    for (const auto& [rollings, names] : same)
+      line += (line.empty() ? "" : "; ") + ("model " + names + " " + rest) + " rolling_friction " + rollings;
   }
   return line;
 }
@@ -109,7 +110,8 @@ struct PairLoop<GranStyle<HERTZ, TANGENTIAL_FINNIE_RABINOWICZ, Cohesion, ROLLING
 template <int Normal, int Tangential, int Cohesion, int Rolling, int Surface>
 void add_combination() {
   typedef GranStyle<Normal, Tangential, Cohesion, Rolling, Surface> Style;
-  PairStyles::Factory::instance().addStyle("gran", Style::HASHCODE, &create<PairStyles::IGranularPairStyle, typename PairLoop<Style>::type>);
+  PairStyles::Factory::instance().addStyle("gran", Style::HASHCODE,
+                                           &create<PairStyles::IGranularPairStyle, typename PairLoop<Style>::type>);
   Walls::Factory::instance().addStyle("gran", Style::HASHCODE, &create<Walls::IGranularWall, MeshWall<ContactModel<Style>>>);
 }
 

@@ -26,12 +26,12 @@ namespace {
 // The tables of fix styles and of commands are private; an explicit instantiation may name a private member.
 typedef LAMMPS_NS::Fix* (*FixCreator)(LAMMPS_NS::LAMMPS*, int, char**);
 struct FixTable {
-  typedef std::map<std::string, FixCreator>* LAMMPS_NS::Modify::*type;
+  typedef std::map<std::string, FixCreator>* LAMMPS_NS::Modify::* type;
   friend type table(FixTable);
 };
 typedef void (*CommandCreator)(LAMMPS_NS::LAMMPS*, int, char**);
 struct CommandTable {
-  typedef std::map<std::string, CommandCreator>* LAMMPS_NS::Input::*type;
+  typedef std::map<std::string, CommandCreator>* LAMMPS_NS::Input::* type;
   friend type table(CommandTable);
 };
 template <class Tag, typename Tag::type Member>

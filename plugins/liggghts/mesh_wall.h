@@ -31,9 +31,9 @@ class MeshAround {
   double* centre_;
   std::vector<int>& visited_;
 
-  static constexpr int face = 7;               // the engine's sign of a closest point inside a triangle
-  static constexpr double smooth = 0.99875;    // cos(0.05 rad): planes at a smaller angle make one smooth surface
-  static constexpr double reach = 0.06;        // of the radius: how far from an edge a sphere can touch both sides of such a groove
+  static constexpr int face = 7;             // the engine's sign of a closest point inside a triangle
+  static constexpr double smooth = 0.99875;  // cos(0.05 rad): planes at a smaller angle make one smooth surface
+  static constexpr double reach = 0.06;      // of the radius: how far from an edge a sphere can touch both sides of such a groove
 
   struct Closest {
     Vec3 point;
@@ -89,9 +89,10 @@ class MeshAround {
         const Closest there = closest(other, centre_);
         bool nearer;
         if (mine.sign != face) nearer = apart < 1e-6 * radius_ && (there.sign == face || there.distance < mine.distance * (1.0 - 1e-13));
-        else nearer = there.sign == face && std::abs(dot(own, normal(other))) >= smooth &&
-                      !mesh_.areCoplanarNodeNeighs(mesh_.id(triangle), mesh_.id(other)) &&
-                      (there.distance < mine.distance || (there.distance == mine.distance && mesh_.id(other) < mesh_.id(triangle)));
+        else
+          nearer = there.sign == face && std::abs(dot(own, normal(other))) >= smooth &&
+                   !mesh_.areCoplanarNodeNeighs(mesh_.id(triangle), mesh_.id(other)) &&
+                   (there.distance < mine.distance || (there.distance == mine.distance && mesh_.id(other) < mesh_.id(triangle)));
         if (nearer && there.distance < distance) best = other, distance = there.distance;
       });
     return best;
@@ -145,7 +146,8 @@ class MeshWall : public LIGGGHTS::Walls::Granular<Models> {
   MeshWall(LAMMPS_NS::LAMMPS* lmp, LAMMPS_NS::FixWallGran* parent, std::int64_t hash) : Stock(lmp, parent, hash), lmp_(lmp) {}
 
   void compute_force(LAMMPS_NS::FixWallGran* wall, LIGGGHTS::ContactModels::SurfacesIntersectData& contact, bool touching, double* velocity,
-                     LAMMPS_NS::FixMeshSurface* fix = nullptr, int number = 0, LAMMPS_NS::TriMesh* mesh = nullptr, int triangle = 0) override {
+                     LAMMPS_NS::FixMeshSurface* fix = nullptr, int number = 0, LAMMPS_NS::TriMesh* mesh = nullptr,
+                     int triangle = 0) override {
     if (mesh && !lmp_->atom->shapetype_flag && !lmp_->atom->superquadric_flag) {
       const int grain = contact.i;
       const MeshAround around(*mesh, grain, contact.radi, lmp_->atom->x[grain], work_);

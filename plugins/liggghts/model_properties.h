@@ -35,9 +35,11 @@ class PropertyReader {
     for (const char* form : {"scalar", "peratomtype", "peratomtypepair"})
       if (std::string(form) != shape && look_up(name, form, 0, 0)) other = form;
     if (!required && other.empty()) return nullptr;
-    const std::string values = n == 0 ? "VALUE" : m == 0 ? "VALUE (one a type)" : std::to_string(lmp_->atom->ntypes) + " VALUE (one a pair of types)";
-    const std::string line = model_ + " needs the material property '" + name + "': fix ID all property/global " + name + " " + shape + " " + values +
-                             (other.empty() ? "" : ", not " + other);
+    const std::string values = n == 0   ? "VALUE"
+                               : m == 0 ? "VALUE (one a type)"
+                                        : std::to_string(lmp_->atom->ntypes) + " VALUE (one a pair of types)";
+    const std::string line = model_ + " needs the material property '" + name + "': fix ID all property/global " + name + " " + shape +
+                             " " + values + (other.empty() ? "" : ", not " + other);
     error_->all(FLERR, line.c_str());
     return nullptr;
   }

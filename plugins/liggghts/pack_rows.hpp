@@ -40,14 +40,18 @@ DEMBARK_HOT Pack<N> values(const double* base, const int* index) {
 namespace detail {
 
 template <int N>
-DEMBARK_HOT typename Pack<N>::Lanes part(const double* from) { return Pack<N>::load(from).lanes; }
+DEMBARK_HOT typename Pack<N>::Lanes part(const double* from) {
+  return Pack<N>::load(from).lanes;
+}
 
 #ifdef DEMBARK_SHUFFLE
 // Four vectors of rows (k, k + 4), k = 0 ... 3, of four columns each, to columns; and columns to such vectors: the same exchange.
 typedef Pack<8>::Lanes Eight;
 DEMBARK_HOT void exchange(Eight (&z)[4]) {
-  const Eight a = __builtin_shufflevector(z[0], z[1], 0, 8, 2, 10, 4, 12, 6, 14), b = __builtin_shufflevector(z[0], z[1], 1, 9, 3, 11, 5, 13, 7, 15);
-  const Eight c = __builtin_shufflevector(z[2], z[3], 0, 8, 2, 10, 4, 12, 6, 14), d = __builtin_shufflevector(z[2], z[3], 1, 9, 3, 11, 5, 13, 7, 15);
+  const Eight a = __builtin_shufflevector(z[0], z[1], 0, 8, 2, 10, 4, 12, 6, 14),
+              b = __builtin_shufflevector(z[0], z[1], 1, 9, 3, 11, 5, 13, 7, 15);
+  const Eight c = __builtin_shufflevector(z[2], z[3], 0, 8, 2, 10, 4, 12, 6, 14),
+              d = __builtin_shufflevector(z[2], z[3], 1, 9, 3, 11, 5, 13, 7, 15);
   z[0] = __builtin_shufflevector(a, c, 0, 1, 8, 9, 4, 5, 12, 13);
   z[1] = __builtin_shufflevector(b, d, 0, 1, 8, 9, 4, 5, 12, 13);
   z[2] = __builtin_shufflevector(a, c, 2, 3, 10, 11, 6, 7, 14, 15);
@@ -57,7 +61,8 @@ typedef Pack<4>::Lanes Four;
 DEMBARK_HOT Eight joined(const Four& low, const Four& high) { return __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7); }
 // Columns c and c + 1 of four rows, in two instructions behind the loads.
 DEMBARK_HOT void two_columns(const double* r0, const double* r1, const double* r2, const double* r3, Four& first, Four& second) {
-  const Four a = __builtin_shufflevector(part<2>(r0), part<2>(r2), 0, 1, 2, 3), b = __builtin_shufflevector(part<2>(r1), part<2>(r3), 0, 1, 2, 3);
+  const Four a = __builtin_shufflevector(part<2>(r0), part<2>(r2), 0, 1, 2, 3),
+             b = __builtin_shufflevector(part<2>(r1), part<2>(r3), 0, 1, 2, 3);
   first = __builtin_shufflevector(a, b, 0, 4, 2, 6);
   second = __builtin_shufflevector(a, b, 1, 5, 3, 7);
 }
@@ -85,7 +90,8 @@ DEMBARK_HOT PackVec<N> rows3(Row row) {
     return {x, y, collect<N>([=](int k) { return row(k)[2]; })};
   }
 #endif
-  return {collect<N>([=](int k) { return row(k)[0]; }), collect<N>([=](int k) { return row(k)[1]; }), collect<N>([=](int k) { return row(k)[2]; })};
+  return {collect<N>([=](int k) { return row(k)[0]; }), collect<N>([=](int k) { return row(k)[1]; }),
+          collect<N>([=](int k) { return row(k)[2]; })};
 }
 
 /// Rows `index` of an array of three columns.
@@ -112,8 +118,8 @@ DEMBARK_HOT Quad<N> rows4(Row row) {
     return {x, y, z, w};
   }
 #endif
-  return {collect<N>([=](int k) { return row(k)[0]; }), collect<N>([=](int k) { return row(k)[1]; }), collect<N>([=](int k) { return row(k)[2]; }),
-          collect<N>([=](int k) { return row(k)[3]; })};
+  return {collect<N>([=](int k) { return row(k)[0]; }), collect<N>([=](int k) { return row(k)[1]; }),
+          collect<N>([=](int k) { return row(k)[2]; }), collect<N>([=](int k) { return row(k)[3]; })};
 }
 
 /// Lane k to the four numbers at row(k).

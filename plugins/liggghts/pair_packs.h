@@ -18,9 +18,9 @@ struct PairBlock {
   static constexpr int capacity = 256, room = capacity + 16;
   alignas(64) int i[room], j[room], flag[room], run[room];  // neighbours as they come: grains, contact flag, which run below
   alignas(64) int pick[room];                               // those with a force: 2 * place above, + 1 if they touch
-  int run_start[room];           // of each run of neighbours of one grain: place of what would be the grain's first neighbour
-  int* run_flags[room];          // its flag
-  double* run_histories[room];   // its history
+  int run_start[room];          // of each run of neighbours of one grain: place of what would be the grain's first neighbour
+  int* run_flags[room];         // its flag
+  double* run_histories[room];  // its history
   alignas(64) int grain[room], partner[room], kind[room];  // pairs with a force
   int* flags[room];
   double* history[room];

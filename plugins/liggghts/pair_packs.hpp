@@ -13,12 +13,13 @@ namespace {
 
 template <int N>
 struct LawPack {
-  Pack<N> effective_youngs_modulus, effective_shear_modulus, damping, static_friction, kinetic_friction, interface_shear_strength, kept_slip;
+  Pack<N> effective_youngs_modulus, effective_shear_modulus, damping, static_friction, kinetic_friction, interface_shear_strength,
+      kept_slip;
 };
 
 template <int N>
 DEMBARK_HOT LawPack<N> law_of_one_kind(const PairLaw& law) {
-  return {law.effective_youngs_modulus, law.effective_shear_modulus,   law.damping,  law.static_friction,
+  return {law.effective_youngs_modulus, law.effective_shear_modulus,  law.damping,  law.static_friction,
           law.kinetic_friction,         law.interface_shear_strength, law.kept_slip};
 }
 
@@ -134,8 +135,9 @@ DEMBARK_HOT void store(const PackVec<N>& v, double (*to)[N]) {
 /// Leaves the lanes `rest` of the pack at `first` to the scalar law, which gets their states as they were.
 template <int N>
 __attribute__((noinline)) void scalar_friction(const PairStep& s, const PairBlock& b, int first, unsigned rest, const PackVec<N>& normal,
-                                               const PackVec<N>& spin, const PackVec<N>& velocity, const dembark::NormalResponse<Pack<N>>& response,
-                                               const Pack<N>& radius_overlap, PackVec<N>& tangential) {
+                                               const PackVec<N>& spin, const PackVec<N>& velocity,
+                                               const dembark::NormalResponse<Pack<N>>& response, const Pack<N>& radius_overlap,
+                                               PackVec<N>& tangential) {
   alignas(64) double n[3][N], w[3][N], v[3][N], t[3][N];
   store(normal, n);
   store(spin, w);
@@ -145,8 +147,14 @@ __attribute__((noinline)) void scalar_friction(const PairStep& s, const PairBloc
     if (!(rest >> k & 1)) continue;
     double force[3];
     s.friction(s.caller, b, first + k,
-               {{n[0][k], n[1][k], n[2][k]}, {w[0][k], w[1][k], w[2][k]}, {v[0][k], v[1][k], v[2][k]}, response.force[k],
-                response.tangential_stiffness[k], response.tangential_damping[k], radius_overlap[k]}, force);
+               {{n[0][k], n[1][k], n[2][k]},
+                {w[0][k], w[1][k], w[2][k]},
+                {v[0][k], v[1][k], v[2][k]},
+                response.force[k],
+                response.tangential_stiffness[k],
+                response.tangential_damping[k],
+                radius_overlap[k]},
+               force);
     for (int axis = 0; axis < 3; ++axis) t[axis][k] = force[axis];
   }
   tangential = {Pack<N>::load(t[0]), Pack<N>::load(t[1]), Pack<N>::load(t[2])};
@@ -190,13 +198,16 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
     state.displacement = dembark::rotate_to_plane<P>(state.displacement, normal, 0.5 * dt * dot(spin, normal));
     state.displacement += motion.tangential * dt;
     const auto sticks = dembark::plainly_sticks(law, response.force, response.tangential_stiffness, dembark::pi * radius_overlap, state);
-    PackVec<N> tangential = dembark::sticking_force<P>(response.tangential_stiffness, response.tangential_damping, motion.tangential, dt, law.kept_slip, state);
+    PackVec<N> tangential =
+        dembark::sticking_force<P>(response.tangential_stiffness, response.tangential_damping, motion.tangential, dt, law.kept_slip, state);
     if (apart) {  // such a pair has forgotten its contact
       const P none = 0.0;
       response.force = select(touching, response.force, none);
       tangential = {select(touching, tangential.x, none), select(touching, tangential.y, none), select(touching, tangential.z, none)};
-      state = {{select(touching, state.displacement.x, none), select(touching, state.displacement.y, none), select(touching, state.displacement.z, none)},
-               select(touching, state.slip, none), select(touching, state.dissipated_energy, none)};
+      state = {{select(touching, state.displacement.x, none), select(touching, state.displacement.y, none),
+                select(touching, state.displacement.z, none)},
+               select(touching, state.slip, none),
+               select(touching, state.dissipated_energy, none)};
     }
     const unsigned packed = s.pack_friction ? bits(sticks) | apart : apart;
     alignas(64) double energy[N];
@@ -207,7 +218,8 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
       for (int k = 0; k < N; ++k) history(k)[4] = energy[k];
     } else {
       alignas(64) double rows[N][4];
-      store_rows4<N>(Quad<N>{state.displacement.x, state.displacement.y, state.displacement.z, state.slip}, [&rows](int k) { return rows[k]; });
+      store_rows4<N>(Quad<N>{state.displacement.x, state.displacement.y, state.displacement.z, state.slip},
+                     [&rows](int k) { return rows[k]; });
       for (int k = 0; k < N; ++k) {
         if (!(packed & there & 1u << k)) continue;
         double* const to = history(k);

@@ -14,7 +14,7 @@
 namespace dembark_liggghts {
 
 struct SettingTable {
-  typedef std::map<std::string, Setting*> Settings::*type;
+  typedef std::map<std::string, Setting*> Settings::* type;
   friend type member(SettingTable);
 };
 

@@ -120,12 +120,10 @@ long table_end(std::FILE* file, long long step) {
 long dump_end(std::FILE* file, long long step) {
   std::vector<char> line(1 << 16);
   long end = 0;
-  const auto next = [&] {
-    return std::fgets(line.data(), int(line.size()), file) && line[std::strlen(line.data()) - 1] == '\n';
-  };
+  const auto next = [&] { return std::fgets(line.data(), int(line.size()), file) && line[std::strlen(line.data()) - 1] == '\n'; };
   while (next() && std::strcmp(line.data(), "ITEM: TIMESTEP\n") == 0) {
     if (!next() || std::atoll(line.data()) > step) break;
-    if (!next() || !next()) break;  // "ITEM: NUMBER OF ...", the number
+    if (!next() || !next()) break;                 // "ITEM: NUMBER OF ...", the number
     long long rows = std::atoll(line.data()) + 5;  // and the box, and the names of the columns
     while (rows > 0 && next()) --rows;
     if (rows > 0) break;

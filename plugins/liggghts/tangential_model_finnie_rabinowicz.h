@@ -4,7 +4,7 @@
 //
 // Works compiled out of tree into liggghts-dembark and, unchanged, copied into a LIGGGHTS src/ folder.
 #ifdef TANGENTIAL_MODEL
-TANGENTIAL_MODEL(TANGENTIAL_FINNIE_RABINOWICZ,finnie_rabinowicz,20)
+TANGENTIAL_MODEL(TANGENTIAL_FINNIE_RABINOWICZ, finnie_rabinowicz, 20)
 #else
 
 #ifndef TANGENTIAL_MODEL_FINNIE_RABINOWICZ_H_
@@ -52,7 +52,8 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
   }
 
  public:
-  TangentialModel(LAMMPS* lmp, IContactHistorySetup* hsetup, class ContactModelBase*) : TangentialModelBase(lmp, hsetup, nullptr), host_(hsetup) {
+  TangentialModel(LAMMPS* lmp, IContactHistorySetup* hsetup, class ContactModelBase*)
+      : TangentialModelBase(lmp, hsetup, nullptr), host_(hsetup) {
     // "1": the sign turns when the engine swaps the two grains of a pair.
     offset_ = hsetup->add_history_value("tangential_displacement_x", "1");
     hsetup->add_history_value("tangential_displacement_y", "1");
@@ -61,7 +62,9 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     hsetup->add_history_value("friction_dissipated_energy", "0");
   }
 
-  void registerSettings(Settings& settings) { dembark_liggghts::register_choice(settings, "presliding", presliding_, {"linear", "exponential"}); }
+  void registerSettings(Settings& settings) {
+    dembark_liggghts::register_choice(settings, "presliding", presliding_, {"linear", "exponential"});
+  }
 
   inline void postSettings(IContactHistorySetup*, ContactModelBase*) {}
 
@@ -82,7 +85,8 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
       }
     books_ = dembark_liggghts::find_energy_books(modify);
     LAMMPS_NS::FixWallGran* const wall = dynamic_cast<LAMMPS_NS::FixWallGran*>(host_);
-    const bool hertz = wall ? wall->contact_match("normal", "hertz") : dynamic_cast<LAMMPS_NS::PairGran&>(*host_).contact_match("normal", "hertz");
+    const bool hertz =
+        wall ? wall->contact_match("normal", "hertz") : dynamic_cast<LAMMPS_NS::PairGran&>(*host_).contact_match("normal", "hertz");
     exponent_ = hertz ? 1.5 : 1.0;
     // The engine tells a model of the end of a contact only within this factor of the radii; without it a grain that bounces
     // between two builds of the neighbour list would keep the displacement of its last contact (as it does in `history`).
@@ -100,24 +104,27 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
   /// Tangential force on the first body of a touching pair. `spin`: sum of both bodies' angular velocities; `radius_overlap`: R* delta;
   /// `dt` is 0 at the set-up of a run, where forces are those of the stored state: a step of zero length, which is not stored.
   /// `displacement`: of the spring, after the step.
-  DEMBARK_HOT dembark::Vec3<double> step(double* contact_history, int itype, int jtype, const dembark::Vec3<double>& normal, const dembark::Vec3<double>& spin,
-                                         const dembark::Vec3<double>& velocity, double normal_force, double k_t, double gamma_t, double radius_overlap,
-                                         double dt, bool update_history, dembark::Vec3<double>* displacement = nullptr) const {
+  DEMBARK_HOT dembark::Vec3<double> step(double* contact_history, int itype, int jtype, const dembark::Vec3<double>& normal,
+                                         const dembark::Vec3<double>& spin, const dembark::Vec3<double>& velocity, double normal_force,
+                                         double k_t, double gamma_t, double radius_overlap, double dt, bool update_history,
+                                         dembark::Vec3<double>* displacement = nullptr) const {
     double* const history = contact_history + offset_;
     dembark::FrictionState<double> state = load(history);
     state.displacement = dembark::rotate_to_plane(state.displacement, normal, 0.5 * dt * dot(spin, normal));
-    const dembark::Vec3<double> force = dembark::friction_step(laws_[itype * types_ + jtype], normal_force, k_t, gamma_t, dembark::pi * radius_overlap, velocity, dt, state);
+    const dembark::Vec3<double> force = dembark::friction_step(laws_[itype * types_ + jtype], normal_force, k_t, gamma_t,
+                                                               dembark::pi * radius_overlap, velocity, dt, state);
     if (update_history) store(history, state);
     if (displacement) *displacement = state.displacement;
     return force;
   }
 
-
   /// The run ends when two centres lie on each other: there is no normal, and the engine's own models would give no number.
   DEMBARK_COLD void refuse_coincidence(int i, int j) const {
     char line[160];
     const int* const tag = atom->tag;
-    if (j < 0) snprintf(line, sizeof line, "the centre of atom %d lies on a wall: it has no normal; take a smaller time step or another start", tag[i]);
+    if (j < 0)
+      snprintf(line, sizeof line, "the centre of atom %d lies on a wall: it has no normal; take a smaller time step or another start",
+               tag[i]);
     else snprintf(line, sizeof line, "atoms %d and %d have the same centre: their contact has no normal; place them apart", tag[i], tag[j]);
     error->one(FLERR, line);
   }
@@ -132,8 +139,8 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     const double reduced_radius = sidata.is_wall ? sidata.radi : sidata.radi * sidata.radj / sidata.radsum;
     dembark::Vec3<double> displacement;
     const dembark::Vec3<double> force =
-        step(sidata.contact_history, sidata.itype, sidata.jtype, normal, spin, {sidata.vtr1, sidata.vtr2, sidata.vtr3}, sidata.Fn, sidata.kt, sidata.gammat,
-             reduced_radius * sidata.deltan, update_history ? update->dt : 0.0, update_history, &displacement);
+        step(sidata.contact_history, sidata.itype, sidata.jtype, normal, spin, {sidata.vtr1, sidata.vtr2, sidata.vtr3}, sidata.Fn,
+             sidata.kt, sidata.gammat, reduced_radius * sidata.deltan, update_history ? update->dt : 0.0, update_history, &displacement);
 
     const dembark::Vec3<double> moment = cross(normal, force);
     const double scale = sidata.is_wall ? sidata.area_ratio : 1.0;

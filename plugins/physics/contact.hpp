@@ -33,7 +33,7 @@ struct ContactParameters {
   HertzParameters elasticity{};          ///< E*, G* (Hertz only) and damping
   double characteristic_velocity = 1.0;  ///< m/s, Hooke only
   bool tangential_damping = true;
-  bool limit_force = false;              ///< no attraction by damping: F >= 0
+  bool limit_force = false;  ///< no attraction by damping: F >= 0
   FinnieRabinowicz friction{};
   Liquid liquid{};
 };
@@ -41,8 +41,8 @@ struct ContactParameters {
 /// What an engine stores per contact, from touching to the end of contact and bridge.
 struct ContactState {
   FrictionState<double> friction{};
-  double bridge_volume = 0.0;      ///< m^3; 0 = no bridge
-  double rupture_distance = 0.0;   ///< m, of the bridge that is there
+  double bridge_volume = 0.0;     ///< m^3; 0 = no bridge
+  double rupture_distance = 0.0;  ///< m, of the bridge that is there
 };
 
 /// The two bodies as an engine sees them. `separation` = position of 1 minus position of 2 (minus the nearest wall point),
@@ -56,15 +56,15 @@ struct ContactBodies {
 };
 
 struct ContactForce {
-  bool interacting = false;      ///< touching, or held by a bridge: the engine has to keep the contact
-  Vec3<double> normal{};         ///< unit, from 2 to 1
-  double overlap = 0.0;          ///< m, negative = gap
-  double normal_force = 0.0;     ///< N, repulsive force of the normal law, without the bridge
-  double capillary_force = 0.0;  ///< N, positive = attractive
-  Vec3<double> tangential{};     ///< N, on body 1, friction
-  double viscous_normal = 0.0;        ///< N, of the liquid, on body 1 along the normal
-  Vec3<double> viscous_tangential{};  ///< N, of the liquid, on body 1
-  Vec3<double> force{};          ///< N, on body 1, everything; body 2 gets its negative
+  bool interacting = false;             ///< touching, or held by a bridge: the engine has to keep the contact
+  Vec3<double> normal{};                ///< unit, from 2 to 1
+  double overlap = 0.0;                 ///< m, negative = gap
+  double normal_force = 0.0;            ///< N, repulsive force of the normal law, without the bridge
+  double capillary_force = 0.0;         ///< N, positive = attractive
+  Vec3<double> tangential{};            ///< N, on body 1, friction
+  double viscous_normal = 0.0;          ///< N, of the liquid, on body 1 along the normal
+  Vec3<double> viscous_tangential{};    ///< N, of the liquid, on body 1
+  Vec3<double> force{};                 ///< N, on body 1, everything; body 2 gets its negative
   Vec3<double> torque_1{}, torque_2{};  ///< N m
 };
 
@@ -121,20 +121,19 @@ inline ContactForce contact_step(const ContactParameters& p, const ContactBodies
 
   if (touching) {
     const double effective_radius = reduced(b.radius_1, b.radius_2), effective_mass = reduced(b.mass_1, b.mass_2);
-    NormalResponse<double> response =
-        p.normal_law == NormalLaw::hertz
-            ? hertz(p.elasticity, effective_radius, effective_mass, out.overlap, motion.normal_velocity)
-            : hooke(HookeParameters(p.elasticity, p.characteristic_velocity),
-                    effective_radius, effective_mass, out.overlap, motion.normal_velocity);
+    NormalResponse<double> response = p.normal_law == NormalLaw::hertz
+                                          ? hertz(p.elasticity, effective_radius, effective_mass, out.overlap, motion.normal_velocity)
+                                          : hooke(HookeParameters(p.elasticity, p.characteristic_velocity), effective_radius,
+                                                  effective_mass, out.overlap, motion.normal_velocity);
     if (p.limit_force && response.force < 0.0) response.force = 0.0;
     out.normal_force = response.force;
 
     const double step = update ? dt : 0.0;
     const double twist = 0.5 * dot(b.angular_velocity_1 + b.angular_velocity_2, out.normal) * step;
     state.friction.displacement = rotate_to_plane(state.friction.displacement, out.normal, twist);
-    out.tangential = friction_step(p.friction, response.force, response.tangential_stiffness,
-                                   p.tangential_damping ? response.tangential_damping : 0.0, response.contact_area,
-                                   motion.tangential_velocity, step, state.friction);
+    out.tangential =
+        friction_step(p.friction, response.force, response.tangential_stiffness, p.tangential_damping ? response.tangential_damping : 0.0,
+                      response.contact_area, motion.tangential_velocity, step, state.friction);
   } else {
     state.friction = {};
   }

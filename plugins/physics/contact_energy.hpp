@@ -43,8 +43,8 @@ struct ContactParts {
 
 /// Springs and dash-pots of a touching contact. `spring`: N, what the normal law gives at rest, which grows with overlap^exponent;
 /// `normal_force`: N, what it gave; `stiffness`: k_t; `tangential`: N, on body 1; `displacement`: xi after the step.
-inline void split_touching(ContactParts& parts, const Vec3<double>& normal, double overlap, double spring, double exponent, double normal_force,
-                           double stiffness, const Vec3<double>& tangential, const Vec3<double>& displacement) {
+inline void split_touching(ContactParts& parts, const Vec3<double>& normal, double overlap, double spring, double exponent,
+                           double normal_force, double stiffness, const Vec3<double>& tangential, const Vec3<double>& displacement) {
   const Vec3<double> held = -stiffness * displacement;
   parts[ContactPart::normal_elastic] = spring * normal;
   parts[ContactPart::normal_viscous] = (normal_force - spring) * normal;
@@ -55,7 +55,8 @@ inline void split_touching(ContactParts& parts, const Vec3<double>& normal, doub
 }
 
 /// The parts of `force`, which `contact_step` has returned when it left `displacement` (xi). Of the bodies only radii and masses count.
-inline ContactParts contact_parts(const ContactParameters& p, const ContactBodies& bodies, const ContactForce& force, const Vec3<double>& displacement) {
+inline ContactParts contact_parts(const ContactParameters& p, const ContactBodies& bodies, const ContactForce& force,
+                                  const Vec3<double>& displacement) {
   ContactParts parts;
   parts[ContactPart::capillary] = -force.capillary_force * force.normal;
   parts[ContactPart::liquid_viscous] = force.viscous_normal * force.normal + force.viscous_tangential;
@@ -87,15 +88,20 @@ struct ContactEnergies {
 
 /// Energies of a contact of which `contact_step` has returned `force` and left `displacement` (xi). `mean` are the bodies at the same
 /// positions, with the velocities V(n) of (1).
-inline ContactEnergies contact_energies(const ContactParameters& p, const ContactBodies& mean, const ContactForce& force, const Vec3<double>& displacement) {
+inline ContactEnergies contact_energies(const ContactParameters& p, const ContactBodies& mean, const ContactForce& force,
+                                        const Vec3<double>& displacement) {
   const ContactParts parts = contact_parts(p, mean, force, displacement);
   const RelativeMotion motion = relative_motion(mean, force.normal, force.overlap);
   const Vec3<double> velocity = motion.normal_velocity * force.normal + motion.tangential_velocity;
   const auto power = [&](ContactPart part) { return dot(parts[part], velocity); };
-  return {parts.normal_stored, parts.tangential_stored,
-          power(ContactPart::normal_elastic), power(ContactPart::normal_viscous),
-          power(ContactPart::tangential_elastic), power(ContactPart::tangential_viscous),
-          power(ContactPart::capillary), power(ContactPart::liquid_viscous)};
+  return {parts.normal_stored,
+          parts.tangential_stored,
+          power(ContactPart::normal_elastic),
+          power(ContactPart::normal_viscous),
+          power(ContactPart::tangential_elastic),
+          power(ContactPart::tangential_viscous),
+          power(ContactPart::capillary),
+          power(ContactPart::liquid_viscous)};
 }
 
 }  // namespace dembark

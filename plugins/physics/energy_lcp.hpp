@@ -184,7 +184,8 @@ class LcpSolver {
       if (options.check_input) definite_.check(island, islands_.first(island), block);
       if (single) {
         if (n > dense_limit)
-          lcp::fail("methods energy and murty keep n^2 numbers and take islands up to ", dense_limit, " unknowns, not ", n, "; use auto or block");
+          lcp::fail("methods energy and murty keep n^2 numbers and take islands up to ", dense_limit, " unknowns, not ", n,
+                    "; use auto or block");
         add(singles_.run(block, unknowns_, options.method == LcpMethod::murty, options));
       } else if (options.method == LcpMethod::pgs) {
         add(lcp::gauss_seidel(block, unknowns_, options));

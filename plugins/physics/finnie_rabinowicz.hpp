@@ -157,7 +157,7 @@ namespace detail {
 /// A step of the exponential pre-sliding curve. Exact for the straight path of one step: T relaxes towards T_max along it.
 template <class Real>
 DEMBARK_COLD Vec3<Real> exponential_step(const FinnieRabinowicz& law, Real normal_force, Real stiffness, Real contact_area,
-                                   const Vec3<Real>& increment, Real dt, FrictionState<Real>& state) {
+                                         const Vec3<Real>& increment, Real dt, FrictionState<Real>& state) {
   using std::exp;
   const Real path = norm(increment);
   const Vec3<Real> before = stiffness * state.displacement;
@@ -190,7 +190,8 @@ DEMBARK_COLD Vec3<Real> exponential_step(const FinnieRabinowicz& law, Real norma
 /// Whether a contact slid in its last step. Without a healing time every sticking step forgets the slip; with one, sliding shows in a
 /// spring at its limit, give or take what damping makes of the normal force.
 template <class Real>
-DEMBARK_COLD bool was_sliding(const FinnieRabinowicz& law, Real normal_force, Real stiffness, Real contact_area, const FrictionState<Real>& state) {
+DEMBARK_COLD bool was_sliding(const FinnieRabinowicz& law, Real normal_force, Real stiffness, Real contact_area,
+                              const FrictionState<Real>& state) {
   if (law.healing_time == 0.0) return true;
   return stiffness * norm(state.displacement) > 0.99 * shear_limit(law, friction_coefficient(law, state.slip), normal_force, contact_area);
 }
@@ -233,7 +234,8 @@ DEMBARK_HOT auto plainly_sticks(const Law& law, Real normal_force, Real stiffnes
 /// The force (N) on body 1 of a linear spring, displaced already, while it sticks: it keeps the share `kept` of its slip, and what its
 /// dash-pot takes is booked.
 template <class Real>
-DEMBARK_HOT Vec3<Real> sticking_force(Real stiffness, Real damping, const Vec3<Real>& velocity, Real dt, Real kept, FrictionState<Real>& state) {
+DEMBARK_HOT Vec3<Real> sticking_force(Real stiffness, Real damping, const Vec3<Real>& velocity, Real dt, Real kept,
+                                      FrictionState<Real>& state) {
   state.slip *= kept;
   state.dissipated_energy += damping * dot(velocity, velocity) * dt;
   return -(stiffness * state.displacement + damping * velocity);
@@ -249,7 +251,7 @@ DEMBARK_HOT Vec3<Real> sticking_force(Real stiffness, Real damping, const Vec3<R
 /// state. The viscous part acts while the contact sticks.
 template <class Real>
 DEMBARK_HOT Vec3<Real> friction_step(const FinnieRabinowicz& law, Real normal_force, Real stiffness, Real damping, Real contact_area,
-                                const Vec3<Real>& velocity, Real dt, FrictionState<Real>& state) {
+                                     const Vec3<Real>& velocity, Real dt, FrictionState<Real>& state) {
   const Vec3<Real> increment = velocity * dt;
   if (law.presliding == Presliding::exponential)
     return detail::exponential_step(law, normal_force, stiffness, contact_area, increment, dt, state);

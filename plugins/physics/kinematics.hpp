@@ -7,8 +7,8 @@ namespace dembark {
 
 template <class Real>
 struct ContactMotion {
-  Real normal;             ///< v_n, m/s, > 0 when separating
-  Vec3<Real> tangential;   ///< of body 1 relative to 2, m/s
+  Real normal;            ///< v_n, m/s, > 0 when separating
+  Vec3<Real> tangential;  ///< of body 1 relative to 2, m/s
 };
 
 /// `normal`: unit, from body 2 to body 1; `relative`: velocity of the centre of 1 relative to that of 2 (m/s); `spin`: sum of both lever

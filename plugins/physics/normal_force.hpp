@@ -31,8 +31,7 @@ inline double effective_youngs_modulus(double youngs_1, double poisson_1, double
 
 /// Effective shear modulus (Pa), 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2 with G = E / (2 (1 + nu)).
 inline double effective_shear_modulus(double youngs_1, double poisson_1, double youngs_2, double poisson_2) {
-  return 1.0 / (2.0 * (2.0 - poisson_1) * (1.0 + poisson_1) / youngs_1 +
-                2.0 * (2.0 - poisson_2) * (1.0 + poisson_2) / youngs_2);
+  return 1.0 / (2.0 * (2.0 - poisson_1) * (1.0 + poisson_1) / youngs_1 + 2.0 * (2.0 - poisson_2) * (1.0 + poisson_2) / youngs_2);
 }
 
 /// R* or m* of two bodies; an infinite partner (a wall) leaves the other's value.
@@ -47,10 +46,10 @@ inline Real reduced(Real a, Real b) {
 /// What the normal contact hands on to the tangential law.
 template <class Real>
 struct NormalResponse {
-  Real force;                ///< N, along the normal, positive = repulsive, damping included
-  Real tangential_stiffness; ///< k_t, N/m
-  Real tangential_damping;   ///< gamma_t, N s/m
-  Real contact_area;         ///< pi R* delta, m^2: the apparent area of the Hertz contact
+  Real force;                 ///< N, along the normal, positive = repulsive, damping included
+  Real tangential_stiffness;  ///< k_t, N/m
+  Real tangential_damping;    ///< gamma_t, N s/m
+  Real contact_area;          ///< pi R* delta, m^2: the apparent area of the Hertz contact
 };
 
 /// beta = ln e / sqrt(ln^2 e + pi^2), in (-1, 0].
@@ -84,18 +83,20 @@ struct HookeParameters {
 
 /// `Parameters`: HertzParameters, or the same three members as packs.
 template <class Parameters, class Real>
-DEMBARK_HOT NormalResponse<Real> hertz(const Parameters& p, Real effective_radius, Real effective_mass, Real overlap, Real normal_velocity) {
+DEMBARK_HOT NormalResponse<Real> hertz(const Parameters& p, Real effective_radius, Real effective_mass, Real overlap,
+                                       Real normal_velocity) {
   using std::sqrt;
   const Real root = sqrt(effective_radius * overlap);
   const Real stiffness = 2.0 * p.effective_youngs_modulus * root;
   const Real k_t = 8.0 * p.effective_shear_modulus * root;
   const auto damping = -2.0 * sqrt_five_sixths * p.damping;
-  return {4.0 / 3.0 * p.effective_youngs_modulus * root * overlap - damping * sqrt(stiffness * effective_mass) * normal_velocity,
-          k_t, damping * sqrt(k_t * effective_mass), pi * effective_radius * overlap};
+  return {4.0 / 3.0 * p.effective_youngs_modulus * root * overlap - damping * sqrt(stiffness * effective_mass) * normal_velocity, k_t,
+          damping * sqrt(k_t * effective_mass), pi * effective_radius * overlap};
 }
 
 template <class Real>
-inline NormalResponse<Real> hooke(const HookeParameters& p, Real effective_radius, Real effective_mass, Real overlap, Real normal_velocity) {
+inline NormalResponse<Real> hooke(const HookeParameters& p, Real effective_radius, Real effective_mass, Real overlap,
+                                  Real normal_velocity) {
   using std::pow;
   using std::sqrt;
   const Real rigidity = sqrt(effective_radius) * p.effective_youngs_modulus;

@@ -56,8 +56,10 @@ struct Pack {
   Lanes lanes;
 
   Pack() = default;
+  // NOLINTBEGIN(google-explicit-constructor): formulas mix packs and plain numbers
   DEMBARK_HOT Pack(const Lanes& given) : lanes(given) {}
   DEMBARK_HOT Pack(double value) : lanes(value - Lanes{}) {}  // in every lane
+  // NOLINTEND(google-explicit-constructor)
 
   DEMBARK_HOT static Pack load(const double* from) {
     Pack p;
@@ -67,9 +69,18 @@ struct Pack {
   DEMBARK_HOT void store(double* to) const { __builtin_memcpy(to, &lanes, sizeof lanes); }
   DEMBARK_HOT double operator[](int k) const { return lanes[k]; }
 
-  DEMBARK_HOT Pack& operator+=(const Pack& o) { lanes += o.lanes; return *this; }
-  DEMBARK_HOT Pack& operator-=(const Pack& o) { lanes -= o.lanes; return *this; }
-  DEMBARK_HOT Pack& operator*=(const Pack& o) { lanes *= o.lanes; return *this; }
+  DEMBARK_HOT Pack& operator+=(const Pack& o) {
+    lanes += o.lanes;
+    return *this;
+  }
+  DEMBARK_HOT Pack& operator-=(const Pack& o) {
+    lanes -= o.lanes;
+    return *this;
+  }
+  DEMBARK_HOT Pack& operator*=(const Pack& o) {
+    lanes *= o.lanes;
+    return *this;
+  }
   DEMBARK_HOT friend Pack operator+(const Pack& a, const Pack& b) { return a.lanes + b.lanes; }
   DEMBARK_HOT friend Pack operator-(const Pack& a, const Pack& b) { return a.lanes - b.lanes; }
   DEMBARK_HOT friend Pack operator*(const Pack& a, const Pack& b) { return a.lanes * b.lanes; }
@@ -118,6 +129,8 @@ DEMBARK_HOT unsigned bits(const Mask<N>& mask) {
   return found;
 }
 template <int N>
-DEMBARK_HOT bool any(const Mask<N>& mask) { return bits(mask) != 0; }
+DEMBARK_HOT bool any(const Mask<N>& mask) {
+  return bits(mask) != 0;
+}
 
 }  // namespace dembark

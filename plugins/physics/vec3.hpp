@@ -16,25 +16,60 @@ namespace dembark {
 
 // Choices of a law that serves packs of contacts too (pack.hpp) are made with these.
 template <class Real>
-DEMBARK_HOT Real select(bool condition, Real yes, Real no) { return condition ? yes : no; }
+DEMBARK_HOT Real select(bool condition, Real yes, Real no) {
+  return condition ? yes : no;
+}
 DEMBARK_HOT bool any(bool condition) { return condition; }
 
 template <class Real>
 struct Vec3 {
   Real x{}, y{}, z{};
 
-  DEMBARK_HOT Vec3& operator+=(const Vec3& o) { x += o.x; y += o.y; z += o.z; return *this; }
-  DEMBARK_HOT Vec3& operator-=(const Vec3& o) { x -= o.x; y -= o.y; z -= o.z; return *this; }
-  DEMBARK_HOT Vec3& operator*=(Real s) { x *= s; y *= s; z *= s; return *this; }
+  DEMBARK_HOT Vec3& operator+=(const Vec3& o) {
+    x += o.x;
+    y += o.y;
+    z += o.z;
+    return *this;
+  }
+  DEMBARK_HOT Vec3& operator-=(const Vec3& o) {
+    x -= o.x;
+    y -= o.y;
+    z -= o.z;
+    return *this;
+  }
+  DEMBARK_HOT Vec3& operator*=(Real s) {
+    x *= s;
+    y *= s;
+    z *= s;
+    return *this;
+  }
 };
 
-template <class Real> DEMBARK_HOT Vec3<Real> operator+(Vec3<Real> a, const Vec3<Real>& b) { return a += b; }
-template <class Real> DEMBARK_HOT Vec3<Real> operator-(Vec3<Real> a, const Vec3<Real>& b) { return a -= b; }
-template <class Real> DEMBARK_HOT Vec3<Real> operator-(const Vec3<Real>& a) { return {-a.x, -a.y, -a.z}; }
-template <class Real> DEMBARK_HOT Vec3<Real> operator*(Vec3<Real> a, Real s) { return a *= s; }
-template <class Real> DEMBARK_HOT Vec3<Real> operator*(Real s, Vec3<Real> a) { return a *= s; }
+template <class Real>
+DEMBARK_HOT Vec3<Real> operator+(Vec3<Real> a, const Vec3<Real>& b) {
+  return a += b;
+}
+template <class Real>
+DEMBARK_HOT Vec3<Real> operator-(Vec3<Real> a, const Vec3<Real>& b) {
+  return a -= b;
+}
+template <class Real>
+DEMBARK_HOT Vec3<Real> operator-(const Vec3<Real>& a) {
+  return {-a.x, -a.y, -a.z};
+}
+template <class Real>
+DEMBARK_HOT Vec3<Real> operator*(Vec3<Real> a, Real s) {
+  return a *= s;
+}
+template <class Real>
+DEMBARK_HOT Vec3<Real> operator*(Real s, Vec3<Real> a) {
+  return a *= s;
+}
 
-template <class Real> DEMBARK_HOT Real dot(const Vec3<Real>& a, const Vec3<Real>& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+template <class Real>
+DEMBARK_HOT Real dot(const Vec3<Real>& a, const Vec3<Real>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
 
 template <class Real>
 DEMBARK_HOT Vec3<Real> cross(const Vec3<Real>& a, const Vec3<Real>& b) {

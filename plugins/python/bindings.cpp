@@ -45,7 +45,8 @@ FinnieRabinowicz make_law(double static_friction, double kinetic_friction, doubl
   law.critical_slip_distance = critical_slip_distance;
   law.interface_shear_strength = interface_shear_strength;
   law.healing_time = healing_time;
-  if (presliding != "linear" && presliding != "exponential") throw std::invalid_argument("presliding must be 'linear' or 'exponential', not '" + presliding + "'");
+  if (presliding != "linear" && presliding != "exponential")
+    throw std::invalid_argument("presliding must be 'linear' or 'exponential', not '" + presliding + "'");
   law.presliding = presliding == "linear" ? Presliding::linear : Presliding::exponential;
   if (law.error()) throw std::invalid_argument(law.error());
   return law;
@@ -73,16 +74,20 @@ NB_MODULE(_physics, m) {
   m.def("capillary_models", &capillary::model_names);
 
   nb::class_<capillary::BridgeForce>(m, "BridgeForce")
-      .def("__init__", [](capillary::BridgeForce* self, const std::string& model, double contact_angle) {
-        new (self) capillary::BridgeForce(model_of(model), contact_angle);
-      }, "model"_a, "contact_angle"_a)
-      .def("force", [](const capillary::BridgeForce& self, Array radius_1, Array radius_2, Array gap, Array volume, Array surface_tension) {
-        double* out;
-        const std::size_t n = gap.shape(0);
-        Result result = make_result(n, out);
-        for (std::size_t i = 0; i < n; ++i) out[i] = self.force(radius_1(i), radius_2(i), gap(i), volume(i), surface_tension(i));
-        return result;
-      })
+      .def(
+          "__init__",
+          [](capillary::BridgeForce* self, const std::string& model, double contact_angle) {
+            new (self) capillary::BridgeForce(model_of(model), contact_angle);
+          },
+          "model"_a, "contact_angle"_a)
+      .def("force",
+           [](const capillary::BridgeForce& self, Array radius_1, Array radius_2, Array gap, Array volume, Array surface_tension) {
+             double* out;
+             const std::size_t n = gap.shape(0);
+             Result result = make_result(n, out);
+             for (std::size_t i = 0; i < n; ++i) out[i] = self.force(radius_1(i), radius_2(i), gap(i), volume(i), surface_tension(i));
+             return result;
+           })
       .def("rupture_distance", [](const capillary::BridgeForce& self, Array radius_1, Array radius_2, Array volume) {
         double* out;
         const std::size_t n = volume.shape(0);
@@ -107,11 +112,11 @@ NB_MODULE(_physics, m) {
   m.def("effective_shear_modulus", &effective_shear_modulus);
 
   nb::class_<FinnieRabinowicz>(m, "FinnieRabinowicz")
-      .def("__init__", [](FinnieRabinowicz* self, double s, double k, double c, double t, double h, const std::string& p) {
-        new (self) FinnieRabinowicz(make_law(s, k, c, t, h, p));
-      })
+      .def("__init__", [](FinnieRabinowicz* self, double s, double k, double c, double t, double h,
+                          const std::string& p) { new (self) FinnieRabinowicz(make_law(s, k, c, t, h, p)); })
       .def("friction_coefficient", [](const FinnieRabinowicz& law, double slip) { return friction_coefficient(law, slip); })
-      .def("shear_limit", [](const FinnieRabinowicz& law, double mu, double normal_force, double area) { return shear_limit(law, mu, normal_force, area); })
+      .def("shear_limit", [](const FinnieRabinowicz& law, double mu, double normal_force,
+                             double area) { return shear_limit(law, mu, normal_force, area); })
       .def("drive", [](const FinnieRabinowicz& law, Array normal_force, Array stiffness, Array area, Points path, Array time_step) {
         const std::size_t n = path.shape(0);
         double* force = new double[3 * n];
@@ -135,45 +140,49 @@ NB_MODULE(_physics, m) {
       });
 
   nb::class_<Contact>(m, "Contact")
-      .def("__init__", [](Contact* self, const std::string& normal_law, double youngs, double shear, double restitution, double characteristic_velocity,
-                          bool tangential_damping, bool limit_force, const FinnieRabinowicz& friction, const std::string& capillary_model,
-                          double contact_angle, double surface_tension, double bridge_volume, double viscosity, double minimum_gap) {
-        new (self) Contact();
-        if (normal_law != "hertz" && normal_law != "hooke") throw std::invalid_argument("normal law must be 'hertz' or 'hooke', not '" + normal_law + "'");
-        ContactParameters& p = self->parameters;
-        p.normal_law = normal_law == "hertz" ? NormalLaw::hertz : NormalLaw::hooke;
-        p.elasticity = {youngs, shear, restitution};
-        p.characteristic_velocity = characteristic_velocity;
-        p.tangential_damping = tangential_damping;
-        p.limit_force = limit_force;
-        p.friction = friction;
-        if (bridge_volume > 0.0) {
-          self->bridge = std::make_shared<const capillary::BridgeForce>(model_of(capillary_model), contact_angle);
-          p.liquid = {self->bridge.get(), surface_tension, bridge_volume, {viscosity, minimum_gap}};
-        }
-      })
-      .def("step", [](Contact& self, const nb::tuple& separation, const nb::tuple& v1, const nb::tuple& v2, const nb::tuple& w1, const nb::tuple& w2,
-                      double radius_1, double radius_2, double mass_1, double mass_2, double dt, bool update) {
-        ContactBodies b;
-        b.separation = vector(separation);
-        b.velocity_1 = vector(v1);
-        b.velocity_2 = vector(v2);
-        b.angular_velocity_1 = vector(w1);
-        b.angular_velocity_2 = vector(w2);
-        b.radius_1 = radius_1;
-        b.radius_2 = radius_2;
-        b.mass_1 = mass_1;
-        b.mass_2 = mass_2;
-        const ContactState before = self.state;
-        const ContactForce f = contact_step(self.parameters, b, dt, self.state, update);
-        // A comparison with what is no number is false: such a contact would end without a word.
-        if (!std::isfinite(f.overlap + f.force.x + f.force.y + f.force.z)) {
-          self.state = before;
-          throw std::invalid_argument("the contact has no finite force: positions, velocities, radii, masses and the time step must be finite numbers");
-        }
-        return nb::make_tuple(tuple(f.force), tuple(f.torque_1), tuple(f.torque_2), f.overlap, f.normal_force, f.capillary_force,
-                              tuple(f.tangential), f.viscous_normal, tuple(f.viscous_tangential), f.interacting);
-      })
+      .def("__init__",
+           [](Contact* self, const std::string& normal_law, double youngs, double shear, double restitution, double characteristic_velocity,
+              bool tangential_damping, bool limit_force, const FinnieRabinowicz& friction, const std::string& capillary_model,
+              double contact_angle, double surface_tension, double bridge_volume, double viscosity, double minimum_gap) {
+             new (self) Contact();
+             if (normal_law != "hertz" && normal_law != "hooke")
+               throw std::invalid_argument("normal law must be 'hertz' or 'hooke', not '" + normal_law + "'");
+             ContactParameters& p = self->parameters;
+             p.normal_law = normal_law == "hertz" ? NormalLaw::hertz : NormalLaw::hooke;
+             p.elasticity = {youngs, shear, restitution};
+             p.characteristic_velocity = characteristic_velocity;
+             p.tangential_damping = tangential_damping;
+             p.limit_force = limit_force;
+             p.friction = friction;
+             if (bridge_volume > 0.0) {
+               self->bridge = std::make_shared<const capillary::BridgeForce>(model_of(capillary_model), contact_angle);
+               p.liquid = {self->bridge.get(), surface_tension, bridge_volume, {viscosity, minimum_gap}};
+             }
+           })
+      .def("step",
+           [](Contact& self, const nb::tuple& separation, const nb::tuple& v1, const nb::tuple& v2, const nb::tuple& w1,
+              const nb::tuple& w2, double radius_1, double radius_2, double mass_1, double mass_2, double dt, bool update) {
+             ContactBodies b;
+             b.separation = vector(separation);
+             b.velocity_1 = vector(v1);
+             b.velocity_2 = vector(v2);
+             b.angular_velocity_1 = vector(w1);
+             b.angular_velocity_2 = vector(w2);
+             b.radius_1 = radius_1;
+             b.radius_2 = radius_2;
+             b.mass_1 = mass_1;
+             b.mass_2 = mass_2;
+             const ContactState before = self.state;
+             const ContactForce f = contact_step(self.parameters, b, dt, self.state, update);
+             // A comparison with what is no number is false: such a contact would end without a word.
+             if (!std::isfinite(f.overlap + f.force.x + f.force.y + f.force.z)) {
+               self.state = before;
+               throw std::invalid_argument(
+                   "the contact has no finite force: positions, velocities, radii, masses and the time step must be finite numbers");
+             }
+             return nb::make_tuple(tuple(f.force), tuple(f.torque_1), tuple(f.torque_2), f.overlap, f.normal_force, f.capillary_force,
+                                   tuple(f.tangential), f.viscous_normal, tuple(f.viscous_tangential), f.interacting);
+           })
       .def_prop_ro("slip", [](const Contact& self) { return self.state.friction.slip; })
       .def_prop_ro("dissipated_energy", [](const Contact& self) { return self.state.friction.dissipated_energy; })
       .def_prop_ro("bridge_volume", [](const Contact& self) { return self.state.bridge_volume; });

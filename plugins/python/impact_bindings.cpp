@@ -81,9 +81,8 @@ void sample(Scene& scene, const StepReport& r, const std::vector<std::int64_t>& 
   for (const auto& v : scene.velocity()) append(h.velocity, v);
   for (const auto& w : scene.spin()) append(h.spin, w);
   h.report.insert(h.report.end(), {double(r.contacts), double(r.active), double(r.impacts_begun), r.peak_force, r.impulse_sum,
-                                   r.dissipated_energy, r.elastic_energy, double(r.pivots), double(r.block_steps),
-                                   double(r.pivots_total), r.certificate, r.worst_certificate, r.peak_force_so_far,
-                                   scene.kinetic_energy_of_half_step()});
+                                   r.dissipated_energy, r.elastic_energy, double(r.pivots), double(r.block_steps), double(r.pivots_total),
+                                   r.certificate, r.worst_certificate, r.peak_force_so_far, scene.kinetic_energy_of_half_step()});
   const auto& contacts = scene.system().contacts();
   for (std::size_t k = 0; k < left.size(); ++k) {
     double force = 0.0;
@@ -122,43 +121,46 @@ void bind_impact(nb::module_& m) {
              }
            })
       // Samples the begin, every `every`-th step and the end; `left`, `right`: keys of the contacts whose normal force is a column.
-      .def("run", [](Scene& scene, std::int64_t steps, std::int64_t every, const std::vector<std::int64_t>& left,
-                     const std::vector<std::int64_t>& right) {
-        History h;
-        std::vector<double> impacts;
-        for (std::int64_t i = 0; i <= steps; ++i) {
-          const StepReport& r = scene.forces();
-          for (const Impact& f : scene.system().take_finished()) {
-            impacts.insert(impacts.end(), {double(f.a), shown(f.b), f.time, f.duration, f.peak_force, f.impulse, f.relative_speed,
-                                           f.dissipated});
-            append(impacts, f.place);
-          }
-          if (i % every == 0 || i == steps) sample(scene, r, left, right, h);
-          if (i < steps) scene.advance();
-          if (i % 4096 == 4095 && PyErr_CheckSignals() != 0) throw nb::python_error();
-        }
-        const std::size_t samples = h.time.size(), n = scene.bodies().size();
-        return nb::make_tuple(numpy(h.time, {samples}), numpy(h.position, {samples, n, 3}), numpy(h.velocity, {samples, n, 3}),
-                              numpy(h.spin, {samples, n, 3}), numpy(h.report, {samples, 14}), numpy(h.column, {samples, left.size()}),
-                              numpy(impacts, {impacts.size() / 11, 11}));
-      })
+      .def("run",
+           [](Scene& scene, std::int64_t steps, std::int64_t every, const std::vector<std::int64_t>& left,
+              const std::vector<std::int64_t>& right) {
+             History h;
+             std::vector<double> impacts;
+             for (std::int64_t i = 0; i <= steps; ++i) {
+               const StepReport& r = scene.forces();
+               for (const Impact& f : scene.system().take_finished()) {
+                 impacts.insert(impacts.end(),
+                                {double(f.a), shown(f.b), f.time, f.duration, f.peak_force, f.impulse, f.relative_speed, f.dissipated});
+                 append(impacts, f.place);
+               }
+               if (i % every == 0 || i == steps) sample(scene, r, left, right, h);
+               if (i < steps) scene.advance();
+               if (i % 4096 == 4095 && PyErr_CheckSignals() != 0) throw nb::python_error();
+             }
+             const std::size_t samples = h.time.size(), n = scene.bodies().size();
+             return nb::make_tuple(numpy(h.time, {samples}), numpy(h.position, {samples, n, 3}), numpy(h.velocity, {samples, n, 3}),
+                                   numpy(h.spin, {samples, n, 3}), numpy(h.report, {samples, 14}), numpy(h.column, {samples, left.size()}),
+                                   numpy(impacts, {impacts.size() / 11, 11}));
+           })
       // Rows: a, b, gap, N, D, tangential, normal, place.
-      .def("contacts", [](const Scene& scene) {
-        std::vector<double> out;
-        const auto& contacts = scene.system().contacts();
-        for (const ContactResult& c : contacts) {
-          out.insert(out.end(), {double(c.key_a), shown(c.key_b), c.gap, c.normal_force, c.opening});
-          append(out, c.tangential);
-          append(out, c.normal);
-          append(out, c.place);
-        }
-        return numpy(out, {contacts.size(), 14});
-      })
+      .def("contacts",
+           [](const Scene& scene) {
+             std::vector<double> out;
+             const auto& contacts = scene.system().contacts();
+             for (const ContactResult& c : contacts) {
+               out.insert(out.end(), {double(c.key_a), shown(c.key_b), c.gap, c.normal_force, c.opening});
+               append(out, c.tangential);
+               append(out, c.normal);
+               append(out, c.place);
+             }
+             return numpy(out, {contacts.size(), 14});
+           })
       .def("kinetic_energy_of_half_step", &Scene::kinetic_energy_of_half_step)
       .def("time", &Scene::time)
-      .def("state", [](const Scene& scene) {
-        const std::vector<double> s = scene.state();
-        return numpy(s, {s.size()});
-      })
+      .def("state",
+           [](const Scene& scene) {
+             const std::vector<double> s = scene.state();
+             return numpy(s, {s.size()});
+           })
       .def("restore", [](Scene& scene, Array state) { scene.restore(std::vector<double>(state.data(), state.data() + state.shape(0))); });
 }

@@ -52,21 +52,23 @@ Eigen::VectorXd vector_of(const Array& q) { return Eigen::Map<const Eigen::Vecto
 void bind_lcp(nb::module_& m) {
   nb::class_<LcpSolver>(m, "LcpSolver")
       .def(nb::init<>())
-      .def("solve_dense", [](LcpSolver& self, const Matrix& M, const Array& q, const Flags& start, bool started, const std::string& method,
-                             double tolerance, int max_iterations, bool check_input) {
-        const Eigen::VectorXd right = vector_of(q);
-        const std::vector<char> flags(start.data(), start.data() + start.shape(0));
-        lcp::check_shapes(Eigen::Index(M.shape(0)), Eigen::Index(M.shape(1)), right.size(), started ? &flags : nullptr);
-        const LcpOptions options = options_of(method, tolerance, max_iterations, check_input);
-        return tuple_of(self.solve_dense(M.data(), right, options, started ? &flags : nullptr));
-      })
-      .def("solve_columns", [](LcpSolver& self, const Indices& outer, const Indices& inner, const Array& value, const Array& q,
-                               const Flags& start, bool started, const std::string& method, double tolerance, int max_iterations, bool check_input) {
-        const Eigen::VectorXd right = vector_of(q);
-        const std::vector<char> flags(start.data(), start.data() + start.shape(0));
-        const Eigen::Index n = Eigen::Index(outer.shape(0)) - 1;
-        lcp::check_shapes(n, n, right.size(), started ? &flags : nullptr);
-        return tuple_of(self.solve_columns(outer.data(), inner.data(), value.data(), right,
-                                           options_of(method, tolerance, max_iterations, check_input), started ? &flags : nullptr));
-      });
+      .def("solve_dense",
+           [](LcpSolver& self, const Matrix& M, const Array& q, const Flags& start, bool started, const std::string& method,
+              double tolerance, int max_iterations, bool check_input) {
+             const Eigen::VectorXd right = vector_of(q);
+             const std::vector<char> flags(start.data(), start.data() + start.shape(0));
+             lcp::check_shapes(Eigen::Index(M.shape(0)), Eigen::Index(M.shape(1)), right.size(), started ? &flags : nullptr);
+             const LcpOptions options = options_of(method, tolerance, max_iterations, check_input);
+             return tuple_of(self.solve_dense(M.data(), right, options, started ? &flags : nullptr));
+           })
+      .def("solve_columns",
+           [](LcpSolver& self, const Indices& outer, const Indices& inner, const Array& value, const Array& q, const Flags& start,
+              bool started, const std::string& method, double tolerance, int max_iterations, bool check_input) {
+             const Eigen::VectorXd right = vector_of(q);
+             const std::vector<char> flags(start.data(), start.data() + start.shape(0));
+             const Eigen::Index n = Eigen::Index(outer.shape(0)) - 1;
+             lcp::check_shapes(n, n, right.size(), started ? &flags : nullptr);
+             return tuple_of(self.solve_columns(outer.data(), inner.data(), value.data(), right,
+                                                options_of(method, tolerance, max_iterations, check_input), started ? &flags : nullptr));
+           });
 }

@@ -20,12 +20,14 @@ PUSH = Path(displacement=("0.00003*sin(2*PI*300*t)", "0.00002*t", "-0.0005*(1-co
 def pushed(path: Path = PUSH, radius: float = R, gap: float = 9e-4, **material: float) -> Scenario:
     m = replace(ALL_OF_IT, **material)
     return Scenario(name="", material=m, time_step=1e-5, steps=1200, grains=(
-        Grain(radius=radius, position=(0.0, 0.0, radius + gap), path=path, angular_velocity=(1.0, 2.0, 0.0)), Grain(path=STILL, position=(0.0, 0.0, -R))))
+        Grain(radius=radius, position=(0.0, 0.0, radius + gap), path=path, angular_velocity=(1.0, 2.0, 0.0)),
+        Grain(path=STILL, position=(0.0, 0.0, -R))))
 
 
 def free(time_step: float = 1e-6, steps: int = 1500, gap: float = 1e-4, speed: float = 0.5, **material: float) -> Scenario:
     return Scenario(name="", material=replace(ALL_OF_IT, **material), time_step=time_step, steps=steps, grains=(
-        Grain(position=(0.0, 0.0, R + gap), velocity=(0.1, 0.0, -speed), angular_velocity=(20.0, -10.0, 5.0)), Grain(position=(0.0, 0.0, -R))))
+        Grain(position=(0.0, 0.0, R + gap), velocity=(0.1, 0.0, -speed), angular_velocity=(20.0, -10.0, 5.0)),
+        Grain(position=(0.0, 0.0, -R))))
 
 
 REST = Path(displacement=("0", "0", "0"), velocity=("0", "0", "0"))
@@ -124,7 +126,8 @@ def test_nothing_happens_at_an_exact_touch(expected):
 
 @pytest.mark.parametrize("change", [{"static_friction": -0.1}, {"kinetic_friction": 0.9}, {"critical_slip_distance": -1.0},
                                     {"interface_shear_strength": 0.0}, {"healing_time": -1.0}, {"bridge_volume": -1e-10},
-                                    {"bridge_volume": inf}, {"surface_tension": inf}, {"surface_tension": float("nan")}, {"contact_angle": 20.0},
+                                    {"bridge_volume": inf}, {"surface_tension": inf}, {"surface_tension": float("nan")},
+                                    {"contact_angle": 20.0},
                                     {"restitution": 0.0}, {"restitution": 1.1}, {"youngs_modulus": inf}, {"youngs_modulus": float("nan")},
                                     {"presliding": "bent"}, {"capillary_model": "wet"}, {"normal_law": "hertzian"}])
 def test_python_refuses_in_one_line(change):
@@ -133,7 +136,8 @@ def test_python_refuses_in_one_line(change):
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("wrong", [{"separation": (0.0, 0.0, float("nan"))}, {"velocity_1": (float("nan"), 0.0, 0.0)}, {"time_step": float("nan")}])
+@pytest.mark.parametrize("wrong", [{"separation": (0.0, 0.0, float("nan"))}, {"velocity_1": (float("nan"), 0.0, 0.0)},
+                                   {"time_step": float("nan")}])
 def test_python_refuses_a_contact_without_numbers(wrong):
     """The state stays as it was."""
     words = {"separation": (0.0, 0.0, 1.99 * R), "velocity_1": (0.1, 0.0, 0.0), "time_step": 1e-6}

@@ -89,7 +89,8 @@ def yade(tmp_path_factory):
     except DembarkError as error:
         pytest.skip(str(error))
     cases = {(kind, name): case for kind, name, case in parts()}
-    found = yade_driver.run_all(cases.values(), tmp_path_factory.mktemp("walls"), {case.name: SURFACES[kind][2] for (kind, _), case in cases.items()})
+    found = yade_driver.run_all(cases.values(), tmp_path_factory.mktemp("walls"),
+                                {case.name: SURFACES[kind][2] for (kind, _), case in cases.items()})
     return {key: found[case.name] for key, case in cases.items()}
 
 

@@ -39,7 +39,8 @@ Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz* lawOf(Scene& scene) {
 }
 
 void checkVolume(const std::string& what, double volume) {
-	if (!(volume >= 0.0 && std::isfinite(volume))) fail("CapillaryLiquid." + what + " is " + text(volume) + " m^3; it must be >= 0 and finite");
+	if (!(volume >= 0.0 && std::isfinite(volume)))
+		fail("CapillaryLiquid." + what + " is " + text(volume) + " m^3; it must be >= 0 and finite");
 }
 
 }  // namespace
@@ -83,7 +84,8 @@ void CapillaryLiquid::postLoad(CapillaryLiquid&) {
 	const auto                     found = std::find(names.begin(), names.end(), returnRule);
 	if (found == names.end()) fail("CapillaryLiquid.returnRule is '" + returnRule + "'; it must be equal, radius or taken");
 	splitting = static_cast<capillary::Return>(found - names.begin());
-	if (!(content >= 0.0 && content < 1.0)) fail("CapillaryLiquid.content is " + text(content) + "; it must be >= 0 and < 1 (liquid volume over solid volume)");
+	if (!(content >= 0.0 && content < 1.0))
+		fail("CapillaryLiquid.content is " + text(content) + "; it must be >= 0 and < 1 (liquid volume over solid volume)");
 	checkVolume("maxBridge", maxBridge);
 }
 
@@ -102,7 +104,8 @@ void CapillaryLiquid::setVolume(int body, Real amount) {
 	meet();
 	const auto& bodies = *Omega::instance().getScene()->bodies;
 	if (body < 0 || static_cast<std::size_t>(body) >= bodies.size() || !sphereOf(bodies[body]))
-		fail("CapillaryLiquid.setVolume: body " + std::to_string(body) + " is no sphere of the scene; the liquid of a wall is given to addWall");
+		fail("CapillaryLiquid.setVolume: body " + std::to_string(body) +
+		     " is no sphere of the scene; the liquid of a wall is given to addWall");
 	liquid[body] = amount;
 }
 
@@ -113,7 +116,8 @@ void CapillaryLiquid::addWall(const std::vector<int>& bodies, Real pool, Real sh
 	meet();
 	for (const int body : bodies) {
 		if (body < 0 || static_cast<std::size_t>(body) >= liquid.size() || !Body::byId(body) || sphereOf(Body::byId(body)))
-			fail("CapillaryLiquid.addWall: body " + std::to_string(body) + " is no wall of the scene; add its bodies to O.bodies first");
+			fail("CapillaryLiquid.addWall: body " + std::to_string(body) +
+			     " is no wall of the scene; add its bodies to O.bodies first");
 		if (walls[body] >= 0) fail("CapillaryLiquid.addWall: body " + std::to_string(body) + " belongs to a wall already");
 	}
 	for (const int body : bodies) walls[body] = static_cast<int>(pools.size());
@@ -128,8 +132,9 @@ int CapillaryLiquid::wallOf(Body::id_t body) const { return static_cast<std::siz
 std::size_t CapillaryLiquid::holder(Body::id_t body, bool wall) const { return wall ? liquid.size() + wallOf(body) : body; }
 
 void CapillaryLiquid::giveBack(Body::id_t first, Body::id_t second, const Bridge& bridge) {
-	const double toFirst = capillary::returned(bridge.volume, bridge.imbalance), toSecond = capillary::returned(bridge.volume, -bridge.imbalance);
-	const auto   give    = [this](Body::id_t body, double amount) { (Body::byId(body) ? liquid[body] : lost) += amount; };
+	const double toFirst  = capillary::returned(bridge.volume, bridge.imbalance),
+		     toSecond = capillary::returned(bridge.volume, -bridge.imbalance);
+	const auto   give     = [this](Body::id_t body, double amount) { (Body::byId(body) ? liquid[body] : lost) += amount; };
 	give(first, toFirst);
 	if (!bridge.wall) give(second, toSecond);
 	else if (wallOf(second) >= 0) pools[wallOf(second)] += toSecond;
@@ -142,7 +147,7 @@ void CapillaryLiquid::findBridges() {
 	for (const auto& interaction : *Omega::instance().getScene()->interactions) {
 		const auto* phys = interaction->isReal() ? dynamic_cast<const FinnieRabinowiczPhys*>(interaction->phys.get()) : nullptr;
 		if (!phys || !(phys->bridgeVolume > 0.0)) continue;
-		Pair pair{interaction->getId1(), interaction->getId2()};
+		Pair       pair{interaction->getId1(), interaction->getId2()};
 		const bool wall = !sphereOf(Body::byId(pair.first)) || !sphereOf(Body::byId(pair.second));
 		if (!sphereOf(Body::byId(pair.first))) std::swap(pair.first, pair.second);
 		bridges[pair] = {phys->bridgeVolume, phys->bridgeImbalance, wall};
@@ -180,22 +185,24 @@ void CapillaryLiquid::grant(const std::vector<LiquidExchange::Request>& asked) {
 		demands.add(r.first, rule(r.firstRadius, r.secondRadius));
 		if (const double part = shareOfSecond(r); part > 0.0) demands.add(holder(r.second, std::isinf(r.secondRadius)), part);
 	}
-	const auto          owned = [this](std::size_t at) -> double& { return at < liquid.size() ? liquid[at] : pools[at - liquid.size()]; };
-	const double        largest = maxBridge > 0.0 ? maxBridge : capillary::flat<double>;
+	const auto   owned   = [this](std::size_t at) -> double& { return at < liquid.size() ? liquid[at] : pools[at - liquid.size()]; };
+	const double largest = maxBridge > 0.0 ? maxBridge : capillary::flat<double>;
 	std::vector<double> taken(asked.size()), takenOfSecond(asked.size());
 	for (std::size_t k = 0; k < asked.size(); ++k) {
-		const auto&       r       = asked[k];
-		const bool        wall    = std::isinf(r.secondRadius);
-		const std::size_t first   = r.first;
-		const double      part    = shareOfSecond(r);
-		const double      given   = rule(r.firstRadius, r.secondRadius) * capillary::grant(liquid[first], demands.of(first));
-		double            other   = 0.0;
+		const auto&       r     = asked[k];
+		const bool        wall  = std::isinf(r.secondRadius);
+		const std::size_t first = r.first;
+		const double      part  = shareOfSecond(r);
+		const double      given = rule(r.firstRadius, r.secondRadius) * capillary::grant(liquid[first], demands.of(first));
+		double            other = 0.0;
 		if (part > 0.0) {
 			const std::size_t second = holder(r.second, wall);
-			other = part * capillary::grant(owned(second), demands.of(second));
+			other                    = part * capillary::grant(owned(second), demands.of(second));
 		}
-		const auto bridge = wall ? capillary::form_wall_bridge(given, other, wallOf(r.second) >= 0 ? wallParts[wallOf(r.second)] : 0.0, splitting, largest)
-		                         : capillary::form_bridge(given, other, r.firstRadius, r.secondRadius, splitting, largest);
+		const auto bridge =
+			wall ? capillary::form_wall_bridge(given, other, wallOf(r.second) >= 0 ? wallParts[wallOf(r.second)] : 0.0,
+			                                   splitting, largest)
+			     : capillary::form_bridge(given, other, r.firstRadius, r.secondRadius, splitting, largest);
 		taken[k]         = bridge.from_i;
 		takenOfSecond[k] = bridge.from_j;
 		if (!(bridge.volume > 0.0)) continue;
@@ -229,12 +236,14 @@ void CapillaryLiquid::action() {
 
 Real CapillaryLiquid::volume(int body) {
 	meet();
-	if (body < 0 || static_cast<std::size_t>(body) >= liquid.size()) fail("CapillaryLiquid.volume: there is no body " + std::to_string(body));
+	if (body < 0 || static_cast<std::size_t>(body) >= liquid.size())
+		fail("CapillaryLiquid.volume: there is no body " + std::to_string(body));
 	return liquid[body];
 }
 
 Real CapillaryLiquid::wallPool(int wall) const {
-	if (wall < 0 || static_cast<std::size_t>(wall) >= pools.size()) fail("CapillaryLiquid.wallPool: there is no wall " + std::to_string(wall));
+	if (wall < 0 || static_cast<std::size_t>(wall) >= pools.size())
+		fail("CapillaryLiquid.wallPool: there is no wall " + std::to_string(wall));
 	return pools[wall];
 }
 

@@ -1,4 +1,5 @@
-// Liquid that bodies carry, lend to bridges and get back: the books, and the exchange once a step. The rule is dembark/capillary/liquid.hpp.
+// Liquid that bodies carry, lend to bridges and get back: the books, and the exchange once a step. The rule is
+// dembark/capillary/liquid.hpp.
 #pragma once
 
 #include <map>
@@ -35,7 +36,7 @@ public:
 	void take(long step, std::vector<Request>&, std::vector<Broken>&);
 
 private:
-	void               begin(long step);
+	void                 begin(long step);
 	std::mutex           guard;
 	long                 current = -1;
 	std::vector<Request> requests;

@@ -58,12 +58,13 @@ ContactWorks::Sums ContactWorks::record(Scene& scene, int threads) {
 void ContactWorks::recordOne(Contact& c, const Interaction& interaction, Scene& scene, Sums& sums) const {
 	c.acting = false;
 	if (!interaction.isReal()) return;
-	c.id1 = interaction.getId1();
-	c.id2 = interaction.getId2();
+	c.id1             = interaction.getId1();
+	c.id2             = interaction.getId2();
 	const IPhys& data = *interaction.phys;
 	if (typeid(data) != typeid(FinnieRabinowiczPhys))
-		fail("EnergyAccount: bodies " + std::to_string(c.id1) + " and " + std::to_string(c.id2) + " interact by "
-		     + data.getClassName() + ", whose energies it does not know; all contacts must be of "
+		fail("EnergyAccount: bodies " + std::to_string(c.id1) + " and " + std::to_string(c.id2) + " interact by " +
+		     data.getClassName() +
+		     ", whose energies it does not know; all contacts must be of "
 		     "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz");
 	const auto* phys  = static_cast<const FinnieRabinowiczPhys*>(&data);
 	const Body &body1 = *Body::byId(c.id1, &scene), &body2 = *Body::byId(c.id2, &scene);
@@ -78,15 +79,15 @@ void ContactWorks::recordOne(Contact& c, const Interaction& interaction, Scene& 
 	const double                    distance = norm(bodies.separation), sign = c.view.sign();
 	const auto                      shear = vec(Vector3r(sign * phys->shearForce)), along = vec(Vector3r(sign * phys->normalForce));
 	::dembark::ContactForce&        f = c.whole;
-	f.overlap            = bodies.radius_1 + (phys->wallBody ? 0.0 : bodies.radius_2) - distance;
-	f.normal             = distance > 0.0 ? bodies.separation * (1.0 / distance) : ::dembark::Vec3<double>{0.0, 0.0, 1.0};
-	f.force              = along + shear;
-	f.capillary_force    = phys->capillaryForce;
-	f.viscous_normal     = phys->viscousForce;
-	f.viscous_tangential = vec(Vector3r(sign * phys->viscousShearForce));
-	f.normal_force       = dot(along, f.normal) + f.capillary_force - f.viscous_normal;
-	f.tangential         = shear - f.viscous_tangential;
-	c.parts              = ::dembark::contact_parts(phys->contact, bodies, f, vec(phys->elasticDisplacement));
+	f.overlap                         = bodies.radius_1 + (phys->wallBody ? 0.0 : bodies.radius_2) - distance;
+	f.normal                          = distance > 0.0 ? bodies.separation * (1.0 / distance) : ::dembark::Vec3<double>{0.0, 0.0, 1.0};
+	f.force                           = along + shear;
+	f.capillary_force                 = phys->capillaryForce;
+	f.viscous_normal                  = phys->viscousForce;
+	f.viscous_tangential              = vec(Vector3r(sign * phys->viscousShearForce));
+	f.normal_force                    = dot(along, f.normal) + f.capillary_force - f.viscous_normal;
+	f.tangential                      = shear - f.viscous_tangential;
+	c.parts                           = ::dembark::contact_parts(phys->contact, bodies, f, vec(phys->elasticDisplacement));
 
 	c.half = 0.5 * scene.dt * dot(c.parts[ContactPart::normal_elastic], f.normal) * motionOf(c.view, f).normal_velocity;
 	sums.half += c.half;
@@ -110,12 +111,14 @@ void ContactWorks::bookOne(Contact& c, const std::vector<BodyMotion>& mean, doub
 
 	// The whole force, as it acts on the bodies: what the parts above miss of it is missing in the balance.
 	const Vector3r force = vec(c.whole.force), moment = vec(cross(c.whole.normal, c.whole.force));
-	const auto     act   = [&](const BodyMotion& body, const Vector3r& push, const Vector3r& turn) {
+	const auto     act = [&](const BodyMotion& body, const Vector3r& push, const Vector3r& turn) {
 		sums.onFree += dt * (along(push, body.velocity, body.blocked, false) + along(turn, body.spin, body.blocked, true));
-		sums.onBlocked += dt * (along(push, body.velocity, body.blocked, false, false) + along(turn, body.spin, body.blocked, true, false));
+		sums.onBlocked +=
+			dt * (along(push, body.velocity, body.blocked, false, false) + along(turn, body.spin, body.blocked, true, false));
 	};
 	act(c.view.swapped() ? two : one, force, -motion.arm_1 * moment);
-	act(c.view.swapped() ? one : two, -force, c.view.wallBody ? Vector3r(-c.view.surface.cross(force)) : Vector3r(-motion.arm_2 * moment));
+	act(c.view.swapped() ? one : two, -force,
+	    c.view.wallBody ? Vector3r(-c.view.surface.cross(force)) : Vector3r(-motion.arm_2 * moment));
 }
 
 double ContactWorks::unexplained(const std::vector<bool>& bodies, bool arriving) const {

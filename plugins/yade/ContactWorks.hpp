@@ -18,7 +18,7 @@ namespace dembark_yade {
 /// How a body moves: before a step, or in the mean of it.
 struct BodyMotion {
 	Vector3r velocity = Vector3r::Zero(), spin = Vector3r::Zero();
-	unsigned blocked  = 0;  // degrees of freedom that forces do not change, bits of State
+	unsigned blocked = 0;  // degrees of freedom that forces do not change, bits of State
 };
 
 inline bool isFree(unsigned blocked, int axis, bool rotation) { return !(blocked & State::axisDOF(axis, rotation)); }
@@ -47,10 +47,10 @@ public:
 	Sums record(Scene&, int threads);
 	/// Works of the step that was recorded, `mean` being the mean motions of the bodies by id in it; fills the rest.
 	Sums book(const std::vector<BodyMotion>& mean, double dt, int threads);
-	/// What the normal springs of these bodies' contacts hold and no work explains: when they begin to be booked all of it, when they are
-	/// booked no more its negative.
+	/// What the normal springs of these bodies' contacts hold and no work explains: when they begin to be booked all of it, when they
+	/// are booked no more its negative.
 	double unexplained(const std::vector<bool>& bodies, bool arriving) const;
-	void clear() { contacts.clear(); }
+	void   clear() { contacts.clear(); }
 
 private:
 	struct Contact {

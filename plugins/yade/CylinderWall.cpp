@@ -33,9 +33,9 @@ void Bo1_CylinderWall_Aabb::go(const shared_ptr<Shape>& shape, shared_ptr<Bound>
 	}
 }
 
-bool Ig2_CylinderWall_Sphere_ScGeom::go(
-        const shared_ptr<Shape>& shape1, const shared_ptr<Shape>& shape2, const State& state1, const State& state2, const Vector3r& shift2,
-        const bool& force, const shared_ptr<Interaction>& interaction) {
+bool Ig2_CylinderWall_Sphere_ScGeom::go(const shared_ptr<Shape>& shape1, const shared_ptr<Shape>& shape2, const State& state1,
+                                        const State& state2, const Vector3r& shift2, const bool& force,
+                                        const shared_ptr<Interaction>& interaction) {
 	const CylinderWall& wall   = *static_cast<CylinderWall*>(shape1.get());
 	const Real          radius = static_cast<Sphere*>(shape2.get())->radius;
 	const Vector3r      centre = state2.pos + shift2;
@@ -60,9 +60,9 @@ bool Ig2_CylinderWall_Sphere_ScGeom::go(
 	return true;
 }
 
-bool Ig2_CylinderWall_Sphere_ScGeom::goReverse(
-        const shared_ptr<Shape>& shape1, const shared_ptr<Shape>& shape2, const State& state1, const State& state2, const Vector3r& shift2,
-        const bool& force, const shared_ptr<Interaction>& interaction) {
+bool Ig2_CylinderWall_Sphere_ScGeom::goReverse(const shared_ptr<Shape>& shape1, const shared_ptr<Shape>& shape2, const State& state1,
+                                               const State& state2, const Vector3r& shift2, const bool& force,
+                                               const shared_ptr<Interaction>& interaction) {
 	interaction->swapOrder();
 	return go(shape2, shape1, state2, state1, -shift2, force, interaction);
 }

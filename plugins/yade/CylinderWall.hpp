@@ -36,8 +36,8 @@ class Ig2_CylinderWall_Sphere_ScGeom : public IGeomFunctor {
 public:
 	bool go(const shared_ptr<Shape>&, const shared_ptr<Shape>&, const State&, const State&, const Vector3r& shift2, const bool& force,
 	        const shared_ptr<Interaction>&) override;
-	bool goReverse(const shared_ptr<Shape>&, const shared_ptr<Shape>&, const State&, const State&, const Vector3r& shift2, const bool& force,
-	               const shared_ptr<Interaction>&) override;
+	bool goReverse(const shared_ptr<Shape>&, const shared_ptr<Shape>&, const State&, const State&, const Vector3r& shift2,
+	               const bool& force, const shared_ptr<Interaction>&) override;
 	FUNCTOR2D(CylinderWall, Sphere);
 	DEFINE_FUNCTOR_ORDER_2D(CylinderWall, Sphere);
 	// clang-format off

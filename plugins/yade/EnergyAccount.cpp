@@ -15,22 +15,49 @@ namespace yade {
 YADE_PLUGIN((EnergyAccount));
 
 using dembark_yade::along;
+using dembark_yade::BodyMotion;
 using dembark_yade::fail;
 using dembark_yade::isFree;
-using dembark_yade::BodyMotion;
 
 namespace {
 
 /// Places in the sums; the parts of a contact's force are in the order of ::dembark::ContactPart.
 struct Entry {
 	enum {
-		kinetic, firstKinetic, gravity, parts, walls = parts + int(::dembark::contact_part_count), damping, other, imposed, balance, normalStored,
-		tangentialStored, stepError, scale, count
+		kinetic,
+		firstKinetic,
+		gravity,
+		parts,
+		walls = parts + int(::dembark::contact_part_count),
+		damping,
+		other,
+		imposed,
+		balance,
+		normalStored,
+		tangentialStored,
+		stepError,
+		scale,
+		count
 	};
 };
-const char* const entryNames[] = {"kinetic", "first_kinetic", "gravity", "normal_elastic", "normal_viscous", "tangential_elastic",
-	"tangential_viscous", "capillary", "liquid_viscous", "walls", "numerical_damping", "other", "imposed", "balance", "normal_stored",
-	"tangential_stored", "step_error", "scale"};
+const char* const entryNames[] = {"kinetic",
+                                  "first_kinetic",
+                                  "gravity",
+                                  "normal_elastic",
+                                  "normal_viscous",
+                                  "tangential_elastic",
+                                  "tangential_viscous",
+                                  "capillary",
+                                  "liquid_viscous",
+                                  "walls",
+                                  "numerical_damping",
+                                  "other",
+                                  "imposed",
+                                  "balance",
+                                  "normal_stored",
+                                  "tangential_stored",
+                                  "step_error",
+                                  "scale"};
 static_assert(std::size(entryNames) == Entry::count, "each entry has a name");
 
 /// What NewtonIntegrator's damping, a share of the acceleration against the mean velocity of the step, adds to an acceleration.
@@ -124,7 +151,8 @@ void EnergyAccount::recordForces(const Body& body, const NewtonIntegrator& newto
 	const State&     state  = *body.state;
 	if (!body.isStandalone()) fail(bodyName(id) + " belongs to a clump, whose rotation cannot be booked; use single spheres");
 	if (newton.exactAsphericalRot && body.isAspherical() && !(motion.blocked & State::DOF_RXRYRZ))
-		fail(bodyName(id) + " is aspherical and turns by another rule than spheres; block its rotation, or set "
+		fail(bodyName(id) +
+		     " is aspherical and turns by another rule than spheres; block its rotation, or set "
 		     "NewtonIntegrator.exactAsphericalRot to False");
 	motion.velocity = state.vel;
 	motion.spin     = state.angVel;
@@ -158,8 +186,8 @@ bool EnergyAccount::recordBodies(const NewtonIntegrator& newton, bool first) {
 		if (body) {
 			const bool     moves   = newton.mask <= 0 || body->maskCompatible(newton.mask);
 			const unsigned blocked = moves ? body->state->blockedDOFs : static_cast<unsigned>(State::DOF_ALL);
-			const bool     same    = mover.body == body && motions[k].blocked == blocked && mover.mass == body->state->mass
-			        && mover.inertia == body->state->inertia;
+			const bool     same    = mover.body == body && motions[k].blocked == blocked && mover.mass == body->state->mass &&
+			                         mover.inertia == body->state->inertia;
 			// After loading nothing is known of a body but its energy.
 			changed[k] = had < 0.0 || (mover.body && !same);
 			if (!same) {
@@ -208,7 +236,8 @@ void EnergyAccount::moveOn(Body::id_t id, const State* state) {
 		for (int i = 0; i < 3; ++i) {
 			if (!isFree(motion.blocked, i, turn)) continue;
 			const Real push = turn ? mover.torque[i] : mover.force[i], weight = turn ? 0.0 : mover.weight[i];
-			const Real rate = length / (turn ? mover.inertia[i] : mover.mass), damping = turn ? mover.dampingTorque[i] : mover.damping[i];
+			const Real rate     = length / (turn ? mover.inertia[i] : mover.mass),
+				   damping  = turn ? mover.dampingTorque[i] : mover.damping[i];
 			const Real expected = before[turn][i] + rate * (push + weight + damping);
 			const Real roundOff = 1e-13 * (math::abs(before[turn][i]) + rate * (math::abs(push) + math::abs(weight)));
 			if (math::abs(now[turn][i] - expected) <= roundOff) continue;
@@ -238,7 +267,8 @@ void EnergyAccount::book(const Scene& after) {
 		const Body* const now = k < bodies.size() ? bodies[k].get() : nullptr;
 		moveOn(static_cast<Body::id_t>(k), now == mover.body ? now->state.get() : nullptr);
 		gravity += along(mover.weight, mean.velocity, mean.blocked, false);
-		damping += along(mover.damping, mean.velocity, mean.blocked, false) + along(mover.dampingTorque, mean.spin, mean.blocked, true);
+		damping += along(mover.damping, mean.velocity, mean.blocked, false) +
+		           along(mover.dampingTorque, mean.spin, mean.blocked, true);
 		onFree += along(mover.force, mean.velocity, mean.blocked, false) + along(mover.torque, mean.spin, mean.blocked, true);
 	}
 	const auto totals = contacts.book(motions, length, ompThreads);

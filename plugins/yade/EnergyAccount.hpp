@@ -45,8 +45,9 @@ public:
 private:
 	/// A body in the step that is being booked, and what acts on it.
 	struct Mover {
-		const Body* body = nullptr;  // to tell whether it is still the same; to own it could mean to end a Python object without the interpreter
-		Real        mass = 0.0;
+		const Body* body    = nullptr;  // to tell whether it is still the same; to own it could mean to end a Python object without
+		                                // the interpreter
+		Real        mass    = 0.0;
 		Vector3r    inertia = Vector3r::Zero();
 		Vector3r    force, torque, weight, damping, dampingTorque;
 	};
@@ -60,15 +61,15 @@ private:
 	void                    moveOn(Body::id_t, const State*);
 	void                    begin();
 
-	std::vector<Mover>                movers;   // by id
+	std::vector<Mover>                    movers;   // by id
 	std::vector<dembark_yade::BodyMotion> motions;  // by id, before the step, and then in the mean of it
-	std::vector<bool>                 changed;  // by id: came, left, or is another one than a step ago
-	dembark_yade::ContactWorks        contacts;
-	bool                              pending  = false;  // the step `recorded` is not in the sums yet
-	long                              recorded = -1;
-	Real                              length   = 0.0;  // s, of that step
-	boost::weak_ptr<Scene>            home;
-	std::mutex                        guard;
+	std::vector<bool>                     changed;  // by id: came, left, or is another one than a step ago
+	dembark_yade::ContactWorks            contacts;
+	bool                                  pending  = false;  // the step `recorded` is not in the sums yet
+	long                                  recorded = -1;
+	Real                                  length   = 0.0;  // s, of that step
+	boost::weak_ptr<Scene>                home;
+	std::mutex                            guard;
 };
 REGISTER_SERIALIZABLE(EnergyAccount);
 

@@ -23,12 +23,12 @@ inline ::dembark::Vec3<double> xyz(const Vector3r& v) { return {v[0], v[1], v[2]
 
 /// Numbers of points, the same for points nearer than `width`: those of a grid cell and of its neighbours are compared.
 class Welder {
-	double                                                     width;
-	std::map<std::array<long, 3>, std::vector<int>>            cells;
-	std::vector<::dembark::Vec3<double>>                       points;
+	double                                          width;
+	std::map<std::array<long, 3>, std::vector<int>> cells;
+	std::vector<::dembark::Vec3<double>>            points;
 
 public:
-	explicit Welder(double distance) : width(distance) { }
+	explicit Welder(double distance) : width(distance) {}
 	int number(const ::dembark::Vec3<double>& p) {
 		const std::array<long, 3> cell{long(std::floor(p.x / width)), long(std::floor(p.y / width)), long(std::floor(p.z / width))};
 		for (long i = -1; i <= 1; ++i)
@@ -56,24 +56,22 @@ void FacetSurface::postLoad(FacetSurface&) {
 
 /// World coordinates of a facet's corners.
 void FacetSurface::move(Member& member) const {
-	const State& state  = *member.body->state;
-	const Facet& facet  = *static_cast<Facet*>(member.body->shape.get());
-	member.position     = state.pos;
-	member.orientation  = state.ori;
-	for (int k = 0; k < 3; ++k)
-		member.triangle.node[k] = xyz(Vector3r(state.pos + state.ori * facet.vertices[k]));
+	const State& state = *member.body->state;
+	const Facet& facet = *static_cast<Facet*>(member.body->shape.get());
+	member.position    = state.pos;
+	member.orientation = state.ori;
+	for (int k = 0; k < 3; ++k) member.triangle.node[k] = xyz(Vector3r(state.pos + state.ori * facet.vertices[k]));
 }
 
 /// Which facets stand beside which, by common corners.
 void FacetSurface::join() {
 	double shortest = INFINITY;
 	for (Member& m : members)
-		for (int k = 0; k < 3; ++k)
-			shortest = std::min(shortest, norm(m.triangle.node[(k + 1) % 3] - m.triangle.node[k]));
+		for (int k = 0; k < 3; ++k) shortest = std::min(shortest, norm(m.triangle.node[(k + 1) % 3] - m.triangle.node[k]));
 	if (!(shortest > 0.0)) fail("FacetSurface: a Facet has two corners at one place");
-	Welder                              welder(std::max(weld, 1e-12) * shortest);
-	std::vector<std::array<int, 3>>     corners;
-	std::map<int, std::vector<int>>     around;  // facets at each corner
+	Welder                               welder(std::max(weld, 1e-12) * shortest);
+	std::vector<std::array<int, 3>>      corners;
+	std::map<int, std::vector<int>>      around;  // facets at each corner
 	std::vector<::dembark::Vec3<double>> normals;
 	for (int f = 0; f < int(members.size()); ++f) {
 		const auto* node = members[f].triangle.node;
@@ -99,12 +97,11 @@ void FacetSurface::join() {
 
 /// Takes up new and lost facets, and where all of them are now.
 void FacetSurface::refresh() {
-	BodyContainer& bodies = *scene->bodies;
+	BodyContainer& bodies  = *scene->bodies;
 	bool           changed = bodiesSeen > bodies.size();
 	for (std::size_t id = bodiesSeen; id < bodies.size() && !changed; ++id)
 		changed = bodies[id] && dynamic_cast<const Facet*>(bodies[id]->shape.get());
-	for (const Member& m : members)
-		changed = changed || bodies[m.id].get() != m.body;
+	for (const Member& m : members) changed = changed || bodies[m.id].get() != m.body;
 	bodiesSeen = bodies.size();
 	if (changed) {
 		members.clear();
@@ -123,8 +120,8 @@ void FacetSurface::refresh() {
 }
 
 FacetSurface::Place FacetSurface::place(int facet, const Vector3r& centre) const {
-	Place        found;
-	const auto   c = xyz(centre);
+	Place      found;
+	const auto c   = xyz(centre);
 	found.closest  = ::dembark::impact::closest_point(members[facet].triangle, c);
 	found.distance = norm(c - found.closest.point);
 	return found;
@@ -189,19 +186,17 @@ void FacetSurface::action() {
 		Vector3r centre = body->state->pos;
 		if (scene->isPeriodic) centre += scene->cell->intrShiftPos(each->cellDist);
 		int now = facet;
-		for (int next; (next = better(now, place(now, centre), centre, sphere->radius)) != now;)
-			now = next;
+		for (int next; (next = better(now, place(now, centre), centre, sphere->radius)) != now;) now = next;
 		if (now != facet) moved.push_back({each, now});
 	}
-	for (const auto& [interaction, facet] : moved)
-		handOver(interaction, facet);
+	for (const auto& [interaction, facet] : moved) handOver(interaction, facet);
 }
 
-bool Ig2_FacetSurface_Sphere_ScGeom::go(
-        const shared_ptr<Shape>&, const shared_ptr<Shape>& shape2, const State& state1, const State& state2, const Vector3r& shift2, const bool& force,
-        const shared_ptr<Interaction>& interaction) {
+bool Ig2_FacetSurface_Sphere_ScGeom::go(const shared_ptr<Shape>&, const shared_ptr<Shape>& shape2, const State& state1, const State& state2,
+                                        const Vector3r& shift2, const bool& force, const shared_ptr<Interaction>& interaction) {
 	if (!surface) fail("Ig2_FacetSurface_Sphere_ScGeom.surface is not set; give it the FacetSurface that stands among the engines");
-	if (!surface->upToDate(scene->iter)) fail("the FacetSurface of Ig2_FacetSurface_Sphere_ScGeom did not run in this step; put it before InteractionLoop");
+	if (!surface->upToDate(scene->iter))
+		fail("the FacetSurface of Ig2_FacetSurface_Sphere_ScGeom did not run in this step; put it before InteractionLoop");
 	const int facet = surface->index(interaction->getId1());
 	if (facet < 0) fail("facet " + std::to_string(interaction->getId1()) + " is not known to FacetSurface; add bodies before it runs");
 	const Real                radius = static_cast<Sphere*>(shape2.get())->radius;
@@ -214,9 +209,12 @@ bool Ig2_FacetSurface_Sphere_ScGeom::go(
 
 	const bool isNew = !interaction->geom;
 	if (isNew) interaction->geom = shared_ptr<ScGeom>(new ScGeom());
-	ScGeom&        geom   = *static_cast<ScGeom*>(interaction->geom.get());
-	const Vector3r arm    = centre - Vector3r(here.closest.point.x, here.closest.point.y, here.closest.point.z);
-	const Vector3r normal = here.distance > 0.0 ? Vector3r(arm / here.distance) : Vector3r(state1.ori * static_cast<Facet*>(Body::byId(interaction->getId1(), scene)->shape.get())->normal);
+	ScGeom&        geom = *static_cast<ScGeom*>(interaction->geom.get());
+	const Vector3r arm  = centre - Vector3r(here.closest.point.x, here.closest.point.y, here.closest.point.z);
+	const Vector3r normal =
+		here.distance > 0.0
+	                ? Vector3r(arm / here.distance)
+	                : Vector3r(state1.ori * static_cast<Facet*>(Body::byId(interaction->getId1(), scene)->shape.get())->normal);
 	// What has no place of its own any more is so far away that every law ends it.
 	geom.penetrationDepth = owner ? radius - here.distance : -1e3 * radius;
 	geom.contactPoint     = centre - (radius - 0.5 * geom.penetrationDepth) * normal;
@@ -226,9 +224,9 @@ bool Ig2_FacetSurface_Sphere_ScGeom::go(
 	return true;
 }
 
-bool Ig2_FacetSurface_Sphere_ScGeom::goReverse(
-        const shared_ptr<Shape>& shape1, const shared_ptr<Shape>& shape2, const State& state1, const State& state2, const Vector3r& shift2,
-        const bool& force, const shared_ptr<Interaction>& interaction) {
+bool Ig2_FacetSurface_Sphere_ScGeom::goReverse(const shared_ptr<Shape>& shape1, const shared_ptr<Shape>& shape2, const State& state1,
+                                               const State& state2, const Vector3r& shift2, const bool& force,
+                                               const shared_ptr<Interaction>& interaction) {
 	interaction->swapOrder();
 	return go(shape2, shape1, state2, state1, -shift2, force, interaction);
 }

@@ -47,13 +47,13 @@ private:
 		bool smooth;
 	};
 	struct Member {
-		Body::id_t                 id;
-		const Body*                body;
+		Body::id_t                  id;
+		const Body*                 body;
 		::dembark::impact::Triangle triangle;
-		double                     height[3];
-		Vector3r                   position;
-		Quaternionr                orientation;
-		std::vector<Neighbour>     neighbours;
+		double                      height[3];
+		Vector3r                    position;
+		Quaternionr                 orientation;
+		std::vector<Neighbour>      neighbours;
 	};
 
 	void refresh();
@@ -72,8 +72,8 @@ class Ig2_FacetSurface_Sphere_ScGeom : public IGeomFunctor {
 public:
 	bool go(const shared_ptr<Shape>&, const shared_ptr<Shape>&, const State&, const State&, const Vector3r& shift2, const bool& force,
 	        const shared_ptr<Interaction>&) override;
-	bool goReverse(const shared_ptr<Shape>&, const shared_ptr<Shape>&, const State&, const State&, const Vector3r& shift2, const bool& force,
-	               const shared_ptr<Interaction>&) override;
+	bool goReverse(const shared_ptr<Shape>&, const shared_ptr<Shape>&, const State&, const State&, const Vector3r& shift2,
+	               const bool& force, const shared_ptr<Interaction>&) override;
 	FUNCTOR2D(Facet, Sphere);
 	DEFINE_FUNCTOR_ORDER_2D(Facet, Sphere);
 	// clang-format off

@@ -22,14 +22,13 @@ public:
 
 	// Built from the attributes by the law and valid as long as `preparedBy` is the law's revision.
 	::dembark::ContactParameters contact;
-	long                         preparedBy = -1;
-	int                          wallBody   = 0;  // 1 or 2: this body of the interaction is a wall; 0: two spheres
+	long                         preparedBy      = -1;
+	int                          wallBody        = 0;  // 1 or 2: this body of the interaction is a wall; 0: two spheres
 	double                       linearStiffness = 0.0;
 
 	void postLoad(FinnieRabinowiczPhys&) { preparedBy = -1; }
 	/// A bridge of carried liquid forms between spheres of these radii (m; infinite = a wall).
-	void setBridge(double volume, double imbalance, double radius1, double radius2)
-	{
+	void setBridge(double volume, double imbalance, double radius1, double radius2) {
 		bridgeVolume    = volume;
 		bridgeImbalance = imbalance;
 		ruptureDistance = contact.liquid.force->rupture_distance(radius1, radius2, volume);
@@ -121,11 +120,11 @@ private:
 	void prepare(FinnieRabinowiczPhys&, const ScGeom&, const Body&, const Body&) const;
 	void trade(FinnieRabinowiczPhys&, const ScGeom&, const Interaction&, double volumeBefore);
 
-	::dembark::NormalLaw        normal     = ::dembark::NormalLaw::hertz;
-	::dembark::Presliding       path       = ::dembark::Presliding::linear;
-	bool                        wet        = false;
-	::dembark::capillary::Model model      = ::dembark::capillary::Model::exact;
-	long                        revision   = 0;
+	::dembark::NormalLaw        normal   = ::dembark::NormalLaw::hertz;
+	::dembark::Presliding       path     = ::dembark::Presliding::linear;
+	bool                        wet      = false;
+	::dembark::capillary::Model model    = ::dembark::capillary::Model::exact;
+	long                        revision = 0;
 };
 REGISTER_SERIALIZABLE(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz);
 

@@ -48,21 +48,23 @@ void addShape(const Body& body, std::size_t place, const impact::Wall& common, c
 		drum.omega                       = state.angVel.dot(round->axis);
 		if (!(drum.radius > 0.0)) fail(where + ": CylinderWall.radius of body " + std::to_string(id) + " is not set; give it in m");
 		if ((state.angVel - drum.omega * round->axis).norm() > 1e-9 * state.angVel.norm())
-			fail(where + ": body " + std::to_string(id) + " turns about another axis than its own; make angVel parallel to CylinderWall.axis");
+			fail(where + ": body " + std::to_string(id) +
+			     " turns about another axis than its own; make angVel parallel to CylinderWall.axis");
 		shapes.drums.push_back(drum);
 		shapes.speed = std::max(shapes.speed, double(state.vel.norm()));  // turning, its surface moves along itself
 	} else if (const auto* facet = dynamic_cast<const Facet*>(body.shape.get())) {
 		impact::Triangle triangle;
 		triangle.id = static_cast<std::int64_t>(place);
 		for (int i = 0; i < 3; ++i) {
-			const Vector3r arm       = state.ori * facet->vertices[i], velocity = state.vel + state.angVel.cross(arm);
+			const Vector3r arm = state.ori * facet->vertices[i], velocity = state.vel + state.angVel.cross(arm);
 			triangle.node[i]     = plain(Vector3r(state.pos + arm));
 			triangle.velocity[i] = plain(velocity);
 			shapes.speed         = std::max(shapes.speed, double(velocity.norm()));
 		}
 		shapes.triangles.push_back(triangle);
 	} else {
-		fail(where + ": body " + std::to_string(id) + " is a " + body.shape->getClassName() + "; it must be a Wall, a CylinderWall or a Facet");
+		fail(where + ": body " + std::to_string(id) + " is a " + body.shape->getClassName() +
+		     "; it must be a Wall, a CylinderWall or a Facet");
 	}
 }
 
@@ -86,15 +88,17 @@ void LogImpact::gatherWalls(Gathered& all) {
 		if (!(wall.stiffness > 0.0)) fail(where + ".stiffness is not set; give the local stiffness of the wall in N/m");
 		if (wall.bodies.empty()) fail(where + ".bodies is empty; give the ids of the bodies that are the wall");
 		impact::Wall& common = all.walls[w].common;
-		common.id        = impact::wall_key(static_cast<std::int64_t>(w));
-		common.material  = static_cast<int>(all.materials.size() + w);
-		common.stiffness = wall.stiffness;
+		common.id            = impact::wall_key(static_cast<std::int64_t>(w));
+		common.material      = static_cast<int>(all.materials.size() + w);
+		common.stiffness     = wall.stiffness;
 		for (std::size_t k = 0; k < wall.bodies.size(); ++k) {
-			if (!scene->bodies->exists(wall.bodies[k])) fail(where + ".bodies: body " + std::to_string(wall.bodies[k]) + " does not exist");
+			if (!scene->bodies->exists(wall.bodies[k]))
+				fail(where + ".bodies: body " + std::to_string(wall.bodies[k]) + " does not exist");
 			log_impact::addShape(*Body::byId(wall.bodies[k], scene), k, common, where, all.walls[w]);
 		}
 		if (wall.bodies.size() > 1 && all.walls[w].triangles.size() != wall.bodies.size())
-			fail(where + ".bodies: a wall of several bodies must be all Facet; make each Wall and CylinderWall a wall of its own");
+			fail(where +
+			     ".bodies: a wall of several bodies must be all Facet; make each Wall and CylinderWall a wall of its own");
 		all.wallSpeed = std::max(all.wallSpeed, all.walls[w].speed);
 	}
 }
@@ -130,8 +134,8 @@ void LogImpact::findContacts(const Gathered& all, double reach, std::vector<impa
 	};
 	for (const auto& c : contacts)
 		if (std::abs(eigen(c.normal)[all.axis]) > 1e-9)
-			fail("LogImpact: log " + std::to_string(c.key_a) + " meets " + partner(c) + " out of the plane it moves in; put all logs at one " +
-			     "xyz"[all.axis] + " and walls upright to that plane");
+			fail("LogImpact: log " + std::to_string(c.key_a) + " meets " + partner(c) +
+			     " out of the plane it moves in; put all logs at one " + "xyz"[all.axis] + " and walls upright to that plane");
 }
 
 void LogImpact::action() {
@@ -139,7 +143,7 @@ void LogImpact::action() {
 	Gathered all;
 	gather(all);
 	gatherWalls(all);
-	const bool first = steps == 0 && velocityAtStart;
+	const bool                           first = steps == 0 && velocityAtStart;
 	std::vector<::dembark::Vec3<double>> force(all.bodies.size()), torque(all.bodies.size());
 	try {
 		prepare(all);
@@ -184,8 +188,8 @@ void LogImpact::report(const impact::StepReport& now) {
 	highestForce     = now.peak_force_so_far;
 }
 
-void LogImpact::moveBack(
-        const Gathered& all, const std::vector<::dembark::Vec3<double>>& force, const std::vector<::dembark::Vec3<double>>& torque) const {
+void LogImpact::moveBack(const Gathered& all, const std::vector<::dembark::Vec3<double>>& force,
+                         const std::vector<::dembark::Vec3<double>>& torque) const {
 	for (std::size_t i = 0; i < all.bodies.size(); ++i) {
 		const impact::Body& log = all.bodies[i];
 		if (std::isinf(log.mass)) continue;
@@ -205,7 +209,9 @@ void LogImpact::writeImpacts() {
 		std::FILE* file = std::fopen(impactsFile.c_str(), mode);
 		const bool done = file && std::fwrite(lines.data(), 1, lines.size(), file) == lines.size();
 		if (!file || std::fclose(file) != 0 || !done)
-			fail("LogImpact.impactsFile '" + impactsFile + "' cannot be written; give the path of a file in a folder that is there", 1);
+			fail("LogImpact.impactsFile '" + impactsFile +
+			             "' cannot be written; give the path of a file in a folder that is there",
+			     1);
 		writtenBytes += static_cast<long>(lines.size());
 	};
 	if (!fileChecked || writtenFile != impactsFile) {
@@ -217,11 +223,15 @@ void LogImpact::writeImpacts() {
 			std::error_code wrong;
 			const auto      size = std::filesystem::file_size(impactsFile, wrong);
 			if (wrong || size < static_cast<std::uintmax_t>(writtenBytes))
-				fail("LogImpact.impactsFile '" + impactsFile + "' " + (wrong ? "is not there" : "has only " + std::to_string(size) + " bytes") +
-				     ", the saved scene had written " + std::to_string(writtenBytes) + " bytes; bring the file back or set impactsFile to a new name");
+				fail("LogImpact.impactsFile '" + impactsFile + "' " +
+				     (wrong ? "is not there" : "has only " + std::to_string(size) + " bytes") +
+				     ", the saved scene had written " + std::to_string(writtenBytes) +
+				     " bytes; bring the file back or set impactsFile to a new name");
 			std::filesystem::resize_file(impactsFile, static_cast<std::uintmax_t>(writtenBytes), wrong);
 			if (wrong)
-				fail("LogImpact.impactsFile '" + impactsFile + "' cannot be cut to " + std::to_string(writtenBytes) + " bytes: " + wrong.message(), 1);
+				fail("LogImpact.impactsFile '" + impactsFile + "' cannot be cut to " + std::to_string(writtenBytes) +
+				             " bytes: " + wrong.message(),
+				     1);
 		} else {
 			put("w", "# id_a id_b time duration peak_force impulse relative_speed dissipated x y z\n");
 		}
@@ -230,9 +240,10 @@ void LogImpact::writeImpacts() {
 	std::string lines;
 	char        line[320];
 	for (const auto& one : ended) {
-		const int length = std::snprintf(
-		        line, sizeof line, "%ld %ld %.12g %.12g %.12g %.12g %.12g %.12g %.12g %.12g %.12g\n", log_impact::shownId(one.a), log_impact::shownId(one.b),
-		        one.time, one.duration, one.peak_force, one.impulse, one.relative_speed, one.dissipated, one.place.x, one.place.y, one.place.z);
+		const int length =
+			std::snprintf(line, sizeof line, "%ld %ld %.12g %.12g %.12g %.12g %.12g %.12g %.12g %.12g %.12g\n",
+			              log_impact::shownId(one.a), log_impact::shownId(one.b), one.time, one.duration, one.peak_force,
+			              one.impulse, one.relative_speed, one.dissipated, one.place.x, one.place.y, one.place.z);
 		lines.append(line, static_cast<std::size_t>(length));
 	}
 	put("a", lines);
@@ -242,8 +253,8 @@ boost::python::list LogImpact::contacts() const {
 	boost::python::list result;
 	if (system)
 		for (const auto& c : system->contacts())
-			result.append(boost::python::make_tuple(
-			        log_impact::shownId(c.key_a), log_impact::shownId(c.key_b), eigen(c.normal), c.gap, c.normal_force, eigen(c.tangential), eigen(c.place)));
+			result.append(boost::python::make_tuple(log_impact::shownId(c.key_a), log_impact::shownId(c.key_b), eigen(c.normal),
+			                                        c.gap, c.normal_force, eigen(c.tangential), eigen(c.place)));
 	return result;
 }
 

@@ -8,6 +8,7 @@
 
 #include "dembark/impact/geometry.hpp"
 #include "dembark/impact/system.hpp"
+#include "dembark/impact/triangles.hpp"
 
 namespace yade {
 
@@ -99,15 +100,15 @@ public:
 	// clang-format on
 
 private:
-	void check(const Scene&) const;
-	void gather(Gathered&);
-	void gatherWalls(Gathered&);
-	void findContacts(const Gathered&, double reach, std::vector<::dembark::impact::Contact>&);
-	void prepare(const Gathered&);
-	void writeImpacts();
-	void report(const ::dembark::impact::StepReport&);
-	void moveBack(
-	        const Gathered&, const std::vector<::dembark::Vec3<double>>& force, const std::vector<::dembark::Vec3<double>>& torque) const;
+	void                        check(const Scene&) const;
+	void                        gather(Gathered&);
+	void                        gatherWalls(Gathered&);
+	void                        findContacts(const Gathered&, double reach, std::vector<::dembark::impact::Contact>&);
+	void                        prepare(const Gathered&);
+	void                        writeImpacts();
+	void                        report(const ::dembark::impact::StepReport&);
+	void                        moveBack(const Gathered&, const std::vector<::dembark::Vec3<double>>& force,
+	                                     const std::vector<::dembark::Vec3<double>>& torque) const;
 	::dembark::impact::Settings settings(const std::vector<int>& materials) const;
 
 	std::unique_ptr<::dembark::impact::System> system;

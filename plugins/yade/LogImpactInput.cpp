@@ -14,8 +14,8 @@ namespace log_input {
 
 namespace py = boost::python;
 
-const char* const frictionWords[] = {"static", "kinetic", "slip", "strength", "healing", "area"};
-constexpr std::size_t frictionWidth = 8;  // two materials and six numbers
+const char* const     frictionWords[] = {"static", "kinetic", "slip", "strength", "healing", "area"};
+constexpr std::size_t frictionWidth   = 8;  // two materials and six numbers
 
 /// Python's own text of a value, for messages.
 std::string shown(const py::object& value) { return py::extract<std::string>(py::str(value)); }
@@ -50,7 +50,7 @@ int material(const py::object& key, const std::string& what) {
 /// Number, or dict of numbers by material, as rows (material or -1, number); each number must be >= 0, or > 0 when `positive`.
 std::vector<Real> perMaterial(const py::object& value, const std::string& what, bool positive) {
 	std::vector<Real> rows;
-	const auto add = [&](int id, const py::object& each, const std::string& where) {
+	const auto        add = [&](int id, const py::object& each, const std::string& where) {
 		const double x = number(each, where);
 		if (!(positive ? x > 0.0 : x >= 0.0))
 			fail(where + " is " + dembark_yade::text(x) + "; it must be " + (positive ? "> 0 N/m" : ">= 0 N s/m"));
@@ -81,8 +81,8 @@ py::object perMaterialToPython(const std::vector<Real>& rows) {
 std::vector<Real> frictionValue(const py::object& value, const std::string& what) {
 	::dembark::FinnieRabinowicz law;
 	law.static_friction = law.kinetic_friction = 0.0;
-	law.critical_slip_distance = 0.0;
-	double area = 0.0;
+	law.critical_slip_distance                 = 0.0;
+	double area                                = 0.0;
 	if (isDict(value)) {
 		const py::dict words = py::extract<py::dict>(value);
 		const py::list keys  = words.keys();
@@ -105,7 +105,8 @@ std::vector<Real> frictionValue(const py::object& value, const std::string& what
 		law.static_friction = law.kinetic_friction = number(value, what);
 	}
 	if (const char* wrong = law.error()) fail(what + ": " + wrong);
-	if (!(area >= 0.0)) fail(what + ": area is " + dembark_yade::text(area) + "; it must be > 0 m^2, or 0 = that of the contact of two circles");
+	if (!(area >= 0.0))
+		fail(what + ": area is " + dembark_yade::text(area) + "; it must be > 0 m^2, or 0 = that of the contact of two circles");
 	return {law.static_friction,          law.kinetic_friction, law.critical_slip_distance,
 	        law.interface_shear_strength, law.healing_time,     area};
 }
@@ -119,7 +120,7 @@ py::object frictionToPython(const Real* numbers) {
 /// Friction laws by pairs of materials, as rows (material or -1, material or -1, six numbers).
 std::vector<Real> frictionPairs(const py::object& value, const std::string& what) {
 	std::vector<Real> rows;
-	const auto add = [&](int a, int b, const py::object& law, const std::string& where) {
+	const auto        add = [&](int a, int b, const py::object& law, const std::string& where) {
 		rows.push_back(a);
 		rows.push_back(b);
 		for (const Real x : frictionValue(law, where)) rows.push_back(x);
@@ -157,7 +158,8 @@ void LogWall::postLoad(LogWall&) {
 	if (!(stiffness >= 0.0) || !std::isfinite(stiffness))
 		fail(where + ".stiffness is " + dembark_yade::text(stiffness) + "; it must be > 0 N/m");
 	for (const int id : bodies)
-		if (id < 0) fail(where + ".bodies: " + std::to_string(id) + " is no id of a body; give ids as O.bodies.append returns them");
+		if (id < 0)
+			fail(where + ".bodies: " + std::to_string(id) + " is no id of a body; give ids as O.bodies.append returns them");
 }
 
 void LogWall::pyHandleCustomCtorArgs(boost::python::tuple&, boost::python::dict& kw) {
@@ -179,12 +181,15 @@ void LogWall::setFriction(const boost::python::object& value) {
 }
 
 void LogImpact::pyHandleCustomCtorArgs(boost::python::tuple&, boost::python::dict& kw) {
-	log_input::take<LogImpact>(*this, kw, {{"stiffness", &LogImpact::setStiffness}, {"damping", &LogImpact::setDamping},
-	                                       {"friction", &LogImpact::setFriction}, {"walls", &LogImpact::setWalls}});
+	log_input::take<LogImpact>(*this, kw,
+	                           {{"stiffness", &LogImpact::setStiffness},
+	                            {"damping", &LogImpact::setDamping},
+	                            {"friction", &LogImpact::setFriction},
+	                            {"walls", &LogImpact::setWalls}});
 }
 
 boost::python::object LogImpact::getStiffness() const { return log_input::perMaterialToPython(stiffnessRows); }
-void LogImpact::setStiffness(const boost::python::object& value) {
+void                  LogImpact::setStiffness(const boost::python::object& value) {
 	stiffnessRows = log_input::perMaterial(value, "LogImpact.stiffness", true);
 }
 
@@ -197,7 +202,7 @@ boost::python::object LogImpact::getFriction() const {
 	boost::python::dict result;
 	for (std::size_t i = 0; i + log_input::frictionWidth <= frictionRows.size(); i += log_input::frictionWidth)
 		result[boost::python::make_tuple(static_cast<int>(frictionRows[i]), static_cast<int>(frictionRows[i + 1]))] =
-		        log_input::frictionToPython(&frictionRows[i + 2]);
+			log_input::frictionToPython(&frictionRows[i + 2]);
 	return result;
 }
 void LogImpact::setFriction(const boost::python::object& value) { frictionRows = log_input::frictionPairs(value, "LogImpact.friction"); }
@@ -210,10 +215,10 @@ boost::python::list LogImpact::getWalls() const {
 
 void LogImpact::setWalls(const boost::python::object& value) {
 	std::vector<shared_ptr<LogWall>> read;
-	const char* const form = "LogImpact.walls must be a list of LogWall objects or of dicts of their attributes";
+	const char* const                form = "LogImpact.walls must be a list of LogWall objects or of dicts of their attributes";
 	if (log_input::isDict(value) || log_input::isText(value) || !PySequence_Check(value.ptr())) fail(form);
 	for (boost::python::ssize_t i = 0; i < boost::python::len(value); ++i) {
-		const boost::python::object                    each = value[i];
+		const boost::python::object                 each = value[i];
 		boost::python::extract<shared_ptr<LogWall>> object(each);
 		if (object.check()) {
 			read.push_back(object());

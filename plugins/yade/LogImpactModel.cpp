@@ -64,7 +64,8 @@ int blockedAxis(const State& state, Body::id_t id) {
 	if (translations == 0 && (rotations == 0 || !spins)) return -1;
 	if (axis >= 0 && (!spins || !(rotations & State::axisDOF(axis, true)))) return axis;
 	fail(logName(id) + "has blockedDOFs '" + state.blockedDOFs_vec_get() +
-	     "'; it must be free (''), held ('xyzXYZ'), or move in a plane, e.g. 'zXY': one translation, and not the rotation about that axis");
+	     "'; it must be free (''), held ('xyzXYZ'), or move in a plane, e.g. 'zXY': one translation, and not the rotation about that "
+	     "axis");
 }
 
 double inertia(const State& state, int axis, Body::id_t id) {
@@ -73,7 +74,8 @@ double inertia(const State& state, int axis, Body::id_t id) {
 	if (!(value > 0.0))
 		fail(logName(id) + "has an inertia of " + text(value) + " kg m^2; set state.inertia, 1/2 m r^2 about the axis of a log");
 	if (axis < 0 && (state.inertia - Vector3r::Constant(value)).cwiseAbs().maxCoeff() > 1e-9 * value)
-		fail(logName(id) + "has three different inertias and moves freely; make them equal or hold it in a plane, blockedDOFs = 'zXY'");
+		fail(logName(id) +
+		     "has three different inertias and moves freely; make them equal or hold it in a plane, blockedDOFs = 'zXY'");
 	return value;
 }
 
@@ -113,10 +115,12 @@ void LogImpact::check(const Scene& on) const {
 		if (const auto* newton = dynamic_cast<const NewtonIntegrator*>(each.get())) {
 			if (!after) fail("LogImpact stands after NewtonIntegrator; put it right before it in O.engines");
 			if (newton->damping > 0.0)
-				fail("NewtonIntegrator.damping is " + text(newton->damping) + "; it must be 0 with LogImpact, which predicts the motion of the step");
+				fail("NewtonIntegrator.damping is " + text(newton->damping) +
+				     "; it must be 0 with LogImpact, which predicts the motion of the step");
 			if (newton->densityScaling) fail("NewtonIntegrator.densityScaling is on; it must be off with LogImpact");
 			if (newton->mask > 0)
-				fail("NewtonIntegrator.mask is " + std::to_string(newton->mask) + "; it must be -1 with LogImpact, hold bodies by blockedDOFs");
+				fail("NewtonIntegrator.mask is " + std::to_string(newton->mask) +
+				     "; it must be -1 with LogImpact, hold bodies by blockedDOFs");
 			found = true;
 			break;
 		}
@@ -129,12 +133,13 @@ void LogImpact::check(const Scene& on) const {
 void LogImpact::gather(Gathered& all) {
 	scene->forces.sync();
 	const Vector3r gravity = log_impact::integrator(*scene).gravity;
-	bool           first = true;
-	const auto take = [&](const Body& body, const Sphere& sphere) {
+	bool           first   = true;
+	const auto     take    = [&](const Body& body, const Sphere& sphere) {
 		const State&     state = *body.state;
 		const Body::id_t id    = body.getId();
 		if (body.isClump() || body.isClumpMember())
-			fail(log_impact::logName(id) + "belongs to a clump; LogImpact knows single spheres only, leave it out by LogImpact.mask or ids");
+			fail(log_impact::logName(id) +
+			     "belongs to a clump; LogImpact knows single spheres only, leave it out by LogImpact.mask or ids");
 		impact::Body one;
 		one.id       = id;
 		one.radius   = sphere.radius;
@@ -156,8 +161,8 @@ void LogImpact::gather(Gathered& all) {
 		all.axis = axis;
 		first    = false;
 		if (!(state.mass > 0.0)) fail(log_impact::logName(id) + "has a mass of " + text(state.mass) + " kg; it must be > 0");
-		one.mass    = state.mass;
-		one.inertia = log_impact::inertia(state, axis, id);
+		one.mass       = state.mass;
+		one.inertia    = log_impact::inertia(state, axis, id);
 		Vector3r force = scene->forces.getForce(id) + state.mass * gravity;
 		if (axis >= 0) force[axis] = 0.0;
 		Vector3r torque = scene->forces.getTorque(id);
@@ -180,14 +185,16 @@ void LogImpact::gather(Gathered& all) {
 			const bool  there  = scene->bodies->exists(id);
 			const auto* sphere = there ? dynamic_cast<const Sphere*>(Body::byId(id, scene)->shape.get()) : nullptr;
 			if (!sphere)
-				fail("LogImpact.ids: body " + std::to_string(id) + (there ? " is no Sphere" : " does not exist") + "; give ids of spheres");
+				fail("LogImpact.ids: body " + std::to_string(id) + (there ? " is no Sphere" : " does not exist") +
+				     "; give ids of spheres");
 			if (mask == 0 || Body::byId(id, scene)->maskOk(mask)) take(*Body::byId(id, scene), *sphere);
 		}
 	}
 	std::sort(all.materials.begin(), all.materials.end());
 	all.materials.erase(std::unique(all.materials.begin(), all.materials.end()), all.materials.end());
 	for (auto& one : all.bodies)
-		one.material = static_cast<int>(std::lower_bound(all.materials.begin(), all.materials.end(), one.material) - all.materials.begin());
+		one.material = static_cast<int>(std::lower_bound(all.materials.begin(), all.materials.end(), one.material) -
+		                                all.materials.begin());
 }
 
 impact::Settings LogImpact::settings(const std::vector<int>& materials) const {
@@ -200,7 +207,7 @@ impact::Settings LogImpact::settings(const std::vector<int>& materials) const {
 		fail(std::string("LogImpact.") + what + " has no value for " + name(id) + "; add it to the dict");
 	};
 	static const Real none[6] = {0.0, 0.0, 0.0, ::dembark::unlimited_strength, 0.0, 0.0};
-	const auto between = [&](int a, int b) -> const Real* {
+	const auto        between = [&](int a, int b) -> const Real* {
 		if (frictionRows.empty()) return none;
 		for (std::size_t i = 0; i + 8 <= frictionRows.size(); i += 8) {
 			const Real x = frictionRows[i], y = frictionRows[i + 1];
@@ -213,7 +220,8 @@ impact::Settings LogImpact::settings(const std::vector<int>& materials) const {
 		if (!wall.frictionRows.empty()) return wall.frictionRows.data();
 		if (frictionRows.empty()) return none;
 		if (frictionRows[0] < 0.0) return &frictionRows[2];
-		fail(log_impact::wallName(number, wall) + " has no friction, and LogImpact.friction is by pairs of materials; give the wall its own");
+		fail(log_impact::wallName(number, wall) +
+		     " has no friction, and LogImpact.friction is by pairs of materials; give the wall its own");
 	};
 	// Each wall is a material of its own, after those of the logs.
 	const std::size_t logs = materials.size(), n = logs + wallList.size();
@@ -226,15 +234,15 @@ impact::Settings LogImpact::settings(const std::vector<int>& materials) const {
 	result.materials.resize(n);
 	result.pairs.resize(n * n);
 	for (std::size_t i = 0; i < n; ++i) {
-		const bool log = i < logs;
+		const bool log                = i < logs;
 		result.materials[i].stiffness = log ? one(stiffnessRows, materials[i], "stiffness") : wallList[i - logs]->stiffness;
 		result.materials[i].damping   = log && !dampingRows.empty() ? one(dampingRows, materials[i], "damping") : 0.0;
 		for (std::size_t j = 0; j < n; ++j) {
-			impact::PairLaw& law = result.pairs[i * n + j];
-			law.tangential_stiffness_ratio = tangentialRatio;
-			law.contact_damping            = contactDamping;
-			const std::size_t last = std::max(i, j);
-			const Real*       six  = last < logs ? between(materials[i], materials[j]) : withWall(last - logs);
+			impact::PairLaw& law                  = result.pairs[i * n + j];
+			law.tangential_stiffness_ratio        = tangentialRatio;
+			law.contact_damping                   = contactDamping;
+			const std::size_t last                = std::max(i, j);
+			const Real*       six                 = last < logs ? between(materials[i], materials[j]) : withWall(last - logs);
 			law.friction.static_friction          = six[0];
 			law.friction.kinetic_friction         = six[1];
 			law.friction.critical_slip_distance   = six[2];
@@ -248,7 +256,7 @@ impact::Settings LogImpact::settings(const std::vector<int>& materials) const {
 
 void LogImpact::prepare(const Gathered& all) {
 	// Everything that the model is built from, so that a change of any of it, O.dt too, is seen; its state is carried over.
-	std::vector<double> from{scene->dt,      theta,          tolerance,         double(sweeps),
+	std::vector<double> from{scene->dt,       theta,          tolerance,         double(sweeps),
 	                         tangentialRatio, contactDamping, double(method[0]), double(all.materials.size())};
 	from.insert(from.end(), all.materials.begin(), all.materials.end());
 	for (const auto* rows : {&stiffnessRows, &dampingRows, &frictionRows}) {
@@ -262,7 +270,7 @@ void LogImpact::prepare(const Gathered& all) {
 	}
 	if (system && from == builtFrom) return;
 	const std::vector<double> state = system ? system->state() : log_impact::decode(savedState);
-	system = std::make_unique<impact::System>(settings(all.materials));
+	system                          = std::make_unique<impact::System>(settings(all.materials));
 	if (!state.empty()) system->restore(state);
 	builtFrom = from;
 }

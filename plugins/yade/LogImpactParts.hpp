@@ -24,11 +24,11 @@ struct WallShapes {
 
 /// The logs and walls of one step.
 struct LogImpact::Gathered {
-	std::vector<::dembark::impact::Body>    bodies;     // in the order of their ids; held spheres have infinite mass
-	std::vector<int>                        materials;  // ids of YADE, increasing; the index is that of the model
-	int                                     axis = -1;  // blocked translation of all logs that move
-	std::vector<log_impact::WallShapes>     walls;
-	double                                  wallSpeed = 0.0;
+	std::vector<::dembark::impact::Body> bodies;     // in the order of their ids; held spheres have infinite mass
+	std::vector<int>                     materials;  // ids of YADE, increasing; the index is that of the model
+	int                                  axis = -1;  // blocked translation of all logs that move
+	std::vector<log_impact::WallShapes>  walls;
+	double                               wallSpeed = 0.0;
 };
 
 namespace log_impact {

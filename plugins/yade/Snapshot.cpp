@@ -22,8 +22,8 @@ int at(const std::vector<int>& values, Body::id_t id, int otherwise) {
 struct Line {
 	std::string& text;
 	char         buffer[40];
-	void add(const char* format, double value) { text.append(buffer, std::snprintf(buffer, sizeof buffer, format, value)); }
-	void add(const char* format, const Vector3r& v) {
+	void         add(const char* format, double value) { text.append(buffer, std::snprintf(buffer, sizeof buffer, format, value)); }
+	void         add(const char* format, const Vector3r& v) {
 		for (int i = 0; i < 3; ++i) add(format, v[i]);
 	}
 	void add(long value) { text.append(buffer, std::snprintf(buffer, sizeof buffer, "%ld ", value)); }
@@ -107,11 +107,11 @@ std::string DembarkSnapshot::contactRows() const {
 		if (!interaction->isReal()) continue;
 		const Body::id_t id1 = interaction->getId1(), id2 = interaction->getId2();
 		if (at(types, id1, 0) <= 0 || at(types, id2, 0) <= 0) continue;
-		const auto* phys = dynamic_cast<const NormShearPhys*>(interaction->phys.get());
+		const auto* phys  = dynamic_cast<const NormShearPhys*>(interaction->phys.get());
 		const auto &body1 = Body::byId(id1, &scene), &body2 = Body::byId(id2, &scene);
 		if (!phys || !body1 || !body2 || !(body1->isDynamic() || body2->isDynamic())) continue;
 		const Vector3i cell1 = image(body1->state->pos), cell2 = image(body2->state->pos);
-		const Vector3r size = high - low;
+		const Vector3r size   = high - low;
 		bool           across = false;
 		for (int i = 0; i < 3; ++i) across |= periodic[i] && interaction->cellDist[i] + cell2[i] - cell1[i] != 0;
 		line.add("%.10g ", Vector3r(body1->state->pos - cell1.cast<Real>().cwiseProduct(size)));
@@ -139,7 +139,8 @@ Real DembarkSnapshot::kineticEnergy() const {
 	scene.forces.sync();
 	Real sum = 0.0;
 	for (const auto& body : *scene.bodies)
-		if (body && at(types, body->getId(), 0) == 1) sum += 0.5 * body->state->mass * motion(*body, scene, gravity).velocity.squaredNorm();
+		if (body && at(types, body->getId(), 0) == 1)
+			sum += 0.5 * body->state->mass * motion(*body, scene, gravity).velocity.squaredNorm();
 	return sum;
 }
 

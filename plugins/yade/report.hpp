@@ -19,23 +19,23 @@ namespace yade::dembark_yade {
 /// `code`, 2 for wrong input and 1 for a run that failed.
 [[noreturn]] inline void fail(const std::string& line, int code = 2) {
 #ifdef _OPENMP
-  const bool parallel = omp_get_level() > 0;
+	const bool parallel = omp_get_level() > 0;
 #else
-  const bool parallel = false;
+	const bool parallel = false;
 #endif
-  if (parallel || !PyGILState_Check()) {
-    std::fprintf(stderr, "dembark: %s\n", line.c_str());
-    std::fflush(nullptr);
-    std::_Exit(code);
-  }
-  throw std::runtime_error("dembark: " + line);
+	if (parallel || !PyGILState_Check()) {
+		std::fprintf(stderr, "dembark: %s\n", line.c_str());
+		std::fflush(nullptr);
+		std::_Exit(code);
+	}
+	throw std::runtime_error("dembark: " + line);
 }
 
 /// Shortest of the usual forms of a number, for such lines.
 inline std::string text(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.6g", value);
-  return buffer;
+	char buffer[32];
+	std::snprintf(buffer, sizeof buffer, "%.6g", value);
+	return buffer;
 }
 
 }  // namespace yade::dembark_yade

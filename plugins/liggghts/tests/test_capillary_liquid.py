@@ -38,7 +38,7 @@ def write_floor(path: Path, n: int = 3) -> None:
             triangles += [(a, b, c), (a, c, d)]
     corners = ["\n".join(f"vertex {x:.9g} {y:.9g} 0" for x, y in triangle) for triangle in triangles]
     facets = "\n".join(f"facet normal 0 0 1\nouter loop\n{three}\nendloop\nendfacet" for three in corners)
-    path.write_text(f"solid floor\n{facets}\nendsolid floor\n")
+    path.write_text(f"solid floor\n{facets}\nendsolid floor\n", encoding="utf-8")
 
 
 def shaken(run: str, *, ranks: int = 1, liquid: str = "content 0.01 return radius wall left 1e-10 0.05 0.3", create: str = CREATE,
@@ -188,7 +188,7 @@ def periodic(run: str, ranks: int) -> str:
     bed = packing(Material(static_friction=0.5, kinetic_friction=0.4, bridge_volume=1.0), run, every=1000)
     bed = re.sub(r"fix p_bridgeVolume.*", "", bed).replace("capillary_model exact", "capillary_model exact carried_liquid on")
     bed = bed.replace("thermo 1000", f"{THERMO}\nthermo_modify norm no format float %.17g\nthermo 250")
-    bed = bed.replace("fix weight", f"fix liquid all capillary/liquid content 0.01 return taken\nfix weight")
+    bed = bed.replace("fix weight", "fix liquid all capillary/liquid content 0.01 return taken\nfix weight")
     return bed if ranks == 2 else bed.replace("processors 2 1 1\n", "")
 
 

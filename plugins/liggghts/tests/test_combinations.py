@@ -9,24 +9,28 @@ from rig.scenarios import Grain, Material, Scenario
 
 ROOT = Path(__file__).resolve().parents[3]
 LIST = re.findall(r"^GRAN_MODEL\((\w+), TANGENTIAL_(\w+), COHESION_(\w+), ROLLING_(\w+), SURFACE_(\w+)\)$",
-                  (ROOT / "plugins/liggghts/granular_combinations_list.h").read_text(), re.M)
+                  (ROOT / "plugins/liggghts/granular_combinations_list.h").read_text(), re.MULTILINE)
 COMBINATIONS = {tuple(word.lower() for word in each) for each in LIST}
 ROLLING = "\n".join(f"fix p_{name} all property/global {name} peratomtypepair 2 0.1 0.1 0.1 0.1"
                     for name in ("coefficientRollingFriction", "coefficientRollingViscousDamping"))
 CASE = Scenario(name="two grains", material=Material(bridge_volume=2e-10), wall=True, steps=3, stride=1, time_step=1e-5, grains=(
-    Grain(position=(0.0, 0.0, 4.99e-3), velocity=(0.1, 0.0, 0.0)), Grain(position=(9.99e-3, 0.0, 4.99e-3), angular_velocity=(0.0, 50.0, 1.0))))
+    Grain(position=(0.0, 0.0, 4.99e-3), velocity=(0.1, 0.0, 0.0)),
+    Grain(position=(9.99e-3, 0.0, 4.99e-3), angular_velocity=(0.0, 50.0, 1.0))))
 
 
 def words(normal, tangential, cohesion, rolling, surface, settings=""):
+    friction = " presliding exponential" if tangential == "finnie_rabinowicz" else ""
+    bridges = " capillary_model willett" if cohesion == "capillary" else ""
     return (f"model {normal} tangential {tangential} cohesion {cohesion} rolling_friction {rolling} surface {surface} {{}}"
-            f"{' presliding exponential' if tangential == 'finnie_rabinowicz' else ''}{' capillary_model willett' if cohesion == 'capillary' else ''}{settings}")
+            f"{friction}{bridges}{settings}")
 
 
 def deck(combination, settings="") -> str:
     text = liggghts_driver.deck(CASE)
     chosen = words(*combination, settings)
-    text = re.sub(r"^pair_style gran .*$", f"{ROLLING}\npair_style gran {chosen.format('')}", text, flags=re.M)
-    return re.sub(r"^fix floor all wall/gran .*$", f"fix floor all wall/gran {chosen.format('primitive type 2 zplane 0')}", text, flags=re.M)
+    text = re.sub(r"^pair_style gran .*$", f"{ROLLING}\npair_style gran {chosen.format('')}", text, flags=re.MULTILINE)
+    return re.sub(r"^fix floor all wall/gran .*$", f"fix floor all wall/gran {chosen.format('primitive type 2 zplane 0')}", text,
+                  flags=re.MULTILINE)
 
 
 def test_documentation_promises_what_is_compiled():
@@ -48,8 +52,10 @@ def test_all_combinations_run(tmp_path, settings):
         assert (abs(frame[:, [10, 12]]) > 1e-6).all(), sorted(COMBINATIONS)[number]
 
 
-@pytest.mark.parametrize("other", [("hertz/stiffness", "finnie_rabinowicz", "off", "off", "default"), ("hertz", "no_history", "capillary", "off", "default"),
-                                   ("hooke", "finnie_rabinowicz", "sjkr", "off", "default"), ("hertz", "finnie_rabinowicz", "capillary", "epsd", "default"),
+@pytest.mark.parametrize("other", [("hertz/stiffness", "finnie_rabinowicz", "off", "off", "default"),
+                                   ("hertz", "no_history", "capillary", "off", "default"),
+                                   ("hooke", "finnie_rabinowicz", "sjkr", "off", "default"),
+                                   ("hertz", "finnie_rabinowicz", "capillary", "epsd", "default"),
                                    ("hertz", "history", "capillary", "luding", "default")])
 def test_others_are_refused_with_exactly_this_list(tmp_path, other):
     done = liggghts_driver.run_deck(tmp_path, deck(other))

@@ -1,16 +1,17 @@
-"""fix energy/account: works of all parts of the forces balance the kinetic energy to round-off, in impacts and in a column that collapses."""
+"""fix energy/account: the works of all forces balance the kinetic energy to round-off, in impacts and in a column that collapses."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from dembark.physics import Body, collide, effective_youngs_modulus
 from rig import liggghts_driver
 from rig.energy_account import FIX, THERMO, Account
 from rig.liggghts_driver import models, properties, run_deck
 from rig.python_driver import contact
 from rig.scenarios import Grain, Material, Scenario
+
+from dembark.physics import Body, collide, effective_youngs_modulus
 
 DRY = Material(static_friction=0.5, kinetic_friction=0.4, restitution=0.6, youngs_modulus=5e6)
 WET = replace(DRY, bridge_volume=5e-11, viscosity=0.01, capillary_model="willett")
@@ -22,13 +23,15 @@ def grains() -> tuple[Grain, ...]:
 
 
 def account_of(folder: Path, case: Scenario) -> Account:
-    return Account(run_deck(folder, liggghts_driver.deck(case, start=f"{FIX}\n{THERMO}").replace(f"thermo {case.steps}", f"thermo {case.stride}")))
+    deck = liggghts_driver.deck(case, start=f"{FIX}\n{THERMO}").replace(f"thermo {case.steps}", f"thermo {case.stride}")
+    return Account(run_deck(folder, deck))
 
 
 def works_in_python(case: Scenario) -> dict[str, float]:
     """J, of the same impact in Python alone: forces as the laws give them, times the velocity of the full step."""
     m, dt = case.material, case.time_step
-    bodies = [Body(radius=g.radius, mass=g.mass, position=g.position, velocity=g.velocity, angular_velocity=g.angular_velocity) for g in case.grains]
+    bodies = [Body(radius=g.radius, mass=g.mass, position=g.position, velocity=g.velocity, angular_velocity=g.angular_velocity)
+              for g in case.grains]
     out = collide(contact(m), *bodies, time_step=dt, steps=case.steps)
     elastic = effective_youngs_modulus(m.youngs_modulus, m.poisson_ratio, m.youngs_modulus, m.poisson_ratio)
     one, two = (g.radius for g in case.grains)
@@ -47,7 +50,8 @@ def works_in_python(case: Scenario) -> dict[str, float]:
     return works
 
 
-@pytest.mark.parametrize("material", [DRY, replace(DRY, restitution=1.0), replace(WET, kinetic_friction=0.2)], ids=["dry", "elastic", "wet"])
+@pytest.mark.parametrize("material", [DRY, replace(DRY, restitution=1.0), replace(WET, kinetic_friction=0.2)],
+                         ids=["dry", "elastic", "wet"])
 def test_parts_of_an_oblique_impact_are_those_of_the_laws(tmp_path, material):
     case = Scenario(name="impact", material=material, grains=grains(), time_step=2e-6, steps=1250, stride=10)
     account = account_of(tmp_path, case)
@@ -71,7 +75,8 @@ def step_errors(folder: Path, time_step: float) -> np.ndarray:
     account = account_of(folder, case)
     account.assert_balanced()
     # Gravity and the spring are all there is: energy that comes or goes is the step's.
-    np.testing.assert_allclose(account.step_error, account.kinetic - account.start - account.gravity + account.normal_stored, atol=1e-14 * account.turnover)
+    np.testing.assert_allclose(account.step_error, account.kinetic - account.start - account.gravity + account.normal_stored,
+                               atol=1e-14 * account.turnover)
     return account.step_error
 
 

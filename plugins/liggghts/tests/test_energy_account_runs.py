@@ -16,7 +16,8 @@ DRY = Material(static_friction=0.5, kinetic_friction=0.4, restitution=0.6, young
 WET = replace(DRY, bridge_volume=5e-11, viscosity=0.01, capillary_model="willett")
 
 
-def bed(run: str, *, material: Material = DRY, ranks: int = 1, create: str = CREATE, state: str = STATE, fixes: str = "", every: int = 100) -> str:
+def bed(run: str, *, material: Material = DRY, ranks: int = 1, create: str = CREATE, state: str = STATE, fixes: str = "",
+        every: int = 100) -> str:
     """64 grains that fall on a floor, periodic along it."""
     text = packing(material, f"{fixes}\n{FIX}\n{THERMO}thermo {every}\n{run}", create=create, state=state)
     return text.replace("processors 2 1 1\n", "") if ranks == 1 else text
@@ -54,7 +55,8 @@ def test_moving_wall_and_an_output_of_contacts(tmp_path):
 
 
 def test_carried_liquid(tmp_path):
-    text = bed("run 1000", material=WET, fixes="fix liquid all capillary/liquid content 0.01").replace("viscous_liquid on", "viscous_liquid on carried_liquid on")
+    text = bed("run 1000", material=WET, fixes="fix liquid all capillary/liquid content 0.01")
+    text = text.replace("viscous_liquid on", "viscous_liquid on carried_liquid on")
     account = account_bed(tmp_path, re.sub(r"fix p_bridgeVolume.*\n", "", text))
     account.assert_balanced()
     assert max(account.bridges[-1], account.viscous[-1]) < -1e-3 * account.turnover
@@ -89,7 +91,8 @@ def test_forces_that_are_no_part_are_other(tmp_path):
     words = models(DRY)
     text = bed("run 2500").replace(words, words.replace("finnie_rabinowicz", "finnie_rabinowicz rolling_friction cdt"))
     wall = models(DRY, wall="primitive type 2 zplane 0")
-    text = text.replace(wall, wall.replace("finnie_rabinowicz", "finnie_rabinowicz rolling_friction cdt")).replace("pair_style", f"{roll}pair_style")
+    text = text.replace(wall, wall.replace("finnie_rabinowicz", "finnie_rabinowicz rolling_friction cdt"))
+    text = text.replace("pair_style", f"{roll}pair_style")
     account = account_bed(tmp_path, text)
     account.assert_balanced(other=False)
     assert account.other[-1] < -1e-4 * account.turnover
@@ -140,13 +143,16 @@ STOCK = "model hertz tangential history"
     (lambda t: t.replace(FIX, f"{FIX} every 5"), ("no keywords", "every")),
     (lambda t: t.replace(FIX, f"group some id 1\n{FIX.replace(' all ', ' some ')}"), ("group must be 'all'",)),
     (lambda t: t.replace(FIX, f"{FIX}\n{FIX.replace(' energy ', ' second ')}"), ("one such fix only", "fix energy")),
-    (lambda t: t.replace(models(DRY, wall="primitive type 2 zplane 0"), f"{STOCK} primitive type 2 zplane 0"), ("tangential finnie_rabinowicz", "fix floor")),
-    (lambda t: t.replace(models(DRY), STOCK).replace("tangential finnie_rabinowicz primitive", "tangential history primitive").replace(" presliding linear", ""),
+    (lambda t: t.replace(models(DRY, wall="primitive type 2 zplane 0"), f"{STOCK} primitive type 2 zplane 0"),
+     ("tangential finnie_rabinowicz", "fix floor")),
+    (lambda t: (t.replace(models(DRY), STOCK)
+                .replace("tangential finnie_rabinowicz primitive", "tangential history primitive").replace(" presliding linear", "")),
      ("tangential finnie_rabinowicz", "pair style")),
     (lambda t: t.replace("fix motion all nve/sphere", ""), ("no grain follows its forces", "nve/sphere")),
     (lambda t: t.replace(FIX, f"{FIX}\nfix late all nve/sphere"), ("must come after fix late",)),
     (lambda t: t.replace("nve/sphere", "nve/limit radius_ratio 0.1"), ("fix motion (nve/limit)", "only fix nve/sphere")),
-    (lambda t: t.replace(FIX, f"group one id 7\nfix push one move linear 0.1 0 0\n{FIX}"), ("atom 7", "fix motion and fix push", "disjoint")),
+    (lambda t: t.replace(FIX, f"group one id 7\nfix push one move linear 0.1 0 0\n{FIX}"),
+     ("atom 7", "fix motion and fix push", "disjoint")),
     (lambda t: t.replace("timestep", "run_style respa 2 2\ntimestep"), ("run_style verlet",)),
 ])
 def test_what_it_cannot_account_for_is_told(tmp_path, change, told):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rig import liggghts_driver, python_driver
+from rig import python_driver
 from rig.liggghts_driver import deck, motion, read_dump, run, run_deck
 from rig.motion import deviation
 from rig.packing import packing

@@ -39,7 +39,8 @@ def test_copies_once(tmp_path):
     before = {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in source.rglob("*") if path.is_file()}
     assert install(source).returncode == 0
     assert {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in source.rglob("*") if path.is_file()} == before
-    for name in ("tangential_model_finnie_rabinowicz.h", "cohesion_model_capillary.h", "fix_lcp_impact.cpp", "fix_resume_exact.cpp", "resume_state.h",
+    for name in ("tangential_model_finnie_rabinowicz.h", "cohesion_model_capillary.h", "fix_lcp_impact.cpp", "fix_resume_exact.cpp",
+                 "resume_state.h",
                  "fix_energy_account.cpp", "energy_books.h"):
         assert (source / name).read_bytes() == (ROOT / "plugins/liggghts" / name).read_bytes()
     assert (source / "dembark/capillary/bridge.hpp").exists() and not (source / "dembark/tests").exists()
@@ -51,7 +52,7 @@ def test_every_included_header_is_there(tmp_path):
     source = stand_in(tmp_path / "src")
     install(source)
     for path in [*source.glob("*_model_*.h"), *source.glob("fix_*"), *source.glob("*state*"), *(source / "dembark").rglob("*.hpp")]:
-        for name in re.findall(r'^#include "([^"]+)"', path.read_text(), re.M):
+        for name in re.findall(r'^#include "([^"]+)"', path.read_text(), re.MULTILINE):
             ours = name.startswith("dembark/") or path.suffix == ".hpp" or (ROOT / "plugins/liggghts" / name).exists()
             assert not ours or (path.parent / name).exists() or (source / name).exists(), f"{path.name}: {name}"
 
@@ -60,7 +61,7 @@ def test_whitelist_is_what_liggghts_dembark_compiles(tmp_path):
     source = stand_in(tmp_path / "src")
     install(source)
     text = (ROOT / "plugins/liggghts/granular_combinations_list.h").read_text()
-    expected = set(re.findall(r"^GRAN_MODEL.*$", text, re.M))
+    expected = set(re.findall(r"^GRAN_MODEL.*$", text, re.MULTILINE))
     assert len(expected) == 18
     assert set((source / "style_contact_model_user.whitelist").read_text().splitlines()) == expected
 
@@ -70,7 +71,8 @@ def test_wrong_folders(tmp_path):
     (old / "version_liggghts.txt").write_text("3.3.1\n")
     taken = stand_in(tmp_path / "taken")
     (taken / "cohesion_model_other.h").write_text("COHESION_MODEL(COHESION_OTHER,other,20)\n")
-    for words, what in (((), "no LIGGGHTS source folder given"), ((tmp_path / "none",), "does not exist"), ((tmp_path,), "has no pair_gran_base.h"),
+    for words, what in (((), "no LIGGGHTS source folder given"), ((tmp_path / "none",), "does not exist"),
+                        ((tmp_path,), "has no pair_gran_base.h"),
                         ((old,), "is LIGGGHTS 3.3.1"), ((taken,), "has the model number 20")):
         done = install(*words)
         assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
@@ -91,8 +93,10 @@ def fetch(folder: Path) -> Path:
         for name in ("lists/partial", "cache/archives/partial"):
             (state / name).mkdir(parents=True, exist_ok=True)
         (state / "status").touch()
-        (state / "source.list").write_text(f"deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] {mirrors[0]} bookworm main\n")
-        options = [f"Dir::Etc::sourcelist={state}/source.list", "Dir::Etc::sourceparts=/dev/null", f"Dir::State={state}", f"Dir::State::lists={state}/lists",
+        key = "/usr/share/keyrings/debian-archive-keyring.gpg"
+        (state / "source.list").write_text(f"deb-src [signed-by={key}] {mirrors[0]} bookworm main\n")
+        options = [f"Dir::Etc::sourcelist={state}/source.list", "Dir::Etc::sourceparts=/dev/null", f"Dir::State={state}",
+                   f"Dir::State::lists={state}/lists",
                    f"Dir::State::status={state}/status", f"Dir::Cache={state}/cache", "APT::Sandbox::User="]
         apt = ["apt-get", "-qq", *(word for option in options for word in ("-o", option))]
         subprocess.run([*apt, "update"], check=True)
@@ -124,10 +128,12 @@ def test_built_from_source_is_the_same_as_liggghts_dembark(tmp_path):
         subprocess.run(["tar", "-xJf", str(fetch(place))], cwd=place, check=True)
         mend(source)
         # Of the stock combinations one is enough.
-        (source / "style_contact_model.whitelist").write_text("GRAN_MODEL(HERTZ, TANGENTIAL_HISTORY, COHESION_OFF, ROLLING_OFF, SURFACE_DEFAULT)\n")
+        (source / "style_contact_model.whitelist").write_text(
+            "GRAN_MODEL(HERTZ, TANGENTIAL_HISTORY, COHESION_OFF, ROLLING_OFF, SURFACE_DEFAULT)\n")
         (source / ".mended").touch()
     assert install(source).returncode == 0
-    made = subprocess.run(["make", f"-j{os.cpu_count()}", "mpi", "LMP_INC=", "VTK_INC=", "VTK_LIB=", "CCFLAGS=-O2 -fPIC -w -std=c++17 -I/usr/include/eigen3", "DEPFLAGS=-MM"],
+    made = subprocess.run(["make", f"-j{os.cpu_count()}", "mpi", "LMP_INC=", "VTK_INC=", "VTK_LIB=",
+                           "CCFLAGS=-O2 -fPIC -w -std=c++17 -I/usr/include/eigen3", "DEPFLAGS=-MM"],
                           cwd=source, capture_output=True, text=True, check=False)
     assert made.returncode == 0, made.stderr[-2000:]
 

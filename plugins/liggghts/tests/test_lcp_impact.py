@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from dembark.physics import Drum, FinnieRabinowicz, ImpactSystem, Plane
 from rig.impact_decks import Case, Log, run
 from rig.liggghts_driver import read_dump
+
+from dembark.physics import Drum, FinnieRabinowicz, ImpactSystem, Plane
 
 GAP = 1e-5
 
@@ -25,7 +26,7 @@ def pair(mass, stiffness, speed, omega_tau, *, words="", extra_steps=1.15):
 
 def test_unequal_logs(tmp_path):
     """Published scheme, 20 and 80 kg: peak force and velocities after; momentum to round-off; the record of the impact."""
-    case, omega, k, reduced = pair((20.0, 80.0), (1e7, 3e7), 1.5, 1e-3, words="impacts impacts.txt")
+    case, omega, _k, reduced = pair((20.0, 80.0), (1e7, 3e7), 1.5, 1e-3, words="impacts impacts.txt")
     found = run(tmp_path, case)
     assert found.vector("peak_so_far") == pytest.approx(16418.8, rel=1e-5)
     # Half of v0 (1 + e) m*/m is lost and won; the scheme's e = exp(-pi omega tau / 2).
@@ -50,7 +51,7 @@ def test_unequal_logs(tmp_path):
 
 @pytest.mark.parametrize("omega_tau", [1e-2, 5e-2])
 def test_restitution_of_the_published_scheme(tmp_path, omega_tau):
-    case, omega, k, reduced = pair((50.0, 50.0), (2e7, 2e7), 1.0, omega_tau)
+    case, _omega, k, reduced = pair((50.0, 50.0), (2e7, 2e7), 1.0, omega_tau)
     found = run(tmp_path, case)
     parted = np.diff(found.velocity()[:, 0])[0]
     assert parted == pytest.approx(math.exp(-0.5 * math.pi * omega_tau), rel=3.0 * omega_tau**2 + 1e-5)
@@ -126,7 +127,8 @@ def test_contact_damping_knows_no_place_of_rest(tmp_path):
 
 
 @pytest.mark.parametrize(("factor", "words", "flat"), [
-    (0.5, "", {}), (0.4, "inertia sphere", {}), (0.5, "inertia cylinder", {"dimension": 2, "boundary": "f f p", "after": "fix flat all enforce2d"})])
+    (0.5, "", {}), (0.4, "inertia sphere", {}),
+    (0.5, "inertia cylinder", {"dimension": 2, "boundary": "f f p", "after": "fix flat all enforce2d"})])
 def test_sliding_becomes_rolling(tmp_path, factor, words, flat):
     """Friction turns a log that slides until it rolls: v0 / (1 + I / m r^2) is left, whatever the friction, and the angular momentum
     about the line of contact stays as it was, also while the friction spring swings between log and floor."""
@@ -198,18 +200,22 @@ def test_a_stack_at_rest_carries_its_weight(tmp_path):
 @pytest.mark.parametrize("theta", [1.0, 0.5])
 def test_the_engine_and_python_agree(tmp_path, theta):
     """A small pile of unequal logs in a turning drum that a plane divides: friction, damping, more than ten impacts."""
-    rows = [(0.11 + 0.02 * math.sin(37.0 * i), -0.45 + 0.3 * (i % 4) + 0.01 * math.sin(91.0 * i), -0.55 + 0.32 * (i // 4)) for i in range(8)]
+    rows = [(0.11 + 0.02 * math.sin(37.0 * i), -0.45 + 0.3 * (i % 4) + 0.01 * math.sin(91.0 * i), -0.55 + 0.32 * (i // 4))
+            for i in range(8)]
     logs = [Log((x, y), (2.0 * math.sin(53.0 * i), -2.0), radius=r, mass=2500.0 * r * r, spin=2.0 * math.sin(17.0 * i))
             for i, (r, x, y) in enumerate(rows)]
     step, steps, every = 2e-5, 7500, 1250
     case = Case(logs, f"stiffness 1e7 theta {theta!r} contact_damping 1500 friction 0.4 0.3 1e-4 impacts impacts.txt "
-                      "wall plane side x 0.75 hi stiffness 4e7 friction 0.2 wall cylinder drum z 0 0 0.95 stiffness 5e7 friction 0.5 omega 1.5",
+                      "wall plane side x 0.75 hi stiffness 4e7 friction 0.2 "
+                      "wall cylinder drum z 0 0 0.95 stiffness 5e7 friction 0.5 omega 1.5",
                 step, f"run {steps}", gravity=9.81, every=every)
     found = run(tmp_path, case)
     law = FinnieRabinowicz(static_friction=0.4, kinetic_friction=0.3, critical_slip_distance=1e-4)
-    walls = [Plane(point=(0.75, 0.0), normal=(-1.0, 0.0), stiffness=4e7, friction=0.2), Drum(radius=0.95, omega=1.5, stiffness=5e7, friction=0.5)]
+    walls = [Plane(point=(0.75, 0.0), normal=(-1.0, 0.0), stiffness=4e7, friction=0.2),
+             Drum(radius=0.95, omega=1.5, stiffness=5e7, friction=0.5)]
     system = ImpactSystem([log.mass for log in logs], [log.radius for log in logs], [log.position for log in logs],
-                          [log.velocity for log in logs], spin=[log.spin for log in logs], stiffness=1e7, gravity=(0.0, -9.81), friction=law,
+                          [log.velocity for log in logs], spin=[log.spin for log in logs], stiffness=1e7, gravity=(0.0, -9.81),
+                          friction=law,
                           walls=walls, theta=theta, contact_damping=1500.0)
     motion = system.run(steps * step, step, every=every)
     assert len(motion.impacts) > 10

@@ -1,5 +1,6 @@
 """fix lcp/impact in the engine: ranks, restarts, meshes, periodic boxes, output, mistakes."""
 
+import itertools
 import math
 
 import numpy as np
@@ -85,7 +86,8 @@ def test_another_time_step_goes_on(tmp_path):
                 "run 2000\ntimestep 2e-6\nrun 3000", every=1000)
     found = run(tmp_path, case)
     assert found.velocity()[:, 0] == pytest.approx([0.0, 1.0], abs=2e-3)
-    ((*_, time, duration, peak, impulse, speed, lost, x, y, z),) = found.impacts()
+    (impact,) = found.impacts()
+    time, duration = impact[-9:-7]
     assert time == pytest.approx(1e-5, abs=2e-6)
     assert duration == pytest.approx(math.pi / math.sqrt(0.5 * 1e7 / 25.0), rel=5e-3)
 
@@ -95,7 +97,7 @@ def floor(folder, *, across=0.0, lift=0.0, squares=7):
     folder.mkdir(parents=True, exist_ok=True)
     facets = []
     edges = [-2.0 + 4.0 * i / squares + (across if 0 < i < squares else 0.0) for i in range(squares + 1)]
-    for a, b in zip(edges, edges[1:]):
+    for a, b in itertools.pairwise(edges):
         for triangle in ([(a, -0.45), (a, 0.45), (b, 0.45)], [(a, -0.45), (b, 0.45), (b, -0.45)]):
             corners = "\n".join(f"   vertex {x:.17g} {lift:.17g} {z:.17g}" for x, z in triangle)
             facets.append(f" facet normal 0 1 0\n  outer loop\n{corners}\n  endloop\n endfacet")
@@ -114,7 +116,7 @@ def test_a_floor_of_triangles_is_a_plane(tmp_path, ranks):
     mesh = Case(ROLLING, f"{WORDS} wall mesh floor stl stiffness 4e7 friction 0.25", 2e-5, "run 15000", gravity=9.81, every=3000,
                 before="fix stl all mesh/surface file floor.stl type 1")
     expected, found = run(tmp_path / "plane", plane), run(tmp_path / "mesh", mesh, ranks=ranks)
-    for a, b in zip(expected.frames, found.frames):
+    for a, b in zip(expected.frames, found.frames, strict=True):
         assert b[:, 1:10] == pytest.approx(a[:, 1:10], abs=1e-9)
     assert abs(found.last[0, 1] - ROLLING[0].position[0]) > 0.3  # over some edges
     assert found.vector("impacts") == expected.vector("impacts")
@@ -149,7 +151,7 @@ def test_a_drum_of_triangles(tmp_path):
     (tmp_path / "mesh").mkdir()
     corner = [(radius * math.cos(2.0 * math.pi * i / sides), radius * math.sin(2.0 * math.pi * i / sides)) for i in range(sides)]
     facets = []
-    for (ax, ay), (bx, by) in zip(corner, corner[1:] + corner[:1]):
+    for (ax, ay), (bx, by) in zip(corner, corner[1:] + corner[:1], strict=True):
         for triangle in ([(ax, ay, -0.4), (bx, by, -0.4), (bx, by, 0.4)], [(ax, ay, -0.4), (bx, by, 0.4), (ax, ay, 0.4)]):
             corners = "\n".join(f"   vertex {x:.17g} {y:.17g} {z:.17g}" for x, y, z in triangle)
             facets.append(f" facet normal 0 0 1\n  outer loop\n{corners}\n  endloop\n endfacet")
@@ -214,11 +216,13 @@ def test_local_array_and_vector(tmp_path):
 
 def test_beside_pair_forces(tmp_path):
     """A pair style for other atoms: excluded from each other's neighbour lists, the logs feel nothing of it."""
-    pair = "\n".join([
-        "fix m1 all property/global youngsModulus peratomtype 5e6", "fix m2 all property/global poissonsRatio peratomtype 0.3",
-        "fix m3 all property/global coefficientRestitution peratomtypepair 1 0.5",
-        "fix m4 all property/global coefficientFriction peratomtypepair 1 0.5",
-        "pair_style gran model hertz tangential history", "pair_coeff * *", "neigh_modify exclude group all all"])
+    pair = """fix m1 all property/global youngsModulus peratomtype 5e6
+fix m2 all property/global poissonsRatio peratomtype 0.3
+fix m3 all property/global coefficientRestitution peratomtypepair 1 0.5
+fix m4 all property/global coefficientFriction peratomtypepair 1 0.5
+pair_style gran model hertz tangential history
+pair_coeff * *
+neigh_modify exclude group all all"""
     alone, beside = run(tmp_path / "alone", pile()), run(tmp_path / "beside", pile(before=pair))
     assert_same(alone.last, beside.last, 0.0)
 
@@ -281,5 +285,3 @@ def test_other_atom_styles_are_refused(tmp_path):
     text = "\n".join(line for line in text.splitlines() if not line.startswith(("set atom", "fix weight")))
     done = run_deck(tmp_path, text)
     assert done.code != 0 and "use atom_style granular (or sphere)" in done.error
-
-

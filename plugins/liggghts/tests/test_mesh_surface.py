@@ -20,7 +20,8 @@ LARGE = [((-0.04, -0.04, 0.0), (0.04, -0.04, 0.0), (0.04, 0.04, 0.0)), ((-0.04, 
 def patch() -> list:
     """A flat floor of irregular triangles, corners of up to eight of them, some upside down."""
     chance = random.Random(3)
-    nodes = [[(0.0031 * (i + chance.uniform(-0.3, 0.3)), 0.0031 * (j + chance.uniform(-0.3, 0.3)), 0.0) for j in range(-3, 4)] for i in range(-3, 4)]
+    nodes = [[(0.0031 * (i + chance.uniform(-0.3, 0.3)), 0.0031 * (j + chance.uniform(-0.3, 0.3)), 0.0) for j in range(-3, 4)]
+             for i in range(-3, 4)]
     found = []
     for i in range(6):
         for j in range(6):
@@ -55,17 +56,21 @@ def drag(name: str, start, displacement, velocity, steps: int, spin=(1.0, 2.0, 3
 
 
 # To and fro over a border by less than the elastic limit; along and over many borders, now touching, now held by the bridge.
-STICK = drag("stick", (0.0, 0.0005, RADIUS - 2e-5), ("0.000002*sin(900*t)", "0", "0"), ("0.0018*cos(900*t)", "0", "0"), 1500, (0.0, 0.0, 0.0))
-ALONG = drag("along", (-0.0041, -0.002, RADIUS - 2e-5), ("0.2*t", "0.115*t", "0.000075*(1-cos(300*t))"), ("0.2", "0.115", "0.0225*sin(300*t)"), 4000)
+STICK = drag("stick", (0.0, 0.0005, RADIUS - 2e-5), ("0.000002*sin(900*t)", "0", "0"), ("0.0018*cos(900*t)", "0", "0"), 1500,
+             (0.0, 0.0, 0.0))
+ALONG = drag("along", (-0.0041, -0.002, RADIUS - 2e-5), ("0.2*t", "0.115*t", "0.000075*(1-cos(300*t))"),
+             ("0.2", "0.115", "0.0225*sin(300*t)"), 4000)
 OVER = drag("over", (-0.0012, 0.0003, RADIUS - 3e-5), ("0.08*t", "0", "0"), ("0.08", "0", "0"), 3000, (0.0, 0.0, 0.0))
-INTO = drag("into", (-0.02 + RADIUS - 2e-5, -0.02 + RADIUS - 3e-5, RADIUS - 1e-5), ("0", "0", "-0.001*t"), ("0", "0", "-0.001"), 20, (0.0, 0.0, 0.0))
+INTO = drag("into", (-0.02 + RADIUS - 2e-5, -0.02 + RADIUS - 3e-5, RADIUS - 1e-5), ("0", "0", "-0.001*t"), ("0", "0", "-0.001"), 20,
+            (0.0, 0.0, 0.0))
 HISTORY = ("compute hold all wall/gran/local history\ndump histories all local {} {}.hist " +
            " ".join(f"c_hold[{k}]" for k in range(1, 8)))
 DEGREE = math.pi / 180.0
 CASES = {  # case and mesh
     "stick, two": (STICK, LARGE), "stick, many": (STICK, patch()),
     "along, two": (ALONG, LARGE), "along, many": (ALONG, patch()),
-    "bend 0": (OVER, bent(0.0)), "bend -2": (OVER, bent(-2 * DEGREE)), "bend 2": (OVER, bent(2 * DEGREE)), "bend -30": (OVER, bent(-30 * DEGREE)),
+    "bend 0": (OVER, bent(0.0)), "bend -2": (OVER, bent(-2 * DEGREE)), "bend 2": (OVER, bent(2 * DEGREE)),
+    "bend -30": (OVER, bent(-30 * DEGREE)),
     "corner": (INTO, box_corner()),
 }
 
@@ -74,7 +79,8 @@ def run_all(folder, names, ranks=1):
     decks = {}
     for name in names:
         case, triangles = CASES[name]
-        text = walls.on_mesh(liggghts_driver.deck(case, start=HISTORY.format(case.steps // 10, len(decks))), folder, triangles, name=f"{len(decks)}.stl")
+        text = walls.on_mesh(liggghts_driver.deck(case, start=HISTORY.format(case.steps // 10, len(decks))), folder, triangles,
+                             name=f"{len(decks)}.stl")
         decks[name] = text
     walls.batch(folder, decks, ranks)
     found = {}

@@ -66,7 +66,8 @@ def run(folder, text, ranks=1, name="case.in"):
 def serial(tmp_path_factory):
     folder = tmp_path_factory.mktemp("serial")
     run(folder, bed("run 3000"))
-    assert any(row[0] > 0.0 and row[5] > 0.0 for row in contacts(folder)[-1].values()) or any(row[6] > 0.0 for row in contacts(folder)[-1].values())
+    assert any(row[0] > 0.0 and row[5] > 0.0 for row in contacts(folder)[-1].values()) or any(row[6] > 0.0
+                                                                                              for row in contacts(folder)[-1].values())
     return folder
 
 
@@ -81,7 +82,8 @@ HARMLESS = {
     "4 ranks": (4, lambda text: text),
     "2 ranks, cut across the height": (2, lambda text: change(text, GRID, "processors 1 1 2\n")),
     "shrink-wrapped top": (2, lambda text: change(text, "boundary p p f", "boundary p p m")),
-    "shrink-wrapped, cut across the height": (2, lambda text: change(change(text, "boundary p p f", "boundary p p s"), GRID, "processors 1 1 2\n")),
+    "shrink-wrapped, cut across the height": (2, lambda text: change(change(text, "boundary p p f", "boundary p p s"), GRID,
+                                                                     "processors 1 1 2\n")),
     "lists in every step": (1, lambda text: change(text, "neigh_modify delay 0", "neigh_modify every 1 delay 0 check no")),
     "sorted often": (1, lambda text: change(text, "atom_modify map array", "atom_modify map array sort 50 0.0")),
 }
@@ -116,7 +118,8 @@ def test_restart_keeps_every_value(tmp_path, ranks):
     """read_restart, also on another number of ranks: what the pairs held at the last build of the lists comes back to the bit."""
     first, second = ranks
     run(tmp_path, bed("run 2000\nwrite_restart bed.restart\nrun 0", ranks=first), first)
-    run(tmp_path, bed("run 0", ranks=second, create="read_restart bed.restart", state="").replace("contacts.dump", "again.dump"), second, "again.in")
+    run(tmp_path, bed("run 0", ranks=second, create="read_restart bed.restart", state="").replace("contacts.dump", "again.dump"), second,
+        "again.in")
     before, after = contacts(tmp_path)[-1], contacts(tmp_path, "again.dump")[0]
     held = {pair for pair, row in before.items() if row.any()}
     assert len(held) > 10 and held == {pair for pair, row in after.items() if row.any()}

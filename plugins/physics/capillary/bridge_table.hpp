@@ -6,8 +6,8 @@
 //   g = 1 / (1 + b s),   b about v^(-1/2),      zeta = sqrt((1 - s/s_r) g) in 0...1 (0 = rupture, 1 = touching),
 //   F = g^2 H(zeta, v)
 // with a smooth H of order one. In v a cell is an octave, so that its number is the exponent of the floating-point number; within
-// it the coordinate mu, a polynomial in m, of the mantissa 1 + m stands in for log2(1 + m). H is a cubic spline in zeta times a cubic in mu;
-// 1/s_r and b are cubics in mu.
+// it the coordinate mu, a polynomial in m, of the mantissa 1 + m stands in for log2(1 + m). H is a cubic spline in zeta times a cubic in
+// mu; 1/s_r and b are cubics in mu.
 #pragma once
 
 #include <algorithm>

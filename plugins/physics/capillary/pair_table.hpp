@@ -64,7 +64,7 @@ class PairTable {
 
  private:
   using Cubic = detail::Cubic;
-  using Surface = std::array<Cubic, 4>;            // [power of y][power of mu]
+  using Surface = std::array<Cubic, 4>;                 // [power of y][power of mu]
   using Patch = std::array<std::array<double, 16>, 4>;  // [power of mu][4 power of zeta + power of y]
   struct Row {
     Surface inverse_rupture, touching;

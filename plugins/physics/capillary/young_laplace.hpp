@@ -20,14 +20,14 @@ namespace dembark::capillary {
 
 /// A bridge that satisfies Young and Laplace, in units of R and gamma.
 struct BridgeShape {
-  bool valid = false;                 ///< the contact line lies on the spheres
-  double gap = 0.0;                   ///< surface to surface; negative where the spheres would overlap
+  bool valid = false;  ///< the contact line lies on the spheres
+  double gap = 0.0;    ///< surface to surface; negative where the spheres would overlap
   double volume = 0.0;
-  double force = 0.0;                 ///< positive = attractive
+  double force = 0.0;  ///< positive = attractive
   double neck_radius = 0.0;
-  double half_filling_angle = 0.0;    ///< rad
-  double pressure = 0.0;              ///< inside minus outside
-  double energy = 0.0;                ///< liquid-gas area - cos(theta) * wetted area; force = d energy / d gap at constant volume
+  double half_filling_angle = 0.0;  ///< rad
+  double pressure = 0.0;            ///< inside minus outside
+  double energy = 0.0;              ///< liquid-gas area - cos(theta) * wetted area; force = d energy / d gap at constant volume
 };
 
 /// Coordinates of the family: phase k, and ln(a) so that sizes of any magnitude are alike.
@@ -132,8 +132,10 @@ class YoungLaplace {
     Residual f = residual(x, volume, gap);
     for (int iteration = 0; f.valid && iteration < 60; ++iteration) {
       if (f.norm() < wanted) return true;
-      const Residual kp = residual({x.phase + h, x.log_slenderness}, volume, gap), km = residual({x.phase - h, x.log_slenderness}, volume, gap);
-      const Residual lp = residual({x.phase, x.log_slenderness + h}, volume, gap), lm = residual({x.phase, x.log_slenderness - h}, volume, gap);
+      const Residual kp = residual({x.phase + h, x.log_slenderness}, volume, gap),
+                     km = residual({x.phase - h, x.log_slenderness}, volume, gap);
+      const Residual lp = residual({x.phase, x.log_slenderness + h}, volume, gap),
+                     lm = residual({x.phase, x.log_slenderness - h}, volume, gap);
       if (!(kp.valid && km.valid && lp.valid && lm.valid)) return false;
       const double a = (kp.volume - km.volume) / (2 * h), b = (lp.volume - lm.volume) / (2 * h);
       const double c = (kp.height - km.height) / (2 * h), d = (lp.height - lm.height) / (2 * h);
@@ -231,7 +233,8 @@ class YoungLaplace {
     const BridgeShape kp = shape({x.phase + h, x.log_slenderness}), km = shape({x.phase - h, x.log_slenderness});
     const BridgeShape lp = shape({x.phase, x.log_slenderness + h}), lm = shape({x.phase, x.log_slenderness - h});
     if (!(kp.valid && km.valid && lp.valid && lm.valid)) return {};
-    return {true, {std::log(kp.volume / km.volume) / (2 * h), std::log(lp.volume / lm.volume) / (2 * h)},
+    return {true,
+            {std::log(kp.volume / km.volume) / (2 * h), std::log(lp.volume / lm.volume) / (2 * h)},
             {(kp.gap - km.gap) / (2 * h), (lp.gap - lm.gap) / (2 * h)}};
   }
 

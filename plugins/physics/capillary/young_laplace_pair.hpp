@@ -23,8 +23,8 @@ using PairCoordinates = std::array<double, 3>;
 
 /// A meridian from body 1 to the height of body 2, in units of R and gamma.
 struct PairShape {
-  bool valid = false;   ///< the meridian stays off the axis and holds liquid
-  double miss = 0.0;    ///< 0 where it meets body 2 at the contact angle
+  bool valid = false;  ///< the meridian stays off the axis and holds liquid
+  double miss = 0.0;   ///< 0 where it meets body 2 at the contact angle
   double gap = 0.0;
   double volume = 0.0;
   double force = 0.0;   ///< positive = attractive

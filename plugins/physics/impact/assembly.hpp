@@ -30,11 +30,11 @@ struct Row {
   double gap = 0.0;
   Vec3<double> normal{}, point_velocity{}, place{};
   const PairLaw* law = nullptr;
-  double stiffness = 0.0;            ///< s, N/m, both springs in series
-  double viscous = 0.0;              ///< c / tau, N/m
-  double compliance = 0.0;           ///< 1 / (s + c/tau), m/N
-  double arm_a = 0.0, arm_b = 0.0;   ///< m, from the centres to the contact
-  double radius = 0.0;               ///< m, R* = r_a r_b / (r_a + r_b), where friction asks for it
+  double stiffness = 0.0;           ///< s, N/m, both springs in series
+  double viscous = 0.0;             ///< c / tau, N/m
+  double compliance = 0.0;          ///< 1 / (s + c/tau), m/N
+  double arm_a = 0.0, arm_b = 0.0;  ///< m, from the centres to the contact
+  double radius = 0.0;              ///< m, R* = r_a r_b / (r_a + r_b), where friction asks for it
 };
 
 class Assembly {
@@ -123,8 +123,8 @@ class Assembly {
     const Body& first = bodies[c.a];
     const int material_b = wall ? c.wall_material : bodies[c.b].material;
     if (first.material < 0 || first.material >= materials || material_b < 0 || material_b >= materials)
-      throw std::invalid_argument(name_of(c) + ": materials " + std::to_string(first.material) + " and " +
-                                  std::to_string(material_b) + " are not below " + std::to_string(materials));
+      throw std::invalid_argument(name_of(c) + ": materials " + std::to_string(first.material) + " and " + std::to_string(material_b) +
+                                  " are not below " + std::to_string(materials));
     r.a = turn ? c.b : c.a;
     r.b = turn ? c.a : c.b;
     r.key_a = turn ? c.key_b : c.key_a;

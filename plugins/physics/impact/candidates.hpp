@@ -1,4 +1,5 @@
-// The candidates of a step in the order of their keys, whatever the order they are given in, each with the place of what is remembered of it.
+// The candidates of a step in the order of their keys, whatever the order they are given in, each with the place of what is remembered of
+// it.
 #pragma once
 
 #include <algorithm>

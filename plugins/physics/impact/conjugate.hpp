@@ -74,8 +74,8 @@ class ConjugateGradients {
 
  private:
   using Vector = typename Lines<Width>::Vector;
-  static constexpr double doubt = 2.0;    ///< of the residual: so far off forces may still be
-  static constexpr int tell = 24;  ///< so many steps tell how fast the residual falls
+  static constexpr double doubt = 2.0;  ///< of the residual: so far off forces may still be
+  static constexpr int tell = 24;       ///< so many steps tell how fast the residual falls
 
   /// A contact, scaled: the forces by the root of the diagonal, the shifts of the bodies by that of their response.
   struct Link {

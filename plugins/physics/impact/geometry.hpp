@@ -222,9 +222,9 @@ inline void wall_contact(const Wall& wall, int body, const Body& b, std::int64_t
 
 /// A plane; the free space is on the side of the normal.
 struct Plane : Wall {
-  Vec3<double> point{};                 ///< m, any of the plane
-  Vec3<double> normal{0.0, 1.0, 0.0};   ///< unit
-  Vec3<double> velocity{};              ///< m/s, of the surface; moving `point` along is the caller's
+  Vec3<double> point{};                ///< m, any of the plane
+  Vec3<double> normal{0.0, 1.0, 0.0};  ///< unit
+  Vec3<double> velocity{};             ///< m/s, of the surface; moving `point` along is the caller's
 };
 
 inline void plane_contacts(const std::vector<Body>& bodies, const Plane& plane, double reach, std::vector<Contact>& contacts) {
@@ -257,5 +257,3 @@ inline void cylinder_contacts(const std::vector<Body>& bodies, const Drum& drum,
 
 }  // namespace impact
 }  // namespace dembark
-
-#include "triangles.hpp"

@@ -24,8 +24,8 @@ class Lines {
 
   /// A row of the problem.
   struct Line {
-    Vector normal;      ///< unit
-    double of_a, of_b;  ///< response of the bodies to a unit force, m/N
+    Vector normal;                        ///< unit
+    double of_a, of_b;                    ///< response of the bodies to a unit force, m/N
     double compliance, inverse, root, q;  ///< inverse: 1 over the diagonal; root: of it
     int a, b, row;
   };
@@ -97,7 +97,7 @@ class Lines {
   template <bool Measured>
   double relax() {
     double most = 0.0;
-    Visit* const end = visits_.data() + near_;
+    const Visit* const end = visits_.data() + near_;
     for (Visit* v = visits_.data(); v != end; ++v) {
       const double old = v->z, free = v->keep * old - (v->q + v->pull.dot(*v->a - *v->b)), next = free > 0.0 ? free : 0.0;
       const double step = next - old;
@@ -209,13 +209,13 @@ class Lines {
   const std::vector<BodyResponse>* bodies_ = nullptr;
   const Component* axes_ = nullptr;
   double scale_ = 0.0;
-  bool built_ = false;    ///< in this step
+  bool built_ = false;  ///< in this step
   std::vector<Line, Eigen::aligned_allocator<Line>> lines_;
   std::vector<Visit, Eigen::aligned_allocator<Visit>> visits_;
   std::vector<Vector, Eigen::aligned_allocator<Vector>> shift_;
   std::vector<int> order_, far_;
   std::size_t near_ = 0;
-  double floor_ = 0.0;    ///< of a row's scale, over its root: steps below the last digit of the largest row are none
+  double floor_ = 0.0;  ///< of a row's scale, over its root: steps below the last digit of the largest row are none
 };
 
 }  // namespace impact

@@ -38,7 +38,7 @@ struct Velocity {
 
 /// What friction reads of a body: v', omega', and its response shared out among the contacts that carry a force.
 struct Moved {
-  Vec3<double> velocity{}, spin{};      ///< m/s, rad/s
+  Vec3<double> velocity{}, spin{};           ///< m/s, rad/s
   double inverse = 0.0, spin_inverse = 0.0;  ///< 1/kg, 1/(kg m^2)
 };
 
@@ -47,8 +47,8 @@ class Motion {
   std::vector<BodyResponse> response;
   std::vector<NormalSum> normal;
   std::vector<TangentialSum> tangential;
-  std::vector<Velocity> change;    ///< v' - v, omega' - omega; see move()
-  std::vector<int> damped;  ///< bodies with lambda > 0, in the order of the contacts
+  std::vector<Velocity> change;  ///< v' - v, omega' - omega; see move()
+  std::vector<int> damped;       ///< bodies with lambda > 0, in the order of the contacts
 
   /// Begins a step; `bodies` must outlive it. Throws std::invalid_argument with one line about the body that is wrong.
   void begin(const std::vector<Body>& bodies, double dt, double kick) {
@@ -102,8 +102,7 @@ class Motion {
   }
   /// Takes the forces but the normal ones over, for gap_acceleration.
   void accelerate() {
-    for (std::size_t b = 0; b < response.size(); ++b)
-      acceleration_[b] = response[b].inverse * (response[b].free + tangential[b].force);
+    for (std::size_t b = 0; b < response.size(); ++b) acceleration_[b] = response[b].inverse * (response[b].free + tangential[b].force);
   }
   /// Acceleration of the gap (m/s^2) by all forces but the normal ones.
   template <class Pair>

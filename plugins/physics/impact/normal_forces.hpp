@@ -41,7 +41,8 @@ class NormalForces {
       relaxation_.approach(q, z);
     } else if (!relaxation_.solve(q, share, z, w, certificate)) {
       flag(z, active);
-      const bool found = elimination_.solve(assembly.rows(), motion.response, scale_, share, q, active, z, w, certificate, report.block_steps);
+      const bool found =
+          elimination_.solve(assembly.rows(), motion.response, scale_, share, q, active, z, w, certificate, report.block_steps);
       if (!found && !relaxation_.finish(share, z, w, certificate)) return solve_exactly(assembly, motion, q, active, z, w, report);
     }
     flag(z, active);

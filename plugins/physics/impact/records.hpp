@@ -20,8 +20,8 @@ namespace impact {
 
 struct Memory {
   bool active = false;
-  double deformation = 0.0;          ///< m, of both springs
-  double elastic = 0.0;              ///< J, in them and in the friction spring
+  double deformation = 0.0;  ///< m, of both springs
+  double elastic = 0.0;      ///< J, in them and in the friction spring
   FrictionState<double> friction{};
   Vec3<double> normal{};
   // the impact under way
@@ -37,9 +37,9 @@ struct Memory {
     double flag = active ? 1.0 : 0.0;
     visit(flag);
     active = flag != 0.0;
-    for (double* p : {&deformation, &elastic, &friction.displacement.x, &friction.displacement.y, &friction.displacement.z, &friction.slip,
-                      &normal.x, &normal.y, &normal.z, &time, &duration, &peak_force, &impulse, &relative_speed, &dissipated,
-                      &place.x, &place.y, &place.z})
+    for (double* p :
+         {&deformation, &elastic, &friction.displacement.x, &friction.displacement.y, &friction.displacement.z, &friction.slip, &normal.x,
+          &normal.y, &normal.z, &time, &duration, &peak_force, &impulse, &relative_speed, &dissipated, &place.x, &place.y, &place.z})
       visit(*p);
   }
 };
@@ -227,8 +227,8 @@ class Records {
     visit(b);
     f.a = std::int64_t(a);
     f.b = std::int64_t(b);
-    for (double* p : {&f.time, &f.duration, &f.peak_force, &f.impulse, &f.relative_speed, &f.place.x, &f.place.y, &f.place.z,
-                      &f.dissipated})
+    for (double* p :
+         {&f.time, &f.duration, &f.peak_force, &f.impulse, &f.relative_speed, &f.place.x, &f.place.y, &f.place.z, &f.dissipated})
       visit(*p);
   }
 
@@ -256,10 +256,10 @@ class Records {
   std::vector<Memory> prior_;           ///< memory before the step; see from_
   std::vector<Memory> kept_;            ///< for cancel()
   std::pair<Totals, Totals> kept_totals_;
-  std::vector<int> kept_from_;          ///< likewise
-  std::vector<int> from_;               ///< of each row its place there, -1: nothing is remembered
-  std::size_t cursor_ = 0;              ///< see recall()
-  std::vector<char> left_;              ///< memories that no row has taken
+  std::vector<int> kept_from_;  ///< likewise
+  std::vector<int> from_;       ///< of each row its place there, -1: nothing is remembered
+  std::size_t cursor_ = 0;      ///< see recall()
+  std::vector<char> left_;      ///< memories that no row has taken
   std::vector<std::size_t> orphans_;
   std::vector<Impact> finished_;
   Memory blank_;

@@ -74,13 +74,13 @@ class Relaxation {
 
    private:
     static constexpr int most_sweeps = 90, blind_sweeps = 4;  ///< none has been seen to do with so few
-    static constexpr double worth_sweeps = 40.0;  ///< so many that are still to come cost more than conjugate gradients
+    static constexpr double worth_sweeps = 40.0;              ///< so many that are still to come cost more than conjugate gradients
     static constexpr int approach_sweeps = 10;
-    static constexpr double close = 1e-4;         ///< of a row's own scale: where approach() stops
+    static constexpr double close = 1e-4;  ///< of a row's own scale: where approach() stops
     static constexpr int most_faces = 300, most_steps = 10000;
-    static constexpr double worth_steps = 80.0;   ///< so many that are still to come cost more than a factor
+    static constexpr double worth_steps = 80.0;  ///< so many that are still to come cost more than a factor
     static constexpr int face_sweeps = 3;
-    static constexpr double fall = 0.2;          ///< of the residual, while the face still changes
+    static constexpr double fall = 0.2;  ///< of the residual, while the face still changes
 
     /// Projected Gauss-Seidel; false where it converges slowly.
     bool sweep(double share, Eigen::VectorXd& w, double& certificate) {

@@ -20,8 +20,8 @@ class Screening {
   bool near(std::size_t i) const { return near_[i] != 0; }
   void keep(std::size_t i) { near_[i] = 1; }
 
-  /// rate: (2 theta - 1) tau (s), what the gap's rate adds to the opening; scale: h tau^2 (s^2), its acceleration. Candidates that are wrong
-  /// stay in, for those who say so.
+  /// rate: (2 theta - 1) tau (s), what the gap's rate adds to the opening; scale: h tau^2 (s^2), its acceleration. Candidates that are
+  /// wrong stay in, for those who say so.
   void begin(const std::vector<Contact>& contacts, const Motion& motion, double rate, double scale) {
     rate_ = rate;
     scale_ = scale;

@@ -137,7 +137,8 @@ class System {
   }
 
  private:
-  void begin(const std::vector<Body>& bodies, double kick, const std::vector<Vec3<double>>& force, const std::vector<Vec3<double>>& torque) {
+  void begin(const std::vector<Body>& bodies, double kick, const std::vector<Vec3<double>>& force,
+             const std::vector<Vec3<double>>& torque) {
     if (!(kick > 0.0 && kick <= 1.0)) throw std::invalid_argument("kick must be > 0 and <= 1, not " + std::to_string(kick));
     if (force.size() != bodies.size() || torque.size() != bodies.size())
       throw std::invalid_argument(std::to_string(bodies.size()) + " bodies need as many forces and torques, not " +
@@ -150,8 +151,8 @@ class System {
 
   /// widen(): gets more candidates where there may be any.
   template <class Widen>
-  const StepReport& run(const std::vector<Body>& bodies, const std::vector<Contact>& contacts, double time, std::vector<Vec3<double>>& force,
-                        std::vector<Vec3<double>>& torque, Widen widen) {
+  const StepReport& run(const std::vector<Body>& bodies, const std::vector<Contact>& contacts, double time,
+                        std::vector<Vec3<double>>& force, std::vector<Vec3<double>>& torque, Widen widen) {
     const bool again = stepped_ && time == time_;
     const StepReport last = report_;
     records_.begin(again);

@@ -42,29 +42,27 @@ inline double sphere_inertia(double mass, double radius) { return 0.4 * mass * r
 
 /// What all walls have in common. The wall has infinite mass and a local stiffness of its own.
 struct Wall {
-  std::int64_t id = -1;                                           ///< < 0, unique, stable: wall_key(number)
-  int material = 0;                                               ///< index into Settings::materials: friction and damping with the bodies
-  double stiffness = std::numeric_limits<double>::infinity();     ///< s_w, N/m, > 0; +inf = rigid
+  std::int64_t id = -1;                                        ///< < 0, unique, stable: wall_key(number)
+  int material = 0;                                            ///< index into Settings::materials: friction and damping with the bodies
+  double stiffness = std::numeric_limits<double>::infinity();  ///< s_w, N/m, > 0; +inf = rigid
 };
 
 /// The key of feature `feature` (triangle, ...) of wall `number` (both >= 0, below 2^20 and 2^32): always < 0, and exact as a double.
 /// Contacts of one body with features of the same wall hand their history on to one another.
-inline std::int64_t wall_key(std::int64_t number, std::int64_t feature = 0) {
-  return -1 - (number * (std::int64_t(1) << 32) + feature);
-}
+inline std::int64_t wall_key(std::int64_t number, std::int64_t feature = 0) { return -1 - (number * (std::int64_t(1) << 32) + feature); }
 /// The number of the wall that a key belongs to.
 inline std::int64_t wall_number(std::int64_t key) { return (-1 - key) / (std::int64_t(1) << 32); }
 
 /// A candidate: a pair that touches or may touch within the step. Geometry is that of step n.
 struct Contact {
-  int a = 0;                       ///< index into the bodies
-  int b = -1;                      ///< index into the bodies, or -1: a wall
-  std::int64_t key_a = 0;          ///< id of body a
-  std::int64_t key_b = -1;         ///< id of body b, or the wall's key (< 0); contacts keep their history by these two
-  double gap = 0.0;                ///< m, < 0 = overlap of the undeformed bodies
-  Vec3<double> normal{};           ///< unit, from b (or the wall) to a
-  Vec3<double> point_velocity{};   ///< m/s, walls: velocity of their surface at the contact
-  int wall_material = 0;           ///< walls: index into Settings::materials
+  int a = 0;                      ///< index into the bodies
+  int b = -1;                     ///< index into the bodies, or -1: a wall
+  std::int64_t key_a = 0;         ///< id of body a
+  std::int64_t key_b = -1;        ///< id of body b, or the wall's key (< 0); contacts keep their history by these two
+  double gap = 0.0;               ///< m, < 0 = overlap of the undeformed bodies
+  Vec3<double> normal{};          ///< unit, from b (or the wall) to a
+  Vec3<double> point_velocity{};  ///< m/s, walls: velocity of their surface at the contact
+  int wall_material = 0;          ///< walls: index into Settings::materials
   double wall_stiffness = std::numeric_limits<double>::infinity();  ///< walls: s_w, N/m
 };
 
@@ -84,7 +82,7 @@ struct PairLaw {
   FinnieRabinowicz friction = frictionless();
   double tangential_stiffness_ratio = 2.0 / 7.0;  ///< tangential stiffness over the normal stiffness of the contact, > 0
   double contact_damping = 0.0;  ///< c, N s/m, >= 0, on the deformation of the contact: Galilean invariant; the ratio's share along it
-  double contact_area = 0.0;  ///< m^2, for the shear strength of the interface; 0 = pi R* N / s, the circle of R*, N and s
+  double contact_area = 0.0;     ///< m^2, for the shear strength of the interface; 0 = pi R* N / s, the circle of R*, N and s
 
   static FinnieRabinowicz frictionless() {
     FinnieRabinowicz law;
@@ -104,31 +102,31 @@ struct Settings {
 
 /// Of the last step, and totals since the system began (marked).
 struct StepReport {
-  int contacts = 0;               ///< candidates
-  int active = 0;                 ///< contacts with N > 0
-  int pivots = 0;                 ///< of all solves of the step; of relaxed ones the contacts that changed sides
-  int block_steps = 0;            ///< likewise
-  std::int64_t impacts_begun = 0;     ///< total
-  std::int64_t pivots_total = 0;      ///< total
-  double impulse_sum = 0.0;           ///< total, N s: sum of N tau over contacts and steps
-  double peak_force = 0.0;            ///< N, largest N of the step
-  double peak_force_so_far = 0.0;     ///< N, total
-  double dissipated_energy = 0.0;     ///< total, J: friction, both dampings and the loss of the scheme
-  double elastic_energy = 0.0;        ///< J, in the springs now, normal and tangential
-  double certificate = 0.0;           ///< worst entry of the solver's certificate in the step, scaled
-  double worst_certificate = 0.0;     ///< total
+  int contacts = 0;                ///< candidates
+  int active = 0;                  ///< contacts with N > 0
+  int pivots = 0;                  ///< of all solves of the step; of relaxed ones the contacts that changed sides
+  int block_steps = 0;             ///< likewise
+  std::int64_t impacts_begun = 0;  ///< total
+  std::int64_t pivots_total = 0;   ///< total
+  double impulse_sum = 0.0;        ///< total, N s: sum of N tau over contacts and steps
+  double peak_force = 0.0;         ///< N, largest N of the step
+  double peak_force_so_far = 0.0;  ///< N, total
+  double dissipated_energy = 0.0;  ///< total, J: friction, both dampings and the loss of the scheme
+  double elastic_energy = 0.0;     ///< J, in the springs now, normal and tangential
+  double certificate = 0.0;        ///< worst entry of the solver's certificate in the step, scaled
+  double worst_certificate = 0.0;  ///< total
 };
 
 /// One contact of the last step, for output.
 struct ContactResult {
-  int a = 0, b = -1;              ///< as in Contact, key_a < key_b for pairs
+  int a = 0, b = -1;  ///< as in Contact, key_a < key_b for pairs
   std::int64_t key_a = 0, key_b = -1;
-  double gap = 0.0;               ///< m, at step n, of the undeformed bodies
-  double normal_force = 0.0;      ///< N, on a along the normal
-  double opening = 0.0;           ///< D, m
-  Vec3<double> tangential{};      ///< N, on a
+  double gap = 0.0;           ///< m, at step n, of the undeformed bodies
+  double normal_force = 0.0;  ///< N, on a along the normal
+  double opening = 0.0;       ///< D, m
+  Vec3<double> tangential{};  ///< N, on a
   Vec3<double> normal{};
-  Vec3<double> place{};           ///< m
+  Vec3<double> place{};  ///< m
 };
 
 /// One impact: a contact from the first step with N > 0 to the last.

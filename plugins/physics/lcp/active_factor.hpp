@@ -80,7 +80,7 @@ class ActiveFactor {
     for (Index r = 0; r < k; ++r) rows_[std::size_t(r)][std::size_t(p)] = r <= j ? lower_[std::size_t(j)][std::size_t(r)] : 0.0;
     for (Index r = j; r + 1 < k; ++r) std::swap(lower_[std::size_t(r)], lower_[std::size_t(r + 1)]);
     for (Index r = j; r + 1 < k; ++r) {
-      double* l = lower_[std::size_t(r)].data();
+      const double* l = lower_[std::size_t(r)].data();
       const double length = std::hypot(l[r], l[r + 1]), c = l[r] / length, s = l[r + 1] / length;
       for (Index below = r; below + 1 < k; ++below) {
         double* t = lower_[std::size_t(below)].data();
@@ -164,10 +164,10 @@ class ActiveFactor {
 
   Index n_ = 0, used_ = 0;
   bool removed_ = false;
-  std::vector<Index> order_;                 ///< active indices in the order of the rows
+  std::vector<Index> order_;  ///< active indices in the order of the rows
   std::vector<double> value_, diagonal_, sign_, y_;
-  std::vector<std::vector<double>> rows_;    ///< V and U, one row of length n per active index
-  std::vector<std::vector<double>> lower_;   ///< L
+  std::vector<std::vector<double>> rows_;   ///< V and U, one row of length n per active index
+  std::vector<std::vector<double>> lower_;  ///< L
 };
 
 }  // namespace dembark::lcp

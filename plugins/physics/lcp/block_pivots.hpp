@@ -62,7 +62,9 @@ class BlockPivots {
       u.active[std::size_t(i)] ^= 1;
       ++outcome.pivots;
       ++singles;
-      if (!least_index && !seen.insert(key ^= set_key(i)).second) singles = 2 * least + 21;
+      if (least_index) continue;
+      key ^= set_key(i);
+      if (!seen.insert(key).second) singles = 2 * least + 21;
     }
     return outcome;
   }

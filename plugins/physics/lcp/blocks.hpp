@@ -11,7 +11,7 @@
 
 namespace dembark::lcp {
 
-using Index = Eigen::Index;
+using Eigen::Index;
 
 /// A violation below this share of s_i = |q_i| + sum_j |M_ij z_j| is rounding: the residual of a backward stable solution.
 inline double rounding_share(double tolerance) { return std::max(64.0 * std::numeric_limits<double>::epsilon(), 0.01 * tolerance); }
@@ -57,7 +57,7 @@ struct DenseBlock {
 /// Compressed columns, both triangles, rows ascending.
 struct SparseBlock {
   Index n = 0;
-  const int* start = nullptr;   ///< n + 1
+  const int* start = nullptr;  ///< n + 1
   const int* row = nullptr;
   const double* value = nullptr;
   const double* diagonals = nullptr;

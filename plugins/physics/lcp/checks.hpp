@@ -54,8 +54,8 @@ constexpr Index tile = 32;
 
 #ifdef DEMBARK_LCP_AVX2
 /// 4 x 4 entries at a time: see tiles_mirror.
-__attribute__((target("avx2"))) inline bool tiles_mirror_avx2(const double* lower, const double* upper, Index stride, const double* row_root,
-                                                              const double* column_root) {
+__attribute__((target("avx2"))) inline bool tiles_mirror_avx2(const double* lower, const double* upper, Index stride,
+                                                              const double* row_root, const double* column_root) {
   const __m256d sign = _mm256_set1_pd(-0.0);
   __m256d good = _mm256_castsi256_pd(_mm256_set1_epi64x(-1));
   for (Index j = 0; j < tile; j += 4)

@@ -40,7 +40,7 @@ class Descent {
   }
 
  private:
-  static constexpr Index least_faces = 300;  ///< so many and as many as unknowns are looked at
+  static constexpr Index least_faces = 300;          ///< so many and as many as unknowns are looked at
   static constexpr double fall = 0.2, close = 1e-8;  ///< of the residual: while the face changes, and after that
 
   /// The face of the positive entries; whether it is the last one.

@@ -125,9 +125,9 @@ class Islands {
   bool valid_ = false, fill_reducing_ = false;
   Index n_ = 0;
   int count_ = 0;
-  std::vector<int> outer_, inner_;           ///< the pattern as it came
-  std::vector<int> first_, order_;           ///< islands one after the other
-  std::vector<int> start_, row_, source_;    ///< columns in that order; rows are local to the island
+  std::vector<int> outer_, inner_;         ///< the pattern as it came
+  std::vector<int> first_, order_;         ///< islands one after the other
+  std::vector<int> start_, row_, source_;  ///< columns in that order; rows are local to the island
   std::vector<double> value_, diagonal_;
 };
 

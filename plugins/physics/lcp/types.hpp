@@ -50,13 +50,13 @@ struct LcpCertificate {
 };
 
 struct LcpResult {
-  Eigen::VectorXd z;             ///< >= 0
-  Eigen::VectorXd w;             ///< M z + q; exactly 0 where z > 0 (but for pgs)
-  int pivots = 0;                ///< single exchanges (pgs: sweeps)
-  int block_steps = 0;           ///< steps that exchanged all violated indices at once
-  int islands = 0;               ///< connected parts of the graph of M
-  bool guarded = false;          ///< some rule stalled or came back to a set that it had left, and a safer one took over
-  LcpCertificate certificate;    ///< of w before its active entries were set to 0
+  Eigen::VectorXd z;           ///< >= 0
+  Eigen::VectorXd w;           ///< M z + q; exactly 0 where z > 0 (but for pgs)
+  int pivots = 0;              ///< single exchanges (pgs: sweeps)
+  int block_steps = 0;         ///< steps that exchanged all violated indices at once
+  int islands = 0;             ///< connected parts of the graph of M
+  bool guarded = false;        ///< some rule stalled or came back to a set that it had left, and a safer one took over
+  LcpCertificate certificate;  ///< of w before its active entries were set to 0
   LcpStatus status = LcpStatus::solved;
 };
 

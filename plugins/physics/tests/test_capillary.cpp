@@ -18,7 +18,8 @@ namespace {
 
 constexpr double pi = 3.14159265358979323846;
 constexpr double degree = pi / 180.0;
-const std::initializer_list<Model> models{Model::exact, Model::willett, Model::willett_full, Model::rabinovich, Model::bagheri, Model::constant};
+const std::initializer_list<Model> models{Model::exact,      Model::willett, Model::willett_full,
+                                          Model::rabinovich, Model::bagheri, Model::constant};
 
 /// Largest change of the force between neighbours of `steps` gaps, close together at touching and, as the square of the distance to it,
 /// at rupture, where the slope of the exact force is infinite.
@@ -74,7 +75,8 @@ TEST_CASE("touching forces of the closed forms", "[capillary]") {
     CHECK_THAT(BridgeForce(Model::willett, theta).force(1.0, 1.0, 0.0, v, 1.0), WithinRel(dry, 1e-14));
     CHECK_THAT(BridgeForce(Model::constant, theta).force(1.0, 1.0, 0.0, v, 1.0), WithinRel(dry, 1e-14));
     const double alpha = std::pow(2.0 * v / pi, 0.25);
-    CHECK_THAT(BridgeForce(Model::rabinovich, theta).force(1.0, 1.0, 0.0, v, 1.0), WithinRel(dry + 2.0 * pi * std::sin(alpha) * std::sin(alpha + theta), 1e-13));
+    CHECK_THAT(BridgeForce(Model::rabinovich, theta).force(1.0, 1.0, 0.0, v, 1.0),
+               WithinRel(dry + 2.0 * pi * std::sin(alpha) * std::sin(alpha + theta), 1e-13));
   }
 }
 
@@ -106,7 +108,8 @@ TEST_CASE("rupture distances of the closed forms", "[capillary]") {
   const double r = 2e-3, volume = 1e-11, theta = 0.6;
   const double lian = (1.0 + 0.5 * theta) * std::cbrt(volume);
   const double c = std::cbrt(volume) / r, willett = r * (1.0 + 0.5 * theta) * (c + 0.1 * c * c);
-  for (const Model m : {Model::rabinovich, Model::constant}) CHECK_THAT(BridgeForce(m, theta).rupture_distance(r, r, volume), WithinRel(lian, 1e-13));
+  for (const Model m : {Model::rabinovich, Model::constant})
+    CHECK_THAT(BridgeForce(m, theta).rupture_distance(r, r, volume), WithinRel(lian, 1e-13));
   for (const Model m : {Model::willett, Model::willett_full, Model::bagheri})
     CHECK_THAT(BridgeForce(m, theta).rupture_distance(r, r, volume), WithinRel(willett, 1e-13));
 }
@@ -116,7 +119,8 @@ TEST_CASE("forces scale with size and surface tension", "[capillary]") {
     const BridgeForce force(m, 0.3);
     const double one = force.force(1.0, 1.0, 0.03, 1e-3, 1.0);
     CHECK_THAT(force.force(2.5e-4, 2.5e-4, 0.03 * 2.5e-4, 1e-3 * std::pow(2.5e-4, 3), 0.072), WithinRel(one * 2.5e-4 * 0.072, 1e-11));
-    CHECK_THAT(force.rupture_distance(2.5e-4, 2.5e-4, 1e-3 * std::pow(2.5e-4, 3)), WithinRel(2.5e-4 * force.rupture_distance(1.0, 1.0, 1e-3), 1e-12));
+    CHECK_THAT(force.rupture_distance(2.5e-4, 2.5e-4, 1e-3 * std::pow(2.5e-4, 3)),
+               WithinRel(2.5e-4 * force.rupture_distance(1.0, 1.0, 1e-3), 1e-12));
   }
 }
 
@@ -175,13 +179,17 @@ TEST_CASE("any numbers give finite forces", "[capillary]") {
       const BridgeForce force(m, theta);
       bool finite = true;
       for (const double radius : {1e-9, 1e-3, 1.0})
-        for (const double v : {1e-300, 1e-30, 1e-12, 9.3e-10, 9.4e-10, 1e-9, 1e-6, 0.03, 0.1, 0.5, 0.9999999999999999, 1.0, 2.0, 1e3, 1e29, 1e200}) {
+        for (const double v :
+             {1e-300, 1e-30, 1e-12, 9.3e-10, 9.4e-10, 1e-9, 1e-6, 0.03, 0.1, 0.5, 0.9999999999999999, 1.0, 2.0, 1e3, 1e29, 1e200}) {
           const double volume = v * radius * radius * radius, reach = force.rupture_distance(radius, radius, volume);
           finite = finite && std::isfinite(reach) && reach >= 0.0;
-          for (const double gap : {-infinity, -1.0, -1e-300, 0.0, 1e-320, 1e-300, 1e-12 * radius, 0.5 * reach, reach * (1.0 - 1e-16), reach, 2.0 * reach, radius, infinity}) {
+          for (const double gap : {-infinity, -1.0, -1e-300, 0.0, 1e-320, 1e-300, 1e-12 * radius, 0.5 * reach, reach * (1.0 - 1e-16), reach,
+                                   2.0 * reach, radius, infinity}) {
             const double f = force.force(radius, radius, gap, volume, 0.07);
             const bool good = std::isfinite(f) && std::fabs(f) < 20.0 * radius * 0.07;
-            if (!good) UNSCOPED_INFO(model_names()[static_cast<int>(m)] << " theta " << theta << " V* " << v << " R " << radius << " gap " << gap << ": " << f);
+            if (!good)
+              UNSCOPED_INFO(model_names()[static_cast<int>(m)] << " theta " << theta << " V* " << v << " R " << radius << " gap " << gap
+                                                               << ": " << f);
             finite = finite && good;
           }
         }

@@ -184,7 +184,8 @@ TEST_CASE("the tables against an independent solver for unequal spheres", "[capi
     CHECK_THAT(reach, WithinRel(r.rupture, 1e-3));
     for (int i = 0; i < 5; ++i) {
       CHECK_THAT(force.force(small, large, parts[i] * r.rupture, r.volume, 1.0), WithinRel(r.force[i], parts[i] > 0.9 ? 5e-3 : 1e-3));
-      CHECK(force.force(small, large, parts[i] * r.rupture, r.volume, 1.0) == force.force(large, small, parts[i] * r.rupture, r.volume, 1.0));
+      CHECK(force.force(small, large, parts[i] * r.rupture, r.volume, 1.0) ==
+            force.force(large, small, parts[i] * r.rupture, r.volume, 1.0));
     }
     CHECK_THAT(force.force(small, large, reach, r.volume, 1.0), WithinRel(r.at_rupture, 2e-2));
   }
@@ -210,7 +211,8 @@ TEST_CASE("almost equal spheres and almost plane walls", "[capillary]") {
 TEST_CASE("a vanishing bridge to a wall pulls with 4 pi R1 gamma cos(theta)", "[capillary]") {
   for (const double degrees : {0.0, 30.0, 60.0}) {
     const double limit = 4.0 * pi * std::cos(degrees * degree);
-    const double coarse = limit - exact(degrees).force(1.0, INFINITY, 0.0, 1.6e-6, 1.0), fine = limit - exact(degrees).force(1.0, INFINITY, 0.0, 1e-7, 1.0);
+    const double coarse = limit - exact(degrees).force(1.0, INFINITY, 0.0, 1.6e-6, 1.0),
+                 fine = limit - exact(degrees).force(1.0, INFINITY, 0.0, 1e-7, 1.0);
     CHECK(coarse > 0.0);
     CHECK_THAT(coarse / fine, WithinRel(2.0, 0.05));
   }
@@ -265,7 +267,8 @@ TEST_CASE("a vanishing touching bridge pulls with 2 pi R gamma cos(theta)", "[ca
 TEST_CASE("rupture goes to Lian's distance for small wetting bridges", "[capillary]") {
   for (const double theta : {0.0, 20.0 * degree, 40.0 * degree}) {
     const BridgeForce force(Model::exact, theta);
-    for (const double v : {1e-8, 1e-6, 1e-4, 1e-3}) CHECK_THAT(force.rupture_distance(1.0, 1.0, v), WithinRel((1.0 + 0.5 * theta) * std::cbrt(v), 0.04));
+    for (const double v : {1e-8, 1e-6, 1e-4, 1e-3})
+      CHECK_THAT(force.rupture_distance(1.0, 1.0, v), WithinRel((1.0 + 0.5 * theta) * std::cbrt(v), 0.04));
   }
 }
 

@@ -1,7 +1,7 @@
-#include "catch.hpp"
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include "catch.hpp"
 
 #include "dembark/contact_energy.hpp"
 
@@ -15,13 +15,16 @@ const capillary::BridgeForce bridge(capillary::Model::willett, 0.35);
 
 /// Sums over an oblique impact of two spheres by leapfrog.
 struct Account {
-  double kinetic_change = 0.0, total = 0.0, normal = 0.0, viscous = 0.0, tangential = 0.0, friction = 0.0, capillary = 0.0, liquid = 0.0, scale = 0.0, worst = 0.0;
+  double kinetic_change = 0.0, total = 0.0, normal = 0.0, viscous = 0.0, tangential = 0.0, friction = 0.0, capillary = 0.0, liquid = 0.0,
+         scale = 0.0, worst = 0.0;
   double half_way = 0.0;  ///< worst difference of what the normal spring took and what it holds
   double unsplit = 0.0;   ///< worst difference of the parts' sum and the force, and of their torques, relative
 };
 
 double kinetic(const ContactBodies& b) {
-  const auto of = [](double m, double r, const Vec3<double>& v, const Vec3<double>& w) { return 0.5 * m * (dot(v, v) + 0.4 * r * r * dot(w, w)); };
+  const auto of = [](double m, double r, const Vec3<double>& v, const Vec3<double>& w) {
+    return 0.5 * m * (dot(v, v) + 0.4 * r * r * dot(w, w));
+  };
   return of(b.mass_1, b.radius_1, b.velocity_1, b.angular_velocity_1) + of(b.mass_2, b.radius_2, b.velocity_2, b.angular_velocity_2);
 }
 

@@ -1,6 +1,6 @@
-#include "catch.hpp"
 #include <cmath>
 #include <vector>
+#include "catch.hpp"
 
 #include "dembark/finnie_rabinowicz.hpp"
 

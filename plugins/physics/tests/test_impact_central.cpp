@@ -1,7 +1,7 @@
 // Central impacts: the scheme against closed solutions, and what it must conserve.
-#include "catch.hpp"
 #include <cmath>
 #include <vector>
+#include "catch.hpp"
 
 #include "dembark/impact/scene.hpp"
 

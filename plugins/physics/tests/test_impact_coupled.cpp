@@ -1,12 +1,12 @@
 // Steps with many coupled contacts: which candidates are solved for, and by which way of solving.
 #include <Eigen/OrderingMethods>
 #include <algorithm>
-#include "catch.hpp"
 #include <cmath>
 #include <memory>
 #include <random>
 #include <set>
 #include <vector>
+#include "catch.hpp"
 
 #include "impact_scenes.hpp"
 
@@ -142,7 +142,8 @@ struct Problem {
         const Row &r = rows[std::size_t(i)], &o = rows[std::size_t(j)];
         for (const auto& [one, sign_one] : {std::pair(r.a, 1.0), std::pair(r.b, -1.0)})
           for (const auto& [two, sign_two] : {std::pair(o.a, 1.0), std::pair(o.b, -1.0)})
-            if (one >= 0 && one == two) m(i, j) += scale * response[std::size_t(one)].inverse * sign_one * sign_two * dot(r.normal, o.normal);
+            if (one >= 0 && one == two)
+              m(i, j) += scale * response[std::size_t(one)].inverse * sign_one * sign_two * dot(r.normal, o.normal);
       }
     return m;
   }
@@ -300,7 +301,8 @@ TEST_CASE("equal logs packed tightly and a long step, where pivots take turns wi
     CHECK(report.active > 300);
     CHECK(report.certificate < 1e-14);
     CHECK(report.block_steps < 13);  // block pivots alone exchange the set a thousand times
-    for (const ContactResult& c : system.contacts()) CHECK((c.normal_force >= 0.0 && c.opening >= 0.0 && c.normal_force * c.opening == 0.0));
+    for (const ContactResult& c : system.contacts())
+      CHECK((c.normal_force >= 0.0 && c.opening >= 0.0 && c.normal_force * c.opening == 0.0));
   }
 }
 

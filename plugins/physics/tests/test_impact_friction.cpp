@@ -1,16 +1,16 @@
 // Friction on top of the normal forces, against the mechanics of rigid bodies.
-#include "catch.hpp"
 #include <cmath>
 #include <vector>
+#include "catch.hpp"
 
 #include "dembark/impact/scene.hpp"
 #include "impact_scenes.hpp"
 
 using namespace dembark;
 using namespace dembark::impact;
-using impact_scenes::g;
 using Catch::WithinAbs;
 using Catch::WithinRel;
+using impact_scenes::g;
 
 namespace {
 

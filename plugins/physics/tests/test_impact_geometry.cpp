@@ -1,10 +1,11 @@
 // Candidates: pairs against the double loop, walls against their definition, triangles against the surface they make up.
-#include "catch.hpp"
 #include <cmath>
 #include <random>
 #include <vector>
+#include "catch.hpp"
 
 #include "dembark/impact/scene.hpp"
+#include "dembark/impact/triangles.hpp"
 
 using namespace dembark;
 using namespace dembark::impact;

@@ -1,11 +1,11 @@
 // Systems of logs: rest, energy in the plane, order, saving, doing a step again, records, bad input.
-#include "catch.hpp"
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <map>
 #include <random>
 #include <vector>
+#include "catch.hpp"
 
 #include "impact_scenes.hpp"
 
@@ -245,7 +245,10 @@ TEST_CASE("a step done again, with the velocity of the full step and half a kick
 TEST_CASE("records: duration, impulse and peak are those of the forces") {
   Scene scene(three_materials(1e-4, 1.0, 0.3), crowd(80));
   scene.drums.push_back(shell(3.0));
-  struct Sum { double impulse = 0.0, peak = 0.0; int steps = 0; };
+  struct Sum {
+    double impulse = 0.0, peak = 0.0;
+    int steps = 0;
+  };
   std::map<std::pair<std::int64_t, std::int64_t>, Sum> sums;
   int ended = 0;
   for (int i = 0; i < 6000; ++i) {

@@ -1,5 +1,5 @@
-#include "catch.hpp"
 #include <cmath>
+#include "catch.hpp"
 
 #include "dembark/contact.hpp"
 #include "dembark/normal_force.hpp"

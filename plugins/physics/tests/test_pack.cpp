@@ -16,7 +16,8 @@ namespace {
 
 template <int N>
 struct LawPack {
-  Pack<N> effective_youngs_modulus, effective_shear_modulus, damping, static_friction, kinetic_friction, interface_shear_strength, kept_slip;
+  Pack<N> effective_youngs_modulus, effective_shear_modulus, damping, static_friction, kinetic_friction, interface_shear_strength,
+      kept_slip;
 };
 
 // Rows of numbers, one a lane.
@@ -54,8 +55,9 @@ void compare() {
   Lanes<N> draw;
   int stuck = 0, moving = 0;
   for (int round = 0; round < 500; ++round) {
-    const LawPack<N> p{draw.uniform(1e6, 1e7), draw.uniform(1e5, 1e6), draw.uniform(-0.5, 0.0), draw.uniform(0.4, 0.6), draw.uniform(0.1, 0.4),
-                       draw.among({1e4, 1e30, INFINITY}), draw.among({0.0, 0.9})};
+    const LawPack<N> p{draw.uniform(1e6, 1e7), draw.uniform(1e5, 1e6), draw.uniform(-0.5, 0.0),
+                       draw.uniform(0.4, 0.6), draw.uniform(0.1, 0.4), draw.among({1e4, 1e30, INFINITY}),
+                       draw.among({0.0, 0.9})};
     const Pack<N> radius = draw.uniform(1e-3, 2e-3), mass = draw.uniform(1e-5, 1e-4), overlap = draw.uniform(1e-6, 1e-4), dt = 1e-5;
     Vec3<Pack<N>> normal = draw.vector(1.0);
     normal *= 1.0 / sqrt(dot(normal, normal));
@@ -71,7 +73,8 @@ void compare() {
     state.displacement = rotate_to_plane(state.displacement, normal, twist) + motion.tangential * dt;
     const unsigned sticks = bits(plainly_sticks(p, response.force, response.tangential_stiffness, response.contact_area, state));
     const FrictionState<Pack<N>> moved = state;
-    const Vec3<Pack<N>> force = sticking_force(response.tangential_stiffness, response.tangential_damping, motion.tangential, dt, p.kept_slip, state);
+    const Vec3<Pack<N>> force =
+        sticking_force(response.tangential_stiffness, response.tangential_damping, motion.tangential, dt, p.kept_slip, state);
 
     for (int k = 0; k < N; ++k) {
       const ContactMotion<double> one_motion = contact_motion(lane(normal, k), lane(relative, k), lane(spin, k));
@@ -86,7 +89,8 @@ void compare() {
       CHECK(one.tangential_stiffness == response.tangential_stiffness[k]);
       CHECK(one.tangential_damping == response.tangential_damping[k]);
       CHECK(one.contact_area == response.contact_area[k]);
-      FrictionState<double> single{rotate_to_plane(lane(before.displacement, k), lane(normal, k), twist[k]), before.slip[k], before.dissipated_energy[k]};
+      FrictionState<double> single{rotate_to_plane(lane(before.displacement, k), lane(normal, k), twist[k]), before.slip[k],
+                                   before.dissipated_energy[k]};
       CHECK(same(single.displacement + one_motion.tangential * dt[k], lane(moved.displacement, k)));
       if (!(sticks >> k & 1)) {
         ++moving;
@@ -99,7 +103,8 @@ void compare() {
       law.kinetic_friction = p.kinetic_friction[k];
       law.interface_shear_strength = p.interface_shear_strength[k];
       law.healing_time = p.kept_slip[k] > 0.0 ? -dt[k] / std::log(p.kept_slip[k]) : 0.0;
-      const Vec3<double> whole = friction_step(law, one.force, one.tangential_stiffness, one.tangential_damping, one.contact_area, one_motion.tangential, dt[k], single);
+      const Vec3<double> whole = friction_step(law, one.force, one.tangential_stiffness, one.tangential_damping, one.contact_area,
+                                               one_motion.tangential, dt[k], single);
       CHECK(same(whole, lane(force, k)));
       CHECK(same(single.displacement, lane(state.displacement, k)));
       CHECK(single.dissipated_energy == state.dissipated_energy[k]);

@@ -120,13 +120,14 @@ TEST_CASE("the liquid takes energy from any motion, and no angular momentum", "[
     state.bridge_volume = volume;
     state.rupture_distance = 1.0;
     const ContactForce f = contact_step(p, b, 1e-7, state);
-    const double power = dot(f.force, b.velocity_1 - b.velocity_2) + dot(f.torque_1, b.angular_velocity_1) +
-                         dot(f.torque_2, b.angular_velocity_2);
+    const double power =
+        dot(f.force, b.velocity_1 - b.velocity_2) + dot(f.torque_1, b.angular_velocity_1) + dot(f.torque_2, b.angular_velocity_2);
     const RelativeMotion m = relative_motion(b, f.normal, f.overlap);
     const auto c = viscous_resistance(oil, 2.0 * reduced(2e-3, 1.5e-3), -f.overlap, volume);
     REQUIRE(power < 0.0);
     REQUIRE_THAT(power, WithinRel(-c.normal * m.normal_velocity * m.normal_velocity -
-                                  c.tangential * dot(m.tangential_velocity, m.tangential_velocity), 1e-10));
+                                      c.tangential * dot(m.tangential_velocity, m.tangential_velocity),
+                                  1e-10));
     REQUIRE_THAT(norm(f.torque_1 + f.torque_2 + cross(b.separation, f.force)), WithinAbs(0.0, 1e-12 * norm(b.separation) * norm(f.force)));
 
     // Seen from the other body it is the same pair.

@@ -2,8 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TypedDict
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+
+class Limits(TypedDict, total=False):
+    """What `numbers` allows."""
+
+    low: float
+    high: float
+    low_open: bool
+    infinite: bool
 
 
 def numbers(name: str, value: ArrayLike, unit: str, *, low: float = -np.inf, high: float = np.inf, low_open: bool = False,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -38,7 +39,8 @@ def _radii(radius_i: ArrayLike, radius_j: ArrayLike) -> tuple[NDArray[np.float64
     return a, b
 
 
-def _by_angle(contact_angle: NDArray[np.float64], model: str, call, *arrays: NDArray[np.float64]) -> NDArray[np.float64] | float:
+def _by_angle(contact_angle: NDArray[np.float64], model: str, call: Callable[..., NDArray[np.float64]],
+              *arrays: NDArray[np.float64]) -> NDArray[np.float64] | float:
     angle, *columns = np.broadcast_arrays(contact_angle, *arrays)
     shape = angle.shape
     angle = angle.ravel()

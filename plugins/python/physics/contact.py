@@ -139,7 +139,7 @@ def _integrate(contact: Contact, bodies: Sequence[Body], wall: tuple[Vector, Vec
     inertia = 0.4 * mass * np.array([b.radius for b in bodies]) ** 2
     g = _vector("gravity", gravity, "m/s^2")
     if wall is None:
-        gap = np.linalg.norm(x[0] - x[1]) - bodies[0].radius - bodies[1].radius
+        gap = float(np.linalg.norm(x[0] - x[1])) - bodies[0].radius - bodies[1].radius
     else:
         point, normal = _vector("wall_point", wall[0], "m"), _vector("wall_normal", wall[1], "1")
         if abs(np.linalg.norm(normal) - 1.0) > 1e-9:
@@ -148,7 +148,8 @@ def _integrate(contact: Contact, bodies: Sequence[Body], wall: tuple[Vector, Vec
     if gap < 0.0:
         raise ValueError(f"bodies must not touch at the start, but overlap by {-gap:g} m")
     state = contact.begin()
-    out = Trajectory(time_step * np.arange(1, steps + 1), np.empty((steps, n, 3)), np.empty((steps, n, 3)), np.empty((steps, n, 3)), [])
+    times = time_step * np.arange(1, steps + 1, dtype=np.float64)
+    out = Trajectory(times, np.empty((steps, n, 3)), np.empty((steps, n, 3)), np.empty((steps, n, 3)), [])
     # The first half step: no contact yet, gravity only, as the engines' set-up finds it.
     v += 0.5 * time_step * g
     for k in range(steps):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dembark import _physics
-from dembark.physics._checks import numbers
+from dembark.physics._checks import Limits, numbers
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ class FinnieRabinowicz:
     interface_shear_strength: float = np.inf
     presliding: str = "linear"
     healing_time: float = 0.0
+    _law: _physics.FinnieRabinowicz = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name in ("static_friction", "kinetic_friction", "critical_slip_distance", "interface_shear_strength", "healing_time"):
@@ -86,7 +88,7 @@ class FinnieRabinowicz:
         points = np.zeros((n, 3))
         points[:, : 1 if path.ndim == 1 else path.shape[1]] = path[:, None] if path.ndim == 1 else path
 
-        def column(name: str, value: ArrayLike, unit: str, **limits: object) -> NDArray[np.float64]:
+        def column(name: str, value: ArrayLike, unit: str, **limits: Unpack[Limits]) -> NDArray[np.float64]:
             array = numbers(name, value, unit, **limits)
             if array.shape not in ((), (n,)):
                 raise ValueError(f"{name} must be a number or have one value a point of the path, shape ({n},), not {array.shape}")

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dembark import _physics
-from dembark.physics._checks import numbers
+from dembark.physics._checks import Limits, numbers
 from dembark.physics.friction import FinnieRabinowicz
 
 Floats = NDArray[np.float64]
@@ -100,7 +101,7 @@ def _vectors(name: str, value: ArrayLike, unit: str, n: int, dimension: int) -> 
     return out
 
 
-def _each(name: str, value: ArrayLike, unit: str, n: int, **limits: object) -> Floats:
+def _each(name: str, value: ArrayLike, unit: str, n: int, **limits: Unpack[Limits]) -> Floats:
     array = numbers(name, value, unit, **limits)
     if array.shape not in ((), (n,)):
         raise ValueError(f"{name} must be a number or have one value a body, shape ({n},), not {array.shape} ({unit})")
@@ -133,6 +134,11 @@ def _theta(theta: float) -> float:
     return float(numbers("theta", theta, "", low=0.5, high=1.0))
 
 
+def _impact(row: list[float]) -> Impact:
+    a, b, time, duration, peak, impulse, speed, dissipated, x, y, z = row
+    return Impact(int(a), int(b), time, duration, peak, impulse, speed, dissipated, (x, y, z))
+
+
 @dataclass
 class _Scene:
     """Arguments of _physics.ImpactScene, kept until the time step is known."""
@@ -148,13 +154,13 @@ class _Scene:
     method: str
     reach: float
     row: bool
-    built: object = field(default=None, init=False)
+    built: _physics.ImpactScene | None = field(default=None, init=False)
     dt: float = field(default=0.0, init=False)
 
-    def at(self, dt: float) -> object:
+    def at(self, dt: float) -> _physics.ImpactScene:
         dt = float(numbers("dt", dt, "s", low=0.0, low_open=True))
         if self.built is None:
-            laws = [law._law for law in self.laws]  # type: ignore[attr-defined]
+            laws = [law._law for law in self.laws]
             self.built = _physics.ImpactScene(dt, self.theta, self.sweeps, self.method, self.materials, laws, self.pairs, self.bodies,
                                               self.planes, self.drums, self.reach, self.row)
             self.dt = dt
@@ -162,23 +168,23 @@ class _Scene:
             raise ValueError(f"dt must stay {self.dt:g} s, as the system began, not {dt:g}")
         return self.built
 
-    def begun(self) -> object:
+    def begun(self) -> _physics.ImpactScene:
         if self.built is None:
             raise RuntimeError("nothing has been run yet: call run(duration, dt) first")
         return self.built
 
     def run(self, duration: float, dt: float, every: int, dimension: int, columns: Sequence[tuple[int, int]]) -> ImpactMotion:
         scene = self.at(dt)
-        steps = int(round(float(numbers("duration", duration, "s", low=0.0)) / self.dt))
+        steps = round(float(numbers("duration", duration, "s", low=0.0)) / self.dt)
         if int(every) < 1:
             raise ValueError(f"every must be >= 1 steps, not {every}")
-        time, position, velocity, spin, report, force, impacts = scene.run(  # type: ignore[attr-defined]
+        time, position, velocity, spin, report, force, impacts = scene.run(
             steps, int(every), [c[0] for c in columns], [c[1] for c in columns])
         named = dict(zip(_REPORT, report.T.copy(), strict=True))
         cut = (slice(None), slice(None), 0) if dimension == 1 else (slice(None), slice(None), slice(0, dimension))
         return ImpactMotion(
             time, position[cut], velocity[cut], spin if dimension == 3 else spin[:, :, 2], force,
-            [Impact(int(r[0]), int(r[1]), *map(float, r[2:8]), place=tuple(map(float, r[8:]))) for r in impacts],
+            [_impact(row) for row in impacts.tolist()],
             named["kinetic_energy"], named["elastic_energy"], named["dissipated_energy"], named)
 
 
@@ -239,11 +245,33 @@ class ImpactChain:
 
     def state(self) -> Floats:
         """Everything needed to go on bit for bit."""
-        return self._scene.begun().state()  # type: ignore[attr-defined]
+        return np.asarray(self._scene.begun().state())
 
     def restore(self, state: ArrayLike, dt: float) -> None:
         """Go on from `state` of a chain with the same logs; dt (s) as it had."""
-        self._scene.at(dt).restore(np.ascontiguousarray(state, dtype=float))  # type: ignore[attr-defined]
+        self._scene.at(dt).restore(np.ascontiguousarray(state, dtype=float))
+
+
+def _walls(walls: Sequence[Plane | Drum], materials: int) -> tuple[Floats, Floats]:
+    """Rows of the planes (p, 12) and the drums (d, 11), as the scene takes them; walls have materials after those of the bodies."""
+    planes, drums = [], []
+    for number, wall in enumerate(walls):
+        if not isinstance(wall, Plane | Drum):
+            raise TypeError(f"walls must be Plane or Drum objects, not {wall!r}")
+        hard = float(numbers("wall stiffness", wall.stiffness, "N/m", low=0.0, low_open=True, infinite=True))
+        if isinstance(wall, Drum):
+            centre = numbers("centre", wall.centre, "m")
+            if centre.shape != (2,):
+                raise ValueError(f"centre must have two components (m), not {wall.centre!r}")
+            size = float(numbers("radius", wall.radius, "m", low=0.0, low_open=True))
+            drums.append([number, materials + number, hard, *centre, 0, 0, 0, 1, size, float(numbers("omega", wall.omega, "rad/s"))])
+        else:
+            normal = _three("normal", wall.normal, "")
+            if not normal.any():
+                raise ValueError("normal must not be zero")
+            planes.append([number, materials + number, hard, *_three("point", wall.point, "m"), *(normal / np.linalg.norm(normal)),
+                           *_three("velocity", wall.velocity, "m/s")])
+    return np.array(planes, dtype=float).reshape(-1, 12), np.array(drums, dtype=float).reshape(-1, 11)
 
 
 class ImpactSystem:
@@ -267,8 +295,8 @@ class ImpactSystem:
     def __init__(self, mass: ArrayLike, radius: ArrayLike, position: ArrayLike, velocity: ArrayLike | None = None, *,
                  spin: ArrayLike | None = None, stiffness: ArrayLike = 1e7, force: ArrayLike | None = None,
                  gravity: Sequence[float] | None = None, inertia: str | ArrayLike = "cylinder", friction: Friction = 0.0,
-                 tangential_ratio: float = 2.0 / 7.0, walls: Sequence[Plane | Drum] = (), theta: float = 1.0, damping: ArrayLike = 0.0, contact_damping: float = 0.0,
-                 friction_sweeps: int = 2, method: str = "auto", reach: float = 0.0) -> None:
+                 tangential_ratio: float = 2.0 / 7.0, walls: Sequence[Plane | Drum] = (), theta: float = 1.0, damping: ArrayLike = 0.0,
+                 contact_damping: float = 0.0, friction_sweeps: int = 2, method: str = "auto", reach: float = 0.0) -> None:
         x = numbers("position", position, "m")
         if x.ndim != 2 or x.shape[0] == 0 or x.shape[1] not in (2, 3):
             raise ValueError(f"position must have the shape (bodies, 2) or (bodies, 3), not {x.shape}")
@@ -301,24 +329,8 @@ class ImpactSystem:
 
         materials, bodies[:, 3] = _materials(stiffness, damping, n)
         own = len(materials)
-        planes, drums, laws = [], [], [_law(friction)] * own
-        for number, wall in enumerate(walls):
-            hard = float(numbers("wall stiffness", wall.stiffness, "N/m", low=0.0, low_open=True, infinite=True))
-            laws.append(_law(friction if wall.friction is None else wall.friction))
-            if isinstance(wall, Drum):
-                centre = numbers("centre", wall.centre, "m")
-                if centre.shape != (2,):
-                    raise ValueError(f"centre must have two components (m), not {wall.centre!r}")
-                size = float(numbers("radius", wall.radius, "m", low=0.0, low_open=True))
-                drums.append([number, own + number, hard, *centre, 0, 0, 0, 1, size, float(numbers("omega", wall.omega, "rad/s"))])
-            elif isinstance(wall, Plane):
-                normal = _three("normal", wall.normal, "")
-                if not normal.any():
-                    raise ValueError("normal must not be zero")
-                planes.append([number, own + number, hard, *_three("point", wall.point, "m"), *(normal / np.linalg.norm(normal)),
-                               *_three("velocity", wall.velocity, "m/s")])
-            else:
-                raise TypeError(f"walls must be Plane or Drum objects, not {wall!r}")
+        planes, drums = _walls(walls, own)
+        laws = [_law(friction)] * own + [_law(friction if wall.friction is None else wall.friction) for wall in walls]
         count = own + len(walls)
         ratio = float(numbers("tangential_ratio", tangential_ratio, "", low=0.0, low_open=True))
         viscous = float(numbers("contact_damping", contact_damping, "N s/m", low=0.0))
@@ -326,7 +338,7 @@ class ImpactSystem:
         table = [laws[max(i, j)] for i in range(count) for j in range(count)]
         self._scene = _Scene(
             bodies, np.vstack([materials, np.tile([1.0, 0.0], (len(walls), 1))]), table, np.tile([ratio, viscous, 0.0], (count * count, 1)),
-            np.array(planes, dtype=float).reshape(-1, 12), np.array(drums, dtype=float).reshape(-1, 11), _theta(theta),
+            planes, drums, _theta(theta),
             int(friction_sweeps), method, float(numbers("reach", reach, "m", low=0.0)), False)
 
     def run(self, duration: float, dt: float, *, every: int = 1) -> ImpactMotion:
@@ -336,14 +348,14 @@ class ImpactSystem:
     def contacts(self) -> list[dict[str, object]]:
         """What the last instant was solved for: contacts with a force now or before, and pairs that the free motion could close. Of each
         a, b (as in Impact), gap (m), normal_force (N), opening (m), tangential (N, on a), normal (towards a), place (m)."""
-        rows = self._scene.begun().contacts()  # type: ignore[attr-defined]
+        rows = np.asarray(self._scene.begun().contacts())
         return [{"a": int(r[0]), "b": int(r[1]), "gap": float(r[2]), "normal_force": float(r[3]), "opening": float(r[4]),
                  "tangential": r[5:8].copy(), "normal": r[8:11].copy(), "place": r[11:14].copy()} for r in rows]
 
     def state(self) -> Floats:
         """Everything needed to go on bit for bit."""
-        return self._scene.begun().state()  # type: ignore[attr-defined]
+        return np.asarray(self._scene.begun().state())
 
     def restore(self, state: ArrayLike, dt: float) -> None:
         """Go on from `state` of a system with the same bodies and walls; dt (s) as it had."""
-        self._scene.at(dt).restore(np.ascontiguousarray(state, dtype=float))  # type: ignore[attr-defined]
+        self._scene.at(dt).restore(np.ascontiguousarray(state, dtype=float))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,7 @@ from scipy import sparse
 
 from dembark import _physics
 
-Matrix = ArrayLike | sparse.sparray | sparse.spmatrix
+Matrix: TypeAlias = ArrayLike | sparse.sparray | sparse.spmatrix
 LCP_METHODS = ("auto", "energy", "block", "murty", "pgs")
 
 

@@ -50,9 +50,9 @@ def liquid_share(radius: ArrayLike, other: ArrayLike, *, share: str = "cap", fac
         raise ValueError(f"share {share!r} is unknown; it can be {', '.join(LIQUID_SHARES)}")
     if wrong := _physics.liquid_share_error(share == "cap", float(factor)):
         raise ValueError(f"{wrong}, not {factor:g}")
-    shape, columns = _columns(numbers("radius", radius, "m", low=0.0, low_open=True),
-                              numbers("other", other, "m", low=0.0, low_open=True, infinite=True))
-    return _shaped(_physics.liquid_share(*columns, share == "cap", float(factor)), shape)
+    shape, (own, others) = _columns(numbers("radius", radius, "m", low=0.0, low_open=True),
+                                    numbers("other", other, "m", low=0.0, low_open=True, infinite=True))
+    return _shaped(_physics.liquid_share(own, others, share == "cap", float(factor)), shape)
 
 
 def liquid_grant(liquid: ArrayLike, demand: ArrayLike) -> NDArray[np.float64] | float:
@@ -86,10 +86,11 @@ def liquid_bridge(given_i: ArrayLike, given_j: ArrayLike, radius_i: ArrayLike, r
     """
     if split not in LIQUID_RETURNS:
         raise ValueError(f"split {split!r} is unknown; it can be {', '.join(LIQUID_RETURNS)}")
-    shape, columns = _columns(numbers("given_i", given_i, "m^3", low=0.0), numbers("given_j", given_j, "m^3", low=0.0),
-                              numbers("radius_i", radius_i, "m", low=0.0, low_open=True),
-                              numbers("radius_j", radius_j, "m", low=0.0, low_open=True, infinite=True),
-                              numbers("wall_part", wall_part, "", low=0.0, high=1.0),
-                              numbers("largest", largest, "m^3", low=0.0, low_open=True, infinite=True))
-    parts = _physics.liquid_bridge(*columns, LIQUID_RETURNS.index(split))
+    shape, (volumes_i, volumes_j, radii_i, radii_j, walls, limits) = _columns(
+        numbers("given_i", given_i, "m^3", low=0.0), numbers("given_j", given_j, "m^3", low=0.0),
+        numbers("radius_i", radius_i, "m", low=0.0, low_open=True),
+        numbers("radius_j", radius_j, "m", low=0.0, low_open=True, infinite=True),
+        numbers("wall_part", wall_part, "", low=0.0, high=1.0),
+        numbers("largest", largest, "m^3", low=0.0, low_open=True, infinite=True))
+    parts = _physics.liquid_bridge(volumes_i, volumes_j, radii_i, radii_j, walls, limits, LIQUID_RETURNS.index(split))
     return LiquidBridge(*(_shaped(part, shape) for part in parts))

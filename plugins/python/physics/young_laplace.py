@@ -7,8 +7,9 @@ smaller sphere, phi the angle of the meridian against the radius,
     dr/dt = cos(phi),   dz/dt = sin(phi),   dphi/dt = p - sin(phi)/r.
 
 It starts at half-filling angle b on the smaller sphere (curvature c), r = sin(b)/c, phi = pi - b - theta, and ends on the other one
-(curvature c'), where sin(phi - theta') = c' r. Liquid and free area are further equations of the system. Unknown are b, the pressure and the
-length of the meridian; the conditions are the contact angle at its end, the volume and the gap (or a step along a branch of constant volume).
+(curvature c'), where sin(phi - theta') = c' r. Liquid and free area are further equations of the system. Unknown are b, the pressure and
+the length of the meridian; the conditions are the contact angle at its end, the volume and the gap (or a step along a branch of constant
+volume).
 
 A bridge is stable up to the first gap at which the determinant of these conditions is zero. Between unequal spheres that is the largest
 gap. Between equal ones it can come before: a branch of asymmetric bridges leaves the symmetric one, and the liquid drains to one side.
@@ -25,10 +26,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+
+Floats = NDArray[np.float64]
 
 _STEP = 1e-6  # of the unknowns, for the Jacobian
 _LONGEST = 0.25  # step along a branch, in the unknowns
@@ -64,7 +68,7 @@ class _Bodies:
         return self.angles[0] == self.angles[1] and self.curvatures[0] == self.curvatures[1]
 
 
-def _rhs(_t: float, y: NDArray, length: NDArray, pressure: NDArray) -> NDArray:
+def _rhs(_t: float, y: Floats, length: Floats, pressure: Floats) -> Floats:
     r, _, phi, _, _ = s = y.reshape(5, -1)
     out = np.empty_like(s)
     sine = np.sin(phi)
@@ -80,27 +84,27 @@ def _rhs(_t: float, y: NDArray, length: NDArray, pressure: NDArray) -> NDArray:
 class _Point:
     """Unknowns and results of a bridge, determinant of its conditions on angle, volume and gap, and the direction of constant volume."""
 
-    x: NDArray
-    out: NDArray
+    x: Floats
+    out: Floats
     determinant: float
-    tangent: NDArray
+    tangent: Floats
 
     @property
     def gap(self) -> float:
         return float(self.out[2])
 
 
-def _neck(_t: float, y: NDArray, _length: NDArray, _pressure: NDArray) -> float:
+def _neck(_t: float, y: Floats, _length: Floats, _pressure: Floats) -> float:
     return float(y[2] - 0.5 * np.pi)
 
 
-def _cap(rim: NDArray, half_angle: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+def _cap(rim: Floats, half_angle: Floats) -> tuple[Floats, Floats, Floats]:
     """Height, volume and area of the cap of a sphere or a plane under a rim."""
     height = rim * np.tan(0.5 * half_angle)
     return height, np.pi * height * (3.0 * rim**2 + height**2) / 6.0, np.pi * (rim**2 + height**2)
 
 
-def _integrate(unknowns: NDArray, bodies: _Bodies, **options):
+def _integrate(unknowns: Floats, bodies: _Bodies, **options: Any) -> tuple[Floats, Any]:
     half_angle, length = bodies.curvatures[0] * np.exp(unknowns[0]), np.exp(unknowns[2])
     if not np.all(half_angle < np.pi):
         raise FloatingPointError("the meridian misses the sphere")
@@ -113,7 +117,7 @@ def _integrate(unknowns: NDArray, bodies: _Bodies, **options):
                             args=(length, unknowns[1] / length), **options)
 
 
-def _shoot(unknowns: NDArray, bodies: _Bodies) -> NDArray:
+def _shoot(unknowns: Floats, bodies: _Bodies) -> Floats:
     """Contact angle missed (over the half-filling angle), ln(volume), gap, height of both caps, force, energy, round-off of the force; one
     column each column of ``unknowns`` = (ln(half-filling angle over curvature), pressure times length, ln length)."""
     start, solution = _integrate(unknowns, bodies)
@@ -133,22 +137,22 @@ def _shoot(unknowns: NDArray, bodies: _Bodies) -> NDArray:
     return np.array([miss, np.log(liquid), z - caps, caps, force, energy, far_force - force])
 
 
-def _newton(guess: NDArray, bodies: _Bodies, volume: float, *, gap: float | None = None,
-            normal: NDArray | None = None) -> _Point:
+def _newton(guess: Floats, bodies: _Bodies, volume: float, *, gap: float | None = None,
+            normal: Floats | None = None) -> _Point:
     """The bridge of a volume, of ``gap`` or in the plane through the guess with ``normal``."""
     x = guess.copy()
     shift = np.hstack([np.zeros((3, 1)), _STEP * np.eye(3)])
 
-    def conditions(out: NDArray, at_gap: float) -> NDArray:
+    def conditions(out: Floats, at_gap: float) -> Floats:
         return np.array([out[0], out[1] - np.log(volume), np.log(np.maximum(out[3] + out[2], 0.0) / np.maximum(out[3] + at_gap, 1e-300))])
 
-    def residuals(x: NDArray, out: NDArray) -> NDArray:
+    def residuals(x: Floats, out: Floats) -> Floats:
         f = conditions(out, gap if gap is not None else 0.0)
         if normal is not None:
             f[2] = normal @ (x[:, None] + shift - guess[:, None])
         return f
 
-    def slopes(f: NDArray) -> NDArray:
+    def slopes(f: Floats) -> Floats:
         return (f[:, 1:] - f[:, :1]) / _STEP
 
     out = _shoot(x[:, None] + shift, bodies)
@@ -243,7 +247,7 @@ def _end(left: _Point, right: _Point, bodies: _Bodies, volume: float) -> _Point:
         # The first one on the way: near 30 degrees equal spheres have two, close together.
         inside = roots.real[(np.abs(roots.imag) < 1e-6) & (np.abs(roots.real) <= half)]
         root = inside.min() if inside.size else roots[np.argmin(np.abs(roots))].real
-        centre += root
+        centre += float(root)
     powers = np.vander((distances - centre) / half, 4)
     x = np.linalg.solve(powers, np.array([p.x for p in points]))[-1]
     return _Point(x, _shoot(x[:, None], bodies)[:, 0], 0.0, normal)

@@ -52,7 +52,8 @@ def cloud() -> str:
             for column in range(8):
                 number = len(rows) + 1
                 place = [(k + 0.5) * 0.0025 + chance.uniform(-1e-4, 1e-4) for k in (column, row)]
-                rows.append(f"{number} {1 + (number % 3 == 0)} {0.002 * chance.uniform(0.7, 1.1)} 2500 {place[0]} {place[1]} {0.0011 + layer * 0.0021}")
+                rows.append(f"{number} {1 + (number % 3 == 0)} {0.002 * chance.uniform(0.7, 1.1)} 2500 "
+                            f"{place[0]} {place[1]} {0.0011 + layer * 0.0021}")
     head = f"cloud\n\n{len(rows)} atoms\n2 atom types\n\n0 0.02 xlo xhi\n0 0.02 ylo yhi\n-0.002 0.04 zlo zhi\n\nAtoms\n\n"
     return head + "\n".join(rows) + "\n"
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
 from rig import liggghts_driver
 from rig.liggghts_driver import Run, read_dump
 
@@ -62,7 +63,8 @@ class Case:
     def text(self, *, head: str | None = None, run: str | None = None, ranks: int = 1, dump: str = "logs.dump") -> str:
         gravity = f"fix weight all gravity {self.gravity!r} vector 0 -1 0" if self.gravity else ""
         return "\n".join([
-            f"log {log_name(dump)}", "units si", f"dimension {self.dimension}", "atom_style granular", "atom_modify map array sort 0 0.0", f"boundary {self.boundary}", "newton off",
+            f"log {log_name(dump)}", "units si", f"dimension {self.dimension}", "atom_style granular", "atom_modify map array sort 0 0.0",
+            f"boundary {self.boundary}", "newton off",
             "communicate single vel yes", f"processors {ranks} 1 1", self.head() if head is None else head, "neighbor 0.05 bin",
             "neigh_modify delay 0", self.before, gravity, f"fix hits all lcp/impact {self.words}", self.after, "fix motion all nve/sphere",
             f"timestep {self.time_step!r}", *self.extra,

@@ -46,7 +46,7 @@ def run_deck(folder: Path, deck: str, *, ranks: int = 1, name: str = "case.in") 
 
 def read_dump(path: Path) -> tuple[NDArray[np.int64], list[NDArray[np.float64]]]:
     """Steps, and for each the table of its rows (as written, one line an item)."""
-    lines = path.read_text().splitlines()
+    lines = path.read_text(encoding="utf-8").splitlines()
     steps, frames = [], []
     at = 0
     while at < len(lines):

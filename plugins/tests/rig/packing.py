@@ -46,7 +46,6 @@ set group all vx v_push_x vy v_push_y vz v_push_z"""
 def packing(material: Material, run_command: str, *, newton: str = "off", create: str = CREATE, state: str = STATE,
             dump: str = "grains.dump", every: int = 1500) -> str:
     """The deck: `create` makes or reads the grains, `state` gives them sizes and velocities; a frame with all digits `every` steps."""
-    words = SETUP.format(newton=newton, create=create, state=state, properties=liggghts_driver.properties(material), every=every, dump=dump,
-                         pair=liggghts_driver.models(material), wall=liggghts_driver.models(material, wall="primitive type 2 zplane 0"),
-                         numbers=" %.17g" * 15, run=run_command)
-    return words
+    return SETUP.format(newton=newton, create=create, state=state, properties=liggghts_driver.properties(material), every=every, dump=dump,
+                        pair=liggghts_driver.models(material), wall=liggghts_driver.models(material, wall="primitive type 2 zplane 0"),
+                        numbers=" %.17g" * 15, run=run_command)

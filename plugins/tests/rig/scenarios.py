@@ -53,7 +53,6 @@ class Path:
 
         return Path(displacement=turn(self.displacement), velocity=turn(self.velocity))
 
-
     def spinning(self, axis: tuple[float, float, float], rate: float, start: tuple[float, float, float]) -> Path:
         """The same path, from the point `start` on, as drawn in a frame that turns about `axis` through the origin at `rate` (rad/s)."""
         k = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
@@ -118,7 +117,6 @@ class Scenario:
         grains = tuple(replace(g, position=turn(g.position), velocity=turn(g.velocity), angular_velocity=turn(g.angular_velocity),
                                path=g.path and g.path.rotated(rotation)) for g in self.grains)
         return replace(self, name=name, grains=grains, gravity=turn(self.gravity))
-
 
     def spinning(self, axis: tuple[float, float, float], rate: float, name: str) -> Scenario:
         """A prescribed case as seen in a frame that turns: paths turn about the origin, and the grains spin with it."""
@@ -224,7 +222,8 @@ def _collision(name: str, material: Material, ratio: float) -> Scenario:
 def _head_on(name: str, material: Material) -> Scenario:
     """Slow central impact without spin that ends after the bridge broke: all that is lost goes into the liquid."""
     return Scenario(name=name, material=replace(material, restitution=1.0), time_step=2e-6, steps=14000, stride=4,
-                    grains=(Grain(position=(0.0, 0.0, 5.02e-3), velocity=(0.0, 0.0, -0.08)), Grain(radius=3e-3, position=(0.0, 0.0, -3e-3))))
+                    grains=(Grain(position=(0.0, 0.0, 5.02e-3), velocity=(0.0, 0.0, -0.08)),
+                            Grain(radius=3e-3, position=(0.0, 0.0, -3e-3))))
 
 
 def _drop(name: str, material: Material) -> Scenario:

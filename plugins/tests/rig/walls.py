@@ -59,7 +59,8 @@ def follow(case: Scenario, surface: Surface) -> Motion:
     force, torque = np.zeros_like(x), np.zeros_like(x)
     for k in range(case.steps + 1):
         away, speed = surface.below(x[k, 0].copy(), k * case.time_step)
-        out = state.step(tuple(away), tuple(v[k, 0]), tuple(speed), tuple(w[k, 0]), (0.0, 0.0, 0.0), grain.radius, np.inf, grain.mass, np.inf,
+        out = state.step(tuple(away), tuple(v[k, 0]), tuple(speed), tuple(w[k, 0]), (0.0, 0.0, 0.0), grain.radius, np.inf, grain.mass,
+                         np.inf,
                          case.time_step, k > 0)
         force[k, 0], torque[k, 0] = out[0], out[1]
     keep = slice(case.stride, None, case.stride)
@@ -73,7 +74,8 @@ def stl(triangles: list[Triangle]) -> str:
     return f"solid floor\n{facets}\nendsolid floor\n"
 
 
-FLOOR: list[Triangle] = [((1e-5, -0.04, 0.0), (1e-5, 0.04, 0.0), (-0.04, 0.0, 0.0)), ((1e-5, -0.04, 0.0), (0.04, 0.0, 0.0), (1e-5, 0.04, 0.0))]
+FLOOR: list[Triangle] = [((1e-5, -0.04, 0.0), (1e-5, 0.04, 0.0), (-0.04, 0.0, 0.0)),
+                         ((1e-5, -0.04, 0.0), (0.04, 0.0, 0.0), (1e-5, 0.04, 0.0))]
 
 
 def on_mesh(text: str, folder: FilePath, triangles: list[Triangle], move: str = "", words: str = "", name: str = "floor.stl") -> str:

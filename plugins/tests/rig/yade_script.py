@@ -96,9 +96,11 @@ def run(case, arrays):
     engines = [
         ForceResetter(),
         # The grains are moved from outside, so the collider looks at each step.
-        InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb(), Bo1_Box_Aabb(), Bo1_Facet_Aabb(), Bo1_CylinderWall_Aabb()], verletDist=0),
+        InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb(), Bo1_Box_Aabb(), Bo1_Facet_Aabb(), Bo1_CylinderWall_Aabb()],
+                              verletDist=0),
         InteractionLoop(
-            [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom(), Ig2_Box_Sphere_ScGeom(), facets, Ig2_CylinderWall_Sphere_ScGeom()], [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**laws)],
+            [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom(), Ig2_Box_Sphere_ScGeom(), facets, Ig2_CylinderWall_Sphere_ScGeom()],
+            [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**laws)],
             [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(
                 normalLaw=m["normal_law"], characteristicVelocity=m["characteristic_velocity"], presliding=m["presliding"],
                 capillaryModel=m["capillary_model"] if wet else "none")]),
@@ -117,10 +119,10 @@ def run(case, arrays):
 
 
 cases, out = sys.argv[1:3]
-with open(cases) as file:
+with open(cases, encoding="utf-8") as file:
     cases = json.load(file)
 results = {}
-for number, case in enumerate(cases):
+for case in cases:
     arrays = None
     if case["prescribed"]:
         with np.load(case["arrays"]) as stored:

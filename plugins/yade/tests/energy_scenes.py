@@ -294,7 +294,8 @@ def table():
     builtins.writer = dembark.EnergyWriter()
     O.engines = [*O.engines, PyRunner(iterPeriod=10, command="writer.write()")]
     O.run(31, True)
-    return {"text": open("energies.csv").read(), "keys": account.keys(), "items": [list(item) for item in account.items()],
+    return {"text": open("energies.csv", encoding="utf-8").read(), "keys": account.keys(),
+            "items": [list(item) for item in account.items()],
             "energies": account.energies(), "found": dembark.energies()}
 
 
@@ -356,6 +357,6 @@ def other_law():
 
 out, *names = sys.argv[1:]
 results = {name: globals()[name]() for name in names}
-with open(out, "w") as file:
+with open(out, "w", encoding="utf-8") as file:
     json.dump(results, file)
 print("scenes: finished", flush=True)

@@ -50,7 +50,8 @@ def held(position, radius=R):
 
 
 def books(engine, count):
-    return {"grains": [engine.volume(i) for i in range(count)], "bridges": engine.inBridges(), "walls": engine.onWalls(), "lost": engine.lost,
+    return {"grains": [engine.volume(i) for i in range(count)], "bridges": engine.inBridges(), "walls": engine.onWalls(),
+            "lost": engine.lost,
             "count": engine.bridgeCount(), "total": engine.total(),
             "volumes": {f"{min(i.id1, i.id2)}-{max(i.id1, i.id2)}": i.phys.bridgeVolume for i in O.interactions if i.isReal}}
 
@@ -102,7 +103,8 @@ def wall():
         rows = []
         for x in (0.0002, -0.00001, 0.0, 0.005):
             put({ids[1]: x})
-            rows.append({"grain": engine.volume(ids[1]), "pool": engine.wallPool(0), "bridges": engine.inBridges(), "total": engine.total()})
+            rows.append({"grain": engine.volume(ids[1]), "pool": engine.wallPool(0), "bridges": engine.inBridges(),
+                         "total": engine.total()})
         found.append(rows)
     engine = scene_with([lambda: utils.wall(-R, 0), held((-0.00001, 0, 0))])
     engine.setVolume(1, 1e-10)
@@ -198,7 +200,7 @@ def history():
     writer = dembark.HistoryWriter({"side": 2}, gravity=(0, 0, 0), progress=False, liquid=engine)
     O.step()
     writer.write()
-    return {"text": open("time.csv").read(), "books": books(engine, 2)}
+    return {"text": open("time.csv", encoding="utf-8").read(), "books": books(engine, 2)}
 
 
 def messages():
@@ -243,6 +245,6 @@ def fixed_volumes_too():
 
 out, *names = sys.argv[1:]
 results = {name: globals()[name]() for name in names}
-with open(out, "w") as file:
+with open(out, "w", encoding="utf-8") as file:
     json.dump(results, file)
 print("scenes: finished", flush=True)

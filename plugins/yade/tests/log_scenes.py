@@ -37,8 +37,8 @@ def side(x, sense):
 
 
 def outputs(engine):
-    names = ("contactCount activeCount impactsBegun peakForce impulseSum dissipatedEnergy elasticEnergy pivots blockSteps pivotsTotal certificate "
-             "worstCertificate highestForce steps")
+    names = ("contactCount activeCount impactsBegun peakForce impulseSum dissipatedEnergy elasticEnergy pivots blockSteps pivotsTotal "
+             "certificate worstCertificate highestForce steps")
     return {name: getattr(engine, name) for name in names.split()}
 
 
@@ -48,7 +48,8 @@ def contacts(engine):
 
 def motion():
     """Position, velocity and angular velocity of each sphere, to the bit."""
-    return [[float(x).hex() for v in (b.state.pos, b.state.vel, b.state.angVel) for x in v] for b in O.bodies if isinstance(b.shape, Sphere)]
+    return [[float(x).hex() for v in (b.state.pos, b.state.vel, b.state.angVel) for x in v] for b in O.bodies
+            if isinstance(b.shape, Sphere)]
 
 
 def steps(count):
@@ -58,7 +59,8 @@ def steps(count):
 
 
 def kinetic():
-    return sum(0.5 * b.state.mass * b.state.vel.squaredNorm() + 0.5 * b.state.inertia[2] * b.state.angVel[2] ** 2 for b in O.bodies if b.dynamic)
+    return sum(0.5 * b.state.mass * b.state.vel.squaredNorm() + 0.5 * b.state.inertia[2] * b.state.angVel[2] ** 2 for b in O.bodies
+               if b.dynamic)
 
 
 def pair(mass=(50.0, 50.0), stiffness=(2e7, 2e7), speed=1.0, turn=0.01, **more):
@@ -71,7 +73,8 @@ def pair(mass=(50.0, 50.0), stiffness=(2e7, 2e7), speed=1.0, turn=0.01, **more):
     engine = setting(bodies, dt, stiffness={"log": stiffness[0], "other": stiffness[1]}, **more)
     begin = kinetic()
     O.run(int(1.5 * math.pi / turn), True)
-    return {"velocity": [b.state.vel[0] for b in O.bodies], "outputs": outputs(engine), "peak": speed * math.sqrt(k * reduced), "begin": begin,
+    return {"velocity": [b.state.vel[0] for b in O.bodies], "outputs": outputs(engine), "peak": speed * math.sqrt(k * reduced),
+            "begin": begin,
             "end": kinetic(), "duration": math.pi / omega, "reduced": reduced, "dt": dt, "stiffness": engine.stiffness}
 
 
@@ -104,7 +107,8 @@ def wall():
             least = min(least, engine.wallForce("floor")[1])
             total = sum(O.forces.f(i)[1] for i in range(len(bodies)))
             assert total == engine.walls[0].force[1], (kind, total)
-        found[kind] = {"velocity": O.bodies[len(bodies)].state.vel[1], "force": least, "peak": speed * math.sqrt(k * mass), "outputs": outputs(engine)}
+        found[kind] = {"velocity": O.bodies[len(bodies)].state.vel[1], "force": least, "peak": speed * math.sqrt(k * mass),
+                       "outputs": outputs(engine)}
     engine = setting([floor(), log((0, 0.1, 0), 0.1, mass)], dt, stiffness=s, walls=[dict(bodies=[0], stiffness=local)])
     O.bodies[0].state.vel = (0, speed, 0)
     O.run(4000, True)
@@ -130,7 +134,8 @@ def rest():
     """A log set down on a floor exactly at its equilibrium; the same thrown freely from v_0."""
     mass, s, local = 40.0, 1e7, 2e7
     overlap = mass * GRAVITY * (1 / s + 1 / local)
-    engine = setting([floor(), log((0, 0.1 - overlap, 0), 0.1, mass)], 1e-5, GRAVITY, stiffness=s, walls=[dict(bodies=[0], stiffness=local)],
+    engine = setting([floor(), log((0, 0.1 - overlap, 0), 0.1, mass)], 1e-5, GRAVITY, stiffness=s,
+                     walls=[dict(bodies=[0], stiffness=local)],
                      velocityAtStart=True)
     speeds = []
     for _ in range(2000):
@@ -156,7 +161,8 @@ def pile():
     O.run(60000, True)
     forces = {name: list(engine.wallForce(name)) for name in ("floor", "left", "right")}
     net = {b.id: O.forces.f(b.id)[1] for b in O.bodies if b.dynamic}
-    return {"forces": forces, "weight": 10 * mass * GRAVITY, "net": net, "fastest": max(b.state.vel.norm() for b in O.bodies), "outputs": outputs(engine),
+    return {"forces": forces, "weight": 10 * mass * GRAVITY, "net": net, "fastest": max(b.state.vel.norm() for b in O.bodies),
+            "outputs": outputs(engine),
             "contacts": contacts(engine)}
 
 
@@ -175,7 +181,8 @@ def drum():
         state = O.bodies[1].state
         x, y, _ = state.pos
         along = (x * state.vel[1] - y * state.vel[0]) / math.hypot(x, y)
-        found[blocked] = {"highest": highest, "spin": state.angVel[2], "along": along, "outputs": outputs(engine), "torque": O.forces.t(0)[2],
+        found[blocked] = {"highest": highest, "spin": state.angVel[2], "along": along, "outputs": outputs(engine),
+                          "torque": O.forces.t(0)[2],
                           "force": list(engine.wallForce("shell")), "contact": contacts(engine)[0]}
     return found
 
@@ -190,17 +197,20 @@ def oblique():
     engine = setting([log((0, 0, 0), 0.1, 30.0, (2.0, 0, 0), 5.0), log((0.21, 0.12, 0), 0.14, 60.0)], 1e-6, stiffness=2e7, friction=0.4)
     begin, energy = sums(), kinetic()
     O.run(8000, True)
-    return {"begin": begin, "end": sums(), "energy": [energy, kinetic()], "outputs": outputs(engine), "spins": [b.state.angVel[2] for b in O.bodies],
+    return {"begin": begin, "end": sums(), "energy": [energy, kinetic()], "outputs": outputs(engine),
+            "spins": [b.state.angVel[2] for b in O.bodies],
             "flat": max(abs(b.state.pos[2]) + abs(b.state.vel[2]) for b in O.bodies)}
 
 
 def heap(**more):
     """Logs that tumble in a turning drum with a plane floor of their own, dense in impacts."""
     bodies = [lambda: dembark.drum((0, 0, 0), 0.6, omega=3.0), side(-0.5, 1)]
-    for i in range(12):
-        bodies.append(log((0.22 * (i % 4) - 0.33, 0.22 * (i // 4) - 0.3, 0), 0.07 + 0.003 * i, 20.0 + 2 * i, (0.5 - 0.1 * i, 0.2, 0), 2.0 - i))
-    return setting(bodies, 5e-5, GRAVITY, stiffness=1e7, damping=100.0, contactDamping=500.0, friction=dict(static=0.5, kinetic=0.3, slip=1e-4, healing=0.1),
-                   walls=[dict(bodies=[0], stiffness=3e7, name="shell"), dict(bodies=[1], stiffness=2e7, friction=0.1, name="flat")], **more)
+    bodies += [log((0.22 * (i % 4) - 0.33, 0.22 * (i // 4) - 0.3, 0), 0.07 + 0.003 * i, 20.0 + 2 * i, (0.5 - 0.1 * i, 0.2, 0), 2.0 - i)
+               for i in range(12)]
+    return setting(bodies, 5e-5, GRAVITY, stiffness=1e7, damping=100.0, contactDamping=500.0,
+                   friction=dict(static=0.5, kinetic=0.3, slip=1e-4, healing=0.1),
+                   walls=[dict(bodies=[0], stiffness=3e7, name="shell"), dict(bodies=[1], stiffness=2e7, friction=0.1, name="flat")],
+                   **more)
 
 
 def save_load():
@@ -212,18 +222,19 @@ def save_load():
         engine = heap(impactsFile=name, velocityAtStart=True)
         O.run(12000, True)
         O.save(f"logs.{ending}")
-        half = open(name).read()
+        half = open(name, encoding="utf-8").read()
         O.run(more, True)
-        straight, lines, end = motion(), open(name).read(), outputs(engine)
+        straight, lines, end = motion(), open(name, encoding="utf-8").read(), outputs(engine)
         O.load(f"logs.{ending}")
         engine = O.engines[1]
         O.save(f"again.{ending}")
         loaded = outputs(engine)
         O.run(more, True)
-        resumed, twice, last = motion(), open(name).read(), outputs(engine)
+        resumed, twice, last = motion(), open(name, encoding="utf-8").read(), outputs(engine)
         O.load(f"again.{ending}")
         O.run(more, True)
-        found[ending] = {"straight": straight, "resumed": resumed, "again": motion(), "lines": lines, "twice": twice, "half": half, "end": end,
+        found[ending] = {"straight": straight, "resumed": resumed, "again": motion(), "lines": lines, "twice": twice, "half": half,
+                         "end": end,
                          "last": last, "loaded": loaded, "stiffness": O.engines[1].stiffness, "friction": O.engines[1].friction,
                          "walls": [[w.name, w.stiffness, w.bodies, w.friction] for w in O.engines[1].walls]}
         # A new time step takes the histories along.
@@ -257,17 +268,19 @@ def save_load():
 
 def records():
     """Lines of the file of impacts: a pair, a wall."""
-    engine = setting([floor(-0.1), log((0, 0, 0), 0.1, 50.0, (1.0, 0, 0)), log((0.25, 0, 0), 0.1, 50.0), log((1, 0.03, 0), 0.1, 40.0, (0, -3.0, 0))],
+    engine = setting([floor(-0.1), log((0, 0, 0), 0.1, 50.0, (1.0, 0, 0)), log((0.25, 0, 0), 0.1, 50.0),
+                      log((1, 0.03, 0), 0.1, 40.0, (0, -3.0, 0))],
                      1e-6, stiffness=2e7, walls=[dict(bodies=[0], stiffness=2e7)], impactsFile="records.txt")
     O.run(80000, True)
-    return {"text": open("records.txt").read(), "outputs": outputs(engine)}
+    return {"text": open("records.txt", encoding="utf-8").read(), "outputs": outputs(engine)}
 
 
 def first_impacts():
     """A small pile that falls together, for comparison with the model alone."""
     radii, masses = (0.1, 0.12, 0.09, 0.11), (30.0, 45.0, 25.0, 35.0)
     places = ((0.0, 0.11), (0.24, 0.13), (0.05, 0.32), (0.28, 0.36))
-    bodies = [floor()] + [log((x, y, 0), r, m, (0.3 - 0.2 * i, -0.5, 0), 1.0 * i) for i, ((x, y), r, m) in enumerate(zip(places, radii, masses))]
+    bodies = [floor()] + [log((x, y, 0), r, m, (0.3 - 0.2 * i, -0.5, 0), 1.0 * i)
+                          for i, ((x, y), r, m) in enumerate(zip(places, radii, masses, strict=True))]
     engine = setting(bodies, 1e-5, GRAVITY, stiffness=1.5e7, friction=0.4, velocityAtStart=True,
                      walls=[dict(bodies=[0], stiffness=4e7, friction=0.4, name="floor")])
     rows = []
@@ -279,6 +292,6 @@ def first_impacts():
 
 out, *names = sys.argv[1:]
 results = {name: globals()[name]() for name in names}
-with open(out, "w") as file:
+with open(out, "w", encoding="utf-8") as file:
     json.dump(results, file)
 print("scenes: finished", flush=True)

@@ -128,7 +128,8 @@ def cylinder_fill():
     begin, out = energy(), -1.0
     for _ in range(60):
         O.run(1000, True)
-        out = max([out] + [math.hypot(b.state.pos[0], b.state.pos[1]) + b.shape.radius - 0.02 for b in O.bodies if isinstance(b.shape, Sphere)])
+        out = max([out] + [math.hypot(b.state.pos[0], b.state.pos[1]) + b.shape.radius - 0.02 for b in O.bodies
+                           if isinstance(b.shape, Sphere)])
     return {"begin": begin, "end": energy(), "out": out}
 
 
@@ -167,7 +168,8 @@ def bridge():
             grain.state.pos, grain.state.vel = Vector3(0, 0, radius + gap), Vector3(0, 0, 0)
             O.step()
             i = next((i for i in O.interactions if i.isReal), None)
-            rows.append([gap, O.forces.f(1)[2], law.bridgeCount(), i.phys.ruptureDistance if i else 0.0, i.phys.capillaryForce if i else 0.0])
+            rows.append([gap, O.forces.f(1)[2], law.bridgeCount(), i.phys.ruptureDistance if i else 0.0,
+                         i.phys.capillaryForce if i else 0.0])
         found[name] = rows
     return found
 
@@ -240,12 +242,13 @@ def dumps():
     builtins.seen = []
 
     def look():
-        seen.append([[list(O.forces.f(i)), list(O.bodies[i].state.vel), list(O.bodies[i].state.pos), O.bodies[i].state.mass] for i in range(5)])
+        seen.append([[list(O.forces.f(i)), list(O.bodies[i].state.vel), list(O.bodies[i].state.pos), O.bodies[i].state.mass]
+                     for i in range(5)])
 
     builtins.look = look
-    O.engines = O.engines[:3] + [PyRunner(iterPeriod=50, firstIterRun=50, command="dump.write(); history.write(); look()")] + O.engines[3:]
+    O.engines = [*O.engines[:3], PyRunner(iterPeriod=50, firstIterRun=50, command="dump.write(); history.write(); look()"), *O.engines[3:]]
     O.run(101, True)
-    read = lambda name: open(name).read()
+    read = lambda name: open(name, encoding="utf-8").read()
     return {"grains": read("grains.dump"), "contacts": read("contacts.dump"), "time": read("time.csv"), "seen": seen}
 
 
@@ -271,7 +274,8 @@ def bad_values():
     cases = [(name, {name: value}) for name, values in {
         "restitution": (0.0, 1.5, math.nan), "staticFriction": (-0.1, math.inf, math.nan), "kineticFriction": (0.9, -0.1, math.nan),
         "criticalSlipDistance": (-1e-6, math.nan), "interfaceShearStrength": (0.0, -1.0, math.nan), "healingTime": (-1.0, math.nan),
-        "bridgeVolume": (-1e-10, math.inf, math.nan), "surfaceTension": (-0.07, math.inf, math.nan), "contactAngle": (math.nan,)}.items() for value in values]
+        "bridgeVolume": (-1e-10, math.inf, math.nan), "surfaceTension": (-0.07, math.inf, math.nan), "contactAngle": (math.nan,)}.items()
+             for value in values]
     cases += [(name, {name: None}) for name in ("restitution", "staticFriction", "kineticFriction", "criticalSlipDistance", "contactAngle")]
     for name, wrong in cases:
         words = {key: value for key, value in {**ok, **wrong}.items() if value is not None}
@@ -334,22 +338,22 @@ def hostile():
         sys.stdout.flush()
         child = os.fork()
         if child == 0:
-            sys.stderr = open(f"{case.__name__}.txt", "w", buffering=1)
+            sys.stderr = open(f"{case.__name__}.txt", "w", encoding="utf-8", buffering=1)
             os.dup2(sys.stderr.fileno(), 2)
             try:
                 case()
                 os._exit(0)
-            except BaseException as error:
+            except BaseException as error:  # noqa: BLE001 (whatever it is, the parent is told)
                 print(f"{type(error).__name__}: {error}", file=sys.stderr)
                 os._exit(3)
         code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-        with open(f"{case.__name__}.txt") as file:
+        with open(f"{case.__name__}.txt", encoding="utf-8") as file:
             found[case.__name__] = [code, file.read().strip()]
     return found
 
 
 out, *names = sys.argv[1:]
 results = {name: globals()[name]() for name in names}
-with open(out, "w") as file:
+with open(out, "w", encoding="utf-8") as file:
     json.dump(results, file)
 print("scenes: finished", flush=True)

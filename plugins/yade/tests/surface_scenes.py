@@ -69,7 +69,7 @@ def sum_of(contacts, name):
 
 def drag(walls, path, steps, joined=True, half=0, **surface):
     """Rows of one sphere on a path (place and velocity as functions of time); saved and loaded after `half` steps."""
-    law, joint = scene(walls, joined, **surface)
+    _, joint = scene(walls, joined, **surface)
     rows = []
 
     def look():
@@ -114,7 +114,8 @@ def flat():
     steps = 4000
     plane = drag([utils.wall(0, 2)], floor_path, steps)
     return {"plane": plane, "patch": drag(facets(patch()), floor_path, steps), "fine": drag(facets(patch(0.8)), floor_path, steps),
-            "reloaded": drag(facets(patch()), floor_path, steps, half=2100), "stock": drag(facets(patch()), floor_path, steps, joined=False)}
+            "reloaded": drag(facets(patch()), floor_path, steps, half=2100),
+            "stock": drag(facets(patch()), floor_path, steps, joined=False)}
 
 
 def bends():
@@ -125,7 +126,8 @@ def bends():
 def corner():
     """A sphere pressed into the corner of three square walls, of planes and of facets."""
     path = lambda t: ((RADIUS - 2e-5, RADIUS - 3e-5, RADIUS - 1e-5 - 0.001 * t), (0, 0, -0.001))
-    square = lambda a, b: [[(0, 0, 0), a, tuple(x + y for x, y in zip(a, b))], [(0, 0, 0), tuple(x + y for x, y in zip(a, b)), b]]
+    add = lambda a, b: tuple(x + y for x, y in zip(a, b, strict=True))
+    square = lambda a, b: [[(0, 0, 0), a, add(a, b)], [(0, 0, 0), add(a, b), b]]
     x, y, z = (0.02, 0, 0), (0, 0.02, 0), (0, 0, 0.02)
     return {"planes": drag([utils.wall(0, k) for k in range(3)], path, 20),
             "facets": drag(facets(square(x, y) + square(y, z) + square(z, x)), path, 20)}
@@ -149,7 +151,7 @@ def periodic():
 
 def changes():
     """Facets that come and go during a run."""
-    law, surface = scene(facets(patch()))
+    scene(facets(patch()))
     builtins.look = lambda: None
     found = []
     grain = O.bodies[0].state
@@ -178,6 +180,6 @@ def messages():
 
 out, *names = sys.argv[1:]
 results = {name: globals()[name]() for name in names}
-with open(out, "w") as file:
+with open(out, "w", encoding="utf-8") as file:
     json.dump(results, file)
 print("scenes: finished", flush=True)

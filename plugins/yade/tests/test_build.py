@@ -29,7 +29,8 @@ def prefix(tmp_path):
 
 
 def overlay(prefix, place):
-    return subprocess.run(["cmake", f"-DPREFIX={prefix}", f"-DOVERLAY={place}", "-DSUBDIR=lib/x/yade", f"-DPLUGIN={prefix.parent}/libdembark_yade.so",
+    return subprocess.run(["cmake", f"-DPREFIX={prefix}", f"-DOVERLAY={place}", "-DSUBDIR=lib/x/yade",
+                           f"-DPLUGIN={prefix.parent}/libdembark_yade.so",
                            f"-DMODULES={HERE}/python", "-P", HERE / "overlay.cmake"], capture_output=True, text=True, check=False)
 
 
@@ -70,14 +71,15 @@ def test_overlay_of_something_else_is_refused(prefix, tmp_path):
     assert not (tmp_path / "overlay").exists()
 
 
-@pytest.mark.parametrize("given, parts", [
+@pytest.mark.parametrize(("given", "parts"), [
     ([], ("YADE_PREFIX=''", "bin/yade")), (["-DYADE_PREFIX={prefix}"], ("YADE_SOURCE_DIR=''", "core/Scene.hpp")),
     (["-DYADE_PREFIX={prefix}", "-DYADE_SOURCE_DIR={tmp}/source"], ("DEMBARK_YADE_DEFINITIONS", "-DYADE_REAL_BIT=64"))])
 def test_wrong_set_up_names_the_variable(prefix, tmp_path, given, parts):
     (tmp_path / "source/core").mkdir(parents=True)
     (tmp_path / "source/core/Scene.hpp").touch()
     words = [word.format(prefix=prefix, tmp=tmp_path) for word in given]
-    done = subprocess.run(["cmake", "-S", HERE, "-B", tmp_path / "build", "-DCMAKE_CXX_COMPILER_WORKS=1", *words], capture_output=True, text=True,
+    done = subprocess.run(["cmake", "-S", HERE, "-B", tmp_path / "build", "-DCMAKE_CXX_COMPILER_WORKS=1", *words], capture_output=True,
+                          text=True,
                           check=False)
     assert done.returncode != 0
     text = " ".join(done.stderr.split())
@@ -109,7 +111,8 @@ def test_what_could_change_the_layout_of_classes_unseen_is_not_guessed(tmp_path)
 
 
 def test_classes_of_other_folders_are_declared_and_own_ones_defined(tmp_path):
-    for path, text in {"core/Body.hpp": "#pragma once\n", "core/Bare.hpp": "", "pkg/common/Wide.hpp": "#pragma once\n#include <pkg/dem/Own.hpp>\n",
+    for path, text in {"core/Body.hpp": "#pragma once\n", "core/Bare.hpp": "",
+                       "pkg/common/Wide.hpp": "#pragma once\n#include <pkg/dem/Own.hpp>\n",
                        "pkg/dem/Own.hpp": "#pragma once\n", "core/Subdomain.hpp": "#pragma once\n"}.items():
         (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / path).write_text(text)

@@ -123,7 +123,8 @@ def test_history_has_the_liquid(found):
 def test_wrong_words_are_told_in_one_line(found):
     said = found["messages"]
     for message, part in zip(said, ("share is 'all'; it must be cap or fraction", "(0, 2]", "(0, 1]", "equal, radius or taken",
-                                    "content", "maxBridge", "volume", "no sphere", "no wall", "share and part", "belongs to a wall already"), strict=True):
+                                    "content", "maxBridge", "volume", "no sphere", "no wall", "share and part",
+                                    "belongs to a wall already"), strict=True):
         assert message.startswith("dembark: CapillaryLiquid") and "\n" not in message
         assert part in message, message
 

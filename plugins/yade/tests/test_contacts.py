@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from dembark.physics import (
-    Body, Contact, FinnieRabinowicz, capillary_force, collide, drop, effective_shear_modulus, effective_youngs_modulus, rupture_distance,
+    Body,
+    Contact,
+    FinnieRabinowicz,
+    capillary_force,
+    collide,
+    drop,
+    effective_shear_modulus,
+    effective_youngs_modulus,
+    rupture_distance,
 )
 
 YOUNG, POISSON, DENSITY, STEP = 5e6, 0.3, 2500.0, 2e-6
@@ -18,7 +26,8 @@ WET = {"bridge_volume": 2e-10, "surface_tension": 0.072, "contact_angle": 0.35}
 
 @pytest.fixture(scope="module")
 def found(yade):
-    return yade.scenes("plain_law", "walls", "held_sphere", "cylinder", "cylinder_fill", "periodic", "bridge", "energy", "hooke", "messages",
+    return yade.scenes("plain_law", "walls", "held_sphere", "cylinder", "cylinder_fill", "periodic", "bridge", "energy", "hooke",
+                       "messages",
                        "bad_values", "hostile")
 
 
@@ -43,7 +52,8 @@ def test_defaults_of_the_law_need_no_word(found):
 
 @pytest.mark.parametrize("wall", ["wall", "box", "facet"])
 def test_drop_on_every_wall_is_that_of_python(found, wall):
-    grain = Body(radius=0.0025, mass=mass(0.0025), position=(0.001, 0.0005, 0.00251), velocity=(0.3, 0.1, -0.5), angular_velocity=(20, -30, 10))
+    grain = Body(radius=0.0025, mass=mass(0.0025), position=(0.001, 0.0005, 0.00251), velocity=(0.3, 0.1, -0.5),
+                 angular_velocity=(20, -30, 10))
     motion = drop(Contact(**PAIR, **WET, capillary_model="exact"), grain, time_step=STEP, steps=1200, gravity=(0, 0, 0))
     rows = np.asarray(found["walls"][wall]["rows"])[:, 0]
     assert_path(rows, motion, 0)
@@ -152,9 +162,11 @@ def test_each_wrong_number_is_told(found):
     for case, said in found["bad_values"].items():
         name = case.split()[0]
         if name == "healingTime" or "Friction" in name or "Slip" in name or "Strength" in name:
-            name = {"healingTime": "healing time", "staticFriction": "static", "kineticFriction": "kinetic", "criticalSlipDistance": "ritical",
+            name = {"healingTime": "healing time", "staticFriction": "static", "kineticFriction": "kinetic",
+                    "criticalSlipDistance": "ritical",
                     "interfaceShearStrength": "hear"}[name]
-        assert said.startswith("dembark: ") and "\n" not in said and name.lower() in said.lower().replace("staticfriction", "static friction"), (case, said)
+        assert said.startswith("dembark: ") and "\n" not in said and name.lower() in said.lower().replace("staticfriction",
+                                                                                                          "static friction"), (case, said)
 
 
 @pytest.mark.parametrize("scene", ["coincident", "erased", "on_top_of_a_bridge", "crowd"])

@@ -137,17 +137,17 @@ def test_parameters_and_column(yade):
     assert len(sites) == 3 * 3 * 2
     assert sites[0] == pytest.approx([0.00345, 0.00345, 0.01345])
     assert columns[0] == columns[1] != columns[2]
-    for grains in columns:
-        grains = np.array(grains)
+    for grains in map(np.array, columns):
         assert len(grains) == 17
         assert np.all(np.abs(grains[:, 3] / 0.0025 - 1.0) <= 0.2)
         gaps = np.linalg.norm(grains[:, None, :3] - grains[None, :, :3], axis=2) - grains[:, None, 3] - grains[None, :, 3]
         assert gaps[~np.eye(17, dtype=bool)].min() > 0.0
 
 
-@pytest.mark.parametrize("word, parts", [
+@pytest.mark.parametrize(("word", "parts"), [
     ("diameter=-1", ("diameter=-1", "> 0 m")), ("diameter=wide", ("diameter=wide", "number (m)")), ("diameter=nan", ("must be a number",)),
-    ("grain_count=2.5", ("integer",)), ("shape=flat", ("round, square",)), ("size=3", ("size is unknown", "diameter")), ("diameter", ("key=value",))])
+    ("grain_count=2.5", ("integer",)), ("shape=flat", ("round, square",)), ("size=3", ("size is unknown", "diameter")),
+    ("diameter", ("key=value",))])
 def test_wrong_parameter_is_one_line_and_code_2(yade, word, parts):
     (yade.folder / "case.toml").write_text(CASE)
     done = yade(script(yade, "wrong", "dembark.parameters('case.toml')\nprint('went on')\n"), word)
@@ -205,14 +205,16 @@ def test_parameters_are_found_beside_the_script(yade):
     assert "count 3" in done.stdout, done.stderr
 
 
-@pytest.mark.parametrize("call, parts, code", [
+@pytest.mark.parametrize(("call", "parts", "code"), [
     ("del full['restitution']; drop(full)", ("restitution is not set",), 2),
-    ("drop(full | dict(staticFriction=MatchMaker(matches=((0, 1, 0.5),))))", ("staticFriction has no value", "materials 0 and 0", "matches"), 2),
+    ("drop(full | dict(staticFriction=MatchMaker(matches=((0, 1, 0.5),))))",
+     ("staticFriction has no value", "materials 0 and 0", "matches"), 2),
     ("drop(full | dict(kineticFriction=0.6))", ("kinetic friction must not exceed static friction", "materials 0 and 0"), 2),
     ("drop(full | dict(restitution=1.5))", ("restitution", "1.5", "<= 1"), 2),
     ("drop(full | dict(bridgeVolume=1e-10))", ("surfaceTension", "N/m"), 2),
     ("drop(full | dict(bridgeVolume=1e-10, surfaceTension=0.07), dict(capillaryModel='exact'))", ("contactAngle is not set",), 2),
-    ("drop(full | dict(bridgeVolume=1e-10, surfaceTension=0.07, contactAngle=2.0), dict(capillaryModel='exact'))", ("contactAngle", "pi/2"), 2),
+    ("drop(full | dict(bridgeVolume=1e-10, surfaceTension=0.07, contactAngle=2.0), dict(capillaryModel='exact'))", ("contactAngle", "pi/2"),
+     2),
     ("drop(full, dict(normalLaw='hooke'))", ("characteristicVelocity", "m/s"), 2),
     ("drop(full, speed=300.0)", ("sphere 1 went through wall 0", "time step"), 1)])
 def test_wrong_property_is_one_line_even_from_the_loop(yade, call, parts, code):

@@ -218,7 +218,7 @@ def test_bodies_come_and_go(found):
 def test_numbers_belong_to_the_last_step_that_is_over(found):
     """Asked within a step, before the integrator or behind it, the account is that of the step before."""
     case = found["in_a_step"]
-    for where, iteration, kinetic, balance, step in case["seen"]:
+    for where, iteration, _, balance, step in case["seen"]:
         assert step == iteration - 1 and abs(balance) < 1e-14 * case["end"]["first_kinetic"], where
     by_step = {}
     for _, iteration, kinetic, _, _ in case["seen"]:
@@ -261,7 +261,8 @@ SAID = {"no integrator": ("no NewtonIntegrator", "exactly one"), "two integrator
         "before the loop": ("after InteractionLoop and before NewtonIntegrator",),
         "after the integrator": ("after InteractionLoop and before NewtonIntegrator",), "density scaling": ("densityScaling", "False"),
         "clump": ("body 0", "clump", "single spheres"), "aspherical": ("body 0", "aspherical", "exactAsphericalRot to False"),
-        "cell": ("cell deforms", "velGrad"), "missed": ("expected step 1", "step 2", "reset()"), "unknown": ("'heat'", "kinetic, first_kinetic")}
+        "cell": ("cell deforms", "velGrad"), "missed": ("expected step 1", "step 2", "reset()"),
+        "unknown": ("'heat'", "kinetic, first_kinetic")}
 
 
 @pytest.mark.parametrize("name", SAID)
@@ -271,7 +272,7 @@ def test_scene_that_cannot_be_booked_is_refused(found, name):
     assert all(part in said for part in SAID[name]), said
 
 
-@pytest.mark.parametrize("name, parts", [
+@pytest.mark.parametrize(("name", "parts"), [
     ("other_law", ("bodies 0 and 1", "FrictPhys", "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz")),
     ("without_account", ("energies", "EnergyAccount in O.engines"))])
 def test_scene_without_known_energies_ends_with_a_line(yade, found, name, parts):

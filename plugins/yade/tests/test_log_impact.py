@@ -219,7 +219,8 @@ def test_first_impacts_of_a_falling_pile_are_those_of_the_model_alone(yade):
     done = yade(HERE / "log_scenes.py", str(out), "first_impacts")
     assert "scenes: finished" in done.stdout, (done.stdout + done.stderr)[-3000:]
     case = json.loads(out.read_text())["first_impacts"]
-    system = ImpactSystem(case["masses"], case["radii"], case["places"], [[0.3 - 0.2 * i, -0.5] for i in range(4)], spin=[0.0, 1.0, 2.0, 3.0],
+    system = ImpactSystem(case["masses"], case["radii"], case["places"], [[0.3 - 0.2 * i, -0.5] for i in range(4)],
+                          spin=[0.0, 1.0, 2.0, 3.0],
                           stiffness=1.5e7, gravity=(0.0, -9.81), friction=0.4,
                           walls=[Plane(point=(0.0, 0.0), normal=(0.0, 1.0), stiffness=4e7, friction=0.4)])
     motion = system.run(8000 * 1e-5, 1e-5)

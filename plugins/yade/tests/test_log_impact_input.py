@@ -58,7 +58,8 @@ CASES = [
     ("step(stiffness='high')", ("LogImpact.stiffness is high", "number")),
     ("step(stiffness={'birch': 1e7})", ("no material birch", "id or the label")),
     ("step(stiffness={bark: -1})", ("LogImpact.stiffness[0] is -1", "> 0 N/m")),
-    ("O.materials.append(FrictMat(label='b'))\nO.bodies[1].mat = O.materials[1]\nstep(stiffness={'bark': 1e7})", ("stiffness has no value for material 1",)),
+    ("O.materials.append(FrictMat(label='b'))\nO.bodies[1].mat = O.materials[1]\nstep(stiffness={'bark': 1e7})",
+     ("stiffness has no value for material 1",)),
     ("step(damping=-1)", ("LogImpact.damping is -1", ">= 0 N s/m")),
     ("step(contactDamping=-1)", ("LogImpact.contactDamping is -1", ">= 0 N s/m")),
     ("step(theta=0.4)", ("LogImpact.theta is 0.4", "0.5...1")),
@@ -79,11 +80,13 @@ CASES = [
     ("step(walls=[dict(stiffness=1e7)])", ("walls[0].bodies is empty",)),
     ("step(walls=[dict(floor, bodies=[7])])", ("walls[0] 'floor'.bodies: body 7 does not exist",)),
     ("step(walls=[dict(floor, bodies=[1])])", ("body 1 can move freely", "xyzXYZ")),
-    ("O.bodies.append(box((0, -1, 0), (1, 1, 1), fixed=True))\nstep(walls=[dict(floor, bodies=[3])])", ("body 3 is a Box", "Wall, a CylinderWall or a Facet")),
+    ("O.bodies.append(box((0, -1, 0), (1, 1, 1), fixed=True))\nstep(walls=[dict(floor, bodies=[3])])",
+     ("body 3 is a Box", "Wall, a CylinderWall or a Facet")),
     ("O.bodies.append(utils.wall(1, 0))\nstep(walls=[dict(floor, bodies=[0, 3])])", ("several bodies must be all Facet",)),
     ("newton.damping = 0.2\nstep()", ("NewtonIntegrator.damping is 0.2", "must be 0")),
     ("newton.mask = 1\nstep()", ("NewtonIntegrator.mask is 1",)),
-    ("impact = LogImpact(stiffness=1e7)\nO.engines = [ForceResetter(), newton, impact]\nO.step()", ("LogImpact stands after NewtonIntegrator",)),
+    ("impact = LogImpact(stiffness=1e7)\nO.engines = [ForceResetter(), newton, impact]\nO.step()",
+     ("LogImpact stands after NewtonIntegrator",)),
     ("O.engines = [ForceResetter(), LogImpact(stiffness=1e7)]\nO.step()", ("no NewtonIntegrator after it",)),
     ("step(between=[GravityEngine(gravity=(0, -1, 0))])", ("GravityEngine stands after LogImpact",)),
     ("O.periodic = True\nstep()", ("periodic",)),
@@ -118,9 +121,10 @@ def test_wrong_input_is_one_line(said, number):
     assert all(part in said[number] for part in CASES[number][1]), said[number]
 
 
-@pytest.mark.parametrize("call, parts, code", [
+@pytest.mark.parametrize(("call", "parts", "code"), [
     # Raised in YADE's own thread, by a function of yade.dembark, when the engine is made.
-    ("scene()\nnewton.damping = 0.2\nO.engines = [ForceResetter(), LogImpact(stiffness=1e7), newton]\nO.run(2, True)", ("damping is 0.2",), 2),
+    ("scene()\nnewton.damping = 0.2\nO.engines = [ForceResetter(), LogImpact(stiffness=1e7), newton]\nO.run(2, True)", ("damping is 0.2",),
+     2),
     ("scene()\ndembark.log((0, 0, 0), 0.1, -3)", ("log: mass -3", "> 0 kg"), 2),
     ("scene()\ndembark.drum((0, 0, 0), 1, axis='w')", ("drum: axis 'w'", "x, y or z"), 2),
     ("LogImpact(theta=2)", ("LogImpact.theta is 2",), 2)])

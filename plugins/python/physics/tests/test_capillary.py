@@ -124,7 +124,8 @@ GOOD = {"radius_i": R, "radius_j": R, "gap": 0.0, "volume": 1e-12, "surface_tens
 
 @pytest.mark.parametrize(("change", "words"), [
     ({"radius_i": 0.0}, "radius_i must be > 0 m"), ({"radius_j": -R}, "radius_j"), ({"radius_i": np.inf, "radius_j": np.inf}, "two walls"),
-    ({"gap": np.nan}, "gap must be a number \\(m\\), not nan"), ({"volume": -1e-12}, "volume must be >= 0 m\\^3"), ({"volume": [1e-12, np.inf]}, "volume"),
+    ({"gap": np.nan}, "gap must be a number \\(m\\), not nan"), ({"volume": -1e-12}, "volume must be >= 0 m\\^3"),
+    ({"volume": [1e-12, np.inf]}, "volume"),
     ({"surface_tension": -1.0}, "surface_tension"), ({"contact_angle": 1.6}, "contact_angle must be between 0 and 1.5708 rad"),
     ({"contact_angle": -0.1}, "contact_angle"), ({"model": "magic"}, "'magic' is unknown; it can be exact, willett"),
 ])

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from dembark.physics import (
-    Body, Contact, FinnieRabinowicz, collide, drop, effective_shear_modulus, effective_youngs_modulus, rupture_distance,
+    Body,
+    Contact,
+    FinnieRabinowicz,
+    collide,
+    drop,
+    effective_shear_modulus,
+    effective_youngs_modulus,
+    rupture_distance,
 )
 
 ELASTIC = (1e7, 0.3, 1e7, 0.3)

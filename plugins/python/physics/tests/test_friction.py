@@ -1,5 +1,6 @@
 """Limits and balances of the Finnie-Rabinowicz law along prescribed paths."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -131,7 +132,7 @@ def fine(corners):
     """Straight lines between the corners in steps of at most 2 % of the limit's displacement, back to the start."""
     corners = np.vstack([np.zeros(2), corners, np.zeros(2)])
     pieces = [a + (b - a) * np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(b - a) / 1.2e-7))[1:, None]
-              for a, b in zip(corners, corners[1:], strict=False)]
+              for a, b in itertools.pairwise(corners)]
     return np.vstack(pieces)
 
 

@@ -172,7 +172,8 @@ def test_every_method_gives_the_same_forces():
 def test_in_space():
     """A ball that slides and spins on a floor obliquely; the axis of its spin turns as friction says."""
     ball = ImpactSystem(1.0, 0.1, [[0, 0, 0.1 - G / 5e6]], [[1.0, 2.0, 0]], spin=[[0, 0, 0]], stiffness=1e7, gravity=(0, 0, -G),
-                        inertia="sphere", friction=0.5, contact_damping=1e3, walls=[Plane(point=(0, 0, 0), normal=(0, 0, 1), stiffness=1e7)])
+                        inertia="sphere", friction=0.5, contact_damping=1e3,
+                        walls=[Plane(point=(0, 0, 0), normal=(0, 0, 1), stiffness=1e7)])
     motion = ball.run(1.0, 1e-5, every=1000)
     np.testing.assert_allclose(motion.velocity[-1, 0], [5 / 7, 10 / 7, 0], atol=3e-3)
     np.testing.assert_allclose(motion.spin[-1, 0] * 0.1, [-10 / 7, 5 / 7, 0], atol=3e-3)

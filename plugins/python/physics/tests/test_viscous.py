@@ -7,7 +7,14 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from dembark.physics import (
-    CAPILLARY_MODELS, Body, Contact, FinnieRabinowicz, capillary_force, collide, rupture_distance, viscous_resistance,
+    CAPILLARY_MODELS,
+    Body,
+    Contact,
+    FinnieRabinowicz,
+    capillary_force,
+    collide,
+    rupture_distance,
+    viscous_resistance,
 )
 
 R, ETA, FLOOR, GAMMA, ANGLE = 1e-3, 0.05, 1e-6, 0.072, 0.35
