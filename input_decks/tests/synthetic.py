@@ -8,39 +8,23 @@ from typing import Any
 
 import numpy as np
 from dembark.physics import capillary_force
-from dumps import contacts_text, grains_text, write_times
+from dembark.postproc.tests.dumps import contacts_text, grains_text, write_times
 
 GRAVITY, DIAMETER, DENSITY = 9.81, 0.005, 2500.0
 FRAMES = 40
 
 
-def _finish(
+def finish(
     folder: Path, engine: str, replica: int, case: str, variant: str, parameters: dict[str, Any], grains: list[str], contacts: list[str]
 ) -> None:
     (folder / "grains.dump").write_text("".join(grains))
     (folder / "contacts.dump").write_text("".join(contacts))
-    provenance = {
-        "commit": "0" * 40,
-        "dirty": False,
-        "versions": {"python": "3.11"},
-        "flags": {},
-        "wall_time": 10.0,
-        "particle_steps_per_second": 1e6,
-    }
-    record = {
-        "case": case,
-        "variant": variant,
-        "profile": "quick",
-        "engine": engine,
-        "replica": replica,
-        "parameters": parameters,
-        "seed": replica,
-        "steps": 10000,
-        "time_step": 1e-5,
-        "frames": len(grains),
-        "inputs": "",
-        "provenance": provenance,
-    }
+    provenance = {"commit": "0" * 40, "dirty": False, "versions": {"python": "3.11"}, "flags": {}, "wall_time": 10.0,
+                  "particle_steps_per_second": 1e6}
+    friction = parameters["wall_friction"]
+    record = {"case": case, "variant": variant, "profile": "quick", "engine": engine, "replica": replica, "seed": replica,
+              "parameters": {**parameters, "seed": replica}, "derived": {"wall_static": friction, "wall_kinetic": friction}, "steps": 10000,
+              "time_step": 1e-5, "frames": len(grains), "inputs": "", "provenance": provenance}
     (folder / "run.json").write_text(json.dumps(record))
 
 
@@ -98,11 +82,7 @@ def silo(
             "step": steps,
             "time": steps * 1e-5,
             "kinetic_energy": 0 * side_fz,
-            "side_fx": 0 * side_fz,
-            "side_fy": 0 * side_fz,
             "side_fz": (1.0 - lost_wall_force) * side_fz,
-            "base_fx": 0 * side_fz,
-            "base_fy": 0 * side_fz,
             "base_fz": base_fz,
         },
     )
@@ -111,13 +91,11 @@ def silo(
         "grain_diameter": DIAMETER,
         "gravity": GRAVITY,
         "wall_friction": 0.5,
-        "static_friction": None,
         "grain_density": DENSITY,
-        "seed": replica,
         "grain_count": len(place),
         **liquid,
     }
-    _finish(folder, engine, replica, "silo", variant, parameters, grains, contacts)
+    finish(folder, engine, replica, "silo", variant, parameters, grains, contacts)
     return folder.parent
 
 
@@ -190,9 +168,7 @@ def plug_flow(
         "grain_density": DENSITY,
         "settle_time": 0.5,
         "wall_friction": 0.5,
-        "static_friction": None,
-        "seed": replica,
         "grain_count": len(place),
     }
-    _finish(folder, engine, replica, "plug_flow", variant, parameters, grains, contacts)
+    finish(folder, engine, replica, "plug_flow", variant, parameters, grains, contacts)
     return folder.parent

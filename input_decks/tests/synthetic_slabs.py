@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from dumps import contacts_text, grains_text, write_times
-from synthetic import DENSITY, DIAMETER, FRAMES, GRAVITY, _finish
+from dembark.input_decks.tests.synthetic import DENSITY, DIAMETER, FRAMES, GRAVITY, finish
+from dembark.postproc.tests.dumps import contacts_text, grains_text, write_times
 
 STEP = 1e-5
 
@@ -54,9 +54,9 @@ def plane_silo(
     write_times(folder / "time.csv", {"step": steps, "time": steps * STEP, "kinetic_energy": 0.0 * steps, **table})
     parameters = {
         "silo_width": width, "slab_depth": depth, "grain_diameter": DIAMETER, "gravity": GRAVITY, "wall_friction": 0.3,
-        "static_friction": None, "grain_density": DENSITY, "seed": replica,
+        "grain_density": DENSITY,
     }
-    _finish(folder, "liggghts", replica, "plane_silo", "dry", parameters, grains, contacts)
+    finish(folder, "liggghts", replica, "plane_silo", "dry", parameters, grains, contacts)
     return folder.parent
 
 
@@ -126,7 +126,7 @@ def gravity_channel(
     write_times(folder / "time.csv", {"step": rows, "time": rows * STEP, "kinetic_energy": energy, "left_fz": held, "right_fz": held})
     parameters = {
         "channel_width": width, "channel_depth": depth, "grain_diameter": DIAMETER, "gravity": GRAVITY, "wall_friction": 0.5,
-        "static_friction": None, "grain_density": DENSITY, "seed": replica,
+        "grain_density": DENSITY,
     }
-    _finish(folder, "liggghts", replica, "gravity_channel", variant, parameters, grains, contacts)
+    finish(folder, "liggghts", replica, "gravity_channel", variant, parameters, grains, contacts)
     return folder.parent

@@ -1,13 +1,13 @@
-"""The checks of plane silo and gravity-driven channel find what was put into synthetic runs, and do not pass what is wrong."""
+"""What is measured of plane silo and gravity-driven channel finds what was put into synthetic runs, and does not pass what is wrong."""
 
 import numpy as np
 import pytest
-from dembark.validation.checks.gravity_channel import study
-from dembark.validation.checks.vessel import Cylinder, Slab
-from dembark.validation.checks.widths import common_exponential, exponent
-from dembark.validation.metrics import measure
+from dembark.input_decks.tests.measuring import judged, module
+from dembark.input_decks.tests.synthetic_slabs import gravity_channel, plane_silo
 from dembark.postproc.statistics import Estimate
-from synthetic_slabs import gravity_channel, plane_silo
+from dembark.validation.metrics import measure
+
+CHANNEL = module("gravity_channel")
 
 
 def by_name(content):
@@ -36,24 +36,6 @@ def test_both_walls_of_the_plane_silo_count(tmp_path):
     # What differs from wall to wall is what the packing's disorder may do, so the interval is wider.
     widths = [one["stress_ratio_k"]["interval"][1] - one["stress_ratio_k"]["interval"][0] for one in (even, tilted)]
     assert widths[1] > 10.0 * widths[0]
-
-
-@pytest.mark.parametrize("vessel", [Cylinder(0.025), Slab(0.05, 0.03)])
-def test_sectors_share_out_everything(vessel):
-    random = np.random.default_rng(1)
-    place = np.column_stack([random.uniform(0.0026, 0.0224, 200), random.uniform(-0.02, 0.05, 200), random.uniform(0, 1, 200)])
-    radii = random.uniform(0.002, 0.003, 200)
-    sectors = vessel.sectors(0.005)
-    np.testing.assert_allclose(vessel.wall_shares(place, sectors).sum(axis=1), 1.0)
-    np.testing.assert_allclose(vessel.volume_shares(place, radii, sectors).sum(axis=1), 1.0)
-    np.testing.assert_allclose(np.linalg.norm(vessel.inward(place), axis=1), 1.0)
-    # A step inward leads away from the wall by as much.
-    np.testing.assert_allclose(vessel.distance(place + 1e-4 * vessel.inward(place)) - vessel.distance(place), 1e-4, rtol=1e-6)
-
-
-def test_walls_of_both_vessels_have_two_over_size_of_area_for_a_volume():
-    assert Cylinder(0.02).area * 2.0 / Cylinder(0.02).size == pytest.approx(2.0 * np.pi * 0.02)
-    assert Slab(0.05, 0.03).area * 2.0 / Slab(0.05, 0.03).size == pytest.approx(2.0 * 0.03)
 
 
 def test_channel_with_a_known_profile(tmp_path):
@@ -90,14 +72,14 @@ def test_widths_that_grow_as_published(tmp_path):
         measure(gravity_channel(tmp_path, cells=cells, variant=f"w{cells}", decay=0.1 * cells, noise=0.005, seed=cells))
         for cells in (20, 30, 40)
     ]
-    found, drawn, _ = study("width", points[::-1], "channel_width")
-    value = {one.name: one for one in found}
-    assert value["exponent_greatest_velocity"].estimate.value == pytest.approx(0.5, abs=0.03)
-    assert value["exponent_slip_velocity"].estimate.value == pytest.approx(0.5, abs=0.05)
-    assert value["exponent_thickness"].estimate.value == pytest.approx(1.0, abs=0.15)
-    assert value["ratio_spread"].judged()[0] == "pass"
-    assert value["profile_collapse"].estimate.value < 0.1 and value["profile_collapse"].judged()[0] == "info"
-    assert value["exponent_thickness"].judged()[0] == "info"
+    found = CHANNEL.study("width", points[::-1], "channel_width")
+    value, drawn = judged("gravity_channel", found), found.profiles
+    assert value["exponent_greatest_velocity"]["value"] == pytest.approx(0.5, abs=0.03)
+    assert value["exponent_slip_velocity"]["value"] == pytest.approx(0.5, abs=0.05)
+    assert value["exponent_thickness"]["value"] == pytest.approx(1.0, abs=0.15)
+    assert value["ratio_spread"]["verdict"] == "pass"
+    assert value["profile_collapse"]["value"] < 0.1 and value["profile_collapse"]["verdict"] == "info"
+    assert value["exponent_thickness"]["verdict"] == "info"
     assert [one["place"] for one in drawn[:3]] == [pytest.approx([20.0, 30.0, 40.0])] * 3
 
 
@@ -106,16 +88,16 @@ def test_a_ratio_that_changes_with_the_width_fails(tmp_path):
         measure(gravity_channel(tmp_path, cells=cells, variant=f"w{cells}", slip=slip, noise=0.005))
         for cells, slip in ((20, 2.4), (30, 2.0), (40, 1.6))
     ]
-    value = {one.name: one for one in study("width", points, "channel_width")[0]}
-    assert value["ratio_spread"].judged()[0] == "fail"
-    assert value["exponent_slip_velocity"].estimate.value == pytest.approx(0.5 + np.log(1.6 / 2.4) / np.log(2.0), abs=0.1)
+    value = judged("gravity_channel", CHANNEL.study("width", points, "channel_width"))
+    assert value["ratio_spread"]["verdict"] == "fail"
+    assert value["exponent_slip_velocity"]["value"] == pytest.approx(0.5 + np.log(1.6 / 2.4) / np.log(2.0), abs=0.1)
 
 
 def test_exponent_and_common_exponential():
     widths = np.array([1.0, 2.0, 4.0])
-    found = exponent(widths, [Estimate(3.0 * width**0.7, 0.03 * width**0.7) for width in widths])
+    found = CHANNEL.exponent(widths, [Estimate(3.0 * width**0.7, 0.03 * width**0.7) for width in widths])
     assert found.value == pytest.approx(0.7)
     assert found.half == pytest.approx(0.01 * np.sqrt(2.0) / np.log(4.0))
     place = np.linspace(0.5, 4.0, 20)
-    assert common_exponential([(place, 1.3 * np.exp(-place)), (2 * place, 1.3 * np.exp(-2 * place))]) == pytest.approx((1.3, 0.0))
-    assert common_exponential([(place, 1.3 * np.exp(-place)), (place, np.exp(-2 * place))])[1] > 0.1
+    assert CHANNEL.common_exponential([(place, 1.3 * np.exp(-place)), (2 * place, 1.3 * np.exp(-2 * place))]) == pytest.approx((1.3, 0.0))
+    assert CHANNEL.common_exponential([(place, 1.3 * np.exp(-place)), (place, np.exp(-2 * place))])[1] > 0.1
