@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from dembark.postproc import ContactFrame, ContactsDump, DumpError, GrainFrame, GrainsDump, read_times
 from numpy.typing import NDArray
+
+from dembark.postproc import ContactFrame, ContactsDump, DumpError, GrainFrame, GrainsDump, read_times
 
 Array = NDArray[np.float64]
 Measured = TypeVar("Measured")

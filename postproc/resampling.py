@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.postproc.replica import Array
 from dembark.postproc.statistics import ONE_SAMPLE, Estimate, block_count, jackknife, over_replicas
-from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+
 from dembark.postproc import profiles
 from dembark.postproc.instruments.channel import Channel, Mask, cells_across, frame_rows, joined, steady_part
 from dembark.postproc.measurement import Measurement, Value
@@ -56,7 +58,7 @@ def read(replica: Replica) -> Channel:
 def _imbalance(times: Mapping[str, Array], steps: Array, fall: Array, weight: float) -> Array:
     """Friction over weight, minus 1, plus what accelerates the grains, between frames; `fall` (frames,): mean velocity over g (steps)."""
     friction, when = times["left_fz"] + times["right_fz"], times["step"]
-    held = [friction[(when > low) & (when <= high)].mean() / weight for low, high in zip(steps[:-1], steps[1:], strict=True)]
+    held = [friction[(when > low) & (when <= high)].mean() / weight for low, high in pairwise(steps)]
     return np.array(held) - 1.0 + np.diff(fall) / np.diff(steps)
 
 
@@ -165,7 +167,7 @@ def common_exponential(curves: Sequence[tuple[Array, Array]]) -> tuple[float, fl
     return a, float(np.abs(value - a * np.exp(-place)).max())
 
 
-def study(name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
+def study(_name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
     """Exponents of velocities and thickness in the width, and the scaled profiles of all widths."""
     points = sorted(points, key=lambda point: float(point["parameters"][along]))
     given, widths = points[0]["parameters"], np.array([float(point["parameters"][along]) for point in points])

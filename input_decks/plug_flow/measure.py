@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+
 from dembark.postproc.instruments import channel_fields
 from dembark.postproc.instruments.channel import Channel, read
 from dembark.postproc.instruments.liquid import liquid_values
@@ -21,6 +22,11 @@ from dembark.postproc.statistics import CONFIDENCE, Estimate, block_mean
 LEAST_DEFICIT = 0.02
 # What nothing is said of when no steady part was found.
 JUDGED = ("core_flatness", "flux_error", "inertial_number", "force_balance_error")
+REMARKS = (
+    "The published flow is driven by gravity alone; here the plate sets the speed, so the widths are shown and not judged by it.",
+    ("Published widths of shear zones exist for rough and smooth walls; none of these papers could be read for this report, so no range is "
+     "quoted."),
+)
 
 
 def measure(replicas: Sequence[Replica]) -> Measurement:
@@ -36,15 +42,11 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
     told = f"the wall's static friction is {replicas[0].derived['wall_static']:g}"
     values["wall_mobilisation"] = Value(over["wall_mobilisation"], detail=told)
     fields = channel_fields.measured(replicas, unsteady)
-    remarks = [
-        unsteady + "." if unsteady
-        else f"The steady part holds {first.steady_share:.0%} of the measuring window (MSER-5 and a drift test on the wall friction).",
-        f"The channel is {first.width / first.diameter:.0f} d wide and filled {first.height / first.diameter:.0f} d high; the cells that "
-        f"rest in the laboratory cover {(first.levels[-1] - first.levels[0]) / first.diameter:.0f} d of it.",
-        "The published flow is driven by gravity alone; here the plate sets the speed, so the widths are shown and not judged by it.",
-        "Published widths of shear zones exist for rough and smooth walls; none of these papers could be read for this report, so no range "
-        "is quoted.",
-    ]
+    steady = f"The steady part holds {first.steady_share:.0%} of the measuring window (MSER-5 and a drift test on the wall friction)."
+    d, window = first.diameter, first.levels[-1] - first.levels[0]
+    size = (f"The channel is {first.width / d:.0f} d wide and filled {first.height / d:.0f} d high; the cells that rest in the laboratory "
+            f"cover {window / d:.0f} d of it.")
+    remarks = [unsteady + "." if unsteady else steady, size, *REMARKS]
     return Measurement({**values, **liquid_values(replicas), **fields.values}, _profiles(channels), remarks, fields.fields)
 
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+
 from dembark.postproc.instruments import janssen, silo, silo_fields
 from dembark.postproc.instruments.column import read
 from dembark.postproc.instruments.liquid import liquid_values
@@ -29,7 +30,7 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
                    fields=fields.fields)
 
 
-def study(name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
+def study(_name: str, points: Sequence[Mapping[str, Any]], _along: str) -> Measurement:
     """The apparent mass of the fillings `points` against Janssen's law for the base, M_app = M_sat (1 - exp(-M / M_sat))."""
     points = sorted(points, key=lambda point: measured(point, "filled_mass").value)
     mass = np.array([measured(point, "filled_mass").value for point in points])
@@ -51,5 +52,6 @@ def study(name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measure
     }
     curve = profile("apparent_mass", "Apparent mass", "filled mass (kg)", "force on the base / g (kg)", mass, [apparent], half=halves,
                     reference=law, reference_label="Janssen, nothing fitted")
-    return Measurement(values, [curve], ["Each point is a packing of its own, filled by rain to that height, with the wall creeping "
-                                         "upward, so that all have the same history."])
+    remark = ("Each point is a packing of its own, filled by rain to that height, with the wall creeping upward, so that all have the same "
+              "history.")
+    return Measurement(values, [curve], [remark])

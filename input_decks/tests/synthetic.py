@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from dembark.physics import capillary_force
 from dembark.postproc.tests.dumps import contacts_text, grains_text, write_times
 
@@ -141,7 +142,7 @@ def plug_flow(
         velocity[:, 2] = -speed * (profile + noise * random.standard_normal(len(place)))
         grains.append(grains_text(int(step), now, radii, velocities=velocity, masses=mass, walls=walls, box=box, flags=flags))
         first = now[neighbour]
-        second = first + [DIAMETER, 0.0, 0.0]
+        second = first + np.array([DIAMETER, 0.0, 0.0])
         forces = np.tile([-push, 0.0, 0.0], (len(neighbour), 1))
         contacts.append(contacts_text(int(step), first, second, np.column_stack([neighbour, neighbour]) + 1, forces, box=box, flags=flags))
     count = 2000

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+
 from dembark.input_decks.tests.synthetic import DENSITY, DIAMETER, FRAMES, GRAVITY, finish
 from dembark.postproc.tests.dumps import contacts_text, grains_text, write_times
 

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import xarray
+
 from dembark.common.errors import RunError
 from dembark.input_decks.tests.synthetic import DIAMETER, plug_flow
 from dembark.validation.metrics import measure

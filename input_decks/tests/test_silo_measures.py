@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import xarray
+
 from dembark.common.errors import RunError
 from dembark.input_decks.tests.measuring import judged, module
 from dembark.input_decks.tests.synthetic import DIAMETER, silo
@@ -46,7 +47,8 @@ def test_silo_that_follows_janssen_passes(tmp_path):
 def test_wet_silo_follows_janssen_with_the_adhesion_that_hangs_on_the_wall(tmp_path):
     found = by_name(measure(silo(tmp_path, k=0.8, friction=0.25, noise=0.02, bridge_volume=8e-11)))
     bridge = float(capillary_force(0.5 * DIAMETER, np.inf, 0.0, 8e-11, 0.072, 0.35))
-    assert found["wall_adhesion"]["value"] == pytest.approx(24 * bridge / (2 * np.pi * 0.025 * DIAMETER), rel=5e-3)  # bands of the measured height
+    # Bands are those of the measured height.
+    assert found["wall_adhesion"]["value"] == pytest.approx(24 * bridge / (2 * np.pi * 0.025 * DIAMETER), rel=5e-3)
     assert found["stress_ratio_k"]["value"] == pytest.approx(0.8, rel=0.02)
     assert found["wall_mobilisation"]["value"] == pytest.approx(0.25, rel=0.01)
     assert found["janssen_length_predicted"]["value"] == pytest.approx(2.5, rel=0.02)

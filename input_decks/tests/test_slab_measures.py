@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from dembark.input_decks.tests.measuring import judged, module
 from dembark.input_decks.tests.synthetic_slabs import gravity_channel, plane_silo
 from dembark.postproc.statistics import Estimate

@@ -18,11 +18,12 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
-from dembark.postproc import ContactFrame, GrainFrame, spheres
-from dembark.postproc.fields.coarse_graining import WallContacts
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.special import ive, ndtr
+
+from dembark.postproc import ContactFrame, GrainFrame, spheres
+from dembark.postproc.fields.coarse_graining import WallContacts
 
 Array = NDArray[np.float64]
 
@@ -46,10 +47,11 @@ class Rings:
 
     @classmethod
     def around(cls, radius: float, height: float, width: float, spacing: float) -> Rings:
-        """Rings of about `spacing` (m) in a vessel of `radius` with a filling of `height`, both borders of rings, and REACH widths around."""
+        """Rings of about `spacing` (m) in a vessel of `radius` with a filling of `height`, both borders of rings; REACH widths around."""
         step, rise = radius / max(1, round(radius / spacing)), height / max(1, round(height / spacing))
         more, further = int(np.ceil(REACH * width / step)), int(np.ceil(REACH * width / rise))
-        return cls(step * np.arange(round(radius / step) + more + 1), rise * np.arange(-further, round(height / rise) + further + 1), width, radius)
+        radial, vertical = np.arange(round(radius / step) + more + 1), np.arange(-further, round(height / rise) + further + 1)
+        return cls(step * radial, rise * vertical, width, radius)
 
     @property
     def radii(self) -> Array:
@@ -175,7 +177,8 @@ def coarse_grain(
 
     `layers` (l, zones): which layers belong to the zones; `sector_shares(places)`: shares (m, sectors) of places (m, 3) in the sectors.
     """
-    lines = [(contacts.first, contacts.branch, contacts.forces), *((one.positions, one.points - one.positions, one.forces) for one in walls)]
+    lines = [(contacts.first, contacts.branch, contacts.forces),
+             *((one.positions, one.points - one.positions, one.forces) for one in walls)]
     place, tensor = _points(*(np.concatenate(parts) for parts in zip(*lines, strict=True)), rings.width)
     count = len(place)
     # The streaming part is a line of no length: the momentum m v is carried with v.

@@ -12,14 +12,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
 from dembark.common.errors import RunError
 from dembark.postproc import ContactFrame, GrainFrame, profiles, stress
 from dembark.postproc.fields.coarse_graining import WallContacts, rows_of
 from dembark.postproc.replica import Array, Replica, once
 from dembark.postproc.spheres import slice_volumes, volume
 from dembark.postproc.statistics import Estimate, block_mean, steady_start
-from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 Mask = NDArray[np.bool_]
 Bands = Mask | slice

@@ -14,6 +14,8 @@ from operator import add
 from typing import Any
 
 import numpy as np
+from scipy.special import ndtr
+
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import CUTOFF
@@ -26,7 +28,6 @@ from dembark.postproc.replica import Array, Replica
 from dembark.postproc.resampling import TimeBlocks, resampled, time_blocks
 from dembark.postproc.statistics import Estimate, block_mean, combined, over_replicas, student
 from dembark.postproc.walls import PlaneWall, wall_contacts
-from scipy.special import ndtr
 
 WIDTH = 0.5  # of the kernel, in grain diameters: the layers at the walls stay apart
 _FIELDS = {
@@ -133,9 +134,9 @@ def read(replica: Replica) -> Flow:
     # The steady part is the last one of the window.
     used = islice(replica.paired_frames(), len(replica.grains()) - len(channel.solid), None)
     for block, (grains, contacts) in zip(blocks.groups.tolist(), used, strict=True):
-        grains, contacts, glued = free_grains(grains, contacts)
-        walls = [*glued, *(wall_contacts(grains, plane) for plane in planes)]
-        found = coarse_grain(grains, contacts, grid, width=WIDTH * d, walls=walls, threads=1)
+        free, among, glued = free_grains(grains, contacts)
+        walls = [*glued, *(wall_contacts(free, plane) for plane in planes)]
+        found = coarse_grain(free, among, grid, width=WIDTH * d, walls=walls, threads=1)
         sums[block] = sums[block] + found if block in sums else found
     return Flow(channel, list(sums.values()), blocks.single)
 

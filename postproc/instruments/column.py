@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.physics import capillary_force
 from dembark.postproc import ContactFrame, GrainFrame, profiles, stress
 from dembark.postproc.instruments import janssen
@@ -23,7 +25,6 @@ from dembark.postproc.instruments.vessel import Vessel, vessel
 from dembark.postproc.replica import Array, Replica
 from dembark.postproc.spheres import slice_volumes
 from dembark.postproc.statistics import Estimate, block_mean
-from numpy.typing import NDArray
 
 Mask = NDArray[np.bool_]
 Bridges = Callable[[Array], Array]

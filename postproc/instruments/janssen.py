@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from dembark.postproc.replica import Array
 from scipy.optimize import least_squares
+
+from dembark.postproc.replica import Array
 
 
 def stress(depth: Array, length: float, weight: float = 1.0) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+
 from dembark.postproc.measurement import Value
 from dembark.postproc.replica import Replica
 from dembark.postproc.statistics import Estimate, block_mean, exact, over_replicas

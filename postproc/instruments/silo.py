@@ -7,13 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
 from dembark.postproc.instruments import janssen
 from dembark.postproc.instruments.column import Column, Mask
 from dembark.postproc.instruments.vessel import overlap
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.replica import Array
 from dembark.postproc.resampling import pooled, profile, resampled, time_blocks
-from dembark.postproc.statistics import Estimate, block_mean, over_replicas
+from dembark.postproc.statistics import Estimate, block_mean
 
 Fit = Callable[[Mask, Mask], Any]
 ZERO = Estimate(0.0, 0.0)
@@ -95,9 +96,9 @@ def _remarks(columns: Sequence[Column], over: Mapping[str, Estimate], wet: bool,
         share = 1.0 - over["_hanging_weight"].value / float(np.mean([column.weight for column in columns]))
         manner += (f" Liquid bridges pull the grains to the wall with {over['wall_adhesion'].value:.3g} Pa; the friction of that pull "
                    f"alone carries {share:.0%} of the weight, and Janssen's law is taken with what is left of it.")
-    remarks = [f"The wall carries {limits} friction (μ_mob = {mobilised:.3f}; static {static:g}, kinetic {kinetic:g}). {manner} Janssen's "
+    remarks = [(f"The wall carries {limits} friction (μ_mob = {mobilised:.3f}; static {static:g}, kinetic {kinetic:g}). {manner} Janssen's "
                "law is therefore checked with the measured mobilisation; with the static coefficient in its place λ would come out shorter "
-               "by the first of these shares."]
+               "by the first of these shares.")]
     if len(columns) < 3:
         remarks.append("With fewer than three packings the intervals come from time blocks and from sectors of the walls within the "
                        "packing; what varies from packing to packing as a whole is not in them.")

@@ -9,6 +9,8 @@ from operator import add
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
+
 from dembark.postproc.fields.rings import Fields, Rings, coarse_grain
 from dembark.postproc.instruments import janssen
 from dembark.postproc.instruments.vessel import Cylinder, overlap
@@ -21,7 +23,6 @@ from dembark.postproc.studies import propagated
 from dembark.postproc.walls import CylinderWall, PlaneWall, wall_contacts
 from dembark.postproc.walls.patches import cylinder_patches
 from dembark.postproc.walls.stress import WallRecorder
-from threadpoolctl import threadpool_limits
 
 # Shares of the filling height that the radial profiles are averaged over.
 BANDS = ((0.2, 0.3), (0.45, 0.55), (0.7, 0.8))

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
 from dembark.postproc.replica import Array
 from dembark.postproc.spheres import volume, volume_below
 
@@ -50,7 +51,7 @@ class Cylinder:
         """Share (n, sectors) of each grain's wall force in the sectors, by the angle."""
         return _ring((np.arctan2(place[:, 1], place[:, 0]) / (2.0 * np.pi)) % 1.0, sectors)
 
-    def volume_shares(self, place: Array, radii: Array, sectors: int) -> Array:
+    def volume_shares(self, place: Array, _radii: Array, sectors: int) -> Array:
         """The same for the grains' volumes, by the angle of the centre."""
         return self.wall_shares(place, sectors)
 

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 import xarray
-from dembark.postproc.output.whole import WholeFile
 from numpy.typing import NDArray
+
+from dembark.postproc.output.whole import WholeFile
 
 Variable = tuple[tuple[str, ...], NDArray[Any], dict[str, str]]
 

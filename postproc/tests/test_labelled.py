@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray
+
 from dembark.postproc.output.labelled import labelled, variable, with_interval, write
 from dembark.postproc.statistics import Estimate
 

@@ -1,6 +1,7 @@
 """A replica: what it wrote is read once, and bodies are counted alike in every engine."""
 
 import pytest
+
 from dembark.postproc import DumpError
 from dembark.postproc.replica import Replica, once
 

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from dembark.postproc import ContactFrame
-from dembark.postproc.fields.coarse_graining import WallContacts
-from dembark.postproc.fields.rings import Rings, coarse_grain
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from packings import grain_frame
+
+from dembark.postproc import ContactFrame
+from dembark.postproc.fields.coarse_graining import WallContacts
+from dembark.postproc.fields.rings import Rings, coarse_grain
 
 
 @settings(max_examples=25, deadline=None)

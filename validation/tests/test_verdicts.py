@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+
 from dembark.common.errors import DembarkError, RunError
 from dembark.postproc.statistics import Estimate, over_replicas
 from dembark.validation.checks import find
@@ -55,7 +56,8 @@ def test_one_of_many_comparisons_may_lie_beyond_its_interval():
     verdicts = []
     for page in samples:
         estimates = [[over_replicas([Estimate(value, 0.0) for value in engine]) for engine in quantity] for quantity in page]
-        verdicts.append({pair(*(entry(one.value, one.half, one.basis) for one in two), "liggghts", "yade", 20)["verdict"] for two in estimates})
+        verdicts.append({pair(*(entry(one.value, one.half, one.basis) for one in two), "liggghts", "yade", 20)["verdict"]
+                         for two in estimates})
     assert sum("fail" in page for page in verdicts) <= 12
     assert sum("info" in page for page in verdicts) > 100
     assert pair(entry(1.0, 0.01), entry(1.05, 0.01), "liggghts", "yade", 20)["verdict"] == "fail"
