@@ -74,11 +74,12 @@ def user(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     for key, value in {"HOME": str(home), "PWD": str(checkout),
                        "XDG_CACHE_HOME": os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache"))}.items():
         monkeypatch.setenv(key, value)
-    before = os.environ.get("DEMBARK_DECKS")
+    before = {name: os.environ.get(name) for name in ("DEMBARK_DECKS", "DEMBARK_CASES")}
     yield checkout
-    os.environ.pop("DEMBARK_DECKS", None)
-    if before is not None:
-        os.environ["DEMBARK_DECKS"] = before
+    for name, value in before.items():
+        os.environ.pop(name, None)
+        if value is not None:
+            os.environ[name] = value
     folders.load.cache_clear()
     for number, handler in handlers.items():
         signal.signal(number, handler)

@@ -43,7 +43,8 @@ def own_roots() -> list[Path]:
 
 def add_own_root(root: Path) -> None:
     """Look for cases in `root` too, in this process and those that it starts."""
-    os.environ[VARIABLE] = os.pathsep.join([*filter(None, [os.environ.get(VARIABLE, "")]), str(root.resolve())])
+    named = [text for text in os.environ.get(VARIABLE, "").split(os.pathsep) if text]
+    os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*named, str(root.resolve())]))
 
 
 def files() -> Iterator[Path]:

@@ -19,17 +19,17 @@ _KEPT_STATES = 2
 
 @cache
 def options():
-    """What the words restart_every=<steps> and resume=yes|no behind the script say: (steps between saved states, 0 never; whether to resume)."""
-    every, resume = 0, False
-    for word in sys.argv[1:]:
-        key, _, text = word.partition("=")
-        if key == "restart_every" and text.isdecimal():
-            every = int(text)
-        elif key == "resume" and text in ("no", "yes"):
-            resume = text == "yes"
-        else:
-            fail(f"argument '{word}': known are restart_every=<steps> and resume=yes or no")
-    return every, resume
+    """What the words restart_every=<steps> and resume=yes|no behind the script say: (steps between saved states, 0 never; whether to resume).
+
+    Other words are the script's own.
+    """
+    words = dict(word.split("=", 1) for word in sys.argv[1:] if "=" in word)
+    every, resume = words.get("restart_every", "0"), words.get("resume", "no")
+    if not every.isdecimal():
+        fail(f"argument 'restart_every={every}': it must be a whole number of steps, 0 for none")
+    if resume not in ("no", "yes"):
+        fail(f"argument 'resume={resume}': it must be yes or no")
+    return int(every), resume == "yes"
 
 
 def _sync(path):
