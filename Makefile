@@ -80,7 +80,7 @@ doctor: $(BUILD)/.python ## say what is found, what is missing and what to do
 lint: $(VENV)/.complete ## check the sources: rules, types, layout
 	@$(BIN)/ruff check
 	@$(BIN)/mypy
-	@git ls-files '*.c' '*.cpp' '*.hpp' '*.h' | xargs $(BIN)/clang-format --dry-run -Werror
+	@git ls-files '*.c' '*.cpp' '*.hpp' '*.h' | xargs -r $(BIN)/clang-format --dry-run -Werror
 	@$(MAKE) tidy
 
 # One translation unit holds all headers.

@@ -38,8 +38,8 @@ def test_table_of_many_logs_is_that_of_the_data_and_so_are_the_largest_steps(fou
 
 def test_data_of_the_pair_are_those_of_the_code(found: dict[str, Any]) -> None:
     for entry in found["pair"][::7]:
-        assert drum_penalty.restitution(entry["turn"], entry["law"]) == pytest.approx((entry["mean"], entry["half_range"]), rel=1e-9,
-                                                                                      abs=1e-12)
+        wanted = pytest.approx((entry["mean"], entry["half_range"]), rel=1e-9, abs=1e-12)
+        assert drum_penalty.restitution(entry["turn"], entry["law"]) == wanted
 
 
 def test_no_run_with_theta_1_gained_energy(found: dict[str, Any]) -> None:

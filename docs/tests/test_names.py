@@ -150,11 +150,10 @@ def test_files_exist() -> None:
 def test_readme_names_every_style() -> None:
     main = (ROOT / "plugins/liggghts/main.cpp").read_text(encoding="utf-8")
     headers = code("plugins/liggghts")
-    styles = {f"fix {name}"
-              for name in re.findall(r'fixes\["([\w/]+)"\]', main)} | set(re.findall(r'command_map|CommandTable\(\)\)\)\)\["(\w+)"\]',
-                                                                                     main))
-    styles |= {f"tangential {name}" for name in re.findall(r"^TANGENTIAL_MODEL\(\w+, ?(\w+),", headers, re.MULTILINE)}
-    styles |= {f"cohesion {name}" for name in re.findall(r"^COHESION_MODEL\(\w+, ?(\w+),", headers, re.MULTILINE)}
+    styles = {f"fix {name}" for name in re.findall(r'fixes\["([\w/]+)"\]', main)}
+    styles |= set(re.findall(r'command_map|CommandTable\(\)\)\)\)\["(\w+)"\]', main))
+    styles |= {f"tangential {name}" for name in re.findall(r"^TANGENTIAL_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
+    styles |= {f"cohesion {name}" for name in re.findall(r"^COHESION_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
     table = {name for cell in rows(TEXTS["README.md"], "style") for name in re.findall(r"`([^`]+)`", cell)}
     assert len(styles - {""}) == 7 and table == styles - {""}
 

@@ -6,9 +6,7 @@
 //
 // Works compiled out of tree into liggghts-dembark and, unchanged, copied into a LIGGGHTS src/ folder.
 #ifdef COHESION_MODEL
-// clang-format off: LIGGGHTS reads this line without blanks.
 COHESION_MODEL(COHESION_CAPILLARY,capillary,20)
-// clang-format on
 #else
 
 #ifndef COHESION_MODEL_CAPILLARY_H_

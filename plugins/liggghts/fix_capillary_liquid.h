@@ -7,7 +7,7 @@
 // same numbers; each rank books for the grains it owns.
 #ifdef FIX_CLASS
 
-FixStyle(capillary / liquid, FixCapillaryLiquid)
+FixStyle(capillary/liquid,FixCapillaryLiquid)
 
 #else
 

@@ -7,7 +7,7 @@
 // on F/m, the works are dt/2 P -+ dt^2/8 Q. The second kick is booked in the next step, or with the forces of a set-up in between.
 #ifdef FIX_CLASS
 
-FixStyle(energy / account, FixEnergyAccount)
+FixStyle(energy/account,FixEnergyAccount)
 
 #else
 

@@ -4,7 +4,7 @@
 // LIGGGHTS and the model. It holds no physics.
 #ifdef FIX_CLASS
 
-FixStyle(lcp / impact, FixLcpImpact)
+FixStyle(lcp/impact,FixLcpImpact)
 
 #else
 

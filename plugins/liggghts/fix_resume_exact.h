@@ -5,7 +5,7 @@
 // histories of all contacts, and what other fixes store per atom, and puts them back after the set-up.
 #ifdef FIX_CLASS
 
-FixStyle(resume / exact, FixResumeExact)
+FixStyle(resume/exact,FixResumeExact)
 
 #else
 

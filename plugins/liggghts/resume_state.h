@@ -1,7 +1,7 @@
 // Input command `resume_state BASE`: read the newest whole state of fix resume/exact.
 #ifdef COMMAND_CLASS
 
-CommandStyle(resume_state, ResumeState)
+CommandStyle(resume_state,ResumeState)
 
 #else
 

@@ -4,9 +4,7 @@
 //
 // Works compiled out of tree into liggghts-dembark and, unchanged, copied into a LIGGGHTS src/ folder.
 #ifdef TANGENTIAL_MODEL
-// clang-format off: LIGGGHTS reads this line without blanks.
 TANGENTIAL_MODEL(TANGENTIAL_FINNIE_RABINOWICZ,finnie_rabinowicz,20)
-// clang-format on
 #else
 
 #ifndef TANGENTIAL_MODEL_FINNIE_RABINOWICZ_H_

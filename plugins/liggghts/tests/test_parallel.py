@@ -66,8 +66,8 @@ def run(folder, text, ranks=1, name="case.in"):
 def serial(tmp_path_factory):
     folder = tmp_path_factory.mktemp("serial")
     run(folder, bed("run 3000"))
-    assert any(row[0] > 0.0 and row[5] > 0.0 for row in contacts(folder)[-1].values()) or any(row[6] > 0.0
-                                                                                              for row in contacts(folder)[-1].values())
+    rows = contacts(folder)[-1].values()
+    assert any(row[0] > 0.0 and row[5] > 0.0 for row in rows) or any(row[6] > 0.0 for row in rows)
     return folder
 
 
@@ -82,8 +82,8 @@ HARMLESS = {
     "4 ranks": (4, lambda text: text),
     "2 ranks, cut across the height": (2, lambda text: change(text, GRID, "processors 1 1 2\n")),
     "shrink-wrapped top": (2, lambda text: change(text, "boundary p p f", "boundary p p m")),
-    "shrink-wrapped, cut across the height": (2, lambda text: change(change(text, "boundary p p f", "boundary p p s"), GRID,
-                                                                     "processors 1 1 2\n")),
+    "shrink-wrapped, cut across the height": (
+        2, lambda text: change(change(text, "boundary p p f", "boundary p p s"), GRID, "processors 1 1 2\n")),
     "lists in every step": (1, lambda text: change(text, "neigh_modify delay 0", "neigh_modify every 1 delay 0 check no")),
     "sorted often": (1, lambda text: change(text, "atom_modify map array", "atom_modify map array sort 50 0.0")),
 }
