@@ -81,7 +81,7 @@ def _columns(state: State) -> dict[str, str]:
 def _state(name: str, kind: str, row: Mapping[str, Any]) -> State:
     defaults = {field.name: field.default for field in fields(State)}
     columns = _columns(State(name, kind=kind))
-    found = {key: row[column] if row[column] is not None else defaults[key] for key, column in columns.items() if key not in ("name", "kind")}
+    found = {key: defaults[key] if row[column] is None else row[column] for key, column in columns.items() if key not in ("name", "kind")}
     return State(name, kind=kind, **found)
 
 
