@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 import pytest
-from dembark.common.errors import DembarkError, RunError
+from dembark.common.errors import RunError
 from dembark.common.files import check_times, count_frames, move_into_place, read_json, retire, sweep, write_json
 from hypothesis import given
 from hypothesis import strategies as st

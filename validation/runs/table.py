@@ -129,6 +129,7 @@ class Table:
                     self._states[state.name] = state
                     self.transition(state.name, "superseded")
                     del self._states[state.name]
+                    self._changed.discard(state.name)
             for folder, run in runs.items():
                 self._follow(run.name, finished(base / folder, run))
             for name in steps:
@@ -201,7 +202,6 @@ class Table:
     def _save(self) -> None:
         self._saved = time.monotonic()
         states = [self._states[name] for name in sorted(self._changed)]
-        self._changed.clear()
         if not self._results:
             return
         try:
@@ -211,6 +211,8 @@ class Table:
                     if state.kind == "run" and state.state == "finished":
                         row |= record_row(self._results / state.folder)
                     schema.change(connection, "runs" if state.kind == "run" else "steps", row)
+            self._changed.clear()
+            self.problem = ""
         except RunError as error:
             self.problem = str(error)
 
