@@ -219,4 +219,5 @@ class Queue:
 def asked(site: Site, used: Resources) -> dict[str, int]:
     """What a job asks for, with the site's values where the plan has none."""
     return {"ranks": used.ranks, "threads": used.threads, "cores": used.cores,
-            "memory_mb": math.ceil((used.memory or site.jobs["memory"]) / 1e6), "minutes": math.ceil((used.time or site.jobs["time"]) / 60)}
+            "memory_mb": math.ceil((used.memory or site.jobs["memory"]) / 1e6), "minutes": math.ceil((used.time or site.jobs["time"]) / 60),
+            "seconds": math.ceil(used.time or site.jobs["time"])}
