@@ -19,9 +19,10 @@ def plan(profile: str | None = None, file: Path | None = None, cases: Sequence[s
     if file is not None:
         found = of_campaign(file, tuple(cases), tuple(engines))
         facts = {"campaign": found.spec.name, "description": found.spec.description, "sweeps": found.sweeps()}
-        return Plan(found.spec.name, found.series, facts, ("--campaign", str(file)), found.resources, found.spec.retries, found.spec.measure,
-                    whole)
-    return Plan(str(profile), tuple(campaign(str(profile), cases, engines)), {"profile": profile}, ("--profile", str(profile)), whole=whole)
+        return Plan(found.spec.name, found.series, facts, ("--campaign", str(file)), found.resources, found.spec.retries,
+                    found.spec.measure, whole)
+    series = tuple(campaign(str(profile), cases, engines))
+    return Plan(str(profile), series, {"profile": profile}, ("--profile", str(profile)), whole=whole)
 
 
 @cache

@@ -1,4 +1,4 @@
-"""The one executor: runs with the longest first, then measurements, studies, comparisons and the report, as soon as what they need is there.
+"""The executor: runs with the longest first; measurements, studies, comparisons and the report as soon as what they need is there.
 
 A run that fails stops nothing else. One that was ended from outside is started again, up to the plan's number of retries; one that failed
 by its own fault is not. Steps work in a few processes that stay, so that what they import is imported once.
@@ -156,8 +156,10 @@ class Executor:
         self._open = {one.name for one in (*self._tasks, *self._steps)}
         try:
             while not self._cancel.is_set():
+                before = len(self._open)
                 self._start()
-                if not self._under_way:
+                # What is up to date makes others ready without anything being under way.
+                if not self._under_way and len(self._open) == before:
                     break
                 for future in wait(self._under_way, timeout=_LOOK, return_when=FIRST_COMPLETED).done:
                     self._end(future)

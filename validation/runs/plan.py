@@ -1,4 +1,4 @@
-"""What there is to do: one run = case, variant, profile, engine and replica with all its numbers, known by a hash of its inputs; and plans."""
+"""What there is to do: a run is a case, variant, profile, engine and replica with all its numbers, known by a hash of its inputs."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Run:
 
     @property
     def inputs(self) -> str:
-        """Hash of everything that decides the outcome: parameters, deck and engine, but not where, on how many cores or beside how many replicas."""
+        """Hash of what decides the outcome: parameters, deck and engine, but not where, on how many cores or beside how many replicas."""
         parameters = {key: value for key, value in self.values.items() if key != "replicas"}
         facts = {"parameters": parameters, "deck": sources(self.case, self.engine.name),
                  "engine": [self.engine.name, self.engine.version, self.engine.identity]}

@@ -82,7 +82,8 @@ class Queue:
         interval = [] if used.restart_interval is None else ["--restart-interval", str(used.restart_interval)]
         words = ["--inputs", run.inputs, "--ranks", str(used.ranks), "--threads", str(used.threads), *interval]
         report = out / f".{run.folder_name}.job.json"
-        return self._add(_Job(run.name, self._name(run.inputs), used, words, report, lambda: finished(out / run.folder_name, run), tell), out)
+        job = _Job(run.name, self._name(run.inputs), used, words, report, lambda: finished(out / run.folder_name, run), tell)
+        return self._add(job, out)
 
     def start_step(self, step: Step) -> Future[object] | None:
         """Begin with a measurement where the plan wants a job for it; None for all other steps."""
@@ -218,4 +219,5 @@ class Queue:
 def asked(site: Site, used: Resources) -> dict[str, int]:
     """What a job asks for, with the site's values where the plan has none."""
     return {"ranks": used.ranks, "threads": used.threads, "cores": used.cores,
-            "memory_mb": math.ceil((used.memory or site.jobs["memory"]) / 1e6), "minutes": math.ceil((used.time or site.jobs["time"]) / 60)}
+            "memory_mb": math.ceil((used.memory or site.jobs["memory"]) / 1e6), "minutes": math.ceil((used.time or site.jobs["time"]) / 60),
+            "seconds": math.ceil(used.time or site.jobs["time"])}

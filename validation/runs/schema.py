@@ -23,15 +23,16 @@ _VALUE = {"name": "TEXT NOT NULL", "label": "TEXT", "unit": "TEXT", "value": "RE
           "reference": "REAL", "reference_low": "REAL", "reference_high": "REAL", "deviation": "REAL", "deviation_kind": "TEXT",
           "tolerance": "REAL", "verdict": "TEXT", "reason": "TEXT", "detail": "TEXT", "source": "TEXT"}
 # What the table of runs knows of each run and step; see `table.State`.
-_STATE = {"state": "TEXT NOT NULL", "message": "TEXT", "attempts": "INTEGER", "began": "REAL", "ended": "REAL", "host": "TEXT", "job": "TEXT"}
+_STATE = {"state": "TEXT NOT NULL", "message": "TEXT", "attempts": "INTEGER", "began": "REAL", "ended": "REAL", "host": "TEXT",
+          "job": "TEXT"}
 
 TABLES: dict[str, dict[str, str]] = {
     "runs": {
         "run_id": "TEXT NOT NULL", **_PLACE, "profile": "TEXT", "engine": "TEXT NOT NULL", "engine_version": "TEXT",
         "engine_identity": "TEXT", "replica": "INTEGER", "seed": "INTEGER", "parameters_json": "TEXT", **_STATE,
         "resumed_from_step": "INTEGER", "step": "INTEGER", "resume": "TEXT", "ranks": "INTEGER",
-        "threads": "INTEGER", "particles": "INTEGER", "steps": "INTEGER", "time_step": "REAL", "estimated_time": "REAL", "wall_time": "REAL",
-        "particle_steps_per_second": "REAL", "commit_hash": "TEXT",
+        "threads": "INTEGER", "particles": "INTEGER", "steps": "INTEGER", "time_step": "REAL", "estimated_time": "REAL",
+        "wall_time": "REAL", "particle_steps_per_second": "REAL", "commit_hash": "TEXT",
         "dirty": "INTEGER", "cpu": "TEXT", "started": "TEXT", "folder": "TEXT"},
     "steps": {"campaign": "TEXT NOT NULL", "name": "TEXT NOT NULL", "kind": "TEXT NOT NULL", **_STATE, "inputs": "TEXT"},
     "quantities": {

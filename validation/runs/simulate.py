@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
+from dembark.common.errors import Interrupted, Killed, RunError
 from dembark.common.files import DISK_FULL, disk_error, move_into_place, sweep, write_json
 from dembark.common.lock import lock
 from dembark.validation import provenance
@@ -29,8 +29,6 @@ from dembark.validation.runs.process import chunks, running
 from dembark.validation.runs.progress import OutputParser
 
 _RESUMED = re.compile(r"dembark: resumed at step (\d+) (exact|approximate)ly")
-
-
 # Called with what changed: step, steps, time_step, attempt, resumed_from.
 Tell = Callable[..., None]
 

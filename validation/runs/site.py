@@ -21,7 +21,7 @@ SHIPPED = Path(__file__).with_name("sites")
 _JOBS = {"at_a_time": int, "memory": str, "time": str, "options": str, "poll": str, "latency": str}
 _COMMANDS = {"submit": str, "status": str, "cancel": str, "test": str}
 _ANSWERS = {"job": str, "line": str, "waiting": list, "running": list, "again": str, "hopeless": str}
-_WORDS = ("name", "title", "log", "ranks", "threads", "cores", "memory_mb", "minutes", "options", "script", "user", "jobs")
+_WORDS = ("name", "title", "log", "ranks", "threads", "cores", "memory_mb", "minutes", "seconds", "options", "script", "user", "jobs")
 _NEVER = r"(?!)"
 
 

@@ -52,7 +52,8 @@ def _check_request(site: Site, resources: dict[str, int]) -> None:
     named = re.search(r"(?:--partition[= ]|-p ?)(\S+)", site.jobs["options"])
     limit = time_limit(named.group(1) if named else "")
     if limit and resources["minutes"] > limit:
-        raise DembarkError("Slurm would never start a job", f"{resources['minutes']} min exceed the partition's limit of {limit:g} min", place)
+        raise DembarkError("Slurm would never start a job",
+                           f"{resources['minutes']} min exceed the partition's limit of {limit:g} min", place)
 
 
 def time_limit(partition: str) -> float | None:

@@ -179,7 +179,8 @@ def build_report(results: Path) -> None:
 
 def count_checks(results: Path) -> tuple[int, int]:
     """Numbers of quantities with a verdict pass or fail, and of those that fail, in `results` and in the report's own verification."""
-    files = [path for name in ("metrics.json", "comparison.json") for path in sorted(results.glob(f"*/*/**/{name}")) if "superseded" not in path.parts]
+    files = [path for name in ("metrics.json", "comparison.json") for path in sorted(results.glob(f"*/*/**/{name}"))
+             if "superseded" not in path.parts]
     files.append(results / "verification.json")
     verdicts = [quantity.get("verdict") for path in files for quantity in (read_json(path) or {}).get("quantities", [])]
     return sum(verdict in ("pass", "fail") for verdict in verdicts), verdicts.count("fail")

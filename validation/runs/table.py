@@ -81,7 +81,7 @@ def _columns(state: State) -> dict[str, str]:
 def _state(name: str, kind: str, row: Mapping[str, Any]) -> State:
     defaults = {field.name: field.default for field in fields(State)}
     columns = _columns(State(name, kind=kind))
-    found = {key: row[column] if row[column] is not None else defaults[key] for key, column in columns.items() if key not in ("name", "kind")}
+    found = {key: defaults[key] if row[column] is None else row[column] for key, column in columns.items() if key not in ("name", "kind")}
     return State(name, kind=kind, **found)
 
 
@@ -129,6 +129,7 @@ class Table:
                     self._states[state.name] = state
                     self.transition(state.name, "superseded")
                     del self._states[state.name]
+                    self._changed.discard(state.name)
             for folder, run in runs.items():
                 self._follow(run.name, finished(base / folder, run))
             for name in steps:
@@ -201,7 +202,6 @@ class Table:
     def _save(self) -> None:
         self._saved = time.monotonic()
         states = [self._states[name] for name in sorted(self._changed)]
-        self._changed.clear()
         if not self._results:
             return
         try:
@@ -211,6 +211,8 @@ class Table:
                     if state.kind == "run" and state.state == "finished":
                         row |= record_row(self._results / state.folder)
                     schema.change(connection, "runs" if state.kind == "run" else "steps", row)
+            self._changed.clear()
+            self.problem = ""
         except RunError as error:
             self.problem = str(error)
 

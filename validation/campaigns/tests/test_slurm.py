@@ -74,8 +74,10 @@ def test_a_launcher_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     words = engine.command(Path("d"), {}, 3)
     assert words[:4] == ["srun", "--mpi=pmix", "-n", "3"] and "/bin/lmp" in words and known() == {"SLURM_CONF", "SLURM_JOB_ID"}
     assert "srun" not in engine.command(Path("d"), {}, 1)
-    assert queue.asked(SLURM, Resources(3, 1, 5e8, 590.0)) == {"ranks": 3, "threads": 1, "cores": 3, "memory_mb": 500, "minutes": 10}
-    assert queue.asked(SLURM, Resources(threads=4)) == {"ranks": 1, "threads": 4, "cores": 4, "memory_mb": 2000, "minutes": 30}
+    assert queue.asked(SLURM, Resources(3, 1, 5e8, 590.0)) == {
+        "ranks": 3, "threads": 1, "cores": 3, "memory_mb": 500, "minutes": 10, "seconds": 590}
+    assert queue.asked(SLURM, Resources(threads=4)) == {
+        "ranks": 1, "threads": 4, "cores": 4, "memory_mb": 2000, "minutes": 30, "seconds": 1800}
 
 
 def test_names_of_jobs_tell_campaigns_apart(tmp_path: Path) -> None:
@@ -222,7 +224,8 @@ def test_a_refused_submission_fails_its_run_and_a_hopeless_one_is_told(campaign:
     one.close()
 
 
-def test_another_scheduler_is_served_by_its_commands(tmp_path: Path, decks: Path, stand_in: Path, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: F811
+def test_another_scheduler_is_served_by_its_commands(tmp_path: Path, decks: Path, stand_in: Path,  # noqa: F811
+                                                     monkeypatch: pytest.MonkeyPatch, wait_for: Callable[..., object]) -> None:  # noqa: F811
     """One like PBS, that tells no names: jobs are processes, their list is a folder."""
     spool = tmp_path / "spool"
     spool.mkdir()
@@ -238,7 +241,7 @@ poll = "0.2 s"
 latency = "1 s"
 options = "-q main"
 [commands]
-submit = "qsub -N {name} -l select=1:ncpus={cores}:mem={memory_mb}mb -l walltime={minutes}:00 {options} {script}"
+submit = "qsub -N {name} -l select=1:ncpus={cores}:mem={memory_mb}mb -l walltime={seconds} {options} {script}"
 status = "qstat -u {user}"
 cancel = "qdel {jobs}"
 [answers]
@@ -248,9 +251,17 @@ waiting = ["Q", "H"]
 running = ["R", "E"]
 """.replace("\\\\", "\\"))
     slurm.check(campaign.site, [Resources()])
-    campaign.script(f"sleep 1; {FINISH}")
-    assert campaign.start().result(60) is None and str(campaign.told["job"]).endswith(".server")
-    campaign.queues[0].close()
+    campaign.script(f"echo x >> $out/started; sleep 4; {FINISH}")
+    campaign.start()
+    number = str(wait_for(lambda: campaign.told.get("job"), 60))
+    assert number.endswith(".server")
+    # Its submitter is killed; the number is all that the next one knows of the job.
+    campaign.queues[0]._end.set()
+    campaign.queues[0]._thread.join()
+    campaign.queues.append(Queue(campaign.site, campaign.results, campaign.plan, campaign.said.append, known=lambda name: number))
+    assert campaign.start(queue_of=campaign.queues[1]).result(60) is None
+    assert (campaign.results / campaign.plan.series[0].place / "started").read_text() == "x\n"
+    campaign.queues[1].close()
     assert campaign.said == []
 
 
