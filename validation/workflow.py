@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dembark.common.errors import DembarkError, Interrupted
-from dembark.common.files import lock, read_json
+from dembark.common.files import lock
 from dembark.validation.campaigns.source import Source
 from dembark.validation.engines import end_with_parent
 from dembark.validation.jobs import (
@@ -30,6 +30,7 @@ from dembark.validation.jobs import (
     variants,
     write_summary,
 )
+from dembark.validation.judge.tally import Tally, of_folder
 from dembark.validation.plan import Series, finished, studies
 from dembark.validation.progress import FileBoard, Monitor, State, watched
 
@@ -39,13 +40,12 @@ _LOOK = 60.0
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came out: runs that are not finished (with reasons), further problems, numbers of checks, and the report if built."""
+    """What came out: runs that are not finished (with reasons), further problems, the tally of all checks, and the report if built."""
 
     runs: int
     unfinished: tuple[str, ...]
     problems: tuple[str, ...]
-    checks: int
-    failed_checks: int
+    tally: Tally
     report: Path | None
 
     @property
@@ -118,14 +118,6 @@ def _stop(process: subprocess.Popen[bytes], cluster: bool) -> None:
                 process.wait(_GRACE)
 
 
-def count_checks(results: Path) -> tuple[int, int]:
-    """Numbers of quantities with a verdict pass or fail, and of those that fail, in `results` and in the report's own verification."""
-    files = [path for name in ("metrics.json", "comparison.json") for path in sorted(results.glob(f"*/*/**/{name}")) if "superseded" not in path.parts]
-    files.append(results / "verification.json")
-    verdicts = [quantity.get("verdict") for path in files for quantity in (read_json(path) or {}).get("quantities", [])]
-    return sum(verdict in ("pass", "fail") for verdict in verdicts), verdicts.count("fail")
-
-
 def validate(profile: str, cancel: threading.Event, cores: int | None = None, results_root: Path = Path("results"),
              cases: Sequence[str] = (), engines: Sequence[str] = ()) -> Outcome:
     """Run everything that the cases list for `profile` and build the report in results_root/<profile>, see `perform`."""
@@ -178,5 +170,4 @@ def _conclude(source: Source, results: Path, all_series: Sequence[Series], code:
     if code and (not (unfinished or problems) or any(entry["state"] == "missing" for entry in entries)):
         # Not a run but the workflow itself failed, or a run's job died before it could say why; the log may tell.
         problems.append(f"the workflow ended with exit code {code}, see {results / 'workflow.log'}")
-    checks, failed = count_checks(results)
-    return Outcome(len(entries), tuple(unfinished), tuple(problems), checks, failed, report if report.is_file() else None)
+    return Outcome(len(entries), tuple(unfinished), tuple(problems), of_folder(results), report if report.is_file() else None)

@@ -10,9 +10,10 @@ from typing import Any
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
-from dembark.validation.campaigns import folder, store, submit
+from dembark.validation.campaigns import folder, submit
 from dembark.validation.campaigns.estimate import wall_clock
 from dembark.validation.jobs import progress_folder
+from dembark.validation.judge.tally import Tally, of_folder
 from dembark.validation.progress import State, headline, watched
 
 
@@ -25,8 +26,7 @@ class Status:
     states: tuple[State, ...]
     left: float | None
     measured: int
-    checks: int
-    failed_checks: int
+    tally: Tally
     report: Path | None
 
     @property
@@ -50,10 +50,9 @@ def look(results: Path) -> Status:
     names = [f"{entry['case']} {entry['variant']} {entry['engine']} {entry['replica']}" for entry in entries]
     told = watched(progress_folder(results), names)()
     states = tuple(_state(results, entry, state, running) for entry, state in zip(entries, told, strict=True))
-    checks, failed = _checks(results)
     report = results / "report.html"
     return Status(folder.read_name(results), running, states, time_left(results, entries, states), len(_measured(results, entries)),
-                  checks, failed, report if report.is_file() else None)
+                  of_folder(results), report if report.is_file() else None)
 
 
 def _locked(results: Path) -> bool:
@@ -109,12 +108,3 @@ def time_left(results: Path, entries: Sequence[Mapping[str, Any]], states: Seque
 def _measured(results: Path, entries: Sequence[Mapping[str, Any]]) -> set[Path]:
     places = {Path(entry["folder"]).parent for entry in entries}
     return {place for place in places if (results / place / "metrics.json").is_file()}
-
-
-def _checks(results: Path) -> tuple[int, int]:
-    if not store.path_of(results).is_file():
-        return 0, 0
-    sql = "SELECT verdict FROM {} t WHERE measured_at = (SELECT MAX(measured_at) FROM {} u WHERE {})"
-    same = "u.case_name = t.case_name AND u.variant = t.variant AND u.engine = t.engine AND u.name = t.name"
-    verdicts = [row["verdict"] for table in ("quantities", "comparisons") for row in store.query(results, sql.format(table, table, same))]
-    return sum(verdict in ("pass", "fail") for verdict in verdicts), verdicts.count("fail")

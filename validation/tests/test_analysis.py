@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from dembark.validation import analysis, checks, show
+from dembark.validation.judge.result import QuantityRecord, Result
 
 HEADER = "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n" \
     "ITEM: ATOMS id type x y z vx vy vz radius mass f_force_side[1] f_force_side[2] f_force_side[3]\n"
@@ -53,6 +54,6 @@ def test_numerical_warnings_become_remarks_and_stay_errors_where_they_are(capsys
 
 
 def test_open_verdicts_are_told_with_their_reason() -> None:
-    quantities = [{"label": name, "verdict": verdict, "reason": reason} for name, verdict, reason in (
-        ("a", "info", "the run is too short"), ("b", "pass", ""), ("c", "info", "the run is too short"), ("d", "info", ""))]
-    assert show.open_lines({"quantities": quantities}) == ["info: a, c: the run is too short"]
+    quantities = tuple(QuantityRecord(name, 1.0, verdict, tolerance=0.1, reason=reason) for name, verdict, reason in (
+        ("a", "info", "the run is too short"), ("b", "pass", ""), ("c", "info", "the run is too short"), ("d", "info", "")))
+    assert show.open_lines(Result("box", "dry", "yade", quantities)) == ["open: a, c: the run is too short"]
