@@ -18,7 +18,7 @@ from typing import Any
 
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import read_json, retire, write_json
-from dembark.validation import analysis, provenance
+from dembark.validation import analysis, pictures, provenance
 from dembark.validation.campaigns import store
 from dembark.validation.campaigns.folder import FILE as CAMPAIGN_FILE
 from dembark.validation.campaigns.source import Source
@@ -75,7 +75,7 @@ def measure_series(folder: Path, runs: Iterable[Run]) -> dict[str, Any]:
         raise
     except Exception as error:  # whatever goes wrong in the analysis is a failed measurement, to be told in one line
         raise RunError(f"{folder} could not be measured", *analysis.reasons(folder, error, done[0].case)) from error
-    content["remarks"] = [*content.get("remarks", ()), *remarks]
+    content["remarks"] = [*content.get("remarks", ()), *remarks, *pictures.draw(folder, content.get("picture"))]
     if "replicas" in content["parameters"]:
         content["parameters"]["replicas"] = len(wanted)  # those of an earlier request for fewer or more are kept, and know its number
     content["measured"] = _now()
@@ -116,8 +116,15 @@ def compare_engines(folder: Path) -> None:
 
 
 def build_report(results: Path) -> None:
-    """Write report.html and report.pdf into `results` (results/<profile> or a campaign's folder); RunError when that fails."""
+    """Write report.html and report.pdf into `results` (results/<profile> or a campaign's folder); RunError when that fails.
+
+    The report of a profile includes the verification of the instruments, which is computed anew before.
+    """
+    from dembark.validation import verification
+
     try:
+        if not (results / CAMPAIGN_FILE).is_file():
+            verification.write(results)
         _builder(results)(results)
     except DembarkError:
         raise
