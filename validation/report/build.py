@@ -113,6 +113,6 @@ def machine(measured: Iterable[Result]) -> list[tuple[str, str]]:
             note(f"version of {engine_name(part)}", version)
         note(f"{name} executable", facts.get("engine"))
         note(f"{name} build flags", " ".join(f"{key}={value}" for key, value in facts.get("flags", {}).items() if value))
-        for key, title in (("host", "host"), ("os", "system"), ("cpu", "processor"), ("cores", "cores"), ("started", "started")):
+        for key, title in (("host", "host"), ("os", "system"), ("cpu", "processor"), ("cores", "cores")):
             note(title, facts.get(key))
     return [(title, ", ".join(values)) for title, values in found.items()]

@@ -89,7 +89,7 @@ def _panel(axes: Any, entries: Sequence[tuple[str, Mapping[str, Any]]], handles:
             return axes.plot(*((values, place) if upward else (place, values)), **style)[0]
 
         if one.get("reference") is not None:
-            same = all(other.get("reference") == one["reference"] for _, other in entries)
+            same = all(_same(other, one) for _, other in entries)
             if not same or not number:
                 shown = "reference" if same else f"reference ({engine_name(engine)})"
                 handles.setdefault(shown, line(_numbers(one["reference"]), color=_INK if same else paint, linestyle=_DASHES[number % 3],
@@ -111,6 +111,12 @@ def _panel(axes: Any, entries: Sequence[tuple[str, Mapping[str, Any]]], handles:
     else:
         low, high = axes.get_ylim()
         axes.set_ylim(min(0.0, low), high + 0.05 * (high - low))
+
+
+def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether two engines have one and the same reference, so that one line will do."""
+    values, others = (_numbers(each.get("reference") or []) for each in (one, other))
+    return len(values) == len(others) and bool(np.allclose(values, others, rtol=1e-3, atol=1e-3 * np.nanmax(np.abs(others)), equal_nan=True))
 
 
 def _clipped(text: str, length: int) -> str:

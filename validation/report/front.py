@@ -12,7 +12,10 @@ from dembark.validation.report import figures, scatter
 from dembark.validation.report.gather import Row
 
 # Lines of each list that the first pages of the PDF hold; what is left out is counted, and in the HTML.
-FAILED, OPEN, MISSING = 14, 16, 10
+FAILED, OPEN, MISSING = 8, 14, 6
+
+# What a failure says most about comes first.
+_WEIGHT = ("experiment", "theory", "identity", "", "code")
 
 CSV_HEADER = ("case", "variant", "engine", "quantity", "label", "unit", "value", "low", "high", "reference", "reference_low", "reference_high",
               "deviation", "deviation_kind", "tolerance", "verdict", "evidence", "reason", "detail", "source")
@@ -39,9 +42,11 @@ def open_lines(rows: Iterable[Row]) -> list[OpenLine]:
     return [OpenLine(case, group[0].anchor, reason, len(group), _names(group)) for (case, reason), group in found.items()]
 
 
-def _names(group: Sequence[Row], shown: int = 3) -> str:
+def _names(group: Sequence[Row]) -> str:
+    """The first of the quantities, and how many more there are."""
     names = list(dict.fromkeys(row.record.title for row in group))
-    return ", ".join(names[:shown]) + (f" and {len(names) - shown} more" if len(names) > shown else "")
+    first = names[0] if len(names[0]) <= 42 else names[0][:40].rsplit(" ", 1)[0] + " …"
+    return first + (f" and {len(names) - 1} more" if len(names) > 1 else "")
 
 
 def evidence(counted: Tally) -> list[dict[str, Any]]:
@@ -55,7 +60,8 @@ def context(rows: Sequence[Row], missing: Sequence[str]) -> Mapping[str, Any]:
     """What the template shows on the first pages."""
     counted = tally(row.record for row in rows)
     found = scatter.points(rows)
-    return {"tally": counted, "evidence": evidence(counted), "failed": [row for row in rows if row.record.standing == "failed"],
+    failed = sorted((row for row in rows if row.record.standing == "failed"), key=lambda row: _WEIGHT.index(row.record.evidence))
+    return {"tally": counted, "evidence": evidence(counted), "failed": failed,
             "open": open_lines(rows), "missing": missing, "points": found, "scatter_lines": len(scatter.lines(found)),
             "most": {"failed": FAILED, "open": OPEN, "missing": MISSING}}
 

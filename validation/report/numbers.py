@@ -31,6 +31,8 @@ def with_interval(value: float | None, interval: Sequence[float] | None) -> str:
     half = 0.5 * (interval[1] - interval[0]) if interval else math.nan
     if not math.isfinite(half) or half <= 1e-12 * max(1.0, abs(value)):
         return plain(value if abs(value) > 1e-12 else 0.0)
+    if half < 1e-6 * abs(value):
+        return f"{plain(value)} ± {plain(half, 2)}"
     power = math.floor(math.log10(max(abs(value), half)))
     scale = 10.0**power if not -3 <= power < 5 else 1.0
     places = max(0, 1 - math.floor(math.log10(half / scale)))
@@ -48,7 +50,8 @@ def deviation(one: QuantityRecord) -> str:
     if one.deviation is None:
         return "–"
     if one.deviation_kind == "relative" and abs(one.deviation) <= _PERCENT:
-        return f"{100.0 * one.deviation:+.{1 if abs(one.deviation) >= 0.001 else 2}f} %".replace("-", "−")
+        text = f"{100.0 * one.deviation:+.{1 if abs(one.deviation) >= 0.001 else 2}f}" if abs(one.deviation) >= 1e-4 else plain(100.0 * one.deviation, 2)
+        return f"{text} %".replace("-", "−")
     absolute = one.deviation_kind == "absolute" or one.value is None or one.reference is None
     difference = one.deviation if absolute else one.value - one.reference  # type: ignore[operator]
     return with_unit(plain(difference, 2), one.unit)

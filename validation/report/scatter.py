@@ -20,7 +20,7 @@ from matplotlib.ticker import NullFormatter
 KINDS = ("experiment", "theory")
 _INK = "#4a4f57"
 # Lines that fit on the first pages; the others are in the table beside the report.
-LINES = 32
+LINES = 24
 
 
 @dataclass(frozen=True)

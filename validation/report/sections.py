@@ -111,7 +111,7 @@ def line(rows: Sequence[Row], what: str) -> str:
     text = f"{what}: {counts.passed} of {counts.checks} within tolerance" + (f", {counts.open} open" if counts.open else "")
     if counts.failed:
         bad = [f"{row.record.title} ({row.place}, {row.who})" for row in closed if row.record.standing == "failed"]
-        return f"{text}, {counts.failed} FAILED: {'; '.join(bad[:6])}" + (f" and {len(bad) - 6} more" if len(bad) > 6 else "") + "."
+        return f"{text}, {counts.failed} FAILED: {'; '.join(bad[:3])}" + (f" and {len(bad) - 3} more" if len(bad) > 3 else "") + "."
     if not closed:
         return f"{text}."
     worst = max(closed, key=badness)
@@ -202,5 +202,5 @@ def verification(gathered: Gathered, folder: Path) -> list[dict[str, Any]]:
         figure, stem = figures.verification_figure(item), f"verification-{item.name}"
         if figure is not None:
             figures.write_csv(folder / f"{stem}.csv", *figures.verification_table(item))
-        found.append({"item": item, "figure": figure and embed(figure, folder, stem, item.caption or item.title, [f"{stem}.csv"])})
+        found.append({"item": item, "figure": figure and embed(figure, folder, stem, item.caption or item.title, [f"{stem}.csv"], main=False)})
     return found

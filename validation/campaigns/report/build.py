@@ -19,7 +19,7 @@ from dembark.validation.report.look import engine_name
 from dembark.validation.report.sections import embed
 
 # A page that shows everything shows nothing: the rest is in the tables.
-_PANELS = 12
+_PANELS = 9
 
 
 def build(folder: Path, against: Path | None = None) -> Path:

@@ -26,7 +26,7 @@ def _panels(count: int, height: float = 1.95) -> tuple[Figure, list[Any]]:
     rows = max(1, math.ceil(count / COLUMNS))
     tall = height * rows + 0.5
     figure = Figure(figsize=(7.2, tall))
-    figure.subplots_adjust(left=0.075, right=0.985, bottom=0.85 / tall, top=1.0 - 0.3 / tall, wspace=0.38, hspace=0.55)
+    figure.subplots_adjust(left=0.075, right=0.985, bottom=0.85 / tall, top=1.0 - 0.3 / tall, wspace=0.42, hspace=0.55)
     return figure, [figure.add_subplot(rows, COLUMNS, number + 1) for number in range(count)]
 
 
@@ -76,8 +76,8 @@ def _unit(quantity: QuantityRecord) -> str:
     return "dimensionless" if quantity.unit == "1" else quantity.unit
 
 
-def _title(quantity: QuantityRecord) -> str:
-    return symbols(quantity.title if len(quantity.title) <= 36 else quantity.name.replace("_", " "))
+def _title(quantity: QuantityRecord, length: int = 36) -> str:
+    return symbols(quantity.title if len(quantity.title) <= length else quantity.name.replace("_", " "))
 
 
 def map_axes(sweep: Sweep) -> tuple[str, str] | None:
@@ -117,7 +117,7 @@ def map_figure(sweep: Sweep, engine: str, quantities: Sequence[QuantityRecord]) 
             axes.set_xticks(range(len(columns)), [_short(one) for one in columns])
             axes.set_yticks(range(len(rows)), [_short(one) for one in rows])
             axes.set(xlabel=sweep.label(across), ylabel=sweep.label(down))
-            axes.set_title(f"{_title(quantity)} ({_unit(quantity)})", fontsize=7.0)
+            axes.set_title(_title(quantity, 30) + ("" if quantity.unit == "1" else f" ({quantity.unit})"), fontsize=6.5)
         figure.text(0.5, 0.02, engine_name(engine), ha="center", color=colour(engine), fontsize=7.5, weight="bold")
     return figure
 
