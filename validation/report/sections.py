@@ -16,7 +16,8 @@ from dembark.validation.report.look import engine_name
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-# Of a case in the PDF: variants with figures, panels of each, and rows of one quantity before only the worst is shown.
+# Of a case in the PDF: variants with figures (of the first all main ones, of the others one), panels of a figure, and rows of one quantity
+# before only the worst is shown.
 VARIANTS, PANELS, ROWS = 2, 4, 4
 
 
@@ -129,7 +130,8 @@ def _section(gathered: Gathered, name: str, pages: list[Page], folder: Path) -> 
     known = gathered.cases.get(name)
     parts = [_part(page, pages, folder) for page in pages]
     variants = [part for part in parts if not part.page.is_study]
-    main = [one for part in (*variants[:VARIANTS], *(part for part in parts if part.page.is_study)) for one in part.figures if one.printed]
+    printed = [[one for one in part.figures if one.printed] for part in (*variants[:VARIANTS], *(part for part in parts if part.page.is_study))]
+    main = [one for number, found in enumerate(printed) for one in (found[:1] if number else found)]
     kinds = {kind: [row for row in rows if row.record.evidence == kind] for kind in ("identity", "code")}
     lines = [line(kinds["identity"], "Identities"), line(kinds["code"], "Engines beside each other")]
     drawn = next((shown for part in variants if (shown := _pictures(part.page))), [])
