@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 from pathlib import Path
 
 from dembark.common.errors import RunError
@@ -68,17 +67,16 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
         if unknown is not None:
             verdict, reason = "info", f"an interval is unknown: {unknown.basis or 'the run is too short'}"
         else:
-            halves = [float(one.half or 0.0) for one in both]
+            halves, scale = (value.half or 0.0, reference.half or 0.0), abs(reference.value)
             half = joint_half(*halves)
-            scale = abs(reference.value)
-            verdict, reason = _judged(abs(deviation), [one / scale for one in halves], [_packings(one) for one in both], comparisons)
+            verdict, reason = _judged(abs(deviation), (halves[0] / scale, halves[1] / scale), (_packings(value), _packings(reference)), comparisons)
     return ComparedRecord(
         name=value.name, label=value.label, unit=value.unit, value=value.value, interval=value.interval, reference=reference.value,
         reference_interval=reference.interval, deviation=deviation, deviation_kind=kind, tolerance=tolerance, verdict=verdict, reason=reason,
         detail="agreement of the engines", source=reference_engine, engine=engine, reference_engine=reference_engine, joint_half_width=half)
 
 
-def _judged(difference: float, halves: Sequence[float], packings: Sequence[float], comparisons: int) -> tuple[str, str]:
+def _judged(difference: float, halves: tuple[float, float], packings: tuple[float, float], comparisons: int) -> tuple[str, str]:
     """Verdict and reason from |difference| and half-widths over the reference, and the numbers of packings."""
     half = joint_half(*halves)
     few = min(packings)

@@ -69,7 +69,8 @@ class Quantity:
         reference = self.reference
         return QuantityRecord(
             name=self.name, label=self.label, value=_number(self.estimate.value), unit=self.unit, interval=_pair(self.estimate),
-            basis=self.estimate.basis, reference=reference and _number(reference.value), reference_interval=reference and _pair(reference),
+            basis=self.estimate.basis, reference=None if reference is None else _number(reference.value),
+            reference_interval=None if reference is None else _pair(reference),
             deviation=_number(self.deviation), deviation_kind="absolute" if self.absolute else "relative", tolerance=_number(self.tolerance),
             verdict=verdict, reason=reason, detail=self.detail, source=self.source, evidence=self.evidence, compared=self.compared,
             deviation_half_width=_number(self.deviation_half), agreement=self.agreement)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from dembark.common.errors import RunError
 from dembark.common.files import read_json, write_json
@@ -196,14 +196,14 @@ def _value(content: Mapping[str, Any], kind: type[Kind], where: str, notes: dict
     notes |= {f"unknown {key!r} left out": None for key in content if key not in known}
     if issubclass(kind, QuantityRecord) and "evidence" not in content:
         notes |= {"no kind of evidence": None} if kind is QuantityRecord else {}
-    given = {}
+    given: dict[str, Any] = {}
     for key in known.keys() & content.keys():
         item = content[key]
         if key == "quantities":
             part = ComparedRecord if kind is Comparison else QuantityRecord
             item = tuple(_value(one, part, where, notes) for one in item)
         given[key] = tuple(item) if isinstance(item, list) else item
-    return kind(**given)
+    return cast(Kind, kind(**given))
 
 
 def results(folder: Path) -> tuple[list[Result], list[Comparison], list[str]]:
@@ -211,11 +211,12 @@ def results(folder: Path) -> tuple[list[Result], list[Comparison], list[str]]:
     found: list[Result] = []
     compared: list[Comparison] = []
     problems: list[str] = []
-    for pattern, kind, into in ((f"*/*/*/{METRICS}", Result, found), (f"*/*/{COMPARISON}", Comparison, compared)):
-        for path in sorted(folder.glob(pattern)):
-            if "superseded" not in path.parts:
-                try:
-                    into.append(_read(path, kind))  # type: ignore[attr-defined]
-                except RunError as error:
-                    problems.append(str(error))
+    for path in sorted(path for name in (f"*/*/*/{METRICS}", f"*/*/{COMPARISON}") for path in folder.glob(name) if "superseded" not in path.parts):
+        try:
+            if path.name == METRICS:
+                found.append(read(path))
+            else:
+                compared.append(read_comparison(path))
+        except RunError as error:
+            problems.append(str(error))
     return found, compared, problems

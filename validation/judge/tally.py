@@ -62,20 +62,23 @@ class Tally(Counts):
 
 def tally(quantities: Iterable[QuantityRecord]) -> Tally:
     """Count `quantities` by how they stand, and by kind of evidence."""
-    total: Counter[str] = Counter()
     kinds: dict[str, Counter[str]] = {kind: Counter() for kind in (*EVIDENCE, "")}
     for one in quantities:
-        total[one.standing] += 1
         kinds[one.evidence][one.standing] += 1
-    by_evidence = {kind: Counts(**counts) for kind, counts in kinds.items() if counts.keys() - {"information"}}
-    return Tally(**total, by_evidence=by_evidence)
+    total = sum(kinds.values(), Counter())
+    by_evidence = {kind: Counts(*_numbers(counts)) for kind, counts in kinds.items() if counts.keys() - {"information"}}
+    return Tally(*_numbers(total), by_evidence=by_evidence)
+
+
+def _numbers(counts: Counter[str]) -> tuple[int, int, int, int]:
+    return counts["passed"], counts["failed"], counts["open"], counts["information"]
 
 
 def of_folder(folder: Path) -> Tally:
     """The tally of everything judged in a results folder: quantities, comparisons of engines, and the verification of the instruments."""
     found, compared, unread = results(folder)
     verified = (read_json(folder / VERIFICATION) or {}).get("quantities", [])
-    counted = tally([*(one for each in (*found, *compared) for one in each.quantities),
+    counted = tally([*(one for each in found for one in each.quantities), *(one for each in compared for one in each.quantities),
                      *(from_json(one, QuantityRecord, VERIFICATION) for one in verified)])
     return replace(counted, unread=tuple(unread))
 

@@ -86,8 +86,8 @@ def figure(found: Sequence[Point], tolerance: float = 0.10) -> Figure | None:
         side = 2.3 / WIDE
         left = result.add_axes((0.055, 1.0 - (0.25 + 2.05) / tall, side, 2.05 / tall))
         right = result.add_axes((0.76, 0.42 / tall, 0.23, 1.0 - (0.25 + 0.42) / tall))
-        ends = [value for one in drawn for value in (one.value, one.reference)]
-        ends = 10.0 ** np.array([math.floor(math.log10(min(ends))), math.ceil(math.log10(max(ends)) + 1e-9)])
+        values = [value for one in drawn for value in (one.value, one.reference)]
+        ends = 10.0 ** np.array([math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)) + 1e-9)])
         left.fill_between(ends, ends * (1 - tolerance), ends * (1 + tolerance), color=_INK, alpha=0.12, linewidth=0)
         left.plot(ends, ends, color=_INK, linewidth=0.6)
         left.set(xscale="log", yscale="log", xlim=ends, ylim=ends, xlabel="reference", ylabel="measured", title="Measured against reference")

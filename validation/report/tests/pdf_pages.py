@@ -27,7 +27,7 @@ class _Text(HTMLParser):
 def page_count(pdf: bytes) -> int:
     """Number of pages, from the page tree, which may lie in a compressed stream."""
     parts = [pdf]
-    for stream in re.findall(rb"stream\r?\n(.*?)\r?\nendstream", pdf, re.S):
+    for stream in re.findall(rb"stream\r?\n(.*?)\r?\nendstream", pdf, re.DOTALL):
         with suppress(zlib.error):
             parts.append(zlib.decompress(stream))
     return max(int(count) for part in parts for count in re.findall(rb"/Type\s*/Pages\b[^>]*?/Count (\d+)|/Count (\d+)[^>]*?/Type\s*/Pages\b", part) for count in count if count)
