@@ -57,7 +57,7 @@ def test_unreadable_results_of_a_folder_are_named(tmp_path: Path) -> None:
         (tmp_path / place).write_text(text)
     found, compared, problems = result.results(tmp_path)
     assert found == [RESULT] and not compared
-    assert len(problems) == 2 and "wet" in problems[0] and "comparison.json has no case" in problems[1]
+    assert len(problems) == 2 and "comparison.json has no case" in problems[0] and "wet" in problems[1]
     assert all("\n" not in line for line in problems)
 
 
