@@ -90,6 +90,8 @@ def run(
     from dembark.validation.case.parameters import pick
     from dembark.validation.case.resolve import resolve, settings
     from dembark.validation.judge import measuring
+    from dembark.validation.judge.result import METRICS, Result, from_json
+    from dembark.validation.judge.tally import tally
     from dembark.validation.runs import restarts
     from dembark.validation.runs.job import cancelled_by_signal
     from dembark.validation.runs.perform import perform_series
@@ -114,14 +116,14 @@ def run(
     used = Resources(ranks, threads, restart_interval=interval)
     metrics = perform_series(planned, folder, cancelled_by_signal(), used, jobs, force)
     console = _console()
-    console.print(show.quantity_table(metrics))
-    for line in show.open_lines(metrics):
+    result = from_json(metrics, Result)
+    console.print(show.quantity_table(result))
+    for line in show.open_lines(result):
         console.print(line, markup=False, soft_wrap=True)
-    failed = sum(quantity.get("verdict") == "fail" for quantity in metrics.get("quantities", []))
-    if failed:
-        console.print(f"{failed} CHECKS FAILED" if failed > 1 else "1 CHECK FAILED", style="bold red")
-    console.print(str(folder / "metrics.json"), markup=False, soft_wrap=True)
-    _strictly(failed, strict)
+    counted = tally(result.quantities)
+    console.print(counted.sentence, style="bold red" if counted.failed else "bold", soft_wrap=True)
+    console.print(str(folder / METRICS), markup=False, soft_wrap=True)
+    _strictly(counted.failed, strict)
 
 
 def _interval(text: str | None) -> float | None:
@@ -151,7 +153,7 @@ def validate(
 
     outcome = perform.validate(profile, cancelled_by_signal(), cores, results, tuple(case or ()), tuple(engine or ()))
     show_outcome(outcome, "the validation", "start again: what is finished is kept")
-    _strictly(outcome.failed_checks, strict)
+    _strictly(outcome.tally.failed, strict)
 
 
 def show_outcome(outcome: Outcome, what: str, advice: str) -> None:
@@ -161,9 +163,10 @@ def show_outcome(outcome: Outcome, what: str, advice: str) -> None:
         console.print(f"not finished: {line}", markup=False, style="red", soft_wrap=True)
     for line in outcome.problems:
         console.print(f"problem: {line}", markup=False, style="red", soft_wrap=True)
-    failed = f"{outcome.failed_checks} FAILED" if outcome.failed_checks else "none failed"
-    console.print(f"{outcome.runs - len(outcome.unfinished)} of {outcome.runs} runs finished, {outcome.checks} checks, {failed}",
-                  style="bold red" if outcome.failed_checks else "bold", soft_wrap=True)
+    console.print(f"{outcome.runs - len(outcome.unfinished)} of {outcome.runs} runs finished; {outcome.tally.sentence}",
+                  style="bold red" if outcome.tally.failed else "bold", soft_wrap=True)
+    for line in outcome.tally.sentences:
+        console.print(f"  {line}", markup=False, soft_wrap=True)
     if outcome.report:
         console.print(str(outcome.report), markup=False, soft_wrap=True)
     if not outcome.complete:

@@ -9,8 +9,9 @@ from pathlib import Path
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
 from dembark.common.lock import held
-from dembark.validation.campaigns import folder, store
+from dembark.validation.campaigns import folder
 from dembark.validation.campaigns.estimate import wall_clock
+from dembark.validation.judge.tally import Tally, of_folder
 from dembark.validation.runs import table
 from dembark.validation.runs.progress import headline
 from dembark.validation.runs.table import State
@@ -25,8 +26,7 @@ class Status:
     states: tuple[State, ...]
     left: float | None
     measured: int
-    checks: int
-    failed_checks: int
+    tally: Tally
     report: Path | None
 
     @property
@@ -48,10 +48,9 @@ def look(results: Path) -> Status:
         raise DembarkError(f"the campaign in {results} has not been started", "", f"start it with 'dembark resume {results}'")
     running = held(results / folder.LOCK)
     states = tuple(_as_the_files_say(results, state, running) for state in found)
-    checks, failed = _checks(results)
     report = results / "report.html"
     measured = {Path(state.folder).parent for state in states if (results / state.folder).with_name("metrics.json").is_file()}
-    return Status(folder.read_name(results), running, states, time_left(states), len(measured), checks, failed,
+    return Status(folder.read_name(results), running, states, time_left(states), len(measured), of_folder(results),
                   report if report.is_file() else None)
 
 
@@ -86,10 +85,3 @@ def time_left(states: Sequence[State]) -> float | None:
     return wall_clock(left, at_once) if at_once else None
 
 
-def _checks(results: Path) -> tuple[int, int]:
-    if not store.path_of(results).is_file():
-        return 0, 0
-    sql = "SELECT verdict FROM {} t WHERE measured_at = (SELECT MAX(measured_at) FROM {} u WHERE {})"
-    same = "u.case_name = t.case_name AND u.variant = t.variant AND u.engine = t.engine AND u.name = t.name"
-    verdicts = [row["verdict"] for table in ("quantities", "comparisons") for row in store.query(results, sql.format(table, table, same))]
-    return sum(verdict in ("pass", "fail") for verdict in verdicts), verdicts.count("fail")

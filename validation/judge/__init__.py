@@ -1,1 +1,1 @@
-"""From numbers with intervals to verdicts."""
+"""Verdicts: quantities with intervals beside their references, engines beside each other, and the tally of all of it."""

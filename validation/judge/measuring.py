@@ -16,7 +16,7 @@ from dembark.validation.case import deck
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.model import Case, Declared, Study
 from dembark.validation.case.parameters import pick
-from dembark.validation.checks.quantity import Quantity
+from dembark.validation.judge.quantity import Quantity
 
 if TYPE_CHECKING:
     from dembark.postproc.replica import Replica

@@ -14,10 +14,11 @@ from dembark.common.errors import DembarkError
 from dembark.common.files import read_json, write_json
 from dembark.common.lock import lock
 from dembark.validation.campaigns import source, store
+from dembark.validation.judge.tally import Tally, of_folder
 from dembark.validation.runs.executor import Backend, Executor, Local, Task
 from dembark.validation.runs.plan import Plan, Resources, Series, studies
 from dembark.validation.runs.progress import Monitor
-from dembark.validation.runs.steps import Step, count_checks, measure_series, steps
+from dembark.validation.runs.steps import Step, measure_series, steps
 from dembark.validation.runs.table import State, Table, summary
 
 LOCK = ".lock"
@@ -27,13 +28,12 @@ Place = Callable[[Table], Backend]
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came out: runs that are not finished (with reasons), further problems, numbers of checks, and the report if built."""
+    """What came out: runs that are not finished (with reasons), further problems, the tally of all checks, and the report if built."""
 
     runs: int
     unfinished: tuple[str, ...]
     problems: tuple[str, ...]
-    checks: int
-    failed_checks: int
+    tally: Tally
     report: Path | None
 
     @property
@@ -97,9 +97,8 @@ def perform(plan: Plan, results: Path, place: Place, cancel: threading.Event, co
     made = {step.name for step in todo}
     problems += [str(error) for name, error in executor.errors.items() if name in made]
     problems += [table.problem] if table.problem else []
-    checks, failed = count_checks(results)
     report = results / "report.html"
-    return Outcome(len(tasks), tuple(unfinished), tuple(dict.fromkeys(problems)), checks, failed, report if report.is_file() else None)
+    return Outcome(len(tasks), tuple(unfinished), tuple(dict.fromkeys(problems)), of_folder(results), report if report.is_file() else None)
 
 
 def perform_series(one: Series, out: Path, cancel: threading.Event, used: Resources, jobs: int | None = None,

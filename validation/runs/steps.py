@@ -14,7 +14,7 @@ from typing import Any
 from dembark import common, postproc, validation
 from dembark.common.errors import DembarkError, RunError
 from dembark.common.files import read_json, retire, write_json
-from dembark.validation import analysis, provenance
+from dembark.validation import analysis, pictures, provenance
 from dembark.validation.runs.plan import Plan, PlannedStudy, Run, finished, studies, variants
 
 # A campaign's folder holds a copy of its file.
@@ -65,7 +65,7 @@ def steps(plan: Plan, results: Path) -> list[Step]:
     """All steps after the runs of `plan`, each after those that it needs."""
     found = []
     for one in plan.series:
-        folder, own = results / one.place, one.runs[0].case.folder / "checks.py"
+        folder, own = results / one.place, one.runs[0].case.folder / "measure.py"
         found.append(Step(name("measure", one.place), "measure", one.place, tuple(run.name for run in one.runs), folder / "metrics.json",
                           (own, *(folder / run.folder_name / "run.json" for run in one.runs)), measure_series, (folder, one.runs),
                           "".join(run.inputs for run in one.runs)))
@@ -130,7 +130,7 @@ def measure_series(folder: Path, runs: Iterable[Run]) -> dict[str, Any]:
         raise
     except Exception as error:  # as in _told, with what is too small in the runs
         raise RunError(f"{folder} could not be measured", *analysis.reasons(folder, error, done[0].case)) from error
-    content["remarks"] = [*content.get("remarks", ()), *remarks]
+    content["remarks"] = [*content.get("remarks", ()), *remarks, *pictures.draw(folder, content.get("picture"))]
     if "replicas" in content["parameters"]:
         content["parameters"]["replicas"] = len(wanted)  # those of an earlier request for fewer or more are kept, and know its number
     content["measured"] = _now()
@@ -170,17 +170,11 @@ def build_report(results: Path) -> None:
     if (results / CAMPAIGN_FILE).is_file():
         from dembark.validation.campaigns import report
     else:
-        from dembark.validation import report
+        from dembark.validation import report, verification
+
+        # The report of a profile includes the verification of the instruments.
+        verification.write(results)
     # Better none than one of other results.
     (results / "report.html").unlink(missing_ok=True)
     with _told(f"the report of {results} could not be built"):
         report.build(results)
-
-
-def count_checks(results: Path) -> tuple[int, int]:
-    """Numbers of quantities with a verdict pass or fail, and of those that fail, in `results` and in the report's own verification."""
-    files = [path for name in ("metrics.json", "comparison.json") for path in sorted(results.glob(f"*/*/**/{name}"))
-             if "superseded" not in path.parts]
-    files.append(results / "verification.json")
-    verdicts = [quantity.get("verdict") for path in files for quantity in (read_json(path) or {}).get("quantities", [])]
-    return sum(verdict in ("pass", "fail") for verdict in verdicts), verdicts.count("fail")

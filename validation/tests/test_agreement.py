@@ -4,7 +4,7 @@ import math
 
 import pytest
 from dembark.postproc.statistics import exact
-from dembark.validation.checks.quantity import Quantity
+from dembark.validation.judge.quantity import Quantity
 from dembark.validation.compare import pair
 
 

@@ -11,6 +11,7 @@ import pytest
 from dembark.common.errors import DembarkError
 from dembark.validation import analysis, show
 from dembark.validation.judge import measuring
+from dembark.validation.judge.result import QuantityRecord, Result
 
 HEADER = "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n" \
     "ITEM: ATOMS id type x y z vx vy vz radius mass f_force_side[1] f_force_side[2] f_force_side[3]\n"
@@ -56,6 +57,6 @@ def test_numerical_warnings_become_remarks_and_stay_errors_where_they_are(capsys
 
 
 def test_open_verdicts_are_told_with_their_reason() -> None:
-    quantities = [{"label": name, "verdict": verdict, "reason": reason} for name, verdict, reason in (
-        ("a", "info", "the run is too short"), ("b", "pass", ""), ("c", "info", "the run is too short"), ("d", "info", ""))]
-    assert show.open_lines({"quantities": quantities}) == ["info: a, c: the run is too short"]
+    quantities = tuple(QuantityRecord(name, 1.0, verdict, tolerance=0.1, reason=reason) for name, verdict, reason in (
+        ("a", "info", "the run is too short"), ("b", "pass", ""), ("c", "info", "the run is too short"), ("d", "info", "")))
+    assert show.open_lines(Result("box", "dry", "yade", quantities)) == ["open: a, c: the run is too short"]

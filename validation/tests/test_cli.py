@@ -80,7 +80,7 @@ def test_cases_shows_every_key(capsys: pytest.CaptureFixture[str]) -> None:
 def test_run_measures_and_shows_verdicts(dembark: Dembark, tmp_path: Path) -> None:
     done = dembark("run", "box", "--engine", "liggghts", "--variant", "wet", "--set", "grain_diameter=4 mm", "--out", "o")
     assert done.returncode == 0, done.stderr
-    assert "FAIL" in done.stdout and "1 CHECK FAILED" in done.stdout and str(tmp_path / "o/metrics.json") in done.stdout
+    assert "FAIL" in done.stdout and "0 of 1 check passed, 1 FAILED" in done.stdout and str(tmp_path / "o/metrics.json") in done.stdout
     assert "box wet liggghts 1: finished" in done.stderr
     assert read_json(tmp_path / "o/metrics.json")["parameters"]["grain_diameter"] == 0.004
 
@@ -90,7 +90,7 @@ def test_a_failed_check_counts_only_when_asked(dembark: Dembark, tmp_path: Path)
     words = ("run", "box", "--engine", "liggghts", "--variant", "wet", "--out", "o")
     first, second = dembark(*words, "--restart-interval", "1 s"), dembark(*words, "--strict")
     assert (first.returncode, second.returncode) == (0, 1)
-    assert "1 CHECK FAILED" in first.stdout and second.stderr.splitlines()[-1] == "dembark: 1 check failed, --strict makes this an error"
+    assert "1 FAILED" in first.stdout and second.stderr.splitlines()[-1] == "dembark: 1 check failed, --strict makes this an error"
     # By the fixed rate of restarts, a million particle-steps a second.
     assert read_json(tmp_path / "o/replica-1/run.json")["restart_every"] == 100_000
 

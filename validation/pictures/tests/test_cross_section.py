@@ -1,12 +1,15 @@
 """Pictures and animations of logs show the logs where they are."""
 
+import io
 import json
+import shutil
 
 import numpy as np
 import pytest
-from dembark.validation.report import cross_section
-from dembark.validation.report.figures import svg
+from dembark.validation import pictures
+from dembark.validation.pictures import sections as cross_section
 from dumps import grains_text
+from matplotlib.figure import Figure
 from PIL import Image
 
 
@@ -29,13 +32,26 @@ def test_scene(folder):
     assert cross_section.scene(folder, "xz", speed=4.0).view == pytest.approx((-0.7, 0.4, -0.7, 0.1))
 
 
-def test_picture_of_engines_side_by_side(folder):
-    one = cross_section.scene(folder, "xz", 1.0, 2.0)
-    figure, reasons = cross_section.picture({"liggghts": one, "yade": one, "other": "it is gone"})
-    assert reasons == ["No picture of other: it is gone."]
-    assert [axes.get_title() for axes in figure.axes[:2]] == ["LIGGGHTS", "YADE"]
-    assert svg(figure).startswith(b"<?xml")
-    assert cross_section.picture({"yade": "it is gone"})[0] is None
+def test_picture_shows_the_last_frame(folder):
+    section = cross_section.scene(folder, "xz", 1.0, 2.0)
+    image = np.asarray(Image.open(io.BytesIO(cross_section.picture(section))).convert("L"))
+    assert image.min() < 120 and image.max() == 255
+    axes = Figure().subplots()
+    cross_section.draw(axes, section, 1.0)
+    np.testing.assert_allclose(axes.collections[0].get_offsets(), [[-0.5, -0.5], [0.3, 0.0]])
+
+
+def test_a_series_has_its_picture_and_animation_beside_it(folder, tmp_path):
+    series = tmp_path / "series"
+    series.mkdir()
+    (series / "picture.png").write_text("an older one")
+    assert pictures.draw(series, {"cross_section": "xz"}) == ["No picture: the run's grains.dump is no longer there."]
+    assert not (series / "picture.png").exists() and pictures.draw(series, None) == []
+    shutil.copytree(folder, series / "replica-1", ignore=lambda *_: ["series"])
+    assert pictures.draw(series, {"cross_section": "xz", "drum_radius": 1.0, "drum_speed": 2.0}) == []
+    assert (series / "picture.png").read_bytes().startswith(b"\x89PNG") and (series / "animation.gif").is_file()
+    (series / "replica-1" / "grains.dump").write_text("gone")
+    assert pictures.draw(series, {"colour_by": "velocity", "scale": 1.0, "cut": False})[0].startswith("No picture: ")
 
 
 def test_animation(folder, tmp_path):

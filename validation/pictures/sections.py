@@ -11,7 +11,9 @@ import numpy as np
 from dembark.common.files import read_json
 from dembark.postproc import GrainFrame, GrainsDump
 from dembark.postproc.dumptext import TextDump
-from dembark.validation.report.figures import engine_name
+from dembark.postproc.style import STYLE
+from dembark.validation.pictures.packings import HEIGHT, png
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import Normalize
@@ -93,48 +95,47 @@ def _chains(folder: Path, frame: GrainFrame, axes: list[int]) -> tuple[Array, Ar
     return np.array(ends).reshape(len(ends), 2, 2), values[:, 6]
 
 
-def picture(scenes: dict[str, Section | str], height: float = 3.3) -> tuple[Figure | None, list[str]]:
-    """The engines' last frames side by side on one colour scale, and for each one that is not there the reason in one line."""
-    reasons = [f"No picture of {engine_name(engine)}: {one}." for engine, one in scenes.items() if isinstance(one, str)]
-    shown = {engine: one for engine, one in scenes.items() if isinstance(one, Section)}
-    if not shown:
-        return None, reasons
-    top = limit(list(shown.values()))
-    with matplotlib.rc_context({"font.size": 7.5, "text.color": "#22262b"}):
-        figure = Figure(figsize=(min(7.2, len(shown) * height + 0.6), height), layout="constrained")
-        axes = figure.subplots(1, len(shown), squeeze=False)[0]
-        for one, (engine, section) in zip(axes, shown.items(), strict=True):
-            if section.drum_radius > 0.0:
-                one.add_patch(Circle((0.0, 0.0), section.drum_radius, fill=False, edgecolor=_SHELL, linewidth=1.6))
-                _arrow(one, section)
-            size = 2.0 * section.radii
-            one.add_collection(EllipseCollection(
-                size, size, np.zeros_like(size), units="x", offsets=section.places[-1], transOffset=one.transData, array=section.speeds[-1],
-                cmap=_MAP, norm=Normalize(0.0, top), edgecolor="white", linewidth=0.3))
-            if len(section.forces):
-                widths = 4.0 * np.sqrt(section.forces / section.forces.max())
-                one.add_collection(LineCollection(list(section.links), linewidths=widths, colors=_CHAIN, alpha=0.85, capstyle="round"))
-            left, right, bottom, upper = section.last_view
-            one.set(xlim=(left, right), ylim=(bottom, upper), aspect="equal")
-            one.set_title(engine_name(engine), fontsize=8.5, fontweight="bold")
-            one.axis("off")
-        bar = figure.colorbar(ScalarMappable(Normalize(0.0, top), _MAP), ax=list(axes), shrink=0.75, aspect=22, pad=0.02, extend="max")
-        bar.set_label(next(iter(shown.values())).label)
+def picture(section: Section) -> bytes:
+    """The last frame as a PNG, with a colour scale."""
+    top = limit(section)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(HEIGHT + 1.1, HEIGHT), layout="constrained")
+        axes = figure.subplots()
+        draw(axes, section, top)
+        bar = figure.colorbar(ScalarMappable(Normalize(0.0, top), _MAP), ax=axes, shrink=0.75, aspect=22, pad=0.02, extend="max")
+        bar.set_label(section.label)
         bar.outline.set_linewidth(0.4)
-    return figure, reasons
+    return png(figure)
 
 
-def limit(sections: list[Section]) -> float:
+def draw(axes: Axes, section: Section, top: float) -> None:
+    """The last frame in `axes`, speeds up to `top` on the colour scale."""
+    if section.drum_radius > 0.0:
+        axes.add_patch(Circle((0.0, 0.0), section.drum_radius, fill=False, edgecolor=_SHELL, linewidth=1.6))
+        _arrow(axes, section)
+    size = 2.0 * section.radii
+    axes.add_collection(EllipseCollection(
+        size, size, np.zeros_like(size), units="x", offsets=section.places[-1], offset_transform=axes.transData, array=section.speeds[-1],
+        cmap=_MAP, norm=Normalize(0.0, top), edgecolor="white", linewidth=0.3))
+    if len(section.forces):
+        widths = 4.0 * np.sqrt(section.forces / section.forces.max())
+        axes.add_collection(LineCollection(list(section.links), linewidths=widths, colors=_CHAIN, alpha=0.85, capstyle="round"))
+    left, right, bottom, upper = section.last_view
+    axes.set(xlim=(left, right), ylim=(bottom, upper), aspect="equal")
+    axes.axis("off")
+
+
+def limit(section: Section) -> float:
     """Upper end of the colour scale: what 2 % of the speeds exceed."""
-    return float(np.percentile(np.concatenate([one.speeds.ravel() for one in sections]), 98.0)) or 1.0
+    return float(np.percentile(section.speeds, 98.0)) or 1.0
 
 
-def _arrow(axes: object, section: Section) -> None:
+def _arrow(axes: Axes, section: Section) -> None:
     if section.drum_speed == 0.0:
         return
     radius, turn = 0.93 * section.drum_radius, math.copysign(1.0, section.drum_speed)
     ends = [(radius * math.cos(angle), radius * math.sin(angle)) for angle in (math.pi / 2 + 0.28 * turn, math.pi / 2 - 0.28 * turn)]
-    axes.annotate("", ends[1], ends[0], arrowprops={"arrowstyle": "->", "color": _SHELL,  # type: ignore[attr-defined]
+    axes.annotate("", ends[1], ends[0], arrowprops={"arrowstyle": "->", "color": _SHELL,
                                                     "connectionstyle": f"arc3,rad={-0.28 * turn}", "linewidth": 1.0})
 
 
@@ -144,7 +145,7 @@ def animate(section: Section, path: Path, *, duration: int = 60) -> Path:
     scale = _OVERSAMPLING * _PIXELS / max(right - left, upper - bottom)
     width, height = round((right - left) * scale), round((upper - bottom) * scale)
     paint = matplotlib.colormaps[_MAP]
-    top = limit([section])
+    top = limit(section)
 
     def at(place: Array) -> tuple[float, float]:
         return (place[0] - left) * scale, (upper - place[1]) * scale

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dembark.validation.report import cross_section
+from dembark.validation.pictures import sections as cross_section
+from matplotlib.figure import Figure
 
 HEAD = "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF {}\n{}\nITEM: BOX BOUNDS ff ff ff\n-1 1\n-1 1\n-1 1\nITEM: {} "
 GRAINS = "id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass\n"
@@ -31,9 +32,9 @@ def test_chains_join_logs_and_reach_to_walls(run: Path) -> None:
     assert found.forces.tolist() == [400.0, 100.0]
     np.testing.assert_allclose(found.links, [[[0.0, 0.1], [0.2, 0.1]], [[0.0, 0.1], [0.0, 0.0]]], atol=1e-12)
     assert not len(cross_section.scene(run, "xy", speed=1.0).forces)
-    figure, reasons = cross_section.picture({"yade": found})
-    assert figure is not None and not reasons
-    lines = [one for axes in figure.axes for one in axes.collections if type(one).__name__ == "LineCollection" and len(one.get_segments()) == 2]
+    axes = Figure().subplots()
+    cross_section.draw(axes, found, 1.0)
+    lines = [one for one in axes.collections if type(one).__name__ == "LineCollection"]
     assert len(lines) == 1
     wide, narrow = lines[0].get_linewidths()
     assert wide == pytest.approx(2.0 * narrow)
