@@ -90,7 +90,7 @@ def _joined(one: Declared, part: str, name: str, value: Value) -> Quantity:
         name=name, label=one.label.replace("*", part), unit=one.unit, estimate=value.estimate, reference=value.reference,
         tolerance=None if tolerance is None else float(tolerance), absolute=one.absolute, deviation_half=value.half, source=one.source,
         detail=value.detail or one.detail or one.why, reason=value.reason, verdict=value.verdict, compared=one.compared and value.compared,
-        agreement=None if one.agreement is None else one.agreement * value.scale)
+        agreement=None if one.agreement is None else one.agreement * value.scale, evidence=one.evidence)
 
 
 def picture(case: Case, known: Mapping[str, Any]) -> dict[str, Any] | None:
