@@ -172,6 +172,8 @@ def test_runs_of_a_lost_node_go_on_elsewhere(campaign: Campaign, on_cluster: Clu
 @pytest.mark.slow
 def test_a_terminated_submitter_takes_its_jobs_back_and_they_go_on_later(
         campaign: Campaign, cluster_file: Path, wait_for: Callable[..., object]) -> None:
+    """Its measurements are jobs as well."""
+    campaign.file.write_text(CAMPAIGN + '[resources.measure]\nmemory = "200 MB"\ntime = "2 min"\n')
     process = campaign.submit(cluster_file)
     wait_for(lambda: process.poll() is None and engines_at_work(campaign.results, 1), 400)
     process.terminate()
@@ -182,6 +184,7 @@ def test_a_terminated_submitter_takes_its_jobs_back_and_they_go_on_later(
     assert code == 0, campaign.log() + out + error
     records = campaign.records()
     assert len(records) == RUNS and any(record["resumed_at"] and record["attempts"] == 2 for record in records)
+    assert len(list(campaign.results.glob("*/*/*/.measure.job.json"))) == RUNS == len(list(campaign.results.glob("*/*/*/metrics.json")))
 
 
 def test_what_slurm_refuses_is_told_before_anything_is_submitted(campaign: Campaign, on_cluster: Cluster, cluster_file: Path) -> None:
