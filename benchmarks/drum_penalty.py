@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark.validation import engines
-from dembark.validation.statistics import student
+from dembark.postproc.statistics import student
 
 Array = NDArray[np.float64]
 LOGS, LOW, HIGH, DENSITY, FILLING = 60, 0.10, 0.25, 850.0, 0.3

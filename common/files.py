@@ -1,22 +1,19 @@
-"""Files that are either whole or not there: atomic writing, locks, folders moved into place, and checks of an engine's output."""
+"""Files that are either whole or not there: atomic writing, folders moved into place, and checks of an engine's output."""
 
 from __future__ import annotations
 
 import csv
 import errno
-import fcntl
 import json
 import math
 import mmap
 import os
 import re
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from dembark.common.errors import DembarkError, RunError
+from dembark.common.errors import RunError
 
 DISK_FULL = "the disk is full"
 _TIMESTEP = b"ITEM: TIMESTEP\n"
@@ -64,18 +61,6 @@ def disk_error(error: OSError, path: Path) -> RunError:
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return RunError(DISK_FULL, f"writing {path}", "free some space and start again; what is finished is kept")
     return RunError(f"cannot write {path}", error.strerror or str(error))
-
-
-@contextmanager
-def lock(path: Path, message: str) -> Iterator[None]:
-    """Hold a lock that the system releases when this process ends in whatever way; DembarkError(message) when another has it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="utf-8") as handle:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise DembarkError(message, f"its lock is {path}", "wait for it to end or stop it") from None
-        yield
 
 
 def move_into_place(work: Path, target: Path) -> None:

@@ -1,4 +1,4 @@
-"""Contacts of a run: `contacts.dump` of either engine, or any local dump, as numpy arrays."""
+"""Contacts of a run: `contacts.dump`, or any local dump, as numpy arrays."""
 
 from __future__ import annotations
 

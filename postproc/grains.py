@@ -194,7 +194,7 @@ def _wall(name: str) -> tuple[str, ...]:
 
 
 class GrainsDump(TypedDump[GrainFrame]):
-    """Grains of either engine as a sequence of GrainFrame, read one at a time: any file that open_dump reads."""
+    """Grains as a sequence of GrainFrame, read one at a time: any file that open_dump reads."""
 
     def __init__(
         self,

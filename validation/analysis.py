@@ -1,7 +1,8 @@
-"""What went wrong while results were analysed, for people: the line of the checks, and what of the run is too small to be measured."""
+"""What went wrong while results were analysed, for people: its line, and what of the run is too small to be measured."""
 
 from __future__ import annotations
 
+import traceback
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,8 +10,7 @@ from pathlib import Path
 from typing import TextIO
 
 from dembark.postproc import DumpError, GrainsDump
-from dembark.validation import checks
-from dembark.validation.cases import Case
+from dembark.validation.case.model import Case
 
 # Below these numbers most checks have nothing to average over.
 _FEW_GRAINS = 100
@@ -37,15 +37,15 @@ def warnings_kept() -> Iterator[list[str]]:
 
 
 def reasons(folder: Path, error: Exception, case: Case) -> tuple[str, ...]:
-    """Parts of one line about `error`, which the checks of `case` raised for the runs in `folder`: what is too small, error and line."""
-    files = (case.folder / "checks.py", *sorted(Path(checks.__file__).parent.glob("*.py")))
-    own, *shipped = (checks.place(error, file) for file in files)
-    told = f"{type(error).__name__}: {error}{own or next(filter(None, shipped), '')}"
+    """Parts of one line about `error`, which the measure.py of `case` raised for the runs in `folder`: what is too small, error and line."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if Path(frame.filename) == case.folder / "measure.py"] or frames
+    told = f"{type(error).__name__}: {error} ({Path(own[-1].filename).name}, line {own[-1].lineno})"
     small = [too_small(path) for path in sorted(folder.glob("replica-*"))]
     worst = next(filter(None, small), "")
     if not worst:
         return (told,)
-    return (f"the run is too small or too short for its checks: {worst}", "take more grains or frames, or a longer time to settle", f"({told})")
+    return (f"the run is too small or too short to be measured: {worst}", "take more grains or frames, or a longer time to settle", f"({told})")
 
 
 def too_small(replica: Path) -> str:

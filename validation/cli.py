@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,14 +12,17 @@ import typer
 from rich.console import Console
 
 from dembark.common.errors import DembarkError, RunError
+from dembark.validation import engines
 from dembark.validation.campaigns import cli as campaigns
+from dembark.validation.case import cli as cases
+from dembark.validation.case import folders
 
 if TYPE_CHECKING:
-    from dembark.validation.workflow import Outcome
+    from dembark.validation.runs.perform import Outcome
 
-_ABOUT = """Granular contact laws and their validation, in LIGGGHTS and YADE.
+_ABOUT = f"""Granular contact laws and their validation, in {engines.titles("and")}.
 
-Your own cases: set DEMBARK_DECKS to the folder that holds their folders; it counts instead of the shipped input_decks."""
+Your own cases: 'dembark new-case NAME' writes one, '--cases FOLDER' (before the command) or DEMBARK_CASES finds them beside those that ship."""
 
 app = typer.Typer(name="dembark", help=_ABOUT,
                   pretty_exceptions_enable=False, rich_markup_mode=None, context_settings={"help_option_names": ["-h", "--help"]})
@@ -50,9 +54,13 @@ def _show_version(wanted: bool) -> None:
 
 
 @app.callback()
-def _common(version: Annotated[bool, typer.Option("--version", is_eager=True, callback=_show_version,
-                                                  help="Show the version, and the commit of a checkout.")] = False) -> None:
+def _common(
+    version: Annotated[bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Show the version, and the commit of a checkout.")] = False,
+    own: Annotated[list[Path] | None, typer.Option("--cases", metavar="FOLDER", help="Folder of your own cases; repeat for more.")] = None,
+) -> None:
     """Options that need no command."""
+    for folder in own or ():
+        folders.add_own_root(folder)
 
 
 def _strictly(failed: int, strict: bool) -> None:
@@ -61,33 +69,15 @@ def _strictly(failed: int, strict: bool) -> None:
         raise RunError(f"{failed} checks failed" if failed > 1 else "1 check failed", "--strict makes this an error")
 
 
-@app.command("cases")
-def show_cases(case: Annotated[str | None, typer.Argument(help="Show the keys, profiles and variants of this case.")] = None) -> None:
-    """List the cases, or everything about one."""
-    from dembark.validation import show
-    from dembark.validation.cases import discover, find
-
-    console = _console()
-    if case is None:
-        console.print(show.case_table(discover().values()))
-        return
-    one = find(case)
-    console.print(f"{one.name}: {one.title}\n{one.description}", markup=False)
-    console.print(show.key_table(one))
-    console.print(show.overrides_table(one))
-    for source in one.source:
-        console.print(f"source: {source}", markup=False)
-
-
 @app.command()
 def run(
     case: Annotated[str, typer.Argument(help="Name of a case, see 'dembark cases'.")],
-    engine: Annotated[str, typer.Option(help="liggghts or yade.")],
+    engine: Annotated[str, typer.Option(help=f"{' or '.join(engines.names())}.")],
     profile: Profile = "quick",
     variant: Annotated[str | None, typer.Option(help="Variant of the case; default: the first one.")] = None,
     change: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=_SET)] = None,
     out: Annotated[Path | None, typer.Option(help=_OUT)] = None,
-    ranks: Annotated[int, typer.Option(min=1, help="MPI processes for each run (LIGGGHTS).")] = 1,
+    ranks: Annotated[int, typer.Option(min=1, help=f"MPI processes for each run ({engines.titles('and', lambda one: one.ranks)}).")] = 1,
     threads: Annotated[int, typer.Option(min=1, help="Threads for each run.")] = 1,
     jobs: Annotated[int | None, typer.Option(min=1, help="Replicas at a time; default: as many as fit the cores.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace results of other inputs once the new ones are finished.")] = False,
@@ -95,51 +85,53 @@ def run(
     strict: Strict = False,
 ) -> None:
     """Run a case in one engine, measure it and show each quantity beside its reference."""
-    from dembark.validation import checks, engines, restarts, show
-    from dembark.validation.cases import ENGINES, find
-    from dembark.validation.execute import execute
-    from dembark.validation.jobs import cancelled_by_signal
-    from dembark.validation.parameters import pick
-    from dembark.validation.plan import series
-    from dembark.validation.resolve import resolve, settings
-    from dembark.validation.simulate import Resources
+    from dembark.validation import show
+    from dembark.validation.case.folders import find
+    from dembark.validation.case.parameters import pick
+    from dembark.validation.case.resolve import resolve, settings
+    from dembark.validation.judge import measuring
+    from dembark.validation.judge.result import METRICS, Result, from_json
+    from dembark.validation.judge.tally import tally
+    from dembark.validation.runs import restarts
+    from dembark.validation.runs.job import cancelled_by_signal
+    from dembark.validation.runs.perform import perform_series
+    from dembark.validation.runs.plan import Resources, series
 
     one = find(case)
     changes = settings(change or ())
     chosen = variant if variant is not None else next(iter(one.variants))
-    pick(engine, ENGINES, "engine", "in --engine")
-    if engine == "yade" and ranks > 1:
-        raise DembarkError(f"--ranks {ranks} with YADE", "", "use --threads: YADE runs in one process")
+    pick(engine, engines.names(), "engine", "in --engine")
+    engines.facts(engine).check_ranks(ranks)
     interval = _interval(restart_interval)
     # Everything the user wrote is checked before an engine is looked for.
     resolve(one, profile, chosen, changes)
     if out is None and changes:
         raise DembarkError("--out is missing", "with --set the run is not the one of the profile", "name a folder for its results")
-    checks.find(one.name, one.folder)
+    measuring.check(one)
     planned = series(one, chosen, profile, engines.find(engine), changes)
     if restart_interval is not None and not restarts.supported(planned.runs[0]):
         raise DembarkError(f"--restart-interval {restart_interval}", f"{one.deck(engine)} writes no states to go on from",
                            "leave it out; see docs/restarts.md for what a deck needs")
     folder = (out or Path("results") / profile / planned.place).resolve()
-    metrics = execute(planned, folder, cancelled_by_signal(), Resources(ranks, threads, interval), jobs, force)
+    used = Resources(ranks, threads, restart_interval=interval)
+    metrics = perform_series(planned, folder, cancelled_by_signal(), used, jobs, force)
     console = _console()
-    console.print(show.quantity_table(metrics))
-    for line in show.open_lines(metrics):
+    result = from_json(metrics, Result)
+    console.print(show.quantity_table(result))
+    for line in show.open_lines(result):
         console.print(line, markup=False, soft_wrap=True)
-    failed = sum(quantity.get("verdict") == "fail" for quantity in metrics.get("quantities", []))
-    if failed:
-        console.print(f"{failed} CHECKS FAILED" if failed > 1 else "1 CHECK FAILED", style="bold red")
-    console.print(str(folder / "metrics.json"), markup=False, soft_wrap=True)
-    _strictly(failed, strict)
+    counted = tally(result.quantities)
+    console.print(counted.sentence, style="bold red" if counted.failed else "bold", soft_wrap=True)
+    console.print(str(folder / METRICS), markup=False, soft_wrap=True)
+    _strictly(counted.failed, strict)
 
 
-def _interval(text: str | None) -> float:
-    """Wall time (s) between states of a run, 0 for none."""
+def _interval(text: str | None) -> float | None:
+    """Wall time (s) between states of a run, 0 for none; None when it is not said."""
     from dembark.validation.campaigns.sizes import seconds
-    from dembark.validation.simulate import Resources
 
     if text is None:
-        return Resources.restart_interval
+        return None
     try:
         return 0.0 if text == "none" else seconds(text)
     except DembarkError as error:
@@ -155,13 +147,13 @@ def validate(
     engine: Annotated[list[str] | None, typer.Option(help="Only this engine.")] = None,
     strict: Strict = False,
 ) -> None:
-    """Run all cases of a profile in both engines and build the report; finished runs are kept."""
-    from dembark.validation.jobs import cancelled_by_signal
-    from dembark.validation.workflow import validate as workflow
+    """Run all cases of a profile in their engines and build the report; finished runs are kept."""
+    from dembark.validation.runs import perform
+    from dembark.validation.runs.job import cancelled_by_signal
 
-    outcome = workflow(profile, cancelled_by_signal(), cores, results, tuple(case or ()), tuple(engine or ()))
+    outcome = perform.validate(profile, cancelled_by_signal(), cores, results, tuple(case or ()), tuple(engine or ()))
     show_outcome(outcome, "the validation", "start again: what is finished is kept")
-    _strictly(outcome.failed_checks, strict)
+    _strictly(outcome.tally.failed, strict)
 
 
 def show_outcome(outcome: Outcome, what: str, advice: str) -> None:
@@ -171,9 +163,10 @@ def show_outcome(outcome: Outcome, what: str, advice: str) -> None:
         console.print(f"not finished: {line}", markup=False, style="red", soft_wrap=True)
     for line in outcome.problems:
         console.print(f"problem: {line}", markup=False, style="red", soft_wrap=True)
-    failed = f"{outcome.failed_checks} FAILED" if outcome.failed_checks else "none failed"
-    console.print(f"{outcome.runs - len(outcome.unfinished)} of {outcome.runs} runs finished, {outcome.checks} checks, {failed}",
-                  style="bold red" if outcome.failed_checks else "bold", soft_wrap=True)
+    console.print(f"{outcome.runs - len(outcome.unfinished)} of {outcome.runs} runs finished; {outcome.tally.sentence}",
+                  style="bold red" if outcome.tally.failed else "bold", soft_wrap=True)
+    for line in outcome.tally.sentences:
+        console.print(f"  {line}", markup=False, soft_wrap=True)
     if outcome.report:
         console.print(str(outcome.report), markup=False, soft_wrap=True)
     if not outcome.complete:
@@ -188,7 +181,7 @@ def make_report(
     results: Results = Path("results"),
 ) -> None:
     """Build the report of a profile or a campaign again from the results that are there."""
-    from dembark.validation.jobs import build_report
+    from dembark.validation.runs.steps import build_report
 
     folder = directory.resolve() if directory else results.resolve() / profile
     if directory and not any(folder.glob("*/*/*/metrics.json")):
@@ -199,6 +192,7 @@ def make_report(
     _console().print(f"{folder / 'report.html'}\n{folder / 'report.pdf'}", markup=False, soft_wrap=True)
 
 
+cases.register(app)
 campaigns.register(app)
 
 
@@ -219,7 +213,7 @@ _PASSED_ON = {"ignore_unknown_options": True, "allow_extra_args": True, "help_op
 
 @app.command(add_help_option=False, context_settings=_PASSED_ON)
 def fields(context: typer.Context) -> None:
-    """Stress, velocity and more on a grid, from dumps of either engine."""
+    """Stress, velocity and more on a grid, from dumps of any engine."""
     from dembark.postproc import cli
 
     raise typer.Exit(cli.run(["fields", *context.args]))
@@ -227,23 +221,29 @@ def fields(context: typer.Context) -> None:
 
 @app.command(add_help_option=False, context_settings=_PASSED_ON)
 def walls(context: typer.Context) -> None:
-    """Stress on walls and inclusions, from dumps of either engine."""
+    """Stress on walls and inclusions, from dumps of any engine."""
     from dembark.postproc import cli
 
     raise typer.Exit(cli.run(["walls", *context.args]))
 
 
-@app.command(add_help_option=False, context_settings=_PASSED_ON)
-def yade(context: typer.Context) -> None:
-    """Start YADE with dembark's laws; all that follows is passed on to it."""
-    from dembark.validation import engines
+def _start(name: str) -> Callable[[typer.Context], None]:
+    """The command that becomes the engine called `name`, with the words given to it."""
+    def start(context: typer.Context) -> None:
+        found = engines.find(name)
+        environment = found.environment()
+        if "DISPLAY" in os.environ:
+            environment["DISPLAY"] = os.environ["DISPLAY"]
+        sys.stdout.flush()
+        os.execve(found.executable, [str(found.executable), *context.args], environment)
 
-    found = engines.find("yade")
-    environment = found.environment()
-    if "DISPLAY" in os.environ:
-        environment["DISPLAY"] = os.environ["DISPLAY"]
-    sys.stdout.flush()
-    os.execve(found.executable, [str(found.executable), *context.args], environment)
+    return start
+
+
+for _facts in map(engines.facts, engines.names()):
+    if _facts.interactive:
+        app.command(_facts.name, add_help_option=False, context_settings=_PASSED_ON,
+                    help=f"Start {_facts.program}; all that follows is passed on to it.")(_start(_facts.name))
 
 
 def main(words: list[str] | None = None) -> int:

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dembark.common.errors import DembarkError
-from dembark.validation import cases, engines, provenance
+from dembark.validation import engines, provenance
+from dembark.validation.case import folders
 
-_PACKAGES = ("numpy", "scipy", "MDAnalysis", "snakemake", "snakemake-executor-plugin-slurm", "typer", "rich", "pint", "jinja2", "matplotlib",
+_PACKAGES = ("numpy", "scipy", "MDAnalysis", "filelock", "typer", "rich", "pint", "jinja2", "matplotlib",
              "weasyprint", "pyvista", "xarray", "h5netcdf", "h5py")
 
 
@@ -40,14 +41,15 @@ def _engine(name: str) -> str:
 
 
 def _decks() -> str:
-    found = cases.discover()
+    found, roots = folders.discover(), [folders.shipped_root(), *folders.own_roots()]
+    where = " and ".join(map(str, roots))
     if not found:
-        raise DembarkError(f"no case in {cases.deck_root()}", "", "set DEMBARK_DECKS to the folder that holds the case folders")
-    return f"{', '.join(found)} in {cases.deck_root()}"
+        raise DembarkError(f"no case in {where}", "", "set DEMBARK_CASES to the folder that holds your case folders")
+    return f"{', '.join(found)} in {where}"
 
 
 def examine() -> list[Finding]:
-    """All findings: Python and its packages, both engines, the cases, and what is useful but not required."""
+    """All findings: Python and its packages, the engines, the cases, and what is useful but not required."""
     packages = {name: provenance.package_version(name) for name in _PACKAGES}
     absent = [name for name, version in packages.items() if version is None]
     mpirun, commit = shutil.which("mpirun"), provenance.commit()
@@ -56,7 +58,7 @@ def examine() -> list[Finding]:
         Finding("Python", platform.python_version() if sys.version_info >= (3, 11) else None, advice="Python 3.11 or newer is needed"),
         Finding("Python packages", None if absent else ", ".join(f"{name} {version}" for name, version in packages.items()),
                 advice=f"{', '.join(absent)} missing: run 'make'"),
-        *(_asked(what, lambda name=name: _engine(name)) for name, what in engines.NAMES.items()),
+        *(_asked(engines.facts(name).program, lambda name=name: _engine(name)) for name in engines.names()),
         _asked("cases", _decks),
         Finding("mpirun", mpirun, False, "install openmpi-bin to use --ranks"),
         Finding("Slurm", shutil.which("sbatch"), False, "only a cluster has it; campaigns run here without it"),

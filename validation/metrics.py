@@ -10,16 +10,25 @@ from typing import Any
 from dembark.common.errors import DembarkError, RunError
 from dembark.common.files import read_json, write_json
 from dembark.postproc import DumpError
-from dembark.validation import checks
-from dembark.validation.cases import Study
-from dembark.validation.cases import find as find_case
-from dembark.validation.checks.run import Replica
+from dembark.postproc.replica import Replica
+from dembark.validation import checks, engines
+from dembark.validation.case import deck
+from dembark.validation.case.folders import find as find_case
+from dembark.validation.case.model import Case, Study
+from dembark.validation.judge import measuring
 
 
 def replicas(folder: Path) -> list[Replica]:
     """Finished replicas of `folder`, in the order of their numbers."""
-    found = [Replica(path.parent, record) for path in folder.glob("replica-*/run.json") if (record := read_json(path)) is not None]
+    found = [Replica(path.parent, _whole(record)) for path in folder.glob("replica-*/run.json") if (record := read_json(path)) is not None]
     return sorted(found, key=lambda one: int(one.record["replica"]))
+
+
+def _whole(record: dict[str, Any]) -> dict[str, Any]:
+    """The record with what those of earlier versions lack: how the engine counts bodies, and the numbers derived from the parameters."""
+    case = None if "derived" in record else _case(record["case"])
+    derived = deck.derived(case, record["parameters"]) if case and (case.derived or (case.folder / "setup.py").is_file()) else {}
+    return {"impact_id_offset": engines.facts(record["engine"]).impact_id_offset, "derived": derived, **record}
 
 
 def measure(run_folder: Path) -> dict[str, Any]:
@@ -31,18 +40,18 @@ def measure(run_folder: Path) -> dict[str, Any]:
     if not runs:
         raise RunError(f"nothing to measure in {run_folder}", "it has no finished replica-*/run.json")
     first = runs[0].record
-    module = checks.find(first["case"], _case_folder(first["case"]))
+    case = _case(first["case"])
+    if case and (case.folder / "measure.py").is_file():
+        return _declared(run_folder, case, runs)
+    module = checks.find(first["case"], case.folder if case else None)
     try:
         quantities, profiles, remarks = module.quantities(runs)
         fields = module.fields(runs, quantities) if hasattr(module, "fields") else None
     except DumpError as error:
         raise RunError(f"{run_folder} could not be measured", str(error)) from None
     if fields is not None:
-        # Labelled arrays take a second to import, which commands that measure nothing need not wait for.
-        from dembark.validation.checks import fields_result
-
         quantities, remarks = [*quantities, *fields.quantities], [*remarks, *fields.remarks]
-        fields_result.write(run_folder, fields.dataset)
+        _write_fields(run_folder, fields.dataset)
     content = {
         "case": first["case"],
         "variant": first["variant"],
@@ -54,6 +63,37 @@ def measure(run_folder: Path) -> dict[str, Any]:
         "remarks": remarks,
         "picture": module.picture(first["parameters"]),
         "references": [asdict(one) for one in module.REFERENCES],
+        "provenance": _provenance(runs),
+    }
+    write_json(run_folder / "metrics.json", content)
+    return content
+
+
+def _write_fields(run_folder: Path, fields: Any) -> None:
+    # Labelled arrays take a second to import, which commands that measure nothing need not wait for.
+    from dembark.postproc.output import labelled
+
+    labelled.write(run_folder / "fields.nc", fields)
+
+
+def _declared(run_folder: Path, case: Case, runs: list[Replica]) -> dict[str, Any]:
+    """Measure by the measure.py of the case, and judge by what its case.toml declares."""
+    first = runs[0].record
+    found = measuring.measure(case, runs)
+    if found.fields is not None:
+        _write_fields(run_folder, found.fields)
+    known = {**first["parameters"], **first.get("derived", {})}
+    content = {
+        "case": first["case"],
+        "variant": first["variant"],
+        "engine": first["engine"],
+        "profile": first["profile"],
+        "parameters": {key: value for key, value in first["parameters"].items() if key != "seed"},
+        "quantities": [quantity.as_json() for quantity in measuring.quantities(case, found)],
+        "profiles": list(found.profiles),
+        "remarks": [*found.remarks, *measuring.statements(case)],
+        "picture": measuring.picture(case, known),
+        "references": measuring.references(case),
         "provenance": _provenance(runs),
     }
     write_json(run_folder / "metrics.json", content)
@@ -72,10 +112,15 @@ def study(planned: Study, folders: Sequence[Path]) -> dict[str, Any]:
             raise RunError(f"study {planned.name} is incomplete", f"{folder} has no metrics.json", "every variant of a study is needed")
         points.append(content)
     first = points[0]
-    module = checks.find(first["case"], _case_folder(first["case"]))
-    if not hasattr(module, "study"):
-        raise RunError(f"case {first['case']} has no studies", "its checks have no function study", "add study(name, points, along)")
-    quantities, profiles, remarks = module.study(planned.name, points, planned.along)
+    case = _case(first["case"])
+    if case and (case.folder / "measure.py").is_file():
+        found = measuring.study(case, planned, points)
+        quantities, profiles, remarks = measuring.quantities(case, found), list(found.profiles), [*found.remarks, *measuring.statements(case)]
+        references = measuring.references(case)
+    else:
+        module = checks.find(first["case"], case.folder if case else None)
+        quantities, profiles, remarks = module.study(planned.name, points, planned.along)
+        references = [asdict(one) for one in module.REFERENCES]
     return {
         "case": first["case"],
         "variant": planned.folder_name,
@@ -88,15 +133,15 @@ def study(planned: Study, folders: Sequence[Path]) -> dict[str, Any]:
         "profiles": profiles,
         "remarks": remarks,
         "picture": None,
-        "references": [asdict(one) for one in module.REFERENCES],
+        "references": references,
         "provenance": {"variants": list(planned.variants)},
     }
 
 
-def _case_folder(name: str) -> Path | None:
+def _case(name: str) -> Case | None:
     # Results stay measurable where the case files are no longer at hand.
     try:
-        return find_case(name).folder
+        return find_case(name)
     except DembarkError:
         return None
 

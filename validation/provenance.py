@@ -13,7 +13,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from dembark.validation.cases import checkout
+from dembark.common.checkout import checkout
 from dembark.validation.engines import Engine
 
 
@@ -52,10 +52,7 @@ def cpu() -> str:
 
 def build_flags(engine: Engine) -> dict[str, str]:
     """Compiler, build type and flags of dembark's part of `engine`, from the CMake cache of its build; empty when there is none."""
-    beside = [engine.prefix.parent / "yade"] if engine.prefix else []
-    folders = beside if engine.name == "yade" else engine.executable.resolve().parents
-    caches = [folder / "CMakeCache.txt" for folder in folders]
-    for path in caches:
+    for path in (folder / "CMakeCache.txt" for folder in engine.build_folders()):
         if path.is_file():
             wanted = r"^(CMAKE_(?:CXX_COMPILER|BUILD_TYPE|CXX_FLAGS|CXX_FLAGS_RELEASE)):[A-Z]+=(.*)$"
             return dict(re.findall(wanted, path.read_text(encoding="utf-8", errors="replace"), re.M))
@@ -67,7 +64,7 @@ def collect(engine: Engine) -> dict[str, Any]:
     return {
         **commit(),
         "versions": {"dembark": package_version("dembark"), engine.name: engine.version, "python": platform.python_version(),
-                     **{name: package_version(name) for name in ("numpy", "scipy", "MDAnalysis", "snakemake")}},
+                     **{name: package_version(name) for name in ("numpy", "scipy", "MDAnalysis")}},
         "engine": str(engine.executable), "engine_identity": engine.identity, "flags": build_flags(engine),
         "host": socket.gethostname(), "os": platform.platform(), "cpu": cpu(), "cores": os.cpu_count(),
     }

@@ -8,10 +8,11 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
-from dembark.validation.cases import Case
+from dembark.validation.case.model import Case
 from dembark.validation.doctor import Finding
+from dembark.validation.judge.result import Result
 
-_COLOURS = {"pass": "green", "fail": "bold red", "info": "dim"}
+_SHOWN = {"passed": "[green]pass[/]", "failed": "[bold red]FAIL[/]", "open": "[yellow]open[/]", "information": ""}
 
 
 def _plain(*columns: str, title: str = "") -> Table:
@@ -72,27 +73,23 @@ def finding_table(findings: Iterable[Finding]) -> Table:
     return table
 
 
-def quantity_table(metrics: Mapping[str, Any]) -> Table:
-    """One row a quantity: value with interval, reference, deviation, tolerance and verdict."""
-    title = f"{metrics.get('case', '')} {metrics.get('variant', '')} {metrics.get('engine', '')} ({metrics.get('profile', '')})"
-    columns = ("quantity", "value", "95 % interval", "unit", "reference", "its interval", "deviation", "tolerance", "verdict")
+def quantity_table(result: Result) -> Table:
+    """One row a quantity: value with interval, reference, deviation, tolerance, kind of evidence and verdict."""
+    title = f"{result.case} {result.variant} {result.engine} ({result.profile})"
+    columns = ("quantity", "value", "95 % interval", "unit", "reference", "its interval", "deviation", "tolerance", "evidence", "verdict")
     table = _plain(*columns, title=title)
-    for quantity in metrics.get("quantities", []):
-        verdict = str(quantity.get("verdict", "info"))
-        shown = verdict.upper() if verdict == "fail" else escape(verdict)
-        name = str(quantity.get("label") or quantity.get("name", ""))
+    for one in result.quantities:
+        verdict = _SHOWN[one.standing]
         table.add_row(
-            escape(name), number(quantity.get("value")), interval(quantity.get("interval")), escape(str(quantity.get("unit", ""))),
-            number(quantity.get("reference")), interval(quantity.get("reference_interval")), number(quantity.get("deviation")),
-            number(quantity.get("tolerance")), f"[{_COLOURS[verdict]}]{shown}[/]" if verdict in _COLOURS else shown)
+            escape(one.title), number(one.value), interval(one.interval), escape(one.unit), number(one.reference),
+            interval(one.reference_interval), number(one.deviation), number(one.tolerance), one.evidence, verdict)
     return table
 
 
-def open_lines(metrics: Mapping[str, Any]) -> list[str]:
-    """Why quantities that have a tolerance, or a reason, got neither pass nor fail: a line for each reason."""
-    reasons: dict[str, list[str]] = {}
-    for quantity in metrics.get("quantities", []):
-        reason = str(quantity.get("reason") or "")
-        if quantity.get("verdict") == "info" and reason:
-            reasons.setdefault(reason, []).append(str(quantity.get("label") or quantity.get("name", "")))
-    return [f"info: {', '.join(names)}: {reason}" for reason, names in reasons.items()]
+def open_lines(result: Result) -> list[str]:
+    """Why quantities got neither pass nor fail although one was due, or why they say little: a line for each reason."""
+    reasons: dict[tuple[str, str], list[str]] = {}
+    for one in result.quantities:
+        if one.verdict == "info" and one.reason:
+            reasons.setdefault((one.standing, one.reason), []).append(one.title)
+    return [f"{standing}: {', '.join(names)}: {reason}" for (standing, reason), names in reasons.items()]

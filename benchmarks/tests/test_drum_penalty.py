@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import drum_penalty
-from benchmarks.drum_resume import last_step, steps_of
+from benchmarks.drum_resume import last_step
 
 
 @pytest.mark.parametrize("turn", [0.01, 0.05])
@@ -98,5 +98,3 @@ def test_rows_of_a_run_that_is_under_way(tmp_path):
     assert last_step(tmp_path) == 0
     (tmp_path / "time.csv").write_text("step,time\n10,1\n20,2\n3")
     assert last_step(tmp_path) == 20
-    (tmp_path / "engine.log").write_text("hello\ndembark: steps 500 time_step 1e-4\n")
-    assert steps_of(tmp_path) == 500

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dembark.common.errors import DembarkError, RunError
-from dembark.common.files import check_times, count_frames, disk_error, lock, move_into_place, read_json, retire, sweep, write_json
+from dembark.common.files import check_times, count_frames, disk_error, move_into_place, read_json, retire, sweep, write_json
 
 
 def dump(frames: int, atoms: int) -> bytes:
@@ -109,10 +109,3 @@ def test_retired_results_are_kept_aside(tmp_path: Path) -> None:
         retire(tmp_path / "metrics.json")
     assert (tmp_path / "superseded" / "metrics.json").read_text() == "2"
     assert not (tmp_path / "metrics.json").exists()
-
-
-def test_a_lock_is_exclusive_and_ends_with_its_holder(tmp_path: Path) -> None:
-    with lock(tmp_path / "l", "busy"), pytest.raises(DembarkError, match="busy"), lock(tmp_path / "l", "busy"):
-        pass
-    with lock(tmp_path / "l", "busy"):
-        pass

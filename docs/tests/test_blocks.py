@@ -15,7 +15,8 @@ import pytest
 from blocks import NOT_RUN, ROOT, SUBSTITUTES, Block, blocks, commands, logical_lines, not_run, replaced
 
 from dembark.common.errors import DembarkError
-from dembark.validation import cases, engines
+from dembark.validation import engines
+from dembark.validation.case import folders
 from dembark.validation.cli import main
 
 TINY_CAMPAIGN = """
@@ -73,12 +74,13 @@ def user(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     for key, value in {"HOME": str(home), "PWD": str(checkout),
                        "XDG_CACHE_HOME": os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache"))}.items():
         monkeypatch.setenv(key, value)
-    before = os.environ.get("DEMBARK_DECKS")
+    before = {name: os.environ.get(name) for name in ("DEMBARK_DECKS", "DEMBARK_CASES")}
     yield checkout
-    os.environ.pop("DEMBARK_DECKS", None)
-    if before is not None:
-        os.environ["DEMBARK_DECKS"] = before
-    cases.load.cache_clear()
+    for name, value in before.items():
+        os.environ.pop(name, None)
+        if value is not None:
+            os.environ[name] = value
+    folders.load.cache_clear()
     for number, handler in handlers.items():
         signal.signal(number, handler)
 
@@ -104,7 +106,7 @@ def run(words: list[str], capture: pytest.CaptureFixture[str]) -> None:
     elif program == "export":
         for name, _, value in (word.partition("=") for word in rest):
             os.environ[name] = value
-            cases.load.cache_clear()
+            folders.load.cache_clear()
     elif program == "dembark" and rest[0] != "yade":
         if "yade" in rest:
             found("yade")
@@ -116,8 +118,6 @@ def run(words: list[str], capture: pytest.CaptureFixture[str]) -> None:
         elif program == "dembark":
             found("yade")
             words[0] = str(Path(sys.executable).with_name("dembark"))
-        elif program == "snakemake":
-            words[:1] = [sys.executable, "-m", "snakemake", "--quiet", "all"]
         elif program == "python":
             words[0] = sys.executable
         done = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False)
@@ -168,7 +168,13 @@ def test_toml(block: Block, tmp_path: Path) -> None:
         for deck in ("liggghts.in", "yade.py"):
             path.with_name(deck).touch()
         path.write_text(block.text)
-        assert cases.load(path).name == name
+        assert folders.load(path).name == name
+    elif "[commands]" in block.text:
+        from dembark.validation.runs import site
+
+        path = tmp_path / "site.toml"
+        path.write_text(block.text)
+        assert site.read(path).commands["submit"]
     else:
         from dembark.validation.campaigns.spec import read
 
@@ -180,7 +186,6 @@ def test_toml(block: Block, tmp_path: Path) -> None:
 @pytest.mark.parametrize("block", blocks("listing"), ids=lambda block: block.place)
 def test_listing(block: Block) -> None:
     code = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "validation").rglob("*.py"))
-    code += (ROOT / "validation/Snakefile").read_text(encoding="utf-8")
     names = set(re.findall(r"[\w-]+\.(?:json|toml|log|sqlite|html|pdf)\b", block.text))
     assert names and not {name for name in names if name not in code and name.removesuffix(".pdf") + ".html" not in code}
 

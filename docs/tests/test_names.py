@@ -11,6 +11,7 @@ from blocks import PAGES, ROOT, blocks, commands, logical_lines
 
 from dembark.postproc import cli as postproc
 from dembark.validation import cli
+from dembark.validation.case.folders import discover
 
 TEXTS = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page in PAGES}
 ALL = "\n".join(TEXTS.values())
@@ -46,7 +47,7 @@ def rows(text: str, *head: str) -> list[str]:
 
 
 def test_modules_and_what_is_in_them() -> None:
-    inside = (ROOT / "plugins/yade/python/dembark.py").read_text(encoding="utf-8")
+    inside = "\n".join(path.read_text(encoding="utf-8") for path in sorted((ROOT / "plugins/yade/python/dembark").glob("*.py")))
     missing = []
     for name in sorted(set(re.findall(r"\bdembark(?:\.[A-Za-z_]\w*)+", ALL))):
         short = name.split(".")[1]
@@ -100,6 +101,8 @@ def subcommands() -> dict[str, set[str]]:
 def test_commands_and_options_exist() -> None:
     given = [words for span in SPANS if re.match(r"dembark [a-z]", span) for words in commands(span.replace("…", ""))]
     given += [words for block in blocks("shell") for line in logical_lines(block.text, "\\") for words in commands(line)]
+    # `--cases FOLDER` stands before the command.
+    given = [[words[0], *words[3:]] if words[1:2] == ["--cases"] else words for words in given]
     wrong = [" ".join(words[:2]) for words in given if words[0] == "dembark" and words[1] not in subcommands()]
     wrong += [f"dembark {words[1]} {word}" for words in given if words[0] == "dembark" and words[1] not in ("yade", *wrong)
               for word in words[2:] if word.startswith("--") and word.partition("=")[0] not in subcommands().get(words[1], set())]
@@ -116,8 +119,8 @@ def test_options_in_the_text_exist() -> None:
     benchmarks = code("benchmarks") + code("packaging") + (ROOT / "conftest.py").read_text(encoding="utf-8")
     common = {option for parameter in typer.main.get_command(cli.app).params for option in parameter.opts}
     known = common.union(*subcommands().values()) | set(re.findall(r'"(--[a-z-]+)"', benchmarks))
-    # Words of other programs: of Slurm, Snakemake and srun.
-    known |= {"--ntasks", "--cpus-per-task", "--mem", "--time", "--test-only", "--mpi", "--me", "--format", "--slow"}
+    # Words of other programs: of Slurm and srun.
+    known |= {"--ntasks", "--cpus-per-task", "--mem", "--time", "--test-only", "--mpi", "--me", "--format", "--slow", "--nodes"}
     unknown = {option for span in SPANS for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", span)} - known
     assert not unknown
 
@@ -135,7 +138,6 @@ def test_variables_of_the_environment_exist() -> None:
     assert {name for name in named if name not in known} == set()
     # What a user may set is told.
     read = set(re.findall(r"environ(?:\.get\(|\[)\"(DEMBARK_[A-Z_]+)\"", code("validation", "postproc")))
-    read -= {"DEMBARK_PREAMBLE", "DEMBARK_PROGRESS"}
     assert read <= named
 
 
@@ -183,6 +185,7 @@ def test_quantities_exist() -> None:
     names -= {"log_pair", "log_cradle", "log_pile", "width", "step", "liquid_content"}
     # An f-string may have anything in the place of its values; `_a` stands for the material that ends a name.
     texts = {re.sub(r"\{[^}]*\}", "\0", text) for text in re.findall(r'f?"([^"\n]+)"', code("validation/checks"))}
+    texts |= {name.replace("*", "\0") for case in discover().values() for name in case.quantities}
     known = [re.compile(re.escape(text).replace("\0", ".+")) for text in texts if re.search(r"[a-z]{3}", text) and " " not in text]
     wrong = [name for name in names if not any(text.fullmatch(name.replace("…", "x") + end) for text in known for end in ("", "_a"))]
     assert len(names) > 60 and not wrong

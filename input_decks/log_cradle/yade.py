@@ -1,41 +1,16 @@
-"""Log cradle in YADE: the same logs and measurements as liggghts.in. What is measured and why: README.md.
+"""Log cradle: equal logs in a row along x, the first of which moves."""
 
-By hand, in an empty folder: yade -n -x yade.py [key=value ...]
-Keys, defaults and units (SI) are those of case.toml beside this file.
-"""
-
-import math
-import sys
-from pathlib import Path
+from types import SimpleNamespace
 
 from yade import dembark
 
-p = dembark.parameters(Path(sys.argv[0]).resolve().with_name("case.toml"))
-
-# --- derived quantities; liggghts.in has the same formulas -------------------------------------------------------------
+p = dembark.parameters()
 O.dt = p.time_step
-stride = math.ceil(p.duration / p.time_step / (p.frames - 1))
-steps = stride * (p.frames - 1)
-spacing = 2 * p.radius + p.gap
-reach = p.log_count * spacing + 2 * p.velocity * steps * p.time_step + 1
+dembark.logs([O.materials.append(FrictMat(label="wood"))])
+# The velocities of the packing belong to the time zero, as in LIGGGHTS.
+impacts = LogImpact(stiffness=p.stiffness, theta=p.theta, impactsFile="impacts.txt", velocityAtStart=True)
+writer = dembark.LogWriter(impacts)
+O.engines = dembark.log_loop(impacts, "writer.write()", p.stride)
 
-O.materials.append(FrictMat(label="wood"))
-for number in range(p.log_count):
-    O.bodies.append(dembark.log((number * spacing, 0, 0), p.radius, p.mass, (p.velocity if number == 0 else 0, 0, 0)))
-
-impacts = LogImpact(
-    stiffness=p.stiffness, theta=p.theta, impactsFile="impacts.txt",
-    # The velocities above belong to the time zero, as in LIGGGHTS.
-    velocityAtStart=True)
-dump = dembark.LogWriter(impacts, bounds=((-reach, reach), (-1, 1), (-1, 1)))
-
-O.engines = [
-    ForceResetter(),
-    impacts,
-    # Between forces and motion, where positions and forces belong to the same time.
-    PyRunner(command="dump.write()", iterPeriod=stride, initRun=True),
-    NewtonIntegrator(damping=0),
-]
-
-dembark.announce(steps)
-dembark.run(steps, p.restart_every, p.resume)
+dembark.announce(p.steps)
+dembark.run(p.steps)

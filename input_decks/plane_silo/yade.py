@@ -1,131 +1,29 @@
-"""Plane silo in YADE: the same grains, walls and measurements as liggghts.in. What is measured and why: README.md.
+"""Plane silo: grains rain between two vertical walls (periodic in the third direction), settle, and the walls creep upward."""
 
-By hand, in an empty folder: yade -n -x yade.py [key=value ...]
-Keys, defaults and units (SI) are those of case.toml beside this file.
-"""
-
-import math
-import sys
-from pathlib import Path
+from types import SimpleNamespace
 
 from yade import dembark
 
-p = dembark.parameters(Path(sys.argv[0]).resolve().with_name("case.toml"))
-
-# --- derived quantities; liggghts.in has the same formulas -------------------------------------------------------------
-grain_static, wall_static = (p.grain_friction, p.wall_friction) if p.static_friction is None else (p.static_friction,) * 2
-grain_kinetic, wall_kinetic = (
-    mu * p.kinetic_friction_ratio if p.kinetic_friction is None else p.kinetic_friction for mu in (grain_static, wall_static))
-
-r_min = 0.5 * p.grain_diameter * (1 - p.grain_diameter_spread)
-d_max = p.grain_diameter * (1 + p.grain_diameter_spread)
-shear_modulus = p.youngs_modulus / (2 * (1 + p.poisson_ratio))
-rayleigh = math.pi * r_min * math.sqrt(p.grain_density / shear_modulus) / (0.1631 * p.poisson_ratio + 0.8766)
-O.dt = p.time_step_fraction * rayleigh
-stride = math.ceil(p.measure_time / O.dt / p.frames)
-settle_steps = math.ceil(p.settle_time / O.dt)
-first = settle_steps + stride
-steps = settle_steps + stride * p.frames
-every = max(1, steps // 1000)
-
-for name, size, least in (("silo_width", p.silo_width, 5), ("slab_depth", p.slab_depth, 4)):
-    if size < least * p.grain_diameter:
-        dembark.fail(f"{name} {size} m is too small, plane_silo/yade.py, take at least {least * p.grain_diameter} m ({least} grain_diameter)")
-jitter = 0.05 * d_max
-margin = 0.15 * d_max
-n_x = math.floor((p.silo_width - 2 * margin) / (1.15 * d_max))
-n_y = math.floor(p.slab_depth / (1.15 * d_max))
-cell = ((p.silo_width - 2 * margin) / n_x, p.slab_depth / n_y, 1.15 * d_max)
-layers = math.ceil(1.3 * p.grain_count / (n_x * n_y))
-z_high = layers * cell[2]
-z_box = z_high + 2 * d_max
-
-
-def part(number: float) -> float:
-    """Fractional part."""
-    return number - math.floor(number)
-
-
-def shake(site: int, use: int) -> float:
-    """One uniform number in [0, 1) per site and use: the fractional part of a large sine."""
-    return part(43758.5453 * math.sin(12.9898 * site + 78.233 * p.seed + use))
-
-
-# YADE is periodic in all three directions; along x and z the cell leaves room for the walls, so only y closes on itself.
-O.periodic = True
-O.cell.setBox(p.silo_width + 8 * p.grain_diameter, p.slab_depth, z_box + 10 * p.grain_diameter)
-
-# --- grains: a pseudo-random part of the cells of the column, none touching (see liggghts.in) ---------------------------------
-grain = O.materials.append(FrictMat(young=p.youngs_modulus, poisson=p.poisson_ratio, density=p.grain_density))
-wall = O.materials.append(FrictMat(young=p.youngs_modulus, poisson=p.poisson_ratio, density=p.grain_density))
-sites = [(i, j, k) for k in range(layers) for j in range(n_y) for i in range(n_x)]
-for number, index in enumerate(sites, start=1):
-    # Multiplication by a prime modulo the number of sites is a permutation: exactly grain_count sites are kept.
-    if part((number + p.seed) * 15485863 / len(sites)) * len(sites) + 0.5 >= p.grain_count:
-        continue
-    diameter = p.grain_diameter * (1 + p.grain_diameter_spread * (2 * shake(number, 1) - 1))
-    corner = (margin, 0, 0.15 * d_max)
-    place = [low + (i + 0.5) * width + jitter * (2 * shake(number, use) - 1)
-             for use, (low, i, width) in enumerate(zip(corner, index, cell), start=2)]
-    body = utils.sphere(place, 0.5 * diameter, material=grain)
-    # Velocities are half a step behind positions: this is rest at the time zero.
-    body.state.vel = (0, 0, 0.5 * p.gravity * O.dt)
-    O.bodies.append(body)
-
-# --- walls: they move in their own planes, so their shape stays --------------------------------------------------------
-# `Wall` is unbounded, which a periodic collider cannot sort; boxes that reach far beyond the cell and all that grains travel do the same.
-far, thick = 1e6 * p.grain_diameter, p.grain_diameter
-floor = dembark.spanning(p.grain_diameter)
-
-
-def plane(centre: tuple[float, float, float], extents: tuple[float, float, float], speed: float) -> int:
-    """A box that moves upward; its body id."""
-    number = O.bodies.append(utils.box(centre, extents, fixed=True, material=wall))
-    O.bodies[number].state.vel = (0, 0, speed)
-    return number
-
+p = dembark.parameters()
+O.dt = p.time_step
+weight = (0, 0, -p.gravity)
+dembark.periodic(axes=[1], room=8 * p.grain_diameter)
+grain, wall = materials = dembark.materials(p)
+dembark.grains(grain, weight)
 
 walls = {
-    "left": plane((-thick, 0, 0), (thick, far, far), p.wall_speed),
-    "right": plane((p.silo_width + thick, 0, 0), (thick, far, far), p.wall_speed),
-    "base": plane((0, 0, -thick), (floor, far, thick), 0.0),
+    "left": dembark.plane(0, 0.0, 1, wall, p.grain_diameter),
+    "right": dembark.plane(0, p.silo_width, -1, wall, p.grain_diameter),
+    "base": dembark.plane(2, 0.0, 1, wall, p.grain_diameter),
 }
+# The walls move in their own planes, so their shape stays.
+for name in ("left", "right"):
+    O.bodies[walls[name]].state.vel = (0, 0, p.wall_speed)
 
-weight = (0, 0, -p.gravity)
-box = ((-d_max, p.silo_width + d_max), (0, p.slab_depth), (-d_max, z_box))
-dump = dembark.DumpWriter(walls=walls, bounds=box, boundary="ff pp ff", gravity=weight)
-history = dembark.HistoryWriter(walls=walls, gravity=weight, path="time.csv")
+record = dembark.Recorder(p, walls, boundary="ff pp ff", gravity=weight)
+O.engines = dembark.engine_loop(
+    p, dembark.contact_loop(p, materials, [Ig2_Box_Sphere_ScGeom()]), bounds=[Bo1_Sphere_Aabb(), Bo1_Box_Aabb()],
+    verlet=0.1 * p.grain_diameter, gravity=weight, periodic=True)
 
-
-def record() -> None:
-    """Write what is due at this step."""
-    if O.iter > 0 and O.iter % every == 0:
-        history.write()
-    if O.iter >= first and (O.iter - first) % stride == 0:
-        dump.write()
-
-
-def pairs(between_grains: float, at_wall: float) -> MatchMaker:
-    """A property of a pair of materials."""
-    return MatchMaker(matches=((grain, grain, between_grains), (grain, wall, at_wall)))
-
-
-O.engines = [
-    ForceResetter(),
-    InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Box_Aabb()], allowBiggerThanPeriod=True, verletDist=0.1 * p.grain_diameter),
-    InteractionLoop(
-        [Ig2_Sphere_Sphere_ScGeom(), Ig2_Box_Sphere_ScGeom()],
-        [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
-            restitution=p.restitution, staticFriction=pairs(grain_static, wall_static), kineticFriction=pairs(grain_kinetic, wall_kinetic),
-            criticalSlipDistance=p.critical_slip_distance, interfaceShearStrength=p.interface_shear_strength,
-            bridgeVolume=p.bridge_volume, contactAngle=p.contact_angle, surfaceTension=p.surface_tension)],
-        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(
-            presliding=p.presliding, capillaryModel=p.capillary_model if p.bridge_volume > 0 else "none")],
-    ),
-    # Between forces and motion, where positions and forces belong to the same time.
-    PyRunner(command="record()", iterPeriod=1),
-    NewtonIntegrator(damping=0, gravity=weight),
-]
-
-dembark.announce(steps)
-dembark.run(steps, p.restart_every, p.resume)
+dembark.announce(p.steps)
+dembark.run(p.steps)

@@ -3,8 +3,6 @@ goes on as if it had not been."""
 
 from __future__ import annotations
 
-import re
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -12,40 +10,30 @@ import numpy as np
 import pytest
 from benchmarks.drum_resume import FILES, Started, compare
 from dembark.common.errors import DembarkError
+from dembark.input_decks.common.setup import Setup
 from dembark.postproc import GrainsDump, read_times
-from dembark.validation.checks import debarking_drum
+from dembark.validation import engines
+from dembark.validation.case.deck import prepare
+from dembark.validation.case.folders import find
+from dembark.validation.case.resolve import resolve
 
-CASE = Path(__file__).resolve().parents[1] / "debarking_drum"
+CASE = find("debarking_drum")
 ENGINES = ("liggghts", "yade")
 TINY: dict[str, Any] = {"log_count": 10, "filling": 0.2, "run_in": 0, "revolutions": 1, "drum_speed": 2.0, "time_step_fraction": 0.4,
                         "frames": 4}
 
 
-def defaults() -> dict[str, Any]:
-    tables = tomllib.loads((CASE / "case.toml").read_text(encoding="utf-8"))["parameters"]
-    return {name: table.get("value") for name, table in tables.items()}
-
-
-def test_decks_and_case_file_know_the_same_keys() -> None:
-    declared = defaults()
-    text = (CASE / "liggghts.in").read_text(encoding="utf-8")
-    in_deck = dict(re.findall(r"^variable\s+(\w+)\s+index\s+(\S+)\s*$", text, re.MULTILINE))
-    # A deck makes one load; how it is saved and resumed is no input; a negative number is a key that is not set.
-    assert in_deck.keys() - {"restart_every", "resume"} == declared.keys() - {"replicas"}
-    for key in declared.keys() - {"replicas"}:
-        value = in_deck[key]
-        assert float(value) == (-1.0 if declared[key] is None else declared[key]), key
-        assert "${%s}" % key in text, key
-        assert re.search(rf"\bp\.{key}\b", (CASE / "yade.py").read_text(encoding="utf-8")), key
+def setup(**values: Any) -> Setup:
+    return prepare(CASE, resolve(CASE, changes=TINY | values))
 
 
 def run(engine: str, folder: Path, **values: Any) -> Path:
     """A finished run of the deck in `folder`."""
-    folder.mkdir(parents=True, exist_ok=True)
     try:
-        Started(engine, folder, TINY | values).wait()
+        engines.find(engine)
     except DembarkError as error:
         pytest.skip(str(error))
+    Started(engine, folder, TINY | values).wait()
     return folder
 
 
@@ -56,8 +44,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_logs_are_those_that_the_case_asks_for(engine: str, finished: dict[str, Path]) -> None:
-    values = defaults() | TINY
-    logs, radius = debarking_drum.geometry(values)
+    prepared = setup()
+    logs, radius = prepared.numbers["logs"], prepared.numbers["inner_radius"]
     assert logs == TINY["log_count"]
     frames = GrainsDump(finished[engine] / "grains.dump")
     assert len(frames) == TINY["frames"]
@@ -68,9 +56,6 @@ def test_logs_are_those_that_the_case_asks_for(engine: str, finished: dict[str, 
     np.testing.assert_allclose((diameters**2).sum() / (2.0 * radius) ** 2, TINY["filling"], rtol=1e-6)
     assert (np.hypot(*frame.positions[:, [0, 2]].T) + frame.radii < 1.01 * radius).all()
     assert (frame.positions[:, 1] == 0.0).all()
-    said = re.search(r"# logs (\d+), drum radius (\S+) m", (finished[engine] / "engine.log").read_text())
-    assert said and int(said[1]) == logs
-    assert float(said[2]) == pytest.approx(radius, rel=1e-8)
 
 
 def test_engines_go_the_same_way_until_chaos_takes_over(finished: dict[str, Path]) -> None:
@@ -99,9 +84,8 @@ def test_energy_and_certificate(engine: str, finished: dict[str, Path]) -> None:
 def test_only_friction_drives_the_logs(engine: str, tmp_path: Path) -> None:
     folder = run(engine, tmp_path, shell_friction=0.0, friction=0.0)
     times = read_times(folder / "time.csv")
-    values = defaults() | TINY
-    _, radius = debarking_drum.geometry(values)
-    scale = debarking_drum.total_weight(values) * radius
+    packing, radius = setup().packing, setup().numbers["inner_radius"]
+    scale = 9.81 * float((packing.densities * np.pi / 6.0 * packing.diameters**3).sum()) * radius
     assert np.abs(times["torque"]).max() < 1e-9 * scale
     assert times["kinetic_energy"][-20:].mean() < 0.05 * times["kinetic_energy"].max()
     assert times["shell_fz"][-50:].mean() == pytest.approx(scale / radius, rel=0.02)
@@ -111,30 +95,30 @@ def test_only_friction_drives_the_logs(engine: str, tmp_path: Path) -> None:
 def test_radius_given_decides_how_many_logs(engine: str, tmp_path: Path) -> None:
     given = {"drum_radius": 0.9, "filling": 0.15, "drum_speed": 20.0, "frames": 2}
     folder = run(engine, tmp_path, **given)
-    logs, radius = debarking_drum.geometry(defaults() | TINY | given)
-    assert (logs, radius) == (15, 0.9)
-    assert len(GrainsDump(folder / "grains.dump")[0].ids) == logs
+    numbers = setup(**given).numbers
+    assert (numbers["logs"], numbers["inner_radius"]) == (15, 0.9)
+    assert len(GrainsDump(folder / "grains.dump")[0].ids) == 15
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_too_many_logs_are_refused_in_one_line(engine: str, tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError, match="dembark: filling is too high"):
-        run(engine, tmp_path, filling=0.5, log_diameter_min=0.24)
+def test_too_many_logs_are_refused_in_one_line() -> None:
+    with pytest.raises(DembarkError, match="filling 0.5 is too high, the drum has places for"):
+        setup(filling=0.5, log_diameter_min=0.24)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_killed_run_goes_on_to_the_same_end(engine: str, tmp_path: Path) -> None:
-    values = TINY | {"time_step_fraction": 0.1, "restart_every": 5000}
     try:
-        found = compare(engine, values, tmp_path)
+        engines.find(engine)
     except DembarkError as error:
         pytest.skip(str(error))
+    found = compare(engine, TINY | {"time_step_fraction": 0.1}, 5000, tmp_path)
     assert 0 < found["went_on_from"] <= found["killed_at_step"] < found["steps"]
     assert found["same"] == dict.fromkeys(FILES, True)
     assert found["impacts"] > 100
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_resume_without_a_state_says_so(engine: str, tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError, match="no whole state"):
-        run(engine, tmp_path, resume="yes")
+def test_resume_without_a_state_says_so(engine: str, decks: Any, tmp_path: Path) -> None:
+    one = decks("debarking_drum", engine, tmp_path, TINY)
+    assert one.start(resume="yes").wait(120) != 0
+    assert "no whole state" in one.said()

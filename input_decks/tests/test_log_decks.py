@@ -1,10 +1,8 @@
-"""The decks of log_pair, log_cradle and log_pile agree with their case files, start alike in both engines and write what readers expect."""
+"""The decks of log_pair, log_cradle and log_pile start alike in both engines, do the same and write what readers expect."""
 
 from __future__ import annotations
 
 import re
-import subprocess
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +10,9 @@ import numpy as np
 import pytest
 from dembark.common.errors import DembarkError
 from dembark.common.files import check_impacts, check_times, count_frames
-from dembark.validation import engines
-from dembark.validation.cases import find
-from dembark.validation.checks.logs import LogRun, read
-from dembark.validation.checks.run import Replica
+from dembark.postproc.instruments.logs import LogRun, read
+from dembark.validation.case.folders import find
 
-ROOT = Path(__file__).resolve().parents[1]
 CASES = ("log_pair", "log_cradle", "log_pile")
 ENGINES = ("liggghts", "yade")
 TINY: dict[str, dict[str, Any]] = {
@@ -39,65 +34,22 @@ TINY: dict[str, dict[str, Any]] = {
 CASE_OF = {name: name if name in CASES else "log_pair" for name in TINY}
 
 
-def table(case: str) -> dict[str, dict[str, Any]]:
-    return tomllib.loads((ROOT / case / "case.toml").read_text(encoding="utf-8"))["parameters"]
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_liggghts_defaults_are_those_of_the_case_file(case: str) -> None:
-    text = (ROOT / case / "liggghts.in").read_text(encoding="utf-8")
-    defaults = dict(re.findall(r"^variable\s+(\w+)\s+index\s+(\S+)\s*$", text, re.MULTILINE))
-    declared = table(case)
-    # How a run is saved and resumed is no input of it.
-    assert (defaults.pop("restart_every"), defaults.pop("resume")) == ("0", "no")
-    assert defaults.keys() == declared.keys()
-    for key, word in defaults.items():
-        assert (word if declared[key]["type"] == "choice" else float(word)) == declared[key]["value"], key
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_both_decks_use_every_key(case: str) -> None:
-    for deck, pattern in (("liggghts.in", r"\$\{%s\}"), ("yade.py", r"\bp\.%s\b")):
-        text = (ROOT / case / deck).read_text(encoding="utf-8")
-        assert not [key for key in table(case) if not re.search(pattern % key, text)], deck
-
-
 @pytest.mark.parametrize("case", CASES)
 def test_the_case_file_asks_for_all_that_is_written(case: str) -> None:
-    assert find(case, ROOT).outputs == ("grains", "contacts", "times", "impacts")
-
-
-def start(case: str, name: str, folder: Path, values: dict[str, Any]) -> subprocess.CompletedProcess[str]:
-    """The deck run by hand, as the README says."""
-    try:
-        engine = engines.find(name)
-    except DembarkError as error:
-        pytest.skip(str(error))
-    if name == "liggghts":
-        given = (word for key, value in values.items() for word in ("-var", key, str(value)))
-        words = [str(engine.executable), "-in", str(ROOT / case / "liggghts.in"), *given]
-    else:
-        words = [str(engine.executable), "-n", "-x", str(ROOT / case / "yade.py"), *(f"{key}={value}" for key, value in values.items())]
-    return engines.call(words, folder, engine.environment())
+    assert find(case).outputs == ("grains", "contacts", "times", "impacts")
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Tiny runs by (scene, engine), each done once: (folder, steps, the run)."""
-    done: dict[tuple[str, str], tuple[Path, int, LogRun]] = {}
+def finished(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Tiny runs by (scene, engine), each done once: (the deck that was run, what the logs did)."""
+    done: dict[tuple[str, str], tuple[Any, LogRun]] = {}
 
-    def get(scene: str, engine: str) -> tuple[Path, int, LogRun]:
+    def get(scene: str, engine: str) -> tuple[Any, LogRun]:
         if (scene, engine) not in done:
-            folder = tmp_path_factory.mktemp(f"{scene}-{engine}")
-            ended = start(CASE_OF[scene], engine, folder, TINY[scene])
-            assert ended.returncode == 0, ended.stdout[-2000:] + ended.stderr[-2000:]
-            lines = [line.strip() for line in ended.stdout.splitlines() if line.strip()]
-            assert "dembark: finished" in lines
-            said = next(re.fullmatch(r"dembark: steps (\d+) time_step (\S+)", line) for line in lines if line.startswith("dembark:"))
-            assert said and float(said[2]) == TINY[scene]["time_step"]
-            values = {key: entry["value"] for key, entry in table(CASE_OF[scene]).items()} | TINY[scene]
-            run = read(Replica(folder, {"engine": engine, "parameters": values, "time_step": float(said[2])}))
-            done[scene, engine] = folder, int(said[1]), run
+            one = decks(CASE_OF[scene], engine, tmp_path_factory.mktemp(f"{scene}-{engine}"), TINY[scene])
+            said = re.search(r"dembark: steps (\d+) time_step (\S+)", one.run())
+            assert said and int(said[1]) == one.setup.steps and float(said[2]) == TINY[scene]["time_step"]
+            done[scene, engine] = one, read(one.replica())
         return done[scene, engine]
 
     return get
@@ -106,12 +58,12 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Any:
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("scene", TINY)
 def test_files_are_whole_and_belong_together(scene: str, engine: str, finished: Any) -> None:
-    folder, steps, run = finished(scene, engine)
-    frames = table(CASE_OF[scene])["frames"]["value"]
+    one, run = finished(scene, engine)
+    folder, frames = one.folder, one.values["frames"]
     assert count_frames(folder / "grains.dump", "ATOMS") == count_frames(folder / "contacts.dump", "ENTRIES") == frames
     assert check_times(folder / "time.csv") == frames - 1 >= 200
     assert check_impacts(folder / "impacts.txt") == len(run.impacts) > 0
-    assert run.times[0] == 0.0 and run.history["step"][-1] == steps
+    assert run.times[0] == 0.0 and run.history["step"][-1] == one.setup.steps
     np.testing.assert_allclose(run.history["kinetic_energy"], run.kinetic[1:], rtol=1e-9, atol=1e-12)
 
 
@@ -119,7 +71,7 @@ def test_files_are_whole_and_belong_together(scene: str, engine: str, finished: 
 @pytest.mark.parametrize("scene", TINY)
 def test_forces_on_each_log_add_up(scene: str, engine: str, finished: Any) -> None:
     """Contacts, walls and weight, counted contact by contact, make up the engine's own total."""
-    run = finished(scene, engine)[2]
+    run = finished(scene, engine)[1]
     for frame, touch in enumerate(run.touches):
         total = np.zeros_like(run.forces[frame])
         total[:, 1] -= run.masses * run.parameters.get("gravity", 0.0)
@@ -134,7 +86,7 @@ def test_forces_on_each_log_add_up(scene: str, engine: str, finished: Any) -> No
 
 @pytest.mark.parametrize("scene", TINY)
 def test_both_engines_do_the_same(scene: str, finished: Any) -> None:
-    one, other = (finished(scene, engine)[2] for engine in ENGINES)
+    one, other = (finished(scene, engine)[1] for engine in ENGINES)
     np.testing.assert_array_equal(one.masses, other.masses)
     np.testing.assert_array_equal(one.radii, other.radii)
     speed = np.abs(one.velocities).max()
@@ -149,7 +101,7 @@ def test_both_engines_do_the_same(scene: str, finished: Any) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_logs_start_as_the_case_says(engine: str, finished: Any) -> None:
-    head_on, aside = finished("log_pair", engine)[2], finished("off_centre", engine)[2]
+    head_on, aside = finished("log_pair", engine)[1], finished("off_centre", engine)[1]
     p = aside.parameters
     for run in (head_on, aside):
         q = run.parameters
@@ -157,14 +109,13 @@ def test_logs_start_as_the_case_says(engine: str, finished: Any) -> None:
         apart = run.positions[0, 1] - run.positions[0, 0] - (q["velocity_1"] - q["velocity_2"]) * q["lead_time"] * np.array([1.0, 0.0, 0.0])
         np.testing.assert_allclose(np.linalg.norm(apart), q["radius_1"] + q["radius_2"], rtol=1e-12)
     np.testing.assert_allclose(aside.positions[0, 0, 1] - aside.positions[0, 1, 1], p["offset"])
-    pile = finished("log_pile", engine)[2]
+    pile = finished("log_pile", engine)[1]
     assert np.ptp(pile.radii) > 0.0 and not pile.velocities[0].any()
     np.testing.assert_allclose(pile.masses, 800.0 * np.pi * pile.radii**2 * 2.0, rtol=1e-12)
     apart = np.linalg.norm(pile.positions[0, :, None] - pile.positions[0, None, :], axis=2) + 10.0 * np.eye(9)
     assert (apart > pile.radii[:, None] + pile.radii[None, :]).all()
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(
     ("case", "values", "word"),
     [
@@ -174,7 +125,6 @@ def test_logs_start_as_the_case_says(engine: str, finished: Any) -> None:
         ("log_pile", {"width": 0.3}, "width"),
     ],
 )
-def test_impossible_set_ups_are_refused(case: str, engine: str, values: dict[str, Any], word: str, tmp_path: Path) -> None:
-    ended = start(case, engine, tmp_path, values)
-    assert ended.returncode != 0
-    assert re.search(rf"dembark: {word}", ended.stdout + ended.stderr)
+def test_impossible_set_ups_are_refused(case: str, values: dict[str, Any], word: str, decks: Any, tmp_path: Path) -> None:
+    with pytest.raises(DembarkError, match=word):
+        decks(case, "liggghts", tmp_path, values)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-import re
 import signal
-import subprocess
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,13 +16,12 @@ import pytest
 from dembark.common.errors import DembarkError, Killed
 from dembark.common.files import check_times, count_frames, read_json
 from dembark.postproc import ContactsDump, GrainsDump, read_times
-from dembark.validation import engines, restarts
-from dembark.validation.cases import find
-from dembark.validation.plan import Run, series
-from dembark.validation.progress import Board
-from dembark.validation.simulate import Resources, simulate
+from dembark.validation import engines
+from dembark.validation.case.folders import find
+from dembark.validation.runs import plan, restarts
+from dembark.validation.runs.plan import Resources
+from dembark.validation.runs.simulate import simulate
 
-ROOT = Path(__file__).resolve().parents[1]
 OUTPUTS = ("time.csv", "grains.dump", "contacts.dump", "impacts.txt")
 SILO = {"grain_count": 120, "cylinder_radius": 0.018, "settle_time": 0.15, "measure_time": 0.05, "frames": 5, "bridge_volume": 8e-11,
         "restart_every": 700}
@@ -41,36 +39,24 @@ COLUMN = {"grain_count": 60, "column_width": 0.021, "column_depth": 0.021, "sett
 
 
 @dataclass
-class Deck:
-    """A deck run by hand in `folder`, with states every `restart_every` steps."""
+class Run:
+    """A deck that is run with the words `restart_every` of its values, on `ranks` processes."""
 
-    case: str
-    engine: str
-    folder: Path
-    values: dict[str, Any]
+    deck: Any
+    every: int
     ranks: int = 1
 
-    def start(self, resume: str = "no", ranks: int | None = None) -> subprocess.Popen[bytes]:
-        try:
-            engine = engines.find(self.engine)
-        except DembarkError as error:
-            pytest.skip(str(error))
-        self.folder.mkdir(exist_ok=True)
-        deck = ROOT / self.case / {"liggghts": "liggghts.in", "yade": "yade.py"}[self.engine]
-        with (self.folder / "log").open("wb") as log:
-            return subprocess.Popen(engine.command(deck, self.values | {"resume": resume}, ranks or self.ranks), cwd=self.folder,
-                                    env=engine.environment(), stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT)
+    @property
+    def folder(self) -> Path:
+        return self.deck.folder
 
-    def run(self, resume: str = "no", ranks: int | None = None) -> str:
+    def go(self, ranks: int | None = None, **words: Any) -> str:
         """To the end; what the engine said."""
-        code = self.start(resume, ranks).wait(120)
-        said = (self.folder / "log").read_text(errors="replace")
-        assert code == 0 and "dembark: finished" in said, said[-2000:]
-        return said
+        return self.deck.run(ranks or self.ranks, restart_every=self.every, **words)
 
     def kill_after(self, step: int) -> int:
         """SIGKILL to a run as soon as it has a state of `step` or later; the step of its newest state."""
-        process = self.start()
+        process = self.deck.start(self.ranks, restart_every=self.every)
         while process.poll() is None and (self.newest() or -1) < step:
             time.sleep(0.005)
         process.kill()
@@ -80,7 +66,7 @@ class Deck:
         return found
 
     def newest(self) -> int | None:
-        return restarts.newest(self.folder, self.engine)
+        return restarts.newest(self.folder, self.deck.engine.name)
 
     def written(self) -> dict[str, bytes]:
         """Output files and the states that are left, which tell all digits of all numbers."""
@@ -89,23 +75,38 @@ class Deck:
         return {name: (self.folder / name).read_bytes() for name in names}
 
 
-def both(case: str, engine: str, base: Path, values: dict[str, Any], ranks: int = 1) -> tuple[Deck, Deck, int]:
-    """A run that was left alone, one that was killed, and the step of the newest state of the latter."""
-    whole, broken = (Deck(case, engine, base / name, values, ranks) for name in ("whole", "broken"))
-    said = whole.run()
-    steps = int(re.search(r"dembark: steps (\d+)", said)[1])  # type: ignore[index]
-    return whole, broken, broken.kill_after(steps // 2)
+@pytest.fixture
+def prepared(decks: Any, tmp_path: Path) -> Callable[..., Run]:
+    """Makes the run of a case in a folder of `tmp_path`."""
+
+    def make(case: str, engine: str, values: dict[str, Any], folder: str = "run", ranks: int = 1) -> Run:
+        given = {key: value for key, value in values.items() if key != "restart_every"}
+        return Run(decks(case, engine, tmp_path / folder, given), values["restart_every"], ranks)
+
+    return make
+
+
+@pytest.fixture
+def both(prepared: Any) -> Callable[..., tuple[Run, Run, int]]:
+    """Makes a run that was left alone, one that was killed, and the step of the newest state of the latter."""
+
+    def make(case: str, engine: str, values: dict[str, Any], ranks: int = 1) -> tuple[Run, Run, int]:
+        whole, broken = (prepared(case, engine, values, name, ranks) for name in ("whole", "broken"))
+        whole.go()
+        return whole, broken, broken.kill_after(whole.deck.setup.steps // 2)
+
+    return make
 
 
 @pytest.mark.parametrize(("case", "values"), [
     ("plug_flow", PLUG | {"grain_count": 120}), ("column_collapse", COLUMN),
     ("plane_silo", {"grain_count": 120, "silo_width": 0.03, "slab_depth": 0.024, "settle_time": 0.1, "measure_time": 0.05, "frames": 3})])
-def test_no_grain_falls_through_the_base_after_a_restart(case: str, values: dict[str, Any], tmp_path: Path) -> None:
+def test_no_grain_falls_through_the_base_after_a_restart(case: str, values: dict[str, Any], prepared: Any) -> None:
     """Pairs that nearly touch are found anew whenever YADE goes on from a state, also those with a base that is larger than the period."""
-    deck = Deck(case, "yade", tmp_path / "run", values | {"restart_every": 80})
-    deck.run()
+    run = prepared(case, "yade", values | {"restart_every": 80})
+    run.go()
     radius = 0.5 * 0.005
-    for frame in GrainsDump(deck.folder / "grains.dump"):
+    for frame in GrainsDump(run.folder / "grains.dump"):
         assert frame.positions[:, 2].min() > -0.05 * 0.2 - 2 * radius
 
 
@@ -113,14 +114,14 @@ def test_no_grain_falls_through_the_base_after_a_restart(case: str, values: dict
     ("silo", "liggghts", 1, SILO), ("silo", "yade", 1, SILO), ("plug_flow", "liggghts", 2, PLUG),
     ("gravity_channel", "liggghts", 2, CHANNEL), ("gravity_channel", "yade", 1, CHANNEL), ("log_pile", "liggghts", 1, PILE),
     ("log_pile", "yade", 1, PILE), ("column_collapse", "liggghts", 2, COLUMN), ("column_collapse", "yade", 1, COLUMN)])
-def test_killed_run_goes_on_to_the_same_bytes(case: str, engine: str, ranks: int, values: dict[str, Any], tmp_path: Path) -> None:
-    whole, broken, step = both(case, engine, tmp_path, values, ranks)
+def test_killed_run_goes_on_to_the_same_bytes(case: str, engine: str, ranks: int, values: dict[str, Any], both: Any) -> None:
+    whole, broken, step = both(case, engine, values, ranks)
     if case == "log_pile":
         # A state that was cut is passed over.
         state = broken.folder / f"state.{step}.{'restart' if engine == 'liggghts' else 'yade.gz'}"
         state.write_bytes(state.read_bytes()[:-100])
         step -= values["restart_every"]
-    assert f"dembark: resumed at step {step} exactly" in broken.run("yes")
+    assert f"dembark: resumed at step {step} exactly" in broken.go(resume="yes")
     one, other = whole.written(), broken.written()
     if case == "gravity_channel" and engine == "liggghts":
         # The list of fixes stands in another order in the file; the numbers are in the outputs.
@@ -130,28 +131,26 @@ def test_killed_run_goes_on_to_the_same_bytes(case: str, engine: str, ranks: int
 
 
 @pytest.mark.parametrize("engine", ["liggghts", "yade"])
-def test_resuming_without_a_state_says_so(engine: str, tmp_path: Path) -> None:
-    deck = Deck("silo", engine, tmp_path, SILO)
-    assert deck.start("yes").wait(60) != 0
-    said = (tmp_path / "log").read_text(errors="replace")
+def test_resuming_without_a_state_says_so(engine: str, prepared: Any) -> None:
+    deck = prepared("silo", engine, SILO).deck
+    assert deck.start(resume="yes").wait(60) != 0
+    said = deck.said()
     assert "there is no whole state" in said and "Traceback" not in said
 
 
 @pytest.mark.parametrize("engine", ["liggghts", "yade"])
-def test_run_begun_anew_forgets_the_states_of_another(engine: str, tmp_path: Path) -> None:
-    deck = Deck("log_pile", engine, tmp_path, PILE | {"duration": 0.2})
-    deck.run()
-    assert deck.newest() == 1800
-    deck.values = PILE | {"duration": 0.1, "restart_every": 500}
-    deck.run()
-    assert deck.newest() == 1000
+def test_run_begun_anew_forgets_the_states_of_another(engine: str, prepared: Any) -> None:
+    for duration, every, newest in ((0.2, 900, 1800), (0.1, 500, 1000)):
+        run = prepared("log_pile", engine, PILE | {"duration": duration, "restart_every": every})
+        run.go()
+        assert run.newest() == newest
 
 
-def test_other_number_of_ranks_goes_on_approximately(tmp_path: Path) -> None:
+def test_other_number_of_ranks_goes_on_approximately(both: Any) -> None:
     """Forces are computed anew at the step of the state: rows and frames are complete, and the bed weighs what it weighs."""
-    whole, broken, step = both("silo", "liggghts", tmp_path, SILO | {"bridge_volume": 0.0}, ranks=2)
-    assert f"dembark: resumed at step {step} approximately: the state is of 2 ranks, the run has 1" in broken.run("yes", ranks=1)
-    one, other = (read_times(deck.folder / "time.csv") for deck in (whole, broken))
+    whole, broken, step = both("silo", "liggghts", SILO | {"bridge_volume": 0.0}, ranks=2)
+    assert f"dembark: resumed at step {step} approximately: the state is of 2 ranks, the run has 1" in broken.go(ranks=1, resume="yes")
+    one, other = (read_times(run.folder / "time.csv") for run in (whole, broken))
     np.testing.assert_array_equal(one["step"], other["step"])
     for reader, name in ((GrainsDump, "grains.dump"), (ContactsDump, "contacts.dump")):
         assert [frame.step for frame in reader(whole.folder / name)] == [frame.step for frame in reader(broken.folder / name)]
@@ -162,10 +161,10 @@ def test_other_number_of_ranks_goes_on_approximately(tmp_path: Path) -> None:
 
 # --- through the harness -----------------------------------------------------------------------------------------------
 
-def planned(engine: str) -> Run:
+def planned(engine: str) -> plan.Run:
     values = {key: value for key, value in SILO.items() if key != "restart_every"}
     try:
-        return series(find("silo"), "wet", "quick", engines.find(engine), values).runs[0]
+        return plan.series(find("silo"), "wet", "quick", engines.find(engine), values).runs[0]
     except DembarkError as error:
         pytest.skip(str(error))
 
@@ -178,7 +177,7 @@ def test_harness_resumes_what_was_ended_from_outside(engine: str, number: int, t
 
     def attempt() -> None:
         try:
-            simulate(one, tmp_path, Board(), threading.Event(), used)
+            simulate(one, tmp_path, threading.Event(), used)
         except Killed as error:
             caught.append(error)
 
@@ -190,7 +189,8 @@ def test_harness_resumes_what_was_ended_from_outside(engine: str, number: int, t
     os.kill(engine_in(work), number)
     thread.join(60)
     assert len(caught) == 1 and "it goes on from step" in str(caught[0])
-    folder = simulate(one, tmp_path, Board(), threading.Event(), used)
+    assert simulate(one, tmp_path, threading.Event(), used)
+    folder = tmp_path / "replica-1"
     record = read_json(folder / "run.json")
     assert record and record["attempts"] == 2 and record["resume"] == "exact" and len(record["resumed_at"]) == 1
     assert count_frames(folder / "grains.dump", "ATOMS") == SILO["frames"]

@@ -1,24 +1,17 @@
-"""The decks of single_contact agree with the case file and do the same, which is what the contact law demands."""
+"""The decks of single_contact do the same, which is what the contact law demands."""
 
 from __future__ import annotations
 
-import re
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from dembark.common.errors import DembarkError
 from dembark.common.files import check_times, count_frames
 from dembark.postproc import GrainsDump
-from dembark.validation import engines
 from dembark.validation.checks.impact_exact import impacts, stepped
-from dembark.validation.checks.run import Replica
 from dembark.validation.checks.single_contact import Flight, read
 
-ROOT = Path(__file__).resolve().parents[1] / "single_contact"
-CASE = tomllib.loads((ROOT / "case.toml").read_text(encoding="utf-8"))
 ENGINES = ("liggghts", "yade")
 SCENES: dict[str, dict[str, Any]] = {
     "test_3": {"time_step": 1e-7, "duration": 4e-5},
@@ -28,47 +21,16 @@ SCENES: dict[str, dict[str, Any]] = {
 }
 
 
-def values(scene: str) -> dict[str, Any]:
-    return {key: table.get("value") for key, table in CASE["parameters"].items()} | CASE["variants"][scene] | SCENES[scene]
-
-
-def test_liggghts_defaults_are_those_of_the_case_file() -> None:
-    text = (ROOT / "liggghts.in").read_text(encoding="utf-8")
-    defaults = dict(re.findall(r"^variable\s+(\w+)\s+index\s+(\S+)\s*$", text, re.MULTILINE))
-    declared = CASE["parameters"]
-    assert defaults.keys() == declared.keys()
-    for key, word in defaults.items():
-        assert (word if declared[key]["type"] == "choice" else float(word)) == declared[key]["value"], key
-
-
-def test_both_decks_use_every_key() -> None:
-    for deck, pattern in (("liggghts.in", r"\$\{%s\}"), ("yade.py", r"\bp\.%s\b")):
-        text = (ROOT / deck).read_text(encoding="utf-8")
-        assert not [key for key in CASE["parameters"] if not re.search(pattern % key, text)], deck
-
-
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Short runs by (scene, engine), each done once: (folder, what the spheres did)."""
-    done: dict[tuple[str, str], tuple[Path, Flight]] = {}
+def finished(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Short runs by (scene, engine), each done once: (the deck that was run, what the spheres did)."""
+    done: dict[tuple[str, str], tuple[Any, Flight]] = {}
 
-    def get(scene: str, name: str) -> tuple[Path, Flight]:
+    def get(scene: str, name: str) -> tuple[Any, Flight]:
         if (scene, name) not in done:
-            try:
-                engine = engines.find(name)
-            except DembarkError as error:
-                pytest.skip(str(error))
-            folder, given = tmp_path_factory.mktemp(f"{scene}-{name}"), CASE["variants"][scene] | SCENES[scene]
-            if name == "liggghts":
-                pairs = (word for key, value in given.items() for word in ("-var", key, str(value)))
-                words = [str(engine.executable), "-in", str(ROOT / "liggghts.in"), *pairs]
-            else:
-                words = [str(engine.executable), "-n", "-x", str(ROOT / "yade.py"), *(f"{key}={value}" for key, value in given.items())]
-            ended = engines.call(words, folder, engine.environment())
-            assert ended.returncode == 0, ended.stdout[-2000:] + ended.stderr[-2000:]
-            assert "dembark: finished" in ended.stdout
-            p = values(scene)
-            done[scene, name] = folder, read(Replica(folder, {"engine": name, "parameters": p, "time_step": p["time_step"]}))
+            one = decks("single_contact", name, tmp_path_factory.mktemp(f"{scene}-{name}"), SCENES[scene], scene)
+            one.run()
+            done[scene, name] = one, read(one.replica())
         return done[scene, name]
 
     return get
@@ -78,8 +40,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Any:
 @pytest.mark.parametrize("scene", SCENES)
 def test_every_sphere_does_what_the_law_demands_in_this_scheme(scene: str, engine: str, finished: Any) -> None:
     """Material, restitution coefficient, partner and start of each one: the scheme, written down again, says where each ends."""
-    folder, flight = finished(scene, engine)
-    p = values(scene)
+    run, flight = finished(scene, engine)
+    folder, p = run.folder, run.values
     one = impacts(p)
     assert count_frames(folder / "grains.dump", "ATOMS") == p["frames"]
     assert check_times(folder / "time.csv") >= 200
@@ -99,3 +61,13 @@ def test_both_engines_do_the_same(scene: str, finished: Any) -> None:
     one, other = (finished(scene, engine)[1] for engine in ENGINES)
     np.testing.assert_allclose(one.overlaps, other.overlaps, rtol=0.0, atol=1e-9 * np.abs(one.overlaps).max())
     np.testing.assert_allclose(one.forces, other.forces, rtol=0.0, atol=1e-7 * np.abs(one.forces).max())
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_resumed_run_does_the_same(engine: str, decks: Any, tmp_path: Path) -> None:
+    whole, resumed = (decks("single_contact", engine, tmp_path / name, SCENES["test_8_b"], "test_8_b") for name in ("whole", "resumed"))
+    for one in (whole, resumed):
+        one.run(restart_every=70)
+    assert "exactly" in resumed.run(restart_every=70, resume="yes")
+    for name in ("time.csv", "grains.dump"):
+        assert (whole.folder / name).read_bytes() == (resumed.folder / name).read_bytes()

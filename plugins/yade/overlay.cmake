@@ -1,4 +1,4 @@
-# Make an overlay of YADE: cmake -DPREFIX= -DOVERLAY= -DSUBDIR=<of PREFIX, with libyade.so> -DPLUGIN= -DMODULES= -P overlay.cmake
+# Make an overlay of YADE: cmake -DPREFIX= -DOVERLAY= -DSUBDIR=<of PREFIX, with libyade.so> -DPLUGIN= -DMODULE= -P overlay.cmake
 # OVERLAY becomes a link to a folder beside it. A new one is built under a name of its own and the link then replaced by one rename,
 # so that there is a whole overlay at any time; the one before stays for runs that still use it.
 file(REAL_PATH ${PREFIX} PREFIX)
@@ -41,10 +41,9 @@ file(MAKE_DIRECTORY ${fresh}/bin ${around})
 run(cp -rs ${PREFIX}/${SUBDIR} ${around}/)
 run(cp ${PLUGIN} ${fresh}/${SUBDIR}/)
 # Copies, not links: an overlay keeps working, and keeps one version of library and module, while the checkout changes.
-file(GLOB modules ${MODULES}/*.py)
-foreach(module ${modules})
-  run(cp ${module} ${fresh}/${SUBDIR}/py/yade/)
-endforeach()
+file(GLOB files ${MODULE}/*.py)
+file(MAKE_DIRECTORY ${fresh}/${SUBDIR}/py/yade/dembark)
+run(cp ${files} ${fresh}/${SUBDIR}/py/yade/dembark/)
 
 file(WRITE ${fresh}/bin/yade "${patched}")
 file(CHMOD ${fresh}/bin/yade PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)

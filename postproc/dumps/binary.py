@@ -1,4 +1,4 @@
-"""Binary dumps of LAMMPS's format, as LIGGGHTS 3.8.0 writes them (`dump ... custom ... file.bin`)."""
+"""LAMMPS binary dumps of grains (`dump ... custom ... file.bin`)."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class BinaryDump(Dump):
         except (DumpError, ValueError):
             head = None
         if head is None:
-            raise DumpError(f"{path} does not begin with 'ITEM: TIMESTEP', nor as a binary dump of LIGGGHTS does")
+            raise DumpError(f"{path} does not begin with 'ITEM: TIMESTEP', nor as a binary dump does")
         if columns is None:
             advice = "give columns=, the words of the deck's dump command"
             raise DumpError(f"{path} is binary and does not name its {head.width} columns; {advice}")

@@ -17,9 +17,9 @@ Trajectory = str | Path | Sequence[str | Path]
 
 
 def open_dump(path: Trajectory, skip_truncated: bool = False, *, stream: bool = False, columns: Sequence[str] | None = None) -> Dump:
-    """Open text or binary dumps of LAMMPS's format, gzipped or not, or VTK files of LIGGGHTS.
+    """Open text or binary dumps of LAMMPS's format, gzipped or not, or VTK files of `dump custom/vtk`, `atom/vtk` and `local/gran/vtk`.
 
-    `path` is a file or, where each step has its own, a pattern such as "post/dump*.liggghts" or "post/grains*.vtk", or a list of files.
+    `path` is a file or, where each step has its own, a pattern such as "post/dump*.dump" or "post/grains*.vtk", or a list of files.
     `columns` names the columns of a binary dump, which holds numbers only, in the order of the deck's `dump` command. `skip_truncated`
     leaves a cut-off last frame out, `stream` reads forward without an index (see Dump). DumpError for a missing, foreign or truncated
     file.

@@ -1,4 +1,4 @@
-"""Runs that write a file a step: dump*.liggghts, grains*.vtk."""
+"""Runs that write a file a step: dump*.dump, grains*.vtk."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""VTK files of LIGGGHTS, one a step, through VTK's own readers: `dump custom/vtk` and `atom/vtk` (grains), `local/gran/vtk` (contacts)."""
+"""VTK files, one a step, through VTK's own readers: `dump custom/vtk` and `atom/vtk` (grains), `local/gran/vtk` (contacts)."""
 
 from __future__ import annotations
 

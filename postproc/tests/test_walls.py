@@ -11,7 +11,8 @@ from dembark.postproc.walls.mesh import TriangleTree, nearest_on_triangles, read
 from dembark.postproc.walls.patches import box_patches, cylinder_patches, inclusion_patches, mesh_patches, plane_patches
 from dembark.postproc.walls.peaks import Blocks, Histogram, PeakFinder
 from dembark.postproc.walls.stress import wall_stress
-from dembark.validation import cases, engines
+from dembark.validation import engines
+from dembark.validation.case import folders
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scenes import contacts_of, frame_of
@@ -369,7 +370,7 @@ SMALL = {"grain_count": 150, "grain_diameter": 0.006, "gravity": 200.0, "settle_
 @pytest.mark.parametrize("name", ["liggghts", "yade"])
 def test_integrated_stress_is_the_engines_own_wall_force(name, tmp_path):
     engine = engines.find(name)
-    done = engines.call(engine.command(cases.find("silo").deck(name), SMALL), tmp_path, engine.environment())
+    done = engines.call(engine.command(folders.find("silo").deck(name), SMALL), tmp_path, engine.environment())
     assert done.returncode == 0, done.stdout[-1000:] + done.stderr[-1000:]
     grains, history = GrainsDump(tmp_path / "grains.dump"), read_times(tmp_path / "time.csv")
     walls = [CylinderWall("side", SMALL["cylinder_radius"]), PlaneWall("base")]
@@ -404,7 +405,7 @@ def test_moving_mesh_has_the_engines_own_force_and_is_where_the_grains_touch_it(
     engine = engines.find("liggghts")
     values = {"grain_count": 120, "channel_width": 0.04, "channel_depth": 0.02, "settle_time": 0.03, "run_in": 0.02, "travel": 0.1,
               "frames": 4, "gravity": 200.0, "base_speed": 0.02}
-    done = engines.call(engine.command(cases.find("plug_flow").deck("liggghts"), values), tmp_path, engine.environment())
+    done = engines.call(engine.command(folders.find("plug_flow").deck("liggghts"), values), tmp_path, engine.environment())
     assert done.returncode == 0, done.stdout[-1000:] + done.stderr[-1000:]
     steps, time_step = (float(word) for word in done.stdout.split("dembark: steps ")[1].split()[0:3:2])
     history = read_times(tmp_path / "time.csv")

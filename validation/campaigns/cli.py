@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,13 +11,13 @@ from rich.console import Console
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from dembark.validation.workflow import Outcome
+    from dembark.validation.runs.perform import Outcome
 
 File = Annotated[str, typer.Argument(metavar="CAMPAIGN", help="File of a campaign, or name of one of 'dembark campaigns'.")]
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of a campaign.")]
-Executor = Annotated[str | None, typer.Option(help="local, slurm, or the folder of a Snakemake profile.")]
+Executor = Annotated[str | None, typer.Option(help="local, slurm, or the TOML file of a site.")]
 Cores = Annotated[int | None, typer.Option(min=1, help="Cores of this machine to use; default: all.")]
-Jobs = Annotated[int | None, typer.Option(min=1, help="Jobs of a cluster at a time; default: what the profile says.")]
+Jobs = Annotated[int | None, typer.Option(min=1, help="Jobs of a cluster at a time; default: what the site's file says.")]
 Out = Annotated[Path | None, typer.Option(help="Folder of the campaign; default: results/campaigns/<name>.")]
 Dry = Annotated[bool, typer.Option("--dry-run", help="Only show the runs, what they cost and whether the file is right.")]
 
@@ -38,12 +37,6 @@ def _console() -> Console:
     return console()
 
 
-def _told(done: int, total: int) -> None:
-    """How many decks have told their steps; a line of its own only where somebody waits for it."""
-    if sys.stderr.isatty():
-        print(f"\rdembark: asked {done} of {total} decks for their steps", end="" if done < total else "\n", file=sys.stderr, flush=True)
-
-
 def show_campaigns() -> None:
     """List the campaigns that come with the cases."""
     from dembark.validation.campaigns.expand import points
@@ -60,33 +53,31 @@ def show_campaigns() -> None:
 def submit(campaign: File, dry_run: Dry = False, executor: Executor = None, out: Out = None, cores: Cores = None,
            jobs: Jobs = None) -> None:
     """Run a campaign, here or on a cluster: all its runs, their measurements and the report. What is finished is kept."""
-    from dembark.validation.campaigns import folder, show
+    from dembark.validation.campaigns import folder, show, source
     from dembark.validation.campaigns import submit as work
-    from dembark.validation.campaigns.source import Source
     from dembark.validation.campaigns.spec import locate
-    from dembark.validation.jobs import cancelled_by_signal
+    from dembark.validation.runs.job import cancelled_by_signal
 
     file = locate(campaign)
     chosen = folder.choose(executor or "local", cores, jobs)
     work.prepare(chosen)
-    plan = Source(file=file).plan()
-    assert plan is not None
+    plan = source.of_campaign(file)
     results = (out or folder.default(plan.spec.name)).resolve()
     cancel = cancelled_by_signal()
     if not dry_run:
-        _conclude(work.submit(file, results, chosen, cancel, _say, _told), results)
+        _conclude(work.submit(file, results, chosen, cancel, _say), results)
         return
     folder.refuse_foreign(results, plan.spec.name)
-    called = work.way(chosen, plan)
-    found = work.forecast(plan, results, cancel, _told)
-    show.dry_run(_console(), plan, found, results, None if called.cluster else cores or os.cpu_count())
+    work.check(chosen, plan)
+    found = work.forecast(plan, results)
+    show.dry_run(_console(), plan, found, results, work.cores_here(chosen) if chosen.executor == "local" else None)
 
 
 def resume(directory: Folder, executor: Executor = None, cores: Cores = None, jobs: Jobs = None) -> None:
     """Go on with a campaign where it was ended, in the way it was submitted unless told otherwise."""
     from dembark.validation.campaigns import folder
     from dembark.validation.campaigns import submit as work
-    from dembark.validation.jobs import cancelled_by_signal
+    from dembark.validation.runs.job import cancelled_by_signal
 
     results = directory.resolve()
     folder.own_file(results)
@@ -95,7 +86,7 @@ def resume(directory: Folder, executor: Executor = None, cores: Cores = None, jo
     same = executor in (None, before.executor)
     chosen = folder.choose(executor or before.executor, cores or before.cores, jobs or (before.jobs if same else None))
     work.prepare(chosen)
-    _conclude(work.resume(results, chosen, cancelled_by_signal(), _say, _told), results)
+    _conclude(work.resume(results, chosen, cancelled_by_signal(), _say), results)
 
 
 def _say(line: str) -> None:
@@ -111,7 +102,7 @@ def _conclude(outcome: Outcome, results: Path) -> None:
 def status(directory: Folder) -> None:
     """Show how far a campaign is: each run with its simulated time, and the time left."""
     from dembark.validation.campaigns.status import look
-    from dembark.validation.progress import duration, state_table
+    from dembark.validation.runs.progress import duration, state_table
 
     results = directory.resolve()
     found = look(results)
@@ -123,7 +114,7 @@ def status(directory: Folder) -> None:
             console.print(f"failed: {state.name}: {state.message}", markup=False, style="red", soft_wrap=True)
     if found.running and found.left:
         console.print(f"about {duration(found.left)} left")
-    console.print(f"{found.measured} series measured, {found.checks} checks, {found.failed_checks} failed")
+    console.print(f"{found.measured} series measured; {found.tally.sentence}")
     if found.report:
         console.print(str(found.report), markup=False, soft_wrap=True)
     if not found.running and not found.complete:
@@ -132,7 +123,7 @@ def status(directory: Folder) -> None:
 
 def export(
     directory: Folder,
-    table: Annotated[str, typer.Option(help="runs, quantities, comparisons or points.")] = "quantities",
+    table: Annotated[str, typer.Option(help="runs, steps, quantities, comparisons or points.")] = "quantities",
     out: Annotated[Path | None, typer.Option(help="File to write; default: to the screen.")] = None,
 ) -> None:
     """Write a table of a store as CSV."""

@@ -1,27 +1,17 @@
-"""What a campaign will cost before it starts: steps as the decks announce them, time from measured rates, and room on the disk."""
+"""What a campaign will cost before it starts: steps of its decks, time from measured rates, and room on the disk."""
 
 from __future__ import annotations
 
-import os
 import shutil
-import tempfile
-import threading
-import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dembark.common.errors import DembarkError, Interrupted
-from dembark.validation import engines
 from dembark.validation.campaigns.expand import Plan
 from dembark.validation.campaigns.rates import Rate, Rates
 from dembark.validation.campaigns.sizes import size_text
-from dembark.validation.plan import Run, Series
-from dembark.validation.process import chunks, running
-from dembark.validation.progress import OutputParser
-
-_PATIENCE = 60.0
+from dembark.validation.case import deck
+from dembark.validation.runs.plan import Series
 
 
 @dataclass(frozen=True)
@@ -52,56 +42,19 @@ class Estimate:
         return None if self.core_seconds is None else self.core_seconds / self.cores
 
 
-def announced(run: Run, cancel: threading.Event) -> tuple[int, float]:
-    """Steps and time step (s) that the deck of `run` announces: its engine is started and ended again as soon as it has said them."""
-    words = run.engine.command(run.case.deck(run.engine.name), run.values)
-    parser, deadline = OutputParser(), time.monotonic() + _PATIENCE
-    with tempfile.TemporaryDirectory(prefix="dembark-") as folder, running(words, Path(folder), run.engine.environment()) as process:
-        for chunk in chunks(process):
-            if cancel.is_set():
-                raise Interrupted("interrupted")
-            parser.hear(chunk)
-            if parser.steps or time.monotonic() > deadline:
-                break
-    if not parser.steps:
-        raise DembarkError(f"{run.name} does not start", f"its deck says no 'dembark: steps <N> time_step <dt>' ({words[0]})",
-                           f"try it with 'dembark run {run.case.name} --engine {run.engine.name}'")
-    return parser.steps, parser.time_step
-
-
-def _asked(run: Run) -> Run:
-    """The same run in LIGGGHTS where that is at hand, which starts much faster than YADE; both decks take the same steps."""
-    if run.engine.name == "liggghts" or "liggghts" not in run.case.engines:
-        return run
-    try:
-        return Run(run.case, run.variant, run.profile, engines.find("liggghts"), run.replica, run.values)
-    except DembarkError:
-        return run
-
-
-def estimates(plan: Plan, rates: Rates, cancel: threading.Event,
-              told: Callable[[int, int], None] = lambda done, total: None) -> list[Estimate]:
-    """One estimate for each series of `plan`, in its order; `told` hears how many of the decks were asked.
-
-    DembarkError when a deck does not start, Interrupted when `cancel` is set.
-    """
-    asked: dict[tuple[object, ...], Run] = {_key(one.runs[0]): _asked(one.runs[0]) for one in plan.series}
-    found: dict[tuple[object, ...], tuple[int, float]] = {}
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        told(0, len(asked))
-        for key, answer in zip(asked, pool.map(lambda run: announced(run, cancel), asked.values()), strict=True):
-            found[key] = answer
-            told(len(found), len(asked))
-    return [_estimate(one, found[_key(one.runs[0])], rates, plan.resources[one.place].cores) for one in plan.series]
-
-
-def _key(run: Run) -> tuple[object, ...]:
-    return run.case.name, *run.values.values()
-
-
-def _estimate(one: Series, answer: tuple[int, float], rates: Rates, cores: int) -> Estimate:
-    run = one.runs[0]
-    return Estimate(one, *answer, run.particles, rates.of(run.case.name, run.engine.name, cores), cores, run.output_size)
+def estimates(plan: Plan, rates: Rates) -> list[Estimate]:
+    """One estimate for each series of `plan`, in its order; DembarkError when the numbers of a run cannot be made."""
+    known: dict[tuple[object, ...], tuple[int, float]] = {}
+    found = []
+    for one in plan.series:
+        run, cores = one.runs[0], plan.resources[one.place].cores
+        # The seed changes neither steps nor time step.
+        key = (run.case.name, *(value for name, value in run.values.items() if name != "seed"))
+        if key not in known:
+            setup = deck.prepare(run.case, run.values)
+            known[key] = (setup.steps, setup.time_step)
+        found.append(Estimate(one, *known[key], run.particles, rates.of(run.case.name, run.engine.name, cores), cores, run.output_size))
+    return found
 
 
 def total(values: Iterable[float | None]) -> float:

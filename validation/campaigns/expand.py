@@ -12,11 +12,10 @@ from typing import Any
 
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
-from dembark.validation.campaigns.spec import CampaignSpec, RunResources, SweepSpec
-from dembark.validation.cases import ENGINES
-from dembark.validation.parameters import Value, checked, pick
-from dembark.validation.plan import Series, series
-from dembark.validation.resolve import merged, resolve
+from dembark.validation.campaigns.spec import CampaignSpec, SweepSpec
+from dembark.validation.case.parameters import Value, checked, pick
+from dembark.validation.case.resolve import merged, resolve
+from dembark.validation.runs.plan import Resources, Series, series
 
 LONGEST_NAME = 100
 MOST_RUNS = 20000
@@ -45,7 +44,7 @@ class Plan:
     spec: CampaignSpec
     points: tuple[Point, ...]
     series: tuple[Series, ...]
-    resources: Mapping[Path, RunResources]
+    resources: Mapping[Path, Resources]
 
     def sweeps(self) -> list[dict[str, Any]]:
         """The sweeps for a JSON file: case, name, title, axes, and their points with folder names and values in SI units."""
@@ -153,10 +152,10 @@ def plan(spec: CampaignSpec, only_cases: Sequence[str] = (), only_engines: Seque
     for name in only_cases:
         pick(name, {sweep.case.name for sweep in spec.sweeps}, "case", f"in {spec.path}")
     for name in only_engines:
-        pick(name, ENGINES, "engine", "in --engine")
+        pick(name, engines.names(), "engine", "in --engine")
     all_points = points(spec)
     found: dict[Path, Series] = {}
-    resources: dict[Path, RunResources] = {}
+    resources: dict[Path, Resources] = {}
     for point in all_points:
         if only_cases and point.sweep.case.name not in only_cases:
             continue

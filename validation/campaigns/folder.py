@@ -14,22 +14,20 @@ from typing import Any
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json, write_json, write_whole
-from dembark.validation import provenance
+from dembark.validation import engines, provenance
 from dembark.validation.campaigns.expand import Plan
 from dembark.validation.campaigns.spec import read
-from dembark.validation.cases import deck_root
+from dembark.validation.case.folders import shipped_root
+from dembark.validation.runs.perform import LOCK
+from dembark.validation.runs.steps import CAMPAIGN_FILE as FILE
 
-FILE = "campaign.toml"
 FACTS = "campaign.json"
 LOG = "campaign.log"
-LOCK = ".lock"
-# What else says which engines and cases are meant; `resume` takes it over where the shell says nothing.
-_VARIABLES = ("DEMBARK_LIGGGHTS", "DEMBARK_YADE", "DEMBARK_DECKS", "DEMBARK_MPIRUN")
 
 
 @dataclass(frozen=True)
 class Options:
-    """How a campaign is run: `local`, `slurm` or the folder of a Snakemake profile; cores of this host and jobs at a time (None = all)."""
+    """How a campaign is run: `local`, `slurm` or the file of a site; cores of this host and jobs at a time (None = all)."""
 
     executor: str = "local"
     cores: int | None = None
@@ -37,8 +35,8 @@ class Options:
 
 
 def choose(executor: str, cores: int | None, jobs: int | None) -> Options:
-    """Options with the path of a profile's folder made absolute, for a later `resume` from elsewhere."""
-    return Options(str(Path(executor).resolve()) if Path(executor).is_dir() else executor, cores, jobs)
+    """Options with the path of a site's file made absolute, for a later `resume` from elsewhere."""
+    return Options(str(Path(executor).resolve()) if Path(executor).is_file() else executor, cores, jobs)
 
 
 def default(name: str) -> Path:
@@ -85,37 +83,36 @@ def options(folder: Path) -> Options:
     return Options(**{key: value for key, value in _last(folder, "options").items() if key in Options.__dataclass_fields__})
 
 
+def _variables() -> list[str]:
+    """What else says which engines and cases are meant; `resume` takes it over where the shell says nothing."""
+    return [*(variable for name in engines.names() for variable in engines.facts(name).variables), "DEMBARK_DECKS", "DEMBARK_MPIRUN"]
+
+
 def restore(folder: Path) -> None:
     """Set the variables for engines and cases as they were at the last submission, unless they are set."""
     for name, value in _last(folder, "environment").items():
-        if name in _VARIABLES:
+        if name in _variables():
             os.environ.setdefault(name, value)
 
 
 def enter(folder: Path, file: Path, plan: Plan, chosen: Options) -> None:
     """Write the copy of the campaign's file into `folder` and add to `campaign.json` who submits it, from where, with what."""
     text = file.read_bytes()
-    _copy(text, folder / FILE)
+    write_whole(folder / FILE, text)
     facts = read_json(folder / FACTS) or {}
     submission: dict[str, Any] = {
         "at": datetime.now(UTC).isoformat(timespec="seconds"), "file": str(file), "sha256": hashlib.sha256(text).hexdigest(),
-        "options": asdict(chosen), "host": socket.gethostname(), "user": _user(), "decks": str(deck_root()),
-        "environment": {name: os.environ[name] for name in _VARIABLES if name in os.environ},
+        "options": asdict(chosen), "host": socket.gethostname(), "user": _user(), "decks": str(shipped_root()),
+        "environment": {name: os.environ[name] for name in _variables() if name in os.environ},
         **provenance.commit(), "versions": versions(plan)}
     write_json(folder / FACTS, {"name": plan.spec.name, "description": plan.spec.description,
                                 "submissions": [*facts.get("submissions", []), submission]})
 
 
-def _copy(text: bytes, copy: Path) -> None:
-    """Write the campaign's file; one that is the same keeps its date, by which the report is known to be up to date."""
-    if not copy.is_file() or copy.read_bytes() != text:
-        write_whole(copy, text)
-
-
 def versions(plan: Plan) -> Mapping[str, str | None]:
-    """Versions of dembark, Snakemake and the engines of a plan."""
+    """Versions of dembark and the engines of a plan."""
     used = {run.engine.name: run.engine.version for one in plan.series for run in one.runs}
-    return {**{name: provenance.package_version(name) for name in ("dembark", "snakemake")}, **used}
+    return {"dembark": provenance.package_version("dembark"), **used}
 
 
 def _user() -> str:

@@ -1,4 +1,4 @@
-"""Particle-steps per second and core: measured ones of a store, else those of the machine that the numbers below were measured on."""
+"""Particle-steps per second and core: measured ones of a store, else those in the facts of the engine."""
 
 from __future__ import annotations
 
@@ -9,25 +9,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from dembark.validation import engines
 from dembark.validation.campaigns import store
-
-MACHINE = "Intel Xeon (2 virtual cores), 2026-11-21, LIGGGHTS-PUBLIC 3.8.0 and YADE 2025.2.0"
-
-# From `make validate` (profile quick, one run a core), except plane_silo, gravity_channel and single_contact, which are of single small
-# runs beside other work. Small runs of logs are mostly the engine's start; each step of many logs costs more than in proportion.
-MEASURED: Mapping[tuple[str, str], float] = {
-    ("silo", "liggghts"): 3.3e6, ("silo", "yade"): 4.1e5,
-    ("plug_flow", "liggghts"): 2.4e6, ("plug_flow", "yade"): 4.3e5,
-    ("plane_silo", "liggghts"): 1.4e6, ("plane_silo", "yade"): 1.9e5,
-    ("gravity_channel", "liggghts"): 1.1e6, ("gravity_channel", "yade"): 1.6e5,
-    ("debarking_drum", "liggghts"): 7.4e5, ("debarking_drum", "yade"): 4.2e5,
-    ("log_pile", "liggghts"): 7.5e5, ("log_pile", "yade"): 4.2e5,
-    ("log_cradle", "liggghts"): 2.7e5, ("log_cradle", "yade"): 1.1e5,
-    ("log_pair", "liggghts"): 3.0e4, ("log_pair", "yade"): 9.0e3,
-    ("single_contact", "liggghts"): 9.0e4, ("single_contact", "yade"): 1.2e4,
-}
-# For other cases: about the mean of those with grains.
-ANY_CASE = {"liggghts": 2e6, "yade": 3e5}
 
 
 @dataclass(frozen=True)
@@ -49,16 +32,17 @@ class Rates:
     def of(self, case: str, engine: str, cores: int = 1) -> Rate:
         """Rate for runs of `case` in `engine` on `cores` cores.
 
-        The median of the store's runs of this case, those of this host and this number of cores before others; else the table.
+        The median of the store's runs of this case, those of this host and this number of cores before others; else the engine's facts.
         """
         rows = [row for row in self._rows if (row["case_name"], row["engine"]) == (case, engine)]
         mine = [row for row in rows if row["host"] == self._host]
         alike = [row for row in mine or rows if row["ranks"] * row["threads"] == cores]
         if chosen := alike or mine or rows:
             return Rate(_median(chosen), f"{len(chosen)} runs measured on {'this host' if mine else 'other hosts'}")
-        if (case, engine) in MEASURED:
-            return Rate(MEASURED[case, engine], f"measured on {MACHINE}")
-        return Rate(ANY_CASE[engine], f"of other cases, measured on {MACHINE}")
+        facts = engines.facts(engine)
+        if case in facts.rates:
+            return Rate(facts.rates[case], f"measured on {facts.measured_on}")
+        return Rate(facts.typical_rate, f"of other cases, measured on {facts.measured_on}")
 
 
 def _median(rows: Iterable[Mapping[str, Any]]) -> float:

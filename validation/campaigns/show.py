@@ -12,8 +12,8 @@ from rich.table import Table
 from dembark.validation.campaigns.estimate import Estimate, rate_sources, total, wall_clock, warnings
 from dembark.validation.campaigns.expand import Plan
 from dembark.validation.campaigns.sizes import core_hours, size_text
-from dembark.validation.plan import Series, finished
-from dembark.validation.progress import duration
+from dembark.validation.runs.plan import Series, finished
+from dembark.validation.runs.progress import duration
 
 
 def _left(one: Series, results: Path) -> int:

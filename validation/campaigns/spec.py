@@ -9,13 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from dembark.common.errors import DembarkError
+from dembark.validation import engines
 from dembark.validation.campaigns import sizes
-from dembark.validation.cases import ENGINES, Case, deck_root, discover, find
-from dembark.validation.expressions import Expression
-from dembark.validation.parameters import Value, checked, nearest, pick
-from dembark.validation.tables import TableReader, load_toml
+from dembark.validation.case.expressions import Expression
+from dembark.validation.case.folders import discover, files, find
+from dembark.validation.case.model import Case
+from dembark.validation.case.parameters import Value, checked, nearest, pick
+from dembark.validation.case.tables import TableReader, load_toml
+from dembark.validation.runs.plan import RETRIES, Resources
 
-RETRIES = 3
 MEASURE = "measure"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 _PER_RUN = {"ranks": int, "threads": int, "memory": str, "time": str, "restart_interval": str}
@@ -23,23 +25,6 @@ _MEASURING = {"memory": str, "time": str}
 _SWEEP = {"case": str, "name": str, "title": str, "profile": str, "variant": str, "variants": list, "engines": list, "grid": dict,
           "list": list, "fixed": dict, "derived": dict, "replicas": int, "resources": dict}
 _CAMPAIGN = {"name": str, "description": str, "profile": str, "engines": list, "replicas": int, "retries": int}
-
-
-@dataclass(frozen=True)
-class RunResources:
-    """What a run of an engine may use: MPI ranks and threads; and memory (bytes), time of an attempt (s) and wall time between restart
-    files (s), where None leaves the choice to the system."""
-
-    ranks: int = 1
-    threads: int = 1
-    memory: float | None = None
-    time: float | None = None
-    restart_interval: float | None = None
-
-    @property
-    def cores(self) -> int:
-        """Cores of one run."""
-        return self.ranks * self.threads
 
 
 @dataclass(frozen=True)
@@ -61,7 +46,7 @@ class SweepSpec:
     fixed: Mapping[str, Value]
     derived: Mapping[str, Expression]
     replicas: int | None
-    resources: Mapping[str, RunResources]
+    resources: Mapping[str, Resources]
 
     @property
     def label(self) -> str:
@@ -78,12 +63,12 @@ class CampaignSpec:
     description: str
     retries: int
     sweeps: tuple[SweepSpec, ...]
-    measure: RunResources | None = None
+    measure: Resources | None = None
 
 
 def shipped() -> dict[str, Path]:
     """The campaigns that lie in the case folders, by name."""
-    return {path.stem: path for path in sorted(deck_root().glob("*/campaigns/*.toml"))}
+    return {path.stem: path for case in files() for path in sorted(case.parent.glob("campaigns/*.toml"))}
 
 
 def locate(name: str) -> Path:
@@ -130,7 +115,7 @@ class _Defaults:
     profile: str | None
     engines: tuple[str, ...] | None
     replicas: int | None
-    resources: dict[str, RunResources] = field(default_factory=dict)
+    resources: dict[str, Resources] = field(default_factory=dict)
 
 
 class _Reader(TableReader):
@@ -148,8 +133,8 @@ class _Reader(TableReader):
         self.least("campaign", head, "replicas", 1)
         self.least("campaign", head, "retries", 0)
         tables = data.get("resources", {})
-        defaults = _Defaults(head.get("profile"), self.engines("campaign", head, ENGINES), head.get("replicas"),
-                             self.resources("resources", tables, {name: RunResources() for name in ENGINES}, measuring=True))
+        defaults = _Defaults(head.get("profile"), self.engines("campaign", head, engines.names()), head.get("replicas"),
+                             self.resources("resources", tables, {name: Resources() for name in engines.names()}, measuring=True))
         sweeps = tuple(self.sweep(number, entry, defaults) for number, entry in enumerate(data["sweeps"], start=1))
         measure = self.measuring(tables[MEASURE]) if MEASURE in tables else None
         return CampaignSpec(self.path, head["name"], head.get("description", "").strip(), head.get("retries", RETRIES), sweeps, measure)
@@ -183,7 +168,7 @@ class _Reader(TableReader):
         self.table(entry, table, _SWEEP, ("case",))
         if "name" in entry:
             self.name(table, entry["name"])
-        pick(entry["case"], (path.parent.name for path in deck_root().glob("*/case.toml")), "case", self.where(table))
+        pick(entry["case"], (path.parent.name for path in files()), "case", self.where(table))
         case = find(entry["case"])
         profile = entry.get("profile", defaults.profile)
         if profile is None:
@@ -304,19 +289,19 @@ class _Reader(TableReader):
         except DembarkError as error:
             raise self.fail(table, str(error)) from None
 
-    def resources(self, table: str, data: Mapping[str, Any], base: Mapping[str, RunResources],
-                  measuring: bool = False) -> dict[str, RunResources]:
+    def resources(self, table: str, data: Mapping[str, Any], base: Mapping[str, Resources],
+                  measuring: bool = False) -> dict[str, Resources]:
         """Resources of each engine: keys of `data` count for all engines, its tables for one; `base` are the defaults."""
-        self.table(data, table, _PER_RUN | dict.fromkeys((*ENGINES, *((MEASURE,) if measuring else ())), dict))
+        self.table(data, table, _PER_RUN | dict.fromkeys((*engines.names(), *((MEASURE,) if measuring else ())), dict))
         common = {key: value for key, value in data.items() if key in _PER_RUN}
         self.checked_resources(table, common)
         found = {}
-        for engine in ENGINES:
+        for engine in engines.names():
             own = data.get(engine, {})
             self.table(own, f"{table}.{engine}", _PER_RUN)
             place = f"{table}.{engine}" if own else table
             # What is said for all engines cannot mean ranks for the one that has none.
-            shared = {key: value for key, value in common.items() if not (engine == "yade" and key == "ranks")}
+            shared = {key: value for key, value in common.items() if key != "ranks" or engines.facts(engine).ranks}
             found[engine] = replace(base[engine], **self.checked_resources(f"{table}.{engine}", shared | own))
             self.fitting(place, engine, found[engine])
         return found
@@ -331,12 +316,13 @@ class _Reader(TableReader):
         except DembarkError as error:
             raise self.fail(table, str(error)) from None
 
-    def fitting(self, table: str, engine: str, found: RunResources) -> None:
-        if engine == "yade" and found.ranks > 1:
-            raise self.fail(table, f"ranks = {found.ranks} for yade", "use threads: YADE runs in one process")
+    def fitting(self, table: str, engine: str, found: Resources) -> None:
+        facts = engines.facts(engine)
+        if found.ranks > 1 and not facts.ranks:
+            raise self.fail(table, f"ranks = {found.ranks} for {engine}", f"use threads: {facts.one_process}")
         if found.time is not None and found.restart_interval is not None and found.restart_interval >= found.time:
             raise self.fail(table, "restart_interval is not shorter than time", "a run that is ended must have written a restart file")
 
-    def measuring(self, data: Mapping[str, Any]) -> RunResources:
+    def measuring(self, data: Mapping[str, Any]) -> Resources:
         self.table(data, f"resources.{MEASURE}", _MEASURING)
-        return replace(RunResources(), **self.checked_resources(f"resources.{MEASURE}", data))
+        return replace(Resources(), **self.checked_resources(f"resources.{MEASURE}", data))

@@ -10,24 +10,20 @@ import csv
 import io
 import json
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import quote
 
-from dembark.common.errors import DembarkError, RunError
-from dembark.common.files import disk_error, read_json, write_whole
-from dembark.validation.campaigns.schema import KEYS, TABLES, VERSION, statements
-from dembark.validation.parameters import pick
-from dembark.validation.plan import Run, Series, finished, studies
+from dembark.common.errors import DembarkError
+from dembark.common.files import read_json, write_whole
+from dembark.validation.case.parameters import pick
+from dembark.validation.runs import schema
+from dembark.validation.runs.schema import KEYS, TABLES, clear, put
 
 if TYPE_CHECKING:
     import numpy as np
 
-FILE = "store.sqlite"
-_PATIENCE = 60.0
-_SUPERSEDED = "superseded"
+FILE = schema.FILE
 
 
 def path_of(results: Path) -> Path:
@@ -38,112 +34,21 @@ def path_of(results: Path) -> Path:
 # --- writing ----------------------------------------------------------------------------------------------------
 
 
-@contextmanager
-def _writing(results: Path) -> Iterator[sqlite3.Connection]:
-    """One transaction on the store, which is made when it is not there; RunError when it cannot be written."""
-    path = path_of(results)
-    try:
-        # The journal is deleted after each transaction: a write-ahead log does not work on network file systems.
-        with closing(sqlite3.connect(path, timeout=_PATIENCE, isolation_level=None)) as connection:
-            connection.execute("PRAGMA synchronous = FULL")
-            connection.execute("BEGIN IMMEDIATE")
-            try:
-                _prepare(connection, path)
-                yield connection
-                connection.execute("COMMIT")
-            except BaseException:
-                connection.execute("ROLLBACK")
-                raise
-    except sqlite3.Error as error:
-        raise RunError(f"the store {path} cannot be written", str(error), "when it is deleted, its rows are made again") from None
-    except OSError as error:
-        raise disk_error(error, path) from None
+def collect(results: Path, campaign: str, places: Iterable[Path], sweeps: Iterable[Mapping[str, Any]] | None = None) -> None:
+    """Put what was measured in `places` below `results` (<case>/<variant>/<engine>) into its store, and comparisons of engines there.
 
-
-def _version(connection: sqlite3.Connection, path: Path) -> int:
-    found = int(connection.execute("PRAGMA user_version").fetchone()[0])
-    if found > VERSION:
-        raise DembarkError(f"{path} has version {found} of the store's tables", f"this dembark knows {VERSION}", "use a newer dembark")
-    return found
-
-
-def _prepare(connection: sqlite3.Connection, path: Path) -> None:
-    if _version(connection, path) == VERSION:
-        return
-    for statement in statements():
-        connection.execute(statement)
-    connection.execute(f"PRAGMA user_version = {VERSION}")
-
-
-def _put(connection: sqlite3.Connection, table: str, rows: Iterable[Mapping[str, Any]]) -> None:
-    columns = list(TABLES[table])
-    marks = ", ".join("?" for _ in columns)
-    connection.executemany(f"INSERT OR REPLACE INTO {table} ({', '.join(columns)}) VALUES ({marks})",
-                           [[row.get(column) for column in columns] for row in rows])
-
-
-def _clear(connection: sqlite3.Connection, table: str, **where: Any) -> None:
-    connection.execute(f"DELETE FROM {table} WHERE {' AND '.join(f'{key} = ?' for key in where)}", list(where.values()))
-
-
-def collect(results: Path, campaign: str, all_series: Sequence[Series], messages: Mapping[str, str] | None = None, whole: bool = False,
-            sweeps: Iterable[Mapping[str, Any]] = ()) -> None:
-    """Put what `results` holds of `all_series` into its store: runs, quantities, comparisons of engines, studies and swept points.
-
-    `messages` are the reasons of failed runs by their name. With `whole` these series are all that the campaign has: runs of other inputs
-    are marked as superseded. RunError when the store cannot be written.
+    `sweeps` replace the swept points. RunError when the store cannot be written; a place is written whole or not at all.
     """
-    for one in all_series:
-        with _writing(results) as connection:
-            _put(connection, "runs", [_run_row(results, campaign, one, run, messages or {}) for run in one.runs])
-            for run in one.runs:
-                _supersede(connection, campaign, run)
-            _put_quantities(connection, campaign, results / one.place)
-    with _writing(results) as connection:
-        for planned in studies(all_series):
-            _put_quantities(connection, campaign, results / planned.place)
-        for place in {one.place.parent for one in (*all_series, *studies(all_series))}:
-            _put_comparisons(connection, campaign, results / place)
-        if whole:
-            _forget(connection, campaign, {run.inputs for one in all_series for run in one.runs})
-            _clear(connection, "points", campaign=campaign)
-            _put(connection, "points", _point_rows(campaign, sweeps))
-
-
-def _supersede(connection: sqlite3.Connection, campaign: str, run: Run) -> None:
-    """What ran in the same place with other inputs counts no more, but its row stays."""
-    place = (campaign, run.case.name, run.variant, run.engine.name, run.replica)
-    sql = "SELECT run_id FROM runs WHERE campaign = ? AND case_name = ? AND variant = ? AND engine = ? AND replica = ?"
-    _retire(connection, {row[0] for row in connection.execute(sql, place)} - {run.inputs})
-
-
-def _forget(connection: sqlite3.Connection, campaign: str, wanted: set[str]) -> None:
-    _retire(connection, {row[0] for row in connection.execute("SELECT run_id FROM runs WHERE campaign = ?", (campaign,))} - wanted)
-
-
-def _retire(connection: sqlite3.Connection, names: set[str]) -> None:
-    """Mark finished runs as superseded; of those that never finished nothing is to be kept."""
-    one_each = [(name,) for name in names]
-    connection.executemany("DELETE FROM runs WHERE run_id = ? AND state IN ('failed', 'missing')", one_each)
-    connection.executemany(f"UPDATE runs SET state = '{_SUPERSEDED}' WHERE run_id = ?", one_each)
-
-
-def _run_row(results: Path, campaign: str, one: Series, run: Run, messages: Mapping[str, str]) -> dict[str, Any]:
-    place = one.place / run.folder_name
-    row = {"run_id": run.inputs, "campaign": campaign, "case_name": run.case.name, "variant": run.variant, "profile": run.profile,
-           "engine": run.engine.name, "engine_version": run.engine.version, "engine_identity": run.engine.identity, "replica": run.replica,
-           "seed": run.values.get("seed"), "parameters_json": json.dumps(dict(run.values)), "particles": run.particles,
-           "folder": str(place)}
-    if not finished(results / place, run):
-        return row | {"state": "failed" if run.name in messages else "missing", "message": messages.get(run.name)}
-    record = read_json(results / place / "run.json") or {}
-    facts = record.get("provenance", {})
-    same = ("ranks", "threads", "wall_time", "particle_steps_per_second", "dirty", "host", "cpu", "started")
-    resumed = record.get("resumed_at") or [None]
-    return row | {"state": "finished", "attempts": record.get("attempts", 1), "resumed_from_step": resumed[-1],
-                  "resume": record.get("resume"), "steps": record.get("steps"), "time_step": record.get("time_step"),
-                  "commit_hash": facts.get("commit"),
-                  **{key: facts.get(key) for key in same}}
+    places = list(places)
+    for place in places:
+        with schema.writing(path_of(results)) as connection:
+            _put_quantities(connection, campaign, results / place)
+    with schema.writing(path_of(results)) as connection:
+        for variant in {place.parent for place in places}:
+            _put_comparisons(connection, campaign, results / variant)
+        if sweeps is not None:
+            clear(connection, "points", campaign=campaign)
+            put(connection, "points", _point_rows(campaign, sweeps))
 
 
 def _measured(content: Mapping[str, Any]) -> dict[str, Any]:
@@ -167,8 +72,8 @@ def _put_quantities(connection: sqlite3.Connection, campaign: str, folder: Path)
     key = {"campaign": campaign, "case_name": case, "variant": variant, "engine": engine, "engine_version": versions.get(engine) or ""}
     common = {**key, **_measured(content), "parameters_json": json.dumps(content.get("parameters", {})), "run_commit": facts.get("commit"),
               "host": facts.get("host"), "replicas": facts.get("replicas")}
-    _clear(connection, "quantities", **key, commit_hash=common["commit_hash"])
-    _put(connection, "quantities", [_value(quantity) | common for quantity in content["quantities"]])
+    clear(connection, "quantities", **key, commit_hash=common["commit_hash"])
+    put(connection, "quantities", [_value(quantity) | common for quantity in content["quantities"]])
 
 
 def _put_comparisons(connection: sqlite3.Connection, campaign: str, folder: Path) -> None:
@@ -180,8 +85,8 @@ def _put_comparisons(connection: sqlite3.Connection, campaign: str, folder: Path
     common = {"campaign": campaign, "case_name": folder.parts[-2], "variant": folder.parts[-1], **_measured(content),
               "engine_versions": ", ".join(f"{name} {version}" for name, version in versions.items())}
     where = {key: common[key] for key in ("campaign", "case_name", "variant", "commit_hash", "engine_versions")}
-    _clear(connection, "comparisons", **where)
-    _put(connection, "comparisons", [_value(quantity) | common for quantity in content["quantities"]])
+    clear(connection, "comparisons", **where)
+    put(connection, "comparisons", [_value(quantity) | common for quantity in content["quantities"]])
 
 
 def _point_rows(campaign: str, sweeps: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
@@ -201,14 +106,7 @@ def query(path: Path | str, sql: str, values: Sequence[Any] = ()) -> list[dict[s
     file = Path(path) / FILE if Path(path).is_dir() else Path(path)
     if not file.is_file():
         raise DembarkError(f"there is no store {file}", "", "it is made when the first run of a campaign has been measured")
-    try:
-        with closing(sqlite3.connect(f"file:{quote(str(file.resolve()))}?mode=ro", uri=True, timeout=_PATIENCE)) as connection:
-            if not _version(connection, file):
-                return []  # it is being made at this moment
-            connection.row_factory = sqlite3.Row
-            return [dict(row) for row in connection.execute(sql, values)]
-    except sqlite3.Error as error:
-        raise DembarkError(f"the store {file} cannot be read", str(error)) from None
+    return schema.rows(file, sql, values)
 
 
 def read(path: Path | str, table: str, **where: Any) -> list[dict[str, Any]]:
@@ -252,7 +150,7 @@ def curve(path: Path | str, case_name: str, engine: str, name: str, axis: str, *
 
     `axis` is a numeric parameter, `fixed` are values of others, all in SI units; of several commits the measurement that came last counts.
     """
-    import numpy as np  # here, because every job of a workflow reads this file
+    import numpy as np  # here, because every job on another host reads this file
 
     last: dict[str, dict[str, Any]] = {}
     for row in sorted(read_quantities(path, case_name=case_name, engine=engine, name=name), key=lambda one: one["measured_at"] or ""):

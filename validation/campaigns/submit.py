@@ -5,96 +5,87 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
-from dataclasses import asdict, replace
 from pathlib import Path
 
 from dembark.common.errors import DembarkError
-from dembark.common.files import lock, read_json, write_json
-from dembark.validation.campaigns import folder, profiles, slurm, store
-from dembark.validation.campaigns.estimate import Estimate, estimates
-from dembark.validation.campaigns.expand import Plan
+from dembark.common.lock import lock
+from dembark.validation.campaigns import estimate, expand, folder, source, store
 from dembark.validation.campaigns.folder import Options
 from dembark.validation.campaigns.rates import Rates
 from dembark.validation.campaigns.sizes import size_text
-from dembark.validation.campaigns.source import Source
-from dembark.validation.workflow import Outcome, Way, here, perform
+from dembark.validation.runs import site, slurm
+from dembark.validation.runs.executor import Local
+from dembark.validation.runs.perform import Outcome, Place, perform
+from dembark.validation.runs.plan import Plan
+from dembark.validation.runs.queue import Queue
 
-ESTIMATES = ".estimates.json"
+Say = Callable[[str], None]
 
 
 def prepare(chosen: Options) -> None:
-    """Take over the environment that the preamble of the chosen profile makes: with it the engines are found, here and in the jobs."""
-    os.environ.update(profiles.find(chosen.executor).environment())
+    """Take over the environment that the preamble of the chosen site makes: with it the engines are found, here and in the jobs."""
+    if chosen.executor != "local":
+        os.environ.update(site.find(chosen.executor).environment())
 
 
-def way(chosen: Options, plan: Plan) -> Way:
-    """How Snakemake is called for `chosen`; DembarkError for an executor that there is not, or runs with more cores than there are."""
-    if chosen.executor == "local":
-        if chosen.jobs is not None:
-            raise DembarkError("--jobs is for a cluster", "with --executor local", "use --cores for the runs of this machine")
-        return _local(chosen, plan)
-    profile = profiles.find(chosen.executor)
-    words = ["--profile", str(profile.folder)]
-    words += ["--jobs", str(chosen.jobs)] if chosen.jobs else []
-    words += ["--local-cores", str(chosen.cores)] if chosen.cores else []
-    return Way(tuple(words), cluster=profile.executor != "local")
+def cores_here(chosen: Options) -> int:
+    """Cores of this machine to use: on a cluster one, for the steps after the runs."""
+    return chosen.cores or (os.cpu_count() or 1 if chosen.executor == "local" else 1)
 
 
-def _local(chosen: Options, plan: Plan) -> Way:
-    cores = chosen.cores or os.cpu_count() or 1
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+def check(chosen: Options, plan: expand.Plan) -> None:
+    """DembarkError for runs with more cores or memory than there are, here; for jobs of a cluster see `slurm.check`."""
+    if chosen.executor != "local":
+        site.find(chosen.executor)
+        return
+    if chosen.jobs is not None:
+        raise DembarkError("--jobs is for a cluster", "with --executor local", "use --cores for the runs of this machine")
+    cores, memory = cores_here(chosen), _memory()
     for place, used in plan.resources.items():
         if used.cores > cores:
             raise DembarkError(f"{place} is to run on {used.cores} cores", f"{cores} are there", "lower ranks or threads, or raise --cores")
         if used.memory and used.memory > memory:
             raise DembarkError(f"{place} is to have {size_text(used.memory)} of memory", f"this machine has {size_text(memory)}",
                                "lower memory")
-    return replace(here(cores), words=(*here(cores).words, "--resources", f"mem_mb={int(memory / 1e6)}"))
 
 
-def forecast(plan: Plan, results: Path, cancel: threading.Event, told: Callable[[int, int], None]) -> list[Estimate]:
+def _memory() -> float:
+    return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+
+
+def _place(chosen: Options, results: Path, plan: Plan, cancel: threading.Event, say: Say) -> Place:
+    if chosen.executor == "local":
+        return lambda table: Local(cores_here(chosen), _memory(), cancel)
+    there = site.find(chosen.executor)
+    return lambda table: Queue(there, results, plan, say, chosen.jobs, lambda name: table.state(name).job)
+
+
+def forecast(plan: expand.Plan, results: Path) -> list[estimate.Estimate]:
     """What each series costs, with the rates of the campaign's own store when it has measured some."""
-    return estimates(plan, Rates(store.path_of(results)), cancel, told)
+    return estimate.estimates(plan, Rates(store.path_of(results)))
 
 
-def submit(file: Path, results: Path, chosen: Options, cancel: threading.Event, say: Callable[[str], None],
-           told: Callable[[int, int], None]) -> Outcome:
+def submit(file: Path, results: Path, chosen: Options, cancel: threading.Event, say: Say) -> Outcome:
     """Run the campaign `file` in the folder `results` until all its runs are finished, measured and reported.
 
     `say` gets lines for people. A second submission of the same campaign waits for nothing: it is refused while the first one lives.
     DembarkError for mistakes, before anything has been started; Interrupted when `cancel` is set.
     """
-    plan = Source(file=file).plan()
-    assert plan is not None
-    folder.refuse_foreign(results, plan.spec.name)
-    called = way(chosen, plan)
+    wanted = source.of_campaign(file)
+    folder.refuse_foreign(results, wanted.spec.name)
+    check(chosen, wanted)
     with lock(results / folder.LOCK, f"the campaign in {results} is being run by another process"):
-        slurm.check(profiles.find(chosen.executor), filter(None, [*plan.resources.values(), plan.spec.measure]))
-        folder.enter(results, file, plan, chosen)
-        with slurm.guarded(profiles.find(chosen.executor), results, cancel, say) as (words, stalled):
-            return _go_on(results, replace(called, words=(*called.words, *words), stalled=stalled), cancel, told)
+        if chosen.executor != "local":
+            slurm.check(site.find(chosen.executor), filter(None, [*wanted.resources.values(), wanted.spec.measure]))
+        folder.enter(results, file, wanted, chosen)
+        # Its own copy counts from here on, whatever becomes of the file.
+        source.of_campaign.cache_clear()
+        copy = results / folder.FILE
+        plan, found = source.plan(file=copy), forecast(source.of_campaign(copy), results)
+        return perform(plan, results, _place(chosen, results, plan, cancel, say), cancel, cores_here(chosen), results / folder.LOG,
+                       {str(one.series.place): one.wall_time for one in found})
 
 
-def resume(results: Path, chosen: Options, cancel: threading.Event, say: Callable[[str], None],
-           told: Callable[[int, int], None]) -> Outcome:
+def resume(results: Path, chosen: Options, cancel: threading.Event, say: Say) -> Outcome:
     """Go on with the campaign of the folder `results`, from its own copy of the file."""
-    return submit(folder.own_file(results), results, chosen, cancel, say, told)
-
-
-def _go_on(results: Path, called: Way, cancel: threading.Event, told: Callable[[int, int], None]) -> Outcome:
-    source = Source(file=results / folder.FILE)
-    plan = source.plan()
-    assert plan is not None
-    remember(results, forecast(plan, results, cancel, told))
-    return perform(source, results, cancel, called, log=results / folder.LOG)
-
-
-def remember(results: Path, found: list[Estimate]) -> None:
-    """Keep the estimates for `dembark status`: wall time (s) of a run by its place."""
-    write_json(results / ESTIMATES, {str(one.series.place): {"wall_time": one.wall_time, "steps": one.steps, "time_step": one.time_step,
-                                                              "cores": one.cores, "rate": asdict(one.rate)} for one in found})
-
-
-def remembered(results: Path) -> dict[str, dict[str, float]]:
-    """What `remember` wrote; empty when there is nothing."""
-    return read_json(results / ESTIMATES) or {}
+    return submit(folder.own_file(results), results, chosen, cancel, say)

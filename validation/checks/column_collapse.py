@@ -14,7 +14,7 @@ from dembark.validation.checks.logs import exact, fitted_exponent
 from dembark.validation.checks.quantity import Quantity, measured
 from dembark.validation.checks.run import Replica, profile
 from dembark.validation.references import LAJEUNESSE, LUBE, SARLIN, STARON, UTILI
-from dembark.validation.statistics import Estimate, combined, over_replicas
+from dembark.postproc.statistics import Estimate, combined, over_replicas
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -95,7 +95,7 @@ def quantities(replicas: Sequence[Replica]) -> tuple[list[Quantity], list[dict[s
             "1",
             over(lambda one: potential_error(one, "weight_height")),
             compared=False,
-            detail="works and positions of a row are not of one time: second order in the step in LIGGGHTS, first in YADE",
+            detail="works and positions of a row are not of one time: of first or second order in the step, by the engine",
         ),
         share("friction", "lost by friction", "slip, and what a spring loses when its contact opens or softens"),
         share("normal_viscous", "lost by normal damping"),

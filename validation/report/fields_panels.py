@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from dembark.validation.report.figures import MARKERS, colour, engine_name
+from dembark.validation.report.look import colour, engine_name, look
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
@@ -51,7 +51,7 @@ def bar(figure: Figure, axes: Any, scale: tuple[float, float], paint: str, label
 
 def curve(axes: Any, engine: str, place: Array, value: Array, half: Array | None = None, *, upward: bool = False, marked: bool = True) -> Any:
     """A profile of an engine with the band of its interval; `upward`: the place is drawn upwards."""
-    paint, style = colour(engine), {"marker": MARKERS.get(engine, "^"), "markersize": 2.6} if marked else {}
+    paint, style = colour(engine), {"marker": look(engine).marker, "markersize": 2.6} if marked else {}
     if half is not None:
         band = np.where(np.isfinite(half), half, 0.0)
         (axes.fill_betweenx if upward else axes.fill_between)(place, value - band, value + band, color=paint, alpha=0.18, linewidth=0)

@@ -1,4 +1,4 @@
-"""Figures of the report as SVG, and their data as CSV."""
+"""Figures of the report as SVG, and tables as CSV."""
 
 from __future__ import annotations
 
@@ -13,24 +13,15 @@ from typing import Any
 import matplotlib
 import numpy as np
 from dembark.postproc.style import STYLE
-from dembark.validation.statistics import Scatter, scatter
+from dembark.validation.report.look import MARKS, PALETTE, colour, engine_name
+from dembark.validation.verification.item import Item, Panel
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import NullLocator
 
-# Okabe & Ito's palette, which colour-blind readers can tell apart.
-COLOURS = {"liggghts": "#0072B2", "yade": "#D55E00"}
-MARKERS = {"liggghts": "o", "yade": "s"}
-_SPARE = ["#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
-
-
-def colour(engine: str) -> str:
-    """Colour of an engine in all figures."""
-    return COLOURS.get(engine) or _SPARE[sum(engine.encode()) % len(_SPARE)]
-
-
-def engine_name(engine: str) -> str:
-    """As its makers write it."""
-    return {"liggghts": "LIGGGHTS", "yade": "YADE"}.get(engine, engine)
+WIDE = 7.2  # inches
+_INK = "#4a4f57"
+_DOTS = 220
+_DASHES = ((0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
 
 
 def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
@@ -49,15 +40,37 @@ def svg(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def profile_figure(profiles: Mapping[str, Sequence[dict[str, Any]]], columns: int = 3) -> Figure:
-    """All profiles of a page in one figure, the engines over the reference; `profiles` holds each engine's list."""
-    names = list(dict.fromkeys(one["name"] for of_engine in profiles.values() for one in of_engine))
-    rows = max(1, math.ceil(len(names) / columns))
+def png(figure: Figure) -> bytes:
+    """The figure as PNG for the PDF, where the many paths of an SVG take seconds to lay out."""
+    buffer = io.BytesIO()
     with matplotlib.rc_context(STYLE):
-        tall = 2.35 * rows + 0.35
-        figure = Figure(figsize=(7.2, tall))
+        figure.savefig(buffer, format="png", dpi=_DOTS)
+    return buffer.getvalue()
+
+
+def symbols(text: str) -> str:
+    """Symbols like σ_zz with real subscripts, in figures."""
+    return re.sub(r"([σρμKv])_([a-z]+)", r"$\\mathrm{\1_{\2}}$", text)
+
+
+Curves = Mapping[str, Sequence[Mapping[str, Any]]]
+
+
+def profile_names(profiles: Curves) -> list[str]:
+    """Names of all profiles of a page, those with a reference first: what a reader looks for is whether it is met."""
+    every = {one["name"]: one for of_engine in reversed(list(profiles.values())) for one in reversed(of_engine)}
+    ordered = list(dict.fromkeys(one["name"] for of_engine in profiles.values() for one in of_engine))
+    return sorted(ordered, key=lambda name: every[name].get("reference") is None)
+
+
+def profile_figure(profiles: Curves, names: Sequence[str], columns: int = 2) -> Figure:
+    """Profiles by name in one figure, the engines over the reference; `profiles` holds each engine's list."""
+    rows = math.ceil(len(names) / columns)
+    tall = 1.95 * rows + 0.3
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDE, tall))
         # Fixed margins: long titles must not make the panels narrow.
-        figure.subplots_adjust(left=0.065, right=0.99, bottom=0.8 / tall, top=1.0 - 0.38 / tall, wspace=0.34, hspace=0.52)
+        figure.subplots_adjust(left=0.075, right=0.99, bottom=0.66 / tall, top=1.0 - 0.32 / tall, wspace=0.2, hspace=0.62)
         handles: dict[str, Any] = {}
         for number, name in enumerate(names):
             axes = figure.add_subplot(rows, columns, number + 1)
@@ -66,38 +79,33 @@ def profile_figure(profiles: Mapping[str, Sequence[dict[str, Any]]], columns: in
     return figure
 
 
-def _panel(axes: Any, entries: Sequence[tuple[str, dict[str, Any]]], handles: dict[str, Any]) -> None:
+def _panel(axes: Any, entries: Sequence[tuple[str, Mapping[str, Any]]], handles: dict[str, Any]) -> None:
     first = entries[0][1]
-    dashes = iter([(0, (4, 2)), (0, (1, 1.5))])
-    for engine, one in entries:
-        place, value = _numbers(one["place"]), _numbers(one["value"])
-        paint = colour(engine)
+    upward = first["vertical"]
+    for number, (engine, one) in enumerate(entries):
+        place, paint = _numbers(one["place"]), colour(engine)
+
+        def line(values: Any, place: Any = place, **style: Any) -> Any:
+            return axes.plot(*((values, place) if upward else (place, values)), **style)[0]
+
         if one.get("reference") is not None:
-            style = {"color": "#4a4f57" if len(entries) == 1 else paint, "linestyle": next(dashes, ":"), "linewidth": 1.0, "alpha": 0.85}
-            reference = _numbers(one["reference"])
-            (handle,) = axes.plot(reference, place, **style) if one["vertical"] else axes.plot(place, reference, **style)
-            handles.setdefault(f"reference ({engine_name(engine)})", handle)
+            same = all(_same(other, one) for _, other in entries)
+            if not same or not number:
+                shown = "reference" if same else f"reference ({engine_name(engine)})"
+                handles.setdefault(shown, line(_numbers(one["reference"]), color=_INK if same else paint, linestyle=_DASHES[number % 3],
+                                              linewidth=0.9, zorder=3))
         if one.get("low") is not None:
-            fill = axes.fill_betweenx if one["vertical"] else axes.fill_between
+            fill = axes.fill_betweenx if upward else axes.fill_between
             fill(place, _numbers(one["low"]), _numbers(one["high"]), color=paint, alpha=0.18, linewidth=0)
-        (handle,) = axes.plot(value, place, color=paint) if one["vertical"] else axes.plot(place, value, color=paint)
-        handles.setdefault(engine_name(engine), handle)
+        # Where engines agree to the last digit the line below must still be seen.
+        handles.setdefault(engine_name(engine), line(_numbers(one["value"]), color=paint, linewidth=0.9 if number else 2.4, alpha=1.0 if number else 0.6))
     across, along = symbols(first["across"]), symbols(first["along"])
-    axes.set(**({"xlabel": across, "ylabel": along} if first["vertical"] else {"xlabel": along, "ylabel": across}))
+    axes.set(**({"xlabel": across, "ylabel": along} if upward else {"xlabel": along, "ylabel": across}))
     labels = sorted({one["reference_label"] for _, one in entries if one.get("reference_label")})
-    note = "; ".join([*labels, *([first["note"]] if first.get("note") else [])])
-    axes.set_title(first["title"], pad=11)
-    if note:
-        axes.text(
-            0.0,
-            1.01,
-            symbols(f"reference: {note}" if labels else note),
-            transform=axes.transAxes,
-            fontsize=5.8,
-            color="#666c75",
-            va="bottom",
-        )
-    if first["vertical"]:
+    note = "; ".join([f"reference: {', '.join(labels)}"] * bool(labels) + [first["note"]] * bool(first.get("note")))
+    axes.set_title(_clipped(first["title"], 58), pad=10)
+    axes.text(0.0, 1.015, symbols(_clipped(note, 92)), transform=axes.transAxes, fontsize=5.8, color="#666c75", va="bottom")
+    if upward:
         axes.set_ylim(bottom=0.0)
         axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
     else:
@@ -105,104 +113,67 @@ def _panel(axes: Any, entries: Sequence[tuple[str, dict[str, Any]]], handles: di
         axes.set_ylim(min(0.0, low), high + 0.05 * (high - low))
 
 
-def symbols(text: str) -> str:
-    return re.sub(r"([σρμKv])_([a-z]+)", r"$\\mathrm{\1_{\2}}$", text)
+def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether two engines have one and the same reference, so that one line will do."""
+    values, others = (_numbers(each.get("reference") or []) for each in (one, other))
+    return len(values) == len(others) and bool(np.allclose(values, others, rtol=1e-3, atol=1e-3 * np.nanmax(np.abs(others)), equal_nan=True))
+
+
+def _clipped(text: str, length: int) -> str:
+    return text if len(text) <= length else text[: length - 1].rsplit(" ", 1)[0] + " …"
 
 
 def _numbers(values: Sequence[float | None]) -> np.ndarray[Any, Any]:
     return np.array([math.nan if value is None else value for value in values], float)
 
 
-def profile_table(of_engine: Mapping[str, dict[str, Any]]) -> tuple[list[str], list[list[Any]]]:
+def profile_table(of_engine: Mapping[str, Mapping[str, Any]]) -> tuple[list[str], list[list[Any]]]:
     """Header and rows of one profile of all engines; engines may have different places."""
     header = ["engine", "place", "value", "low", "high", "reference"]
     rows = []
     for engine, one in of_engine.items():
-        count = len(one["place"])
-        columns = [one.get(key) or [None] * count for key in ("place", "value", "low", "high", "reference")]
+        columns = [one.get(key) or [None] * len(one["place"]) for key in header[1:]]
         rows += [[engine, *cells] for cells in zip(*columns, strict=True)]
     return header, rows
 
 
-def pairs(quantities: Iterable[tuple[str, dict[str, Any]]]) -> list[tuple[str, float, float, float, float]]:
-    """(name, value, reference, relative half-widths of both) of the quantities that a ratio makes sense for."""
-    found = []
-    for name, one in quantities:
-        value, reference = one["value"], one["reference"]
-        if one.get("deviation_kind") == "absolute" or value is None or reference is None or value <= 0 or reference <= 0:
-            continue
-        halves = [
-            0.5 * (one[key][1] - one[key][0]) / middle if one.get(key) else 0.0
-            for key, middle in (("interval", value), ("reference_interval", reference))
-        ]
-        found.append((name, value, reference, *halves))
-    return found
-
-
-def statistics(found: Sequence[tuple[str, float, float, float, float]]) -> Scatter | None:
-    """Scatter statistics of `pairs`; None for fewer than three. sigma_E is the references' own: half of their 95 % half-widths, rms."""
-    if len(found) < 3:
+def verification_figure(item: Item) -> Figure | None:
+    """The panels of an item of the verification side by side; None without any."""
+    if not item.panels:
         return None
-    sigma = math.sqrt(sum((0.5 * reference_half) ** 2 for *_, reference_half in found) / len(found))
-    return scatter([one[1] for one in found], [one[2] for one in found], sigma)
-
-
-def scatter_figure(groups: Mapping[str, Sequence[tuple[str, float, float, float, float]]], tolerance: float = 0.10) -> Figure:
-    """Measured against reference, all quantities on logarithmic axes; `groups` (by key: engine name or 'engines') of `pairs`."""
-    everything = [one for group in groups.values() for one in group]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 3.1), layout="constrained")
-        axes, ratio = figure.subplots(1, 2, width_ratios=[1.0, 1.25])
-        ends = [value for one in everything for value in one[1:3]] or [0.1, 10.0]
-        # Whole decades, so that every axis has numbers on it.
-        line = 10.0 ** np.array([math.floor(math.log10(min(ends))), math.ceil(math.log10(max(ends)))])
-        for one in (axes, ratio):
-            one.set_xscale("log")
-            one.set_xlim(line)
-            one.xaxis.set_minor_formatter(NullFormatter())
-        axes.set(yscale="log", ylim=line, xlabel="reference", ylabel="measured", title="Measured against reference")
-        axes.yaxis.set_minor_formatter(NullFormatter())
-        axes.plot(line, line, color="#4a4f57", linewidth=0.8)
-        axes.fill_between(line, line * (1 - tolerance), line * (1 + tolerance), color="#4a4f57", alpha=0.12, linewidth=0)
-        ratio.axhspan(1 - tolerance, 1 + tolerance, color="#4a4f57", alpha=0.12, linewidth=0)
-        ratio.axhline(1.0, color="#4a4f57", linewidth=0.8)
-        ratio.set(xlabel="reference", ylabel="measured / reference", title="Bias and scatter")
-        for key, group in groups.items():
-            if not group:
-                continue
-            paint, marker = (colour(key), MARKERS.get(key, "^")) if key != "engines" else ("#009E73", "D")
-            label = "YADE against LIGGGHTS" if key == "engines" else f"{engine_name(key)} against theory"
-            _, value, reference, value_half, reference_half = (np.array(column) for column in zip(*group, strict=True))
-            value, reference, value_half, reference_half = (
-                column.astype(float) for column in (value, reference, value_half, reference_half)
-            )
-            style = {
-                "fmt": marker,
-                "color": paint,
-                "markersize": 3.4,
-                "elinewidth": 0.6,
-                "markeredgecolor": "white",
-                "markeredgewidth": 0.4,
-            }
-            axes.errorbar(
-                reference,
-                value,
-                yerr=np.minimum(value * value_half, 0.9 * value),
-                xerr=np.minimum(reference * reference_half, 0.9 * reference),
-                **style,
-            )
-            found = statistics(group)
-            if found:
-                label += f": δ = {found.bias:.3f}, σ = {found.model:.3f} ({found.count} pairs)"
-                ratio.axhline(found.bias, color=paint, linewidth=0.9)
-                ratio.axhspan(found.bias - 2 * found.model, found.bias + 2 * found.model, color=paint, alpha=0.08, linewidth=0)
-            ratio.errorbar(
-                reference, value / reference, yerr=value / reference * np.hypot(value_half, reference_half), label=label, **style
-            )
-        if everything:
-            spread = max(0.3, 1.4 * max(abs(one[1] / one[2] - 1.0) for one in everything))
-            ratio.set_ylim(max(0.0, 1.0 - spread), 1.0 + spread)
-            figure.legend(loc="outside lower center", ncols=1 if len(groups) > 3 else 2, fontsize=6.5, handlelength=1.2, columnspacing=1.2)
+        drawn = Figure(figsize=(WIDE, 2.1), layout="constrained")
+        # A single panel is as large as one of two.
+        places = drawn.subplots(1, max(2, len(item.panels)))
+        for axes, panel in zip(places, item.panels, strict=False):
+            _draw(axes, panel)
+        for axes in places[len(item.panels) :]:
+            axes.axis("off")
+    return drawn
+
+
+def _draw(axes: Any, panel: Panel) -> None:
+    number = 0
+    for curve in panel.curves:
+        if curve.theory:
+            axes.plot(curve.place, curve.value, color=_INK, linewidth=0.9, linestyle=_DASHES[0], label=curve.label)
         else:
-            ratio.text(0.5, 0.5, "no pairs to show", transform=ratio.transAxes, ha="center", color="#666c75")
-    return figure
+            axes.plot(curve.place, curve.value, color=PALETTE[number % len(PALETTE)], marker=MARKS[number % len(MARKS)], markersize=3.2, linewidth=1.1,
+                      label=curve.label)
+            number += 1
+    axes.set(yscale="log", xlabel=panel.along, ylabel=panel.across)
+    axes.set_title(panel.title, fontsize=7.5)
+    if not panel.linear:
+        axes.set_xscale("log")
+        places = np.unique(np.concatenate([np.asarray(curve.place) for curve in panel.curves]))
+        if len(places) <= 5:
+            axes.set_xticks(places, [f"{place:.2g}" for place in places], minor=False, fontsize=6)
+            axes.xaxis.set_minor_locator(NullLocator())
+    axes.legend(fontsize=6.5)
+
+
+def verification_table(item: Item) -> tuple[list[str], list[list[Any]]]:
+    """Header and rows of all curves of an item of the verification."""
+    return ["panel", "curve", "place", "value"], [
+        [panel.title, curve.label, float(place), float(value)]
+        for panel in item.panels for curve in panel.curves for place, value in zip(curve.place, curve.value, strict=True)]

@@ -1,39 +1,55 @@
-"""What the report shows, collected from a results folder: measurements, comparisons, and the runs that should be there but are not."""
+"""What a report shows, collected from a results folder: results, comparisons, and the runs that should be there but are not."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
-from dembark.validation.cases import STUDY_PREFIX, Case, discover
+from dembark.validation import verification
+from dembark.validation.case.folders import discover
+from dembark.validation.case.model import STUDY_PREFIX, Case
+from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result, results
+from dembark.validation.report.look import engine_name
+from dembark.validation.verification.item import Item
 
-# Parameters of the method, not of the physics: results that depend on them do so by numerical error.
-NUMERICAL = {"time_step_fraction": "time step", "time_step": "time step", "youngs_modulus": "stiffness"}
+# What comparisons of variants leave out: they are due to differ, or say how long and often a run is repeated.
+_REPEATS = ("seed", "replicas", "frames", "grain_count", "settle_time", "measure_time")
+
+
+@dataclass(frozen=True)
+class Row:
+    """A judged quantity and where it was measured: `place` for people, `anchor` of its section, `engine` "" when no engine measured it."""
+
+    case: str
+    place: str
+    anchor: str
+    engine: str
+    record: QuantityRecord
+
+    @property
+    def who(self) -> str:
+        """The engine, or both of a comparison, for people."""
+        if isinstance(self.record, ComparedRecord):
+            return f"{engine_name(self.record.engine)} / {engine_name(self.record.reference_engine)}"
+        return engine_name(self.engine) if self.engine else "dembark"
 
 
 @dataclass
 class Page:
-    """One variant of a case: `metrics` by engine, `comparison` of the engines, `missing` runs as (engine, replica or None, reason)."""
+    """One variant of a case: `results` by engine, the `comparison` of the engines, `missing` runs in words."""
 
     case: str
     variant: str
-    title: str
-    description: str
-    source: tuple[str, ...]
     folder: Path
-    engines: list[str] = field(default_factory=list)
-    metrics: dict[str, dict[str, Any]] = field(default_factory=dict)
-    comparison: dict[str, Any] | None = None
-    missing: list[tuple[str, int | None, str]] = field(default_factory=list)
-
-    @property
-    def anchor(self) -> str:
-        """Identifier within the document and stem of file names."""
-        return f"{self.case}-{self.variant}"
+    title: str = ""
+    description: str = ""
+    results: dict[str, Result] = field(default_factory=dict)
+    comparison: Comparison | None = None
+    missing: list[str] = field(default_factory=list)
 
     @property
     def is_study(self) -> bool:
@@ -41,59 +57,79 @@ class Page:
         return self.variant.startswith(STUDY_PREFIX)
 
     @property
-    def heading(self) -> str:
-        """Title of the page."""
-        return self.title if self.is_study else f"{self.title}: {self.variant.replace('_', ' ')}"
+    def anchor(self) -> str:
+        """Identifier within the document and stem of file names."""
+        return f"{self.case}-{self.variant}"
+
+    @property
+    def words(self) -> str:
+        """The variant for people."""
+        return self.variant.replace("_", " ").replace("-", " ")
 
     @property
     def name(self) -> str:
-        """For people."""
-        return f"{self.case.replace('_', ' ')} / {self.variant.replace('_', ' ').replace('-', ' ')}"
+        """Case and variant for people."""
+        return f"{self.case.replace('_', ' ')}, {self.words}"
+
+    def rows(self) -> Iterator[Row]:
+        """All that was judged, engine by engine, then the engines beside each other."""
+        for engine, one in sorted(self.results.items()):
+            yield from (Row(self.case, self.name, self.anchor, engine, record) for record in one.quantities)
+        for record in self.comparison.quantities if self.comparison else ():
+            yield Row(self.case, self.name, self.anchor, record.engine, record)
 
 
-def gather(results: Path) -> list[Page]:
-    """Pages of results/<profile>: everything that its `runs.json` or else the case files expect, and everything that is there."""
+@dataclass(frozen=True)
+class Gathered:
+    """A results folder: its `pages`, the verification of the instruments, `missing` runs and unreadable results in one line each, and
+    what `runs.json` says of the whole."""
+
+    folder: Path
+    pages: list[Page]
+    items: list[Item]
+    cases: Mapping[str, Case]
+    unread: list[str]
+    summary: Mapping[str, Any]
+
+    @property
+    def rows(self) -> list[Row]:
+        """Everything judged."""
+        verified = [Row("verification", "verification", "verification", "", record) for item in self.items for record in item.quantities]
+        return [*(row for page in self.pages for row in page.rows()), *verified]
+
+    @property
+    def missing(self) -> list[str]:
+        """A line for each run that is missing and each result that cannot be read."""
+        return [*(f"{page.name}: {line}" for page in self.pages for line in page.missing), *self.unread]
+
+
+def gather(folder: Path) -> Gathered:
+    """Everything that `runs.json` or else the case files expect in a results folder, and everything that is there."""
     cases = _cases()
     pages: dict[tuple[str, str], Page] = {}
 
     def page(case: str, variant: str) -> Page:
-        known = cases.get(case)
-        return pages.setdefault(
-            (case, variant),
-            Page(
-                case,
-                variant,
-                known.title if known else case.replace("_", " "),
-                known.description if known else "",
-                known.source if known else (),
-                results / case / variant,
-            ),
-        )
+        return pages.setdefault((case, variant), Page(case, variant, folder / case / variant))
 
-    for case, variant, engine, replica, reason in _expected(results, cases):
+    summary = read_json(folder / "runs.json") or {}
+    silent: dict[tuple[str, str], dict[str, bool]] = {}
+    for case, variant, engine, line in _expected(folder, cases, summary):
         one = page(case, variant)
-        if engine not in one.engines:
-            one.engines.append(engine)
-        if reason is not None:
-            one.missing.append((engine, replica, reason))
-    for path in sorted(results.glob("*/*/*/metrics.json")):
-        content = read_json(path)
-        if not content or "quantities" not in content or "superseded" in path.parts:
-            continue
-        one = page(path.parts[-4], path.parts[-3])
-        one.metrics[path.parts[-2]] = content
-        if one.is_study:
-            one.title, one.description = content.get("title", one.title), content.get("description", "")
-        if path.parts[-2] not in one.engines:
-            one.engines.append(path.parts[-2])
-    for one in pages.values():
-        one.engines.sort()
-        one.comparison = read_json(one.folder / "comparison.json") if len(one.metrics) > 1 else None
-        told = {engine for engine, *_ in one.missing}
-        one.missing += [
-            (engine, None, "it could not be measured") for engine in one.engines if engine not in one.metrics and engine not in told
-        ]
-    return sorted(pages.values(), key=lambda one: (one.case != "silo", one.case, one.is_study, "wet" in one.variant, one.variant))
+        one.missing += [line] if line else []
+        of_variant = silent.setdefault((case, variant), {})
+        of_variant[engine] = of_variant.get(engine, True) and not line
+    measured, compared, unread = results(folder)
+    for found in measured:
+        one = page(found.case, found.variant)
+        one.results[found.engine] = found
+        one.title, one.description = found.title, found.description
+    for both in compared:
+        page(both.case, both.variant).comparison = both
+    for key, engines in silent.items():
+        pages[key].missing += [f"{engine_name(engine)}: it could not be measured" for engine in sorted(engines)
+                               if engines[engine] and engine not in pages[key].results]
+    ordered = sorted(pages.values(), key=lambda one: (one.case != "silo", one.case, one.is_study, "wet" in one.variant, one.variant))
+    return Gathered(folder, ordered, verification.read(folder), cases, unread, summary)
 
 
 def _cases() -> Mapping[str, Case]:
@@ -104,80 +140,43 @@ def _cases() -> Mapping[str, Case]:
         return {}
 
 
-def _expected(results: Path, cases: Mapping[str, Case]) -> list[tuple[str, str, str, int | None, str | None]]:
-    """(case, variant, engine, replica, None or why it is missing) of every run that should be there."""
-    summary = read_json(results / "runs.json")
-    if summary:
-        return [
-            (
-                run["case"],
-                run["variant"],
-                run["engine"],
-                run["replica"],
-                None if run["state"] == "finished" else run.get("message") or run["state"],
-            )
-            for run in summary["runs"]
-        ]
-    return [
-        (
-            case.name,
-            planned.variant,
-            engine,
-            None,
-            None if (results / case.name / planned.variant / engine / "metrics.json").is_file() else "not run",
-        )
-        for case in cases.values()
-        for planned in case.runs.get(results.name, ())
-        for engine in planned.engines
-    ]
+def _expected(folder: Path, cases: Mapping[str, Case], summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str]]:
+    """(case, variant, engine, why it is missing or '') of every run that should be there."""
+    for run in summary.get("runs", ()):
+        reason = "" if run["state"] == "finished" else f"{engine_name(run['engine'])}, replica {run['replica']}: {run.get('message') or run['state']}"
+        yield run["case"], run["variant"], run["engine"], reason
+    if not summary:
+        for case in cases.values():
+            for planned in case.runs.get(folder.name, ()):
+                for engine in planned.engines:
+                    there = (folder / case.name / planned.variant / engine / "metrics.json").is_file()
+                    yield case.name, planned.variant, engine, "" if there else f"{engine_name(engine)}: not run"
 
 
-def studies(page: Page, pages: list[Page]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """(numerical, physical) comparisons of `page` with the variants of its case that differ from it in one parameter only.
+@dataclass(frozen=True)
+class Beside:
+    """Two variants in one engine that differ in one parameter: its values `own` and `other`, and the quantities of both."""
 
-    Each is {engine, parameter, own, other, rows}; rows are (label, own value, other value, relative difference).
-    """
-    numerical, physical = [], []
+    engine: str
+    parameter: str
+    own: Any
+    other: Any
+    variant: str
+    pairs: list[tuple[QuantityRecord, QuantityRecord]]
+
+
+def beside(page: Page, pages: list[Page]) -> list[Beside]:
+    """Variants of the same case that differ from `page` in one parameter only."""
+    found = []
     for other in pages:
         if other.case != page.case or other is page or page.is_study or other.is_study:
             continue
-        for engine in sorted(page.metrics.keys() & other.metrics.keys()):
-            one, two = page.metrics[engine], other.metrics[engine]
-            keys = one["parameters"].keys() | two["parameters"].keys()
-            changed = [
-                key
-                for key in keys
-                if one["parameters"].get(key) != two["parameters"].get(key)
-                and key not in ("seed", "replicas", "frames", "grain_count", "settle_time", "measure_time")
-            ]
-            if len(changed) != 1:
-                continue
-            key = changed[0]
-            entry = {
-                "engine": engine,
-                "parameter": NUMERICAL.get(key, key.replace("_", " ")),
-                "variant": other.variant.replace("_", " "),
-                "own": one["parameters"].get(key),
-                "other": two["parameters"].get(key),
-                "rows": _differences(one, two),
-            }
-            (numerical if key in NUMERICAL else physical).append(entry)
-    return numerical, physical
-
-
-def _differences(one: dict[str, Any], two: dict[str, Any]) -> list[dict[str, Any]]:
-    by_name = {quantity["name"]: quantity for quantity in two["quantities"]}
-    rows = []
-    for quantity in one["quantities"]:
-        other = by_name.get(quantity["name"])
-        if quantity.get("compared") and other and quantity["value"] and other["value"] is not None:
-            rows.append(
-                {
-                    "label": quantity["label"],
-                    "unit": quantity["unit"],
-                    "own": quantity,
-                    "other": other,
-                    "deviation": other["value"] / quantity["value"] - 1.0,
-                }
-            )
-    return rows
+        for engine in sorted(page.results.keys() & other.results.keys()):
+            one, two = page.results[engine], other.results[engine]
+            changed = [key for key in one.parameters.keys() | two.parameters.keys()
+                       if one.parameters.get(key) != two.parameters.get(key) and key not in _REPEATS]
+            if len(changed) == 1:
+                pairs = [(mine, its) for mine in one.quantities if mine.compared and (its := two.find(mine.name))]
+                found.append(Beside(engine, changed[0].replace("_", " "), one.parameters.get(changed[0]), two.parameters.get(changed[0]),
+                                    other.words, pairs))
+    return found

@@ -1,11 +1,15 @@
-"""Numbers as people read them: a value with as many digits as its interval deserves."""
+"""Numbers for people."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
+from dembark.validation.judge.result import QuantityRecord
+
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+# Relative deviations beyond this say that the reference is near zero, not how large the deviation is.
+_PERCENT = 1.0
 
 
 def plain(value: float | None, digits: int = 3) -> str:
@@ -27,11 +31,39 @@ def with_interval(value: float | None, interval: Sequence[float] | None) -> str:
     half = 0.5 * (interval[1] - interval[0]) if interval else math.nan
     if not math.isfinite(half) or half <= 1e-12 * max(1.0, abs(value)):
         return plain(value if abs(value) > 1e-12 else 0.0)
+    if half < 1e-6 * abs(value):
+        return f"{plain(value)} ± {plain(half, 2)}"
     power = math.floor(math.log10(max(abs(value), half)))
     scale = 10.0**power if not -3 <= power < 5 else 1.0
     places = max(0, 1 - math.floor(math.log10(half / scale)))
     text = f"{value / scale:.{places}f} ± {half / scale:.{places}f}".replace("-", "−")
     return text if scale == 1.0 else f"({text})·10{str(power).translate(_SUPERSCRIPTS)}"
+
+
+def with_unit(text: str, unit: str) -> str:
+    """A number with its unit, which is left out when it is 1."""
+    return text if unit == "1" or text == "–" else f"{text} {unit}"
+
+
+def deviation(one: QuantityRecord) -> str:
+    """The deviation from the reference: in per cent, or as a difference where it is absolute or the reference is near zero."""
+    if one.deviation is None:
+        return "–"
+    if one.deviation_kind == "relative" and abs(one.deviation) <= _PERCENT:
+        text = f"{100.0 * one.deviation:+.{1 if abs(one.deviation) >= 0.001 else 2}f}" if abs(one.deviation) >= 1e-4 else plain(100.0 * one.deviation, 2)
+        return f"{text} %".replace("-", "−")
+    absolute = one.deviation_kind == "absolute" or one.value is None or one.reference is None
+    difference = one.deviation if absolute else one.value - one.reference  # type: ignore[operator]
+    return with_unit(plain(difference, 2), one.unit)
+
+
+def allowed(one: QuantityRecord) -> str:
+    """The tolerance, in per cent where it is relative; empty where there is none."""
+    if one.tolerance is None:
+        return ""
+    if one.tolerance == 0.0:
+        return "exact"
+    return f"±{plain(100.0 * one.tolerance, 2)} %" if one.deviation_kind == "relative" else f"±{with_unit(plain(one.tolerance, 2), one.unit)}"
 
 
 def compact(value: float | str | None) -> str:
@@ -46,10 +78,10 @@ def compact(value: float | str | None) -> str:
 
 
 def percent(value: float | None) -> str:
-    """A relative deviation with sign."""
+    """A relative change with sign; `–` for none."""
     if value is None or not math.isfinite(value):
         return "–"
-    return f"{100.0 * value:+.{1 if abs(value) < 0.995 else 0}f} %".replace("-", "−")
+    return f"{100.0 * value:+.1f} %".replace("-", "−") if abs(value) <= _PERCENT else f"× {plain(1.0 + value, 2)}"
 
 
 def duration(seconds: float | None) -> str:

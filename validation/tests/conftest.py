@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from dembark.validation import cases, engines
+from dembark.validation import engines
+from dembark.validation.case import folders
 
 CASE = """
 [case]
@@ -91,6 +92,10 @@ type = "int"
 min = 1
 doc = "number of packings"
 
+[derived]
+steps = "100"
+time_step = "1e-5"
+
 [profiles.quick]
 [profiles.standard]
 replicas = 3
@@ -116,12 +121,12 @@ def decks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     root = tmp_path / "decks"
     (root / "box").mkdir(parents=True)
     (root / "box" / "case.toml").write_text(CASE)
-    for name in ("liggghts.in", "yade.py"):
-        (root / "box" / name).write_text("# deck that knows restart_every and resume\n")
+    (root / "box" / "liggghts.in").write_text("# A deck that knows restart_every and resume.\n")
+    (root / "box" / "yade.py").write_text("p = dembark.parameters()\ndembark.run(p.steps)\n")
     # What measures stands in for the real thing, too.
-    (root / "box" / "checks.py").write_text("REFERENCES = ()\ndef quantities(replicas): ...\ndef picture(parameters): ...\n")
+    (root / "box" / "measure.py").write_text("from dembark.postproc.measurement import Measurement\ndef measure(replicas):\n    return Measurement({})\n")
     monkeypatch.setenv("DEMBARK_DECKS", str(root))
-    cases.load.cache_clear()
+    folders.load.cache_clear()
     return root
 
 

@@ -25,7 +25,7 @@ def study(planned, folders):
 
 
 def compare(folder):
-    return {"engines": sorted(path.parent.name for path in folder.glob("*/metrics.json")), "quantities": []}
+    return {"case": folder.parent.name, "variant": folder.name, "engines": sorted(path.parent.name for path in folder.glob("*/metrics.json")), "quantities": []}
 
 
 def build(folder):
@@ -34,6 +34,11 @@ def build(folder):
     (folder / "report.pdf").write_text("pdf")
 
 
-for name, function in (("metrics", measure), ("metrics", study), ("compare", compare), ("report", build), ("campaigns.report", build)):
+def write(folder):
+    pass
+
+
+for name, function in (("verification", write), ("metrics", measure), ("metrics", study), ("compare", compare), ("report", build),
+                       ("campaigns.report", build)):
     module = sys.modules.setdefault(f"dembark.validation.{name}", types.ModuleType(f"dembark.validation.{name}"))
     setattr(module, function.__name__, function)

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Stands in for both engines where a test is about the handling of processes and files, not about physics.
 
-Called like LIGGGHTS (`-in deck -log none -var key value ...`) or YADE (`-j1 -n -x deck key=value ...`); it obeys the deck contract
+Called like LIGGGHTS (`-in deck -log none -var key value ...`) or YADE (`-j1 -n -x deck key=value ...`); it reads its numbers in the deck and obeys the deck contract
 unless the parameter `behaviour` asks for a fault. It writes its process id to `pid` in the working folder first.
 """
 
@@ -20,9 +20,14 @@ print("LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0-stand-in, compiled 2022)")
 if "/dev/null" in words:
     sys.exit(0)
 if "-in" in words:
-    values = {words[i + 1]: words[i + 2] for i, word in enumerate(words) if word == "-var"}
+    with open(words[words.index("-in") + 1]) as file:
+        values = {line.split()[1]: line.split(" index ")[1].split(" # ")[0].strip() for line in file if line.startswith("variable ")}
+    values |= {words[i + 1]: words[i + 2] for i, word in enumerate(words) if word == "-var"}
 else:
-    values = dict(word.split("=", 1) for word in words if "=" in word)
+    with open(words[words.index("-x") + 1]) as file:
+        numbers = [line.split("  # ")[0].strip().rstrip(",").split("=", 1) for line in file if line.startswith("    ")]
+    values = {key: text.strip("'") for key, text in numbers if text != "None"}
+    values |= dict(word.split("=", 1) for word in words if "=" in word)
 behaviour, frames, grains = values["behaviour"], int(values["frames"]), int(values["grain_count"])
 with open("pid", "w") as file:
     file.write(str(os.getpid()))

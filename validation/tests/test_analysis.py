@@ -8,7 +8,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from dembark.validation import analysis, checks, show
+from dembark.common.errors import DembarkError
+from dembark.validation import analysis, show
+from dembark.validation.judge import measuring
+from dembark.validation.judge.result import QuantityRecord, Result
 
 HEADER = "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n" \
     "ITEM: ATOMS id type x y z vx vy vz radius mass f_force_side[1] f_force_side[2] f_force_side[3]\n"
@@ -29,15 +32,16 @@ def test_what_is_too_small_is_named(tmp_path: Path, count: int, frames: int, for
     assert analysis.too_small(replica(tmp_path / "replica-1", count, frames, force)) == expected
 
 
-def test_an_error_in_own_checks_is_told_with_its_line(tmp_path: Path) -> None:
-    case = SimpleNamespace(name="mine", folder=tmp_path)
-    (tmp_path / "checks.py").write_text("REFERENCES = ()\ndef picture(parameters): ...\ndef quantities(replicas):\n    return 1 / 0\n")
-    module = checks.find("mine", tmp_path)
+def test_an_error_in_a_measurement_is_told_with_its_line(tmp_path: Path) -> None:
+    case = SimpleNamespace(name="mine", folder=tmp_path, studies=("size",))
+    (tmp_path / "measure.py").write_text("def measure(replicas):\n    return 1 / 0\n\ndef study(name, points, along):\n    return points[along]\n")
     with pytest.raises(ZeroDivisionError) as caught:
-        module.quantities([])
-    assert analysis.reasons(tmp_path, caught.value, case) == ("ZeroDivisionError: division by zero (checks.py, line 4)",)
+        measuring.measure(case, [])
+    assert analysis.reasons(tmp_path, caught.value, case) == ("ZeroDivisionError: division by zero (measure.py, line 2)",)
+    with pytest.raises(DembarkError, match=r"measure\.py, line 5, KeyError"):
+        measuring.study(case, SimpleNamespace(name="size", along="grain_count"), {})
     replica(tmp_path / "replica-1", 1, 2, 1.0)
-    assert analysis.reasons(tmp_path, caught.value, case)[0] == "the run is too small or too short for its checks: 1 grain, 2 frames"
+    assert analysis.reasons(tmp_path, caught.value, case)[0] == "the run is too small or too short to be measured: 1 grain, 2 frames"
 
 
 def test_numerical_warnings_become_remarks_and_stay_errors_where_they_are(capsys: pytest.CaptureFixture[str]) -> None:
@@ -53,6 +57,6 @@ def test_numerical_warnings_become_remarks_and_stay_errors_where_they_are(capsys
 
 
 def test_open_verdicts_are_told_with_their_reason() -> None:
-    quantities = [{"label": name, "verdict": verdict, "reason": reason} for name, verdict, reason in (
-        ("a", "info", "the run is too short"), ("b", "pass", ""), ("c", "info", "the run is too short"), ("d", "info", ""))]
-    assert show.open_lines({"quantities": quantities}) == ["info: a, c: the run is too short"]
+    quantities = tuple(QuantityRecord(name, 1.0, verdict, tolerance=0.1, reason=reason) for name, verdict, reason in (
+        ("a", "info", "the run is too short"), ("b", "pass", ""), ("c", "info", "the run is too short"), ("d", "info", "")))
+    assert show.open_lines(Result("box", "dry", "yade", quantities)) == ["open: a, c: the run is too short"]

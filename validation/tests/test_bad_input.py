@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from dembark.validation import cases, engines
+from dembark.validation import engines
+from dembark.validation.case import folders
 from dembark.validation.cli import main
 
 HEAD = '[campaign]\nname = "mine"\nprofile = "quick"\n[[sweeps]]\ncase = "silo"\n'
@@ -123,14 +124,14 @@ def test_a_wrong_campaign_is_refused(name: str, tmp_path: Path, capsys: pytest.C
 
 
 @pytest.mark.parametrize(("text", "expected"), [
-    (None, "add one with quantities(replicas)"),
-    ("def quantities(:\n", "SyntaxError"),
-    ("REFERENCES = ()\nimport no_such_module\n", "no_such_module' (checks.py, line 2)"),
-    ("REFERENCES = ()\ndef quantities(replicas): ...\n", "has no picture"),
+    (None, "add one with measure(replicas)"),
+    ("def measure(:\n", "measure.py, line 1, SyntaxError"),
+    ("\nimport no_such_module\n", "measure.py, line 2, ModuleNotFoundError: No module named 'no_such_module'"),
+    ("def quantities(replicas): ...\n", "has no function measure"),
 ])
 def test_missing_or_broken_checks_are_told_before_a_run(text: str | None, expected: str, decks: Path, tmp_path: Path,
                                                         capsys: pytest.CaptureFixture[str]) -> None:
-    file = decks / "box/checks.py"
+    file = decks / "box/measure.py"
     file.unlink()
     if text is not None:
         file.write_text(text)
@@ -140,7 +141,7 @@ def test_missing_or_broken_checks_are_told_before_a_run(text: str | None, expect
 
 def test_own_decks_that_are_not_there_are_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv("DEMBARK_DECKS", "nowhere")
-    cases.load.cache_clear()
+    folders.load.cache_clear()
     refused(("cases",), "set it to the folder that holds the case folders", capsys)
 
 
@@ -148,4 +149,4 @@ def test_version_and_help_tell_what_a_first_user_needs(capsys: pytest.CaptureFix
     assert main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("dembark 0.")
     assert main(["--help"]) == 0
-    assert "DEMBARK_DECKS" in capsys.readouterr().out
+    assert "DEMBARK_CASES" in capsys.readouterr().out

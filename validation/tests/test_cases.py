@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from dembark.common.errors import DembarkError
 from dembark.common.units import to_si
-from dembark.validation import cases
-from dembark.validation.cases import discover, find, load
-from dembark.validation.expressions import Expression
-from dembark.validation.resolve import for_replica, portable, resolve, settings
+from dembark.validation.case import folders
+from dembark.validation.case.folders import discover, find, load
+from dembark.validation.case.expressions import Expression
+from dembark.validation.case.resolve import for_replica, portable, resolve, settings
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -21,7 +21,7 @@ def edited(decks: Path, old: str, new: str) -> Path:
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new, 1))
-    cases.load.cache_clear()
+    folders.load.cache_clear()
     return path
 
 

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 from dembark.common.files import read_json
-from dembark.validation import cases, engines
+from dembark.validation import engines
+from dembark.validation.case import folders
 from dembark.validation.cli import main
 
 Dembark = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -52,7 +53,7 @@ def test_a_mistake_gets_one_line_and_exit_code_2(words: list[str], expected: str
 
 def test_a_missing_engine_gets_the_command_that_makes_it(
         monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    monkeypatch.setattr(engines, "checkout", lambda: tmp_path)
+    monkeypatch.setattr(engines.base, "checkout", lambda: tmp_path)
     monkeypatch.setenv("PATH", "/usr/bin")
     for engine, variable, advice in (("liggghts", "DEMBARK_LIGGGHTS", "make liggghts"), ("yade", "DEMBARK_YADE", "make yade-plugin")):
         monkeypatch.delenv(variable)
@@ -71,7 +72,7 @@ def test_cases_shows_every_key(capsys: pytest.CaptureFixture[str]) -> None:
     assert "box" in capsys.readouterr().out
     assert main(["cases", "box"]) == 0
     shown = capsys.readouterr().out
-    for key in cases.find("box").parameters.values():
+    for key in folders.find("box").parameters.values():
         assert key.name in shown and key.doc in shown
     assert "not set" in shown and "> 0" in shown and "dry (liggghts, yade)" in shown
 
@@ -79,7 +80,7 @@ def test_cases_shows_every_key(capsys: pytest.CaptureFixture[str]) -> None:
 def test_run_measures_and_shows_verdicts(dembark: Dembark, tmp_path: Path) -> None:
     done = dembark("run", "box", "--engine", "liggghts", "--variant", "wet", "--set", "grain_diameter=4 mm", "--out", "o")
     assert done.returncode == 0, done.stderr
-    assert "FAIL" in done.stdout and "1 CHECK FAILED" in done.stdout and str(tmp_path / "o/metrics.json") in done.stdout
+    assert "FAIL" in done.stdout and "0 of 1 check passed, 1 FAILED" in done.stdout and str(tmp_path / "o/metrics.json") in done.stdout
     assert "box wet liggghts 1: finished" in done.stderr
     assert read_json(tmp_path / "o/metrics.json")["parameters"]["grain_diameter"] == 0.004
 
@@ -89,7 +90,7 @@ def test_a_failed_check_counts_only_when_asked(dembark: Dembark, tmp_path: Path)
     words = ("run", "box", "--engine", "liggghts", "--variant", "wet", "--out", "o")
     first, second = dembark(*words, "--restart-interval", "1 s"), dembark(*words, "--strict")
     assert (first.returncode, second.returncode) == (0, 1)
-    assert "1 CHECK FAILED" in first.stdout and second.stderr.splitlines()[-1] == "dembark: 1 check failed, --strict makes this an error"
+    assert "1 FAILED" in first.stdout and second.stderr.splitlines()[-1] == "dembark: 1 check failed, --strict makes this an error"
     # By the fixed rate of restarts, a million particle-steps a second.
     assert read_json(tmp_path / "o/replica-1/run.json")["restart_every"] == 100_000
 

@@ -10,11 +10,12 @@ from pathlib import Path
 import pytest
 from dembark.common.errors import Interrupted, RunError
 from dembark.common.files import read_json
-from dembark.validation import cases, engines, provenance
-from dembark.validation.cases import find
-from dembark.validation.plan import Run, series
-from dembark.validation.progress import Board
-from dembark.validation.simulate import Resources, simulate
+from dembark.validation import engines, provenance
+from dembark.validation.case import folders
+from dembark.validation.case.folders import find
+from dembark.validation.engines.liggghts import Liggghts
+from dembark.validation.runs.plan import Resources, Run, series
+from dembark.validation.runs.simulate import simulate
 
 CASE = """
 [case]
@@ -38,12 +39,11 @@ doc = "steps of 1e-5 s"
 value = 2
 type = "int"
 doc = "frames"
+[derived]
+time_step = "1e-5"
 """
 
 LIGGGHTS = """
-variable gravity index 9.81
-variable steps index 1000
-variable frames index 2
 variable stride equal ${steps}/${frames}
 atom_style granular
 units si
@@ -83,12 +83,11 @@ print "dembark: finished"
 """
 
 YADE = """
-import sys
-values = dict(gravity=9.81, steps=1000, frames=2)
-values.update((k, float(v)) for k, v in (word.split("=", 1) for word in sys.argv[1:]))
-steps, frames = int(values["steps"]), int(values["frames"])
+from types import SimpleNamespace
+p = dembark.parameters()
+steps, frames = p.steps, p.frames
 ids = [O.bodies.append(sphere((x, 0, 0), 0.05)) for x in (0, 0.5)]
-O.engines = [ForceResetter(), NewtonIntegrator(gravity=(0, 0, -values["gravity"]), damping=0)]
+O.engines = [ForceResetter(), NewtonIntegrator(gravity=(0, 0, -p.gravity), damping=0)]
 O.dt = 1e-5
 print(f"dembark: steps {steps} time_step {O.dt}")
 with open("time.csv", "w") as times, open("grains.dump", "w") as grains, open("contacts.dump", "w") as contacts:
@@ -113,9 +112,9 @@ def decks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     (folder / "case.toml").write_text(CASE)
     (folder / "liggghts.in").write_text(LIGGGHTS)
     (folder / "yade.py").write_text(YADE)
-    (folder / "checks.py").touch()
+    (folder / "measure.py").touch()
     monkeypatch.setenv("DEMBARK_DECKS", str(folder.parent))
-    cases.load.cache_clear()
+    folders.load.cache_clear()
     engines.find.cache_clear()
     yield
     engines.find.cache_clear()
@@ -155,11 +154,12 @@ def final_energy(folder: Path) -> float:
 
 @pytest.mark.parametrize(("engine", "gravity"), [("liggghts", 9.81), ("liggghts", -2.0), ("yade", 2.0)])
 def test_both_engines_get_the_parameters_and_fall_as_they_say(tmp_path: Path, engine: str, gravity: float) -> None:
-    board = Board()
-    folder = simulate(plan(engine, gravity=gravity), tmp_path / "out", board, threading.Event())
+    told: dict[str, object] = {}
+    simulate(plan(engine, gravity=gravity), tmp_path / "out", threading.Event(), tell=lambda **facts: told.update(facts))
+    folder = tmp_path / "out/replica-1"
     record = read_json(folder / "run.json")
     assert (record["steps"], record["time_step"], record["frames"]) == (1000, 1e-5, 2)
-    assert board.states()[0].step == 1000
+    assert told["step"] == 1000
     velocity = gravity * 1e-2
     density = 2500 if engine == "liggghts" else 1000
     mass = density * 4 / 3 * 3.141592653589793 * 0.05**3
@@ -170,7 +170,8 @@ def test_both_engines_get_the_parameters_and_fall_as_they_say(tmp_path: Path, en
 
 
 def test_two_mpi_ranks(tmp_path: Path) -> None:
-    folder = simulate(plan("liggghts"), tmp_path / "out", Board(), threading.Event(), Resources(ranks=2))
+    simulate(plan("liggghts"), tmp_path / "out", threading.Event(), Resources(ranks=2))
+    folder = tmp_path / "out/replica-1"
     assert read_json(folder / "run.json")["provenance"]["ranks"] == 2
     assert "2 by 1 by 1" in (folder / "engine.log").read_text() or "1 by 2" in (folder / "engine.log").read_text()
 
@@ -183,25 +184,25 @@ def test_a_mistake_in_a_deck_is_told_in_the_engines_words(tmp_path: Path, engine
     deck = run.case.deck(engine)
     deck.write_text(deck.read_text().replace(old, new))
     with pytest.raises(RunError, match=word) as caught:
-        simulate(run, tmp_path / "out", Board(), threading.Event())
+        simulate(run, tmp_path / "out", threading.Event())
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(("engine", "ranks"), [("liggghts", 1), ("liggghts", 2), ("yade", 1)])
 def test_progress_comes_while_it_runs_and_cancelling_leaves_no_process(
         tmp_path: Path, engine: str, ranks: int, wait_for: Callable[..., object]) -> None:
-    board, cancel, ended = Board(), threading.Event(), []
+    told, cancel, ended = [], threading.Event(), []
     run = plan(engine, steps=10**9, frames=10**5)
 
     def work() -> None:
         with pytest.raises(Interrupted):
-            simulate(run, tmp_path / "out", board, cancel, Resources(ranks=ranks))
+            simulate(run, tmp_path / "out", cancel, Resources(ranks=ranks), lambda **facts: told.append(facts.get("step", 0)))
         ended.append(True)
 
     thread = threading.Thread(target=work)
     thread.start()
     try:
-        assert wait_for(lambda: not thread.is_alive() or any(state.step > 0 for state in board.states()), 60) and thread.is_alive()
+        assert wait_for(lambda: not thread.is_alive() or any(told), 60) and thread.is_alive()
     finally:
         cancel.set()
         thread.join(30)
@@ -218,5 +219,5 @@ def test_compiler_flags_are_read_beside_the_build(tmp_path: Path) -> None:
     (tmp_path / "build/engines/CMakeCache.txt").write_text(cache)
     (tmp_path / "build/bin").mkdir()
     (tmp_path / "build/bin/liggghts-dembark").symlink_to(program)
-    engine = engines.Engine("liggghts", tmp_path / "build/bin/liggghts-dembark", "3.8.0", "")
+    engine = Liggghts(tmp_path / "build/bin/liggghts-dembark", "3.8.0", "")
     assert provenance.build_flags(engine) == {"CMAKE_BUILD_TYPE": "Release", "CMAKE_CXX_FLAGS": "-O2 -g"}

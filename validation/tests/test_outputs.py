@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 from dembark.common.errors import DembarkError, RunError
 from dembark.common.files import check_impacts
-from dembark.validation import cases, outcome
+from dembark.validation.case import folders, model
+from dembark.validation.runs import outcome
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,16 +16,16 @@ HEADER = "# impacts that have ended\n# id_a id_b time duration peak_force impuls
 ROW = "1 -1 0.5 1e-3 1.2e4 6 2 0.1 0 0.1 0\n"
 
 
-def with_outputs(decks: Path, words: str) -> cases.Case:
+def with_outputs(decks: Path, words: str) -> model.Case:
     path = decks / "box" / "case.toml"
     path.write_text(path.read_text().replace('source = ["nobody"]', f'source = ["nobody"]\noutputs = {words}', 1))
-    cases.load.cache_clear()
-    return cases.find("box")
+    folders.load.cache_clear()
+    return folders.find("box")
 
 
 def test_a_case_that_says_nothing_writes_the_standard_files(decks: Path) -> None:
-    cases.load.cache_clear()
-    assert cases.find("box").outputs == ("grains", "contacts", "times")
+    folders.load.cache_clear()
+    assert folders.find("box").outputs == ("grains", "contacts", "times")
 
 
 def test_a_case_names_what_it_writes(decks: Path) -> None:
@@ -91,9 +92,9 @@ def write_run(folder: Path, frames: int = 2) -> None:
 
 def test_only_what_is_asked_for_is_looked_at(tmp_path: Path) -> None:
     write_run(tmp_path)
-    everything = tuple(cases.OUTPUTS)
+    everything = tuple(model.OUTPUTS)
     assert outcome.check_output(tmp_path, everything, 2) == 2
-    for name, file in cases.OUTPUTS.items():
+    for name, file in model.OUTPUTS.items():
         (tmp_path / file).rename(tmp_path / "aside")
         with pytest.raises(RunError, match=f"no {file}"):
             outcome.check_output(tmp_path, everything, 2)

@@ -1,15 +1,21 @@
 """Verification: instruments of the harness on problems whose answer is known exactly, apart from any engine.
 
-A chapter of the report. Each item is a function without arguments that computes an `Item` in a second or two; a new one is added to
-`ITEMS`.
+Each item is a function without arguments that computes an `Item` in a second or two; a new one is added to `ITEMS`. The workflow writes
+them all to `verification.json`, which the report includes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
 
+import numpy as np
+from dembark.common.files import read_json, write_json
+from dembark.validation.judge.result import QuantityRecord, as_json, from_json
+from dembark.validation.judge.tally import VERIFICATION as FILE
 from dembark.validation.verification import fields_balance, fields_exact, fields_rings
-from dembark.validation.verification.item import Item
+from dembark.validation.verification.item import Curve, Item, Panel
 
 ITEMS: tuple[Callable[[], Item], ...] = (
     fields_exact.conservation,
@@ -23,5 +29,28 @@ ITEMS: tuple[Callable[[], Item], ...] = (
 
 
 def items() -> list[Item]:
-    """All items, computed."""
+    """All items, computed; some seconds."""
     return [compute() for compute in ITEMS]
+
+
+def write(results: Path, found: list[Item] | None = None) -> None:
+    """Compute all items, unless they are `found` already, and write them to `verification.json` in a results folder."""
+    chosen = items() if found is None else found
+    quantities = [as_json(one) for item in chosen for one in item.quantities]
+    described = [{**{key: getattr(item, key) for key in ("name", "title", "text", "caption")}, "quantities": [one.name for one in item.quantities],
+                  "panels": [asdict(panel) | {"curves": [_plain(curve) for curve in panel.curves]} for panel in item.panels]} for item in chosen]
+    write_json(results / FILE, {"quantities": quantities, "items": described})
+
+
+def _plain(curve: Curve) -> dict[str, object]:
+    return {"label": curve.label, "place": np.asarray(curve.place, float).tolist(), "value": np.asarray(curve.value, float).tolist(),
+            "theory": curve.theory}
+
+
+def read(results: Path) -> list[Item]:
+    """The items in the `verification.json` of a results folder; none when there is no such file."""
+    content = read_json(results / FILE) or {}
+    records = {one["name"]: from_json(one, QuantityRecord, FILE) for one in content.get("quantities", [])}
+    return [Item(one["name"], one["title"], one["text"], [records[name] for name in one["quantities"]],
+                 [Panel(**panel | {"curves": [Curve(**curve) for curve in panel["curves"]]}) for panel in one["panels"]], one["caption"])
+            for one in content.get("items", [])]

@@ -6,7 +6,8 @@ import numpy as np
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import CUTOFF
-from dembark.validation.checks import fields_axial as axial
+from dembark.postproc.fields.rings import Fields, Rings
+from dembark.postproc.fields.rings import coarse_grain as ring_fields
 from dembark.validation.verification import scenes
 from dembark.validation.verification.item import Array, Curve, Item, Panel, exact
 from dembark.validation.verification.scenes import GRAVITY, Network
@@ -19,8 +20,8 @@ _RADIUS = 0.75
 def rings() -> Item:
     """Mass and momentum balance of ring-shaped cells, and their stress beside that of ever finer cubes."""
     network = _centred(scenes.heap())
-    cells = axial.Rings.around(_RADIUS, 1.0, _WIDTH, 0.1)
-    fields, _ = axial.coarse_grain(network.frame, network.links, [network.base], cells, np.ones((len(cells.heights), 1)),
+    cells = Rings.around(_RADIUS, 1.0, _WIDTH, 0.1)
+    fields, _ = ring_fields(network.frame, network.links, [network.base], cells, np.ones((len(cells.heights), 1)),
                                    lambda place: np.ones((len(place), 1)))
     unbalanced = np.abs(fields.unbalanced(cells, GRAVITY)).max() / (fields.mean("mass", cells).max() * GRAVITY)
     cut = 1.0 - float(erf(CUTOFF / np.sqrt(2.0))) ** 3
@@ -51,7 +52,7 @@ def _centred(network: Network) -> Network:
                    type(base)(base.points - shift, base.positions - shift, base.forces))
 
 
-def _against_cubes(network: Network, cells: axial.Rings, fields: axial.Fields, spacing: float) -> float:
+def _against_cubes(network: Network, cells: Rings, fields: Fields, spacing: float) -> float:
     half, low = 1.2, -0.6
     across, up = int(np.ceil(2.0 * half / spacing)), int(np.ceil(2.2 / spacing))
     grid = Grid([-half, -half, low], [half, half, low + up * spacing], (across, across, up))

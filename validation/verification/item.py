@@ -1,13 +1,14 @@
-"""What an item of the verification chapter consists of."""
+"""What an item of the verification consists of."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from dembark.validation.checks.quantity import Quantity
-from dembark.validation.statistics import Estimate
+from dembark.postproc.statistics import Estimate
+from dembark.validation.judge.quantity import Quantity
+from dembark.validation.judge.result import QuantityRecord
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -23,8 +24,8 @@ class Curve:
     """`value` over `place`; `theory`: drawn as a thin dark line instead of points."""
 
     label: str
-    place: Array
-    value: Array
+    place: Sequence[float] | Array
+    value: Sequence[float] | Array
     theory: bool = False
 
 
@@ -46,19 +47,22 @@ class Item:
     name: str
     title: str
     text: str
-    quantities: list[Quantity]
-    panels: list[Panel] = field(default_factory=list)
+    quantities: Sequence[QuantityRecord]
+    panels: Sequence[Panel] = ()
     caption: str = ""
 
 
-def exact(name: str, label: str, error: float, source: str, *, tolerance: float = ROUND_OFF, detail: str = "", unit: str = "1") -> Quantity:
+def exact(name: str, label: str, error: float, source: str, *, tolerance: float = ROUND_OFF, detail: str = "", unit: str = "1") -> QuantityRecord:
     """An error that is due to be zero to `tolerance`."""
-    return Quantity(name, label, unit, Estimate(float(error), 0.0), reference=Estimate(0.0, 0.0), absolute=True, tolerance=tolerance,
-                    source=source, detail=detail, compared=False)
+    return _judged(name, label, unit, float(error), 0.0, tolerance, source, detail, "identity")
 
 
-def order(name: str, label: str, steps: Array, errors: Array, due: float, source: str, detail: str = "") -> Quantity:
+def order(name: str, label: str, steps: Array, errors: Array, due: float, source: str, detail: str = "") -> QuantityRecord:
     """Observed order of convergence, the slope of ln(error) over ln(step), against the one of theory."""
     slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
-    return Quantity(name, label, "1", Estimate(slope, 0.0), reference=Estimate(due, 0.0), absolute=True, tolerance=ORDER_TOLERANCE,
-                    source=source, detail=detail, compared=False)
+    return _judged(name, label, "1", slope, due, ORDER_TOLERANCE, source, detail, "theory")
+
+
+def _judged(name: str, label: str, unit: str, value: float, due: float, tolerance: float, source: str, detail: str, evidence: str) -> QuantityRecord:
+    return Quantity(name, label, unit, Estimate(value, 0.0), reference=Estimate(due, 0.0), absolute=True, tolerance=tolerance, source=source,
+                    detail=detail, compared=False, evidence=evidence).record()

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib
 import numpy as np
 from dembark.postproc.style import STYLE
+from dembark.validation.campaigns.report.against import Difference
 from dembark.validation.campaigns.report.sweeps import Sweep, words
-from dembark.validation.report.figures import colour, engine_name, symbols
+from dembark.validation.judge.result import QuantityRecord
+from dembark.validation.report.figures import symbols
+from dembark.validation.report.look import colour, engine_name
 from matplotlib.figure import Figure
 
 _INK = "#4a4f57"
@@ -23,11 +26,11 @@ def _panels(count: int, height: float = 1.95) -> tuple[Figure, list[Any]]:
     rows = max(1, math.ceil(count / COLUMNS))
     tall = height * rows + 0.5
     figure = Figure(figsize=(7.2, tall))
-    figure.subplots_adjust(left=0.075, right=0.985, bottom=0.85 / tall, top=1.0 - 0.3 / tall, wspace=0.38, hspace=0.55)
+    figure.subplots_adjust(left=0.075, right=0.985, bottom=0.85 / tall, top=1.0 - 0.3 / tall, wspace=0.42, hspace=0.55)
     return figure, [figure.add_subplot(rows, COLUMNS, number + 1) for number in range(count)]
 
 
-def study_figure(sweep: Sweep, quantities: Sequence[Mapping[str, Any]]) -> Figure | None:
+def study_figure(sweep: Sweep, quantities: Sequence[QuantityRecord]) -> Figure | None:
     """Each quantity along the sweep's main axis with 95 % intervals, a line for each combination of the others, both engines; its
     reference dashed in grey. None for a sweep without a numeric axis."""
     along = sweep.along
@@ -42,36 +45,39 @@ def study_figure(sweep: Sweep, quantities: Sequence[Mapping[str, Any]]) -> Figur
     return figure
 
 
-def _study_panel(axes: Any, sweep: Sweep, along: str, quantity: Mapping[str, Any], handles: dict[str, Any]) -> None:
+def _study_panel(axes: Any, sweep: Sweep, along: str, quantity: QuantityRecord, handles: dict[str, Any]) -> None:
     for engine in sweep.engines:
-        for number, (others, line) in enumerate(sweep.lines(along, engine, quantity["name"])):
+        for number, (others, line) in enumerate(sweep.lines(along, engine, quantity.name)):
             place = np.array([at for at, _ in line])
-            value = np.array([one["value"] for _, one in line])
+            value = np.array([one.value for _, one in line], float)
             style = {"color": colour(engine), "linestyle": _DASHES[number % len(_DASHES)], "marker": _MARKS[number % len(_MARKS)]}
             handle = axes.errorbar(place, value, yerr=_bars(line), markersize=3.2, elinewidth=0.7, linewidth=1.1, **style)
             label = engine_name(engine) + (f", {words(others)}" if others else "")
             handles.setdefault(label, handle)
-            known = [(at, one["reference"]) for at, one in line if one.get("reference") is not None]
+            known = [(at, one.reference) for at, one in line if one.reference is not None]
             if known:
                 (reference,) = axes.plot(*zip(*known, strict=True), color=_INK, linewidth=0.8, linestyle=_DASHES[1], alpha=0.8, zorder=1)
                 handles.setdefault("reference", reference)
-    axes.set_xlabel(sweep.label(along))
+    axes.set(xlabel=sweep.label(along), ylabel=_unit(quantity))
     axes.set_title(_title(quantity), fontsize=7.0)
     low, high = sweep.levels(along)[0], sweep.levels(along)[-1]
     if low > 0 and high / low > 20:
         axes.set_xscale("log")
 
 
-def _bars(line: Sequence[tuple[float, Mapping[str, Any]]]) -> np.ndarray[Any, Any]:
-    ends = [one["interval"] or (one["value"], one["value"]) for _, one in line]
-    return np.array([[one["value"] - low for (_, one), (low, _) in zip(line, ends, strict=True)],
-                     [high - one["value"] for (_, one), (_, high) in zip(line, ends, strict=True)]]).clip(min=0.0)
+def _bars(line: Sequence[tuple[float, QuantityRecord]]) -> np.ndarray[Any, Any]:
+    """Lower and upper parts (2, n) of the 95 % intervals."""
+    values = np.array([one.value for _, one in line], float)
+    ends = np.array([one.interval or (one.value, one.value) for _, one in line], float)
+    return np.stack([values - ends[:, 0], ends[:, 1] - values]).clip(min=0.0)
 
 
-def _title(quantity: Mapping[str, Any]) -> str:
-    unit = "" if quantity["unit"] == "1" else f" ({quantity['unit']})"
-    text = quantity["label"]
-    return symbols((text if len(text) + len(unit) <= 34 else quantity["name"].replace("_", " ")) + unit)
+def _unit(quantity: QuantityRecord) -> str:
+    return "dimensionless" if quantity.unit == "1" else quantity.unit
+
+
+def _title(quantity: QuantityRecord, length: int = 36) -> str:
+    return symbols(quantity.title if len(quantity.title) <= length else quantity.name.replace("_", " "))
 
 
 def map_axes(sweep: Sweep) -> tuple[str, str] | None:
@@ -83,7 +89,7 @@ def map_axes(sweep: Sweep) -> tuple[str, str] | None:
     return across, down
 
 
-def map_figure(sweep: Sweep, engine: str, quantities: Sequence[Mapping[str, Any]]) -> Figure | None:
+def map_figure(sweep: Sweep, engine: str, quantities: Sequence[QuantityRecord]) -> Figure | None:
     """Maps of quantities over the two axes of a sweep; a frame marks points that failed their check. None when there are not two."""
     axes_names = map_axes(sweep)
     if axes_names is None or not quantities:
@@ -96,11 +102,11 @@ def map_figure(sweep: Sweep, engine: str, quantities: Sequence[Mapping[str, Any]
             values = np.full((len(rows), len(columns)), np.nan)
             failed = []
             for point in sweep.points:
-                one = point.quantity(engine, quantity["name"])
+                one = point.quantity(engine, quantity.name)
                 cell = rows.index(point.values[down]), columns.index(point.values[across])
                 if one is not None:
-                    values[cell] = one["value"]
-                    failed += [cell] if one.get("verdict") == "fail" else []
+                    values[cell] = one.value
+                    failed += [cell] if one.standing == "failed" else []
             image = axes.imshow(values, origin="lower", aspect="auto", cmap="cividis")
             for (row, column), value in np.ndenumerate(values):
                 text = "–" if np.isnan(value) else f"{value:.3g}"
@@ -111,7 +117,7 @@ def map_figure(sweep: Sweep, engine: str, quantities: Sequence[Mapping[str, Any]
             axes.set_xticks(range(len(columns)), [_short(one) for one in columns])
             axes.set_yticks(range(len(rows)), [_short(one) for one in rows])
             axes.set(xlabel=sweep.label(across), ylabel=sweep.label(down))
-            axes.set_title(_title(quantity), fontsize=7.0)
+            axes.set_title(_title(quantity, 30) + ("" if quantity.unit == "1" else f" ({quantity.unit})"), fontsize=6.5)
         figure.text(0.5, 0.02, engine_name(engine), ha="center", color=colour(engine), fontsize=7.5, weight="bold")
     return figure
 
@@ -120,15 +126,15 @@ def _short(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def against_figure(rows: Sequence[Mapping[str, Any]]) -> Figure:
+def against_figure(rows: Sequence[Difference]) -> Figure:
     """Two campaigns: the change of each quantity over its joint 95 % half-width; beyond the grey band it changed."""
-    known = [row for row in rows if row["significance"] is not None]
+    known = [row for row in rows if row.significance is not None]
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 2.4), layout="constrained")
         axes = figure.subplots()
         axes.axhspan(-1.0, 1.0, color=_INK, alpha=0.12, linewidth=0)
-        for engine in sorted({row["engine"] for row in known}):
-            points = [(number, row["significance"]) for number, row in enumerate(known) if row["engine"] == engine]
+        for engine in sorted({row.engine for row in known}):
+            points = [(number, row.significance) for number, row in enumerate(known) if row.engine == engine]
             axes.plot(*zip(*points, strict=True), ".", color=colour(engine), label=engine_name(engine), markersize=4)
         axes.set(xlabel="quantity, in the order of the table", ylabel="change / joint half-width")
         if known:

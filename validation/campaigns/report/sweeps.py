@@ -7,21 +7,24 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from dembark.validation.convergence import REFINEMENT, Convergence, convergence, refinement
+from dembark.postproc.convergence import REFINEMENT, Convergence, convergence, refinement
+from dembark.validation.case.model import Case
+from dembark.validation.judge.result import QuantityRecord, Result
+from dembark.validation.report.gather import Page
 
 
 @dataclass(frozen=True)
 class Point:
-    """One point of a sweep: the swept `values` (None = the parameter is not set), the folder name `variant`, `metrics` by engine."""
+    """One point of a sweep: the swept `values` (None = the parameter is not set), the folder name `variant`, `results` by engine."""
 
     values: Mapping[str, Any]
     variant: str
-    metrics: Mapping[str, Mapping[str, Any]]
+    results: Mapping[str, Result]
 
-    def quantity(self, engine: str, name: str) -> Mapping[str, Any] | None:
+    def quantity(self, engine: str, name: str) -> QuantityRecord | None:
         """The measured quantity of that name; None where it was not measured or has no number."""
-        found = next((one for one in self.metrics.get(engine, {}).get("quantities", []) if one["name"] == name), None)
-        return found if found and found["value"] is not None and math.isfinite(found["value"]) else None
+        found = self.results[engine].find(name) if engine in self.results else None
+        return found if found and found.value is not None and math.isfinite(found.value) else None
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,7 @@ class Sweep:
     @property
     def engines(self) -> list[str]:
         """Engines with at least one measured point."""
-        return sorted({engine for point in self.points for engine in point.metrics})
+        return sorted({engine for point in self.points for engine in point.results})
 
     def levels(self, axis: str) -> list[Any]:
         """The values along one axis in their order: numbers by size, words as they come."""
@@ -60,25 +63,40 @@ class Sweep:
         found = [axis for axis in self.axes if self.numeric(axis) and len(self.levels(axis)) > 1]
         return max(found, key=lambda axis: (len(self.levels(axis)), -self.axes.index(axis)), default=None)
 
-    def quantities(self) -> list[Mapping[str, Any]]:
-        """The quantities worth a picture, once each: those that are checked or that the engines must agree in."""
-        found: dict[str, Mapping[str, Any]] = {}
-        for point in self.points:
-            for metrics in point.metrics.values():
-                for one in metrics.get("quantities", []):
-                    if one["value"] is not None and (one.get("compared") or one.get("tolerance") is not None):
-                        found.setdefault(one["name"], one)
-        return list(found.values())
+    def quantities(self) -> list[QuantityRecord]:
+        """The quantities worth a picture, once each: those that failed first, then those that are checked or that the engines must agree in."""
+        found: dict[str, QuantityRecord] = {}
+        failed: set[str] = set()
+        for one in (one for point in self.points for result in point.results.values() for one in result.quantities):
+            failed |= {one.name} if one.standing == "failed" else set()
+            if one.value is not None and (one.compared or one.standing != "information"):
+                found.setdefault(one.name, one)
+        return sorted(found.values(), key=lambda one: one.name not in failed)
 
-    def lines(self, along: str, engine: str, name: str) -> list[tuple[dict[str, Any], list[tuple[float, Mapping[str, Any]]]]]:
+    def lines(self, along: str, engine: str, name: str) -> list[tuple[dict[str, Any], list[tuple[float, QuantityRecord]]]]:
         """Measured values against `along`, one line for each combination of the other axes: (those values, [(place, quantity)])."""
-        lines: dict[tuple[Any, ...], list[tuple[float, Mapping[str, Any]]]] = {}
+        lines: dict[tuple[Any, ...], list[tuple[float, QuantityRecord]]] = {}
         others = [axis for axis in self.axes if axis != along]
         for point in self.points:
             found = point.quantity(engine, name)
             if found is not None:
                 lines.setdefault(tuple(point.values[axis] for axis in others), []).append((float(point.values[along]), found))
         return [(dict(zip(others, key, strict=True)), sorted(line, key=lambda one: one[0])) for key, line in lines.items()]
+
+
+def sweeps(facts: Sequence[Mapping[str, Any]], pages: Iterable[Page], cases: Mapping[str, Case]) -> list[Sweep]:
+    """The sweeps that `runs.json` tells of, with what was measured at their points."""
+    measured = {(page.case, page.variant): page.results for page in pages}
+    return [_sweep(one, number, measured, cases.get(one["case"])) for number, one in enumerate(facts, start=1)]
+
+
+def _sweep(facts: Mapping[str, Any], number: int, measured: Mapping[tuple[str, str], Mapping[str, Result]], known: Case | None) -> Sweep:
+    case, axes = facts["case"], tuple(facts["axes"])
+    points = tuple(Point(point["values"], point["variant"], measured.get((case, point["variant"]), {})) for point in facts["points"])
+    title = facts.get("title") or f"{case.replace('_', ' ').capitalize()}: {' × '.join(axis.replace('_', ' ') for axis in axes) or 'one point'}"
+    # A case that has gone since leaves its results without units of the axes.
+    units = {axis: known.parameters[axis].unit for axis in axes if known and axis in known.parameters}
+    return Sweep(case, title, axes, points, f"{case}-{number}", units)
 
 
 def words(values: Mapping[str, Any]) -> str:
@@ -93,7 +111,7 @@ class NumericalError:
 
     sweep: Sweep
     engine: str
-    quantity: Mapping[str, Any]
+    quantity: QuantityRecord
     parameter: str
     at: str
     finest: float
@@ -107,16 +125,16 @@ def numerical_errors(sweeps: Iterable[Sweep]) -> list[NumericalError]:
         for parameter in (axis for axis in sweep.axes if axis in REFINEMENT and len(sweep.levels(axis)) > 1):
             for one in sweep.quantities():
                 for engine in sweep.engines:
-                    for others, line in sweep.lines(parameter, engine, one["name"]):
+                    for others, line in sweep.lines(parameter, engine, one.name):
                         if len(line) > 1:
                             result.append(_judged(sweep, engine, parameter, others, line))
     return result
 
 
 def _judged(sweep: Sweep, engine: str, parameter: str, others: Mapping[str, Any],
-            line: Sequence[tuple[float, Mapping[str, Any]]]) -> NumericalError:
+            line: Sequence[tuple[float, QuantityRecord]]) -> NumericalError:
     h = [refinement(parameter, place) for place, _ in line]
-    halves = [0.5 * (one["interval"][1] - one["interval"][0]) if one.get("interval") else math.inf for _, one in line]
+    halves = [math.inf if one.half is None else one.half for _, one in line]
     finest = min(range(len(h)), key=h.__getitem__)
-    found = convergence(h, [one["value"] for _, one in line], halves)
+    found = convergence(h, [float(one.value or 0.0) for _, one in line], halves)
     return NumericalError(sweep, engine, line[finest][1], parameter, words(others), line[finest][0], found)

@@ -94,7 +94,7 @@ class Cluster:
     def environment(self) -> dict[str, str]:
         """Variables for clients, added to those of this process; nothing of a Slurm that this process may itself run in."""
         clean = {key: value for key, value in os.environ.items() if not key.startswith(("SLURM_", "SBATCH_", "SRUN_", "PMI"))}
-        return clean | {"SLURM_CONF": str(self.folder / "slurm.conf"), "PATH": f"{self.folder}/bin:{clean.get('PATH', '')}:/usr/sbin:/sbin"}
+        return clean | {"SLURM_CONF": str(self.folder / "slurm.conf"), "PATH": f"{clean.get('PATH', '')}:/usr/sbin:/sbin"}
 
     def call(self, *words: str, check: bool = True) -> str:
         """Output of a Slurm command."""
@@ -132,11 +132,6 @@ class Cluster:
         (self.folder / "slurm.conf").write_text(text)
         # Nothing here uses control groups; asked for by name, version 1 does not look for them, which a container may lack.
         (self.folder / "cgroup.conf").write_text("CgroupPlugin=cgroup/v1\nIgnoreSystemd=yes\n")
-        # Snakemake's executor hides SLURM_CONF from the srun within a job; a site has its file where srun looks for it anyway.
-        srun = self.folder / "bin" / "srun"
-        srun.parent.mkdir()
-        srun.write_text(f'#!/bin/sh\nSLURM_CONF="{self.folder}/slurm.conf" exec {_program("srun")} "$@"\n')
-        srun.chmod(0o755)
 
     def _start_munge(self) -> None:
         place = self.folder / "munge"

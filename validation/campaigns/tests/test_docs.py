@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 from dembark.validation.campaigns import store
-from dembark.validation.campaigns.schema import TABLES
+from dembark.validation.runs import schema
+from dembark.validation.runs.schema import TABLES
 from dembark.validation.campaigns.spec import shipped
 
 PAGE = (Path(__file__).resolve().parents[3] / "docs/campaigns.md").read_text(encoding="utf-8")
@@ -22,14 +23,14 @@ def results(tmp_path: Path) -> Path:
     """A campaign's folder with a store of two quantities of two points."""
     folder = tmp_path / "results/campaigns/silo-small"
     folder.mkdir(parents=True)
-    with store._writing(folder) as connection:
+    with schema.writing(store.path_of(folder)) as connection:
         for friction, value in ((0.2, 0.8), (0.4, 0.6)):
             common = {"campaign": "silo-small", "case_name": "silo", "variant": f"dry_wall_friction={friction}", "engine": "liggghts",
                       "commit_hash": "c", "engine_version": "3.8.0", "measured_at": "2026", "value": value, "low": value - 0.1,
                       "high": value + 0.1, "parameters_json": f'{{"wall_friction": {friction}, "bridge_volume": 0.0}}'}
-            store._put(connection, "quantities", [{**common, "name": "apparent_mass_ratio", "label": "share", "verdict": "fail"},
+            schema.put(connection, "quantities", [{**common, "name": "apparent_mass_ratio", "label": "share", "verdict": "fail"},
                                                   {**common, "name": "stress_ratio_k", "verdict": "pass"}])
-            store._put(connection, "runs", [{**common, "run_id": str(friction), "state": "finished", "attempts": 2, "wall_time": 10.0,
+            schema.put(connection, "runs", [{**common, "run_id": str(friction), "state": "finished", "attempts": 2, "wall_time": 10.0,
                                              "ranks": 2, "threads": 1}])
     return folder
 
@@ -52,7 +53,7 @@ def test_python(results: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
 
 
 def test_every_column_and_campaign_is_named() -> None:
-    names = {name for table in ("runs", "quantities", "points") for name in TABLES[table]}
+    names = {name for table in ("runs", "steps", "quantities", "points") for name in TABLES[table]}
     assert {name for name in names if f"`{name}`" not in PAGE} == set()
     for name in shipped():
         assert f"`{name}`" in PAGE or f"`{name.removesuffix('-full')}-standard`, `-full`" in PAGE

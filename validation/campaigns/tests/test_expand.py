@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 from dembark.common.errors import DembarkError
+from dembark.validation.campaigns import source
 from dembark.validation.campaigns.expand import LONGEST_NAME, plan, points, variant_name
-from dembark.validation.campaigns.source import Source
 from dembark.validation.campaigns.spec import read
-from dembark.validation.plan import campaign
+from dembark.validation.runs.plan import campaign
 from harness import decks, stand_in  # noqa: F401
 from hypothesis import given
 from hypothesis import strategies as st
@@ -133,16 +133,17 @@ def test_mistakes_in_derived_parameters(derived: str, expected: str, tmp_path: P
 
 def test_only_what_is_chosen(tmp_path: Path) -> None:
     spec = spec_of(tmp_path, '[[sweeps]]\ncase = "box"\ngrid = { grain_count = [10, 20] }\n[resources.yade]\nthreads = 2\n')
-    source = Source(file=spec.path)
-    assert {one.place.name for one in source.series((), ["yade"])} == {"yade"} and len(source.series(["box"])) == 4
-    assert {place.name: used.threads for place, used in source.resources().items()} == {"liggghts": 1, "yade": 2}
-    assert [one.place.name for one in source.series()] == ["yade", "yade", "liggghts", "liggghts"]  # the longest first
-    assert source.facts()["sweeps"][0]["axes"] == ["grain_count"] and source.label == "boxes"
+    whole, chosen = source.plan(file=spec.path), source.plan(file=spec.path, engines=["yade"])
+    assert {one.place.name for one in chosen.series} == {"yade"} and len(source.plan(file=spec.path, cases=["box"]).series) == 4
+    assert {one.place.name: whole.of(one).threads for one in whole.series} == {"liggghts": 1, "yade": 2}
+    assert [one.place.name for one in whole.series] == ["yade", "yade", "liggghts", "liggghts"]  # the longest first
+    assert whole.facts["sweeps"][0]["axes"] == ["grain_count"] and whole.label == "boxes" and whole.whole and not chosen.whole
     with pytest.raises(DembarkError, match="did you mean box"):
-        source.series(["bxo"])
+        source.plan(file=spec.path, cases=["bxo"])
 
 
-def test_a_source_is_a_profile_or_a_campaign() -> None:
+def test_a_plan_is_that_of_a_profile_or_a_campaign() -> None:
     with pytest.raises(DembarkError, match="--profile or --campaign"):
-        Source()
-    assert Source("quick").facts() == {"profile": "quick"} and Source("quick").plan() is None
+        source.plan()
+    planned = source.plan("quick")
+    assert planned.facts == {"profile": "quick"} and planned.label == "quick" and planned.words == ("--profile", "quick")

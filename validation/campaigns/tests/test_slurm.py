@@ -1,99 +1,70 @@
-"""The guards around Slurm, against a real one: what it would refuse is told before, and no job is left behind, doubled or lost."""
+"""Jobs of a scheduler, against a real Slurm: what it would refuse is told before, and no job is left behind, doubled or lost."""
 
 from __future__ import annotations
 
-import datetime
-import os
-import signal
-import subprocess
+import json
 import sys
-import threading
-import time
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
+from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
+from dembark.validation import engines
+from dembark.validation.campaigns import source
+from dembark.validation.runs import queue, site, slurm
+from dembark.validation.runs.plan import Plan, Resources
+from dembark.validation.runs.queue import Queue
+from harness import decks, stand_in, wait_for  # noqa: F401
 from slurm_cluster import Cluster
 
-from dembark.common.errors import DembarkError, Interrupted
-from dembark.validation import engines
-from dembark.validation.campaigns import profiles, slurm
-from dembark.validation.campaigns.spec import RunResources
-
-SLURM = profiles.find("slurm")
-LONG = ["--time=1", "--output=/dev/null", "--wrap=sleep 60"]
+SLURM = site.find("slurm")
+QUICK = 'base = "slurm"\n[jobs]\npoll = "0.3 s"\nlatency = "1 s"\n'
 
 
-def profile(folder: Path, text: str) -> profiles.ExecutorProfile:
-    """A profile with the shipped Slurm settings and `text`."""
-    folder.mkdir(exist_ok=True)
-    (folder / "config.yaml").write_text((SLURM.folder / "config.yaml").read_text() + text)
-    return profiles.load(folder)
-
-
-def submit(cluster: Cluster, results: Path, *words: str) -> int:
-    """A job with a name as the executor gives it in the campaign `results`."""
-    return int(cluster.call("sbatch", "--parsable", f"--job-name={slurm.job_prefix(results)}_5c1e", "--comment=rule_simulate_box", *words))
-
-
-def test_keys_of_the_shipped_profiles_are_options_of_snakemake() -> None:
-    from snakemake.cli import get_argument_parser
-
-    known = {option.lstrip("-") for action in get_argument_parser()._actions for option in action.option_strings}
-    assert {"slurm-status-command", "default-resources", "executor"} <= known
-    for path in SLURM.folder.parent.glob("*/config.yaml"):
-        settings = profiles.yaml.safe_load(path.read_text())
-        assert set(settings) <= known, path
-    assert profiles.find("local").executor == "local" and SLURM.executor == "slurm"
+def written(folder: Path, text: str = QUICK) -> site.Site:
+    """A site's file with `text`."""
+    (folder / "site.toml").write_text(text)
+    return site.find(str(folder / "site.toml"))
 
 
 @pytest.mark.parametrize(("text", "words"), [
-    ("groups:\n  simulate: g\n", "rejected by sbatch without a word"),
-    ("group-components:\n  g: 5\n", "rejected by sbatch without a word"),
-    ("slurm_partition: <partition>\n", "fill it in"),
-    ("default-resources: 5\n", "name: value"),
-    ("a: [1\n", "cannot be read"),
+    ('base = "slrum"', "base = 'slrum' is not known"),
+    ('base = "slurm"\n[jobs]\noptions = "-p <partition>"', "<partition> in options is a place for your own value"),
+    ('base = "slurm"\n[jobs]\nat_a_time = 0', "at_a_time = 0 is out of range"),
+    ('base = "slurm"\n[jobs]\npoll = "10"', "'10' is no duration"),
+    ('base = "slurm"\n[jobs]\njobs = 5', "unknown key 'jobs'"),
+    ('base = "slurm"\n[commands]\nsubmit = "sbatch {skript}"', "{skript} in submit is not known"),
+    ('base = "slurm"\n[answers]\njob = "("', "job is no regular expression"),
+    ('base = "slurm"\n[answers]\nline = "(?P<job>x)"', "line has no group"),
+    ('[commands]\nsubmit = "qsub"\nstatus = "qstat"', "cancel is missing"),
+    ("a = [1\n", "cannot be read"),
 ])
-def test_a_mistake_in_a_profile_is_told_in_one_line(tmp_path: Path, text: str, words: str) -> None:
-    with pytest.raises(DembarkError, match=words) as caught:
-        profile(tmp_path, text)
-    assert "\n" not in str(caught.value) and str(tmp_path / "config.yaml") in str(caught.value)
+def test_a_mistake_in_a_sites_file_is_told_in_one_line(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(DembarkError) as caught:
+        written(tmp_path, text)
+    assert words in str(caught.value) and "\n" not in str(caught.value) and str(tmp_path / "site.toml") in str(caught.value)
 
 
-def test_a_profile_that_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "empty").mkdir()
-    for name, words in (("slrum", "did you mean slurm"), ("nowhere/at-all", "neither local, nor slurm"), ("empty", "with a config.yaml")):
-        with pytest.raises(DembarkError, match=words):
-            profiles.find(name)
-    (tmp_path / "empty" / "config.yaml").touch()
-    with pytest.raises(DembarkError, match="holds no keys"):
-        profiles.find("empty")
-
-
-def test_the_template_asks_to_be_filled_in() -> None:
+def test_a_site_that_is_not_there_and_the_template() -> None:
+    with pytest.raises(DembarkError, match="did you mean slurm"):
+        site.find("slrum")
     with pytest.raises(DembarkError, match="<partition>.*fill it in"):
-        profiles.load(SLURM.folder.with_name("site"))
-    assert subprocess.run(["bash", "-n", SLURM.folder.with_name("site") / "preamble.sh"], check=False).returncode == 0
+        site.find(str(site.SHIPPED / "site.toml"))
 
 
 def test_the_preamble_sets_the_environment(tmp_path: Path) -> None:
-    one = profile(tmp_path, "")
-    assert profiles.PREAMBLE_VARIABLE not in one.environment()
-    (tmp_path / "preamble.sh").write_text("echo Loading openmpi\nexport SITE=\"two\nlines\" DEMBARK_MPIRUN='srun --mpi=pmix'\n"
-                                          "echo $UNSET\nmodule() { true; }\nexport -f module\n")
-    found = one.environment()
-    assert found["SITE"] == "two\nlines" and found[profiles.PREAMBLE_VARIABLE] == str(tmp_path / "preamble.sh")
-    assert not any("openmpi" in key for key in found) and "BASH_FUNC_module%%" in found
-    (tmp_path / "preamble.sh").write_text("module load nothing\n")
-    with pytest.raises(DembarkError, match="preamble.sh fails.*module"):
-        one.environment()
+    text = "preamble = '''\necho Loading openmpi\nexport SITE=\"two\nlines\" DEMBARK_MPIRUN=\"srun --mpi=pmix\"\necho $UNSET\n'''\n"
+    found = written(tmp_path, text + QUICK).environment()
+    assert found["SITE"] == "two\nlines" and found["DEMBARK_MPIRUN"] == "srun --mpi=pmix" and not any("openmpi" in key for key in found)
+    with pytest.raises(DembarkError, match="preamble of .*site.toml fails.*module"):
+        written(tmp_path, "preamble = 'module load nothing'\n" + QUICK).environment()
 
 
 def test_a_launcher_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     for key, value in {"SLURM_JOB_ID": "1", "SLURM_NODELIST": "n1", "PMI_RANK": "0", "SLURM_CONF": "/c"}.items():
         monkeypatch.setenv(key, value)
-    engine = engines.Engine("liggghts", Path("/bin/lmp"), "", "")
+    engine = Liggghts(Path("/bin/lmp"), "", "")
 
     def known() -> set[str]:
         return {key for key in engine.environment() if key.startswith(("SLURM_", "PMI"))}
@@ -103,152 +74,195 @@ def test_a_launcher_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     words = engine.command(Path("d"), {}, 3)
     assert words[:4] == ["srun", "--mpi=pmix", "-n", "3"] and "/bin/lmp" in words and known() == {"SLURM_CONF", "SLURM_JOB_ID"}
     assert "srun" not in engine.command(Path("d"), {}, 1)
-    assert slurm.request(RunResources(3, 1, 5e8, 590.0)) == {"mem_mb": 500, "runtime": 10, "tasks": 3, "cpus_per_task": 1, "mpi": "srun"}
-    assert slurm.request(RunResources(threads=4)) == {"cpus_per_task": 4} and slurm.request(RunResources()) == {}
+    assert queue.asked(SLURM, Resources(3, 1, 5e8, 590.0)) == {
+        "ranks": 3, "threads": 1, "cores": 3, "memory_mb": 500, "minutes": 10, "seconds": 590}
+    assert queue.asked(SLURM, Resources(threads=4)) == {
+        "ranks": 1, "threads": 4, "cores": 4, "memory_mb": 2000, "minutes": 30, "seconds": 1800}
 
 
-def test_what_slurm_would_take_passes(on_cluster: Cluster, tmp_path: Path) -> None:
-    slurm.check(SLURM, [RunResources(1, 1, 5e8, 300), RunResources(4, 1, 4e9, 3600), RunResources(1, 4)])
-    slurm.check(profiles.find("local"), [RunResources(99)])
-    # What Snakemake works out by itself cannot be asked for beforehand.
-    (tmp_path / "config.yaml").write_text((SLURM.folder / "config.yaml").read_text().replace("mem_mb: 2000", "mem_mb: attempt * 2000"))
-    slurm.check(profiles.load(tmp_path), [])
+def test_names_of_jobs_tell_campaigns_apart(tmp_path: Path) -> None:
+    names = {queue.prefix(tmp_path / name) for name in ("a b", "a_b", "x/a b", "ü" * 80, "")}
+    assert len(names) == 5 and all(len(name) <= 42 and name.isascii() and " " not in name for name in names)
+    assert queue.prefix(tmp_path / "x" / ".." / "a") == queue.prefix(tmp_path / "a")
 
 
-@pytest.mark.parametrize(("text", "used", "words"), [
-    ("", RunResources(8), "would refuse.*node configuration is not available.*tasks=8"),
-    ("", RunResources(memory=5e10), "would refuse.*node configuration is not available.*mem_mb=50000"),
-    ("", RunResources(time=3601), "would never start.*61 min exceed the partition's limit of 60 min"),
-    ("  slurm_partition: mian\n", RunResources(), "would refuse.*mian.*slurm_partition=mian"),
-    ("  constraint: gpu\n", RunResources(), "would refuse.*feature"),
+def test_what_slurm_would_take_passes(on_cluster: Cluster) -> None:
+    slurm.check(SLURM, [Resources(1, 1, 5e8, 300), Resources(4, 1, 4e9, 3600), Resources(1, 4)])
+
+
+@pytest.mark.parametrize(("options", "used", "words"), [
+    ("", Resources(8), "would refuse.*node configuration is not available.*ranks=8"),
+    ("", Resources(memory=5e10), "would refuse.*node configuration is not available.*memory_mb=50000"),
+    ("", Resources(time=3601), "would never start.*61 min exceed the partition's limit of 60 min"),
+    ("--partition=mian", Resources(), "would refuse.*mian"),
+    ("--constraint=gpu", Resources(), "would refuse.*feature"),
 ])
-def test_what_slurm_would_refuse_is_told_before_the_start(on_cluster: Cluster, tmp_path: Path, text: str, used: RunResources,
+def test_what_slurm_would_refuse_is_told_before_the_start(on_cluster: Cluster, tmp_path: Path, options: str, used: Resources,
                                                           words: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(slurm, "_PAUSE", 0.05)
     with pytest.raises(DembarkError, match=words) as caught:
-        slurm.check(profile(tmp_path, text), [used])
+        slurm.check(written(tmp_path, f'{QUICK}options = "--nodes=1 {options}"\n'), [used])
     assert "\n" not in str(caught.value)
-
-
-def test_a_status_command_that_would_wait_for_ever_is_refused(on_cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asks_sacct = profile(tmp_path, "slurm-status-command: sacct\n")
-    with pytest.raises(DembarkError, match="sacct does not answer.*accounting storage is disabled.*to squeue"):
-        slurm.check(asks_sacct, [])
-    (tmp_path / "scontrol").write_text("#!/bin/sh\necho 'MinJobAge               = 60 sec'\n")
-    (tmp_path / "scontrol").chmod(0o755)
-    monkeypatch.setenv("PATH", f"{tmp_path}:{on_cluster.environment['PATH']}")
-    with pytest.raises(DembarkError, match="forgets jobs 60 s after their end.*to sacct"):
-        slurm.check(SLURM, [])
 
 
 def test_without_slurm_the_missing_commands_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(DembarkError, match="sbatch, squeue, scancel, scontrol not found"):
+    with pytest.raises(DembarkError, match="sbatch, squeue, scancel not found"):
         slurm.check(SLURM, [])
 
 
-@pytest.mark.parametrize("minute", [0, 5, 719])
-def test_sacct_looks_back_over_midnight(monkeypatch: pytest.MonkeyPatch, minute: int) -> None:
-    # Without a start time sacct begins at midnight, and jobs that ended before it are never seen to have ended.
-    from snakemake_executor_plugin_slurm import job_status_query
-
-    class Clock(datetime.datetime):
-        @classmethod
-        def now(cls, tz: datetime.tzinfo | None = None) -> datetime.datetime:
-            return datetime.datetime(2024, 3, 1) + datetime.timedelta(minutes=minute)
-
-    monkeypatch.setattr(job_status_query, "datetime", Clock)
-    words = job_status_query.query_job_status_sacct("dembark").split()
-    start = datetime.datetime.fromisoformat(words[words.index("--starttime") + 1])
-    assert start <= datetime.datetime(2024, 2, 29)
-    # squeue, which the shipped profiles ask, knows no dates at all.
-    assert "time" not in job_status_query.query_job_status_squeue("dembark")
-    assert SLURM.settings["slurm-status-command"] == "squeue"
+# --- the queue, with job scripts that stand in for the job ------------------------------------------------------------
 
 
-def test_names_of_jobs_tell_campaigns_apart(tmp_path: Path) -> None:
-    from snakemake_executor_plugin_slurm import ExecutorSettings
+class Campaign:
+    """A queue of the small case's runs on the private Slurm; each job does what `script` says, in the place of the run."""
 
-    names = {slurm.job_prefix(tmp_path / name) for name in ("a b", "a_b", "x/a b", "ü" * 80, "")}
-    assert len(names) == 5 and all(len(name) <= 50 and name.isascii() and " " not in name for name in names)
-    assert slurm.job_prefix(tmp_path / "x" / ".." / "a") == slurm.job_prefix(tmp_path / "a")
-    assert "jobname_prefix" in ExecutorSettings.__dataclass_fields__
-    with slurm.guarded(profiles.find("local"), tmp_path, threading.Event(), pytest.fail) as nothing:
-        assert nothing == ([], None)
+    def __init__(self, folder: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.results, self.plan, self.said, self.told = folder / "results", plan, list[str](), dict[str, object]()
+        self.program = folder / "program"
+        self.site = written(folder)
+        self.queues: list[Queue] = []
+        monkeypatch.setattr(sys, "executable", str(self.program))
 
+    def script(self, text: str) -> None:
+        """`$report` is the file to tell in, `$out` the folder of the run, `$inputs` its hash."""
+        words = 'while [ $# -gt 0 ]; do case $1 in --report) report=$2; out=$(dirname $2);; --inputs) inputs=$2;; esac; shift; done\n'
+        self.program.write_text(f"#!/bin/bash\n{words}{text}\n")
+        self.program.chmod(0o755)
 
-def test_jobs_left_by_a_dead_process_are_waited_for_or_cancelled(on_cluster: Cluster, tmp_path: Path) -> None:
-    mine, other = tmp_path / "mine", tmp_path / "other"
-    running = submit(on_cluster, mine, "--time=1", "--output=/dev/null", f"--wrap=sleep 2; touch {tmp_path}/worked")
-    late = submit(on_cluster, mine, "--begin=now+1hour", *LONG)
-    elsewhere = submit(on_cluster, other, *LONG)
-    deadline = time.monotonic() + 20
-    while on_cluster.jobs()[running][0] != "RUNNING" or on_cluster.jobs()[elsewhere][0] != "RUNNING":
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
-    assert {job.number: job.waits for job in slurm.jobs(mine)} == {str(running): False, str(late): True}
-    assert slurm.jobs(mine)[0].what == "rule_simulate_box"
-    told: list[str] = []
-    assert slurm.adopt_or_cancel(mine, threading.Event(), told.append, interval=0.2) == (1, 1)
-    assert (tmp_path / "worked").exists() and slurm.jobs(mine) == []
-    assert told == ["1 waiting jobs of an earlier start cancelled", f"waiting for 1 jobs of an earlier start: {running}"]
-    assert on_cluster.jobs()[late][0] == "CANCELLED" and on_cluster.jobs()[elsewhere][0] == "RUNNING"
-    assert slurm.adopt_or_cancel(mine, threading.Event(), told.append) == (0, 0)
-    stop = threading.Event()
-    stop.set()
-    with pytest.raises(Interrupted, match="1 jobs of an earlier start go on"):
-        slurm.adopt_or_cancel(other, stop, told.append)
-    assert [job.number for job in slurm.cancel_all(other)] == [str(elsewhere)]
-    assert slurm.adopt_or_cancel(other, threading.Event(), told.append, interval=0.2)[1] == 0
+    def start(self, index: int = 0, queue_of: Queue | None = None) -> Future[object]:
+        (run,) = self.plan.series[index].runs
+        one = queue_of or self.queue()
+        return one.start(run, self.results / self.plan.series[index].place, Resources(time=60, memory=1e8), lambda **facts: self.told.update(facts))
+
+    def queue(self) -> Queue:
+        self.queues.append(Queue(self.site, self.results, self.plan, self.said.append))
+        return self.queues[-1]
 
 
-def test_a_job_that_will_never_start_is_told_and_no_job_is_left_in_the_queue(on_cluster: Cluster, tmp_path: Path) -> None:
-    told: list[str] = []
-    with pytest.raises(ZeroDivisionError), slurm.guarded(SLURM, tmp_path, threading.Event(), told.append) as (words, watch):
-        assert words == ["--slurm-jobname-prefix", slurm.job_prefix(tmp_path)]
-        number = submit(on_cluster, tmp_path, "--time=600", "--output=/dev/null", "--wrap=true")
-        deadline = time.monotonic() + 20
-        while not told:
-            assert time.monotonic() < deadline
-            assert not watch(os.getpid())
-            time.sleep(0.2)
-        assert not watch(os.getpid())
-        raise ZeroDivisionError
-    assert len(told) == 2 and f"job {number} (rule_simulate_box) will not start: PartitionTimeLimit" in told[0]
-    assert told[1] == "1 jobs were still in the queue and are cancelled" and slurm.jobs(tmp_path) == []
+@pytest.fixture
+def campaign(tmp_path: Path, decks: Path, stand_in: Path, on_cluster: Cluster,  # noqa: F811
+             monkeypatch: pytest.MonkeyPatch) -> Iterator[Campaign]:
+    one = Campaign(tmp_path, source.plan("quick"), monkeypatch)
+    yield one
+    for each in one.queues:
+        each._end.set()
 
 
-def test_a_workflow_that_waits_for_forgotten_jobs_is_noticed(on_cluster: Cluster, tmp_path: Path) -> None:
-    log = tmp_path / "workflow.log"
-    waiting, working = (subprocess.Popen(["sh", "-c", words], start_new_session=True) for words in ("exec sleep 60", "sleep 60; true"))
-    try:
-        log.write_text("SLURM run ID\n")
-        told: list[str] = []
-        watch = slurm.Watch(tmp_path, log, told.append)
-        assert not watch(waiting.pid)
-        os.utime(log, (time.time() - 500, time.time() - 500))
-        assert not watch(working.pid)
-        number = submit(on_cluster, tmp_path, *LONG)
-        assert not watch(waiting.pid) and told == []
-        on_cluster.call("scancel", str(number))
-        slurm.adopt_or_cancel(tmp_path, threading.Event(), str, interval=0.2)
-        assert watch(waiting.pid) and "forgotten jobs" in told[0]
-    finally:
-        for process in (waiting, working):
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+FINISH = 'mkdir -p $out/replica-1; echo "{\\"inputs\\": \\"$inputs\\"}" > $out/replica-1/run.json'
 
 
-def test_a_scheduler_that_restarts_is_waited_for(on_cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(slurm, "_PAUSE", 0.3)
-    number = submit(on_cluster, tmp_path, *LONG)
+def test_a_job_tells_its_progress_and_its_end(campaign: Campaign) -> None:
+    told = json.dumps({"state": "running", "step": 7, "steps": 9, "host": "n1"}).replace('"', '\\"')
+    campaign.script(f'echo "{told}" > $report; sleep 2; {FINISH}')
+    assert campaign.start().result(60) is None
+    assert campaign.told["step"] == 7 and campaign.told["state"] == "running" and str(campaign.told["job"]).isdigit()
+    campaign.queues[0].close()
+    assert campaign.said == []
+
+
+@pytest.mark.parametrize(("text", "error", "words"), [
+    ('echo \'{"state": "failed", "message": "it blew up"}\' > $report; exit 1', RunError, "it blew up"),
+    ('echo \'{"state": "stopped", "message": "it goes on from step 5"}\' > $report; exit 1', Killed, "goes on from step 5"),
+    ("echo no module; exit 3", Killed, "its job [0-9]+ ended as FAILED, see .*log"),
+])
+def test_how_a_job_ended_is_told_by_its_files(campaign: Campaign, text: str, error: type[Exception], words: str) -> None:
+    campaign.script(text)
+    with pytest.raises(error, match=words) as caught:
+        campaign.start().result(60)
+    assert isinstance(caught.value, Killed) == (error is Killed)
+
+
+def test_jobs_of_a_dead_submitter_are_adopted_or_cancelled(campaign: Campaign, on_cluster: Cluster,
+                                                           wait_for: Callable[..., object]) -> None:  # noqa: F811
+    campaign.script(f"echo x >> $out/started; sleep 4; {FINISH}")
+    campaign.start()
+    number = wait_for(lambda: campaign.told.get("job"), 60)
+    stray = on_cluster.call("sbatch", "--parsable", f"--job-name={queue.prefix(campaign.results)}00000000", "--output=/dev/null", "--wrap=sleep 60")
+    campaign.queues[0]._end.set()
+    campaign.queues[0]._thread.join()
+    campaign.told.clear()
+    assert campaign.start().result(60) is None
+    assert campaign.told["job"] == number and len(list(campaign.results.glob("*/*/*/started"))) == 1
+    (started,) = campaign.results.glob("*/*/*/started")
+    assert started.read_text() == "x\n" and on_cluster.jobs()[int(stray)][0] == "CANCELLED"
+    assert campaign.said == ["1 jobs of an earlier start cancelled", f"waiting for 1 jobs of an earlier start: {number}"]
+
+
+def test_what_is_under_way_is_taken_back(campaign: Campaign, wait_for: Callable[..., object]) -> None:  # noqa: F811
+    campaign.script("sleep 60")
+    future = campaign.start()
+    wait_for(lambda: campaign.told.get("job"), 60)
+    campaign.queues[0].close()
+    with pytest.raises(Interrupted):
+        future.result(1)
+    assert campaign.said == ["1 jobs were still in the queue and are cancelled"]
+    wait_for(lambda: not [row for row in SLURM.rows(queue.prefix(campaign.results)) or () if SLURM.lives(row)], 60)
+
+
+def test_a_scheduler_that_is_away_is_waited_for(campaign: Campaign, on_cluster: Cluster, monkeypatch: pytest.MonkeyPatch,
+                                               wait_for: Callable[..., object]) -> None:  # noqa: F811
+    monkeypatch.setattr(queue, "_SILENCE", 0.5)
+    campaign.script(f"sleep 1; {FINISH}")
     on_cluster.stop_controller()
-    with ThreadPoolExecutor(1) as pool:
-        found = pool.submit(slurm.jobs, tmp_path)
-        time.sleep(1.0)
-        # By this thread: daemons end with the thread that started them.
-        on_cluster.start_controller()
-        assert [job.number for job in found.result()] == [str(number)]
+    future = campaign.start()
+    wait_for(lambda: campaign.said, 60)
+    on_cluster.start_controller()
+    assert future.result(60) is None and campaign.said == ["the scheduler does not answer; waiting for it"]
+
+
+def test_a_refused_submission_fails_its_run_and_a_hopeless_one_is_told(campaign: Campaign, on_cluster: Cluster,
+                                                                      wait_for: Callable[..., object]) -> None:  # noqa: F811
+    campaign.script("sleep 60")
+    (run,) = campaign.plan.series[0].runs
+    one, out = campaign.queue(), campaign.results / campaign.plan.series[0].place
+    with pytest.raises(RunError, match="its job was refused, .*configuration is not available"):
+        one.start(run, out, Resources(memory=1e12), lambda **facts: None).result(60)
+    one.start(run, out, Resources(time=36000, memory=1e8), lambda **facts: None)
+    wait_for(lambda: campaign.said, 60)
+    assert "will not start: PartitionTimeLimit" in campaign.said[0]
+    one.close()
+
+
+def test_another_scheduler_is_served_by_its_commands(tmp_path: Path, decks: Path, stand_in: Path,  # noqa: F811
+                                                     monkeypatch: pytest.MonkeyPatch, wait_for: Callable[..., object]) -> None:  # noqa: F811
+    """One like PBS, that tells no names: jobs are processes, their list is a folder."""
+    spool = tmp_path / "spool"
+    spool.mkdir()
+    for name, text in {"qsub": f'"${{@: -1}}" & echo $! > {spool}/$!; echo "$!.server"', "qdel": 'for j in "$@"; do kill ${j%.server}; done',
+                       "qstat": f'cd {spool}; for j in *; do kill -0 $j 2>/dev/null && echo "$j.server some R"; done; true'}.items():
+        (tmp_path / name).write_text(f"#!/bin/bash\n{text}\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    campaign = Campaign(tmp_path, source.plan("quick"), monkeypatch)
+    campaign.site = written(tmp_path, """
+[jobs]
+poll = "0.2 s"
+latency = "1 s"
+options = "-q main"
+[commands]
+submit = "qsub -N {name} -l select=1:ncpus={cores}:mem={memory_mb}mb -l walltime={seconds} {options} {script}"
+status = "qstat -u {user}"
+cancel = "qdel {jobs}"
+[answers]
+job = '^(?P<job>\\\\S+)'
+line = '^(?P<job>\\\\S+) \\\\S+ (?P<state>\\\\S+)'
+waiting = ["Q", "H"]
+running = ["R", "E"]
+""".replace("\\\\", "\\"))
+    slurm.check(campaign.site, [Resources()])
+    campaign.script(f"echo x >> $out/started; sleep 4; {FINISH}")
+    campaign.start()
+    number = str(wait_for(lambda: campaign.told.get("job"), 60))
+    assert number.endswith(".server")
+    # Its submitter is killed; the number is all that the next one knows of the job.
+    campaign.queues[0]._end.set()
+    campaign.queues[0]._thread.join()
+    campaign.queues.append(Queue(campaign.site, campaign.results, campaign.plan, campaign.said.append, known=lambda name: number))
+    assert campaign.start(queue_of=campaign.queues[1]).result(60) is None
+    assert (campaign.results / campaign.plan.series[0].place / "started").read_text() == "x\n"
+    campaign.queues[1].close()
+    assert campaign.said == []
 
 
 def test_liggghts_runs_with_mpi_in_a_job(on_cluster: Cluster, tmp_path: Path) -> None:
@@ -262,16 +276,15 @@ def test_liggghts_runs_with_mpi_in_a_job(on_cluster: Cluster, tmp_path: Path) ->
     program.write_text("import subprocess, sys\nfrom pathlib import Path\nfrom dembark.validation import engines\n"
                        "engine, ranks = engines.find('liggghts'), int(sys.argv[1])\n"
                        f"sys.exit(subprocess.run(engine.command(Path({str(deck)!r}), {{}}, ranks), env=engine.environment()).returncode)\n")
-    # As the executor starts them: one rank as a step of its own, more in the allocation with most of Slurm's variables hidden.
     script = tmp_path / "job.sh"
     script.write_text(f"""#!/bin/bash
 set -e
-srun -n1 {sys.executable} {program} 1
-for v in $(env | sed -n 's/^\\(SLURM_[A-Z_]*\\)=.*/\\1/p' | grep -v -e JOB_ID -e CONF); do unset $v; done
+{sys.executable} {program} 1
 {sys.executable} {program} 2
 DEMBARK_MPIRUN="srun --mpi=pmix" {sys.executable} {program} 2
 """)
     log = tmp_path / "log"
-    on_cluster.call("sbatch", "--wait", "--ntasks=2", "--time=1", f"--output={log}", str(script), check=False)
+    on_cluster.call("sbatch", "--wait", "--ntasks=2", "--time=2", f"--output={log}", str(script), check=False)
     text = log.read_text()
     assert text.count("1 by 1 by 1 MPI processor grid") == 1 and text.count("1 by 1 by 2 MPI processor grid") == 2, text
+

@@ -16,7 +16,7 @@ from harness import decks, environment, stand_in, wait_for  # noqa: F401
 from slurm_cluster import Cluster
 
 from dembark.common.files import read_json
-from dembark.validation.campaigns import profiles, slurm
+from dembark.validation.runs import queue, site
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
@@ -46,14 +46,24 @@ RUNS = 4
 
 
 @pytest.fixture
-def site(tmp_path: Path) -> Path:
-    """A site's profile: the shipped one for Slurm, asking after its jobs more often, and a preamble."""
-    folder = tmp_path / "site profile"
-    folder.mkdir()
-    text = (profiles.find("slurm").folder / "config.yaml").read_text()
-    (folder / "config.yaml").write_text(text.replace("checks: 20", "checks: 2").replace("latency-wait: 60", "latency-wait: 10"))
-    (folder / "preamble.sh").write_text(f"echo read by ${{SLURM_JOB_ID:-nobody}} >> '{tmp_path}/preamble.log'\nexport SITE=$UNSET\n")
-    return folder
+def cluster_file(tmp_path: Path) -> Path:
+    """A site's file: the shipped Slurm, asked after its jobs more often, and a preamble."""
+    (tmp_path / "my site.toml").write_text(f"""base = "slurm"
+preamble = '''
+echo read by ${{SLURM_JOB_ID:-nobody}} >> "{tmp_path}/preamble.log"
+export SITE=$UNSET
+'''
+[jobs]
+poll = "1 s"
+latency = "3 s"
+""")
+    return tmp_path / "my site.toml"
+
+
+def jobs(results: Path) -> list[str]:
+    """Numbers of the campaign's jobs that have not ended."""
+    slurm = site.find("slurm")
+    return [row.job for row in slurm.rows(queue.prefix(results)) or () if slurm.lives(row)]
 
 
 class Campaign:
@@ -69,8 +79,8 @@ class Campaign:
             return subprocess.Popen([sys.executable, "-m", "dembark.validation.cli", *words], cwd=self.folder, env=self.environment,
                                     stdout=out, stderr=error)
 
-    def submit(self, site: Path) -> subprocess.Popen[bytes]:
-        return self.start("submit", str(self.file), "--executor", str(site), "--out", str(self.results))
+    def submit(self, cluster_file: Path) -> subprocess.Popen[bytes]:
+        return self.start("submit", str(self.file), "--executor", str(cluster_file), "--out", str(self.results))
 
     def said(self) -> str:
         """What the process that was started last has written to its error output."""
@@ -86,8 +96,7 @@ class Campaign:
         return process.returncode, (self.folder / "out").read_text(), self.said()
 
     def log(self) -> str:
-        path = self.results / "workflow.log"
-        return path.read_text()[-4000:] if path.is_file() else ""
+        return "".join(path.read_text()[-2000:] for path in sorted(self.results.glob(".jobs/*.log")))
 
     def records(self) -> list[dict[str, object]]:
         """Records of all finished runs."""
@@ -103,7 +112,8 @@ class Campaign:
 def campaign(on_cluster: Cluster, tmp_path: Path, environment: dict[str, str]) -> Iterator[Campaign]:
     one = Campaign(tmp_path, environment | on_cluster.environment | {"PYTHONPATH": environment["PYTHONPATH"]})
     yield one
-    slurm.cancel_all(one.results)
+    for number in jobs(one.results):
+        on_cluster.call("scancel", number, check=False)
 
 
 def engines_at_work(results: Path, count: int) -> list[int]:
@@ -114,8 +124,8 @@ def engines_at_work(results: Path, count: int) -> list[int]:
 
 
 def test_a_campaign_survives_kills_of_a_run_the_scheduler_and_the_submitter(
-        campaign: Campaign, on_cluster: Cluster, site: Path, wait_for: Callable[..., object]) -> None:
-    process = campaign.submit(site)
+        campaign: Campaign, on_cluster: Cluster, cluster_file: Path, wait_for: Callable[..., object]) -> None:
+    process = campaign.submit(cluster_file)
     try:
         killed, held, *_ = wait_for(lambda: process.poll() is None and engines_at_work(campaign.results, 2), 400)
         os.kill(held, signal.SIGSTOP)
@@ -137,15 +147,15 @@ def test_a_campaign_survives_kills_of_a_run_the_scheduler_and_the_submitter(
     killed = [record for record in records if record["attempts"] > 1]
     assert killed and all(record["resumed_at"] for record in killed)
     assert sorted(state for state, _ in campaign.stored()) == ["finished"] * RUNS
-    assert slurm.jobs(campaign.results) == [] and not list(campaign.results.glob("**/.replica-*.work-*"))
+    assert jobs(campaign.results) == [] and not list(campaign.results.glob("**/.replica-*.work-*"))
     assert len((campaign.results / "report.html").read_text().split()) == RUNS
     places = {line.split()[-1] for line in (campaign.folder / "preamble.log").read_text().splitlines()}
     assert "nobody" in places and len(places) > RUNS
 
 
 @pytest.mark.slow
-def test_runs_of_a_lost_node_go_on_elsewhere(campaign: Campaign, on_cluster: Cluster, site: Path, wait_for: Callable[..., object]) -> None:
-    process = campaign.submit(site)
+def test_runs_of_a_lost_node_go_on_elsewhere(campaign: Campaign, on_cluster: Cluster, cluster_file: Path, wait_for: Callable[..., object]) -> None:
+    process = campaign.submit(cluster_file)
     try:
         wait_for(lambda: process.poll() is None and engines_at_work(campaign.results, 1), 400)
         # All four fit on the first node.
@@ -161,22 +171,25 @@ def test_runs_of_a_lost_node_go_on_elsewhere(campaign: Campaign, on_cluster: Clu
 
 @pytest.mark.slow
 def test_a_terminated_submitter_takes_its_jobs_back_and_they_go_on_later(
-        campaign: Campaign, site: Path, wait_for: Callable[..., object]) -> None:
-    process = campaign.submit(site)
+        campaign: Campaign, cluster_file: Path, wait_for: Callable[..., object]) -> None:
+    """Its measurements are jobs as well."""
+    campaign.file.write_text(CAMPAIGN + '[resources.measure]\nmemory = "200 MB"\ntime = "2 min"\n')
+    process = campaign.submit(cluster_file)
     wait_for(lambda: process.poll() is None and engines_at_work(campaign.results, 1), 400)
     process.terminate()
     code, _, error = campaign.end(process, 400)
     assert code == 130 and "interrupted" in error
-    wait_for(lambda: not slurm.jobs(campaign.results), 120)
+    wait_for(lambda: not jobs(campaign.results), 120)
     code, out, error = campaign.end(campaign.start("resume", str(campaign.results)))
     assert code == 0, campaign.log() + out + error
     records = campaign.records()
     assert len(records) == RUNS and any(record["resumed_at"] and record["attempts"] == 2 for record in records)
+    assert len(list(campaign.results.glob("*/*/*/.measure.job.json"))) == RUNS == len(list(campaign.results.glob("*/*/*/metrics.json")))
 
 
-def test_what_slurm_refuses_is_told_before_anything_is_submitted(campaign: Campaign, on_cluster: Cluster, site: Path) -> None:
+def test_what_slurm_refuses_is_told_before_anything_is_submitted(campaign: Campaign, on_cluster: Cluster, cluster_file: Path) -> None:
     before = set(on_cluster.jobs())
     campaign.file.write_text(CAMPAIGN.replace("2 min", "61 min"))
-    code, _, error = campaign.end(campaign.submit(site))
+    code, _, error = campaign.end(campaign.submit(cluster_file))
     assert code == 2 and error.count("\n") == 1 and "61 min exceed the partition's limit of 60 min" in error
-    assert set(on_cluster.jobs()) == before and not (campaign.results / "workflow.log").exists()
+    assert set(on_cluster.jobs()) == before and not (campaign.results / ".jobs").exists()

@@ -17,8 +17,10 @@ from slurm_cluster import Cluster
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
-from dembark.validation import cases, engines, restarts
-from dembark.validation.campaigns import profiles, slurm
+from dembark.validation import engines
+from dembark.validation.case import folders
+from dembark.validation.runs import queue, restarts
+from dembark.validation.runs import site as sites
 
 pytestmark = pytest.mark.slow
 
@@ -81,8 +83,8 @@ def wait(question, seconds: float, process: subprocess.Popen[str], folder: Path)
 
 def outcome(folder: Path, process: subprocess.Popen[str], seconds: float = 1200) -> None:
     code = process.wait(seconds)
-    log = folder / "results" / "workflow.log"
-    assert code == 0, (folder / "dembark.log").read_text()[-4000:] + (log.read_text()[-4000:] if log.exists() else "")
+    logs = "".join(path.read_text()[-1000:] for path in folder.glob("results/.jobs/*.log"))
+    assert code == 0, (folder / "dembark.log").read_text()[-4000:] + logs
 
 
 def records(results: Path) -> dict[str, dict]:
@@ -97,7 +99,7 @@ def quantities(results: Path) -> dict[tuple[str, str], dict]:
 @pytest.fixture
 def real_engines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Both engines, and a copy of the case: whoever edits its deck meanwhile would change the inputs."""
-    shutil.copytree(cases.deck_root() / "silo", tmp_path / "decks" / "silo")
+    shutil.copytree(folders.package_root() / "silo", tmp_path / "decks" / "silo")
     monkeypatch.setenv("DEMBARK_DECKS", str(tmp_path / "decks"))
     try:
         for name in ("liggghts", "yade"):
@@ -106,12 +108,17 @@ def real_engines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         pytest.skip(str(error))
 
 
-def write_profile(folder: Path, preamble: str = "") -> None:
-    """The shipped profile for Slurm, asking after its jobs more often, with a preamble."""
-    folder.mkdir()
-    text = (profiles.find("slurm").folder / "config.yaml").read_text()
-    (folder / "config.yaml").write_text(text.replace("checks: 20", "checks: 5").replace("latency-wait: 60", "latency-wait: 10"))
-    (folder / "preamble.sh").write_text(preamble)
+def write_site(folder: Path, preamble: str = "") -> Path:
+    """The shipped Slurm, asked after its jobs more often, with a preamble."""
+    file = folder / "site.toml"
+    file.write_text(f"base = 'slurm'\npreamble = '''{preamble}'''\n[jobs]\npoll = '2 s'\nlatency = '10 s'\n")
+    return file
+
+
+def jobs(results: Path) -> list[str]:
+    """Numbers of the campaign's jobs that have not ended."""
+    slurm = sites.find("slurm")
+    return [row.job for row in slurm.rows(queue.prefix(results)) or () if slurm.lives(row)]
 
 
 def with_faults(folder: Path, site: Path, cluster: Cluster) -> tuple[Path, Path]:
@@ -133,22 +140,22 @@ def with_faults(folder: Path, site: Path, cluster: Cluster) -> tuple[Path, Path]
 
 def test_a_sweep_of_both_engines_survives_and_gives_the_numbers_of_one_without_faults(
         tmp_path: Path, on_cluster: Cluster, real_engines: None) -> None:
-    site, results, clean = tmp_path / "site", tmp_path / "results", tmp_path / "clean"
-    write_profile(site)
+    site, results, clean = write_site(tmp_path), tmp_path / "results", tmp_path / "clean"
     (tmp_path / "friction.toml").write_text(CAMPAIGN)
     try:
         killed, frozen = with_faults(tmp_path, site, on_cluster)
-        assert slurm.jobs(results)
+        assert jobs(results)
         outcome(tmp_path, dembark(tmp_path, "resume", str(results)))
     finally:
-        slurm.cancel_all(results)
-    ended = [state for state, comment in on_cluster.jobs().values() if "simulate" in comment]
+        for number in jobs(results):
+            on_cluster.call("scancel", number, check=False)
+    ended = [state for state, comment in on_cluster.jobs().values() if "silo" in comment]
     assert "TIMEOUT" in ended and "FAILED" in ended
 
     # Every run complete, exactly once, and nothing left.
     found = records(results)
     assert len(found) == RUNS == len({record["inputs"] for record in found.values()})
-    assert slurm.jobs(results) == [] and not list(results.glob("*/*/*/.replica-*.work-*"))
+    assert jobs(results) == [] and not list(results.glob("*/*/*/.replica-*.work-*"))
     for work in (killed, frozen):
         record = found[str((work.parent / work.name[1:].partition(".work-")[0]).relative_to(results))]
         assert record["attempts"] == 2 and len(record["resumed_at"]) == 1 and record["resumed_at"][0] > 0
@@ -178,8 +185,7 @@ def test_a_sweep_of_both_engines_survives_and_gives_the_numbers_of_one_without_f
 
 @pytest.mark.parametrize("launcher", ["", "srun --mpi=pmix"])
 def test_a_run_with_mpi_loses_a_rank_and_goes_on(tmp_path: Path, on_cluster: Cluster, real_engines: None, launcher: str) -> None:
-    site, results, file = tmp_path / "site", tmp_path / "results", tmp_path / "ranks.toml"
-    write_profile(site, f"export DEMBARK_MPIRUN='{launcher}'\n")
+    site, results, file = write_site(tmp_path, f'export DEMBARK_MPIRUN="{launcher}"'), tmp_path / "results", tmp_path / "ranks.toml"
     text = CAMPAIGN.replace('engines = ["liggghts", "yade"]', 'engines = ["liggghts"]').replace("replicas = 3", "replicas = 1")
     file.write_text(text.replace("[0.3, 0.5]", "[0.3]").replace('restart_interval = "0.2 s"', 'restart_interval = "0.1 s"\nranks = 2'))
     process = dembark(tmp_path, "submit", str(file), "--executor", str(site), "--out", str(results))
@@ -190,9 +196,10 @@ def test_a_run_with_mpi_loses_a_rank_and_goes_on(tmp_path: Path, on_cluster: Clu
     finally:
         process.kill()
         process.wait()
-        slurm.cancel_all(results)
+        for number in jobs(results):
+            on_cluster.call("scancel", number, check=False)
     (record,) = records(results).values()
     assert record["attempts"] == 2 and record["resumed_at"][0] > 0 and record["provenance"]["ranks"] == 2
     assert record["command"][0] == (launcher.split()[0] if launcher else "mpirun")
-    states = [state for state, comment in on_cluster.jobs().values() if "simulate_silo" in comment]
+    states = [state for state, comment in on_cluster.jobs().values() if "silo" in comment]
     assert "FAILED" in states and "COMPLETED" in states

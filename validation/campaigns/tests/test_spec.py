@@ -176,7 +176,7 @@ def test_a_mistake_gets_one_line_before_anything_starts(name: str, write, tmp_pa
     (["nowhere.toml"], "there is no campaign 'nowhere.toml'"),
     (["sub/nowhere.toml"], "there is no file sub/nowhere.toml"),
     (["."], "is a folder"),
-    (["small", "--executor", "slrum"], "--executor slrum is neither local, nor slurm, nor the folder"),
+    (["small", "--executor", "slrum"], "--executor slrum is neither local, nor slurm, nor the file of a site"),
     (["small", "--jobs", "3"], "--jobs is for a cluster"),
     (["wide", "--cores", "2"], "is to run on 3 cores, 2 are there"),
     (["large", "--cores", "2"], "is to have 1e+03 GB of memory"),

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 from dembark.common.errors import DembarkError, RunError
+from dembark.validation import engines
 from dembark.validation.campaigns import store
-from dembark.validation.campaigns.rates import ANY_CASE, MEASURED, Rates
-from dembark.validation.campaigns.schema import KEYS, TABLES, VERSION
-from dembark.validation.plan import Series, campaign
+from dembark.validation.campaigns.rates import Rates
+from dembark.validation.runs.plan import Series, campaign
+from dembark.validation.runs.schema import KEYS, TABLES, VERSION
+from dembark.validation.runs.table import Table
 from harness import decks, stand_in  # noqa: F401
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
@@ -41,6 +43,16 @@ def put(results: Path, one: Series, quantities: list[dict[str, Any]], commit: st
     (results / one.place / "metrics.json").write_text(json.dumps(content))
 
 
+def collect(results: Path, label: str, planned: list[Series], messages: dict[str, str] | None = None, whole: bool = False,
+            sweeps: list[dict[str, Any]] | None = None) -> None:
+    """What the executor does with the store before and after the runs of `planned`."""
+    table = Table(results, label)
+    table.enter({str(one.place / run.folder_name): run for one in planned for run in one.runs}, results, {}, whole)
+    for name, message in (messages or {}).items():
+        table.transition(name, "failed", message=message)
+    store.collect(results, label, [one.place for one in planned], sweeps)
+
+
 def test_every_run_and_quantity_is_there_once_however_often_they_are_collected(tmp_path: Path) -> None:
     planned = campaign("quick")
     for index, one in enumerate(planned):
@@ -50,12 +62,12 @@ def test_every_run_and_quantity_is_there_once_however_often_they_are_collected(t
          "measured": {"commit": "c1", "dirty": None, "at": "2026"}}))
     point = {"variant": "dry", "base": "dry", "values": {"grain_count": 10, "variant": "dry"}}
     sweeps = [{"case": "box", "name": "sweep 1", "points": [point]}]
-    store.collect(tmp_path, "boxes", planned, {}, True, sweeps)
+    collect(tmp_path, "boxes", planned, {}, True, sweeps)
     first = {table: store.read(tmp_path, table) for table in TABLES}
     for _ in range(2):
         for one in planned:
-            store.collect(tmp_path, "boxes", [one])
-        store.collect(tmp_path, "boxes", planned, {}, True, sweeps)
+            collect(tmp_path, "boxes", [one])
+        collect(tmp_path, "boxes", planned, {}, True, sweeps)
     assert {table: store.read(tmp_path, table) for table in TABLES} == first
     assert len(first["runs"]) == 3 and len(first["quantities"]) == 6 and len(first["comparisons"]) == 1 and len(first["points"]) == 2
     row = store.read_quantities(tmp_path, case_name="box", variant="dry", engine="yade", name="k")[0]
@@ -71,13 +83,13 @@ def test_runs_that_are_not_finished_are_told_from_those_that_are(tmp_path: Path)
     planned = campaign("quick")
     put(tmp_path, planned[0], [quantity("k", 1.0)])
     failed = planned[1].runs[0]
-    store.collect(tmp_path, "boxes", planned, {failed.name: "it blew up"}, True)
+    collect(tmp_path, "boxes", planned, {failed.name: "it blew up"}, True)
     rows = {row["run_id"]: (row["state"], row["message"]) for row in store.read_runs(tmp_path)}
-    assert rows[planned[0].runs[0].inputs] == ("finished", None) and rows[failed.inputs] == ("failed", "it blew up")
-    assert [state for state, _ in rows.values()].count("missing") == 1 and len(rows) == 3
+    assert rows[planned[0].runs[0].inputs] == ("finished", "") and rows[failed.inputs] == ("failed", "it blew up")
+    assert [state for state, _ in rows.values()].count("waiting") == 1 and len(rows) == 3
     put(tmp_path, planned[1], [quantity("k", 1.0)])
-    store.collect(tmp_path, "boxes", [planned[1]])
-    assert len(store.read_runs(tmp_path, state=["finished", "missing"])) == 3
+    collect(tmp_path, "boxes", [planned[1]])
+    assert len(store.read_runs(tmp_path, state=["finished", "waiting"])) == 3
 
 
 def test_rows_of_several_commits_stay_and_the_same_commit_replaces_its_own(tmp_path: Path) -> None:
@@ -85,27 +97,27 @@ def test_rows_of_several_commits_stay_and_the_same_commit_replaces_its_own(tmp_p
     for index, commit in enumerate(("c1", "c2", "c2")):
         others = [quantity("renamed", 1.0)] if index == 1 else []
         put(tmp_path, one, [quantity("k", 1.0 + index), *others], commit, f"2026-01-0{index + 1}")
-        store.collect(tmp_path, "boxes", [one])
+        collect(tmp_path, "boxes", [one])
     rows = store.trend(tmp_path, "box", "wet", "liggghts", "k")
     assert [(row["commit_hash"], row["value"]) for row in rows] == [("c1", 1.0), ("c2", 3.0)]
     assert not store.read_quantities(tmp_path, name="renamed")
 
 
 def test_runs_of_other_inputs_are_superseded_not_lost(tmp_path: Path, decks: Path) -> None:  # noqa: F811
-    from dembark.validation import cases
+    from dembark.validation.case import folders
 
     before = campaign("quick")
-    store.collect(tmp_path, "boxes", campaign("standard"), {}, True)  # never finished: not to be kept
+    collect(tmp_path, "boxes", campaign("standard"), {}, True)  # never finished: not to be kept
     for one in before:
         put(tmp_path, one, [quantity("k", 1.0)])
-    store.collect(tmp_path, "boxes", before, {}, True)
+    collect(tmp_path, "boxes", before, {}, True)
     path = decks / "box/case.toml"
     path.write_text(path.read_text().replace("value = 0.35", "value = 0.36").replace(', {variant = "wet", engines = ["liggghts"]}', ""))
-    cases.load.cache_clear()
+    folders.load.cache_clear()
     after = campaign("quick")
     for one in after:
         put(tmp_path, one, [quantity("k", 2.0)])
-    store.collect(tmp_path, "boxes", after, {}, True)
+    collect(tmp_path, "boxes", after, {}, True)
     rows = store.read_runs(tmp_path)
     assert {row["run_id"] for row in rows if row["state"] == "finished"} == {run.inputs for one in after for run in one.runs}
     assert {row["run_id"] for row in rows if row["state"] == "superseded"} == {run.inputs for one in before for run in one.runs}
@@ -114,25 +126,25 @@ def test_runs_of_other_inputs_are_superseded_not_lost(tmp_path: Path, decks: Pat
 def test_a_series_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     one = campaign("quick")[0]
     put(tmp_path, one, [quantity("k", 1.0), quantity("l", 1.0)])
-    store.collect(tmp_path, "boxes", [one])
+    collect(tmp_path, "boxes", [one])
     put(tmp_path, one, [quantity("k", 5.0), {**quantity("l", 5.0), "name": None}])
     with pytest.raises(RunError, match="store.sqlite cannot be written"):
-        store.collect(tmp_path, "boxes", [one])
+        collect(tmp_path, "boxes", [one])
     assert {row["name"]: row["value"] for row in store.read_quantities(tmp_path)} == {"k": 1.0, "l": 1.0}
 
 
 def test_a_curve_is_that_of_the_last_measurement(tmp_path: Path, decks: Path) -> None:  # noqa: F811
     (tmp_path / "c.toml").write_text('[campaign]\nname = "c"\nprofile = "quick"\n[[sweeps]]\ncase = "box"\nengines = ["yade"]\n'
                                      'grid = { grain_count = [30, 10, 20] }\n')
-    from dembark.validation.campaigns.source import Source
+    from dembark.validation.campaigns import source
 
-    planned = Source(file=tmp_path / "c.toml").series()
+    planned = list(source.plan(file=tmp_path / "c.toml").series)
     for commit in ("a", "b"):
         for one in planned:
             count = one.runs[0].values["grain_count"]
             interval = [count * 2 - 1, count * 2 + 1] if count > 10 else None
             put(tmp_path, one, [quantity("k", count * (2 if commit == "b" else 1), interval)], commit, commit)
-        store.collect(tmp_path, "c", planned)
+        collect(tmp_path, "c", planned)
     places, measured, half = store.curve(tmp_path, "box", "yade", "k", "grain_count")
     assert list(places) == [10, 20, 30] and list(measured) == [20, 40, 60] and np.isnan(half[0]) and list(half[1:]) == [1, 1]
     assert list(store.curve(tmp_path, "box", "yade", "k", "grain_count", grain_count=20)[1]) == [40]
@@ -142,7 +154,7 @@ def test_a_curve_is_that_of_the_last_measurement(tmp_path: Path, decks: Path) ->
 def test_tables_go_to_csv(tmp_path: Path) -> None:
     one = campaign("quick")[0]
     put(tmp_path, one, [quantity("k", 0.1 + 0.2)])
-    store.collect(tmp_path, "boxes", [one])
+    collect(tmp_path, "boxes", [one])
     store.export(tmp_path, "quantities", tmp_path / "q.csv")
     header, row = (tmp_path / "q.csv").read_text().splitlines()
     assert header.split(",") == list(TABLES["quantities"]) and str(0.1 + 0.2) in row
@@ -151,7 +163,7 @@ def test_tables_go_to_csv(tmp_path: Path) -> None:
 def test_a_reader_says_what_is_wrong(tmp_path: Path) -> None:
     with pytest.raises(DembarkError, match="there is no store"):
         store.read_runs(tmp_path)
-    store.collect(tmp_path, "boxes", [])
+    collect(tmp_path, "boxes", [])
     for wrong, words in ((lambda: store.read(tmp_path, "quantity"), "did you mean quantities"),
                          (lambda: store.read_runs(tmp_path, host_name="x"), "unknown column"),
                          (lambda: store.query(tmp_path, "SELECT nothing FROM runs"), "cannot be read"),
@@ -161,7 +173,7 @@ def test_a_reader_says_what_is_wrong(tmp_path: Path) -> None:
     with sqlite3.connect(tmp_path / store.FILE) as connection:
         assert connection.execute("PRAGMA user_version").fetchone() == (VERSION,)
         connection.execute(f"PRAGMA user_version = {VERSION + 1}")
-    for use in (lambda: store.read_runs(tmp_path), lambda: store.collect(tmp_path, "boxes", [])):
+    for use in (lambda: store.read_runs(tmp_path), lambda: collect(tmp_path, "boxes", [])):
         with pytest.raises(DembarkError, match="use a newer dembark"):
             use()
     (tmp_path / store.FILE).write_bytes(b"no data base" * 100)
@@ -176,10 +188,11 @@ def test_keys_are_columns() -> None:
 def test_rates_are_those_of_the_store_before_those_of_the_table(tmp_path: Path) -> None:
     planned = campaign("standard")
     none = Rates(tmp_path / store.FILE)
-    assert none.of("silo", "yade").value == MEASURED["silo", "yade"] and none.of("box", "yade").value == ANY_CASE["yade"]
+    facts = engines.facts("yade")
+    assert none.of("silo", "yade").value == facts.rates["silo"] and none.of("box", "yade").value == facts.typical_rate
     for speed, one in zip((400.0, 100.0), planned, strict=True):
         put(tmp_path, one, [], speed=speed, ranks=4 if one.place.name == "yade" else 1)
-    store.collect(tmp_path, "boxes", planned)
+    collect(tmp_path, "boxes", planned)
     rates = Rates(tmp_path / store.FILE)
     by_engine = {one.place.name: rates.of("box", one.place.name) for one in planned}
     assert by_engine["yade"].value == 100.0 and by_engine["liggghts"].value == 100.0 and "3 runs measured" in by_engine["yade"].source

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.validation.checks import carried_liquid, liquid_exchange
+from dembark.validation.checks import liquid_exchange
 from dembark.validation.checks.run import Replica
 
 CASE = Path(__file__).resolve().parents[3] / "input_decks/liquid_exchange/case.toml"
@@ -91,19 +91,3 @@ def test_wrong_books_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, spoil
     monkeypatch.setattr(liquid_exchange, "expected", lambda *words: due("cap"))
     found, _, _ = liquid_exchange.quantities([run])
     assert {one.name for one in found if one.judged()[0] == "fail"} == names
-
-
-def test_carried_liquid_of_any_case(tmp_path: Path) -> None:
-    steps = np.arange(1, 401)
-    bridges = 0.3 + 0.01 * np.sin(steps)
-    header = "step,time,kinetic_energy,base_fz,liquid_grains,liquid_bridges,liquid_walls,liquid_lost,bridge_count"
-    for drift, verdict in ((0.0, "pass"), (1e-11, "fail")):
-        table = np.column_stack([steps, steps * 1e-3, steps * 0 + 1.0, steps * 0, (0.7 - bridges) + drift * steps, bridges,
-                                 steps * 0 + 0.25, steps * 0 + 0.05, 300 + steps % 3])
-        np.savetxt(tmp_path / "time.csv", table, delimiter=",", fmt="%.15g", comments="", header=header)
-        run = Replica(tmp_path, {"parameters": {"liquid_content": 0.01, "grain_count": 100}})
-        found = {one.name: one for one in carried_liquid.liquid_quantities([run])}
-        assert found["liquid_total"].judged()[0] == verdict
-        assert found["bridge_count"].estimate.value == pytest.approx(3.01, abs=0.01)
-        assert found["liquid_in_bridges"].estimate.value == pytest.approx(0.3, abs=0.002)
-    assert carried_liquid.liquid_quantities([Replica(tmp_path, {"parameters": {"liquid_content": 0.0}})]) == []

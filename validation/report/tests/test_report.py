@@ -1,152 +1,117 @@
-"""The report stands alone, hides nothing, and its numbers read well."""
+"""The report says what failed on its first page, names what is missing, opens no trajectory, and its PDF can be read."""
 
 import csv
 import json
 import re
 import sys
-import types
+from pathlib import Path
 
+import full_size
 import numpy as np
+import pdf_pages as pdf
 import pytest
-import xarray
 from dembark.common.errors import RunError
-from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.validation import report
-from dembark.validation.compare import compare
-from dembark.validation.metrics import measure
-from dembark.validation.report import fields, figures, numbers, pictures
-from dembark.validation.report.build import _fields, overview
-from dembark.validation.verification import scenes
-from synthetic import plug_flow, silo
+from dembark.validation.judge import result
+from dembark.validation.report import figures, front, numbers, scatter, sections
+from dembark.validation.report.build import write_pdf
+from dembark.validation.report.gather import Row, gather
+
+build_module = sys.modules[write_pdf.__module__]
+
+_opened: list[str] | None = None
+
+
+def _hook(event, arguments):
+    if _opened is not None and event == "open":
+        _opened.append(str(arguments[0]))
+
+
+sys.addaudithook(_hook)
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    """A silo in both engines, one of them with lost wall forces, a channel in one, and one run that failed."""
-    folder = tmp_path_factory.mktemp("results") / "quick"
-    for engine, lost in (("liggghts", 0.0), ("yade", 0.02)):
-        measure(silo(folder, engine=engine, noise=0.05, lost_wall_force=lost))
-    compare(folder / "silo" / "dry")
-    measure(plug_flow(folder))
-    runs = [
-        {"case": case, "variant": variant, "engine": engine, "replica": 1, "state": state, "message": message}
-        for case, variant, engine, state, message in (
-            ("silo", "dry", "liggghts", "finished", ""),
-            ("silo", "dry", "yade", "finished", ""),
-            ("plug_flow", "smooth", "liggghts", "finished", ""),
-            ("plug_flow", "smooth", "yade", "failed", "the engine was killed by SIGKILL <at> step 7"),
-        )
-    ]
-    (folder / "runs.json").write_text(json.dumps({"profile": "quick", "runs": runs}))
-    (folder / "plug_flow" / "smooth" / "liggghts" / "replica-1" / "grains.dump").write_text("gone")
+    """Two cases in both engines with a failed identity, a failure without tolerance, a run that failed, a result that cannot be read, and
+    trajectories that nobody may open."""
+    global _opened
+    folder = full_size.write(tmp_path_factory.mktemp("results") / "quick", ("silo", "log_pile"), variants=2)
+    full_size.change(folder / "silo/variant_0/yade/metrics.json", "quantity_0", verdict="fail", value=0.3, deviation=0.3, label="lost momentum")
+    full_size.change(folder / "log_pile/variant_1/liggghts/metrics.json", "quantity_6", verdict="fail", tolerance=None, label="too few contacts")
+    runs = json.loads((folder / "runs.json").read_text())
+    runs["runs"].append({"case": "plug_flow", "variant": "smooth", "engine": "yade", "replica": 1, "state": "failed",
+                         "message": "the engine was killed by SIGKILL <at> step 7"})
+    (folder / "runs.json").write_text(json.dumps(runs))
+    (folder / "silo/variant_1/yade/metrics.json").write_text('{"case": "silo"}')
+    for place in (path.parent for path in folder.glob("*/*/*/metrics.json")):
+        (place / "replica-1").mkdir()
+        for name in ("grains.dump", "contacts.dump", "run.json", "time.csv"):
+            (place / "replica-1" / name).write_text("not to be read")
+    written = sorted(path for path in folder.rglob("*") if path.is_file())
+    pages = []
+    _opened = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(build_module, "write_pdf", lambda html, path: pages.append(html) or write_pdf(html, path))
+        report.build(folder)
+    opened, _opened = _opened, None
+    return folder, pages[0], opened, written
+
+
+def test_no_trajectory_is_opened_and_no_result_is_written(results):
+    folder, _, opened, written = results
+    assert any(path.endswith("metrics.json") for path in opened) and not [path for path in opened if "replica-" in path]
+    made = {path for path in folder.rglob("*") if path.is_file()} - set(written)
+    assert {path.parent.name for path in made} == {"figures", "quick"} and {path.name for path in made if path.parent == folder} == {
+        "report.html", "report.pdf"}
+
+
+def test_the_first_page_says_what_failed_and_what_is_missing(results):
+    first = pdf.pages(results[1])[0]
+    assert "2 FAILED" in first and "lost momentum" in first and "too few contacts" in first
+    assert first.index("lost momentum") < first.index("too few contacts")
+    assert "the engine was killed by SIGKILL <at> step 7" in first
+    assert re.search(r"silo/variant_1/yade/metrics.json has no .*variant", first.replace(" ", " "))
+    assert re.search(r"identity conservation laws, the scheme against itself \d+ 1 \d+", first)
+
+
+def test_a_case_names_its_failed_identity_and_the_page_of_a_missing_case(results):
+    text = " ".join(pdf.pages(results[1]))
+    assert re.search(r"Identities: \d+ of \d+ within tolerance, \d+ open, 1 FAILED: lost momentum \(silo, variant 0, YADE\)", text)
+    assert "smooth: YADE, replica 1: the engine was killed" in text
+
+
+def test_html_has_contents_and_everything_and_stands_alone(results):
+    folder = results[0]
+    html = (folder / "report.html").read_text()
+    assert '<nav id="contents">' in html and html.count("<details>") > 6 and 'href="#silo-variant_0"' in html
+    links = re.findall(r'href="([^"#][^"]*)"', html)
+    assert links and all((folder / link).is_file() for link in links)
+    assert not re.search(r'src="(?!data:)', html) and "url(" not in html
+    assert "quantity σ<sub>zz</sub> number 11" in html
+    for text in (html, results[1]):
+        assert not re.search(r"\b(None|nan|inf)\b", pdf.text(text))
+
+
+def test_csv_holds_every_quantity_and_profile(results):
+    folder = results[0]
+    rows = list(csv.DictReader((folder / "figures/quantities.csv").open()))
+    assert len(rows) == 7 * 18 + 4 * 9 + 1
+    assert {row["evidence"] for row in rows} == {"experiment", "theory", "code", "identity", ""}
+    own = result.read(folder / "silo/variant_0/liggghts/metrics.json").profiles[1]
+    table = [row for row in csv.DictReader((folder / "figures/silo-variant_0-curve_1.csv").open()) if row["engine"] == "liggghts"]
+    np.testing.assert_allclose([float(row["value"]) for row in table], own["value"])
+
+
+def test_pdf_of_a_full_profile_is_short_and_begins_with_two_pages_of_verdicts(tmp_path, monkeypatch):
+    folder = full_size.write(tmp_path / "quick", variants=2, profiles=4)
+    for case in full_size.CASES:
+        full_size.change(folder / case / "variant_0/yade/metrics.json", "quantity_3", verdict="fail", value=1.4, deviation=0.4)
+    kept = []
+    monkeypatch.setattr(build_module, "write_pdf", lambda html, path: kept.append(html) or write_pdf(html, path))
     report.build(folder)
-    return folder
-
-
-def test_html_needs_no_other_file(results):
-    html = (results / "report.html").read_text()
-    assert not re.search(r'(?:src|href)="(?!data:|#)', html)
-    assert "url(" not in html
-    assert html.count("data:image/svg+xml;base64,") >= 4
-
-
-def test_pdf_is_written(results):
-    assert (results / "report.pdf").read_bytes().startswith(b"%PDF")
-
-
-def test_failed_check_is_shown_as_failed(results):
-    html = (results / "report.html").read_text()
-    assert '<tr class="fail' in html
-    rows = list(csv.DictReader((results / "figures" / "verdicts.csv").open()))
-    failed = {(row["engine"], row["quantity"]) for row in rows if row["verdict"] == "fail"}
-    assert ("YADE", "force_balance_error") in failed
-    assert ("LIGGGHTS", "force_balance_error") not in failed
-
-
-def test_overview_counts_the_verdicts_of_each_engine():
-    page, other = (types.SimpleNamespace(anchor=name) for name in ("silo-dry", "silo-wet"))
-    rows = [
-        {"page": one, "engine": engine, "verdict": verdict}
-        for one, engine, verdict in ((page, "YADE", "pass"), (page, "YADE", "pass"), (page, "LIGGGHTS", "fail"), (other, "YADE", "missing"))
-    ]
-    first, second = overview(rows)
-    assert first["counts"]["YADE"] == {"pass": 2, "fail": 0, "info": 0, "missing": 0} and first["counts"]["LIGGGHTS"]["fail"] == 1
-    assert second["page"] is other and second["counts"]["YADE"]["missing"] == 1
-
-
-def test_missing_run_is_shown_with_its_reason(results):
-    html = (results / "report.html").read_text()
-    assert "1 run is missing" in html
-    assert "the engine was killed by SIGKILL &lt;at&gt; step 7" in html
-
-
-def test_unreadable_dump_is_no_silent_gap(results):
-    assert re.search(r"No picture of LIGGGHTS: .*does not begin with", (results / "report.html").read_text())
-
-
-def test_every_profile_has_its_data_beside_it(results):
-    metrics = json.loads((results / "silo" / "dry" / "liggghts" / "metrics.json").read_text())
-    for profile in metrics["profiles"]:
-        rows = list(csv.DictReader((results / "figures" / f"silo-dry-{profile['name']}.csv").open()))
-        assert {row["engine"] for row in rows} == {"liggghts", "yade"}
-        own = [float(row["value"]) for row in rows if row["engine"] == "liggghts"]
-        np.testing.assert_allclose(own, profile["value"])
-    assert (results / "figures" / "scatter.csv").is_file()
-
-
-def test_fields_are_drawn_with_their_data_beside_them(results):
-    html = (results / "report.html").read_text()
-    assert "Fields over radius and height" in html and "Eulerian beside Lagrangian profiles" in html
-    rows = list(csv.DictReader((results / "figures" / "silo-dry-fields-section.csv").open()))
-    assert {row["engine"] for row in rows} == {"liggghts", "yade"}
-    fields = xarray.load_dataset(results / "silo" / "dry" / "yade" / "fields.nc", engine="h5netcdf")
-    place, stress = (np.array([float(row[name]) for row in rows if row["engine"] == "yade"]) for name in ("height_m", "sigma_zz_Pa"))
-    np.testing.assert_allclose(np.interp(place, fields.height, fields.stress_zz_section), stress)
-    assert (results / "figures" / "silo-dry-fields-maps.svg").is_file()
-
-
-def test_fields_that_cannot_be_drawn_are_no_silent_gap(tmp_path):
-    page = types.SimpleNamespace(folder=tmp_path, metrics={"yade": {}}, anchor="silo-dry", name="silo / dry")
-    assert _fields(page, tmp_path) == ([], "")
-    (tmp_path / "yade").mkdir()
-    (tmp_path / "yade" / "fields.nc").write_text("not NetCDF")
-    drawn, reason = _fields(page, tmp_path)
-    assert drawn == [] and reason.startswith("fields.nc cannot be drawn: ")
-
-
-def test_verification_is_a_chapter_and_its_verdicts_count(results):
-    html = (results / "report.html").read_text()
-    assert "Static balance" in html and 'href="#verification"' in html
-    own = {row["quantity"]: row["verdict"] for row in csv.DictReader((results / "figures" / "verdicts.csv").open()) if row["engine"] == "dembark"}
-    assert own["balance_order"] == own["mass_error"] == "pass"
-    written = json.loads((results / "verification.json").read_text())["quantities"]
-    assert {one["name"] for one in written} == own.keys()
-    assert (results / "figures" / "verification-balance.csv").is_file()
-
-
-def test_drum_is_drawn_without_a_single_impact_on_the_shell():
-    place, angle, force = np.array([-0.5, 0.5]), np.arange(-175.0, 180.0, 10.0), np.logspace(1.1, 5.9, 25)
-    none = np.zeros((len(angle), len(force)))
-    variables = {"impact_power": (("x", "z"), np.array([[0.0, 1.0], [2.0, 0.0]])), "shell_power": (("angle",), none[:, 0]),
-                 "shell_power_half": (("angle",), none[:, 0]), "shell_peaks": (("angle", "force"), none),
-                 **{name: (("log",), np.array([0.1])) for name in ("log_x", "log_z", "log_radius")}}
-    attributes = {"kind": "drum", "drum_radius": 1.0, "impact_speed": 0.1, "revolutions": 3, "replicas": 1, "impacts": 2, "log_length": 1.0}
-    one = xarray.Dataset(variables, {"x": place, "z": place, "angle": angle, "force": force}, attributes)
-    found, unrolled = fields.figures({"yade": one})
-    assert len(found.tables["power"][1]) == 4 and len(unrolled.tables["shell_power"][1]) == len(angle)
-    assert figures.svg(found.figure).startswith(b"<?xml") and figures.svg(unrolled.figure).startswith(b"<?xml")
-
-
-def test_pressure_in_a_grain_between_two_others():
-    """A row of three, pressed with the force F: F d over three volumes in the middle one, half of that at the ends."""
-    place = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
-    frame = scenes.grains(place, np.full(3, 0.5), low=-np.ones(3), high=np.full(3, 3.0))
-    pairs = np.array([[0, 1], [1, 2]])
-    links = scenes.contacts(place[pairs[:, 0]], np.tile([1.0, 0.0, 0.0], (2, 1)), np.tile([-6.0, 0.0, 0.0], (2, 1)), pairs)
-    middle = 6.0 * 1.0 / (3.0 * np.pi / 6.0)
-    np.testing.assert_allclose(pictures.grain_pressure(frame, links), [0.5 * middle, middle, 0.5 * middle])
-    wall = WallContacts(np.array([[-0.5, 0.0, 0.0]]), place[:1], np.array([[6.0, 0.0, 0.0]]))
-    np.testing.assert_allclose(pictures.grain_pressure(frame, links, [wall]), [middle, middle, 0.5 * middle])
+    assert pdf.page_count((folder / "report.pdf").read_bytes()) <= 40
+    pages = pdf.pages(kept[0])
+    assert "Bias and scatter" in pages[0] + pages[1] and pages[2].startswith("Silo")
 
 
 def test_nothing_to_report_is_an_error(tmp_path, monkeypatch):
@@ -155,36 +120,48 @@ def test_nothing_to_report_is_an_error(tmp_path, monkeypatch):
         report.build(tmp_path / "none")
 
 
-def test_renderer_that_dies_gives_its_reason(monkeypatch):
-    scene = pictures.Scene(np.zeros((1, 3)), np.ones(1), np.ones(1), "v")
-    monkeypatch.setattr(sys, "executable", "/bin/false")
-    figure, reasons = pictures.picture({"liggghts": scene})
-    assert figure is None
-    assert reasons == ["No picture of LIGGGHTS: the renderer ended with code 1."]
+def row(number, **changes):
+    record = full_size.quantity(number, 0)
+    return Row("silo", "silo, dry", "silo-dry", "yade", type(record)(**{**record.__dict__, **changes}))
 
 
-def test_picture_is_drawn_without_a_display(monkeypatch):
-    monkeypatch.delenv("DISPLAY", raising=False)
-    random = np.random.default_rng(1)
-    scene = pictures.Scene(random.uniform(0, 1, (50, 3)), np.full(50, 0.1), random.uniform(0, 1, 50), "v")
-    figure, reasons = pictures.picture({"liggghts": scene})
-    assert reasons == []
-    image = figure.axes[0].images[0].get_array()
-    assert image.min() < 100
-    assert image.max() > 250
+def test_scatter_is_of_checks_against_experiment_and_theory_only():
+    rows = [row(3), row(5), row(0), row(6), row(3, tolerance=None, verdict="info"), row(3, reference=0.0), row(3, value=None),
+            row(3, deviation_kind="absolute")]
+    found = scatter.points(rows)
+    assert [one.evidence for one in found] == ["theory", "experiment"] and found[0].half == pytest.approx(0.02)
+    drawn = scatter.figure(found)
+    assert len(drawn.axes[1].get_yticklabels()) == len({one.line for one in found}) == 2
+    assert scatter.figure([]) is None and scatter.statistics(found) is None
+
+
+def test_open_checks_are_one_line_for_each_case_and_reason():
+    rows = [row(8, reason="its interval (±0.4) is wider than what is allowed"), row(17, reason="its interval (±0.5) is wider than what is allowed"),
+            row(26, reason="the run is too short")]
+    first, second = front.open_lines(rows)
+    assert (first.count, first.reason) == (2, "its interval is wider than what is allowed") and "1 more" in first.names
+    assert (second.count, second.reason) == (1, "the run is too short")
+
+
+def test_of_many_variants_the_worst_is_shown_and_every_failure_counts():
+    rows = [row(3, deviation=0.01 * number) for number in range(8)]
+    (found,) = sections.decided(rows)
+    assert len(found.rows) == 1 and found.worst_of == 8 and found.rows[0].record.deviation == 0.07
+    (found,) = sections.decided([*rows, row(3, deviation=0.5, verdict="fail"), row(3, deviation=0.2, verdict="fail")])
+    assert [one.record.deviation for one in found.rows] == [0.5, 0.2] and found.counts.failed == 2
+    assert sections.decided([row(0), row(3, tolerance=None, verdict="info")]) == []
+
+
+def test_runs_that_a_profile_expects_are_missing_without_a_list_of_runs(tmp_path):
+    (tmp_path / "quick").mkdir()
+    found = gather(tmp_path / "quick")
+    assert any("single contact, test 1: YADE: not run" in line for line in found.missing)
 
 
 @pytest.mark.parametrize(
     ("value", "interval", "text"),
-    [
-        (2.0512, [1.94, 2.1624], "2.05 ± 0.11"),
-        (539.0, [456.0, 622.0], "539 ± 83"),
-        (4.1e-5, [2.7e-5, 5.5e-5], "(4.1 ± 1.4)·10⁻⁵"),
-        (0.25, None, "0.250"),
-        (-0.0008, [-0.003, 0.0014], "−0.0008 ± 0.0022"),
-        (None, None, "–"),
-        (0.0, [0.0, 0.0], "0"),
-    ],
+    [(2.0512, [1.94, 2.1624], "2.05 ± 0.11"), (539.0, [456.0, 622.0], "539 ± 83"), (4.1e-5, [2.7e-5, 5.5e-5], "(4.1 ± 1.4)·10⁻⁵"), (0.25, None, "0.250"),
+     (-0.0008, [-0.003, 0.0014], "−0.0008 ± 0.0022"), (None, None, "–"), (0.0, [0.0, 0.0], "0"), (0.3, [0.3 - 2e-11, 0.3 + 2e-11], "0.300 ± 2.0·10⁻¹¹")],
 )
 def test_value_has_the_digits_of_its_interval(value, interval, text):
     assert numbers.with_interval(value, interval) == text
@@ -195,7 +172,23 @@ def test_parameters_without_needless_zeros(value, text):
     assert numbers.compact(value) == text
 
 
-def test_pairs_leave_out_what_has_no_ratio():
-    good = {"value": 2.0, "interval": [1.8, 2.2], "reference": 1.0, "reference_interval": None, "deviation_kind": "relative"}
-    bad = [good | {"reference": 0.0}, good | {"deviation_kind": "absolute"}, good | {"value": None}]
-    assert figures.pairs([("a", good), *(("b", one) for one in bad)]) == [("a", 2.0, 1.0, pytest.approx(0.1), 0.0)]
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [({"deviation": 0.0123}, "+1.2 %"), ({"deviation": 2.7e-7}, "2.7·10⁻⁵ %"), ({"deviation": 60.35, "value": 0.6135, "reference": 0.01}, "0.60 kPa"),
+     ({"deviation": 0.002, "deviation_kind": "absolute"}, "0.0020 kPa"), ({"deviation": None}, "–")],
+)
+def test_deviations_are_no_percentages_near_a_reference_of_zero(changes, text):
+    assert numbers.deviation(row(3, **changes).record) == text
+
+
+def test_profiles_with_a_reference_come_first():
+    profiles = {"yade": [{"name": "a"}, {"name": "b", "reference": [1.0]}, {"name": "c"}]}
+    assert figures.profile_names(profiles) == ["b", "a", "c"]
+
+
+def test_a_figure_of_a_missing_picture_is_left_out(tmp_path):
+    folder = full_size.write(Path(tmp_path, "quick"), ("silo",), variants=1, quantities=2, profiles=0)
+    for path in folder.rglob("picture.png"):
+        path.unlink()
+    (one,) = sections.sections(gather(folder), tmp_path)
+    assert one.pictures == [] and one.figures == []

@@ -3,15 +3,16 @@
 import numpy as np
 import pytest
 from dembark.validation import verification
+from dembark.validation.judge.tally import of_folder
 from dembark.validation.verification import fields_balance, scenes
-from dembark.validation.verification.item import order
+from dembark.validation.verification.item import Curve, Item, Panel, order
 
 
 @pytest.mark.parametrize("compute", verification.ITEMS, ids=lambda compute: compute.__name__)
 def test_item_passes(compute):
     item = compute()
     assert item.title and item.text and item.quantities
-    assert {quantity.name: quantity.judged()[0] for quantity in item.quantities} == {quantity.name: "pass" for quantity in item.quantities}
+    assert {one.name: one.verdict for one in item.quantities} == {one.name: "pass" for one in item.quantities}
     for panel in item.panels:
         for curve in panel.curves:
             assert len(curve.place) == len(curve.value) and (np.asarray(curve.value) > 0.0).all()
@@ -46,4 +47,14 @@ def test_a_contact_that_is_missing_shows_in_the_balance():
 @pytest.mark.parametrize(("due", "verdict"), [(2.0, "pass"), (1.0, "fail")])
 def test_order_of_convergence(due, verdict):
     steps = np.array([0.1, 0.05, 0.025])
-    assert order("order", "o", steps, 3.0 * steps**2, due, "theory").judged()[0] == verdict
+    assert order("order", "o", steps, 3.0 * steps**2, due, "theory").verdict == verdict
+
+
+def test_items_come_back_as_they_were_written(tmp_path):
+    steps = np.array([0.1, 0.05])
+    curve = Curve("error", steps, steps**2)
+    item = Item("wave", "Wave", "A wave.", [order("order", "order", steps, steps**2, 2.0, "theory")], [Panel("Wave", "h", "error", [curve])])
+    verification.write(tmp_path, [item])
+    (found,) = verification.read(tmp_path)
+    assert found.quantities == item.quantities and found.panels[0].curves[0].value == [*curve.value]
+    assert of_folder(tmp_path).passed == 1 and verification.read(tmp_path / "none") == []

@@ -1,53 +1,43 @@
-"""A campaign's report as a whole, from a store with rows of a known law."""
+"""A campaign's report as a whole, from results of a known law."""
 
 from __future__ import annotations
 
 import json
-import sqlite3
-from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import pytest
 from dembark.common.errors import DembarkError
 from dembark.validation.campaigns import report
-from dembark.validation.campaigns.report.gather import gather
-from dembark.validation.campaigns.schema import TABLES, VERSION, statements
-from dembark.validation.campaigns.store import path_of
+from dembark.validation.judge import result
+from dembark.validation.judge.result import QuantityRecord, Result
 
 FRICTIONS, RADII = (0.2, 0.4, 0.8), (0.02, 0.04)
 
 
-def fill(folder: Path, commit: str = "a" * 40, shift: float = 0.0, measured: str = "2030-01-01T00:00:00", failed: str = "") -> Path:
-    """A campaign folder whose quantity `k` is friction times radius plus `shift`, in both engines."""
-    folder.mkdir(parents=True, exist_ok=True)
+def fill(folder: Path, commit: str = "a" * 40, shift: float = 0.0, killed: str = "", broken: str = "") -> Path:
+    """A campaign folder whose quantity `k` is friction times radius plus `shift`, in both engines.
+
+    At the point `killed` the runs failed, at `broken` YADE's quantity `contacts`, which has no tolerance, failed.
+    """
     points = {f"dry_f={friction}_r={radius}": {"wall_friction": friction, "cylinder_radius": radius} for friction in FRICTIONS for radius in RADII}
     sweep = {"case": "silo", "name": "grid", "title": "Friction and radius", "axes": ["wall_friction", "cylinder_radius"],
              "points": [{"variant": name, "base": "dry", "values": values, "changes": values} for name, values in points.items()]}
-    (folder / "runs.json").write_text(json.dumps({"campaign": "test", "description": "a known law", "sweeps": [sweep], "runs": []}))
-    rows: dict[str, list[dict[str, Any]]] = {"quantities": [], "runs": []}
+    runs = []
     for name, values in points.items():
         for engine in ("liggghts", "yade"):
-            place = {"campaign": "test", "case_name": "silo", "variant": name, "engine": engine}
-            bad = name == failed
-            rows["runs"].append({**place, "run_id": f"{engine}{name}{commit}", "replica": 1, "state": "failed" if bad else "finished",
-                                 "message": "the engine was killed" if bad else None, "steps": 1000, "time_step": 1e-5, "wall_time": 2.0,
-                                 "particle_steps_per_second": 1e6, "started": "2030-01-01"})
+            runs.append({"case": "silo", "variant": name, "engine": engine, "replica": 1, "state": "failed" if name == killed else "finished",
+                         "message": "the engine was killed" if name == killed else ""})
+            place = folder / "silo" / name / engine
+            place.mkdir(parents=True)
             value = values["wall_friction"] * values["cylinder_radius"] + shift
-            common = {**place, "commit_hash": commit, "engine_version": "1.0", "measured_at": measured, "run_commit": commit,
-                      "parameters_json": json.dumps(values)}
-            if not bad:
-                rows["quantities"].append({**common, "name": "k", "label": "K_ratio", "unit": "1", "value": value, "low": value - 1e-3,
-                                           "high": value + 1e-3, "reference": value * 1.02, "deviation": -0.02, "deviation_kind": "relative",
-                                           "tolerance": 0.1, "verdict": "pass", "basis": "", "compared": 1})
-    with closing(sqlite3.connect(path_of(folder))) as connection, connection:
-        for statement in statements():
-            connection.execute(statement)
-        connection.execute(f"PRAGMA user_version = {VERSION}")
-        for table, entries in rows.items():
-            columns = list(TABLES[table])
-            connection.executemany(f"INSERT OR REPLACE INTO {table} VALUES ({', '.join('?' * len(columns))})",
-                                   [[entry.get(column) for column in columns] for entry in entries])
+            verdict = "fail" if engine == "yade" and name == broken else "pass"
+            quantities = (QuantityRecord("k", value, "pass", "K_ratio", "1", (value - 1e-3, value + 1e-3), "", value * 1.02, None, -0.02, tolerance=0.1,
+                                         evidence="theory"),
+                          QuantityRecord("contacts", 2.0, verdict, "contacts of a log", compared=False, evidence="theory"))
+            if name != killed:
+                result.write(place / "metrics.json", Result("silo", name, engine, quantities, parameters=values, provenance={
+                    "commit": commit, "replicas": 1, "steps": 1000, "time_step": 1e-5, "wall_time": 2.0, "versions": {engine: "1.0"}}))
+    (folder / "runs.json").write_text(json.dumps({"campaign": "test", "description": "a known law", "sweeps": [sweep], "runs": runs}))
     return folder
 
 
@@ -58,25 +48,22 @@ def test_a_whole_report_with_tables_and_comparison(tmp_path: Path) -> None:
     text = page.read_text(encoding="utf-8")
     assert (after / "report.pdf").read_bytes().startswith(b"%PDF")
     names = {path.name for path in (after / "figures").iterdir()}
-    assert {"silo-1.csv", "silo-1.tex", "silo-1-study.svg", "silo-1-map-yade.svg", "scatter.csv", "against.csv"} <= names
+    assert {"silo-1.csv", "silo-1.tex", "silo-1-study.svg", "silo-1-map-yade.svg", "scatter.csv", "quantities.csv", "against.csv"} <= names
     assert "Friction and radius" in text and "12 changed" in text and "aaaaaaaaaaaa" in text and "bbbbbbbbbbbb" in text
-    assert len((after / "figures/silo-1.csv").read_text().splitlines()) == 13
+    assert "24 of 24 checks passed, none failed" in text
+    assert len((after / "figures/silo-1.csv").read_text().splitlines()) == 25
 
 
 def test_runs_that_failed_are_missing_and_named(tmp_path: Path) -> None:
-    folder = fill(tmp_path / "one", failed="dry_f=0.2_r=0.02")
-    campaign = gather(folder)
-    assert len(campaign.missing) == 2 and "the engine was killed" in campaign.missing[0]
-    assert "not measured" in report.build(folder).read_text(encoding="utf-8")
+    text = report.build(fill(tmp_path / "one", killed="dry_f=0.2_r=0.02")).read_text(encoding="utf-8")
+    assert text.count("the engine was killed") >= 2 and "2 results are missing" in text and "not measured" in text
 
 
-def test_the_last_measurement_counts(tmp_path: Path) -> None:
-    folder = fill(tmp_path / "one")
-    fill(folder, "c" * 40, shift=1.0, measured="2031-01-01T00:00:00")
-    values = {one["quantities"][0]["value"] for one in gather(folder).contents}
-    assert min(values) > 1.0 and len(gather(folder).contents) == 12
+def test_a_quantity_without_tolerance_that_failed_is_shown(tmp_path: Path) -> None:
+    text = report.build(fill(tmp_path / "one", broken="dry_f=0.8_r=0.04")).read_text(encoding="utf-8")
+    assert "23 of 24 checks passed, 1 FAILED" in text and "YADE: contacts of a log" in text
 
 
-def test_a_folder_without_a_store_is_refused_in_one_line(tmp_path: Path) -> None:
-    with pytest.raises(DembarkError, match="no store"):
+def test_a_folder_without_results_is_refused_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(DembarkError, match="nothing to report"):
         report.build(tmp_path)

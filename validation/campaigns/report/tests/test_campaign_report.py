@@ -7,19 +7,28 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from dembark.validation.case import folders
 from dembark.validation.campaigns.report import against, figures, tables
-from dembark.validation.campaigns.report.gather import by_point, sweep
-from dembark.validation.campaigns.report.sweeps import Sweep, numerical_errors
+from dembark.validation.campaigns.report.sweeps import Sweep, numerical_errors, sweeps
+from dembark.validation.judge.result import QuantityRecord, Result
+from dembark.validation.report.gather import Page
 
 
-def quantity(name: str, value: float | None, half: float | None = 0.01, **more: Any) -> dict[str, Any]:
-    interval = None if half is None or value is None else [value - half, value + half]
-    return {"name": name, "label": name, "unit": "1", "value": value, "interval": interval, "basis": "", "reference": None, "deviation": None,
-            "reference_interval": None, "deviation_kind": "relative", "tolerance": None, "verdict": "info", "compared": True, **more}
+def quantity(name: str, value: float | None, half: float | None = 0.01, **more: Any) -> QuantityRecord:
+    interval = None if half is None or value is None else (value - half, value + half)
+    return QuantityRecord(**{"name": name, "value": value, "verdict": "info", "label": name, "interval": interval, **more})
 
 
-def content(variant: str, engine: str, *quantities: dict[str, Any]) -> dict[str, Any]:
-    return {"case": "silo", "variant": variant, "engine": engine, "quantities": list(quantities), "provenance": {"commit": "a" * 40}}
+def content(variant: str, engine: str, *quantities: QuantityRecord) -> Result:
+    return Result("silo", variant, engine, tuple(quantities), provenance={"commit": "a" * 40})
+
+
+def sweep(case: str, axes: tuple[str, ...], points: dict[str, dict[str, Any]], contents: tuple[Result, ...] = ()) -> Sweep:
+    pages = {one.variant: Page(case, one.variant, Path()) for one in contents}
+    for one in contents:
+        pages[one.variant].results[one.engine] = one
+    facts = {"case": case, "axes": axes, "points": [{"variant": variant, "values": values} for variant, values in points.items()]}
+    return sweeps([facts], pages.values(), folders.discover())[0]
 
 
 def grid(frictions: tuple[float, ...] = (0.2, 0.4, 0.8), radii: tuple[float, ...] = (0.02, 0.04)) -> Sweep:
@@ -28,14 +37,14 @@ def grid(frictions: tuple[float, ...] = (0.2, 0.4, 0.8), radii: tuple[float, ...
         content(name, engine, quantity("k", values["wall_friction"] * values["cylinder_radius"], reference=1.0, tolerance=0.1,
                                        verdict="fail" if values["wall_friction"] == 0.8 else "pass"))
         for name, values in points.items() for engine in ("liggghts", "yade"))
-    return sweep("silo", 1, ("wall_friction", "cylinder_radius"), points, by_point(contents))
+    return sweep("silo", ("wall_friction", "cylinder_radius"), points, contents)
 
 
 def steps(engine_error: float, half: float) -> Sweep:
     points = {f"h{h}": {"time_step_fraction": h} for h in (0.05, 0.1, 0.2)}
     contents = tuple(content(name, "yade", quantity("k", 1.0 + engine_error * values["time_step_fraction"] ** 2, half))
                      for name, values in points.items())
-    return sweep("silo", 2, ("time_step_fraction",), points, by_point(contents))
+    return sweep("silo", ("time_step_fraction",), points, contents)
 
 
 def test_a_grid_gives_lines_and_maps() -> None:
@@ -54,14 +63,14 @@ def test_a_grid_gives_lines_and_maps() -> None:
 
 
 def test_axes_have_units() -> None:
-    one = sweep("silo", 1, ("wall_friction", "cylinder_radius", "gravity"), {"a": {}}, {})
+    one = sweep("silo", ("wall_friction", "cylinder_radius", "gravity"), {"a": {}})
     assert [one.label(axis) for axis in one.axes] == ["wall friction", "cylinder radius / m", "gravity / (m/s^2)"]
-    assert sweep("a case that has gone", 1, ("grain_diameter",), {"a": {}}, {}).label("grain_diameter") == "grain diameter"
+    assert sweep("a case that has gone", ("grain_diameter",), {"a": {}}).label("grain_diameter") == "grain diameter"
 
 
 def test_points_that_were_not_measured_leave_gaps() -> None:
     points = {"a": {"wall_friction": 0.2, "wall": "smooth"}, "b": {"wall_friction": 0.4, "wall": "rough"}}
-    one = sweep("silo", 1, ("wall_friction", "wall"), points, by_point((content("a", "yade", quantity("k", math.nan), quantity("l", 1.0)),)))
+    one = sweep("silo", ("wall_friction", "wall"), points, (content("a", "yade", quantity("k", math.nan), quantity("l", 1.0)),))
     assert one.lines("wall_friction", "yade", "k") == []
     assert not one.numeric("wall") and one.levels("wall") == ["smooth", "rough"]
     assert figures.study_figure(one, one.quantities()) is not None
@@ -85,8 +94,8 @@ def test_table_holds_every_quantity_once(tmp_path: Path) -> None:
 
 
 def test_latex_escapes_what_latex_would_read() -> None:
-    one = sweep("silo", 1, ("grain_count",), {"a": {"grain_count": 3}},
-                by_point((content("a", "yade", quantity("k", 1.5e-7, 1e-9, label="σ_zz & 50 % of #1", unit="m^2")),)))
+    one = sweep("silo", ("grain_count",), {"a": {"grain_count": 3}},
+                (content("a", "yade", quantity("k", 1.5e-7, 1e-9, label="σ_zz & 50 % of #1", unit="m^2")),))
     text = tables.latex(one, one.quantities())
     row = next(line for line in text.splitlines() if "YADE" in line)
     assert row.count(" & ") == 6 and r"$\sigma$\_zz \& 50 \% of \#1" in row and r"$\cdot10^{-7}$" in row
@@ -97,16 +106,26 @@ def test_two_campaigns_differ_where_intervals_say_so() -> None:
                       quantity("exact", 2.0, 0.0))]
     after = [content("dry", "yade", quantity("k", 1.1), quantity("l", 1.005), quantity("m", 1.2, None), quantity("new", 1.0),
                      quantity("exact", 2.0, 0.0))]
-    rows = {row["name"]: row for row in against.differences(before, after)}
-    assert {name: row["state"] for name, row in rows.items()} == {
+    rows = {row.name: row for row in against.differences(before, after)}
+    assert {name: row.state for name, row in rows.items()} == {
         "k": "changed", "l": "same", "m": "unknown", "gone": "gone", "new": "new", "exact": "same"}
-    assert rows["k"]["change"] == pytest.approx(0.1)
+    assert rows["k"].change == pytest.approx(0.1)
     assert next(iter(rows)) == "k"
 
 
 def test_a_deterministic_quantity_changes_with_its_last_digits() -> None:
     (row,) = against.differences([content("dry", "yade", quantity("k", 1.0, 0.0))], [content("dry", "yade", quantity("k", 1.0 + 1e-9, 0.0))])
-    assert row["state"] == "changed"
+    assert row.state == "changed"
     (row,) = against.differences([content("dry", "yade", quantity("k", 1.0, 0.0, agreement=1e-6))],
                                  [content("dry", "yade", quantity("k", 1.0 + 1e-9, 0.0, agreement=1e-6))])
-    assert row["state"] == "same"
+    assert row.state == "same"
+
+
+def test_axes_of_figures_have_units_and_what_failed_comes_first() -> None:
+    contents = (content("a", "yade", quantity("p", 1.0, unit="Pa"), quantity("failed", 1.0, verdict="fail", compared=False)),
+                content("b", "yade", quantity("p", 2.0, unit="Pa"), quantity("failed", 1.0, verdict="pass", compared=False)))
+    one = sweep("silo", ("cylinder_radius",), {"a": {"cylinder_radius": 0.02}, "b": {"cylinder_radius": 0.04}}, contents)
+    assert [found.name for found in one.quantities()] == ["failed", "p"]
+    drawn = figures.study_figure(one, one.quantities())
+    assert drawn is not None
+    assert [(axes.get_xlabel(), axes.get_ylabel()) for axes in drawn.axes] == [("cylinder radius / m", "dimensionless"), ("cylinder radius / m", "Pa")]

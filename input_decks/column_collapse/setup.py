@@ -1,0 +1,32 @@
+"""Column collapse: a dilute column between a back wall and a gate, and the steps of its output."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+from dembark.input_decks.common import packing
+from dembark.input_decks.common.setup import Setup, contacts, rectangle, time_step
+
+
+def setup(p: SimpleNamespace) -> Setup:
+    """A row of time.csv every `every` steps, a frame every 20 rows; the gate begins to move at a row, which is the first frame."""
+    step = time_step(p)
+    every = math.ceil(p.collapse_time / step / (20 * (p.frames - 1)))
+    first, stride = every * math.ceil(p.settle_time / step / every), 20 * every
+    steps = first + stride * (p.frames - 1)
+    d_max = packing.largest(p)
+    sites, height = packing.slab(p, p.column_width, p.column_depth, margin=0.15 * d_max, foot=0.15 * d_max)
+    # The box reaches as far as the gate gets.
+    far, top = p.column_width + p.gate_speed * step * (steps - first) + 2.0 * d_max, height + 2.0 * d_max
+    grains = packing.grains(p, sites, [(-d_max, far), (0.0, p.column_depth), (-2.0 * d_max, top)])
+    # Panels about as high as the period is deep, for LIGGGHTS cannot place elements that are much larger than the period.
+    panels = math.ceil((top + d_max) / p.column_depth)
+    rise = (top + d_max) / panels
+    feet = [(p.column_width, 0.0, rise * k - d_max) for k in range(panels)]
+    gate = np.vstack([rectangle(foot, (0.0, p.column_depth, 0.0), (0.0, 0.0, rise)) for foot in feet])
+    # Steps until the gate has its speed.
+    numbers = {"first": first, "stride": stride, "every": every, "ramp": math.ceil(p.gate_speed / (p.gate_acceleration * step))}
+    # A thicker skin than the bridges need pays while the gate moves.
+    return Setup(steps, step, grains, {**numbers, **contacts(p, skin=0.2)}, {"gate": gate})

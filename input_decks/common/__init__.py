@@ -1,0 +1,1 @@
+"""What several cases share: parameter groups, derived numbers, packings and deck fragments."""

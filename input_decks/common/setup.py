@@ -1,0 +1,85 @@
+"""Derived numbers of a run, made once for every engine: time step, output steps, friction, liquid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+
+import numpy as np
+from dembark.input_decks.common.packing import Packing, largest
+from numpy.typing import NDArray
+
+Number = float | int | str
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What a deck needs beside the parameters of its case.
+
+    `steps` of `time_step` (s); `packing`: the bodies at the start; `numbers`: derived values by name, which the decks of all engines use;
+    `meshes`: triangles (n, 3, 3) in m by name, each written as <name>.stl; `tables`: rows of numbers by name, for decks alone.
+    """
+
+    steps: int
+    time_step: float
+    packing: Packing | None = None
+    numbers: Mapping[str, Number] = field(default_factory=dict)
+    meshes: Mapping[str, Array] = field(default_factory=dict)
+    tables: Mapping[str, tuple[Number, ...]] = field(default_factory=dict)
+
+
+def rayleigh_time(p: SimpleNamespace) -> float:
+    """Rayleigh time (s) of the smallest grain: pi R sqrt(rho / G) / (0.1631 nu + 0.8766)."""
+    radius = 0.5 * p.grain_diameter * (1.0 - p.grain_diameter_spread)
+    shear_modulus = p.youngs_modulus / (2.0 * (1.0 + p.poisson_ratio))
+    return math.pi * radius * math.sqrt(p.grain_density / shear_modulus) / (0.1631 * p.poisson_ratio + 0.8766)
+
+
+def time_step(p: SimpleNamespace) -> float:
+    """The fraction `time_step_fraction` of the Rayleigh time (s)."""
+    return p.time_step_fraction * rayleigh_time(p)
+
+
+def window(start: int, stride: int, frames: int, rows: int = 1000) -> dict[str, Number]:
+    """Output steps: `frames` dumps every `stride` steps, the first a stride after step `start`, and about `rows` rows of the history."""
+    steps = start + stride * frames
+    return {"first": start + stride, "stride": stride, "steps": steps, "every": max(1, steps // rows)}
+
+
+def strides(duration: float, time_step: float, count: int) -> dict[str, Number]:
+    """Output steps: `count` equal strides that cover `duration` (s), or a little more, in steps of `time_step` (s)."""
+    stride = math.ceil(duration / time_step / count)
+    return {"stride": stride, "steps": stride * count}
+
+
+def friction(p: SimpleNamespace) -> dict[str, Number]:
+    """Static and kinetic coefficients of grains and walls; `static_friction` and `kinetic_friction` replace all where they are set."""
+    grain, wall = (p.grain_friction, p.wall_friction) if p.static_friction is None else (p.static_friction, p.static_friction)
+    kinetic = [mu * p.kinetic_friction_ratio if p.kinetic_friction is None else p.kinetic_friction for mu in (grain, wall)]
+    return {"grain_static": grain, "wall_static": wall, "grain_kinetic": kinetic[0], "wall_kinetic": kinetic[1]}
+
+
+def liquid(p: SimpleNamespace) -> dict[str, Number]:
+    """Whether there are bridges (`wet`) of liquid that grains carry (`carried`), and `reach` (m), which no bridge of a wall exceeds.
+
+    Walls look for grains within the skin only. The bound is generous: rupture is near (1 + angle/2) volume^(1/3) between grains, a
+    little later at a wall. A wall asks for half of a grain's liquid; foreseen is that the largest grain owns twice as much as at the start.
+    """
+    content = getattr(p, "liquid_content", 0.0)
+    volume = content * math.pi / 6.0 * largest(p) ** 3 if content > 0.0 else p.bridge_volume
+    return {"wet": int(volume > 0.0), "carried": int(content > 0.0), "reach": 1.3 * (1.0 + 0.5 * p.contact_angle) * volume ** (1.0 / 3.0)}
+
+
+def contacts(p: SimpleNamespace, skin: float = 0.1) -> dict[str, Number]:
+    """What the contacts of a deck need: friction, liquid, and the neighbour search's skin: `skin` mean diameters beyond all bridges."""
+    wet = liquid(p)
+    return {**friction(p), **wet, "skin": skin * p.grain_diameter + wet["reach"]}
+
+
+def rectangle(corner: Sequence[float], first: Sequence[float], second: Sequence[float]) -> Array:
+    """Two triangles (2, 3, 3) in m of the parallelogram at `corner` with the sides `first` and `second`; their normal is first x second."""
+    a, u, v = (np.asarray(x, float) for x in (corner, first, second))
+    return np.array([[a, a + u, a + u + v], [a, a + u + v, a + v]])

@@ -1,0 +1,13 @@
+"""The rebound, from the energy before and after the impact."""
+
+import numpy as np
+from dembark.postproc.measurement import Measurement, Value
+from dembark.postproc.statistics import Estimate
+
+
+def measure(replicas):
+    """Numbers by the names that case.toml declares; replicas[k].parameters, .grains(), .times() are what there is to measure."""
+    run, p = replicas[0], replicas[0].parameters
+    energies = [0.5 * frame.velocities[0, 2] ** 2 + 9.81 * (frame.positions[0, 2] - p["radius"]) for frame in run.grains()]
+    ratio = np.sqrt(energies[-1] / energies[0])
+    return Measurement({"rebound": Value(Estimate(ratio, 0.0), Estimate(p["restitution"], 0.0))})

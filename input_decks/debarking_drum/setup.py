@@ -1,0 +1,47 @@
+"""Debarking drum: its radius, or the number of its logs, output steps, and logs on the lowest places in the drum."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+from dembark.common.errors import DembarkError
+from dembark.input_decks.common import packing
+from dembark.input_decks.common.setup import Setup
+
+# Rows of output in a revolution, each a whole number of steps.
+ROWS = 200
+
+
+def setup(p: SimpleNamespace) -> Setup:
+    """Diameters are the middles of n equal parts of their range: the same set for every seed, so that the filling is met exactly.
+
+    Places are a lattice of triangles, a little wider than the thickest log; the seed says which log has which diameter.
+    """
+    mean, span = 0.5 * (p.log_diameter_min + p.log_diameter_max), p.log_diameter_max - p.log_diameter_min
+    n = p.log_count if p.drum_radius is None else math.floor(4.0 * p.filling * p.drum_radius**2 / (mean**2 + span**2 / 12.0) + 0.5)
+    square = mean**2 + span**2 / 12.0 * (1.0 - 1.0 / n**2)
+    radius = 0.5 * math.sqrt(n * square / p.filling) if p.drum_radius is None else p.drum_radius
+
+    period = 2.0 * math.pi / p.drum_speed
+    line_density = 0.25 * math.pi * p.log_density * p.log_length
+    every = math.ceil(period * math.sqrt(p.log_stiffness / (line_density * p.log_diameter_min**2)) / p.time_step_fraction / ROWS)
+    steps, stride = ROWS * every * (p.run_in + p.revolutions), ROWS * every // p.frames
+
+    spacing = 1.02 * p.log_diameter_max
+    reach, rise = math.ceil(radius / spacing), math.sqrt(3.0) * spacing
+    numbers = np.arange(-reach, reach + 1)
+    k, i, shift = (axis.ravel() for axis in np.meshgrid(numbers, numbers, [0.0, 0.5], indexing="ij"))
+    sites = np.column_stack(((i + shift) * spacing, np.zeros(len(k)), k * rise + shift * rise))
+    sites = sites[np.hypot(sites[:, 0], sites[:, 2]) <= radius - 0.52 * p.log_diameter_max]
+    if len(sites) < n:
+        raise DembarkError(f"filling {p.filling:g} is too high", f"the drum has places for {len(sites)} of {n} logs only",
+                           "take less or thinner logs")
+    diameters = p.log_diameter_min + span * (packing.rank(n, p.seed) + 0.5) / n
+    box = [(-1.1 * radius, 1.1 * radius), (-0.5 * spacing, 0.5 * spacing), (-1.1 * radius, 1.1 * radius)]
+    masses = line_density * diameters**2
+    logs = packing.bodies(box, sites[:n], 0.5 * diameters, masses)
+    return Setup(steps, period / (ROWS * every), logs, {
+        "logs": n, "inner_radius": radius, "load_weight": p.gravity * masses.sum(),
+        "every": every, "stride": stride, "first": steps - stride * (p.frames - 1)})

@@ -1,0 +1,73 @@
+"""Log cradle: the velocities after an impact through a row of logs against the exact motion of the row."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from dembark.physics.exact.chains import Chain, ChainMotion
+from dembark.postproc.instruments.logs import LogRun, energy_curves, number, over_time, read, solver_values
+from dembark.postproc.measurement import Measurement
+from dembark.postproc.replica import Array, Replica
+
+# Curves are drawn of so many logs at most.
+SHOWN = 5
+
+
+def row(p: Mapping[str, Any]) -> Chain:
+    """The logs of a run with parameters `p`, the first of which moves; a contact is two boundaries in series."""
+    n = int(p["log_count"])
+    return Chain(np.full(n, p["mass"]), np.full(n - 1, 0.5 * p["stiffness"]), np.full(n - 1, p["gap"]), p["velocity"] * np.eye(n)[0])
+
+
+def measure(replicas: Sequence[Replica]) -> Measurement:
+    """Values and curves of the run (there is one)."""
+    return measured(read(replicas[0]))
+
+
+def measured(run: LogRun) -> Measurement:
+    """The same from a run that was read."""
+    p, chain, duration = run.parameters, row(run.parameters), float(run.times[-1])
+    motion, speed, turn = chain.motion(run.times), p["velocity"], chain.highest_frequency * run.time_step
+    due, peak = motion.velocities[-1], chain.peak_force(duration)
+    with_loss = chain.velocities_with_loss(duration, (2.0 * p["theta"] - 1.0) * run.time_step)
+    final = run.velocities[-1, :, 0]
+    # What the phases of all the beginnings and ends within a step add up to.
+    phase = len(chain.gaps) * turn**2
+    values = {
+        f"velocity_{log + 1}_after": number(
+            final[log], due[log], bound=1.25 * abs(with_loss[log] - due[log]) + phase * speed, scale=speed,
+            detail=f"the scheme's loss at its step is expected to change it by {with_loss[log] - due[log]:+.2e} m/s")
+        for log in range(len(final))
+    } | {
+        "scheme_deviation": number(np.abs(final - with_loss).max() / speed, 0.0, bound=phase),
+        "peak_force": number(run.history["highest_force"][-1], peak, bound=0.25 * math.pi * turn, scale=peak),
+        "energy_kept": number(run.kinetic[-1] / run.kinetic[0], 0.5 * chain.masses @ with_loss**2 / run.kinetic[0], bound=phase),
+        "momentum_error": number(run.momentum_error(), 0.0),
+        **solver_values(run),
+    }
+    shares = ", ".join(f"{value:.4f}" for value in due / speed)
+    return Measurement(values, _curves(run, chain, motion), [
+        f"Exact velocities after, over that of the first log: {shares} ({motion.events} contacts close or open on the way). All act at the "
+        "same time; a row of separate pairs would hand on the whole speed."])
+
+
+def _curves(run: LogRun, chain: Chain, motion: ChainMotion) -> list[dict[str, Any]]:
+    n, along, forces, due = len(run.masses), run.velocities[:, :, 0], contact_forces(run) / 1e3, motion.forces / 1e3
+    return [
+        *(over_time(f"velocity_{log + 1}", f"Velocity of log {log + 1}", "v (m/s)", run.times, along[:, log], motion.velocities[:, log])
+          for log in np.unique(np.linspace(0, n - 1, min(n, SHOWN)).round().astype(int))),
+        *(over_time(f"force_{one + 1}", f"Force of logs {one + 1} and {one + 2}", "N (kN)", run.times, forces[:, one], due[:, one])
+          for one in sorted({0, n - 2})),
+        *energy_curves(run, 0.5 * (motion.forces**2 / chain.stiffness).sum(axis=1)),
+    ]
+
+
+def contact_forces(run: LogRun) -> Array:
+    """Normal forces (frames, n - 1) in N of neighbours."""
+    forces = np.zeros((len(run.touches), len(run.masses) - 1))
+    for frame, touch in enumerate(run.touches):
+        forces[frame, touch.ids.min(axis=1) - 1] = touch.forces
+    return forces

@@ -1,0 +1,24 @@
+"""Plane silo: the silo's quantities for a packing between two walls a distance W apart, periodic in the third direction.
+
+The walls have the area 2 dz for each W dz of the slab, a cylinder's 2 pi R dz for each pi R^2 dz: Janssen's balance is the same with W in
+R's place, lambda = W / (2 K mu_mob). K is the mean normal stress of both walls over the mean sigma_zz of the cross-section W x period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from dembark.postproc.instruments import silo
+from dembark.postproc.instruments.column import read
+from dembark.postproc.measurement import Measurement
+from dembark.postproc.replica import Replica
+
+
+def measure(replicas: Sequence[Replica]) -> Measurement:
+    """Values, profiles and remarks of all replicas of a series."""
+    given = replicas[0].parameters
+    found = silo.measured([read(replica) for replica in replicas], "W", "x", replicas[0].derived)
+    remark = (f"The slab is a period of {given['slab_depth'] / given['grain_diameter']:.1f} d, so that grains pack in three dimensions; a "
+              "layer one grain deep would need walls in front and behind, which carry weight too, or grains that are held in a plane.")
+    return replace(found, remarks=[*found.remarks, remark])

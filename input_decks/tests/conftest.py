@@ -1,0 +1,61 @@
+"""Decks with the numbers of a small run, in a folder of their own and run with the plain command of the engine."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+from dembark.common.errors import DembarkError
+from dembark.postproc.replica import Replica
+from dembark.validation import engines
+from dembark.validation.case import deck
+from dembark.validation.case.folders import find
+from dembark.validation.case.resolve import portable, resolve
+
+
+class Deck:
+    """The deck of `case` for an engine, written into `folder` with its defaults, the `variant` and the changed `values`."""
+
+    def __init__(self, case: str, engine: str, folder: Path, values: dict[str, Any], variant: str | None = None) -> None:
+        try:
+            self.engine = engines.find(engine)
+        except DembarkError as error:
+            pytest.skip(str(error))
+        self.folder = folder
+        folder.mkdir(exist_ok=True)
+        found = find(case)
+        self.values = portable(resolve(found, None, variant, values))
+        self.setup = deck.write(found, engine, self.values, folder)
+
+    def start(self, ranks: int = 1, **words: Any) -> subprocess.Popen[bytes]:
+        """The engine at work, with `words` such as resume="yes" behind its command; it writes into `log`."""
+        command = self.engine.command(self.folder / self.engine.facts.deck, words, ranks)
+        with (self.folder / "log").open("wb") as log:
+            return subprocess.Popen(command, cwd=self.folder, env=self.engine.environment(), stdin=subprocess.DEVNULL, stdout=log,
+                                    stderr=subprocess.STDOUT)
+
+    def said(self) -> str:
+        return (self.folder / "log").read_text(errors="replace")
+
+    def run(self, ranks: int = 1, **words: Any) -> str:
+        """To the end; what the engine said."""
+        process = self.start(ranks, **words)
+        try:
+            code = process.wait(300)
+        finally:
+            process.kill()
+        assert code == 0 and "dembark: finished" in self.said(), self.said()[-2000:]
+        return self.said()
+
+    def replica(self) -> Replica:
+        """What the run has written, with the record that a run of the harness has."""
+        facts, numbers = self.engine.facts, {**self.setup.numbers, "steps": self.setup.steps, "time_step": self.setup.time_step}
+        return Replica(self.folder, {"engine": facts.name, "parameters": self.values, "time_step": self.setup.time_step, "derived": numbers,
+                                     "impact_id_offset": facts.impact_id_offset})
+
+
+@pytest.fixture(scope="session")
+def decks() -> type[Deck]:
+    return Deck

@@ -1,0 +1,133 @@
+"""Run folders with known answers: a plane silo by Janssen's law, a gravity-driven channel with an exponential profile."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from dembark.input_decks.tests.synthetic import DENSITY, DIAMETER, FRAMES, GRAVITY, finish
+from dembark.postproc.tests.dumps import contacts_text, grains_text, write_times
+
+STEP = 1e-5
+
+
+def plane_silo(
+    results: Path, *, replica: int = 1, k: float = 0.7, friction: float = 0.2, noise: float = 0.0, seed: int = 0, tilt: float = 0.0
+) -> Path:
+    """Write a replica whose walls and base follow Janssen's law with lambda = W / (2 k friction); returns the engine's folder.
+
+    `tilt`: the left wall carries 1 + tilt, the right one 1 - tilt of its share, which the mean over both does not show.
+    """
+    random = np.random.default_rng(seed)
+    across, along, levels = 10, 6, 40
+    width, depth, top = across * DIAMETER, along * DIAMETER, levels * DIAMETER
+    up, x, y = np.meshgrid(*((np.arange(count) + 0.5) * DIAMETER for count in (levels, across, along)), indexing="ij")
+    place = np.column_stack([x.ravel(), y.ravel(), up.ravel()])
+    layer = across * along
+    mass = np.full(len(place), 0.6 * DENSITY * width * depth * DIAMETER / layer)
+    length, weight = width / (2.0 * k * friction), mass.sum() * GRAVITY / (width * depth * top)
+    stress = weight * length * -np.expm1(-(top - place[:, 2]) / length)
+    side = {name: np.isclose(place[:, 0], where) for name, where in (("left", 0.5 * DIAMETER), ("right", width - 0.5 * DIAMETER))}
+    folder = results / "plane_silo" / "dry" / "liggghts" / f"replica-{replica}"
+    folder.mkdir(parents=True)
+    box, flags = ((-1.0, 1.0), (0.0, depth), (-1.0, 10.0)), "ff pp ff"
+    above, below = np.arange(layer, len(place)), np.arange(len(place) - layer)
+    grains, contacts, steps, lift = [], [], 5000 + 100 * np.arange(FRAMES), []
+    for step in steps:
+        walls = {}
+        for name, sign in (("left", 1.0), ("right", -1.0)):
+            push = np.where(side[name], k * stress * DIAMETER**2 * (1.0 + sign * tilt), 0.0)
+            push *= 1.0 + noise * random.standard_normal(len(place))
+            walls[name] = np.column_stack([sign * push, np.zeros(len(place)), friction * push])
+        held = walls["left"][:, 2] + walls["right"][:, 2]
+        # Each layer's load, evenly on its grains: the sum above a level is what the levels below carry.
+        carried = np.repeat(np.cumsum((mass * GRAVITY - held).reshape(levels, layer).sum(axis=1)[::-1])[::-1] / layer, layer)
+        base = np.zeros_like(place)
+        base[:layer, 2] = carried[:layer]
+        radii, forced = np.full(len(place), 0.5 * DIAMETER), {**walls, "base": base}
+        grains.append(grains_text(int(step), place, radii, masses=mass, walls=forced, box=box, flags=flags))
+        forces = np.column_stack([np.zeros((len(above), 2)), carried[above]])
+        ids = np.column_stack([above, below]) + 1
+        contacts.append(contacts_text(int(step), place[above], place[below], ids, forces, box=box, flags=flags))
+        lift.append([wall[:, 2].sum() for wall in (walls["left"], walls["right"], base)])
+    table = dict(zip(("left_fz", "right_fz", "base_fz"), np.array(lift).T, strict=True))
+    write_times(folder / "time.csv", {"step": steps, "time": steps * STEP, "kinetic_energy": 0.0 * steps, **table})
+    parameters = {
+        "silo_width": width, "slab_depth": depth, "grain_diameter": DIAMETER, "gravity": GRAVITY, "wall_friction": 0.3,
+        "grain_density": DENSITY,
+    }
+    finish(folder, "liggghts", replica, "plane_silo", "dry", parameters, grains, contacts)
+    return folder.parent
+
+
+def gravity_channel(
+    results: Path,
+    *,
+    cells: int = 20,
+    variant: str = "w20",
+    replica: int = 1,
+    greatest: float = 3.0,
+    slip: float = 2.0,
+    decay: float = 1.5,
+    noise: float = 0.02,
+    friction: float = 1.0,
+    acceleration: float = 0.0,
+    drift: float = 0.0,
+    seed: int = 0,
+) -> Path:
+    """Write a replica with u = u_max - (u_max - u_slip) exp(-(distance - d/2) / (decay d)), velocities over sqrt(g W), W = `cells` d.
+
+    `friction`: mean friction of the walls over the weight; `acceleration` (over g): the whole flow's; `drift`: relative growth of the
+    kinetic energy over the window. Returns the engine's folder.
+    """
+    random = np.random.default_rng(seed)
+    width, depth, length = cells * DIAMETER, 5 * DIAMETER, 5 * DIAMETER
+    scale = np.sqrt(GRAVITY * width)
+    x, y, z = np.meshgrid(*((np.arange(count) + 0.5) * DIAMETER for count in (cells, 5, 5)), indexing="ij")
+    place = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    from_wall = np.minimum(place[:, 0], width - place[:, 0]) / DIAMETER
+    fall = scale * (greatest - (greatest - slip) * np.exp(-(from_wall - 0.5) / decay))
+    radii = np.full(len(place), 0.5 * DIAMETER)
+    mass = DENSITY * 4.0 / 3.0 * np.pi * radii**3
+    weight = mass.sum() * GRAVITY
+    folder = results / "gravity_channel" / variant / "liggghts" / f"replica-{replica}"
+    folder.mkdir(parents=True)
+    steps = 100000 + 2000 * np.arange(FRAMES)
+    # The period does not begin at zero: its middle stays when it shrinks.
+    box, flags = ((-1.0, 1.0), (0.0, depth), (0.02, 0.02 + length)), "ff pp pp"
+    sides = {"left": from_wall < 0.6, "right": from_wall < 0.6}
+    sides["left"] &= place[:, 0] < 0.5 * width
+    sides["right"] &= place[:, 0] > 0.5 * width
+    push = 0.5 * weight / 0.3 / sides["left"].sum()
+    neighbour = np.nonzero(place[:, 0] < width - DIAMETER)[0]
+    grains, contacts = [], []
+    for step in steps:
+        elapsed = (step - steps[0]) * STEP
+        speed = fall + acceleration * GRAVITY * elapsed
+        low = place[:, 2] - (fall * elapsed + 0.5 * acceleration * GRAVITY * elapsed**2)
+        images = np.column_stack([np.zeros((len(place), 2)), np.floor(low / length)])
+        now = np.column_stack([place[:, :2], 0.02 + low - images[:, 2] * length])
+        walls = {name: np.zeros_like(place) for name in sides}
+        for name, sign in (("left", 1.0), ("right", -1.0)):
+            walls[name][sides[name]] = [sign * push, 0.0, 0.3 * push]
+        velocity = np.zeros_like(place)
+        velocity[:, 2] = -speed + noise * scale * random.standard_normal(len(place))
+        velocity[:, 2] -= velocity[:, 2].mean() + speed.mean()
+        grains.append(
+            grains_text(int(step), now, radii, velocities=velocity, masses=mass, walls=walls, images=images, box=box, flags=flags)
+        )
+        forces = np.tile([-push, 0.0, 0.0], (len(neighbour), 1))
+        second = now[neighbour] + [DIAMETER, 0.0, 0.0]
+        ids = np.column_stack([neighbour, neighbour]) + 1
+        contacts.append(contacts_text(int(step), now[neighbour], second, ids, forces, box=box, flags=flags))
+    rows = np.arange(20, steps[-1] + 1, 20)
+    held = 0.5 * weight * (friction - acceleration) * (1.0 + 0.3 * random.standard_normal(len(rows)))
+    energy = 1.0 + 0.02 * random.standard_normal(len(rows)) + drift * np.linspace(-1.0, 1.0, len(rows)).clip(0.0)
+    write_times(folder / "time.csv", {"step": rows, "time": rows * STEP, "kinetic_energy": energy, "left_fz": held, "right_fz": held})
+    parameters = {
+        "channel_width": width, "channel_depth": depth, "grain_diameter": DIAMETER, "gravity": GRAVITY, "wall_friction": 0.5,
+        "grain_density": DENSITY,
+    }
+    finish(folder, "liggghts", replica, "gravity_channel", variant, parameters, grains, contacts)
+    return folder.parent

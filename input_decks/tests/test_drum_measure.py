@@ -1,0 +1,183 @@
+"""What is measured of a drum is what was put into the files, and what is wrong in them fails."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.postproc import DumpError
+from dembark.postproc.instruments.drum import Drum, _along_shell, estimates, read
+from dembark.postproc.replica import Replica
+from dembark.postproc.resampling import Array
+from dembark.postproc.tests.dumps import write_times
+from dembark.validation.case import deck
+from dembark.validation.case.folders import find
+
+drum = module("debarking_drum")
+LOGS, TURNS, RUN_IN, SPEED = 40, 4, 1, 1.2
+POWER = 1000.0
+PERIOD, ROWS = 2.0 * np.pi / SPEED, 200
+
+
+def parameters(**changes: Any) -> dict[str, Any]:
+    return defaults("debarking_drum", log_count=LOGS, revolutions=TURNS, run_in=RUN_IN, drum_speed=SPEED, filling=0.3) | changes
+
+
+def derived(**changes: Any) -> dict[str, Any]:
+    return deck.derived(find("debarking_drum"), parameters(**changes))
+
+
+def replica(folder: Path, *, seed: int = 0, certificate: float = 1e-15, leak: float = 0.0, lift: float = 1.0,
+            stored: float = 0.0, hits: int = 300, speed: float = 0.5, scale: float = 1.0) -> Replica:
+    """A drum that takes POWER and loses it, but for a share `leak` that vanishes; in every quarter `hits` impacts of at least 0.1 m/s.
+
+    `stored` (J): growth of the kinetic energy over the run; a third as many slow contacts stand beside the impacts, with huge forces.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    random = np.random.default_rng(seed)
+    numbers = derived() | {"every": 10}
+    rows = ROWS * (TURNS + RUN_IN)
+    row, count = PERIOD / ROWS, np.arange(1, rows + 1)
+    lost = POWER * (1.0 - leak) * row * count
+    kinetic = 50.0 + stored * count / rows
+    weight = numbers["load_weight"]
+    write_times(folder / "time.csv", {
+        "step": count * 10, "time": count * row, "kinetic_energy": kinetic, "shell_fx": 0.0 * count, "shell_fy": 0.0 * count,
+        "shell_fz": lift * weight + random.normal(0.0, 0.001 * weight, rows), "potential_energy": 0.0 * count,
+        "elastic_energy": 0.0 * count,
+        "dissipated_energy": lost - (kinetic - 50.0), "torque": np.full(rows, POWER / SPEED), "contacts": 60 + 0 * count,
+        "active": 50 + 0 * count,
+        "begun": 5 * count, "impulse_sum": 7.0 * count, "pivots": 20 * count, "certificate": np.full(rows, certificate),
+        "peak_force": 1e4 + 0.0 * count})
+    quarters = 4 * (TURNS + RUN_IN)
+    begin = (np.arange(quarters).repeat(hits) + random.random(quarters * hits)) * PERIOD / 4.0
+    slow = begin[::3]
+    time = np.concatenate([begin, slow])
+    approach = np.concatenate([np.full(len(begin), speed), np.full(len(slow), 0.05)])
+    peak = np.concatenate([scale * 1000.0 * np.exp(random.normal(0.0, 1.0, len(begin))), np.full(len(slow), 1e6)])
+    radius = numbers["inner_radius"]
+    angle = np.radians(random.uniform(0.0, 90.0, len(time)))
+    partner = np.where(random.random(len(time)) < 0.25, -1, 3)
+    table = np.column_stack([np.ones(len(time)), partner, time, np.full(len(time), 0.005), peak, np.ones(len(time)), approach,
+                             np.ones(len(time)), -radius * np.sin(angle), 0.0 * time, -radius * np.cos(angle)])
+    np.savetxt(folder / "impacts.txt", table, fmt=["%d", "%d", *["%.12g"] * 9],
+               header="id_a id_b time duration peak_force impulse relative_speed dissipated x y z")
+    return Replica(folder, {"parameters": parameters(), "derived": numbers, "time_step": PERIOD / (10 * ROWS)})
+
+
+@pytest.fixture(autouse=True)
+def _no_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The files here hold no logs to draw."""
+    monkeypatch.setattr(drum, "fields", lambda _: None)
+
+
+def measured(*replicas: Replica) -> dict[str, dict[str, Any]]:
+    return judged("debarking_drum", drum.measure(replicas))
+
+
+def test_what_was_put_in_is_measured(tmp_path: Path) -> None:
+    found = measured(replica(tmp_path))
+    assert found["impacts_per_revolution"]["value"] == pytest.approx(4 * 300)
+    assert found["impacts_per_log"]["value"] == pytest.approx(4 * 300 / LOGS)
+    assert found["peak_force_mean"]["value"] == pytest.approx(1000.0 * np.exp(0.5), rel=0.05)
+    assert found["peak_force_p99"]["value"] == pytest.approx(1000.0 * np.exp(2.326), rel=0.15)
+    low, high = found["peak_force_mean"]["interval"]
+    assert low < 1000.0 * np.exp(0.5) < high and high - low < 300.0
+    assert found["impulse_sum"]["value"] == pytest.approx(7.0 * 200)
+    assert found["dissipated_energy"]["value"] == pytest.approx(POWER * PERIOD)
+    assert found["pivots_per_step"]["value"] == pytest.approx(2.0)
+    assert found["shell_share"]["value"] == pytest.approx(0.25, abs=0.03)
+    numbers = derived()
+    assert found["torque_arm"]["value"] == pytest.approx(POWER / SPEED / (numbers["load_weight"] * numbers["inner_radius"]))
+    assert names(found, "pass") == {"certificate_max", "energy_balance_error", "power_ratio", "lift_over_weight"}
+
+
+@pytest.mark.parametrize(("change", "name"), [
+    ({"certificate": 2e-10}, "certificate_max"), ({"leak": 0.01}, "energy_balance_error"), ({"leak": 0.08}, "power_ratio"),
+    ({"lift": 1.03}, "lift_over_weight")])
+def test_what_is_wrong_fails(tmp_path: Path, change: dict[str, float], name: str) -> None:
+    assert measured(replica(tmp_path, **change))[name]["verdict"] == "fail"
+
+
+def test_energy_that_is_stored_is_not_missing(tmp_path: Path) -> None:
+    found = measured(replica(tmp_path, stored=2000.0))
+    assert found["energy_balance_error"]["value"] < 1e-9
+    assert found["power_ratio"]["value"] > 1.05
+
+
+def test_worst_replica_counts(tmp_path: Path) -> None:
+    found = measured(*(replica(tmp_path / str(k), seed=k, certificate=value) for k, value in enumerate((1e-15, 3e-9, 1e-15))))
+    assert found["certificate_max"]["value"] == 3e-9
+    assert found["certificate_max"]["verdict"] == "fail"
+    assert "3 replicas" in found["peak_force_mean"]["basis"]
+
+
+def test_histogram_holds_every_impact(tmp_path: Path) -> None:
+    by_name = {one["name"]: one for one in drum.measure([replica(tmp_path)]).profiles}
+    forces, angles = by_name["peak_forces"], by_name["impacts_at_angle"]
+    assert np.sum(forces["value"]) * np.diff(forces["place"])[0] == pytest.approx(4 * 300 / LOGS, rel=0.01)
+    assert np.sum(angles["value"]) == pytest.approx(4 * 300 / LOGS)
+    inside = [value for place, value in zip(angles["place"], angles["value"], strict=True) if 0.0 < place < 90.0]
+    assert np.sum(inside) == pytest.approx(np.sum(angles["value"]))
+    exceeded = [value for value in by_name["peak_forces_exceeded"]["value"] if value is not None]
+    assert np.all(np.diff(exceeded) <= 0.0)
+    assert 10.0 ** exceeded[0] == pytest.approx(4 * 300 / LOGS, rel=0.02)
+
+
+def test_time_that_is_missing_is_refused(tmp_path: Path) -> None:
+    one = replica(tmp_path)
+    lines = (tmp_path / "time.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "time.csv").write_text("".join(lines[:-7]))
+    with pytest.raises(DumpError, match="993 rows instead of 1000"):
+        drum.measure([one])
+
+
+@pytest.mark.parametrize(("changes", "logs", "radius"), [
+    ({"log_count": 100, "log_diameter_min": 0.2, "log_diameter_max": 0.2, "filling": 0.25}, 100, 2.0),
+    ({"drum_radius": 2.0, "log_diameter_min": 0.2, "log_diameter_max": 0.2, "filling": 0.25}, 100, 2.0),
+    ({"drum_radius": 2.0, "log_diameter_min": 0.2, "log_diameter_max": 0.2, "filling": 0.125}, 50, 2.0)])
+def test_geometry(changes: dict[str, float], logs: int, radius: float) -> None:
+    found = derived(**changes)
+    assert (found["logs"], found["inner_radius"]) == (logs, pytest.approx(radius))
+    # All logs of 0.2 m are 1 m long, of 850 kg/m3.
+    assert found["load_weight"] == pytest.approx(logs * 850.0 * np.pi * 0.1**2 * 9.81)
+
+
+def test_study_finds_the_exponent(tmp_path: Path) -> None:
+    points = []
+    for k, speed in enumerate((2.0, 0.5, 1.0)):
+        found = measured(replica(tmp_path / str(k), seed=7, scale=speed**1.5))
+        points.append({"parameters": {"drum_speed": speed}, "quantities": list(found.values())})
+    studied = drum.study("speed", points, "drum_speed")
+    by_name = judged("debarking_drum", studied)
+    assert by_name["peak_force_mean_exponent"]["value"] == pytest.approx(1.5)
+    assert by_name["impacts_per_log_exponent"]["value"] == pytest.approx(0.0, abs=1e-9)
+    low, high = by_name["peak_force_mean_exponent"]["interval"]
+    assert low < 1.5 < high
+    assert studied.profiles[0]["place"] == [0.5, 1.0, 2.0]
+
+
+def with_impacts(one: Drum, angle: Array, loss: Array) -> Drum:
+    """`one` with impacts at `angle` (degrees) that lose `loss` (J), every other on the shell, half as much as all that is lost."""
+    count, turn = len(angle), np.radians(angle)
+    return replace(one, quarter=np.arange(count) % one.quarters, place=-np.column_stack([np.sin(turn), np.cos(turn)]), loss=loss,
+                   peak=np.full(count, 1e3), shell=np.arange(count) % 2 == 0, lost=np.full(len(one.lost), 2.0 * loss.sum() / len(one.lost)))
+
+
+def test_shares_of_the_loss_and_its_direction(tmp_path: Path) -> None:
+    random = np.random.default_rng(2)
+    found = estimates(with_impacts(read(replica(tmp_path)), 60.0 + random.normal(0.0, 5.0, 4000), np.ones(4000)))
+    assert found["impact_loss_share"].value == pytest.approx(0.5)
+    assert found["shell_loss_share"].value == pytest.approx(0.5)
+    assert found["shell_power_angle"].value == pytest.approx(60.0, abs=0.5)
+
+
+def test_power_along_the_shell_adds_up_to_what_is_lost_there(tmp_path: Path) -> None:
+    one = with_impacts(read(replica(tmp_path)), np.linspace(-179.0, 179.0, 400), np.linspace(0.0, 2.0, 400))
+    patch, duration = 0.3, one.revolutions * one.period
+    total = sum(cell.value for cell in _along_shell(one, patch)) * patch * duration
+    assert total == pytest.approx(one.loss[one.shell].sum(), rel=1e-12)

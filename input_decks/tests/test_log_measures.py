@@ -1,0 +1,230 @@
+"""The measurements of the cases of logs pass for runs that are right and fail for runs that are not."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from dembark.postproc.instruments.logs import LogRun, TouchFrame
+from dembark.input_decks.tests.measuring import defaults, judged, module, names
+
+log_pair, log_cradle, log_pile = (module(name) for name in ("log_pair", "log_cradle", "log_pile"))
+
+
+def row_of_springs(p, mass, stiffness, place, velocity, steps, stride):
+    """The scheme for logs in a row, theta-weighted leapfrog, one contact at a time solved by bisection on the active set: a LogRun."""
+    tau, theta, n = p["time_step"], p["theta"], len(mass)
+    x, v = np.array(place, float), np.array(velocity, float)
+    difference = np.diff(np.eye(n), axis=0)
+    rest = np.full(n - 1, p["touch"])
+    matrix = np.diag(1.0 / stiffness) + theta * tau**2 * difference @ np.diag(1.0 / mass) @ difference.T
+    frames, highest, impulse, longest = [], 0.0, 0.0, 0
+    force = np.zeros(n - 1)
+    for step in range(steps + 1):
+        known = difference @ x - rest + (2.0 * theta - 1.0) * tau * (difference @ v)
+        active = known < 0.0
+        for _ in range(4 * n):
+            force = np.zeros(n - 1)
+            if active.any():
+                force[active] = np.linalg.solve(matrix[np.ix_(active, active)], -known[active])
+            again = (force > 0.0) | (~active & (matrix @ force + known < 0.0))
+            if (again == active).all():
+                break
+            active = again
+        highest, impulse, longest = max(highest, force.max()), impulse + tau * force.sum(), longest + bool(force.any())
+        push = difference.T @ force
+        if step % stride == 0:
+            frames.append((step, x.copy(), v + 0.5 * tau * push / mass, push, force.copy(), highest, impulse))
+        v = v + (0.5 if step == 0 else 1.0) * tau * push / mass
+        x = x + tau * v
+    count = len(frames)
+
+    def vectors(index):
+        table = np.zeros((count, n, 3))
+        table[:, :, 0] = [frame[index] for frame in frames]
+        return table
+
+    velocities = vectors(2)
+    kinetic = 0.5 * (velocities**2).sum(axis=2) @ mass
+    elastic = np.array([0.5 * (frame[4] ** 2 / stiffness).sum() for frame in frames])
+    history = {
+        "step": np.array([frame[0] for frame in frames])[1:],
+        "highest_force": np.array([frame[5] for frame in frames])[1:],
+        "elastic_energy": elastic[1:],
+        "dissipated_energy": (kinetic[0] - kinetic - elastic)[1:],
+        "kinetic_energy": kinetic[1:],
+        **{name: np.zeros(count - 1) for name in ("worst_certificate", "pivots_total", "pivots", "contacts")},
+    }
+    record = np.array([[1, 2, p.get("lead_time", 0.0), longest * tau, highest, impulse, 1.0, 0.0, 0, 0, 0]])
+    touches = [
+        TouchFrame(
+            frame[0],
+            np.array([[i + 1, i + 2] for i in range(n - 1)]),
+            np.tile([-1.0, 0.0, 0.0], (n - 1, 1)),
+            np.zeros(n - 1),
+            frame[4],
+            np.zeros((n - 1, 3)),
+            np.zeros((n - 1, 3)),
+        )
+        for frame in frames
+    ]
+    times = np.array([frame[0] for frame in frames]) * tau
+    return LogRun(
+        p, tau, times, vectors(1), velocities, np.zeros((count, n, 3)), vectors(3), mass, np.full(n, 0.1), history, record, touches
+    )
+
+
+def pair_run(**changes):
+    p = defaults("log_pair", **changes)
+    p["touch"] = p["radius_1"] + p["radius_2"]
+    stiffness = np.array([p["stiffness_1"] * p["stiffness_2"] / (p["stiffness_1"] + p["stiffness_2"])])
+    steps = math.ceil(p["duration"] / p["time_step"] / 200)
+    place = [-p["touch"] - (p["velocity_1"] - p["velocity_2"]) * p["lead_time"], 0.0]
+    return row_of_springs(p, np.array([p["mass_1"], p["mass_2"]]), stiffness, place, [p["velocity_1"], p["velocity_2"]], 200 * steps, steps)
+
+
+def of_pair(run):
+    return judged("log_pair", log_pair.measured(run))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"theta": 0.5, "time_step": 1.58e-5},
+        {"mass_1": 20.0, "stiffness_2": 3e7, "velocity_1": 1.5, "velocity_2": -0.2},
+        {"time_step": 3.1e-5},
+    ],
+)
+def test_a_pair_by_the_scheme_passes(changes):
+    found = of_pair(pair_run(**changes))
+    assert not names(found, "fail"), found
+    assert {"peak_force", "contact_time", "velocity_1_after", "restitution", "momentum_error", "impulse"} <= names(found, "pass")
+
+
+def test_what_is_wrong_with_a_pair_is_seen():
+    run = pair_run()
+    bent = replace(run, velocities=run.velocities * (1.0 + np.linspace(0.0, 0.01, len(run.times)))[:, None, None])
+    assert {"velocity_2_after", "restitution", "momentum_error", "impulse"} <= names(of_pair(bent), "fail")
+    # The loss of theta = 1 in a run that says it has none.
+    lossy = replace(run, parameters=run.parameters | {"theta": 0.5})
+    assert {"peak_force", "restitution", "velocity_1_after"} <= names(of_pair(lossy), "fail")
+    late = replace(run, impacts=run.impacts * np.where(np.arange(11) == 3, 1.01, 1.0))
+    assert of_pair(late)["contact_time"]["verdict"] == "fail"
+
+
+def test_a_damped_pair_is_shown_beside_the_exact_motion_without_a_verdict():
+    run = pair_run()
+    found = of_pair(replace(run, parameters=run.parameters | {"contact_damping": 100.0}))
+    for name in ("peak_force", "contact_time", "velocity_1_after", "restitution"):
+        assert (found[name]["verdict"], found[name]["tolerance"]) == ("info", None)
+        assert found[name]["reference"] is not None and "no formula" in found[name]["reason"]
+    assert found["energy_change"]["reference"] is None and "impulse" not in found
+    assert found["momentum_error"]["verdict"] == "pass"
+
+
+@pytest.mark.parametrize(("theta", "order"), [(1.0, 1.0), (0.5, 2.0)])
+def test_the_study_finds_the_order(theta, order):
+    points = []
+    for step in (3.104558833061282e-5, 6.209117666122564e-5, 1.2418235332245128e-4):
+        run = pair_run(theta=theta, time_step=step)
+        points.append({"parameters": run.parameters, "quantities": list(of_pair(run).values())})
+    found = judged("log_pair", log_pair.study("any", points, "time_step"))
+    assert found["order_peak_force"]["value"] == pytest.approx(order, abs=0.05)
+    assert names(found, "pass") == {"order_peak_force", "order_velocity_curve_error"}
+    wrong = [point | {"parameters": point["parameters"] | {"theta": 1.5 - theta}} for point in points]
+    assert names(judged("log_pair", log_pair.study("any", wrong, "time_step")), "fail") == set(found)
+
+
+def cradle_run(**changes):
+    p = defaults("log_cradle", **changes)
+    chain = log_cradle.row(p)
+    p["touch"] = 2.0 * p["radius"]
+    place = np.arange(len(chain.masses)) * (p["touch"] + p["gap"])
+    steps = math.ceil(p["duration"] / p["time_step"] / 200)
+    return row_of_springs(p, chain.masses, chain.stiffness, place, chain.velocities, 200 * steps, steps)
+
+
+def of_cradle(run):
+    return judged("log_cradle", log_cradle.measured(run))
+
+
+def test_a_cradle_by_the_scheme_passes_and_another_does_not():
+    run = cradle_run(time_step=1e-5)
+    found = of_cradle(run)
+    assert not names(found, "fail"), found
+    bent = run.velocities.copy()
+    bent[-1, 1] += 0.01
+    assert {"velocity_2_after", "scheme_deviation", "momentum_error"} <= names(of_cradle(replace(run, velocities=bent)), "fail")
+    softer = replace(run, parameters=run.parameters | {"stiffness": 1.5e7})
+    assert of_cradle(softer)["peak_force"]["verdict"] == "fail"
+
+
+def stack(*, lift=1.0, count=201, logs=4):
+    """Logs of 50 kg that rest side by side on the ground, smooth and without friction; the ground carries `lift` of the weight."""
+    p = defaults("log_pile", log_count=logs, friction=0.0)
+    mass, weight = np.full(logs, 50.0), 50.0 * p["gravity"]
+    ids = np.array([[i + 1, -1] for i in range(logs)] + [[1, -2], [logs, -3]] + [[i + 1, i + 2] for i in range(logs - 1)])
+    normals = np.array([[0.0, 1.0, 0.0]] * logs + [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]] + [[-1.0, 0.0, 0.0]] * (logs - 1))
+    forces = np.array([lift * weight] * logs + [100.0] * (logs + 1))
+    zero = np.zeros((len(ids), 3))
+    positions = np.zeros((count, logs, 3))
+    positions[:, :, 1] = np.linspace(1.0, 0.1, count)[:, None]
+    still = np.zeros((count, logs, 3))
+    lost = (mass.sum() * p["gravity"]) * (positions[0, 0, 1] - positions[1:, 0, 1])
+    steps = np.arange(count) * 100
+    history = {
+        "step": steps[1:],
+        "kinetic_energy": np.zeros(count - 1),
+        "elastic_energy": np.zeros(count - 1),
+        "dissipated_energy": lost,
+        "worst_certificate": np.full(count - 1, 1e-16),
+        "pivots_total": steps[1:] * 1.0,
+        "pivots": np.ones(count - 1),
+        "contacts": np.full(count - 1, 9.0),
+        "impacts": np.arange(count - 1),
+        "highest_force": np.full(count - 1, 1e4),
+    }
+    rng = np.random.default_rng(1)
+    impacts = np.column_stack(
+        [np.full(30, 1), np.full(30, 2), np.linspace(0.1, 0.4, 30), *rng.uniform(1.0, 2.0, (5, 30)), np.zeros((30, 3))]
+    )
+    touches = [TouchFrame(int(step), ids, normals, np.zeros(len(ids)), forces, zero, zero) for step in steps]
+    return LogRun(p, 5e-5, steps * 5e-5, positions, still, still, still, mass, np.full(logs, 0.1), history, impacts, touches)
+
+
+def of_pile(run):
+    return judged("log_pile", log_pile.measured(run))
+
+
+def test_a_stack_at_rest_passes_and_one_that_floats_does_not():
+    run = stack()
+    found = of_pile(run)
+    assert not names(found, "fail"), found
+    assert {"lift_over_weight", "ground_share", "log_balance", "contacts_per_log", "energy_balance"} <= names(found, "pass")
+    assert {"lift_over_weight", "ground_share", "log_balance"} <= names(of_pile(stack(lift=0.98)), "fail")
+    creeping = replace(run, velocities=run.velocities + np.array([0.1, 0.0, 0.0]))
+    assert of_pile(creeping)["residual_speed"]["verdict"] == "fail"
+    lossy = replace(run, history=dict(run.history) | {"dissipated_energy": 0.9 * run.history["dissipated_energy"]})
+    assert of_pile(lossy)["energy_balance"]["verdict"] == "fail"
+
+
+def test_a_stack_with_too_few_contacts_fails():
+    run = stack()
+    few = [replace(one, ids=one.ids[:4], normals=one.normals[:4], forces=one.forces[:4], friction=one.friction[:4]) for one in run.touches]
+    assert of_pile(replace(run, touches=few))["contacts_per_log"]["verdict"] == "fail"
+
+
+def test_rough_stakes_may_carry_a_part_of_the_weight():
+    run = stack()
+    found = of_pile(replace(run, parameters=run.parameters | {"stake_friction": 0.4}))["ground_share"]
+    assert (found["verdict"], found["reference"], found["tolerance"]) == ("info", None, None)
+
+
+def test_the_beginning_is_the_state_before_the_eleventh_impact():
+    run = stack()
+    frame, logs, first = log_pile.beginning(run)
+    assert logs.tolist() == [0, 1] and len(first) == 10
+    assert run.times[frame] < run.impacts[10, 2] <= run.times[frame + 1]
+    shuffled = replace(run, impacts=run.impacts[::-1])
+    assert log_pile.beginning(shuffled)[0] == frame

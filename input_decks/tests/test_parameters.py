@@ -1,0 +1,69 @@
+"""Every parameter of every case changes what the engines read."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from dembark.validation import engines
+from dembark.validation.case import deck
+from dembark.validation.case.folders import find
+from dembark.validation.case.model import Case
+from dembark.validation.case.parameters import Parameter, Value
+from dembark.validation.case.resolve import merged, portable
+
+SCENE = Path(__file__).resolve().parents[2] / "plugins/yade/python/dembark/scene.py"
+# What parameters need to do anything.
+LIQUID = {"bridge_volume": 8e-11, "liquid_viscosity": 0.01}
+BASES: dict[str, dict[str, Any]] = {
+    "silo": {"grain_count": 40, "bridge_volume": 8e-11},
+    "plane_silo": {"grain_count": 40, "bridge_volume": 8e-11},
+    "plug_flow": {"grain_count": 40, "bridge_volume": 8e-11},
+    "gravity_channel": {"channel_width": 0.04, "channel_depth": 0.021, "channel_length": 0.02, "bridge_volume": 8e-11},
+    "column_collapse": {"grain_count": 60, **LIQUID},
+    "log_pair": {"offset": 0.05},
+    "log_cradle": {},
+    "log_pile": {},
+    "debarking_drum": {},
+    "single_contact": {"partner": "rest", "sweep": "spin", "points": 3, "duration": 0.01},
+    "liquid_exchange": {},
+}
+# How many packings there are is the harness's, for a deck makes one; what counts as an impact is the measurement's.
+NOT_READ = {"replicas", "impact_speed"}
+# Where a deck uses a number, and where the numbers at its top end.
+USE = {"liggghts": (r"\$\{NAME\}", "\n\n"), "yade": (r'\bp\.NAME\b|"NAME"', "\n)\n")}
+
+
+def other(parameter: Parameter, value: Value) -> Value:
+    """Another value that the parameter may have."""
+    if parameter.values:
+        return next(word for word in parameter.values if word != value)
+    if parameter.name == "liquid_content":
+        return 0.004
+    if value is None:
+        return 0.9
+    return value + 1 if isinstance(value, int) else 0.9 * value or 0.5  # type: ignore[operator]
+
+
+def inputs(case: Case, engine: str, values: dict[str, Value], folder: Path) -> dict[str, str]:
+    """What the engine reads: all files of a run's folder, but of the numbers at the top of the deck only those that are used."""
+    deck.write(case, engine, values, folder)
+    texts = {path.name: path.read_text(encoding="utf-8") for path in folder.iterdir()}
+    name, (use, end) = engines.facts(engine).deck, USE[engine]
+    head, body = texts[name].split(end, 1)
+    body += SCENE.read_text(encoding="utf-8") if engine == "yade" else ""
+    numbers = {match.group(1): match.group() for match in re.finditer(r"^(?:variable| {3}) +(\w+).*", head, re.MULTILINE)}
+    return texts | {name: body} | {key: line for key, line in numbers.items() if re.search(use.replace("NAME", key), body)}
+
+
+@pytest.mark.parametrize("case", BASES)
+@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+def test_every_parameter_changes_the_input(case: str, engine: str, tmp_path: Path) -> None:
+    found = find(case)
+    values = portable(merged(found, None, None, BASES[case]))
+    before = inputs(found, engine, values, tmp_path)
+    for name in found.parameters.keys() - NOT_READ:
+        changed = values | {name: other(found.parameters[name], values[name])}
+        assert inputs(found, engine, changed, tmp_path) != before, name

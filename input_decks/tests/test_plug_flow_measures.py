@@ -1,0 +1,65 @@
+"""What is measured of the plug flow finds what was put into synthetic runs, and does not pass what is wrong."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray
+
+from dembark.common.errors import RunError
+from dembark.input_decks.tests.synthetic import DIAMETER, plug_flow
+from dembark.validation.metrics import measure
+
+
+def by_name(content):
+    return {quantity["name"]: quantity for quantity in content["quantities"]}
+
+
+def test_plug_flow_with_a_known_profile(tmp_path):
+    found = by_name(measure(plug_flow(tmp_path, slip=0.4, decay=2.0)))
+    assert found["shear_zone_width"]["value"] == pytest.approx(2.0, rel=0.12)
+    assert found["shear_zone_width_90"]["value"] == pytest.approx(0.5 + 2.0 * np.log(10.0), rel=0.12)
+    assert found["wall_mobilisation"]["value"] == pytest.approx(0.3, rel=1e-6)
+    assert found["solid_fraction"]["value"] == pytest.approx(np.pi / 6.0, rel=0.02)
+    assert found["core_fluctuation"]["value"] == pytest.approx(0.02, rel=0.2)
+    assert abs(found["flux_error"]["value"]) < 0.02
+    assert found["flux_error"]["verdict"] == "pass"
+    assert found["force_balance_error"]["verdict"] == "pass"
+    assert found["inertial_number"]["verdict"] == "pass"
+
+
+def test_flat_core_passes_and_a_tilted_one_fails(tmp_path):
+    assert by_name(measure(plug_flow(tmp_path / "flat", slip=0.3, decay=0.8)))["core_flatness"]["verdict"] == "pass"
+    found = by_name(measure(plug_flow(tmp_path / "tilted", slip=0.3, decay=0.8, tilt=0.2)))["core_flatness"]
+    assert found["value"] == pytest.approx(0.2 * 0.225, rel=0.15)
+    assert found["verdict"] == "fail"
+
+
+def test_no_shear_zone_is_said_and_not_measured(tmp_path):
+    found = by_name(measure(plug_flow(tmp_path, slip=0.0)))["shear_zone_width"]
+    assert found["verdict"] == "info" and not found["compared"]
+    assert "no shear zone" in found["reason"]
+
+
+def test_channel_gives_back_velocity_slope_and_temperature(tmp_path):
+    folder = plug_flow(tmp_path, slip=0.4, decay=2.0, noise=0.02)
+    found = {one["name"]: one for one in measure(folder)["quantities"]}
+    fields = xarray.load_dataset(folder / "fields.nc", engine="h5netcdf")
+    place = fields.x.values / DIAMETER
+    core = np.abs(place - 10.0) < 4.0
+    np.testing.assert_allclose(fields.velocity_profile.values[core], found["core_velocity"]["value"], rtol=0.02)
+    # The grains' vertical velocity scatters by 0.02 v0 in one of three directions.
+    assert found["temperature_core"]["value"] == pytest.approx(0.02**2 / 3.0, rel=0.15)
+    # v / v_core = 1 - 0.4 exp(-s / 2): slope 0.2 exp(-s / 2) / d, smoothed over half a diameter.
+    due = 0.2 * np.exp(-2.0 / 2.0) * found["core_velocity"]["value"]
+    assert np.interp(2.0, place, fields.shear_rate_profile.values) == pytest.approx(due, rel=0.1)
+    assert np.interp(18.0, place, fields.shear_rate_profile.values) == pytest.approx(-due, rel=0.1)
+
+
+def test_a_window_that_hardly_stays_filled_is_told(tmp_path):
+    folder = plug_flow(tmp_path)
+    record = json.loads((folder / "replica-1" / "run.json").read_text())
+    record["parameters"]["grain_diameter"] *= 5.0
+    (folder / "replica-1" / "run.json").write_text(json.dumps(record))
+    with pytest.raises(RunError, match="of its height stay filled while the plate sinks, take more grains or less travel"):
+        measure(folder)

@@ -1,0 +1,182 @@
+"""What is measured of silos finds what was put into synthetic runs, and does not pass what is wrong."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray
+
+from dembark.common.errors import RunError
+from dembark.input_decks.tests.measuring import judged, module
+from dembark.input_decks.tests.synthetic import DIAMETER, silo
+from dembark.physics import capillary_force
+from dembark.postproc.instruments.janssen import two_parameter
+from dembark.validation.compare import compare, pair
+from dembark.validation.metrics import measure
+
+SILO = module("silo")
+
+
+def by_name(content):
+    return {quantity["name"]: quantity for quantity in content["quantities"]}
+
+
+def test_silo_that_follows_janssen_passes(tmp_path):
+    folder = silo(tmp_path, k=0.8, friction=0.25, noise=0.1)
+    content = measure(folder)
+    found = by_name(content)
+    assert found["stress_ratio_k"]["value"] == pytest.approx(0.8, rel=0.02)
+    assert found["wall_mobilisation"]["value"] == pytest.approx(0.25, rel=0.01)
+    assert found["janssen_length_predicted"]["value"] == pytest.approx(2.5, rel=0.02)
+    assert found["janssen_length_measured"]["value"] == pytest.approx(2.5, rel=0.03)
+    assert found["two_parameter_gain"]["value"] < 1.0
+    assert {
+        found[name]["verdict"]
+        for name in (
+            "janssen_profile_deviation",
+            "janssen_length_predicted",
+            "apparent_mass_ratio",
+            "force_balance_error",
+            "field_balance_deviation",
+        )
+    } == {"pass"}
+    assert abs(found["field_balance_deviation"]["value"]) < 1e-9
+    assert json.loads((folder / "metrics.json").read_text()) == content
+
+
+def test_wet_silo_follows_janssen_with_the_adhesion_that_hangs_on_the_wall(tmp_path):
+    found = by_name(measure(silo(tmp_path, k=0.8, friction=0.25, noise=0.02, bridge_volume=8e-11)))
+    bridge = float(capillary_force(0.5 * DIAMETER, np.inf, 0.0, 8e-11, 0.072, 0.35))
+    # Bands are those of the measured height.
+    assert found["wall_adhesion"]["value"] == pytest.approx(24 * bridge / (2 * np.pi * 0.025 * DIAMETER), rel=5e-3)
+    assert found["stress_ratio_k"]["value"] == pytest.approx(0.8, rel=0.02)
+    assert found["wall_mobilisation"]["value"] == pytest.approx(0.25, rel=0.01)
+    assert found["janssen_length_predicted"]["value"] == pytest.approx(2.5, rel=0.02)
+    assert found["janssen_length_measured"]["value"] == pytest.approx(2.5, rel=0.03)
+    assert {found[name]["verdict"] for name in ("janssen_profile_deviation", "janssen_length_predicted", "apparent_mass_ratio")} == {"pass"}
+
+
+def test_solid_fraction_counts_up_to_the_wall(tmp_path):
+    found = by_name(measure(silo(tmp_path)))
+    assert found["solid_fraction"]["value"] == pytest.approx(24.0 * np.pi / 6.0 * DIAMETER**2 / (np.pi * 0.025**2), rel=2e-3)
+
+
+def test_missing_wall_force_is_a_failed_balance(tmp_path):
+    found = by_name(measure(silo(tmp_path, noise=0.01, lost_wall_force=0.01)))["force_balance_error"]
+    assert found["value"] == pytest.approx(-0.01 * 0.75, rel=0.3)
+    assert found["verdict"] == "fail"
+
+
+def test_three_replicas_give_an_interval_over_replicas(tmp_path):
+    for replica, k in ((1, 0.78), (2, 0.8), (3, 0.83)):
+        folder = silo(tmp_path, replica=replica, k=k, noise=0.1, seed=replica)
+    found = by_name(measure(folder))["stress_ratio_k"]
+    assert found["basis"] == "3 replicas"
+    low, high = found["interval"]
+    assert low < 0.8 < high
+    assert high - low == pytest.approx(2 * 4.303 * np.std([0.78, 0.8, 0.83], ddof=1) / np.sqrt(3), rel=0.1)
+
+
+def three_packings(folder, engine, **values):
+    for replica in (1, 2, 3):
+        made = silo(folder, engine=engine, replica=replica, noise=0.1, seed=10 * len(engine) + replica, **values)
+    return measure(made)
+
+
+def test_engines_that_agree_and_engines_that_do_not(tmp_path):
+    for engine in ("liggghts", "yade"):
+        three_packings(tmp_path, engine, k=0.8)
+    found = by_name(compare(tmp_path / "silo" / "dry"))
+    assert found["stress_ratio_k"]["verdict"] == "pass"
+    for engine, k in (("liggghts", 0.8), ("yade", 1.0)):
+        three_packings(tmp_path, engine, variant="wet", k=k)
+    found = by_name(compare(tmp_path / "silo" / "wet"))
+    assert found["stress_ratio_k"]["verdict"] == "fail"
+    assert found["stress_ratio_k"]["deviation"] == pytest.approx(0.25, rel=0.05)
+
+
+def test_height_of_one_packing_has_no_interval_and_decides_nothing(tmp_path):
+    height = by_name(measure(silo(tmp_path, noise=0.1)))["filling_height"]
+    assert height["interval"] is None
+    found = pair(height, height | {"value": 1.003 * height["value"]}, "liggghts", "yade")
+    assert found["verdict"] == "info"
+    assert "other packings" in found["reason"]
+
+
+def filling_points(length, per_radius=0.07, radii=(1.0, 2.0, 4.0), hydrostatic=0.0, half=0.0):
+    saturation = length * per_radius
+    for height in radii:
+        mass = per_radius * height
+        apparent = float(two_parameter(np.array([mass]), saturation, hydrostatic)[0])
+        values = {"filled_mass": mass, "filling_height": height, "apparent_mass_ratio": apparent / mass, "janssen_length_predicted": length}
+        yield {"quantities": [{"name": name, "value": value, "interval": [value - half, value + half]} for name, value in values.items()]}
+
+
+def filling(length, **changes):
+    found = SILO.study("filling", list(filling_points(length, **changes)), "grain_count")
+    return judged("silo", found), found.profiles
+
+
+def test_filling_curve_gives_back_its_length():
+    quantity, (curve,) = filling(2.1, half=0.01)
+    length = quantity["filling_length"]
+    assert length["value"] == pytest.approx(2.1, rel=1e-6)
+    assert 0.0 < length["interval"][1] - length["value"] < 0.2
+    assert length["verdict"] == quantity["largest_apparent_mass"]["verdict"] == "pass"
+    np.testing.assert_allclose(curve["value"], curve["reference"], rtol=1e-6)
+
+
+def test_filling_curve_with_another_length_than_the_walls_fails_and_a_hydrostatic_zone_is_found():
+    points = list(filling_points(2.1, half=0.001))
+    for point in points:
+        point["quantities"][-1] |= {"value": 3.0, "interval": [2.99, 3.01]}
+    assert judged("silo", SILO.study("filling", points, "grain_count"))["filling_length"]["verdict"] == "fail"
+    found, _ = filling(1.5, radii=(0.5, 1.0, 2.0, 3.0, 5.0), hydrostatic=0.07)
+    assert found["filling_two_parameter_gain"]["value"] > 0.95
+
+
+def test_compare_needs_two_engines(tmp_path):
+    measure(silo(tmp_path))
+    with pytest.raises(RunError, match="liggghts only"):
+        compare(tmp_path / "silo" / "dry")
+
+
+def test_truncated_dump_is_one_clear_line(tmp_path):
+    folder = silo(tmp_path)
+    path = folder / "replica-1" / "contacts.dump"
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(RunError, match="truncated") as caught:
+        measure(folder)
+    assert "\n" not in str(caught.value)
+    assert not (folder / "metrics.json").exists()
+
+
+@pytest.fixture(scope="module")
+def measured_silo(tmp_path_factory):
+    folder = silo(tmp_path_factory.mktemp("silo"), k=0.8, friction=0.25, noise=0.02)
+    return {one["name"]: one for one in measure(folder)["quantities"]}, xarray.load_dataset(folder / "fields.nc", engine="h5netcdf")
+
+
+def test_silo_has_its_fields_beside_its_metrics(measured_silo):
+    found, fields = measured_silo
+    assert fields.attrs["kind"] == "silo" and fields.attrs["width"] == DIAMETER
+    assert {fields[name].attrs["units"] for name in ("stress_zz", "stress_rr", "stress_zr")} == {"Pa"}
+    # The whole mass is in the rings, and the field's section carries what Janssen's law says.
+    volume = np.pi * np.diff(fields.radius_bounds.values**2).ravel()[:, None] * np.diff(fields.height_bounds.values).ravel()
+    assert float((fields.density.values * volume).sum()) == pytest.approx(found["filled_mass"]["value"], rel=1e-12)
+    lower = (fields.height.values > 2 * DIAMETER) & (fields.height.values < 0.5 * fields.attrs["filling_height"])
+    np.testing.assert_allclose(fields.stress_zz_section.values[lower], fields.janssen.values[lower], rtol=0.03)
+    assert found["field_janssen_deviation"]["verdict"] == "pass"
+
+
+def test_silo_wall_patches_carry_the_engines_wall_force(measured_silo):
+    found, fields = measured_silo
+    assert found["wall_force_deviation"]["verdict"] == "pass"
+    assert abs(found["wall_force_deviation"]["value"]) < 1e-6
+    held = np.isfinite(fields.wall_normal.values)
+    assert fields.wall_shear.values[held].sum() == pytest.approx(0.25 * fields.wall_normal.values[held].sum(), rel=1e-6)
+
+
+def test_silo_whose_wall_force_is_lost_in_the_history_does_not_pass(tmp_path):
+    found = {one["name"]: one for one in measure(silo(tmp_path, lost_wall_force=0.02))["quantities"]}
+    assert found["wall_force_deviation"]["verdict"] == "fail"

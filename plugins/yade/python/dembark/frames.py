@@ -1,0 +1,75 @@
+"""Frames of all bodies and a history with all digits, so that runs can be compared to round-off."""
+
+from yade import Omega, Sphere
+from yade.dembark.scene import box
+from yade.dembark.states import options, table
+from yade.minieigenHP import Vector3
+
+O = Omega()
+
+
+def spheres():
+    """The bodies that are spheres, or logs, and move."""
+    return [body for body in O.bodies if isinstance(body.shape, Sphere) and body.dynamic]
+
+
+def motion(body, gravity=(0.0, 0.0, 0.0)):
+    """Force (N, with the weight), velocity (m/s) and angular velocity (rad/s) at the time of the positions.
+
+    YADE's own velocities are half a step behind.
+    """
+    state = body.state
+    force, torque = O.forces.f(body.id) + state.mass * Vector3(*gravity), O.forces.t(body.id)
+    velocity = [v if axis in state.blockedDOFs else v + 0.5 * O.dt * f / state.mass for axis, v, f in zip("xyz", state.vel, force)]
+    spin = [w if axis in state.blockedDOFs else w + 0.5 * O.dt * t / i for axis, w, t, i in zip("XYZ", state.angVel, torque, state.inertia)]
+    return force, velocity, spin
+
+
+class FrameWriter:
+    """Appends frames of the moving spheres to grains.dump, and rows to time.csv.
+
+    columns : names of the columns of time.csv after step, time and kinetic_energy
+    bounds : ((xlo, xhi), (ylo, yhi), (zlo, zhi)), m; by default those of packing.data
+    gravity : m/s^2
+    """
+
+    def __init__(self, columns=(), bounds=None, gravity=(0.0, 0.0, 0.0)):
+        self.gravity = gravity
+        self._box = "".join(f"{low:.17g} {high:.17g}\n" for low, high in bounds or box())
+        self._history = table("time.csv", ",".join(["step", "time", "kinetic_energy", *columns]))
+        self._begin("grains.dump")
+
+    @staticmethod
+    def _begin(path):
+        open(path, "a" if options()[1] else "w").close()
+
+    def _frame(self, path, kind, rows, columns):
+        with open(path, "a", encoding="ascii") as file:
+            file.write(f"ITEM: TIMESTEP\n{O.iter}\nITEM: NUMBER OF {kind}\n{len(rows)}\nITEM: BOX BOUNDS ff ff ff\n{self._box}")
+            file.write(f"ITEM: {kind} {columns}\n")
+            file.writelines(" ".join(f"{x:.17g}" for x in row) + "\n" for row in rows)
+
+    def frame(self):
+        """Append the present state to grains.dump; call it between forces and motion, where positions and forces are of the same time."""
+        rows = []
+        for body in spheres():
+            force, velocity, spin = motion(body, self.gravity)
+            rows.append((body.id + 1, 1, *body.state.pos, 0, 0, 0, *velocity, *spin, *force, body.shape.radius, body.state.mass))
+        self._frame("grains.dump", "ATOMS", rows, "id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass")
+
+    def row(self, *values):
+        """Append a row with the `values` of all columns to time.csv, after step 0; print step, time and energy for whoever watches."""
+        if O.iter == 0:
+            return
+        energy = 0.0
+        for body in spheres():
+            _, velocity, spin = motion(body, self.gravity)
+            energy += 0.5 * sum(body.state.mass * v * v for v in velocity) + 0.5 * sum(i * w * w for i, w in zip(body.state.inertia, spin))
+        self._history.write(",".join([str(O.iter), *(f"{x:.17g}" for x in (O.time, energy, *values))]) + "\n")
+        self._history.flush()
+        print(O.iter, f"{O.time:.6g}", f"{energy:.6g}", flush=True)
+
+    def write(self):
+        """A frame and a row."""
+        self.frame()
+        self.row()

@@ -1,0 +1,155 @@
+"""Scenes of decks: bodies of packing.data, materials, walls, and the engines around the Finnie-Rabinowicz law."""
+
+from yade import (
+    ForceResetter, FrictMat, Ig2_Sphere_Sphere_ScGeom, InsertionSortCollider, InteractionLoop, Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys,
+    Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz, MatchMaker, NewtonIntegrator, Omega, PyRunner, utils,
+)
+from yade.dembark.report import fail
+from yade.dembark.writers import DumpWriter, HistoryWriter
+from yade.minieigenHP import Vector3
+
+O = Omega()
+
+
+def parameters():
+    """In a deck of dembark this line stands for the numbers of a run, which 'dembark deck' puts in its place."""
+    fail("this deck has no numbers; write it with 'dembark deck CASE --engine yade --out FOLDER'")
+
+
+def packing(path="packing.data"):
+    """Rows (type, diameter, density, position, velocity, spin) of the bodies in a LAMMPS data file of atom style granular; SI units."""
+    rows, section = {}, None
+    try:
+        with open(path, encoding="ascii") as file:
+            for line in file:
+                words = line.split()
+                if words in (["Atoms"], ["Velocities"]):
+                    section = words[0]
+                elif words and section == "Atoms":
+                    kind, (diameter, density, *place) = int(words[1]), map(float, words[2:])
+                    rows[int(words[0])] = [kind, diameter, density, place, (0, 0, 0), (0, 0, 0)]
+                elif words and section == "Velocities":
+                    numbers = [float(word) for word in words[1:]]
+                    rows[int(words[0])][4:] = numbers[:3], numbers[3:]
+    except (OSError, ValueError, KeyError) as error:
+        fail(f"file {path}: {error}; it must be a data file of atom style granular")
+    return [rows[number] for number in sorted(rows)]
+
+
+def box(path="packing.data"):
+    """((xlo, xhi), (ylo, yhi), (zlo, zhi)) in m of a data file."""
+    with open(path, encoding="ascii") as file:
+        rows = [line.split()[:2] for line in file if line.rstrip().endswith("hi")]
+    return tuple((float(low), float(high)) for low, high in rows)
+
+
+def materials(p):
+    """Materials (ids) of grains and walls."""
+    return tuple(O.materials.append(FrictMat(young=p.youngs_modulus, poisson=p.poisson_ratio, density=p.grain_density)) for _ in range(2))
+
+
+def grains(material, gravity=(0, 0, 0), mask=1, held=None, path="packing.data"):
+    """Add the spheres of the packing: those of type 1 with `material` and `mask`, the others held with the (material, mask) `held`.
+
+    YADE's velocities are half a step behind positions: with `gravity` (m/s^2), and O.dt set, those of the file are met at the time zero.
+    Returns the ids of all by type.
+    """
+    ids = {}
+    for kind, diameter, _, place, velocity, spin in packing(path):
+        moves = kind == 1 or held is None
+        own, bits = (material, mask) if moves else held
+        body = utils.sphere(place, 0.5 * diameter, material=own, mask=bits, fixed=not moves)
+        if moves:
+            body.state.vel = Vector3(*velocity) - 0.5 * O.dt * Vector3(*gravity)
+            body.state.angVel = Vector3(*spin)
+        ids.setdefault(kind, []).append(O.bodies.append(body))
+    return ids
+
+
+def periodic(axes, room):
+    """Make the scene periodic along `axes` (0 ... 2), with the box of the packing as its cell.
+
+    YADE is periodic in all three directions; along the others the cell is larger by `room` (m) for the walls: nothing closes on itself.
+    """
+    O.periodic = True
+    O.cell.setBox(*(high - low + (0.0 if axis in axes else room) for axis, (low, high) in enumerate(box())))
+
+
+def plane(axis, position, side, material, diameter, mask=1):
+    """A plane wall across `axis` (0 ... 2) at `position` (m) in periodic scenes, grains of mean `diameter` (m) on its `side` (+-1); its id.
+
+    `Wall` is unbounded, which a periodic collider cannot sort; a fixed box that reaches far beyond the cell, and all that grains travel,
+    does the same. After a restart YADE's collider looks for pairs along x, from a body's lower end to its upper one, within one period.
+    So the ends of the box must almost meet there, with a gap that no grain fits into; or a grain just above it would never be found.
+    """
+    extents = [1e6 * diameter] * 3
+    extents[0] = 0.5 * (2001 * O.cell.size[0] - 0.5 * diameter)
+    extents[axis] = diameter
+    centre = [0.0] * 3
+    centre[axis] = position - side * diameter
+    return O.bodies.append(utils.box(centre, extents, fixed=True, material=material, mask=mask))
+
+
+def pairs(materials, between_grains, at_wall):
+    """A property of pairs of grains, and of a grain and a wall; `materials` as from `materials(p)`."""
+    grain, wall = materials
+    return MatchMaker(matches=((grain, grain, between_grains), (grain, wall, at_wall)))
+
+
+def contact_loop(p, materials, walls, static=None, kinetic=None):
+    """InteractionLoop of the Finnie-Rabinowicz law with the numbers `p` of a deck; `walls`: Ig2 functors beside that of two spheres.
+
+    `static`, `kinetic`: friction (of grains, of walls) other than that of `p`.
+    """
+    static = static or (p.grain_static, p.wall_static)
+    kinetic = kinetic or (p.grain_kinetic, p.wall_kinetic)
+    given = vars(p)
+    names = {"interfaceShearStrength": "interface_shear_strength", "liquidViscosity": "liquid_viscosity", "minimumGap": "minimum_gap"}
+    more = {word: given[key] for word, key in names.items() if key in given}
+    law = {"presliding": p.presliding} if "presliding" in given else {}
+    return InteractionLoop(
+        [Ig2_Sphere_Sphere_ScGeom(), *walls],
+        [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
+            restitution=p.restitution, staticFriction=pairs(materials, *static), kineticFriction=pairs(materials, *kinetic),
+            criticalSlipDistance=p.critical_slip_distance, bridgeVolume=0 if p.carried else p.bridge_volume, contactAngle=p.contact_angle,
+            surfaceTension=p.surface_tension, **more)],
+        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(
+            capillaryModel=p.capillary_model if p.wet else "none", carriedLiquid=bool(p.carried), **law)])
+
+
+def engine_loop(p, loop, bounds, verlet, gravity, liquid=None, account=None, periodic=False, record="record()"):
+    """All engines of a scene: `loop` from `contact_loop`, `bounds`: Bo1 functors, `verlet` (m): Verlet distance of the collider.
+
+    `record`, called in every step between forces and motion, where positions and forces belong to the same time, writes what is due.
+    """
+    sorting = {"allowBiggerThanPeriod": True} if periodic else {}
+    return [
+        ForceResetter(),
+        InsertionSortCollider(bounds, verletDist=verlet, **sorting),
+        loop,
+        *([liquid] if liquid is not None else []),
+        PyRunner(command=record, iterPeriod=1),
+        *([account] if account is not None else []),
+        NewtonIntegrator(damping=0, gravity=gravity),
+    ]
+
+
+class Recorder:
+    """Writes what is due at a step: a row of time.csv every p.every steps, a frame of the dumps every p.stride from p.first on.
+
+    `history`: writer of time.csv other than HistoryWriter; `report`: steps between two lines of progress, by default each row.
+    """
+
+    def __init__(self, p, walls, bounds=None, boundary="ff ff ff", gravity=(0, 0, 0), glued=None, liquid=None, history=None, report=None):
+        self.p, self.report = p, report
+        self.dump = DumpWriter(walls=walls, bounds=bounds or box(), boundary=boundary, gravity=gravity)
+        self.history = history or HistoryWriter(walls=walls, glued=glued, gravity=gravity, liquid=liquid, progress=report is None)
+
+    def __call__(self):
+        """Once in every step."""
+        if O.iter > 0 and O.iter % self.p.every == 0:
+            self.history.write()
+        if self.report and O.iter > 0 and O.iter % self.report == 0:
+            print(O.iter, f"{O.time:.6g}", flush=True)
+        if O.iter >= self.p.first and (O.iter - self.p.first) % self.p.stride == 0:
+            self.dump.write()

@@ -1,0 +1,177 @@
+"""Runs with states to resume from: whole or not at all, and equal to the bit to a run that was not interrupted, on one thread."""
+
+import glob
+import gzip
+import math
+import os
+import re
+import shutil
+import sys
+import zlib
+from functools import cache
+
+from yade import Omega
+from yade.dembark.report import fail, finish
+
+O = Omega()
+_KEPT_STATES = 2
+
+
+@cache
+def options():
+    """What the words restart_every=<steps> and resume=yes|no behind the script say: (steps between saved states, 0 never; whether to resume).
+
+    Other words are the script's own.
+    """
+    words = dict(word.split("=", 1) for word in sys.argv[1:] if "=" in word)
+    every, resume = words.get("restart_every", "0"), words.get("resume", "no")
+    if not every.isdecimal():
+        fail(f"argument 'restart_every={every}': it must be a whole number of steps, 0 for none")
+    if resume not in ("no", "yes"):
+        fail(f"argument 'resume={resume}': it must be yes or no")
+    return int(every), resume == "yes"
+
+
+def _sync(path):
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _check_sum(path):
+    crc, size = 0, 0
+    with open(path, "rb") as file:
+        while block := file.read(1 << 20):
+            crc, size = zlib.crc32(block, crc), size + len(block)
+    return f"{size} {crc:08x}"
+
+
+def _states(base):
+    """Steps and files of all saved states `base`.<step>.yade.gz, the newest first."""
+    found = ((re.fullmatch(re.escape(base) + r"\.(\d+)\.yade\.gz", path), path) for path in glob.glob(glob.escape(base) + ".*.yade.gz"))
+    return sorted(((int(match.group(1)), path) for match, path in found if match), reverse=True)
+
+
+def _is_whole(path):
+    try:
+        with open(path + ".crc", encoding="ascii") as mark:
+            return mark.read().strip() == _check_sum(path)
+    except (OSError, ValueError):
+        return False
+
+
+def _can_be_read(path):
+    """Whether a packed file ends as it should."""
+    try:
+        with gzip.open(path) as file:
+            while file.read(1 << 20):
+                pass
+    except (EOFError, OSError, zlib.error):
+        return False
+    return True
+
+
+def _number(line):
+    """The integer that a line begins with; infinity when it begins with something else."""
+    found = re.match(rb"\d+", line)
+    return int(found.group()) if found else math.inf
+
+
+def _save(base, outputs):
+    """Save the scene as `base`.<step>.yade.gz: whole or not at all, and marked with its check sum when it is; keep the last two."""
+    path = f"{base}.{O.iter}.yade.gz"
+    part = f"{base}.part.yade.gz"
+    # YADE would try for ever to write on a full disk. A packed body with its contacts takes about 150 bytes.
+    if shutil.disk_usage(os.path.dirname(path) or ".").free < 1000 * len(O.bodies) + (1 << 20):
+        fail(f"file {path} cannot be written: No space left on the disk")
+    O.save(part, quiet=True)
+    if not _can_be_read(part):
+        fail(f"file {part} could not be written whole. No space left on the disk?")
+    for name in (*filter(os.path.isfile, outputs), part):
+        _sync(name)
+    if os.path.exists(path + ".crc"):
+        os.unlink(path + ".crc")
+    os.replace(part, path)
+    with open(path + ".crc.part", "w", encoding="ascii") as mark:
+        mark.write(_check_sum(path) + "\n")
+    _sync(path + ".crc.part")
+    os.replace(path + ".crc.part", path + ".crc")
+    _sync(os.path.dirname(path) or ".")
+    _forget(_states(base)[_KEPT_STATES:])
+
+
+def _forget(states):
+    for _, path in states:
+        for name in (path + ".crc", path):
+            if os.path.exists(name):
+                os.unlink(name)
+
+
+def _cut(path, step):
+    """Cut a table or a dump before the first row or frame at or after `step`, or the first that is not whole."""
+    if not os.path.isfile(path):
+        return
+    end = 0
+    with open(path, "rb") as file:
+        first = file.readline()
+        if first == b"ITEM: TIMESTEP\n":
+            line = first
+            while line == b"ITEM: TIMESTEP\n" and _number(file.readline()) < step:
+                file.readline()
+                rows = _number(file.readline()) + 5  # and the box, and the names of the columns
+                if rows == math.inf or sum(file.readline().endswith(b"\n") for _ in range(rows)) < rows:
+                    break
+                end, line = file.tell(), file.readline()
+        elif first.endswith(b"\n"):
+            end = file.tell()
+            while (line := file.readline()).endswith(b"\n") and _number(line) < step:
+                end = file.tell()
+    os.truncate(path, end)
+
+
+def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.csv", "grains.dump", "contacts.dump"), base="state", saving=None,
+        loaded=None):
+    """Run the scene until step `steps` is written, and say that it is finished.
+
+    `restart_every` and `resume` are what the words behind the script say unless they are given. Every `restart_every` steps (0: never) the scene is saved as `base`.<step>.yade.gz. With `resume` the newest of these that is whole
+    takes the scene's place, and what `outputs` (tables that begin with the step, and dumps) got after it is cut off, for it comes again.
+    Call it when the scene is complete. A scene goes on from the saved copy of itself, so that a run that was killed and resumed
+    is the same to the bit as one that was not, on one thread. `saving()` is called before the scene is saved, `loaded()` after it was
+    resumed.
+    """
+    given = options()
+    restart_every = given[0] if restart_every is None else restart_every
+    resume = given[1] if resume is None else resume
+    if resume:
+        whole = [path for _, path in _states(base) if _is_whole(path)]
+        if not whole:
+            fail(f"resume=yes: there is no whole state {base}.<step>.yade.gz in this folder; start with restart_every > 0 first")
+        O.load(whole[0], quiet=True)
+        for path in outputs:
+            _cut(path, O.iter)
+        print(f"dembark: resumed at step {O.iter} exactly", flush=True)
+        if loaded:
+            loaded()
+    else:
+        _forget(_states(base))
+    # The last row and frame are written in the step that starts from their state.
+    end = steps + 1
+    while O.iter < end:
+        O.run(min(end, (O.iter // restart_every + 1) * restart_every if restart_every else end) - O.iter, True)
+        if restart_every and O.iter < end:
+            if saving:
+                saving()
+            _save(base, outputs)
+            O.load(f"{base}.{O.iter}.yade.gz", quiet=True)
+    finish()
+
+
+def table(path, header):
+    """A file to append rows to: with a header, or as a run left it that is resumed."""
+    file = open(path, "a" if options()[1] else "w", encoding="ascii")
+    if not options()[1]:
+        file.write(header + "\n")
+        file.flush()
+    return file

@@ -1,0 +1,234 @@
+"""Coarse-grained fields of a vessel about the z axis, averaged around it: functions of radius and height only.
+
+The fields are those of Gaussian coarse graining in three dimensions (Goldhirsch, Granular Matter 12 (2010) 239, with the lines of wall
+contacts of Weinhart et al., Granular Matter 14 (2012) 289), and the average around the axis is taken before anything is put on a grid.
+It has a closed form: a point at the radius s carries to the radius r the mean of the Gaussian around the axis, and of its products with
+the cosine of the angle between the two for vectors that turn with the angle,
+
+    K_n(r; s) = exp(-(r^2 + s^2) / 2 w^2) I_n(r s / w^2) / (2 pi w^2),    n = 0, 1, 2,
+
+I_n being the modified Bessel functions. Cells are rings; what they hold are exact integrals of K_n, so mass is conserved to round-off, and
+the momentum that flows through the faces of a ring is balanced by its weight and the force of the walls (Fields.unbalanced).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.special import ive, ndtr
+
+from dembark.postproc import ContactFrame, GrainFrame, spheres
+from dembark.postproc.fields.coarse_graining import WallContacts
+
+Array = NDArray[np.float64]
+
+REACH = 4.0  # widths beyond the vessel that the rings go on
+_POINTS = 3  # of Gauss's rule on a line as long as the width, at least, and within a ring
+_TABLE = 24  # radii for each width in the table of the kernel
+
+
+@dataclass(frozen=True, eq=False)
+class Rings:
+    """Rings between the radii `radial` (k + 1,), from 0, and the heights `vertical` (l + 1,), in m, for a kernel of `width` (m) in a vessel
+    of `radius` (m) with its base at z = 0.
+
+    The last ring also takes what the kernel carries beyond it, and so do the lowest and the highest.
+    """
+
+    radial: Array
+    vertical: Array
+    width: float
+    radius: float
+
+    @classmethod
+    def around(cls, radius: float, height: float, width: float, spacing: float) -> Rings:
+        """Rings of about `spacing` (m) in a vessel of `radius` with a filling of `height`, both borders of rings; REACH widths around."""
+        step, rise = radius / max(1, round(radius / spacing)), height / max(1, round(height / spacing))
+        more, further = int(np.ceil(REACH * width / step)), int(np.ceil(REACH * width / rise))
+        radial, vertical = np.arange(round(radius / step) + more + 1), np.arange(-further, round(height / rise) + further + 1)
+        return cls(step * radial, rise * vertical, width, radius)
+
+    @property
+    def radii(self) -> Array:
+        """Middle radii (k,)."""
+        return 0.5 * (self.radial[1:] + self.radial[:-1])
+
+    @property
+    def heights(self) -> Array:
+        """Middle heights (l,)."""
+        return 0.5 * (self.vertical[1:] + self.vertical[:-1])
+
+    @cached_property
+    def areas(self) -> Array:
+        """Areas (k,) in m2 of the rings seen from above."""
+        return np.pi * np.diff(self.radial**2)
+
+    @cached_property
+    def volumes(self) -> Array:
+        """Volumes (k, l) in m3."""
+        return self.areas[:, None] * np.diff(self.vertical)
+
+    @cached_property
+    def _table(self) -> CubicSpline:
+        """Shares (k,) of K_0, K_1 and K_2 in the rings and, at their k + 1 borders, the values of K_1, over the radius of the source."""
+        places = np.linspace(0.0, self.radial[-1], 1 + int(np.ceil(_TABLE * self.radial[-1] / self.width)))
+        node, weight = np.polynomial.legendre.leggauss(_POINTS)
+        half = 0.5 * np.diff(self.radial)[:, None]
+        points, weights = self.radii[:, None] + half * node, half * weight
+        shares = [(self._kernel(order, points, places[:, None, None]) * 2.0 * np.pi * points * weights).sum(axis=2) for order in (0, 1, 2)]
+        shares[0][:, -1] += 1.0 - shares[0].sum(axis=1)
+        borders = self._kernel(1, self.radial, places[:, None])
+        # Beyond the last ring is nothing that it could flow into.
+        borders[:, -1] = 0.0
+        return CubicSpline(places, np.hstack([*shares, borders]))
+
+    def _kernel(self, order: int, radius: Array, source: Array) -> Array:
+        scaled = ive(order, radius * source / self.width**2) * np.exp(-0.5 * ((radius - source) / self.width) ** 2)
+        return np.asarray(scaled / (2.0 * np.pi * self.width**2))
+
+    def across(self, source: Array) -> tuple[Array, Array, Array, Array]:
+        """For sources at the radii (m,): shares (m, k) of K_0, K_1, K_2, and values (m, k + 1) of K_1 at the borders in 1/m2."""
+        count = len(self.radii)
+        found = self._table(np.minimum(source, self.radial[-1]))
+        return found[:, :count], found[:, count : 2 * count], found[:, 2 * count : 3 * count], found[:, 3 * count :]
+
+    def along(self, source: Array) -> tuple[Array, Array]:
+        """For sources at the heights (m,): shares (m, l) in the layers, and values (m, l + 1) at their borders in 1/m."""
+        distance = (self.vertical - source[:, None]) / self.width
+        below = ndtr(distance)
+        density = np.exp(-0.5 * distance**2) / (np.sqrt(2.0 * np.pi) * self.width)
+        # The outermost layers hold what lies beyond them, so nothing flows through their outer borders.
+        below[:, 0], below[:, -1] = 0.0, 1.0
+        density[:, [0, -1]] = 0.0
+        return np.diff(below, axis=1), density
+
+    @cached_property
+    def above(self) -> Array:
+        """Part (l,) of the kernel that lies above the base: 1 far from it, ½ at it."""
+        return np.asarray(ndtr(self.heights / self.width))
+
+    @cached_property
+    def coverage(self) -> Array:
+        """Part (k, l) of the kernel that lies inside the vessel. A field over this is a mean over what the kernel sees inside, free of the
+        dimming where it reaches through a wall."""
+        node, weight = np.polynomial.legendre.leggauss(200)
+        source = 0.5 * self.radius * (node + 1.0)
+        inside = (np.pi * self.radius * weight * source) @ self.across(source)[0] / self.areas
+        return np.asarray(inside[:, None] * self.above)
+
+
+@dataclass
+class Fields:
+    """Sums over `frames` frames, compression positive; (k, l) unless said otherwise.
+
+    `mass` (kg) and `volume` (m3) of grains; upward forces (N): `net`, of contacts and gravity on grains, and `wall`, of walls; stress
+    times volume (J): `zz`, `rr`, `tt`, `zr` (flow of vertical momentum outward), `rz` (flow of radial momentum upward). Flow (N) of
+    vertical momentum by contacts: `through_rings` (k + 1, l) outward and `through_layers` (k, l + 1) upward.
+    """
+
+    frames: int
+    mass: Array
+    volume: Array
+    net: Array
+    wall: Array
+    zz: Array
+    rr: Array
+    tt: Array
+    zr: Array
+    rz: Array
+    through_rings: Array
+    through_layers: Array
+
+    def __add__(self, other: Fields) -> Fields:
+        return Fields(**{one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)})
+
+    def mean(self, name: str, rings: Rings) -> Array:
+        """Mean over frames and volume of the rings (k, l): kg/m3, 1, N/m3 or Pa."""
+        return np.asarray(getattr(self, name) / (self.frames * rings.volumes))
+
+    def unbalanced(self, rings: Rings, gravity: float) -> Array:
+        """Force density (k, l) in N/m3 of walls less weight and less the flow out through the faces of the rings: 0 at rest."""
+        out = np.diff(self.through_rings, axis=0) + np.diff(self.through_layers, axis=1)
+        return np.asarray((self.wall - self.mass * gravity - out) / (self.frames * rings.volumes))
+
+
+@dataclass(frozen=True)
+class Zones:
+    """Stress zz and rr times volume (zones, sectors, k, 2) in J of one frame, and zz of all rings together (l,)."""
+
+    stress: Array
+    column: Array
+
+
+def coarse_grain(
+    grains: GrainFrame,
+    contacts: ContactFrame,
+    walls: Sequence[WallContacts],
+    rings: Rings,
+    layers: Array,
+    sector_shares: Callable[[Array], Array],
+) -> tuple[Fields, Zones]:
+    """Fields of one frame.
+
+    `layers` (l, zones): which layers belong to the zones; `sector_shares(places)`: shares (m, sectors) of places (m, 3) in the sectors.
+    """
+    lines = [(contacts.first, contacts.branch, contacts.forces),
+             *((one.positions, one.points - one.positions, one.forces) for one in walls)]
+    place, tensor = _points(*(np.concatenate(parts) for parts in zip(*lines, strict=True)), rings.width)
+    count = len(place)
+    # The streaming part is a line of no length: the momentum m v is carried with v.
+    place = np.concatenate([place, grains.positions])
+    tensor = _turned(np.concatenate([tensor, np.einsum("n,na,nb->nab", grains.masses, grains.velocities, grains.velocities)]), place)
+    zero, one, two, border = rings.across(np.hypot(place[:, 0], place[:, 1]))
+    layer, level = rings.along(place[:, 2])
+    trace, difference = 0.5 * (tensor[:, 0, 0] + tensor[:, 1, 1]), 0.5 * (tensor[:, 0, 0] - tensor[:, 1, 1])
+    vertical = zero * tensor[:, 2, 2, None]
+    even, odd = zero * trace[:, None], two * difference[:, None]
+    even_sum, odd_sum = even.T @ layer, odd.T @ layer
+    touched, pull = np.concatenate([wall.points for wall in walls]), np.concatenate([wall.forces[:, 2] for wall in walls])
+
+    def of_grains(values: Array) -> Array:
+        return np.asarray((zero[count:] * values[:, None]).T @ layer[count:])
+
+    found = Fields(
+        frames=1,
+        mass=of_grains(grains.masses),
+        volume=of_grains(spheres.volume(grains.radii)),
+        net=of_grains(grains.forces[:, 2]),
+        wall=(rings.across(np.hypot(touched[:, 0], touched[:, 1]))[0] * pull[:, None]).T @ rings.along(touched[:, 2])[0],
+        zz=vertical.T @ layer,
+        rr=even_sum + odd_sum,
+        tt=even_sum - odd_sum,
+        zr=(one * tensor[:, 2, 0, None]).T @ layer,
+        rz=(one * tensor[:, 0, 2, None]).T @ layer,
+        through_rings=2.0 * np.pi * rings.radial[:, None] * ((border[:count] * tensor[:count, 2, 0, None]).T @ layer[:count]),
+        through_layers=vertical[:count].T @ level[:count],
+    )
+    shares = (layer @ layers)[:, :, None] * sector_shares(place)[:, None, :]
+    table = shares.reshape(len(place), -1).T
+    size = (layers.shape[1], shares.shape[2], len(rings.radii))
+    return found, Zones(np.stack([(table @ part).reshape(size) for part in (vertical, even + odd)], axis=-1), found.zz.sum(axis=0))
+
+
+def _points(first: Array, branch: Array, forces: Array, width: float) -> tuple[Array, Array]:
+    """Places (m, 3) of Gauss's rule on all lines, and there the lines' -f l (m, 3, 3) in J by the weights of the rule."""
+    longest = float(np.sqrt((branch**2).sum(axis=1).max(initial=0.0)))
+    node, weight = np.polynomial.legendre.leggauss(max(_POINTS, round(_POINTS * longest / width)))
+    places = first[:, None, :] + 0.5 * (node + 1.0)[:, None] * branch[:, None, :]
+    lines = -forces[:, :, None] * branch[:, None, :]
+    return places.reshape(-1, 3), (0.5 * weight[:, None, None] * lines[:, None]).reshape(-1, 3, 3)
+
+
+def _turned(tensor: Array, place: Array) -> Array:
+    """Components (m, 3, 3) along the directions outward, around and up at each place."""
+    radius = np.hypot(place[:, 0], place[:, 1])
+    safe = np.where(radius > 0.0, radius, 1.0)
+    cosine, sine = np.where(radius > 0.0, place[:, 0] / safe, 1.0), place[:, 1] / safe
+    turn = np.zeros((len(place), 3, 3))
+    turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1], turn[:, 2, 2] = cosine, sine, -sine, cosine, 1.0
+    return np.asarray(turn @ tensor @ turn.transpose(0, 2, 1))

@@ -1,0 +1,1 @@
+"""Instruments: numbers with intervals from the files of a run, without judgement."""

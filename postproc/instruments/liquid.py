@@ -1,0 +1,33 @@
+"""Liquid that grains carry, in any case with the parameter `liquid_content`: is it conserved, and where is it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from dembark.postproc.measurement import Value
+from dembark.postproc.replica import Replica
+from dembark.postproc.statistics import Estimate, block_mean, exact, over_replicas
+
+
+def liquid_values(replicas: Sequence[Replica]) -> dict[str, Value]:
+    """`liquid_total`, change over the whole run; `bridge_count` a grain and the part `liquid_in_bridges` over its second half.
+
+    None when bridges have volumes of their own.
+    """
+    if not float(replicas[0].parameters.get("liquid_content") or 0.0) > 0.0:
+        return {}
+    tables, grains = [replica.times() for replica in replicas], float(replicas[0].parameters["grain_count"])
+    totals = [sum(times[f"liquid_{place}"] for place in ("grains", "bridges", "walls", "lost")) for times in tables]
+
+    def late(series: Sequence[np.ndarray]) -> Estimate:
+        return over_replicas([block_mean(one[len(one) // 2 :]) for one in series])
+
+    return {
+        "liquid_total": Value(exact(max(float(np.abs(total / total[0] - 1.0).max()) for total in totals)), exact(0.0),
+                              detail=f"on grains, in bridges and on walls, and what left; {totals[0][0]:.4g} m³ at the start, over the "
+                                     "whole run"),
+        "bridge_count": Value(late([times["bridge_count"] / grains for times in tables])),
+        "liquid_in_bridges": Value(late([times["liquid_bridges"] / total for times, total in zip(tables, totals, strict=True)])),
+    }

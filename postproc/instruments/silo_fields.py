@@ -1,0 +1,184 @@
+"""Fields of a cylindrical silo over radius and height: stresses beside Janssen's law, K from the axis to the wall, balance of momentum."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, reduce
+from operator import add
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from dembark.postproc.fields.rings import Fields, Rings, coarse_grain
+from dembark.postproc.instruments import janssen
+from dembark.postproc.instruments.vessel import Cylinder, overlap
+from dembark.postproc.measurement import Measurement, Value
+from dembark.postproc.output.labelled import labelled, variable, with_interval
+from dembark.postproc.replica import Array, Replica
+from dembark.postproc.resampling import TimeBlocks, resampled, time_blocks
+from dembark.postproc.statistics import Estimate, block_mean, combined, over_replicas
+from dembark.postproc.studies import propagated
+from dembark.postproc.walls import CylinderWall, PlaneWall, wall_contacts
+from dembark.postproc.walls.patches import cylinder_patches
+from dembark.postproc.walls.stress import WallRecorder
+
+# Shares of the filling height that the radial profiles are averaged over.
+BANDS = ((0.2, 0.3), (0.45, 0.55), (0.7, 0.8))
+_MOST_SECTORS = 8
+_STRESSES = {"zz": "vertical stress", "rr": "radial stress", "tt": "hoop stress", "zr": "shear stress, vertical momentum outward",
+             "rz": "shear stress, radial momentum upward"}
+
+
+@dataclass(frozen=True)
+class Silo:
+    """One replica. `zones` (frames, 1 + bands, sectors, rings, 2): stress times volume zz and rr, first of the lower half of the column;
+    `column` (frames, layers): zz of all rings together; `wall` (layers, 2): normal and upward shear stress of the wall in Pa;
+    `wall_error`: force of the wall on the grains less that of time.csv, over the `weight` (N)."""
+
+    rings: Rings
+    fields: Fields
+    zones: Array
+    column: Array
+    wall: Array
+    wall_error: Estimate
+    weight: float
+
+    @cached_property
+    def blocks(self) -> TimeBlocks:
+        """Time blocks that are long against the memory of the stress."""
+        return time_blocks(self.column.sum(axis=1))
+
+    @property
+    def section(self) -> Array:
+        """sigma_zz (frames, layers) in Pa, mean over the cross-section; near the base over what the kernel sees above it."""
+        rings = self.rings
+        return np.asarray(self.column / (np.pi * rings.radius**2 * np.diff(rings.vertical) * rings.above))
+
+    def k(self, zone: int, rings: Any) -> Estimate:
+        """sigma_rr over sigma_zz in a zone, for the chosen `rings`."""
+        sectors = np.arange(self.zones.shape[2])
+
+        def ratio(frames: Any, kept: Any) -> float:
+            zz, rr = self.zones[frames, zone][:, kept][:, :, rings].sum(axis=(0, 1, 2))
+            return float(rr / zz)
+
+        return resampled(ratio, self.blocks, sectors, overlap(len(sectors)))
+
+
+def read(replica: Replica, rings: Rings, height: float) -> Silo:
+    """Measure one run folder; `height` (m) of the filling."""
+    given, radius = replica.parameters, rings.radius
+    vessel, side, base, diameter = Cylinder(radius), CylinderWall("side", radius), PlaneWall("base"), float(given["grain_diameter"])
+    sectors = min(_MOST_SECTORS, vessel.sectors(diameter))
+    zones = [(diameter, 0.5 * height), *((low * height, high * height) for low, high in BANDS)]
+    low, high = rings.vertical[:-1, None], rings.vertical[1:, None]
+    # Part of each layer that lies in each zone.
+    layers = np.clip(np.minimum(high, [top for _, top in zones]) - np.maximum(low, [foot for foot, _ in zones]), 0.0, None) / (high - low)
+    inside = np.nonzero((rings.heights > 0.0) & (rings.heights < height))[0]
+    recorder = WallRecorder(side, cylinder_patches(side, 1, rings.vertical[inside[0] : inside[-1] + 2]), keep_series=False)
+    total, rows = [], []
+    # Products of tall thin matrices gain nothing from more threads, and a second measurement may run beside this one.
+    with threadpool_limits(1, "blas"):
+        for grains, contacts in replica.paired_frames():
+            walls = [wall_contacts(grains, side), wall_contacts(grains, base)]
+            found, zone = coarse_grain(grains, contacts, walls, rings, layers, lambda place: vessel.wall_shares(place, sectors))
+            recorder.add(grains)
+            total.append(found)
+            rows.append((zone.stress, zone.column, grains.wall_forces["side"][:, 2].sum(), grains.step, grains.masses.sum()))
+    stresses, column, lift, steps, masses = (np.array(part) for part in zip(*rows, strict=True))
+    times, weight = replica.times(), float(masses[-1]) * float(given["gravity"])
+    wall = np.full((len(rings.heights), 2), np.nan)
+    wall[inside] = recorder.result().mean[:, :2]
+    error = block_mean((lift - np.interp(steps, times["step"], times["side_fz"])) / weight)
+    return Silo(rings, reduce(add, total), stresses, column, wall, error, weight)
+
+
+class _Janssen:
+    """Janssen's law from the measured quantities of a case, and how far it moves within their intervals."""
+
+    def __init__(self, known: Mapping[str, Value], radius: float, height: float, specific: float) -> None:
+        """`specific`: weight (N/m3) of the column per volume."""
+        found = [known[name].estimate for name in ("stress_ratio_k", "wall_mobilisation", "wall_adhesion") if name in known]
+        self.values, self.halves = (np.array([getattr(one, part) for one in found]) for part in ("value", "half"))
+        self._radius, self.height, self._specific = radius, height, specific
+
+    def __call__(self, heights: Array, values: Array | None = None) -> Array:
+        """sigma_zz (Pa) at `heights` (m), with other `values` of K, mu_mob and a."""
+        k, friction, *adhesion = self.values if values is None else values
+        weight = self._specific - 2.0 * friction * sum(adhesion) / self._radius
+        return janssen.stress(np.maximum(self.height - heights, 0.0), self._radius / (2.0 * k * friction), weight)
+
+    def deviation(self, silos: Sequence[Silo], diameter: float) -> Value:
+        """Largest |law / field - 1| of the lower half."""
+        heights = silos[0].rings.heights
+        chosen = np.nonzero((heights > diameter) & (heights < 0.5 * self.height))[0]
+        mean = np.mean([one.section.mean(axis=0) for one in silos], axis=0)
+        worst = int(chosen[np.argmax(np.abs(self(heights) / mean - 1.0)[chosen])])
+        measured = over_replicas([block_mean(one.section[:, worst]) for one in silos])
+        known = propagated(lambda values: float(self(heights, values)[worst]) / measured.value - 1.0, self.values, self.halves)
+        half = combined([known.half, (1.0 + known.value) * measured.half / measured.value])
+        found = Estimate(abs(known.value), half, f"propagated from K, μ_mob and σ_zz; {measured.basis}")
+        return Value(found, Estimate(0.0, 0.0), detail="mean over the cross-section, at the worst height "
+                     f"(z = {heights[worst] / diameter:.1f} d); law with measured K, μ_mob, ρ_b, nothing fitted")
+
+
+def measured(replicas: Sequence[Replica], known: Mapping[str, Value]) -> Measurement:
+    """Fields of all replicas of a series and values drawn from them; `known`: the case's values, whose K, friction and height are used."""
+    given = replicas[0].parameters
+    radius, diameter, gravity = (float(given[name]) for name in ("cylinder_radius", "grain_diameter", "gravity"))
+    height = known["filling_height"].estimate.value * radius
+    rings = Rings.around(radius, height, diameter, 0.5 * diameter)
+    silos = [read(replica, rings, height) for replica in replicas]
+    specific = float(np.mean([one.weight for one in silos])) / (np.pi * radius**2 * height)
+    law, zero = _Janssen(known, radius, height, specific), Estimate(0.0, 0.0)
+    near = {"axis": rings.radii < 0.5 * radius, "wall": (rings.radii > radius - diameter) & (rings.radii < radius)}
+
+    def worst(one: Silo, accelerated: bool) -> Estimate:
+        rest = one.fields.unbalanced(rings, gravity) - (one.fields.mean("net", rings) if accelerated else 0.0)
+        return Estimate(float(np.abs(rest).max()) / specific, 0.0, "every ring of the mean over all frames")
+
+    values = {
+        "field_janssen_deviation": law.deviation(silos, diameter),
+        "field_momentum_residual": Value(over_replicas([worst(one, True) for one in silos]), zero),
+        "field_static_residual": Value(over_replicas([worst(one, False) for one in silos])),
+        "wall_force_deviation": Value(over_replicas([one.wall_error for one in silos]), zero),
+        **{f"stress_ratio_k_{place}": Value(over_replicas([one.k(0, chosen) for one in silos])) for place, chosen in near.items()},
+    }
+    remark = (f"The fields are coarse-grained with a Gaussian of width {diameter:g} m = 1 d and averaged around the axis in closed form, "
+              "which conserves mass and momentum exactly; within one width of a wall they are means over what the kernel sees inside.")
+    return Measurement(values, remarks=[remark], fields=_dataset(silos, law, diameter, gravity))
+
+
+def _dataset(silos: Sequence[Silo], law: _Janssen, diameter: float, gravity: float) -> Any:
+    rings, (both, high), fields = silos[0].rings, (("radius", "height"), ("height",)), reduce(add, (one.fields for one in silos))
+    stress = [over_replicas([block_mean(layer) for layer in layers]) for layers in zip(*(one.section.T for one in silos), strict=True)]
+    ratio = [[over_replicas([one.k(1 + band, slice(ring, ring + 1)) for one in silos]) for ring in range(len(rings.radii))]
+             for band in range(len(BANDS))]
+    wall = np.mean([one.wall for one in silos], axis=0)
+    borders = {"radius": rings.radial, "height": rings.vertical}
+    variables = {f"stress_{part}": variable(both, fields.mean(part, rings), "Pa", f"{name}, compression positive")
+                 for part, name in _STRESSES.items()}
+    variables |= {
+        "density": variable(both, fields.mean("mass", rings), "kg m-3", "bulk density"),
+        "solid_fraction": variable(both, fields.mean("volume", rings), "1", "volume of grains per volume"),
+        "coverage": variable(both, rings.coverage, "1", "part of the kernel that lies inside the vessel"),
+        "wall_force": variable(both, fields.mean("wall", rings), "N m-3", "upward force density of walls on grains"),
+        "unbalanced": variable(both, fields.unbalanced(rings, gravity), "N m-3",
+                               "walls less weight less divergence of the vertical stresses"),
+        "net_force": variable(both, fields.mean("net", rings), "N m-3", "upward force density that accelerates grains"),
+        **with_interval("stress_zz_section", high, stress, "Pa", "vertical stress, mean over the cross-section"),
+        "janssen": variable(high, law(rings.heights), "Pa", "vertical stress by Janssen's law, nothing fitted"),
+        "wall_normal": variable(high, wall[:, 0], "Pa", "normal stress of the wall"),
+        "wall_shear": variable(high, wall[:, 1], "Pa", "upward shear stress of the wall"),
+        **with_interval("k_profile", ("band", "radius"), ratio, "1", "sigma_rr over sigma_zz"),
+        "band_bounds": variable(("band", "bounds"), np.array(BANDS) * law.height, "m", "heights between which k_profile is averaged"),
+        **{f"{name}_bounds": variable((name, "bounds"), np.stack([edges[:-1], edges[1:]], axis=1), "m",
+                                      f"borders of the {'rings' if name == 'radius' else 'layers'}") for name, edges in borders.items()},
+    }
+    coordinates = {"radius": variable(["radius"], rings.radii, "m", "distance from the axis"),
+                   "height": variable(high, rings.heights, "m", "height above the base")}
+    return labelled(variables, coordinates, kind="silo", kernel="gaussian", width=rings.width, averaged="around the axis and over frames",
+                    frames=fields.frames, replicas=len(silos), vessel_radius=rings.radius, filling_height=law.height,
+                    grain_diameter=diameter)

@@ -1,0 +1,92 @@
+"""One replica of a run: its record, its parameters and what it wrote."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dembark.postproc import ContactFrame, ContactsDump, DumpError, GrainFrame, GrainsDump, read_times
+
+Array = NDArray[np.float64]
+Measured = TypeVar("Measured")
+
+
+@dataclass(frozen=True)
+class Replica:
+    """A finished run: its folder, the record in run.json, and its outputs."""
+
+    folder: Path
+    record: Mapping[str, Any]
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """Resolved parameters in SI units."""
+        return self.record["parameters"]
+
+    @property
+    def derived(self) -> Mapping[str, Any]:
+        """Numbers that the case's setup derived from the parameters: friction, geometry, steps; empty where none were recorded."""
+        return self.record.get("derived", {})
+
+    @property
+    def time_step(self) -> float:
+        """Simulated time of one step in s."""
+        return float(self.record["time_step"])
+
+    def grains(self) -> GrainsDump:
+        """Frames of the measuring window."""
+        return GrainsDump(self.folder / "grains.dump")
+
+    def contacts(self) -> ContactsDump:
+        """Contacts of the same frames."""
+        return ContactsDump(self.folder / "contacts.dump")
+
+    def times(self) -> dict[str, Array]:
+        """The whole run, a row an output interval."""
+        return read_times(self.folder / "time.csv")
+
+    def impacts(self) -> Array:
+        """Impacts that have ended, (n, 11): id_a id_b time duration peak_force impulse relative_speed dissipated x y z; SI units.
+
+        Bodies are counted from 1, by the offset that the record holds for engines that count from 0; id_b < 0 is a wall. DumpError when the
+        file cannot be read.
+        """
+        path = self.folder / "impacts.txt"
+        try:
+            rows = [line.split() for line in path.read_text(encoding="ascii").splitlines() if not line.startswith("#")]
+            table = np.array(rows, float).reshape(len(rows), 11)
+        except OSError:
+            raise DumpError(f"{path} does not exist") from None
+        except ValueError:
+            raise DumpError(f"{path}: a line does not hold 11 numbers") from None
+        table[:, :2] += int(self.record.get("impact_id_offset", 0)) * (table[:, :2] >= 0)
+        return table
+
+    def paired_frames(self) -> Iterator[tuple[GrainFrame, ContactFrame]]:
+        """(grains, contacts) of every frame; DumpError when the two files do not hold the same steps."""
+        grains, contacts = self.grains(), self.contacts()
+        if len(grains) != len(contacts):
+            raise DumpError(f"{self.folder}: grains.dump has {len(grains)} frames, contacts.dump {len(contacts)}")
+        for one, other in zip(grains, contacts, strict=True):
+            if one.step != other.step:
+                raise DumpError(f"{self.folder}: step {one.step} of grains.dump stands beside step {other.step} of contacts.dump")
+            yield one, other
+
+
+def once(read: Callable[[Replica], Measured]) -> Callable[[Replica], Measured]:
+    """`read(replica)`, done once for each Replica object: the quantities of a case and its fields share what was read."""
+
+    @wraps(read)
+    def kept(replica: Replica) -> Measured:
+        found = replica.__dict__.setdefault("_read", {})
+        if read not in found:
+            found[read] = read(replica)
+        return found[read]
+
+    return kept

@@ -1,0 +1,86 @@
+"""Intervals from one replica by resampling its time and its places, over replicas, and the profiles of a report with their bands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dembark.postproc.replica import Array
+from dembark.postproc.statistics import ONE_SAMPLE, Estimate, block_count, jackknife, over_replicas
+
+
+@dataclass(frozen=True)
+class TimeBlocks:
+    """`groups` (frames,): number of the time block of each frame; `single`: the blocks are too correlated to count as several samples."""
+
+    groups: NDArray[np.int64]
+    single: bool
+
+
+def time_blocks(series: Array) -> TimeBlocks:
+    """Time blocks that are long against the correlation of `series` (frames,), or else four that count as a single sample."""
+    blocks = block_count(series, most=10)
+    return TimeBlocks(np.arange(len(series)) * (blocks or 4) // len(series), not blocks)
+
+
+def resampled(
+    measure: Callable[[NDArray[np.bool_], NDArray[np.bool_]], float],
+    frames: TimeBlocks,
+    places: NDArray[np.int64] | None = None,
+    overlap: float = 1.0,
+) -> Estimate:
+    """`measure(keep_frames, keep_places)` with an interval from what varies in time and, with `places`, from place to place.
+
+    `overlap` is what sharing samples leaves of the variance among places. The wider of the two
+    jackknife intervals counts: places stand for the disorder of the packing, which time does not average out, and what is left of the
+    variation in time is in their differences too; blocks of time add what all places do together.
+    """
+    everywhere = np.ones(0 if places is None else len(places), bool)
+    in_time = jackknife(lambda keep: measure(keep, everywhere), frames.groups, name="time blocks")
+    if frames.single:
+        in_time = Estimate(in_time.value, in_time.half * math.sqrt(len(np.unique(frames.groups))), ONE_SAMPLE)
+    if places is None:
+        return in_time
+    always = np.ones(len(frames.groups), bool)
+    in_space = jackknife(lambda keep: measure(always, keep), places, name="sectors or bands")
+    in_space = Estimate(in_space.value, in_space.half / math.sqrt(overlap), in_space.basis)
+    return max(in_time, in_space, key=lambda one: one.half)
+
+
+def pooled(replicas: Sequence[Mapping[str, Estimate]], name: str) -> Estimate:
+    """The quantity `name` over replicas."""
+    return over_replicas([one[name] for one in replicas])
+
+
+def profile(
+    name: str, title: str, along: str, across: str, place: Array, values: Sequence[Array], *, half: Array | None = None,
+    vertical: bool = False, reference: Array | None = None, reference_label: str = "", note: str = "",
+) -> dict[str, Any]:
+    """A profile for figure and CSV: `values` of each replica at the same `place`; the band is Student's interval over replicas (three or
+    more), the range of two, or for one the half-widths `half` of its 95 % intervals, where all are known.
+
+    `along` and `across` label the axes of place and value; `vertical` draws the place upwards.
+    """
+    table = np.asarray(values, float)
+    mean = table.mean(axis=0)
+    entry: dict[str, Any] = {"name": name, "title": title, "along": along, "across": across, "vertical": vertical, "place": _numbers(place),
+                             "value": _numbers(mean), "note": note}
+    if half is not None and np.isfinite(half).all():
+        entry |= {"low": _numbers(mean - half), "high": _numbers(mean + half), "band": "95 % interval"}
+    elif len(table) == 2:
+        entry |= {"low": _numbers(table.min(axis=0)), "high": _numbers(table.max(axis=0)), "band": "range of 2 replicas"}
+    elif len(table) > 2:
+        spread = np.array([over_replicas([Estimate(value, 0.0) for value in column]).half for column in table.T])
+        entry |= {"low": _numbers(mean - spread), "high": _numbers(mean + spread), "band": f"95 % interval over {len(table)} replicas"}
+    if reference is not None:
+        entry |= {"reference": _numbers(reference), "reference_label": reference_label}
+    return entry
+
+
+def _numbers(values: Array) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in np.asarray(values)]

@@ -1,0 +1,203 @@
+"""Means with honest intervals: correlated time series, replicas, resampling in space, the steady part of a run, and scatter statistics.
+
+All intervals are two-sided with 95 % confidence unless `confidence` says otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+Array = NDArray[np.float64]
+
+CONFIDENCE = 0.95
+ONE_SAMPLE = "4 time blocks, too correlated to count as more than one sample"
+_MIN_BLOCKS = 4
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with the half-width of its interval (inf when the data allow none) and the `basis` of that interval in words."""
+
+    value: float
+    half: float
+    basis: str = ""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Lower and upper end."""
+        return self.value - self.half, self.value + self.half
+
+
+def exact(value: float, half: float = 0.0) -> Estimate:
+    """A number of a run in which nothing is random; `half` is what the time step hides of it."""
+    return Estimate(float(value), half, "none, nothing is random" if half == 0.0 else "the time step")
+
+
+def student(degrees: float, confidence: float = CONFIDENCE) -> float:
+    """Two-sided quantile of Student's t distribution."""
+    return float(stats.t.ppf(0.5 + 0.5 * confidence, degrees)) if degrees >= 1 else math.inf
+
+
+def correlation_time(series: Array) -> float:
+    """Integrated autocorrelation time in samples, 1 for independent ones; Sokal's self-consistent window, M >= 5 tau (1997).
+
+    A. Sokal, Monte Carlo methods in statistical mechanics, in: Functional Integration (Springer 1997) 131.
+    """
+    values = np.asarray(series, float)
+    count = len(values)
+    deviation = values - values.mean()
+    if count < 4 or not np.any(np.abs(deviation) > 1e-14 * np.abs(values).max(initial=0.0)):
+        return 1.0
+    spectrum = np.fft.rfft(deviation, 2 * count)
+    correlation = np.fft.irfft(np.abs(spectrum) ** 2)[:count]
+    correlation /= correlation[0]
+    tau = 2.0 * np.cumsum(correlation) - 1.0
+    window = np.arange(count) >= 5.0 * tau
+    return float(max(1.0, tau[np.argmax(window)] if window.any() else tau[-1]))
+
+
+def block_count(series: Array, most: int = 20) -> int:
+    """Number of blocks of a series that are each at least two correlation times long, at most `most`; 0 when fewer than 4 fit."""
+    blocks = min(most, int(len(series) / (2.0 * correlation_time(series))))
+    return blocks if blocks >= _MIN_BLOCKS else 0
+
+
+def block_mean(series: Array, confidence: float = CONFIDENCE) -> Estimate:
+    """Mean of a correlated time series with Student's interval over block averages (Flyvbjerg & Petersen, J. Chem. Phys. 91 (1989) 461).
+
+    A series shorter than four blocks of two correlation times counts as a single sample, whose spread is that of four blocks; one of
+    fewer than eight values has no interval (inf).
+    """
+    values = np.asarray(series, float)
+    blocks = block_count(values)
+    if not blocks:
+        if len(values) < 2 * _MIN_BLOCKS:
+            return Estimate(float(values.mean()), math.inf, f"{len(values)} samples are too few")
+        spread = float(np.std([part.mean() for part in np.array_split(values, _MIN_BLOCKS)], ddof=1))
+        return Estimate(float(values.mean()), student(_MIN_BLOCKS - 1, confidence) * spread, ONE_SAMPLE)
+    means = np.array([part.mean() for part in np.array_split(values, blocks)])
+    half = student(blocks - 1, confidence) * float(means.std(ddof=1)) / math.sqrt(blocks)
+    return Estimate(float(values.mean()), half, f"{blocks} block averages")
+
+
+def replica_mean(values: Sequence[float], confidence: float = CONFIDENCE) -> Estimate:
+    """Mean over independent packings with Student's interval; half-width inf for a single one."""
+    data = np.asarray(values, float)
+    if len(data) < 2:
+        return Estimate(float(data.mean()), math.inf, "1 replica")
+    half = student(len(data) - 1, confidence) * float(data.std(ddof=1)) / math.sqrt(len(data))
+    return Estimate(float(data.mean()), half, f"{len(data)} replicas")
+
+
+def jackknife(
+    measure: Callable[[NDArray[np.bool_]], float], groups: NDArray[np.int64], confidence: float = CONFIDENCE, name: str = "groups"
+) -> Estimate:
+    """Delete-a-group jackknife of `measure(keep)`, which computes a quantity from the samples where the mask `keep` is true.
+
+    `groups` (samples,) numbers the group of each sample, `name` says what they are; groups should be independent of each other.
+    Standard error sqrt((g - 1)/g sum (q_k - mean q)^2); Efron, The Jackknife, the Bootstrap and Other Resampling Plans (SIAM 1982).
+    """
+    labels = np.unique(groups)
+    value = measure(np.ones(len(groups), bool))
+    if len(labels) < _MIN_BLOCKS:
+        return Estimate(value, math.inf, f"{len(labels)} {name}: too few or too correlated")
+    left_out = np.array([measure(groups != label) for label in labels])
+    count = len(labels)
+    error = math.sqrt((count - 1) / count * float(np.sum((left_out - left_out.mean()) ** 2)))
+    return Estimate(value, student(count - 1, confidence) * error, f"jackknife over {count} {name}")
+
+
+def combined(parts: Sequence[float]) -> float:
+    """Half-width of independent contributions together."""
+    return math.sqrt(sum(part**2 for part in parts))
+
+
+def over_replicas(estimates: Sequence[Estimate]) -> Estimate:
+    """One estimate from those of the replicas: Student's interval over replicas from three on, else their own intervals pooled.
+
+    Two values say next to nothing about a spread (t = 12.7 with one degree of freedom), less than what varies inside each run.
+    """
+    if len(estimates) >= 3:
+        return replica_mean([one.value for one in estimates])
+    mean = float(np.mean([one.value for one in estimates]))
+    half = combined([one.half for one in estimates]) / len(estimates)
+    plural = "" if len(estimates) == 1 else "s"
+    return Estimate(mean, half, f"within {len(estimates)} replica{plural}: {estimates[0].basis}")
+
+
+def joint_half(one: float, other: float) -> float:
+    """Half-width of the interval of a difference of two independent values with half-widths `one` and `other`."""
+    return combined([one, other])
+
+
+def joint_limit(one: float, other: float, count_one: float, count_other: float, confidence: float) -> float:
+    """Half-width of the interval of the same difference for another `confidence`, when `one` and `other` are Student's 95 % half-widths
+    over `count_one` and `count_other` values (two or more; inf: known exactly how they scatter).
+
+    B. L. Welch, Biometrika 34 (1947) 28: the variances add, and the degrees of freedom are between the smaller of both and their sum.
+    """
+    degrees = (count_one - 1.0, count_other - 1.0)
+    squares = [(half / student(degree)) ** 2 for half, degree in zip((one, other), degrees, strict=True)]
+    if not sum(squares) > 0.0:
+        return 0.0
+    common = sum(squares) ** 2 / max(sum(square**2 / degree for square, degree in zip(squares, degrees, strict=True)), 1e-300)
+    return student(common, confidence) * math.sqrt(sum(squares))
+
+
+def steady_start(series: Array, batch: int = 5) -> int:
+    """Index from which `series` is steady, by MSER-5 and Geweke's test; len(series) when there is no steady part.
+
+    Of the truncation points d in the first half of the batch means the one with the smallest sum (y_i - mean)^2 / (n - d)^2 over the
+    rest is taken (K. P. White, Simulation 69 (1997) 323; White, Cobb & Spratt, Proc. 2000 Winter Simulation Conference, 755). What is
+    left counts as steady unless the means of its two halves differ significantly (J. Geweke, in: Bayesian Statistics 4 (Oxford 1992)
+    169): by more than Student's 99 % interval of the difference, from five blocks in each half.
+    """
+    values = np.asarray(series, float)
+    count = len(values) // batch
+    if count < 2 * _MIN_BLOCKS:
+        return len(values)
+    means = values[: count * batch].reshape(count, batch).mean(axis=1)
+    rest = np.arange(count, 0, -1)
+    # About the overall mean, for differences of large squares would lose the small ones.
+    total = np.cumsum((means - means.mean())[::-1])[::-1]
+    squares = np.cumsum(((means - means.mean()) ** 2)[::-1])[::-1]
+    error = np.maximum(0.0, squares - total**2 / rest) / rest.astype(float) ** 2
+    start = int(np.argmin(error[: count // 2 + 1])) * batch
+    blocks = np.array([part.mean() for part in np.array_split(values[start:], 10)])
+    one, other = blocks[:5], blocks[5:]
+    error = math.sqrt((one.var(ddof=1) + other.var(ddof=1)) / 5.0)
+    return start if abs(one.mean() - other.mean()) <= student(8, 0.99) * error else len(values)
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Bias factor `bias` = delta and relative standard deviation `model` = sigma_M of a model against references, with
+    `reference` = sigma_E, over `count` pairs."""
+
+    count: int
+    bias: float
+    model: float
+    reference: float
+
+
+def scatter(model: Sequence[float], reference: Sequence[float], reference_deviation: float) -> Scatter:
+    """Scatter statistics of k pairs (M, E) of positive numbers as in the validation guide of the Fire Dynamics Simulator.
+
+    With u^2 = sum (ln(M/E) - mean)^2 / (k - 1), sigma_E = min(`reference_deviation`, u / sqrt 2) and omega^2 = max(0, u^2 - sigma_E^2):
+    delta = exp(mean ln(M/E) + omega^2 / 2 - sigma_E^2 / 2), sigma_M = delta omega. Both halves are the shift between the logarithm of
+    a mean and the mean of a logarithm. K. McGrattan & B. Toman, Metrologia 48 (2011) 173; form checked with FDS's scatplot script.
+    """
+    ratio = np.log(np.asarray(model, float) / np.asarray(reference, float))
+    if len(ratio) < 2:
+        raise ValueError("scatter statistics need at least two pairs")
+    u = float(ratio.std(ddof=1))
+    sigma = min(reference_deviation, u / math.sqrt(2.0))
+    omega2 = max(0.0, u**2 - sigma**2)
+    bias = math.exp(float(ratio.mean()) + 0.5 * omega2 - 0.5 * sigma**2)
+    return Scatter(len(ratio), bias, bias * math.sqrt(omega2), sigma)

@@ -1,0 +1,35 @@
+"""What studies share: the measured quantities of their points, intervals of what is computed from these, and exponents."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from dembark.postproc.statistics import Estimate, combined
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def measured(point: Mapping[str, Any], name: str, factor: float = 1.0) -> Estimate:
+    """The quantity `name` of the result `point` (the content of a metrics.json), times `factor`; half-width inf where it has no interval."""
+    one = next(quantity for quantity in point["quantities"] if quantity["name"] == name)
+    half = 0.5 * (one["interval"][1] - one["interval"][0]) if one["interval"] else math.inf
+    return Estimate(one["value"] * factor, half * factor, one.get("basis", ""))
+
+
+def propagated(measure: Callable[[Array], float], values: Array, halves: Array, source: str = "the points") -> Estimate:
+    """`measure(values)` with the half-width that independent intervals `halves` of `values` (n,) give it, to first order; inf where one of
+    them is unknown. `source` says in the basis what the values are."""
+    middle = measure(values)
+    if not np.isfinite(halves).all():
+        return Estimate(middle, math.inf, f"one of {source} has no interval")
+    parts = [measure(values + np.where(np.arange(len(values)) == index, half, 0.0)) - middle for index, half in enumerate(halves)]
+    return Estimate(middle, combined(parts), f"propagated from {source}")
+
+
+def fitted_exponent(x: Array, y: Array) -> float:
+    """p of y = c x^p by least squares on logarithmic axes, for positive x and y (n,)."""
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])

@@ -1,0 +1,32 @@
+"""A replica: what it wrote is read once, and bodies are counted alike in every engine."""
+
+import pytest
+
+from dembark.postproc import DumpError
+from dembark.postproc.replica import Replica, once
+
+
+def test_what_was_read_is_kept_with_the_replica(tmp_path):
+    calls = []
+
+    @once
+    def read(replica):
+        calls.append(replica)
+        return len(calls)
+
+    one, other = Replica(tmp_path, {}), Replica(tmp_path, {})
+    assert [read(one), read(one), read(other), read(one)] == [1, 1, 2, 1]
+
+
+def test_a_record_without_derived_numbers_has_none(tmp_path):
+    assert Replica(tmp_path, {}).derived == {}
+    assert Replica(tmp_path, {"derived": {"steps": 7}}).derived["steps"] == 7
+
+
+def test_bodies_are_counted_from_one_in_every_engine(tmp_path):
+    (tmp_path / "impacts.txt").write_text("# a\n0 3 0 0 0 0 0 0 0 0 0\n1 -2 0 0 0 0 0 0 0 0 0\n")
+    assert Replica(tmp_path, {"impact_id_offset": 1}).impacts()[:, :2].tolist() == [[1, 4], [2, -2]]
+    assert Replica(tmp_path, {}).impacts()[:, :2].tolist() == [[0, 3], [1, -2]]
+    (tmp_path / "impacts.txt").write_text("# a\n0 3 0\n")
+    with pytest.raises(DumpError, match="11 numbers"):
+        Replica(tmp_path, {}).impacts()

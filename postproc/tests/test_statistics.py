@@ -1,0 +1,113 @@
+"""Intervals hold what they promise, and known answers come out."""
+
+import math
+
+import numpy as np
+import pytest
+from dembark.postproc.statistics import (
+    Estimate,
+    block_mean,
+    correlation_time,
+    jackknife,
+    joint_half,
+    joint_limit,
+    over_replicas,
+    replica_mean,
+    scatter,
+    steady_start,
+)
+
+
+def correlated(random, count, memory):
+    """First-order autoregressive series of unit variance with correlation `memory` from one value to the next."""
+    noise = random.standard_normal(count) * math.sqrt(1.0 - memory**2)
+    series = np.empty(count)
+    series[0] = random.standard_normal()
+    for index in range(1, count):
+        series[index] = memory * series[index - 1] + noise[index]
+    return series
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
+def test_correlation_time_of_an_autoregressive_series(memory):
+    series = correlated(np.random.default_rng(3), 200000, memory)
+    assert correlation_time(series) == pytest.approx((1.0 + memory) / (1.0 - memory), rel=0.15)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.8])
+def test_block_intervals_cover_the_mean_as_often_as_they_say(memory):
+    random = np.random.default_rng(4)
+    hits = sum(abs(found.value) <= found.half for found in (block_mean(correlated(random, 600, memory)) for _ in range(300)))
+    assert 0.89 <= hits / 300 <= 0.99
+
+
+def test_too_short_a_series_has_no_interval():
+    assert block_mean(np.array([1.0, 2.0, 1.5, 1.2, 1.8, 1.1, 1.4])).half == math.inf
+    assert math.isfinite(block_mean(np.random.default_rng(5).standard_normal(100)).half)
+
+
+def test_replica_interval_is_students():
+    found = replica_mean([1.0, 2.0, 3.0])
+    assert found.half == pytest.approx(4.30265 / math.sqrt(3.0), rel=1e-5)
+    assert replica_mean([1.0]).half == math.inf
+
+
+def test_jackknife_of_a_mean_is_the_standard_error():
+    values = np.random.default_rng(6).standard_normal(30)
+    found = jackknife(lambda keep: float(values[keep].mean()), np.arange(30))
+    assert found.half == pytest.approx(2.04523 * values.std(ddof=1) / math.sqrt(30.0), rel=1e-5)
+
+
+def test_pooling_below_three_replicas_keeps_their_own_intervals():
+    assert over_replicas([Estimate(1.0, 0.3)]).half == 0.3
+    assert over_replicas([Estimate(1.0, 0.3), Estimate(2.0, 0.4)]) == Estimate(1.5, 0.25, "within 2 replicas: ")
+    assert over_replicas([Estimate(1.0, 9.0)] * 3).half == 0.0
+
+
+def test_joint_interval_adds_in_quadrature():
+    assert joint_half(3.0, 4.0) == 5.0
+
+
+@pytest.mark.parametrize("counts", [(3, 3), (3, 10), (5, 5)])
+def test_joint_limit_is_exceeded_as_often_as_it_says(counts):
+    random = np.random.default_rng(10)
+    tables = [random.standard_normal((4000, count)) * scale for count, scale in zip(counts, (1.0, 2.0), strict=True)]
+    means = [[replica_mean(row) for row in table] for table in tables]
+    beyond = [abs(one.value - other.value) > joint_limit(one.half, other.half, *counts, 0.95) for one, other in zip(*means, strict=True)]
+    assert 0.03 <= np.mean(beyond) <= 0.06
+    assert joint_limit(1.0, 1.0, 5, 5, 0.999) > joint_limit(1.0, 1.0, 5, 5, 0.95)
+    assert joint_limit(1.96, 0.0, math.inf, math.inf, 0.95) == pytest.approx(1.96, rel=1e-4)
+    assert joint_limit(0.0, 0.0, 3, 3, 0.99) == 0.0
+
+
+@pytest.mark.parametrize("length", [50, 120])
+def test_transient_is_cut_off(length):
+    random = np.random.default_rng(7)
+    series = 1.0 + 0.05 * random.standard_normal(400)
+    series[:length] += 3.0 * np.exp(-np.arange(length) / (0.2 * length))
+    start = steady_start(series)
+    assert 0.2 * length <= start <= 1.7 * length
+
+
+def test_steady_series_is_kept_and_drift_is_not_called_steady():
+    random = np.random.default_rng(8)
+    kept = [steady_start(random.standard_normal(400)) for _ in range(40)]
+    assert sum(start < 400 for start in kept) >= 38
+    assert steady_start(np.linspace(0.0, 1.0, 400) + 0.01 * random.standard_normal(400)) == 400
+    assert steady_start(np.ones(20)) == 20
+
+
+def test_scatter_recovers_bias_and_spread():
+    random = np.random.default_rng(9)
+    truth = random.uniform(1.0, 100.0, 20000)
+    found = scatter(1.2 * truth * (1.0 + 0.08 * random.standard_normal(20000)), truth * (1.0 + 0.05 * random.standard_normal(20000)), 0.05)
+    assert found.bias == pytest.approx(1.2, rel=0.005)
+    assert found.model / found.bias == pytest.approx(0.08, rel=0.05)
+    assert found.reference == 0.05
+
+
+def test_scatter_of_equal_pairs_has_neither_bias_nor_spread():
+    found = scatter([1.0, 2.0, 3.0], [1.0, 2.0, 3.0], 0.1)
+    assert (found.bias, found.model) == (1.0, 0.0)
+    with pytest.raises(ValueError, match="two pairs"):
+        scatter([1.0], [1.0], 0.1)

@@ -1,0 +1,93 @@
+"""The commands for cases: `dembark cases`, `deck`, `new-case`."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dembark.common.errors import DembarkError
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to `dembark`."""
+    app.command("cases")(show_cases)
+    app.command()(deck)
+    app.command("new-case")(new_case)
+
+
+def show_cases(case: Annotated[str | None, typer.Argument(help="Show the keys, profiles and variants of this case.")] = None) -> None:
+    """List the cases, or everything about one."""
+    from dembark.validation import show
+    from dembark.validation.case.folders import discover, find
+    from dembark.validation.cli import _console
+
+    console = _console()
+    if case is None:
+        console.print(show.case_table(discover().values()))
+        return
+    one = find(case)
+    console.print(f"{one.name}: {one.title}\n{one.description}", markup=False)
+    console.print(show.key_table(one))
+    console.print(show.overrides_table(one))
+    for source in one.source:
+        console.print(f"source: {source}", markup=False)
+
+
+def deck(
+    case: Annotated[str, typer.Argument(help="Name of a case, see 'dembark cases'.")],
+    engine: Annotated[str, typer.Option(help="Engine, see 'dembark doctor'.")],
+    out: Annotated[Path, typer.Option(help="New or empty folder for the deck.")],
+    profile: Annotated[str, typer.Option(help="Size of the run: quick, standard, full, ...")] = "quick",
+    variant: Annotated[str | None, typer.Option(help="Variant of the case; default: the first one.")] = None,
+    change: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help='Change a key: --set "grain_diameter=4 mm".')] = None,
+) -> None:
+    """Write a deck with all its numbers, packing and meshes: a folder that runs with the plain engine command."""
+    from dembark.validation import engines
+    from dembark.validation.case.deck import write
+    from dembark.validation.case.folders import find
+    from dembark.validation.case.parameters import pick
+    from dembark.validation.case.resolve import portable, resolve, settings
+
+    one = find(case)
+    pick(engine, engines.names(), "engine", "in --engine")
+    pick(engine, one.engines, "engine", f"in case {one.name}")
+    values = portable(resolve(one, profile, variant or next(iter(one.variants)), settings(change or ())))
+    _empty(out)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        setup = write(one, engine, values, out)
+    except OSError as error:
+        raise DembarkError(f"cannot write to {out}", error.strerror or str(error)) from None
+    facts = engines.facts(engine)
+    print(f"{out / facts.deck}: {setup.steps} steps of {setup.time_step:.6g} s. Run it in its folder: {facts.by_hand}")
+
+
+def _empty(folder: Path) -> None:
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise DembarkError(f"{folder} is not empty", "", "name a new folder")
+
+
+def new_case(
+    name: Annotated[str, typer.Argument(help="Name of the case: letters, digits and underscores.")],
+    folder: Annotated[Path, typer.Option("--in", help="Folder of your cases; the case gets a folder of its name in it.")] = Path(),
+) -> None:
+    """Write a small case that runs, to start your own from."""
+    from dembark.validation import engines
+    from dembark.validation.case.folders import package_root, shipped_root
+
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
+        raise DembarkError(f"{name!r} is no name of a case", "", "take lower-case letters, digits and underscores, a letter first")
+    if (shipped_root() / name).exists():
+        raise DembarkError(f"a case {name} comes with dembark", "", "choose another name")
+    target = folder / name
+    _empty(target)
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        for path in sorted((package_root() / "common" / "template").iterdir()):
+            (target / path.name).write_text(path.read_text(encoding="utf-8").replace("NAME", name), encoding="utf-8")
+    except OSError as error:
+        raise DembarkError(f"cannot write to {target}", error.strerror or str(error)) from None
+    print(f"{target} is a case now. Run it: dembark --cases {folder} run {name} --engine {engines.names()[0]} --out results-{name}")

@@ -1,0 +1,181 @@
+"""Complete deck folders: derived numbers, packing and meshes are made once, and every engine's deck gets the same bits."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import math
+import shutil
+import sys
+import traceback
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import TYPE_CHECKING
+
+import jinja2
+import numpy as np
+from dembark.common.errors import DembarkError
+from dembark.validation import engines
+from dembark.validation.case.folders import package_root
+from dembark.validation.case.parameters import Value
+
+if TYPE_CHECKING:
+    from dembark.input_decks.common.setup import Array, Setup
+    from dembark.validation.case.model import Case
+
+PACKING = "packing.data"
+
+
+def load_module(path: Path, name: str) -> ModuleType:
+    """The Python file `path` of a case folder; DembarkError with file and line when it cannot be loaded."""
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise DembarkError(f"{path} cannot be loaded")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # the file may be the user's: whatever is wrong in it is told in one line
+        raise failed(path, error) from None
+    return module
+
+
+def failed(path: Path, error: Exception) -> DembarkError:
+    """One line about an `error` that came up in the Python file `path` of a case folder: what, file and line."""
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+    line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
+    return DembarkError(f"{path}{f', line {line}' if line else ''}", f"{type(error).__name__}: {error}")
+
+
+@cache
+def _setup_module(path: Path) -> ModuleType:
+    return load_module(path, f"dembark_setup_{path.parent.name}")
+
+
+def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
+    """Derived numbers, packing and meshes of a run with the parameters `values`; DembarkError with file and line when they cannot be made."""
+    from dembark.input_decks.common.setup import Setup
+
+    path = case.folder / "setup.py"
+    known: dict[str, Value] = dict(values)
+    for name, expression in case.derived.items():
+        try:
+            known[name] = expression(known)
+        except (ArithmeticError, ValueError, TypeError) as error:
+            raise DembarkError(f"{name} = {expression.text!r} cannot be evaluated", f"[derived] of case {case.name}", str(error)) from None
+    if not path.is_file():
+        missing = [name for name in ("steps", "time_step") if not isinstance(known.get(name), int | float)]
+        if missing:
+            raise DembarkError(f"case {case.name} does not say its {' and '.join(missing)}", str(case.folder),
+                               "add a setup.py, or expressions in a table [derived]")
+        return Setup(round(float(known["steps"])), float(known["time_step"]), None, {name: known[name] for name in case.derived})  # type: ignore[arg-type, misc]
+    try:
+        return _setup_module(path).setup(SimpleNamespace(**known))
+    except DembarkError:
+        raise
+    except Exception as error:  # as above
+        raise failed(path, error) from None
+
+
+def write(case: Case, engine: str, values: Mapping[str, Value], folder: Path) -> Setup:
+    """Write everything that `engine` needs for a run with the parameters `values` into `folder`; returns what was derived."""
+    setup = prepare(case, values)
+    for name, path in _companions(case).items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, folder / name)
+    for name, content in _files(case, engine, values, setup).items():
+        (folder / name).write_bytes(content)
+    return setup
+
+
+@cache
+def _check_sum(path: Path, changed: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def require_measure(case: Case) -> None:
+    """DembarkError when `case` has no measure.py: its runs could not be measured. Nothing is imported."""
+    if not (case.folder / "measure.py").is_file():
+        raise DembarkError(f"case {case.name} has no measure.py", str(case.folder), "add one with measure(replicas), see docs/cases.md")
+
+
+def derived(case: Case, values: Mapping[str, Value]) -> dict[str, Value]:
+    """Numbers that follow from the parameters `values`, by name, with `steps` and `time_step` (s)."""
+    setup = prepare(case, values)
+    return {name: _plain(value) for name, value in {**setup.numbers, "steps": setup.steps, "time_step": setup.time_step}.items()}
+
+
+def sources(case: Case, engine: str) -> dict[str, str]:
+    """What makes the deck of `engine` beside the parameters: checksums of the files by name, and the expressions of derived numbers."""
+    shared = package_root() / "common"
+    files = {path.name: path for path in (case.deck(engine), case.folder / "setup.py") if path.is_file()} | _companions(case)
+    files |= {f"common/{path.relative_to(shared)}": path for pattern in ("*.py", f"{engine}/*") for path in shared.glob(pattern)}
+    found = {name: _check_sum(path, path.stat().st_mtime_ns) for name, path in sorted(files.items())}
+    return found | {f"derived {name}": expression.text for name, expression in case.derived.items()}
+
+
+def _companions(case: Case) -> dict[str, Path]:
+    """Other files of the case folder that decks may read, by their names in it: meshes, tables, what they include."""
+    known = {"case.toml", "setup.py", "measure.py", *(engines.facts(name).deck for name in engines.names())}
+    relative = {path.relative_to(case.folder): path for path in case.folder.rglob("*") if path.is_file()}
+    return {str(name): path for name, path in sorted(relative.items())
+            if str(name) not in known and name.suffix not in (".md", ".pyc") and name.parts[0] not in ("tests", "campaigns", "reference")
+            and not any(part.startswith(".") for part in name.parts)}
+
+
+def archive(case: Case, folder: Path) -> None:
+    """Copy the files that a run was made and is measured by into `folder`/case, as they are."""
+    for name in ("case.toml", "setup.py", "measure.py"):
+        if (case.folder / name).is_file():
+            (folder / "case").mkdir(exist_ok=True)
+            shutil.copyfile(case.folder / name, folder / "case" / name)
+
+
+def _files(case: Case, engine: str, values: Mapping[str, Value], setup: Setup) -> dict[str, bytes]:
+    kind = engines.registered(engine)
+    source = case.folder / kind.facts.deck
+    try:
+        text = source.read_text(encoding="utf-8")
+    except OSError as error:
+        raise DembarkError(f"{source} cannot be read", error.strerror or str(error), f"add the deck, or take {engine} from engines in case.toml") from None
+    known: dict[str, Value] = {**values, **setup.numbers, "steps": setup.steps, "time_step": setup.time_step}
+    numbers = {name: engines.DeckNumber(_plain(value), _meaning(case, name)) for name, value in known.items() if name != "replicas"}
+    numbers |= {name: engines.DeckNumber(tuple(map(_plain, row))) for name, row in setup.tables.items()}
+    try:
+        deck = kind.deck_text(text, numbers, [source.parent, package_root() / "common" / engine])
+    except jinja2.TemplateError as error:
+        line = f", line {error.lineno}" if isinstance(error, jinja2.TemplateSyntaxError) else ""
+        raise DembarkError(f"{source}{line}", str(error)) from None
+    files = {kind.facts.deck: deck.encode()}
+    if setup.packing is not None:
+        files[PACKING] = setup.packing.text().encode()
+    return files | {f"{name}.stl": _stl(name, triangles) for name, triangles in setup.meshes.items()}
+
+
+def _meaning(case: Case, name: str) -> str:
+    if name not in case.parameters:
+        return ""
+    unit = case.parameters[name].unit
+    return f"{'' if unit == '1' else unit + '; '}{' '.join(case.parameters[name].doc.split())}"
+
+
+def _plain(value: Value) -> Value:
+    """A number as decks of all engines can read it: unlimited is 1e300."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, bool):
+        return int(value)
+    return math.copysign(1e300, value) if isinstance(value, float) and math.isinf(value) else value
+
+
+def _stl(name: str, triangles: Array) -> bytes:
+    """Triangles (n, 3, 3) as an STL text with all digits."""
+    lines = [f"solid {name}"]
+    for corners in np.asarray(triangles, float):
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        lines += ["facet normal " + " ".join(f"{x:.17g}" for x in normal / np.linalg.norm(normal)), "outer loop"]
+        lines += ["vertex " + " ".join(f"{x:.17g}" for x in corner) for corner in corners]
+        lines += ["endloop", "endfacet"]
+    return ("\n".join([*lines, f"endsolid {name}"]) + "\n").encode()

@@ -1,0 +1,79 @@
+"""Where cases are: the folder that ships, and the user's own beside it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+from dembark.common.errors import DembarkError
+from dembark.validation.case.model import Case
+from dembark.validation.case.parameters import pick
+
+# Folders of the user's own cases, as in PATH; `dembark --cases FOLDER` adds to it.
+VARIABLE = "DEMBARK_CASES"
+# A folder in the place of the cases that ship.
+INSTEAD = "DEMBARK_DECKS"
+
+
+def package_root() -> Path:
+    """Folder of the cases that ship, and of what cases share."""
+    from dembark import input_decks
+
+    return Path(next(iter(input_decks.__path__))).resolve()
+
+
+def shipped_root() -> Path:
+    """Folder of the cases that ship, or the one that DEMBARK_DECKS names in its place."""
+    named = os.environ.get(INSTEAD)
+    if named and not Path(named).is_dir():
+        raise DembarkError(f"{INSTEAD}={named} is no folder", "", "set it to the folder that holds the case folders")
+    return Path(named).resolve() if named else package_root()
+
+
+def own_roots() -> list[Path]:
+    """Folders of the user's own cases; DembarkError for one that is not there."""
+    named = [Path(text) for text in os.environ.get(VARIABLE, "").split(os.pathsep) if text]
+    for root in named:
+        if not root.is_dir():
+            raise DembarkError(f"{root} is no folder", f"in {VARIABLE} or --cases", "name the folder that holds your case folders")
+    return [root.resolve() for root in named]
+
+
+def add_own_root(root: Path) -> None:
+    """Look for cases in `root` too, in this process and those that it starts."""
+    named = [text for text in os.environ.get(VARIABLE, "").split(os.pathsep) if text]
+    os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*named, str(root.resolve())]))
+
+
+def files() -> Iterator[Path]:
+    """The case.toml of all cases, own ones last; DembarkError when two cases have one name."""
+    seen: dict[str, Path] = {}
+    for root in (shipped_root(), *own_roots()):
+        for path in sorted(root.glob("*/case.toml")):
+            if path.parent.name in seen:
+                raise DembarkError(f"two cases are called {path.parent.name}", f"{seen[path.parent.name]} and {path}", "rename yours")
+            seen[path.parent.name] = path
+            yield path
+
+
+def discover() -> dict[str, Case]:
+    """All cases by name; raises DembarkError at the first case.toml with a mistake."""
+    return {path.parent.name: load(path) for path in files()}
+
+
+def find(name: str) -> Case:
+    """The case called `name`; only its own file is read, so a mistake in another case does not matter."""
+    known = {path.parent.name: path for path in files()}
+    pick(name, known, "case", "")
+    return load(known[name])
+
+
+@cache
+def load(path: Path) -> Case:
+    """Read and check one case.toml; raises DembarkError saying what is wrong in which table."""
+    from dembark.validation.case.read import CaseReader
+    from dembark.validation.case.tables import load_toml
+
+    return CaseReader(path).case(load_toml(path))

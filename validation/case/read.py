@@ -1,0 +1,196 @@
+"""Reads and checks a case.toml: every mistake is told with the table that it is in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any
+
+from dembark.common.errors import DembarkError
+from dembark.common.units import known_unit
+from dembark.validation import engines
+from dembark.validation.case.expressions import Expression
+from dembark.validation.case.folders import package_root
+from dembark.validation.case.model import (
+    EVIDENCE, OUTPUTS, STANDARD_OUTPUTS, Case, Constraint, Declared, PlannedRun, Study,
+)
+from dembark.validation.case.parameters import Parameter, Value, checked, nearest, pick
+from dembark.validation.case.tables import TableReader, load_toml
+
+
+@cache
+def _groups() -> dict[str, Any]:
+    return load_toml(package_root() / "common" / "groups.toml")
+
+
+def _full(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """The entry of a parameter with its type, and `above` and `below` as limits that are excluded."""
+    kind = "choice" if "values" in entry else "int" if isinstance(entry.get("value"), int) else "float"
+    result = {"type": kind, **entry}
+    for short, long in (("above", "min"), ("below", "max")):
+        if short in result:
+            result |= {long: result.pop(short), f"exclusive_{long}": True}
+    return result
+
+
+class CaseReader(TableReader):
+    """Turns the tables of one case.toml into a Case; each mistake names the table it is in."""
+
+    def case(self, data: Mapping[str, Any]) -> Case:
+        tables = {"case": dict, "parameters": dict, "profiles": dict, "variants": dict, "runs": dict, "constraints": list, "studies": dict,
+                  "derived": dict, "quantities": dict, "picture": dict}
+        self.table(data, "top level", tables, ("case",))
+        head = data["case"]
+        keys = {"name": str, "title": str, "description": str, "source": list, "engines": list, "outputs": list, "particles": str,
+                "groups": list, "references": list}
+        self.table(head, "case", keys, ("name", "title", "engines"))
+        if head["name"] != self.path.parent.name:
+            raise self.fail("case", f"name = {head['name']!r}", f"the name of its folder, {self.path.parent.name!r}")
+        for engine in head["engines"]:
+            pick(engine, engines.names(), "engine", f"[case] of {self.path}")
+        outputs = tuple(head.get("outputs", STANDARD_OUTPUTS))
+        for output in outputs:
+            pick(output, OUTPUTS, "output", f"[case] of {self.path}")
+        if not outputs or len(set(outputs)) < len(outputs):
+            raise self.fail("case", f"outputs = {list(outputs)}", f"one or more of {', '.join(OUTPUTS)}, each once")
+        groups = [_groups()[pick(str(name), _groups(), "group", f"[case] of {self.path}")] for name in head.get("groups", ())]
+        entries = self.merged("parameters", data.get("parameters", {}), groups)
+        parameters = {name: self.parameter(name, entry) for name, entry in entries.items()}
+        constraints = [*(one for group in groups for one in group.get("constraints", ())), *data.get("constraints", ())]
+        derived = self.derived(data.get("derived", {}), parameters)
+        quantities = self.merged("quantities", data.get("quantities", {}), groups)
+        variants = self.changes("variants", data.get("variants", {"default": {}}), parameters)
+        profiles = self.changes("profiles", data.get("profiles", {"quick": {}}), parameters)
+        return Case(
+            name=head["name"], title=head["title"], description=head.get("description", "").strip(), source=tuple(head.get("source", ())),
+            engines=tuple(head["engines"]), folder=self.path.parent, parameters=parameters, profiles=profiles, variants=variants,
+            runs=self.runs(data.get("runs", {}), profiles, variants, tuple(head["engines"]), parameters),
+            constraints=tuple(self.constraint(entry, parameters) for entry in constraints),
+            studies={name: self.study(name, entry, parameters, variants) for name, entry in data.get("studies", {}).items()},
+            outputs=outputs, particles=self.expression("case", head["particles"], parameters) if "particles" in head else None,
+            derived=derived, quantities={name: self.quantity(name, entry) for name, entry in quantities.items()},
+            references=tuple(head.get("references", ())), picture=data.get("picture", {}))
+
+    def merged(self, table: str, own: Mapping[str, Any], groups: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+        """The entries of all `groups`, then those of the case; where both have one, the case's keys replace single keys of the group's."""
+        result: dict[str, Any] = {name: entry for group in groups for name, entry in group.get(table, {}).items()}
+        for name, entry in own.items():
+            if not isinstance(entry, dict):
+                raise self.fail(f"{table}.{name}", f"{entry!r} is no table", "write it as { key = value, ... }")
+            result[name] = {**result.get(name, {}), **entry}
+        return result
+
+    def derived(self, data: Mapping[str, Any], parameters: Mapping[str, Parameter]) -> dict[str, Expression]:
+        found: dict[str, Expression] = {}
+        for name, text in data.items():
+            if not isinstance(text, str) or not name.isidentifier() or name in parameters:
+                raise self.fail("derived", f"{name} = {text!r}", "a new name and an expression in the parameters, as a text")
+            found[name] = self.expression("derived", text, {**parameters, **found})
+        return found
+
+    def quantity(self, name: str, entry: Mapping[str, Any]) -> Declared:
+        table = f"quantities.{name}"
+        keys = {"label": str, "unit": str, "evidence": str, "tolerance": (int, float, str), "why": str, "absolute": bool, "source": str,
+                "detail": str, "agreement": (int, float), "compared": bool}
+        self.table(entry, table, keys, ("label",))
+        if "evidence" in entry:
+            pick(entry["evidence"], EVIDENCE, "kind of evidence", self.where(table))
+        if not known_unit(entry.get("unit", "1")):
+            raise self.fail(table, f"unknown unit {entry['unit']!r}", 'an SI unit, or "1"')
+        tolerance = entry.get("tolerance")
+        if tolerance is not None and "evidence" not in entry:
+            raise self.fail(table, "a tolerance without evidence", f"say what the reference is: {', '.join(EVIDENCE)}")
+        if tolerance is not None and not (tolerance == "bound" or (isinstance(tolerance, int | float) and tolerance >= 0)):
+            raise self.fail(table, f"tolerance = {tolerance!r}", 'a number >= 0, or "bound"')
+        return Declared(name=name, **entry)
+
+    def parameter(self, name: str, entry: Mapping[str, Any]) -> Parameter:
+        table, number = f"parameters.{name}", (int, float)
+        if not isinstance(entry, dict) or not name.isidentifier():
+            raise self.fail(table, "a parameter is a table with an identifier as name")
+        keys = {"value": (int, float, str), "unit": str, "type": str, "min": number, "max": number, "exclusive_min": bool,
+                "exclusive_max": bool, "doc": str, "values": list, "optional": bool, "above": number, "below": number}
+        self.table(entry, table, keys, ("doc",))
+        entry = _full(entry)
+        pick(entry["type"], ("float", "int", "choice"), "type", f"[{table}] of {self.path}")
+        if "value" not in entry and not entry.get("optional"):
+            raise self.fail(table, "value is missing", "a value, or optional = true")
+        if (entry["type"] == "choice") != ("values" in entry):
+            raise self.fail(table, "type and values do not fit", 'values = [...] together with type = "choice"')
+        if not known_unit(entry.get("unit", "1")):
+            raise self.fail(table, f"unknown unit {entry['unit']!r}", 'an SI unit, or "1"')
+        parameter = Parameter(name=name, **{**entry, "values": tuple(entry.get("values", ()))})
+        self.check(table, parameter, parameter.value)
+        return parameter
+
+    def check(self, table: str, parameter: Parameter, value: Value) -> Value:
+        try:
+            return checked(parameter, value)
+        except DembarkError as error:
+            raise self.fail(table, str(error)) from None
+
+    def changes(self, kind: str, tables: Mapping[str, Any], parameters: Mapping[str, Parameter]) -> dict[str, dict[str, Value]]:
+        return {name: self.overrides(f"{kind}.{name}", entry, parameters) for name, entry in tables.items()}
+
+    def overrides(self, table: str, entry: Any, parameters: Mapping[str, Parameter]) -> dict[str, Value]:
+        if not isinstance(entry, dict):
+            raise self.fail(table, "overrides are a table of key = value")
+        for key in entry:
+            if key not in parameters:
+                raise self.fail(table, f"unknown parameter {key!r}", nearest(key, parameters))
+        return {key: self.check(table, parameters[key], value) for key, value in entry.items()}
+
+    def runs(self, data: Mapping[str, Any], profiles: Mapping[str, Any], variants: Mapping[str, Any],
+             engines: tuple[str, ...], parameters: Mapping[str, Parameter]) -> dict[str, tuple[PlannedRun, ...]]:
+        result = {}
+        for profile, entries in data.items():
+            pick(profile, profiles, "profile", f"[runs] of {self.path}")
+            planned = []
+            for entry in entries:
+                self.table(entry, "runs", {"variant": str, "engines": list, "replicas": dict}, ("variant",))
+                chosen = tuple(entry.get("engines", engines))
+                pick(entry["variant"], variants, "variant", f"[runs] of {self.path}")
+                for engine in chosen:
+                    pick(engine, engines, "engine", f"[runs] of {self.path}")
+                planned.append(PlannedRun(entry["variant"], chosen, self.replicas(entry, chosen, parameters)))
+            pairs = [(run.variant, engine) for run in planned for engine in run.engines]
+            if len(set(pairs)) < len(pairs):
+                raise self.fail("runs", f"{profile} names a variant twice for the same engine")
+            result[profile] = tuple(planned)
+        return result
+
+    def replicas(self, entry: Mapping[str, Any], engines: tuple[str, ...], parameters: Mapping[str, Parameter]) -> dict[str, int]:
+        counts = entry.get("replicas", {})
+        for engine, count in counts.items():
+            pick(engine, engines, "engine", f"replicas in [runs] of {self.path}")
+            if "replicas" not in parameters:
+                raise self.fail("runs", "replicas are given, but nothing in this case is random", "leave them out")
+            self.check("runs", parameters["replicas"], count)
+        return dict(counts)
+
+    def study(self, name: str, entry: Any, parameters: Mapping[str, Parameter], variants: Mapping[str, Any]) -> Study:
+        table = f"studies.{name}"
+        if not isinstance(entry, dict):
+            raise self.fail(table, "a study is a table with title, along and variants")
+        self.table(entry, table, {"title": str, "description": str, "along": str, "variants": list}, ("title", "along", "variants"))
+        pick(entry["along"], parameters, "parameter", f"[{table}] of {self.path}")
+        for variant in entry["variants"]:
+            pick(variant, variants, "variant", f"[{table}] of {self.path}")
+        if len(set(entry["variants"])) < max(3, len(entry["variants"])):
+            raise self.fail(table, "a study needs at least three variants, each once")
+        return Study(name, entry["title"], entry.get("description", "").strip(), entry["along"], tuple(entry["variants"]))
+
+    def constraint(self, entry: Any, parameters: Mapping[str, Parameter]) -> Constraint:
+        if not isinstance(entry, dict):
+            raise self.fail("constraints", "a constraint is a table with expression and message")
+        self.table(entry, "constraints", {"expression": str, "message": str}, ("expression", "message"))
+        return Constraint(self.expression("constraints", entry["expression"], parameters), entry["message"])
+
+    def expression(self, table: str, text: str, parameters: Mapping[str, Parameter | Expression]) -> Expression:
+        try:
+            expression = Expression(text)
+        except DembarkError as error:
+            raise self.fail(table, str(error)) from None
+        for name in sorted(expression.names - parameters.keys()):
+            raise self.fail(table, f"unknown parameter {name!r}", nearest(name, parameters))
+        return expression

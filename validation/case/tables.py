@@ -1,0 +1,54 @@
+"""Tables of a TOML file: read, and checked for unknown keys and wrong types, each mistake told with the table that it is in."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from dembark.common.errors import DembarkError
+from dembark.validation.case.parameters import nearest
+
+Types = type | tuple[type, ...]
+_WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", list: "a list [...]", dict: "a table {...}"}
+
+
+def load_toml(path: Path) -> dict[str, Any]:
+    """Content of a TOML file; DembarkError naming the line when it is none."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise DembarkError(f"{path} cannot be read", str(error)) from None
+
+
+def wanted(types: Types) -> str:
+    """What is expected where `types` are: `a text or a list [...]`."""
+    kinds = types if isinstance(types, tuple) else (types,)
+    return " or ".join(_WORDS[kind] for kind in kinds if not (kind is int and float in kinds))
+
+
+class TableReader:
+    """Checks the tables of one file; a reader of a kind of file builds on it."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def where(self, table: str) -> str:
+        """A table of the file, for an error line."""
+        return f"[{table}] of {self.path}"
+
+    def fail(self, table: str, what: str, right: str = "") -> DembarkError:
+        """The error to raise for a mistake in `table`."""
+        return DembarkError(what, self.where(table), right)
+
+    def table(self, data: Mapping[str, Any], name: str, keys: Mapping[str, Types], required: Iterable[str] = ()) -> None:
+        """Raise DembarkError unless the table `name` has only `keys`, of these types, and all that are `required`."""
+        for key, value in data.items():
+            if key not in keys:
+                raise self.fail(name, f"unknown key {key!r}", nearest(key, keys))
+            if not isinstance(value, keys[key]) or (isinstance(value, bool) and keys[key] is not bool):
+                raise self.fail(name, f"{key} = {value!r} has the wrong type", f"wanted is {wanted(keys[key])}")
+        for key in required:
+            if key not in data:
+                raise self.fail(name, f"{key} is missing", f"wanted is {wanted(keys[key])}")

@@ -1,0 +1,50 @@
+"""The engines: one module each, found by name.
+
+To add an engine:
+1. write `validation/engines/<name>.py` with a class that derives from Engine (base.py) and says its facts, program and command;
+2. add the class to ENGINES below, where it shall stand in lists and tables;
+3. add its deck, with the file name from its facts, to the cases that it shall run, and its name to `engines` in their case.toml.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+from dembark.validation.case.parameters import pick
+from dembark.validation.engines.base import DeckNumber, Engine, EngineFacts, call, end_with_parent, mpi_launcher
+from dembark.validation.engines.liggghts import Liggghts
+from dembark.validation.engines.yade import Yade
+
+__all__ = ["ENGINES", "DeckNumber", "Engine", "EngineFacts", "call", "end_with_parent", "facts", "find", "mpi_launcher", "names", "registered",
+           "titles"]
+
+ENGINES: tuple[type[Engine], ...] = (Liggghts, Yade)
+
+
+def names() -> tuple[str, ...]:
+    """Names of the registered engines, in their order."""
+    return tuple(engine.facts.name for engine in ENGINES)
+
+
+def facts(name: str) -> EngineFacts:
+    """What is known of the engine called `name` even where it is not installed; DembarkError with near matches for an unknown one."""
+    return registered(name).facts
+
+
+@cache
+def find(name: str) -> Engine:
+    """The engine called `name`, asked for its version; DembarkError when it is unknown, or telling what to do if it is not installed."""
+    return registered(name).find()
+
+
+def titles(joint: str, which: Callable[[EngineFacts], bool] = lambda one: True) -> str:
+    """Titles for a sentence, of the engines for which `which` holds, with `joint` before the last: `A, B and C`."""
+    found = [engine.facts.title for engine in ENGINES if which(engine.facts)]
+    return f" {joint} ".join([", ".join(found[:-1]), found[-1]]) if len(found) > 1 else "".join(found)
+
+
+def registered(name: str) -> type[Engine]:
+    """The class of the engine called `name`; DembarkError with near matches for an unknown one."""
+    pick(name, names(), "engine", "")
+    return next(engine for engine in ENGINES if engine.facts.name == name)

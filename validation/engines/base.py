@@ -1,0 +1,220 @@
+"""What an engine is to the harness: the protocol that each module beside this one fulfils, and what several of them need."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import tempfile
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import ClassVar, Self
+
+from dembark.common.checkout import checkout
+from dembark.common.errors import DembarkError
+from dembark.validation.case.parameters import Value
+
+# An environment variable for each engine: which program it was that told its version, and the version.
+_TOLD = "DEMBARK_TOLD_BY_"
+DECK_NOTE = ("Written by dembark; SI units. The numbers without a comment follow from the others: to change a parameter, write the deck anew with "
+             "'dembark deck'.")
+
+
+@dataclass(frozen=True)
+class EngineFacts:
+    """What is known of an engine even where its program is not installed.
+
+    `name` stands in commands, files and folders, `title` in text and figures; `program` is what has to be installed. Rates are in
+    particle-steps per second and core. `restart_rate` turns the wall time between restart files into steps: a fixed number, because a
+    measured one would make a run differ from host to host. `rates` are those measured for each case, `typical_rate` is for all others,
+    and `measured_on` says where and when. `relative_cost` is that of a particle-step.
+    """
+
+    name: str
+    title: str
+    program: str
+    deck: str
+    version_words: tuple[str, ...]
+    version_pattern: str
+    restart_suffix: str
+    colour: str
+    marker: str
+    relative_cost: float
+    restart_rate: float
+    typical_rate: float
+    measured_on: str
+    rates: Mapping[str, float] = field(default_factory=dict)
+    # Environment variables that say which program is meant.
+    variables: tuple[str, ...] = ()
+    # What makes the ids in its impact files count from 1.
+    impact_id_offset: int = 0
+    # What stands in the source of a deck that writes states to resume from.
+    restart_words: tuple[str, ...] = ()
+    # File name patterns of what it leaves in a run's folder and no result needs.
+    leftovers: tuple[str, ...] = ()
+    # How the line begins that it writes when a signal makes it stop, if it writes one.
+    stop_message: str | None = None
+    # How a deck is run in its folder.
+    by_hand: str = ""
+    # MPI processes, threads, and whether it can be started by hand, as 'dembark <name>'.
+    ranks: bool = False
+    threads: bool = False
+    interactive: bool = False
+
+    def check_ranks(self, ranks: int) -> None:
+        """DembarkError when a run shall have several MPI processes and the engine has none."""
+        if ranks > 1 and not self.ranks:
+            raise DembarkError(f"--ranks {ranks} with {self.title}", "", f"use --threads: {self.one_process}")
+
+    @property
+    def one_process(self) -> str:
+        """Why it takes no ranks, for the end of an error line."""
+        return f"{self.title} runs in one process"
+
+
+@dataclass(frozen=True)
+class DeckNumber:
+    """A number or word of a deck (None: not set), or a table of them, and what it is, in words; derived ones have none."""
+
+    value: Value | tuple[Value, ...]
+    meaning: str = ""
+
+
+@dataclass(frozen=True)
+class Engine(ABC):
+    """An engine that was found: `identity` changes when the program or dembark's part of it is rebuilt differently."""
+
+    facts: ClassVar[EngineFacts]
+    executable: Path
+    version: str
+    identity: str
+
+    @classmethod
+    @abstractmethod
+    def locate(cls) -> Path:
+        """The program; DembarkError telling what to do if there is none."""
+
+    @abstractmethod
+    def command(self, deck: Path, values: Mapping[str, Value], ranks: int = 1, threads: int = 1) -> list[str]:
+        """Words that run `deck` with `values` (None = leave the deck's default) in the current folder."""
+
+    @classmethod
+    @abstractmethod
+    def deck_text(cls, source: str, numbers: Mapping[str, DeckNumber], folders: Sequence[Path]) -> str:
+        """The deck that runs, from its `source` in a case folder: with all numbers, and what it includes from `folders` in its place."""
+
+    @classmethod
+    def find(cls) -> Self:
+        """The engine of this machine, asked for its version; DembarkError telling what to do if there is none."""
+        bare = cls(cls.locate(), "", "")
+        return replace(bare, version=bare._version(), identity=digest(bare.own_files()))
+
+    @property
+    def name(self) -> str:
+        """Its name in commands, files and folders."""
+        return self.facts.name
+
+    def own_files(self) -> Iterable[Path]:
+        """The files that decide how it computes: the program and dembark's part of it."""
+        return [self.executable]
+
+    def build_folders(self) -> Iterable[Path]:
+        """Folders where the CMake cache of the build of dembark's part may lie, the most likely first."""
+        return self.executable.resolve().parents
+
+    def environment(self, threads: int = 1) -> dict[str, str]:
+        """Environment for the engine: one thread unless asked for more, nothing of this Python's virtual environment or of a job step."""
+        hidden = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "DISPLAY")
+        result = {key: value for key, value in os.environ.items() if key not in hidden and not _of_job_step(key)}
+        # Ranks that wait for each other without yielding would halt a run with more ranks than free cores.
+        result |= {"OMP_NUM_THREADS": str(threads), "PYTHONUNBUFFERED": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
+        if os.geteuid() == 0:
+            result |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+        return result
+
+    def _version(self) -> str:
+        """The version that the program tells; asked once by a process and those that it starts, for a start takes a second or two."""
+        facts, variable = self.executable.stat(), _TOLD + self.name.upper()
+        asked = f"{self.executable}:{facts.st_size}:{facts.st_mtime_ns}"
+        told = os.environ.get(variable, "").rpartition("=")
+        if told[0] == asked:
+            return told[2]
+        version = _first_match(self.facts.version_pattern, [str(self.executable), *self.facts.version_words], self.environment())
+        os.environ[variable] = f"{asked}={version}"
+        return version
+
+
+def texts(values: Mapping[str, Value]) -> dict[str, str]:
+    """The values that are set, as decks read them: numbers with all their digits."""
+    return {key: repr(value) if isinstance(value, float) else str(value) for key, value in values.items() if value is not None}
+
+
+def built(path: str) -> Path | None:
+    """`path` below the folder `build` of the source tree; None in an installed copy."""
+    tree = checkout()
+    return tree / "build" / path if tree else None
+
+
+def is_program(path: Path) -> bool:
+    """Whether `path` can be executed."""
+    return path.is_file() and os.access(path, os.X_OK)
+
+
+def named_program(path: Path, variable: str) -> Path:
+    """`path`, which `variable` of the environment leads to; DembarkError when it is no program."""
+    if not is_program(path):
+        raise DembarkError(f"{variable}={path} is no program", "", f"set {variable} to the engine's executable, or unset it")
+    return path
+
+
+def end_with_parent(signal: str) -> list[str]:
+    """Words before a command that let the system send it `signal` (`TERM`, `KILL`) when the process that started it has ended."""
+    return ["setpriv", "--pdeathsig", signal, "--"] if shutil.which("setpriv") else []
+
+
+def mpi_launcher(ranks: int) -> list[str]:
+    """Words that start `ranks` processes: those of DEMBARK_MPIRUN (`srun --mpi=pmix`, `mpiexec`, ...) and -n, else Open MPI's mpirun."""
+    named = shlex.split(os.environ.get("DEMBARK_MPIRUN", ""))
+    # Without binding, two runs that go on at the same time do not end up on the same core.
+    return [*named, "-n", str(ranks)] if named else ["mpirun", "-np", str(ranks), "--bind-to", "none", "--oversubscribe"]
+
+
+def call(words: Sequence[str | Path], folder: Path, environment: Mapping[str, str] | None = None,
+         timeout: float = 120.0) -> subprocess.CompletedProcess[str]:
+    """Run an engine in `folder` to its end, at most `timeout` (s); its output is text whatever bytes it wrote."""
+    return subprocess.run([str(word) for word in words], cwd=folder, env=environment, capture_output=True, text=True, errors="replace",
+                          stdin=subprocess.DEVNULL, timeout=timeout, check=False)
+
+
+def digest(files: Iterable[Path]) -> str:
+    """SHA-256 over the names and contents of `files`, in whatever order they are given."""
+    total = hashlib.sha256()
+    for path in sorted(files):
+        total.update(path.name.encode())
+        total.update(path.read_bytes())
+    return total.hexdigest()
+
+
+def _of_job_step(variable: str) -> bool:
+    # An MPI program that finds the variables of the job step it runs in takes itself for one of the step's ranks and ends when Slurm
+    # started no PMI for it; mpirun would start its daemons through srun. Only srun has to know the job, for its own step.
+    kept = {"SLURM_CONF"} | ({"SLURM_JOB_ID"} if Path(mpi_launcher(1)[0]).name == "srun" else set())
+    return variable.startswith(("SLURM_", "PMI_", "PMIX_")) and variable not in kept
+
+
+def _first_match(pattern: str, command: list[str], environment: Mapping[str, str] | None = None) -> str:
+    try:
+        with tempfile.TemporaryDirectory(prefix="dembark-") as folder:
+            done = call(command, Path(folder), environment)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise DembarkError(f"{command[0]} does not start", "", str(error)) from None
+    found = re.search(pattern, done.stdout + done.stderr)
+    if found:
+        return found.group(1)
+    last = (done.stderr or done.stdout).strip().splitlines()[-1:] or [f"exit code {done.returncode} without a word"]
+    raise DembarkError(f"{command[0]} does not tell its version", "", last[0])

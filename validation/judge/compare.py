@@ -1,0 +1,100 @@
+"""Whether two engines agree: each compared quantity's difference within the joint interval, and never more than 10 % apart; or, where
+nothing is random, within a bound that the quantity brings along.
+
+Packings differ by more than what varies within one, so a comparison of random runs is decided only by intervals over three packings or
+more in each engine. A page compares many quantities, of which one in twenty lies beyond its 95 % interval although nothing is wrong:
+what fails is beyond the interval that holds all differences of the page together with 99 %.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+from dembark.common.errors import RunError
+from dembark.validation.judge import result
+from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result
+from dembark.postproc.statistics import joint_half, joint_limit
+
+CAP = 0.10
+PACKINGS = 3
+# Of all comparisons of a page together.
+CONFIDENCE = 0.99
+
+
+def compare(folder: Path) -> Comparison:
+    """The engines that have a `metrics.json` below the folder of a case and variant, beside each other. RunError for fewer than two.
+
+    Of each pair of engines the first in alphabetical order is the reference.
+    """
+    measured = sorted((result.read(path) for path in folder.glob(f"*/{result.METRICS}")), key=lambda one: one.engine)
+    if len(measured) < 2:
+        raise RunError(f"nothing to compare in {folder}", f"there is a measurement of {measured[0].engine if measured else 'no engine'} only")
+    first = measured[0]
+    pairs = [pair for index, one in enumerate(measured) for other in measured[index + 1 :] for pair in _pairs(one, other)]
+    return Comparison(first.case, first.variant, tuple(one.engine for one in measured), tuple(pairs), first.profile, CAP)
+
+
+def _pairs(first: Result, second: Result) -> list[ComparedRecord]:
+    by_name = {one.name: one for one in first.quantities if one.compared}
+    both = [(by_name[one.name], one) for one in second.quantities if one.compared and one.name in by_name]
+    return [pair(*two, first.engine, second.engine, len(both)) for two in both]
+
+
+def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str, engine: str, comparisons: int = 1) -> ComparedRecord:
+    """One quantity of two engines with its verdict; `comparisons`: how many quantities are compared together with it.
+
+    pass: the difference is within the joint 95 % interval, which is at most 10 % wide. fail: it is beyond what chance does to one of
+    all `comparisons`. info: between the two; or the joint interval is unknown, too wide to tell 10 %, or from fewer than three
+    packings in either engine, which cannot hold what varies from one packing to the next.
+
+    A quantity of a deterministic run has an `agreement` instead, in its own unit: pass within it, fail beyond it.
+    """
+    both = (value, reference)
+    deviation: float | None = None
+    kind, tolerance, half = "relative", CAP, None
+    bounds = [one.agreement for one in both if one.agreement is not None]
+    if value.value is None or reference.value is None or not (bounds or reference.value):
+        verdict, reason = "fail", "no number to compare"
+    elif bounds:
+        kind, tolerance, deviation = "absolute", max(bounds), value.value - reference.value
+        same = abs(deviation) <= tolerance
+        verdict, reason = ("pass", "") if same else ("fail", "the same numbers are due")
+    else:
+        deviation = (value.value - reference.value) / abs(reference.value)
+        unknown = next((one for one in both if one.half is None), None)
+        if unknown is not None:
+            verdict, reason = "info", f"an interval is unknown: {unknown.basis or 'the run is too short'}"
+        else:
+            halves, scale = (value.half or 0.0, reference.half or 0.0), abs(reference.value)
+            half = joint_half(*halves)
+            verdict, reason = _judged(abs(deviation), (halves[0] / scale, halves[1] / scale), (_packings(value), _packings(reference)), comparisons)
+    return ComparedRecord(
+        name=value.name, label=value.label, unit=value.unit, value=value.value, interval=value.interval, reference=reference.value,
+        reference_interval=reference.interval, deviation=deviation, deviation_kind=kind, tolerance=tolerance, verdict=verdict, reason=reason,
+        detail="agreement of the engines", source=reference_engine, engine=engine, reference_engine=reference_engine, joint_half_width=half)
+
+
+def _judged(difference: float, halves: tuple[float, float], packings: tuple[float, float], comparisons: int) -> tuple[str, str]:
+    """Verdict and reason from |difference| and half-widths over the reference, and the numbers of packings."""
+    half = joint_half(*halves)
+    few = min(packings)
+    if few < PACKINGS:
+        return "info", (f"the joint interval (±{half:.1%}) comes from within {few:g} packing{'s' * (few > 1)}; "
+                        f"{PACKINGS} in each engine are needed to judge it")
+    limit = max(half, joint_limit(*halves, *packings, 1.0 - (1.0 - CONFIDENCE) / comparisons))
+    if difference > limit:
+        return "fail", f"the joint interval is ±{half:.1%}, chance allows ±{limit:.1%}"
+    if half > CAP:
+        return "info", f"the joint interval (±{half:.0%}) is wider than 10 %"
+    if difference > half:
+        return "info", (f"beyond the joint interval (±{half:.1%}), as one of {comparisons} may be by chance (±{limit:.1%}); "
+                        "more packings would decide")
+    return "pass", ""
+
+
+def _packings(quantity: QuantityRecord) -> float:
+    """Over how many packings the interval was taken; 1 or 2 when it comes from within them, infinite when it rests on no packing."""
+    told = re.match(r"(?:within )?(\d+) replica", quantity.basis)
+    return int(told.group(1)) if told else math.inf

@@ -1,0 +1,116 @@
+"""Runs a case's measure.py and joins what it measured with what case.toml declares of each quantity."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from dembark.common.errors import DembarkError, RunError
+from dembark.postproc import DumpError
+from dembark.postproc.measurement import Measurement, Value
+from dembark.validation.case import deck
+from dembark.validation.case.expressions import Expression
+from dembark.validation.case.model import Case, Declared, Study
+from dembark.validation.case.parameters import pick
+from dembark.validation.judge.quantity import Quantity
+
+if TYPE_CHECKING:
+    from dembark.postproc.replica import Replica
+
+# Keys of [picture] that are expressions in parameters and derived numbers.
+_NUMBERS = ("scale", "radius", "drum_radius", "drum_speed", "speed")
+
+
+def measure(case: Case, replicas: Sequence[Replica]) -> Measurement:
+    """What measure(replicas) of the case returns; DembarkError or RunError in one line for whatever goes wrong in it."""
+    return _call(case, "measure", lambda function: function(replicas))
+
+
+def study(case: Case, planned: Study, points: Sequence[Mapping[str, Any]]) -> Measurement:
+    """What study(name, points, along) of the case returns; `points` are the contents of the variants' metrics.json."""
+    return _call(case, "study", lambda function: function(planned.name, points, planned.along))
+
+
+def check(case: Case) -> ModuleType:
+    """The measure.py of the case, loaded; DembarkError, with file and line, when it is missing or cannot be loaded."""
+    deck.require_measure(case)
+    path = case.folder / "measure.py"
+    module = deck.load_module(path, f"dembark_measure_{case.name}")
+    for name in ("measure", *(["study"] if case.studies else [])):
+        if not callable(getattr(module, name, None)):
+            raise DembarkError(f"{path} has no function {name}", "", "it needs measure(replicas) and, with [studies], study(name, points, along)")
+    return module
+
+
+def _call(case: Case, name: str, call: Callable[[Callable[..., Any]], Any]) -> Measurement:
+    path, module = case.folder / "measure.py", check(case)
+    try:
+        found = call(getattr(module, name))
+    except DumpError as error:
+        raise RunError(f"a run of case {case.name} could not be measured", str(error)) from None
+    except Exception as error:
+        # The caller of `measure` knows the runs and says what of them is too small.
+        if name == "measure" or isinstance(error, DembarkError):
+            raise
+        raise deck.failed(path, error) from error
+    if not isinstance(found, Measurement):
+        raise DembarkError(f"{name} of {path} returned {type(found).__name__}", "", "return a Measurement, see docs/cases.md")
+    return found
+
+
+def quantities(case: Case, found: Measurement) -> list[Quantity]:
+    """The measured quantities as declared, in the order of the declaration; DembarkError for one that is not declared."""
+    order = list(case.quantities)
+    matched = [(*declared(case, name), name, value) for name, value in found.values.items()]
+    return [_joined(one, part, name, value) for one, part, name, value in sorted(matched, key=lambda entry: order.index(entry[0].name))]
+
+
+def declared(case: Case, name: str) -> tuple[Declared, str]:
+    """The declaration of the quantity `name`, and what stands in the place of its `*`; DembarkError when there is none."""
+    if name in case.quantities:
+        return case.quantities[name], ""
+    for pattern, one in case.quantities.items():
+        before, star, after = pattern.partition("*")
+        if star and name.startswith(before) and name.endswith(after) and len(name) > len(before) + len(after):
+            return one, name[len(before) : len(name) - len(after)]
+    raise DembarkError(f"quantity {name} is measured but not declared", f"{case.folder / 'case.toml'}", f"add a table [quantities.{name}]")
+
+
+def _joined(one: Declared, part: str, name: str, value: Value) -> Quantity:
+    if one.tolerance == "bound" and value.bound is None and value.reference is not None and not value.reason:
+        raise DembarkError(f"quantity {name} is declared with tolerance = \"bound\"", "", "give bound=... in its Value")
+    if value.bound is not None and one.tolerance != "bound":
+        raise DembarkError(f"quantity {name} has a bound", "its tolerance is not the word \"bound\"", "take the bound away or declare it")
+    tolerance = None if value.reference is None else value.bound if one.tolerance == "bound" else one.tolerance
+    return Quantity(
+        name=name, label=one.label.replace("*", part), unit=one.unit, estimate=value.estimate, reference=value.reference,
+        tolerance=None if tolerance is None else float(tolerance), absolute=one.absolute, deviation_half=value.half, source=one.source,
+        detail=value.detail or one.detail or one.why, reason=value.reason, verdict=value.verdict, compared=one.compared and value.compared,
+        agreement=None if one.agreement is None else one.agreement * value.scale, evidence=one.evidence)
+
+
+def picture(case: Case, known: Mapping[str, Any]) -> dict[str, Any] | None:
+    """How the report shows a run: the table [picture] with its expressions evaluated for the numbers `known`; None without one."""
+    if not case.picture:
+        return None
+    return {key: Expression(value)(known) if key in _NUMBERS and isinstance(value, str) else value for key, value in case.picture.items()}
+
+
+@cache
+def _citations() -> dict[str, dict[str, str]]:
+    return tomllib.loads(Path(__file__).with_name("references.toml").read_text(encoding="utf-8"))
+
+
+def references(case: Case) -> list[dict[str, str]]:
+    """The publications that the case names."""
+    known = _citations()
+    return [known[pick(name, known, "reference", f"[case] of {case.folder / 'case.toml'}")] for name in case.references]
+
+
+def statements(case: Case) -> list[str]:
+    """What the publications of the case are cited for, a sentence each."""
+    return [f"{one['short']}: {one['statement']}" for one in references(case) if one["statement"]]

@@ -1,0 +1,222 @@
+"""What was measured and judged, as typed values: the only writer and reader of `metrics.json` and `comparison.json`."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+from dembark.common.errors import RunError
+from dembark.common.files import read_json, write_json
+
+EVIDENCE = ("experiment", "theory", "code", "identity")
+VERDICTS = ("pass", "fail", "info")
+METRICS, COMPARISON = "metrics.json", "comparison.json"
+
+Interval = tuple[float, float]
+Kind = TypeVar("Kind", bound="QuantityRecord | Result | Comparison")
+
+
+@dataclass(frozen=True)
+class QuantityRecord:
+    """A quantity as it stands in `metrics.json`: numbers in `unit` (None where there is none), 95 % intervals as (low, high).
+
+    `verdict` is pass, fail or info, with its `reason`; `tolerance` None means that nothing was due to be checked. `deviation` is value minus
+    reference, over the reference when `deviation_kind` is "relative". `evidence`: what the reference is, one of EVIDENCE; "" is not stated.
+    `compared`: the engines are to agree in it, within `agreement` (in `unit`) where nothing is random.
+    """
+
+    name: str
+    value: float | None
+    verdict: str
+    label: str = ""
+    unit: str = "1"
+    interval: Interval | None = None
+    basis: str = ""
+    reference: float | None = None
+    reference_interval: Interval | None = None
+    deviation: float | None = None
+    deviation_kind: str = "relative"
+    tolerance: float | None = None
+    reason: str = ""
+    detail: str = ""
+    source: str = ""
+    evidence: str = ""
+    compared: bool = True
+    deviation_half_width: float | None = None
+    agreement: float | None = None
+
+    def __post_init__(self) -> None:
+        """RunError for a verdict or a kind of evidence that does not exist."""
+        for key, allowed in (("verdict", VERDICTS), ("evidence", ("", *EVIDENCE))):
+            if getattr(self, key) not in allowed:
+                raise RunError(f"{key} = {getattr(self, key)!r}", f"quantity {self.name!r}", f"give one of {', '.join(filter(None, allowed))}")
+
+    @property
+    def title(self) -> str:
+        """For people."""
+        return self.label or self.name.replace("_", " ")
+
+    @property
+    def half(self) -> float | None:
+        """Half-width of the interval."""
+        return None if self.interval is None else 0.5 * (self.interval[1] - self.interval[0])
+
+    @property
+    def standing(self) -> str:
+        """passed, failed, open (a check that could not be decided) or information (nothing was due)."""
+        if self.verdict != "info":
+            return "passed" if self.verdict == "pass" else "failed"
+        return "open" if self.tolerance is not None else "information"
+
+
+@dataclass(frozen=True)
+class ComparedRecord(QuantityRecord):
+    """The same quantity in two engines: `value` of `engine` beside `reference`, the value of `reference_engine`."""
+
+    evidence: str = "code"
+    engine: str = ""
+    reference_engine: str = ""
+    joint_half_width: float | None = None
+
+
+@dataclass(frozen=True)
+class Result:
+    """The replicas of one case, variant and engine, measured and judged; or a study of several variants, with a `title` of its own.
+
+    `profiles`: curves as `validation.checks.run.profile` makes them; `picture`: how to show the packing; `references`: cited works;
+    `measured`: when and by which commit; `inputs`: hash of each replica's inputs; `replicas_missing`: numbers of those that did not finish.
+    """
+
+    case: str
+    variant: str
+    engine: str
+    quantities: tuple[QuantityRecord, ...]
+    profile: str = ""
+    title: str = ""
+    description: str = ""
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    profiles: tuple[Mapping[str, Any], ...] = ()
+    remarks: tuple[str, ...] = ()
+    picture: Mapping[str, Any] | None = None
+    references: tuple[Mapping[str, Any], ...] = ()
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    measured: Mapping[str, Any] = field(default_factory=dict)
+    inputs: tuple[str, ...] = ()
+    replicas_missing: tuple[int, ...] = ()
+
+    def find(self, name: str) -> QuantityRecord | None:
+        """The quantity of that name; None when there is none."""
+        return next((one for one in self.quantities if one.name == name), None)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The engines of one case and variant beside each other: no two may differ by more than `cap`, relative."""
+
+    case: str
+    variant: str
+    engines: tuple[str, ...]
+    quantities: tuple[ComparedRecord, ...]
+    profile: str = ""
+    cap: float = 0.10
+    measured: Mapping[str, Any] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+
+def as_json(value: QuantityRecord | Result | Comparison) -> dict[str, Any]:
+    """The value as JSON has it; what is optional and was not given is left out."""
+    content = {}
+    for one in fields(value):
+        item = getattr(value, one.name)
+        if one.name in _OPTIONAL and item == _default(one):
+            continue
+        content[one.name] = [as_json(part) for part in item] if one.name == "quantities" else list(item) if isinstance(item, tuple) else item
+    return content
+
+
+_OPTIONAL = ("deviation_half_width", "agreement", "title", "description", "measured", "inputs", "replicas_missing")
+
+
+def _default(one: dataclasses.Field[Any]) -> Any:
+    return one.default_factory() if one.default_factory is not dataclasses.MISSING else one.default
+
+
+def write(path: Path, value: Result | Comparison) -> Result | Comparison:
+    """Write `metrics.json` or `comparison.json`, whole or not at all; returns `value`."""
+    write_json(path, as_json(value))
+    return value
+
+
+def read(path: Path) -> Result:
+    """The Result in a `metrics.json`. RunError in one line when there is none or it lacks what every result has.
+
+    A file of another version of dembark is read as far as it goes; a remark tells which keys it lacks, or has more.
+    """
+    return _read(path, Result)
+
+
+def read_comparison(path: Path) -> Comparison:
+    """The Comparison in a `comparison.json`, see `read`."""
+    return _read(path, Comparison)
+
+
+def _read(path: Path, kind: type[Kind]) -> Kind:
+    content = read_json(path)
+    if content is None:
+        raise RunError(f"{path} cannot be read", "it is not there or holds no JSON")
+    return from_json(content, kind, str(path))
+
+
+def from_json(content: Mapping[str, Any], kind: type[Kind], where: str = "") -> Kind:
+    """The value that `as_json` wrote, see `read`; `where` is named in errors."""
+    notes: dict[str, None] = {}
+    found = _value(content, kind, where, notes)
+    if notes and isinstance(found, Result | Comparison):
+        note = f"This was written by another version of dembark: {', '.join(notes)}. Measure again to have all of it."
+        found = dataclasses.replace(found, remarks=(*found.remarks, note))
+    return found
+
+
+@cache
+def _keys(kind: type) -> tuple[dict[str, dataclasses.Field[Any]], tuple[str, ...]]:
+    known = {one.name: one for one in fields(kind)}
+    needed = [name for name, one in known.items() if one.default is one.default_factory is dataclasses.MISSING]
+    return known, tuple(needed)
+
+
+def _value(content: Mapping[str, Any], kind: type[Kind], where: str, notes: dict[str, None]) -> Kind:
+    known, needed = _keys(kind)
+    missing = [key for key in needed if key not in content]
+    if missing:
+        raise RunError(f"{where} has no {', '.join(missing)}", "it is no result of this version of dembark", "measure it again")
+    notes |= {f"unknown {key!r} left out": None for key in content if key not in known}
+    if issubclass(kind, QuantityRecord) and "evidence" not in content:
+        notes |= {"no kind of evidence": None} if kind is QuantityRecord else {}
+    given: dict[str, Any] = {}
+    for key in known.keys() & content.keys():
+        item = content[key]
+        if key == "quantities":
+            part = ComparedRecord if kind is Comparison else QuantityRecord
+            item = tuple(_value(one, part, where, notes) for one in item)
+        given[key] = tuple(item) if isinstance(item, list) else item
+    return cast(Kind, kind(**given))
+
+
+def results(folder: Path) -> tuple[list[Result], list[Comparison], list[str]]:
+    """All results and comparisons below a results folder in the order of their places, and a line for each file that cannot be read."""
+    found: list[Result] = []
+    compared: list[Comparison] = []
+    problems: list[str] = []
+    for path in sorted(path for name in (f"*/*/*/{METRICS}", f"*/*/{COMPARISON}") for path in folder.glob(name) if "superseded" not in path.parts):
+        try:
+            if path.name == METRICS:
+                found.append(read(path))
+            else:
+                compared.append(read_comparison(path))
+        except RunError as error:
+            problems.append(str(error))
+    return found, compared, problems

@@ -1,0 +1,92 @@
+"""How many checks passed, failed and stayed open, by kind of evidence: what every place says that speaks of verdicts."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from dembark.common.files import read_json
+from dembark.validation.judge.result import EVIDENCE, QuantityRecord, from_json, results
+
+VERIFICATION = "verification.json"
+# What each kind of evidence means, for people; "" is that of cases that do not say.
+MEANING = {"experiment": "measured values", "theory": "laws and exact solutions", "code": "another code or engine",
+           "identity": "conservation laws, the scheme against itself", "": "not stated"}
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Numbers of quantities: checks that passed, failed or could not be decided (open), and those that nothing was due of."""
+
+    passed: int = 0
+    failed: int = 0
+    open: int = 0
+    information: int = 0
+
+    @property
+    def decided(self) -> int:
+        """Checks with a verdict."""
+        return self.passed + self.failed
+
+    @property
+    def checks(self) -> int:
+        """Checks, decided or open."""
+        return self.decided + self.open
+
+    @property
+    def sentence(self) -> str:
+        """`12 checks passed, 1 FAILED, 3 open`."""
+        if not self.checks:
+            return "no checks"
+        plural = "s" if self.checks > 1 else ""
+        failed = f"{self.failed} FAILED" if self.failed else "none failed"
+        return f"{self.passed} of {self.checks} check{plural} passed, {failed}" + (f", {self.open} open" if self.open else "")
+
+
+@dataclass(frozen=True)
+class Tally(Counts):
+    """Counts of all quantities, and `by_evidence` of each kind that occurs among the checks, in the order of EVIDENCE; `unread`: a line
+    for each result that could not be read and is not counted."""
+
+    by_evidence: Mapping[str, Counts] = field(default_factory=dict)
+    unread: tuple[str, ...] = ()
+
+    @property
+    def sentences(self) -> list[str]:
+        """A line for each kind of evidence, `theory (laws and exact solutions): 3 of 4 checks passed, 1 FAILED`, and each unread result."""
+        lines = [f"{kind or 'evidence'} ({MEANING[kind]}): {counts.sentence}" for kind, counts in self.by_evidence.items()]
+        return [*lines, *(f"not counted: {line}" for line in self.unread)]
+
+
+def tally(quantities: Iterable[QuantityRecord]) -> Tally:
+    """Count `quantities` by how they stand, and by kind of evidence."""
+    kinds: dict[str, Counter[str]] = {kind: Counter() for kind in (*EVIDENCE, "")}
+    for one in quantities:
+        kinds[one.evidence][one.standing] += 1
+    total = sum(kinds.values(), Counter())
+    by_evidence = {kind: Counts(*_numbers(counts)) for kind, counts in kinds.items() if counts.keys() - {"information"}}
+    return Tally(*_numbers(total), by_evidence=by_evidence)
+
+
+def _numbers(counts: Counter[str]) -> tuple[int, int, int, int]:
+    return counts["passed"], counts["failed"], counts["open"], counts["information"]
+
+
+def of_folder(folder: Path) -> Tally:
+    """The tally of everything judged in a results folder: quantities, comparisons of engines, and the verification of the instruments."""
+    found, compared, unread = results(folder)
+    verified = (read_json(folder / VERIFICATION) or {}).get("quantities", [])
+    counted = tally([*(one for each in found for one in each.quantities), *(one for each in compared for one in each.quantities),
+                     *(from_json(one, QuantityRecord, VERIFICATION) for one in verified)])
+    return replace(counted, unread=tuple(unread))
+
+
+def open_reasons(quantities: Iterable[QuantityRecord]) -> dict[str, list[QuantityRecord]]:
+    """The checks that stayed open, by reason."""
+    found: dict[str, list[QuantityRecord]] = {}
+    for one in quantities:
+        if one.standing == "open":
+            found.setdefault(one.reason or "there is no number to judge", []).append(one)
+    return found

@@ -1,0 +1,83 @@
+"""The first pages: verdicts by kind of evidence, what failed, what is missing, and what is open and why."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from dembark.validation.judge.tally import MEANING, Tally, tally
+from dembark.validation.report import figures, scatter
+from dembark.validation.report.gather import Row
+
+# Lines of each list that the first pages of the PDF hold; what is left out is counted, and in the HTML.
+FAILED, OPEN, MISSING = 8, 14, 6
+
+# What a failure says most about comes first.
+_WEIGHT = ("experiment", "theory", "identity", "", "code")
+
+CSV_HEADER = ("case", "variant", "engine", "quantity", "label", "unit", "value", "low", "high", "reference", "reference_low", "reference_high",
+              "deviation", "deviation_kind", "tolerance", "verdict", "evidence", "reason", "detail", "source")
+
+
+@dataclass(frozen=True)
+class OpenLine:
+    """Checks of a case that stayed open for one reason: how many, and which."""
+
+    case: str
+    anchor: str
+    reason: str
+    count: int
+    names: str
+
+
+def open_lines(rows: Iterable[Row]) -> list[OpenLine]:
+    """One line for each case and reason; numbers in brackets, which differ from quantity to quantity, are left out of the reason."""
+    found: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        if row.record.standing == "open":
+            reason = re.sub(r" \([^()]*\d[^()]*\)", "", row.record.reason) or "there is no number to judge"
+            found.setdefault((row.case, reason), []).append(row)
+    return [OpenLine(case, group[0].anchor, reason, len(group), _names(group)) for (case, reason), group in found.items()]
+
+
+def _names(group: Sequence[Row]) -> str:
+    """The first of the quantities, and how many more there are."""
+    names = list(dict.fromkeys(row.record.title for row in group))
+    first = names[0] if len(names[0]) <= 42 else names[0][:40].rsplit(" ", 1)[0] + " …"
+    return first + (f" and {len(names) - 1} more" if len(names) > 1 else "")
+
+
+def evidence(counted: Tally) -> list[dict[str, Any]]:
+    """Rows of the table of verdicts: each kind of evidence with its counts, and all together."""
+    kinds = [{"kind": kind or "not stated", "meaning": MEANING[kind] if kind else "the case does not say", "counts": counts}
+             for kind, counts in counted.by_evidence.items()]
+    return [*kinds, {"kind": "all", "meaning": "", "counts": counted}]
+
+
+def context(rows: Sequence[Row], missing: Sequence[str]) -> Mapping[str, Any]:
+    """What the template shows on the first pages."""
+    counted = tally(row.record for row in rows)
+    found = scatter.points(rows)
+    failed = sorted((row for row in rows if row.record.standing == "failed"), key=lambda row: _WEIGHT.index(row.record.evidence))
+    return {"tally": counted, "evidence": evidence(counted), "failed": failed,
+            "open": open_lines(rows), "missing": missing, "points": found, "scatter_lines": len(scatter.lines(found)),
+            "most": {"failed": FAILED, "open": OPEN, "missing": MISSING}}
+
+
+def csv_rows(rows: Iterable[Row]) -> Iterable[Sequence[Any]]:
+    """All quantities as rows of a table, see CSV_HEADER."""
+    for row in rows:
+        one = row.record
+        yield (row.case, row.anchor.removeprefix(f"{row.case}-"), row.who, one.name, one.label, one.unit, one.value, *(one.interval or (None, None)),
+               one.reference, *(one.reference_interval or (None, None)), one.deviation, one.deviation_kind, one.tolerance, one.verdict, one.evidence,
+               one.reason, one.detail, one.source)
+
+
+def write_tables(folder: Any, rows: Sequence[Row], found: Sequence[scatter.Point]) -> None:
+    """quantities.csv and scatter.csv."""
+    figures.write_csv(folder / "quantities.csv", CSV_HEADER, csv_rows(rows))
+    figures.write_csv(folder / "scatter.csv", ("case", "quantity", "engine", "evidence", "measured", "reference", "relative_half_width",
+                                               "reference_relative_half_width"),
+                      ((*one.line, one.engine, one.evidence, one.value, one.reference, one.half, one.reference_half) for one in found))

@@ -1,0 +1,208 @@
+"""The section of a case: what was decided by evidence in one table, the main figures; and for the HTML everything else."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from dembark.validation import pictures
+from dembark.validation.judge.tally import Counts, tally
+from dembark.validation.report import fields, figures, front
+from dembark.validation.report.gather import Gathered, Page, Row, beside
+from dembark.validation.report.look import engine_name
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+# Of a case in the PDF: variants with figures (of the first all main ones, of the others one), panels of a figure, and rows of one quantity
+# before only the worst is shown.
+VARIANTS, PANELS, ROWS = 2, 4, 4
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A figure: its image in the HTML, its caption, the files with its data, and its image in the PDF, '' when that leaves it out."""
+
+    image: Markup
+    caption: str
+    files: Sequence[str] = ()
+    printed: Markup | str = ""
+
+
+@dataclass(frozen=True)
+class Decided:
+    """Rows of a quantity that are shown, and of how many the first of them is the worst (0: all are shown)."""
+
+    rows: Sequence[Row]
+    worst_of: int
+    counts: Counts
+
+
+@dataclass
+class Part:
+    """A variant within a case's section, for the HTML."""
+
+    page: Page
+    table: list[list[Row]]
+    figures: list[Shown]
+    beside: list[Any]
+    remarks: list[str]
+    bases: list[str]
+
+
+@dataclass
+class Section:
+    """A case: `decided` quantities by evidence, one line each for identities and for the engines beside each other, figures, and `parts`."""
+
+    case: str
+    title: str
+    description: str
+    source: Sequence[str]
+    missing: list[str]
+    decided: list[Decided]
+    lines: list[str]
+    open: list[front.OpenLine]
+    pictures: list[Shown]
+    figures: list[Shown]
+    parts: list[Part] = field(default_factory=list)
+
+
+def embed(figure: Figure, folder: Path, name: str, caption: str, files: Sequence[str] = (), main: bool = True) -> Shown:
+    """The figure inside the document, in the PDF if `main`, and as a file `name`.svg beside its data."""
+    data = figures.svg(figure)
+    (folder / f"{name}.svg").write_bytes(data)
+    return Shown(_image(data, "svg+xml", name), caption, [f"figures/{file}" for file in files], _image(figures.png(figure), "png", name) if main else "")
+
+
+def _image(data: bytes, kind: str, alt: str) -> Markup:
+    return Markup('<img alt="{}" src="data:image/{};base64,{}">').format(alt, kind, base64.b64encode(data).decode())
+
+
+def badness(row: Row) -> float:
+    """Deviation over tolerance; what failed counts as worse than everything else."""
+    one = row.record
+    size = abs(one.deviation) / one.tolerance if one.deviation is not None and one.tolerance else abs(one.deviation or 0.0)
+    return size + (1e9 if one.standing == "failed" else 0.0)
+
+
+def decided(rows: Iterable[Row]) -> list[Decided]:
+    """Checks against experiment and theory, and those that do not state their evidence, by quantity; of many only what failed and the worst."""
+    by_name: dict[str, list[Row]] = {}
+    for row in rows:
+        if row.record.standing != "information" and row.record.evidence not in ("identity", "code"):
+            by_name.setdefault(row.record.name, []).append(row)
+    found = []
+    for group in by_name.values():
+        few = len(group) <= ROWS
+        shown = group if few else sorted(group, key=badness, reverse=True)
+        failed = sum(row.record.standing == "failed" for row in group)
+        found.append(Decided(shown if few else shown[: min(ROWS, max(1, failed))], 0 if few else len(group), tally(row.record for row in group)))
+    return found
+
+
+def line(rows: Sequence[Row], what: str) -> str:
+    """How checks of one kind stand together, and which is nearest to its limit, or what failed."""
+    checks = [row for row in rows if row.record.standing != "information"]
+    if not checks:
+        return ""
+    counts = tally(row.record for row in checks)
+    closed = [row for row in checks if row.record.standing != "open"]
+    text = f"{what}: {counts.passed} of {counts.checks} within tolerance" + (f", {counts.open} open" if counts.open else "")
+    if counts.failed:
+        bad = [f"{row.record.title} ({row.place}, {row.who})" for row in closed if row.record.standing == "failed"]
+        return f"{text}, {counts.failed} FAILED: {'; '.join(bad[:3])}" + (f" and {len(bad) - 3} more" if len(bad) > 3 else "") + "."
+    if not closed:
+        return f"{text}."
+    worst = max(closed, key=badness)
+    return f"{text}; nearest to its limit: {worst.record.title} ({worst.place}, {worst.who}), at {100.0 * badness(worst):.2g} % of what is allowed."
+
+
+def sections(gathered: Gathered, folder: Path) -> list[Section]:
+    """All cases of the results, their data written into `folder`."""
+    cases = list(dict.fromkeys(page.case for page in gathered.pages))
+    return [_section(gathered, case, [page for page in gathered.pages if page.case == case], folder) for case in cases]
+
+
+def _section(gathered: Gathered, name: str, pages: list[Page], folder: Path) -> Section:
+    rows = [row for page in pages for row in page.rows()]
+    known = gathered.cases.get(name)
+    parts = [_part(page, pages, folder) for page in pages]
+    variants = [part for part in parts if not part.page.is_study]
+    printed = [[one for one in part.figures if one.printed] for part in (*variants[:VARIANTS], *(part for part in parts if part.page.is_study))]
+    main = [one for number, found in enumerate(printed) for one in (found[:1] if number else found)]
+    kinds = {kind: [row for row in rows if row.record.evidence == kind] for kind in ("identity", "code")}
+    lines = [line(kinds["identity"], "Identities"), line(kinds["code"], "Engines beside each other")]
+    drawn = next((shown for part in variants if (shown := _pictures(part.page))), [])
+    return Section(name, known.title if known else name.replace("_", " "), known.description if known else "", known.source if known else (),
+                   [f"{page.words}: {text}" for page in pages for text in page.missing], decided(rows), [one for one in lines if one],
+                   front.open_lines(rows), drawn, main, parts)
+
+
+def _pictures(page: Page) -> list[Shown]:
+    found = []
+    for engine in sorted(page.results):
+        path = page.folder / engine / pictures.PICTURE
+        if path.is_file():
+            moving = path.with_name(pictures.ANIMATION)
+            files = [f"{page.case}/{page.variant}/{engine}/{moving.name}"] if moving.is_file() else []
+            image = _image(path.read_bytes(), "png", f"{page.name}, {engine}")
+            found.append(Shown(image, f"{engine_name(engine)}, {page.words}: last frame of the first replica.", files, image))
+    return found
+
+
+def _part(page: Page, pages: list[Page], folder: Path) -> Part:
+    rows = list(page.rows())
+    names = list(dict.fromkeys(row.record.name for row in rows))
+    shared = [text for one in page.results.values() for text in one.remarks]
+    remarks = [f"{engine_name(engine)}: {text}" if shared.count(text) < len(page.results) else text
+               for engine, one in sorted(page.results.items()) for text in one.remarks]
+    bases = [f"{engine_name(engine)}: {', '.join(dict.fromkeys(filter(None, (record.basis for record in one.quantities))))}"
+             for engine, one in sorted(page.results.items())]
+    return Part(page, [[row for row in rows if row.record.name == name] for name in names], [*_profiles(page, folder), *_fields(page, folder)],
+                beside(page, pages), list(dict.fromkeys(remarks)), bases)
+
+
+def _profiles(page: Page, folder: Path) -> list[Shown]:
+    """The profiles of a page as figures of PANELS panels; the first is a main one. Their data are written beside the report."""
+    curves = {engine: one.profiles for engine, one in sorted(page.results.items()) if one.profiles}
+    names = figures.profile_names(curves)
+    for name in names:
+        of_engine = {engine: one for engine, found in curves.items() for one in found if one["name"] == name}
+        figures.write_csv(folder / f"{page.anchor}-{name}.csv", *figures.profile_table(of_engine))
+    found = []
+    for start in range(0, len(names), PANELS):
+        chosen = names[start : start + PANELS]
+        stem = f"{page.anchor}-profiles" + (f"-{start // PANELS + 1}" if start else "")
+        found.append(embed(figures.profile_figure(curves, chosen), folder, stem,
+                           f"{page.name}: engines over the reference; bands over replicas where there are any.",
+                           [f"{page.anchor}-{name}.csv" for name in chosen], main=not start))
+    return found
+
+
+def _fields(page: Page, folder: Path) -> list[Shown]:
+    """The page's figures of fields; their data are written beside the report, and why there are none is told."""
+    try:
+        drawn = fields.figures(fields.read(page.folder, sorted(page.results)))
+    except (OSError, ValueError, KeyError, AttributeError) as error:
+        page.missing.append(f"fields.nc cannot be drawn: {error}")
+        return []
+    found = []
+    for one in drawn:
+        for name, table in one.tables.items():
+            figures.write_csv(folder / f"{page.anchor}-fields-{name}.csv", *table)
+        found.append(embed(one.figure, folder, f"{page.anchor}-fields-{one.name}", f"{page.name}: {one.title}. {one.caption}",
+                           [f"{page.anchor}-fields-{name}.csv" for name in one.tables]))
+    return found
+
+
+def verification(gathered: Gathered, folder: Path) -> list[dict[str, Any]]:
+    """The items of the verification for the template; the data of their figures are written beside the report."""
+    found = []
+    for item in gathered.items:
+        figure, stem = figures.verification_figure(item), f"verification-{item.name}"
+        if figure is not None:
+            figures.write_csv(folder / f"{stem}.csv", *figures.verification_table(item))
+        found.append({"item": item, "figure": figure and embed(figure, folder, stem, item.caption or item.title, [f"{stem}.csv"], main=False)})
+    return found

@@ -1,0 +1,92 @@
+"""How a run ended: what the engine's exit, its words, its files and the disk say of it."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import signal
+from collections.abc import Sequence
+from pathlib import Path
+
+from dembark.common.errors import Killed, RunError
+from dembark.common.files import DISK_FULL, check_impacts, check_times, count_frames
+from dembark.validation.case.model import OUTPUTS
+from dembark.validation.case.parameters import Value
+from dembark.validation.runs.plan import Run
+from dembark.validation.runs.progress import OutputParser
+
+_RESERVE = 4 << 20
+_DUMPS = {"grains": "ATOMS", "contacts": "ENTRIES"}
+# Signals by which a user, a scheduler or the system ends what is sound; the others are faults of the engine.
+_STOPPED = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGXCPU)
+
+
+def check_room(run: Run, folder: Path) -> None:
+    """RunError when the disk of `folder` has less room than the output of `run` will need by a rough estimate."""
+    if run.output_size is None:
+        return
+    need, free = run.output_size + _RESERVE, shutil.disk_usage(folder).free
+    if free < need:
+        raise RunError("the disk is too full", f"{folder} has {free >> 20} MB free", f"the run needs about {need >> 20} MB")
+
+
+def check_disk(work: Path) -> None:
+    """RunError when next to nothing is free on the disk of `work`, on which the run is writing."""
+    if shutil.disk_usage(work).free < _RESERVE:
+        raise RunError(DISK_FULL, f"less than {_RESERVE >> 20} MB are free in {work.parent}")
+
+
+def _tail(log: Path, size: int = 20000) -> list[str]:
+    with log.open("rb") as handle:
+        handle.seek(max(0, log.stat().st_size - size))
+        return handle.read().decode(errors="replace").splitlines()
+
+
+def reason(lines: list[str]) -> str:
+    """The engine's own word about what went wrong: the last line that looks like an error, else its last line."""
+    told = re.compile(r"^\s*(?:dembark: (?!steps|finished|resumed)|ERROR|\w*(?:Error|Exception)\b.*|.*[Nn]o space left)")
+    spoken = [line.strip() for line in lines if line.strip()]
+    return next((line for line in reversed(spoken) if told.match(line)), spoken[-1] if spoken else "it said nothing")
+
+
+def judge(run: Run, code: int, parser: OutputParser, work: Path) -> None:
+    """Killed or RunError, with the reason, unless the engine ended well and said so."""
+    stop_message, lines = run.engine.facts.stop_message, _tail(work / "engine.log")
+    where = f"at step {parser.step} of {parser.steps}" if parser.steps else "before its first step"
+    if any("No space left" in line for line in lines):
+        raise RunError(DISK_FULL, f"the engine stopped {where}")
+    relayed = re.search(r"exited on signal (\d+)", "\n".join(lines)) if code else None
+    # srun tells of a signal as shells do, by 128 and its number.
+    number = -code if code < 0 else int(relayed.group(1)) if relayed else code - 128 if code - 128 in _STOPPED else 0
+    if number:
+        hint = "by hand or because memory ran out" if number == signal.SIGKILL else ""
+        kind = Killed if number in _STOPPED else RunError
+        raise kind(f"the engine was killed by {signal.Signals(number).name} {where}", hint)
+    if stop_message and not parser.finished and any(line.startswith(stop_message) for line in lines):
+        raise Killed(f"the engine was told to stop {where}")
+    if code:
+        raise RunError(f"the engine ended with exit code {code} {where}", reason(lines))
+    if not parser.finished:
+        raise RunError(f"the engine ended without 'dembark: finished' {where}", reason(lines))
+    if not parser.steps:
+        raise RunError("the engine never said 'dembark: steps <N> time_step <dt>'", "the deck must print this line")
+
+
+def check_output(work: Path, outputs: Sequence[str], wanted: Value) -> int:
+    """Frames in the dumps (0 without any) of a run that wrote all of `outputs` whole; RunError otherwise."""
+    try:
+        counts = {kind: count_frames(work / OUTPUTS[kind], key) for kind, key in _DUMPS.items() if kind in outputs}
+        if len(set(counts.values())) > 1:
+            raise RunError("grains.dump and contacts.dump have different numbers of frames")
+        for kind, frames in counts.items():
+            if isinstance(wanted, int) and frames != wanted:
+                raise RunError(f"{OUTPUTS[kind]} holds {frames} frames instead of {wanted}")
+        if "times" in outputs:
+            check_times(work / OUTPUTS["times"])
+        if "impacts" in outputs:
+            check_impacts(work / OUTPUTS["impacts"])
+    except RunError as error:
+        # The engines do not notice a full disk: what tells is a file that was cut off and no room left.
+        full = shutil.disk_usage(work).free < _RESERVE
+        raise RunError(DISK_FULL if full else "", str(error)) from None
+    return next(iter(counts.values()), 0)

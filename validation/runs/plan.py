@@ -1,0 +1,198 @@
+"""What there is to do: a run is a case, variant, profile, engine and replica with all its numbers, known by a hash of its inputs."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from dembark.common.errors import DembarkError
+from dembark.common.files import read_json
+from dembark.validation import engines
+from dembark.validation.case.deck import require_measure, sources
+from dembark.validation.case.folders import discover
+from dembark.validation.case.model import Case, Study
+from dembark.validation.engines import Engine
+from dembark.validation.case.parameters import Value, pick
+from dembark.validation.case.resolve import for_replica, portable, resolve
+
+# How often a run that was ended from outside is started again.
+RETRIES = 3
+# A line of grains.dump and two to three of contacts.dump for each grain and frame.
+_BYTES_PER_GRAIN_AND_FRAME = 800
+
+
+@dataclass(frozen=True)
+class Run:
+    """One simulation; `values` are the resolved parameters in SI units with this replica's own seed."""
+
+    case: Case
+    variant: str
+    profile: str
+    engine: Engine
+    replica: int
+    values: Mapping[str, Value]
+
+    @property
+    def name(self) -> str:
+        """Short name for people: case, variant, engine and replica."""
+        return f"{self.case.name} {self.variant} {self.engine.name} {self.replica}"
+
+    @property
+    def folder_name(self) -> str:
+        """Name of the folder with its results."""
+        return f"replica-{self.replica}"
+
+    @property
+    def particles(self) -> int | None:
+        """Number of grains or logs; None when the case does not say."""
+        return self.case.particle_count(self.values)
+
+    @property
+    def output_size(self) -> int | None:
+        """About how many bytes the run writes; None when the case does not say how many particles or frames there are."""
+        frames = self.values.get("frames")
+        return self.particles * frames * _BYTES_PER_GRAIN_AND_FRAME if self.particles and isinstance(frames, int) else None
+
+    @property
+    def inputs(self) -> str:
+        """Hash of what decides the outcome: parameters, deck and engine, but not where, on how many cores or beside how many replicas."""
+        parameters = {key: value for key, value in self.values.items() if key != "replicas"}
+        facts = {"parameters": parameters, "deck": sources(self.case, self.engine.name),
+                 "engine": [self.engine.name, self.engine.version, self.engine.identity]}
+        return hashlib.sha256(json.dumps(facts, sort_keys=True, allow_nan=False).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Series:
+    """The replicas of one case, variant and engine; they are measured together."""
+
+    runs: tuple[Run, ...]
+
+    @property
+    def place(self) -> Path:
+        """Folder below results/<profile>: <case>/<variant>/<engine>."""
+        run = self.runs[0]
+        return Path(run.case.name, run.variant, run.engine.name)
+
+    @property
+    def cost(self) -> float:
+        """Relative cost of one replica, to start the longest first."""
+        return (self.runs[0].particles or 1) * self.runs[0].engine.facts.relative_cost
+
+
+@dataclass(frozen=True)
+class Resources:
+    """What a run may use: MPI ranks (LIGGGHTS) and threads; memory (bytes), time of an attempt (s) and about how long it computes between
+    states to resume from (s, 0: none), where None leaves the choice to the system."""
+
+    ranks: int = 1
+    threads: int = 1
+    memory: float | None = None
+    time: float | None = None
+    restart_interval: float | None = None
+
+    @property
+    def cores(self) -> int:
+        """Cores of one run."""
+        return self.ranks * self.threads
+
+
+@dataclass(frozen=True)
+class PlannedStudy:
+    """A study of one engine: the series of its variants, in the study's order."""
+
+    study: Study
+    series: tuple[Series, ...]
+
+    @property
+    def place(self) -> Path:
+        """Folder below results/<profile>: <case>/study-<name>/<engine>."""
+        first = self.series[0].place
+        return first.parent.parent / self.study.folder_name / first.name
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that belongs into one results folder: a profile, or a campaign, and its series with the longest first.
+
+    `resources` are those of a series' runs by its place, `measure` those of a measurement that is to be a job of its own; `facts` go into
+    runs.json, `words` tell a job on another host which plan it belongs to. `whole`: nothing was left out of it by choice.
+    """
+
+    label: str
+    series: tuple[Series, ...]
+    facts: Mapping[str, Any]
+    words: tuple[str, ...]
+    resources: Mapping[Path, Resources] = field(default_factory=dict)
+    retries: int = RETRIES
+    measure: Resources | None = None
+    whole: bool = True
+
+    def of(self, one: Series) -> Resources:
+        """What each run of a series may use."""
+        return self.resources.get(one.place, Resources())
+
+
+def studies(all_series: Iterable[Series]) -> list[PlannedStudy]:
+    """The studies that `all_series` hold all variants of, engine by engine."""
+    by_place = {one.place: one for one in all_series}
+    cases = {one.runs[0].case.name: one.runs[0].case for one in by_place.values()}
+    found = []
+    for case in cases.values():
+        for study in case.studies.values():
+            for engine in case.engines:
+                places = [Path(case.name, variant, engine) for variant in study.variants]
+                if all(place in by_place for place in places):
+                    found.append(PlannedStudy(study, tuple(by_place[place] for place in places)))
+    return found
+
+
+def series(case: Case, variant: str, profile: str | None, engine: Engine, changes: Mapping[str, Value] | None = None,
+           name: str | None = None) -> Series:
+    """The runs of one case, variant and engine; as many as the parameter `replicas` says (1 when the case has none).
+
+    With `changes` to the variant, `name` tells it from the variant itself; it has no part in the hash of the inputs.
+    """
+    pick(engine.name, case.engines, "engine", f"in case {case.name}")
+    if not case.deck(engine.name).is_file():
+        raise DembarkError(f"{case.deck(engine.name)} is missing", "", f"remove {engine.name} from engines in case.toml or add the deck")
+    require_measure(case)
+    values = portable(resolve(case, profile, variant, changes))
+    count = values.get("replicas")
+    numbers = range(1, (count if isinstance(count, int) else 1) + 1)
+    return Series(tuple(Run(case, name or variant, profile or "default", engine, k, for_replica(values, k)) for k in numbers))
+
+
+def campaign(profile: str, only_cases: Sequence[str] = (), only_engines: Sequence[str] = ()) -> list[Series]:
+    """All series that the cases list for `profile`, longest first; only the engines that are needed have to be there."""
+    cases = discover()
+    for name in only_cases:
+        pick(name, cases, "case", "in --case")
+    for name in only_engines:
+        pick(name, engines.names(), "engine", "in --engine")
+    pick(profile, {name for case in cases.values() for name in case.profiles}, "profile", "in the cases")
+    result = [series(case, planned.variant, profile, engines.find(engine), planned.changes(engine))
+              for case in cases.values() if not only_cases or case.name in only_cases
+              for planned in case.runs.get(profile, ())
+              for engine in planned.engines if not only_engines or engine in only_engines]
+    if not result:
+        raise DembarkError(f"profile {profile} has no runs", "for the chosen cases and engines", "see 'dembark cases'")
+    return sorted(result, key=lambda one: -one.cost)
+
+
+def finished(folder: Path, run: Run) -> bool:
+    """Whether `folder` holds the finished result of exactly this run."""
+    record = read_json(folder / "run.json")
+    return record is not None and record.get("inputs") == run.inputs
+
+
+def variants(all_series: Sequence[Series]) -> dict[Path, list[Series | PlannedStudy]]:
+    """Series, and studies, by the folder of their case and variant; those with more than one are compared."""
+    groups: dict[Path, list[Series | PlannedStudy]] = {}
+    for one in (*all_series, *studies(all_series)):
+        groups.setdefault(one.place.parent, []).append(one)
+    return groups

@@ -1,0 +1,198 @@
+"""One simulation: start the engine in a hidden folder, watch it, check what it wrote, and only then put the result in place.
+
+A run that is stopped or killed leaves its hidden folder, named after the hash of its inputs, and the next attempt goes on from the last
+state in it, on whatever host. A run that fails by its own fault begins anew.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from dembark.common.errors import Interrupted, Killed, RunError
+from dembark.common.files import DISK_FULL, disk_error, move_into_place, sweep, write_json
+from dembark.common.lock import lock
+from dembark.validation import provenance
+from dembark.validation.case import deck
+from dembark.validation.case.parameters import Value
+from dembark.validation.runs import outcome, restarts
+from dembark.validation.runs.plan import Resources, Run, finished
+from dembark.validation.runs.process import chunks, running
+from dembark.validation.runs.progress import OutputParser
+
+_RESUMED = re.compile(r"dembark: resumed at step (\d+) (exact|approximate)ly")
+# Called with what changed: step, steps, time_step, attempt, resumed_from.
+Tell = Callable[..., None]
+
+
+def quiet(**facts: object) -> None:
+    """A `Tell` for callers that need no progress."""
+
+
+def simulate(run: Run, out: Path, cancel: threading.Event, used: Resources | None = None, tell: Tell = quiet) -> bool:
+    """Run `run` into `out/replica-<k>`; False when its finished result stands there already.
+
+    Until the run is finished and checked, an earlier result in that folder stays as it is. When it fails, RunError says why
+    in one line and the engine's log is kept in `out/failed`. `cancel` ends the engine and raises Interrupted. A run that was cancelled
+    or killed goes on from its last state when it is simulated again with the same inputs.
+    """
+    target = out / run.folder_name
+    with lock(out / f".{run.folder_name}.lock", f"{target} is being computed by another process", cancel) as lost:
+        sweep(target)
+        if finished(target, run):
+            return False
+        _run_into(run, target, tell, _Ended(cancel, lost), used or Resources())
+    return True
+
+
+@dataclass(frozen=True)
+class _Ended:
+    """Whether an attempt has to end, by whoever's will: its user's, or another process's that has taken its lock."""
+
+    cancel: threading.Event
+    lost: threading.Event
+
+    def is_set(self) -> bool:
+        return self.cancel.is_set() or self.lost.is_set()
+
+
+def _run_into(run: Run, target: Path, tell: Tell, ended: _Ended, used: Resources) -> None:
+    work = restarts.work_folder(run, target)
+    computed = kept = False
+    try:
+        for other in restarts.work_folders(target):
+            if other != work:
+                shutil.rmtree(other)
+        outcome.check_room(run, target.parent)
+        step, computed = restarts.begin(run, work), True
+        if step is None:
+            deck.write(run.case, run.engine.name, run.values, work)
+        record = _execute(run, work, step, tell, ended, used)
+        restarts.clear(run, work)
+        deck.archive(run.case, work)
+        write_json(work / "run.json", record)
+        move_into_place(work, target)
+        _forget_failure(target)
+    except OSError as error:
+        kept, going_on = _going_on(run, work)
+        raise RunError(f"{run.name} failed", str(disk_error(error, target)), going_on) from None
+    except Interrupted:
+        if ended.lost.is_set():
+            kept = True
+            raise Killed(f"{run.name} was given up", "another process has taken its lock, because this one was held up") from None
+        kept, going_on = _going_on(run, work)
+        raise Interrupted(f"{run.name} was interrupted", going_on) from None
+    except Killed as error:
+        kept, going_on = _going_on(run, work)
+        raise Killed(f"{run.name} failed", str(error), going_on, _keep_log(work, target)) from None
+    except RunError as error:
+        # A run is at fault for what it did, but not for a disk without room.
+        faulty = computed and not str(error).startswith(DISK_FULL)
+        kept, going_on = (False, "") if faulty else _going_on(run, work)
+        raise RunError(f"{run.name} failed", str(error), going_on, _keep_log(work, target)) from None
+    finally:
+        if not kept:
+            shutil.rmtree(work, ignore_errors=True)
+
+
+def _going_on(run: Run, work: Path) -> tuple[bool, str]:
+    """Whether there is a state to resume from, and what the next attempt will do, in words."""
+    step = restarts.newest(work, run.engine.name)
+    how = "begins anew" if step is None else f"goes on from step {step}"
+    return step is not None, f"it {how} when it is started again"
+
+
+def _keep_log(work: Path, target: Path) -> str:
+    if not (work / "engine.log").is_file():
+        return ""
+    kept = target.parent / "failed" / f"{target.name}.log"
+    try:
+        kept.parent.mkdir(exist_ok=True)
+        shutil.copyfile(work / "engine.log", kept)
+    except OSError:
+        return "its log could not be kept"
+    return f"see {kept}"
+
+
+def _forget_failure(target: Path) -> None:
+    kept = target.parent / "failed"
+    (kept / f"{target.name}.log").unlink(missing_ok=True)
+    if kept.is_dir() and not any(kept.iterdir()):
+        kept.rmdir()
+
+
+def _execute(run: Run, work: Path, step: int | None, tell: Tell, ended: _Ended, used: Resources) -> dict[str, Any]:
+    """One attempt in `work`, from `step` on (None: from the start); the record of the finished run."""
+    words: dict[str, Value] = {}
+    every = 0
+    if restarts.supported(run):
+        interval = restarts.INTERVAL if used.restart_interval is None else used.restart_interval
+        every = restarts.steps_between(run, interval, used.cores)
+        words = {"restart_every": every} | ({"resume": "yes"} if step is not None else {})
+    command = run.engine.command(work / run.engine.facts.deck, words, used.ranks, used.threads)
+    before = _with_log(work, restarts.attempts(work))
+    began, clock = datetime.now(UTC), time.monotonic()
+    restarts.remember(work, replace(before, attempts=before.attempts + 1, ended=False))
+    parser = OutputParser()
+    tell(attempt=before.attempts + 1, resumed_from=step or 0)
+
+    def update() -> None:
+        tell(step=parser.step, steps=parser.steps, time_step=parser.time_step)
+
+    try:
+        with running(command, work, run.engine.environment(used.threads)) as process:
+            _listen(process, work, parser, update, ended)
+            code = process.wait()
+    finally:
+        wall = time.monotonic() - clock
+        done = _with_log(work, replace(before, attempts=before.attempts + 1, wall_time=before.wall_time + wall, ended=False))
+        restarts.remember(work, done)
+    outcome.judge(run, code, parser, work)
+    frames = outcome.check_output(work, run.case.outputs, run.values.get("frames"))
+    # The speed of this attempt: of the others nobody knows how many steps were done twice.
+    speed = run.particles * (parser.steps - (step or 0)) / wall if run.particles else None
+    return {
+        "case": run.case.name, "variant": run.variant, "profile": run.profile, "engine": run.engine.name, "replica": run.replica,
+        "parameters": dict(run.values), "derived": deck.derived(run.case, run.values), "seed": run.values.get("seed"),
+        "steps": parser.steps, "time_step": parser.time_step, "impact_id_offset": run.engine.facts.impact_id_offset, "frames": frames,
+        "inputs": run.inputs, "deck": deck.sources(run.case, run.engine.name), "command": command,
+        "attempts": done.attempts, "resumed_at": list(done.resumed_at), "resume": done.resume, "restart_every": every,
+        "provenance": {**provenance.collect(run.engine), "ranks": used.ranks, "threads": used.threads, "seed": run.values.get("seed"),
+                       "started": began.isoformat(timespec="seconds"), "wall_time": done.wall_time, "particle_steps_per_second": speed},
+    }
+
+
+def _with_log(work: Path, told: restarts.Attempts) -> restarts.Attempts:
+    """The same with what the engine's log says of the last attempt, unless that was read when it ended: a killed harness reads nothing."""
+    if told.ended or not (work / "engine.log").is_file():
+        return replace(told, ended=True)
+    with (work / "engine.log").open(encoding="utf-8", errors="replace") as log:
+        found = next(filter(None, map(_RESUMED.match, log)), None)
+    if not found:
+        return replace(told, ended=True)
+    # One approximate resumption makes the whole run approximate.
+    approximate = "approximate" in (found.group(2), told.resume)
+    return replace(told, resumed_at=(*told.resumed_at, int(found.group(1))), resume="approximate" if approximate else "exact", ended=True)
+
+
+def _listen(process: subprocess.Popen[bytes], work: Path, parser: OutputParser, update: Callable[[], None],
+            ended: _Ended) -> None:
+    looked = time.monotonic()
+    with (work / "engine.log").open("wb", buffering=0) as log:
+        for chunk in chunks(process):
+            if ended.is_set():
+                raise Interrupted("interrupted")
+            if time.monotonic() - looked > 2.0:
+                looked = time.monotonic()
+                outcome.check_disk(work)
+            log.write(chunk)
+            if parser.feed(chunk):
+                update()

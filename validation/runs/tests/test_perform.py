@@ -1,0 +1,170 @@
+"""The whole chain with stand-ins: nothing is repeated, nothing stale is reported, failures stop nothing else."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from dembark.common.files import read_json
+from dembark.validation.case import folders
+from dembark.validation.runs.plan import campaign, studies, variants
+from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
+
+pytestmark = pytest.mark.usefixtures("decks", "stand_in")
+
+
+def start(tmp_path: Path, environment: dict[str, str], *words: str) -> subprocess.Popen[str]:
+    return subprocess.Popen([sys.executable, "-m", "dembark.validation.cli", *words], cwd=tmp_path, env=environment,
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def dembark(tmp_path: Path, environment: dict[str, str], *words: str) -> tuple[int, str, str]:
+    process = start(tmp_path, environment, *words)
+    out, error = process.communicate(timeout=300)
+    assert "Traceback" not in error
+    return process.returncode, out, error
+
+
+def set_default(decks: Path, variant: str, line: str) -> None:
+    path = decks / "box" / "case.toml"
+    head, _, tail = path.read_text().partition(f"[variants.{variant}]\n")
+    path.write_text(f"{head}[variants.{variant}]\n{line}\n{tail}")
+
+
+def test_all_runs_then_none_again_then_only_what_changed(tmp_path: Path, environment: dict[str, str], decks: Path) -> None:
+    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    results = tmp_path / "results" / "quick"
+    assert code == 0, error
+    assert "3 of 3 runs finished; 2 of 3 checks passed, 1 FAILED" in out and str(results / "report.html") in out
+    assert (results / "report.html").read_text().split() == [
+        "box/dry/liggghts/metrics.json", "box/dry/yade/metrics.json", "box/wet/liggghts/metrics.json"]
+    assert read_json(results / "box/dry/comparison.json")["engines"] == ["liggghts", "yade"]
+    assert not (results / "box/wet/comparison.json").exists()
+    assert error.count("finished in") == 3 + 3 + 1 + 1  # runs, measurements, a comparison and the report
+    made = {path: path.stat().st_mtime_ns for path in results.glob("*/*/*/replica-1/run.json")}
+
+    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    assert code == 0 and error.count("already finished; reusing") == 3 and "started" not in error
+    assert {path: path.stat().st_mtime_ns for path in made} == made
+
+    set_default(decks, "wet", "grain_count = 12")
+    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    assert code == 0 and error.count("already finished; reusing") == 2 and error.count("1: finished in") == 1
+    assert sum(path.stat().st_mtime_ns != before for path, before in made.items()) == 1
+    assert read_json(results / "box/wet/liggghts/metrics.json")["parameters"]["grain_count"] == 12
+
+
+STUDY = """[variants.large]
+grain_count = 30
+[variants.huge]
+grain_count = 40
+[studies.size]
+title = "Sizes"
+along = "grain_count"
+variants = ["dry", "large", "huge"]
+[runs]
+"""
+
+
+def test_studies_are_planned_for_engines_that_run_all_their_variants(decks: Path) -> None:
+    path = decks / "box" / "case.toml"
+    path.write_text(path.read_text().replace("[runs]\n", STUDY).replace(
+        '{variant = "wet", engines = ["liggghts"]}', '{variant = "large"}, {variant = "huge", engines = ["yade"]}'))
+    planned = campaign("quick")
+    assert [str(one.place) for one in studies(planned)] == ["box/study-size/yade"]
+    assert len(variants(planned)[Path("box/large")]) == 2 and len(variants(planned)[Path("box/study-size")]) == 1
+    path.write_text(path.read_text().replace(', engines = ["yade"]', ""))
+    folders.load.cache_clear()
+    assert len(variants(campaign("quick"))[Path("box/study-size")]) == 2
+
+
+def test_a_line_of_runs_may_give_an_engine_its_own_number_of_replicas(decks: Path) -> None:
+    path = decks / "box" / "case.toml"
+    path.write_text(path.read_text().replace('standard = [{variant = "dry"}]', 'standard = [{variant = "dry", replicas = {yade = 1}}]'))
+    assert {one.runs[0].engine.name: len(one.runs) for one in campaign("standard")} == {"liggghts": 3, "yade": 1}
+
+
+def test_a_study_is_made_of_its_variants_and_again_when_one_of_them_changes(tmp_path: Path, environment: dict[str, str], decks: Path) -> None:
+    path = decks / "box" / "case.toml"
+    path.write_text(path.read_text().replace("[runs]\n", STUDY).replace('{variant = "dry"}, {variant = "wet", engines = ["liggghts"]}', '{variant = "dry", engines = ["liggghts"]}, '
+                    '{variant = "large", engines = ["liggghts"]}, {variant = "huge", engines = ["liggghts"]}'))
+    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    results = tmp_path / "results" / "quick"
+    assert code == 0, error
+    assert read_json(results / "box/study-size/liggghts/metrics.json")["numbers"] == [10, 30, 40]
+    assert "box/study-size/liggghts/metrics.json" in (results / "report.html").read_text()
+
+    path.write_text(path.read_text().replace("grain_count = 40", "grain_count = 50"))
+    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    assert code == 0 and read_json(results / "box/study-size/liggghts/metrics.json")["numbers"] == [10, 30, 50]
+
+
+def test_a_failed_run_is_missing_in_the_report_and_nothing_stale_takes_its_place(
+        tmp_path: Path, environment: dict[str, str], decks: Path) -> None:
+    assert dembark(tmp_path, environment, "validate")[0] == 0
+    results = tmp_path / "results" / "quick"
+    set_default(decks, "wet", 'behaviour = "kill"')
+    code, out, error = dembark(tmp_path, environment, "validate")
+    assert code == 1
+    assert "2 of 3 runs finished" in out and "not finished: box wet liggghts 1: " in out and "SIGKILL" in out
+    assert "dembark: the validation is incomplete" in error
+    assert (results / "report.html").read_text().split() == ["box/dry/liggghts/metrics.json", "box/dry/yade/metrics.json"]
+    states = {(run["variant"], run["engine"]): run["state"] for run in read_json(results / "runs.json")["runs"]}
+    assert states == {("dry", "liggghts"): "finished", ("dry", "yade"): "finished", ("wet", "liggghts"): "failed"}
+    assert (results / "box/wet/liggghts/superseded/replica-1/run.json").is_file()
+
+
+def test_replicas_that_are_no_longer_wanted_do_not_count(tmp_path: Path, environment: dict[str, str], decks: Path) -> None:
+    words = ("validate", "--profile", "standard", "--engine", "liggghts")
+    assert dembark(tmp_path, environment, *words)[0] == 0
+    metrics = tmp_path / "results/standard/box/dry/liggghts/metrics.json"
+    assert read_json(metrics)["quantities"][0]["value"] == 3
+    path = decks / "box" / "case.toml"
+    path.write_text(path.read_text().replace("replicas = 3", "replicas = 2"))
+    assert dembark(tmp_path, environment, *words)[0] == 0
+    assert read_json(metrics)["quantities"][0]["value"] == 2
+
+
+def test_a_measurement_that_fails_is_told(tmp_path: Path, environment: dict[str, str]) -> None:
+    folder = tmp_path / "results/quick/box/wet/liggghts"
+    folder.mkdir(parents=True)
+    (folder / "unmeasurable").touch()
+    code, out, _ = dembark(tmp_path, environment, "validate")
+    assert code == 1 and "problem: " in out and "ValueError: cannot be measured" in out and "report.html" in out
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
+def test_an_interrupted_workflow_goes_on_where_it_was(
+        tmp_path: Path, environment: dict[str, str], decks: Path, number: int, wait_for: Callable[..., object],
+        engine_pid: Callable[[Path], int], lives: Callable[[int], bool]) -> None:
+    set_default(decks, "wet", 'behaviour = "hang"')
+    process = start(tmp_path, environment, "validate", "--cores", "3")
+    results = tmp_path / "results" / "quick"
+    wait_for(lambda: len(list(results.glob("box/dry/*/replica-1/run.json"))) == 2, 60)
+    pid = engine_pid(results / "box/wet")
+    process.send_signal(number)
+    _, error = process.communicate(timeout=60)
+    assert process.returncode == (-9 if number == signal.SIGKILL else 130) and "Traceback" not in error
+    wait_for(lambda: not lives(pid))
+    time.sleep(0.5)
+    path = decks / "box" / "case.toml"
+    path.write_text(path.read_text().replace('behaviour = "hang"\n', ""))
+    code, _, error = dembark(tmp_path, environment, "validate")
+    assert code == 0 and error.count("already finished; reusing") == 2 and error.count("1: finished in") == 1
+    assert not list(results.glob("**/.replica-1.part-*"))
+
+
+def test_two_validations_of_one_profile_do_not_mix(
+        tmp_path: Path, environment: dict[str, str], decks: Path, engine_pid: Callable[[Path], int]) -> None:
+    set_default(decks, "wet", 'behaviour = "hang"')
+    first = start(tmp_path, environment, "validate")
+    engine_pid(tmp_path / "results/quick/box/wet")
+    code, _, error = dembark(tmp_path, environment, "validate")
+    assert code == 2 and "another validation" in error
+    first.terminate()
+    first.communicate(timeout=60)

@@ -1,0 +1,208 @@
+"""One run: what is kept, what is repeated, and what happens to engines that die, lie or never end."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from dembark.common.errors import DembarkError, Interrupted, RunError
+from dembark.common.files import read_json
+from dembark.validation import engines
+from dembark.validation.case import folders
+from dembark.validation.case.folders import find
+from dembark.validation.runs import outcome, simulate
+from dembark.validation.runs.plan import Run, series
+
+FindPid = Callable[[Path], int]
+Lives = Callable[[int], bool]
+Command = tuple[subprocess.Popen[str], Path]
+
+from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
+
+pytestmark = pytest.mark.usefixtures("decks", "stand_in")
+
+
+def plan(engine: str = "liggghts", **changes: object) -> Run:
+    engines.find.cache_clear()
+    folders.load.cache_clear()
+    return series(find("box"), "dry", "quick", engines.find(engine), changes).runs[0]
+
+
+def run(out: Path, engine: str = "liggghts", cancel: threading.Event | None = None, **changes: object) -> tuple[Path, str]:
+    one = plan(engine, **changes)
+    made = simulate.simulate(one, out, cancel or threading.Event())
+    return out / one.folder_name, "finished" if made else "kept"
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+def test_a_run_leaves_its_files_and_its_record(tmp_path: Path, engine: str) -> None:
+    folder, state = run(tmp_path / "out", engine, static_friction=0.4)
+    assert state == "finished"
+    assert {"engine.log", "grains.dump", "contacts.dump", "time.csv", "run.json"} <= set(os.listdir(folder))
+    record = read_json(folder / "run.json")
+    assert (record["steps"], record["time_step"], record["frames"], record["replica"]) == (100, 1e-5, 3, 1)
+    assert record["parameters"]["static_friction"] == 0.4 and record["parameters"]["kinetic_friction"] is None
+    assert record["provenance"]["versions"][engine].endswith("stand-in")
+    assert record["provenance"]["particle_steps_per_second"] > 0
+    assert "DISPLAY" not in engines.find(engine).environment() and engines.find(engine).environment()["OMP_NUM_THREADS"] == "1"
+    passed = dict(line.split("=") for line in (folder / "values").read_text().splitlines())
+    assert passed["strength"] == "1e+300" and passed["seed"] == "7" and "kinetic_friction" not in passed
+
+
+def test_a_result_holds_the_deck_that_made_it(tmp_path: Path, decks: Path, stand_in: Path) -> None:
+    (decks / "box" / "lid").mkdir()
+    (decks / "box" / "lid" / "lid.stl").write_text("solid lid\n")
+    deck, case = (decks / "box" / "liggghts.in").read_text(), (decks / "box" / "case.toml").read_text()
+    folder, _ = run(tmp_path / "out")
+    (decks / "box" / "liggghts.in").write_text("# another deck\n")
+    assert deck in (folder / "liggghts.in").read_text() and (folder / "case/case.toml").read_text() == case
+    assert re.search(r"variable grain_count +index 10 # number of grains", (folder / "liggghts.in").read_text())
+    assert (folder / "lid/lid.stl").is_file() and not (folder / "yade.py").exists()
+
+
+def test_a_finished_run_is_not_repeated_unless_an_input_changes(tmp_path: Path, decks: Path, stand_in: Path) -> None:
+    out = tmp_path / "out"
+    folder, _ = run(out)
+    made = (folder / "run.json").stat().st_mtime_ns
+    assert run(out) == (folder, "kept")
+    case = decks / "box" / "case.toml"
+    case.write_text(case.read_text().replace("Grains in a box.", "Better words."))
+    (decks / "box" / "yade.py").write_text("# the other engine's deck\np = dembark.parameters()\n")
+    (decks / "box" / "README.md").write_text("words\n")
+    (decks / "box" / "measure.py").write_text("# looks at results only\n")
+    assert run(out) == (folder, "kept")
+    assert (folder / "run.json").stat().st_mtime_ns == made
+    assert run(out, grain_diameter="6 mm")[1] == "finished"
+    assert run(out, grain_diameter=0.006)[1] == "kept"
+    (decks / "box" / "liggghts.in").write_text("# another deck\n")
+    assert run(out, grain_diameter=0.006)[1] == "finished"
+    stand_in.write_text(stand_in.read_text() + "# another build\n")
+    assert run(out, grain_diameter=0.006)[1] == "finished"
+
+
+@pytest.mark.parametrize(("behaviour", "words"), [
+    ("exit", ["exit code 1", "at step 50 of 100", "Lost atoms"]),
+    ("kill", ["killed by SIGKILL", "at step 50"]),
+    ("full", ["disk is full"]),
+    ("truncate", ["grains.dump is truncated"]),
+    ("short", ["grains.dump holds 2 frames instead of 3"]),
+    ("unstable", ["unstable", "step 100"]),
+    ("silent", ["without 'dembark: finished'"]),
+])
+def test_failures_are_told_in_one_line_and_leave_earlier_results(tmp_path: Path, behaviour: str, words: list[str]) -> None:
+    out = tmp_path / "out"
+    folder, _ = run(out)
+    before = {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    with pytest.raises(RunError) as caught:
+        run(out, behaviour=behaviour)
+    message, log = str(caught.value), out / "failed" / "replica-1.log"
+    assert "\n" not in message and str(log) in message and message.startswith("box dry liggghts 1 failed")
+    for word in words:
+        assert word in message
+    assert "dembark: steps 100" in log.read_text()
+    assert {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+    assert not list(out.glob(".*work*"))
+    run(out, pause=0.001)
+    assert not (out / "failed").exists()
+
+
+def test_cancelling_ends_the_engine_and_clears_up(tmp_path: Path, engine_pid: FindPid, lives: Lives) -> None:
+    out, cancel, caught = tmp_path / "out", threading.Event(), []
+
+    def work() -> None:
+        try:
+            run(out, cancel=cancel, behaviour="hang")
+        except Interrupted as error:
+            caught.append(error)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    pid = engine_pid(out)
+    cancel.set()
+    thread.join(20)
+    assert caught and not lives(pid)
+    assert [name for name in os.listdir(out) if "lock" not in name] == []
+
+
+@pytest.fixture
+def command(tmp_path: Path) -> Iterator[Command]:
+    """`dembark run` of a run that hangs, in a process of its own."""
+    out = tmp_path / "out"
+    words = ["run", "box", "--engine", "liggghts", "--set", "behaviour=hang", "--out", str(out)]
+    process = subprocess.Popen([sys.executable, "-m", "dembark.validation.cli", *words],
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    yield process, out
+    process.kill()
+    process.communicate()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_to_the_command_ends_the_engine(command: Command, number: int, engine_pid: FindPid, lives: Lives) -> None:
+    process, out = command
+    pid = engine_pid(out)
+    process.send_signal(number)
+    _, error = process.communicate(timeout=90)
+    assert process.returncode == 130 and "interrupted" in error and "Traceback" not in error
+    assert not lives(pid) and not list(out.glob(".*work*"))
+
+
+def test_a_killed_command_leaves_no_engine_and_the_next_start_clears_up(
+        command: Command, engine_pid: FindPid, lives: Lives, wait_for: Callable[..., object]) -> None:
+    process, out = command
+    pid = engine_pid(out)
+    process.kill()
+    process.wait()
+    wait_for(lambda: not lives(pid))
+    assert list(out.glob(".replica-1.work-*"))
+    assert run(out)[1] == "finished"
+    assert not list(out.glob(".replica-1.work-*"))
+
+
+def test_two_processes_do_not_compute_the_same_run(command: Command, engine_pid: FindPid) -> None:
+    _, out = command
+    engine_pid(out)
+    with pytest.raises(DembarkError, match="by another process"):
+        run(out)
+
+
+def test_too_little_room_is_told_before_the_start(tmp_path: Path) -> None:
+    with pytest.raises(RunError, match="disk is too full.*needs about"):
+        run(tmp_path, grain_count=10**9, frames=10**6)
+    assert not list(tmp_path.glob("replica-*"))
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
+def test_a_disk_that_fills_up_is_named_as_the_cause(tmp_path: Path) -> None:
+    out = tmp_path / "small"
+    out.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=8m", "none", str(out)], capture_output=True, check=False).returncode:
+        pytest.skip("this machine allows no mounts")
+    try:
+        (out / "filler").write_bytes(bytes(7 << 20))
+        with pytest.raises(RunError, match="disk is full|disk is too full"):
+            run(out, pause=0.5)
+        assert not list(out.glob("replica-*")) and not list(out.glob(".*work*"))
+    finally:
+        subprocess.run(["umount", str(out)], check=True)
+
+
+def test_mpi_ranks_are_for_liggghts() -> None:
+    deck = Path("deck")
+    assert engines.find("liggghts").command(deck, {}, ranks=2)[:3] == ["mpirun", "-np", "2"]
+    with pytest.raises(DembarkError, match="--threads"):
+        engines.find("yade").command(deck, {}, ranks=2)
+    assert engines.find("yade").command(deck, {}, threads=2)[1] == "-j2"
+
+
+def test_the_engines_own_word_is_found() -> None:
+    assert outcome.reason(["Traceback (most recent call last):", "  x", "ValueError: no", "bye"]) == "ValueError: no"
+    assert outcome.reason(["ERROR: Unknown pair style (force.cpp:1)", "Last command: x"]).startswith("ERROR: Unknown pair")
+    assert outcome.reason(["dembark: steps 3", "only this"]) == "only this"
+    assert outcome.reason([]) == "it said nothing"

@@ -1,0 +1,36 @@
+"""Numbers of runs in which nothing is random are compared by a stated bound, others by their intervals."""
+
+import math
+
+import pytest
+from dembark.postproc.statistics import exact
+from dembark.validation.judge.quantity import Quantity
+from dembark.validation.compare import pair
+
+
+def entry(value, agreement, half=0.0):
+    return Quantity("speed", "speed", "m/s", exact(value, half), agreement=agreement).as_json()
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "verdict"),
+    [
+        (1.0, 1.0 + 5e-10, "pass"),
+        (1.0, 1.0 + 2e-9, "fail"),
+        (0.0, 5e-10, "pass"),
+        (0.0, 2e-9, "fail"),
+        (math.nan, 1.0, "fail"),
+        (1.0, math.nan, "fail"),
+    ],
+)
+def test_deterministic_numbers_agree_within_their_bound(one, other, verdict):
+    found = pair(entry(one, 1e-9), entry(other, 1e-9), "liggghts", "yade")
+    assert found["verdict"] == verdict
+    if verdict == "pass":
+        assert found["deviation_kind"] == "absolute" and found["tolerance"] == 1e-9
+
+
+def test_numbers_without_a_bound_are_compared_by_their_intervals():
+    assert "agreement" not in entry(1.0, None)
+    assert pair(entry(1.0, None, 0.06), entry(1.05, None, 0.06), "liggghts", "yade")["verdict"] == "pass"
+    assert pair(entry(1.0, None), entry(1.05, None), "liggghts", "yade")["verdict"] == "fail"

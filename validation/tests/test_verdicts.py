@@ -1,0 +1,104 @@
+"""Verdicts of quantities and of comparisons of engines."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from dembark.common.errors import DembarkError, RunError
+from dembark.postproc.statistics import Estimate, over_replicas
+from dembark.validation.checks import find
+from dembark.validation.judge.quantity import Quantity, judge
+from dembark.validation.compare import pair
+from dembark.validation.metrics import measure
+
+
+def entry(value, half, basis="5 replicas"):
+    return {
+        "basis": basis,
+        "name": "q",
+        "label": "q",
+        "unit": "1",
+        "value": value,
+        "interval": None if half is None else [value - half, value + half],
+    }
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "verdict"),
+    [
+        ((1.0, 0.04), (1.05, 0.04), "pass"),
+        ((1.0, 0.01), (1.05, 0.01), "fail"),
+        ((1.0, 0.2), (1.15, 0.2), "info"),
+        ((1.0, 0.05), (1.3, 0.05), "fail"),
+        ((1.0, None), (1.0, 0.1), "info"),
+        ((0.0, 0.1), (1.0, 0.1), "fail"),
+    ],
+)
+def test_verdict_of_a_pair(one, other, verdict):
+    assert pair(entry(*one), entry(*other), "liggghts", "yade")["verdict"] == verdict
+
+
+@pytest.mark.parametrize("other", [1.0, 1.05, 1.5])
+@pytest.mark.parametrize("packings", ["1 replica", "2 replicas"])
+def test_intervals_within_fewer_than_three_packings_leave_a_comparison_open(other, packings):
+    single = f"within {packings}: jackknife over 8 sectors or bands"
+    found = pair(entry(1.0, 0.01, single), entry(other, 0.01), "liggghts", "yade")
+    assert found["verdict"] == "info"
+    assert f"within {packings.split()[0]} packing" in found["reason"]
+
+
+def test_one_of_many_comparisons_may_lie_beyond_its_interval():
+    """Five packings in each engine of one and the same truth: all comparisons of a page together fail once in a hundred pages."""
+    random = np.random.default_rng(7)
+    samples = random.standard_normal((500, 20, 2, 5)) * 0.01 + 1.0
+    verdicts = []
+    for page in samples:
+        estimates = [[over_replicas([Estimate(value, 0.0) for value in engine]) for engine in quantity] for quantity in page]
+        verdicts.append({pair(*(entry(one.value, one.half, one.basis) for one in two), "liggghts", "yade", 20)["verdict"]
+                         for two in estimates})
+    assert sum("fail" in page for page in verdicts) <= 12
+    assert sum("info" in page for page in verdicts) > 100
+    assert pair(entry(1.0, 0.01), entry(1.05, 0.01), "liggghts", "yade", 20)["verdict"] == "fail"
+
+
+@pytest.mark.parametrize(
+    ("deviation", "half", "verdict"),
+    [
+        (0.05, 0.02, "pass"),
+        (-0.1, 0.1, "pass"),
+        (0.11, 0.02, "fail"),
+        (0.0, 0.2, "info"),
+        (0.5, float("inf"), "info"),
+        (0.0, float("nan"), "info"),
+    ],
+)
+def test_verdict_needs_an_interval_narrower_than_the_tolerance(deviation, half, verdict):
+    assert judge(deviation, half, 0.1)[0] == verdict
+
+
+def test_nan_fails():
+    broken = Quantity("q", "q", "1", Estimate(float("nan"), 0.1), reference=Estimate(1.0, 0.0), tolerance=0.1)
+    assert broken.judged()[0] == "fail"
+    assert broken.as_json()["value"] is None
+
+
+def test_a_bound_that_is_not_finite_is_none_in_the_file() -> None:
+    """A column too small for an interval allows anything; JSON has no number for that."""
+    entry = Quantity("field_balance", "balance", "1", Estimate(0.1, math.inf), reference=Estimate(0.0, 0.0), tolerance=math.inf,
+                     absolute=True).as_json()
+    assert entry["tolerance"] is None and entry["interval"] is None
+    json.dumps(entry, allow_nan=False)
+
+
+def test_no_replica_is_told(tmp_path):
+    with pytest.raises(RunError, match="nothing to measure"):
+        measure(tmp_path)
+
+
+def test_a_case_may_bring_its_own_checks(tmp_path):
+    (tmp_path / "checks.py").write_text("REFERENCES = ()\nquantities = picture = None\n")
+    assert find("drum", tmp_path).REFERENCES == ()
+    with pytest.raises(DembarkError, match="no checks"):
+        find("drum")
