@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+
 from dembark.physics.exact.impacts import Array, Impacts, Rebounds
 
 # Factor from one part of an integration to the next where the impact begins and ends, and the share of the first.

@@ -49,10 +49,12 @@ class Impacts:
 
     @property
     def reduced_radius(self) -> Array:
+        """R* of the two bodies (m)."""
         return 1.0 / (1.0 / self.radius).sum(axis=0)
 
     @property
     def reduced_mass(self) -> Array:
+        """m* of the two bodies (kg)."""
         return 1.0 / (1.0 / self.mass).sum(axis=0)
 
     @property
@@ -112,7 +114,7 @@ class Rebounds:
 
     def numbers(self, one: Impacts) -> dict[str, Array]:
         """By name, (n,) each: `overlap`, `force`, `duration`, and velocities after over the speed of approach: that of parting
-        (`restitution`), and of the sphere along the plane (`slide`), of its surface by its `spin`, and of its point of contact (`patch`)."""
+        (`restitution`), of the sphere along the plane (`slide`), of its surface by its `spin`, and of its point of contact (`patch`)."""
         slide, spin = self.slide[0] / one.closing, one.radius[0] * self.spin[0] / one.closing
         return {"restitution": (self.normal[0] - self.normal[1]) / one.closing, "slide": slide, "spin": spin, "patch": slide + spin,
                 "overlap": self.overlap, "force": self.force, "duration": self.duration}

@@ -7,7 +7,17 @@ from yade.dembark.frames import FrameWriter
 from yade.dembark.logs import LogWriter, drum, log, log_loop, logs
 from yade.dembark.report import announce, fail, finish
 from yade.dembark.scene import (
-    Recorder, box, contact_loop, engine_loop, grains, materials, packing, pairs, parameters, periodic, plane,
+    Recorder,
+    box,
+    contact_loop,
+    engine_loop,
+    grains,
+    materials,
+    packing,
+    pairs,
+    parameters,
+    periodic,
+    plane,
 )
 from yade.dembark.states import options, run, table
 from yade.dembark.writers import DumpWriter, EnergyWriter, HistoryWriter, energies

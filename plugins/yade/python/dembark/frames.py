@@ -20,8 +20,10 @@ def motion(body, gravity=(0.0, 0.0, 0.0)):
     """
     state = body.state
     force, torque = O.forces.f(body.id) + state.mass * Vector3(*gravity), O.forces.t(body.id)
-    velocity = [v if axis in state.blockedDOFs else v + 0.5 * O.dt * f / state.mass for axis, v, f in zip("xyz", state.vel, force)]
-    spin = [w if axis in state.blockedDOFs else w + 0.5 * O.dt * t / i for axis, w, t, i in zip("XYZ", state.angVel, torque, state.inertia)]
+    velocity = [v if axis in state.blockedDOFs else v + 0.5 * O.dt * f / state.mass
+                for axis, v, f in zip("xyz", state.vel, force, strict=True)]
+    spin = [w if axis in state.blockedDOFs else w + 0.5 * O.dt * t / i
+            for axis, w, t, i in zip("XYZ", state.angVel, torque, state.inertia, strict=True)]
     return force, velocity, spin
 
 
@@ -64,7 +66,8 @@ class FrameWriter:
         energy = 0.0
         for body in spheres():
             _, velocity, spin = motion(body, self.gravity)
-            energy += 0.5 * sum(body.state.mass * v * v for v in velocity) + 0.5 * sum(i * w * w for i, w in zip(body.state.inertia, spin))
+            energy += 0.5 * sum(body.state.mass * v * v for v in velocity)
+            energy += 0.5 * sum(i * w * w for i, w in zip(body.state.inertia, spin, strict=True))
         self._history.write(",".join([str(O.iter), *(f"{x:.17g}" for x in (O.time, energy, *values))]) + "\n")
         self._history.flush()
         print(O.iter, f"{O.time:.6g}", f"{energy:.6g}", flush=True)

@@ -1,8 +1,18 @@
 """Scenes of decks: bodies of packing.data, materials, walls, and the engines around the Finnie-Rabinowicz law."""
 
 from yade import (
-    ForceResetter, FrictMat, Ig2_Sphere_Sphere_ScGeom, InsertionSortCollider, InteractionLoop, Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys,
-    Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz, MatchMaker, NewtonIntegrator, Omega, PyRunner, utils,
+    ForceResetter,
+    FrictMat,
+    Ig2_Sphere_Sphere_ScGeom,
+    InsertionSortCollider,
+    InteractionLoop,
+    Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys,
+    Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz,
+    MatchMaker,
+    NewtonIntegrator,
+    Omega,
+    PyRunner,
+    utils,
 )
 from yade.dembark.report import fail
 from yade.dembark.writers import DumpWriter, HistoryWriter
@@ -117,7 +127,7 @@ def contact_loop(p, materials, walls, static=None, kinetic=None):
             capillaryModel=p.capillary_model if p.wet else "none", carriedLiquid=bool(p.carried), **law)])
 
 
-def engine_loop(p, loop, bounds, verlet, gravity, liquid=None, account=None, periodic=False, record="record()"):
+def engine_loop(p, loop, bounds, verlet, gravity, liquid=None, account=None, periodic=False, record="record()"):  # noqa: ARG001 (every deck gives its numbers)
     """All engines of a scene: `loop` from `contact_loop`, `bounds`: Bo1 functors, `verlet` (m): Verlet distance of the collider.
 
     `record`, called in every step between forces and motion, where positions and forces belong to the same time, writes what is due.

@@ -19,7 +19,7 @@ _KEPT_STATES = 2
 
 @cache
 def options():
-    """What the words restart_every=<steps> and resume=yes|no behind the script say: (steps between saved states, 0 never; whether to resume).
+    """What the words restart_every=<steps> and resume=yes|no behind the script say: (steps between saved states, 0 never; resume or not).
 
     Other words are the script's own.
     """
@@ -131,15 +131,15 @@ def _cut(path, step):
     os.truncate(path, end)
 
 
-def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.csv", "grains.dump", "contacts.dump"), base="state", saving=None,
-        loaded=None):
+def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.csv", "grains.dump", "contacts.dump"), base="state",
+        saving=None, loaded=None):
     """Run the scene until step `steps` is written, and say that it is finished.
 
-    `restart_every` and `resume` are what the words behind the script say unless they are given. Every `restart_every` steps (0: never) the scene is saved as `base`.<step>.yade.gz. With `resume` the newest of these that is whole
-    takes the scene's place, and what `outputs` (tables that begin with the step, and dumps) got after it is cut off, for it comes again.
-    Call it when the scene is complete. A scene goes on from the saved copy of itself, so that a run that was killed and resumed
-    is the same to the bit as one that was not, on one thread. `saving()` is called before the scene is saved, `loaded()` after it was
-    resumed.
+    `restart_every` and `resume` are what the words behind the script say unless they are given. Every `restart_every` steps (0: never)
+    the scene is saved as `base`.<step>.yade.gz. With `resume` the newest of these that is whole takes the scene's place, and what
+    `outputs` (tables that begin with the step, and dumps) got after it is cut off, for it comes again. Call it when the scene is
+    complete. A scene goes on from the saved copy of itself, so that a run that was killed and resumed is the same to the bit as one
+    that was not, on one thread. `saving()` is called before the scene is saved, `loaded()` after it was resumed.
     """
     given = options()
     restart_every = given[0] if restart_every is None else restart_every

@@ -138,7 +138,8 @@ class EnergyWriter:
     """
 
     def __init__(self, path="energies.csv", names=None, more=(), more_values=tuple):
-        self._names, self._more_values = names or {name: name for name in EnergyAccount().keys()}, more_values
+        self._names = names or {name: name for name in EnergyAccount().keys()}  # noqa: SIM118 (it is no dictionary)
+        self._more_values = more_values
         self._file = table(path, ",".join(["step", "time", *self._names, *more]))
 
     def write(self):
