@@ -34,8 +34,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.validation import engines
 from dembark.postproc.statistics import student
+from dembark.validation import engines
 
 Array = NDArray[np.float64]
 LOGS, LOW, HIGH, DENSITY, FILLING = 60, 0.10, 0.25, 850.0, 0.3

@@ -9,13 +9,6 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from dembark.common.errors import DembarkError
-from dembark.common.files import disk_error
-from dembark.postproc.output.whole import Labelled, WholeFile
-from dembark.postproc.style import STYLE
-from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, PlaneWall
-from dembark.postproc.walls.peaks import Histogram
-from dembark.postproc.walls.stress import WallStress
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
@@ -24,6 +17,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
+
+from dembark.common.errors import DembarkError
+from dembark.common.files import disk_error
+from dembark.postproc.output.whole import Labelled, WholeFile
+from dembark.postproc.style import STYLE
+from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, PlaneWall
+from dembark.postproc.walls.peaks import Histogram
+from dembark.postproc.walls.stress import WallStress
 
 Array = NDArray[np.float64]
 
@@ -308,4 +309,3 @@ def save(folder: str | Path, figures: Mapping[str, Figure]) -> list[Path]:
     except OSError as error:
         raise disk_error(error, folder) from None
     return found
-

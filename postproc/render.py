@@ -16,17 +16,18 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from PIL import Image
+
 from dembark.common.errors import RunError
 from dembark.postproc.fields.coarse_graining import interpolate
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.output.whole import Labelled, WholeFile
 from dembark.postproc.plots import labelled, scalar
 from dembark.postproc.style import STYLE
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
-from PIL import Image
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]

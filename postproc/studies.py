@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from dembark.postproc.statistics import Estimate, combined
 from numpy.typing import NDArray
+
+from dembark.postproc.statistics import Estimate, combined
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dembark.common.errors import DembarkError, RunError
+from dembark.common.errors import RunError
 from dembark.common.files import check_times, count_frames, disk_error, move_into_place, read_json, retire, sweep, write_json
 
 

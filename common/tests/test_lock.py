@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
 from dembark.common.errors import DembarkError, Interrupted
 from dembark.common.lock import Busy, held, lock
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+
 from dembark.postproc.dumps.frames import DumpError
 
 _WINDOW = 1 << 22

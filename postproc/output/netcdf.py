@@ -14,13 +14,14 @@ from typing import Any
 import h5netcdf
 import numpy as np
 import xarray
+from numpy.typing import NDArray
+
 from dembark.common.errors import DembarkError
 from dembark.common.files import disk_error
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.output.whole import Labelled, SteadyFile, WholeFile
 from dembark.postproc.walls.peaks import Histogram
 from dembark.postproc.walls.stress import COMPONENTS, WallStress
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Attributes = Mapping[str, str | float | int]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.postproc.grains import GrainFrame, cell

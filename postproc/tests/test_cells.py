@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from dembark.common.errors import DembarkError
-from dembark.postproc.fields.cells import cell_average, cell_grid, cell_totals
-from dembark.postproc.fields.grid import Grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from packings import cubic_lattice, fcc_lattice, grain_frame, packing_at_rest, random_frame
+
+from dembark.common.errors import DembarkError
+from dembark.postproc.fields.cells import cell_average, cell_grid, cell_totals
+from dembark.postproc.fields.grid import Grid
 
 
 @settings(max_examples=30, deadline=None)

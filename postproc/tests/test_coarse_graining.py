@@ -4,6 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from packings import contact_frame, cubic_lattice, fcc_lattice, grain_frame, packing_at_rest, random_frame
+
 from dembark.common.errors import DembarkError
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.fields.coarse_graining import WallContacts, coarse_grain, interpolate
@@ -11,9 +15,6 @@ from dembark.postproc.fields.face_stress import face_stress
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import NAMES, Kernel
 from dembark.postproc.fields.sums import Fields, moving_average
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
-from packings import contact_frame, cubic_lattice, fcc_lattice, grain_frame, packing_at_rest, random_frame
 
 flags = st.tuples(st.booleans(), st.booleans(), st.booleans())
 shapes = st.tuples(st.integers(1, 5), st.integers(1, 4), st.integers(1, 9))

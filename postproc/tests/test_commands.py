@@ -10,16 +10,17 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 import xarray
-from dembark.common.errors import DembarkError
-from dembark.postproc.cli import progress
-from dembark.postproc.fields import run as field_run
-from dembark.postproc.words import counts, frame_numbers, length, parse_wall, span
-from dembark.validation.cli import main
 from dumps import contacts_text, grains_text, write_times
 from hypothesis import given
 from hypothesis import strategies as st
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
+
+from dembark.common.errors import DembarkError
+from dembark.postproc.cli import progress
+from dembark.postproc.fields import run as field_run
+from dembark.postproc.words import counts, frame_numbers, length, parse_wall, span
+from dembark.validation.cli import main
 
 RADIUS, WEIGHT, STEPS = 0.005, 0.02, (100, 200, 300, 400)
 BOX = ((0.0, 0.04), (0.0, 0.04), (0.0, 0.06))

@@ -4,10 +4,11 @@ import shutil
 
 import numpy as np
 import pytest
+from dumps import contacts_text
+
 from dembark.common.errors import DembarkError
 from dembark.postproc import ContactsDump, DumpError, GrainsDump, open_dump, universe
 from dembark.validation import engines
-from dumps import contacts_text
 
 COLUMNS = "id type x y z ix iy iz vx vy vz radius mass fx fy fz omegax omegay omegaz".split()
 PAIRS = {"first": (1, 2, 3), "second": (4, 5, 6), "ids": (7, 8), "forces": (10, 11, 12), "delta": 13}

@@ -6,11 +6,12 @@ import warnings
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from dembark import _dumps
 from dembark.postproc import DumpError, DumpWarning, TextDump, open_dump
 from dembark.postproc.dumps import source
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 HEAD = "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS pp ff pp\n0 1\n0 2\n-1 1\nITEM: ATOMS {columns}\n"
 

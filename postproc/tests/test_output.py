@@ -7,6 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray
+from scenes import frame_of
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+from vtkmodules.vtkIOHDF import vtkHDFReader
+
 from dembark.common.errors import DembarkError, RunError
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
@@ -25,10 +30,6 @@ from dembark.postproc.output import (
 from dembark.postproc.walls import CylinderWall, MeshWall, Motion, PlaneWall
 from dembark.postproc.walls.patches import cylinder_patches, mesh_patches, plane_patches
 from dembark.postproc.walls.stress import wall_stress
-from scenes import frame_of
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
-from vtkmodules.vtkIOHDF import vtkHDFReader
 
 GRID = Grid((-1.0, 0.0, 2.0), (1.0, 3.0, 6.0), (2, 3, 4), (False, True, False))
 

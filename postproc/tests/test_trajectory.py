@@ -5,9 +5,10 @@ import warnings
 import MDAnalysis
 import numpy as np
 import pytest
-from dembark.postproc import DumpError, GrainsDump, universe
 from dumps import grains_text
 from MDAnalysis import transformations
+
+from dembark.postproc import DumpError, GrainsDump, universe
 
 BOX = ((0.0, 1.0), (-1.0, 1.0), (0.0, 3.0))
 PLACES = np.array([[0.1, -0.2, 0.5], [0.5, 0.5, 1.5], [0.9, 0.9, 2.5]])

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from scenes import contacts_of, frame_of
+
 from dembark.common.errors import DembarkError
 from dembark.postproc import ContactsDump, DumpError, GrainsDump, read_times
 from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, Motion, PlaneWall, into_box, wall_contacts
@@ -13,9 +17,6 @@ from dembark.postproc.walls.peaks import Blocks, Histogram, PeakFinder
 from dembark.postproc.walls.stress import wall_stress
 from dembark.validation import engines
 from dembark.validation.case import folders
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
-from scenes import contacts_of, frame_of
 
 RANDOM = np.random.default_rng(7)
 

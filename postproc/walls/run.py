@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+
 from dembark.common.errors import DembarkError
 from dembark.postproc.dumptext import DumpError
 from dembark.postproc.grains import GrainFrame

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.common.errors import DembarkError
 from dembark.postproc.walls.mesh import TriangleTree, read_stl
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Vector = Sequence[float] | Array

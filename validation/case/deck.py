@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import jinja2
 import numpy as np
+
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
 from dembark.validation.case.folders import package_root

@@ -12,7 +12,14 @@ from dembark.validation import engines
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.folders import package_root
 from dembark.validation.case.model import (
-    EVIDENCE, OUTPUTS, STANDARD_OUTPUTS, Case, Constraint, Declared, PlannedRun, Study,
+    EVIDENCE,
+    OUTPUTS,
+    STANDARD_OUTPUTS,
+    Case,
+    Constraint,
+    Declared,
+    PlannedRun,
+    Study,
 )
 from dembark.validation.case.parameters import Parameter, Value, checked, nearest, pick
 from dembark.validation.case.tables import TableReader, load_toml

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import jinja2
+
 from dembark.common.errors import DembarkError
 from dembark.validation.case.parameters import Value
 from dembark.validation.engines.base import (

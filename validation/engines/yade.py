@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from dembark.common.errors import DembarkError
-from dembark.validation.engines.base import DECK_NOTE, DeckNumber, Engine, EngineFacts, built, is_program, named_program, texts
 from dembark.validation.case.parameters import Value
+from dembark.validation.engines.base import DECK_NOTE, DeckNumber, Engine, EngineFacts, built, is_program, named_program, texts
 
 
 class Yade(Engine):

@@ -13,9 +13,9 @@ import re
 from pathlib import Path
 
 from dembark.common.errors import RunError
+from dembark.postproc.statistics import joint_half, joint_limit
 from dembark.validation.judge import result
 from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result
-from dembark.postproc.statistics import joint_half, joint_limit
 
 CAP = 0.10
 PACKINGS = 3

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from dembark.validation.judge.result import QuantityRecord, as_json
 from dembark.postproc.statistics import Estimate
+from dembark.validation.judge.result import QuantityRecord, as_json
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,6 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
-from dembark.common.files import read_json
-from dembark.postproc import GrainFrame, GrainsDump
-from dembark.postproc.dumptext import TextDump
-from dembark.postproc.style import STYLE
-from dembark.validation.pictures.packings import HEIGHT, png
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
@@ -21,6 +16,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
+
+from dembark.common.files import read_json
+from dembark.postproc import GrainFrame, GrainsDump
+from dembark.postproc.dumptext import TextDump
+from dembark.postproc.style import STYLE
+from dembark.validation.pictures.packings import HEIGHT, png
 
 _MAP = "cividis"
 _PIXELS = 300

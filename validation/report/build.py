@@ -9,14 +9,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
+from markupsafe import Markup, escape
+
 from dembark.common.errors import RunError
 from dembark.common.files import disk_error, write_whole
 from dembark.validation.judge.result import Result
 from dembark.validation.report import front, numbers, scatter, sections
 from dembark.validation.report.gather import Gathered, gather
 from dembark.validation.report.look import colour, engine_name
-from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
-from markupsafe import Markup, escape
 
 _HERE = Path(__file__).parent
 _SIGNS = {"passed": "✓ pass", "failed": "✗ FAIL", "open": "○ open", "information": ""}

@@ -7,11 +7,12 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
+
+from dembark.postproc.style import STYLE
 from dembark.validation.report.fields import FieldFigure
 from dembark.validation.report.fields_panels import DIVERGING, SEQUENTIAL, bar, curve, image, limits, long_table
-from dembark.postproc.style import STYLE
 from dembark.validation.report.look import colour, engine_name
-from matplotlib.figure import Figure
 
 # Name in the dataset, label, colour map, and whether the scale is even about zero.
 _MAPS = (

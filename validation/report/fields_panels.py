@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from dembark.validation.report.look import colour, engine_name, look
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+
+from dembark.validation.report.look import colour, engine_name, look
 
 Array = NDArray[np.float64]
 

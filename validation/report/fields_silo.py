@@ -7,12 +7,13 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from dembark.validation.report.fields import FieldFigure
-from dembark.validation.report.fields_panels import DIVERGING, SEQUENTIAL, bar, curve, image, limits, long_table
-from dembark.postproc.style import STYLE
-from dembark.validation.report.look import engine_name
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+
+from dembark.postproc.style import STYLE
+from dembark.validation.report.fields import FieldFigure
+from dembark.validation.report.fields_panels import DIVERGING, SEQUENTIAL, bar, curve, image, limits, long_table
+from dembark.validation.report.look import engine_name
 
 Array = NDArray[np.float64]
 

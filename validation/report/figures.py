@@ -12,11 +12,12 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+
 from dembark.postproc.style import STYLE
 from dembark.validation.report.look import MARKS, PALETTE, colour, engine_name
 from dembark.validation.verification.item import Item, Panel
-from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
 
 WIDE = 7.2  # inches
 _INK = "#4a4f57"

@@ -9,13 +9,14 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from dembark.postproc.statistics import Scatter, scatter
 from dembark.postproc.style import STYLE
 from dembark.validation.report.figures import WIDE, symbols
 from dembark.validation.report.gather import Row
 from dembark.validation.report.look import look
-from dembark.postproc.statistics import Scatter, scatter
-from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
 
 KINDS = ("experiment", "theory")
 _INK = "#4a4f57"

@@ -144,4 +144,3 @@ def refuse_foreign(one: Series, out: Path) -> None:
 
 def _ours(out: Path) -> bool:
     return all(path.name in ("failed", "superseded", "metrics.json") or path.name.startswith(".replica-") for path in out.iterdir())
-

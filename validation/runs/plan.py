@@ -15,9 +15,9 @@ from dembark.validation import engines
 from dembark.validation.case.deck import require_measure, sources
 from dembark.validation.case.folders import discover
 from dembark.validation.case.model import Case, Study
-from dembark.validation.engines import Engine
 from dembark.validation.case.parameters import Value, pick
 from dembark.validation.case.resolve import for_replica, portable, resolve
+from dembark.validation.engines import Engine
 
 # How often a run that was ended from outside is started again.
 RETRIES = 3

@@ -255,4 +255,3 @@ def summary(states: Iterable[State], runs: Mapping[str, Run]) -> list[dict[str, 
         found.append({"case": run.case.name, "variant": run.variant, "engine": run.engine.name, "replica": run.replica, "folder": folder,
                       "inputs": run.inputs, "state": told, "message": "" if told == "finished" else state.message})
     return found
-

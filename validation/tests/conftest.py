@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from dembark.validation import engines
 from dembark.validation.case import folders
 

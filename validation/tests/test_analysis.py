@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
 from dembark.common.errors import DembarkError
 from dembark.validation import analysis, show
 from dembark.validation.judge import measuring

@@ -6,14 +6,15 @@ import math
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from dembark.common.errors import DembarkError
 from dembark.common.units import to_si
 from dembark.validation.case import folders
-from dembark.validation.case.folders import discover, find, load
 from dembark.validation.case.expressions import Expression
+from dembark.validation.case.folders import discover, find, load
 from dembark.validation.case.resolve import for_replica, portable, resolve, settings
-from hypothesis import given
-from hypothesis import strategies as st
 
 
 def edited(decks: Path, old: str, new: str) -> Path:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
 from dembark.common.files import read_json
 from dembark.validation import engines
 from dembark.validation.case import folders

@@ -9,8 +9,8 @@ import pytest
 from dembark.common.errors import DembarkError, RunError
 from dembark.postproc.statistics import Estimate, over_replicas
 from dembark.validation.checks import find
-from dembark.validation.judge.quantity import Quantity, judge
 from dembark.validation.compare import pair
+from dembark.validation.judge.quantity import Quantity, judge
 from dembark.validation.metrics import measure
 
 

@@ -11,6 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
+
 from dembark.common.files import read_json, write_json
 from dembark.validation.judge.result import QuantityRecord, as_json, from_json
 from dembark.validation.judge.tally import VERIFICATION as FILE

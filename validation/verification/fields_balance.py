@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import Kernel
@@ -84,4 +85,3 @@ def wall_forces() -> Item:
                float(np.abs(of_field - total).max()) / weight, "Weinhart et al. 2012"),
          exact("wall_force_weight", "vertical force of the contacts over the weight, − 1", total[2] / weight - 1.0, "Newton's second law")],
     )
-

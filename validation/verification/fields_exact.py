@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import NAMES, Kernel

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import erf
+
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import CUTOFF
@@ -11,7 +13,6 @@ from dembark.postproc.fields.rings import coarse_grain as ring_fields
 from dembark.validation.verification import scenes
 from dembark.validation.verification.item import Array, Curve, Item, Panel, exact
 from dembark.validation.verification.scenes import GRAVITY, Network
-from scipy.special import erf
 
 _WIDTH = 0.15
 _RADIUS = 0.75

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.postproc.statistics import Estimate
 from dembark.validation.judge.quantity import Quantity
 from dembark.validation.judge.result import QuantityRecord
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from dembark.postproc import ContactFrame, GrainFrame
-from dembark.postproc.fields.coarse_graining import WallContacts
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+
+from dembark.postproc import ContactFrame, GrainFrame
+from dembark.postproc.fields.coarse_graining import WallContacts
 
 Array = NDArray[np.float64]
 

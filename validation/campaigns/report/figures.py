@@ -8,13 +8,14 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
+
 from dembark.postproc.style import STYLE
 from dembark.validation.campaigns.report.against import Difference
 from dembark.validation.campaigns.report.sweeps import Sweep, words
 from dembark.validation.judge.result import QuantityRecord
 from dembark.validation.report.figures import symbols
 from dembark.validation.report.look import colour, engine_name
-from matplotlib.figure import Figure
 
 _INK = "#4a4f57"
 _DASHES = ["-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (8, 3))]

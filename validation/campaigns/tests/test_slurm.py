@@ -9,14 +9,16 @@ from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
+from harness import decks, stand_in, wait_for  # noqa: F401
+from slurm_cluster import Cluster
+
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.validation import engines
 from dembark.validation.campaigns import source
+from dembark.validation.engines.liggghts import Liggghts
 from dembark.validation.runs import queue, site, slurm
 from dembark.validation.runs.plan import Plan, Resources
 from dembark.validation.runs.queue import Queue
-from harness import decks, stand_in, wait_for  # noqa: F401
-from slurm_cluster import Cluster
 
 SLURM = site.find("slurm")
 QUICK = 'base = "slurm"\n[jobs]\npoll = "0.3 s"\nlatency = "1 s"\n'
@@ -287,4 +289,3 @@ DEMBARK_MPIRUN="srun --mpi=pmix" {sys.executable} {program} 2
     on_cluster.call("sbatch", "--wait", "--ntasks=2", "--time=2", f"--output={log}", str(script), check=False)
     text = log.read_text()
     assert text.count("1 by 1 by 1 MPI processor grid") == 1 and text.count("1 by 1 by 2 MPI processor grid") == 2, text
-

@@ -200,6 +200,6 @@ def test_a_run_with_mpi_loses_a_rank_and_goes_on(tmp_path: Path, on_cluster: Clu
             on_cluster.call("scancel", number, check=False)
     (record,) = records(results).values()
     assert record["attempts"] == 2 and record["resumed_at"][0] > 0 and record["provenance"]["ranks"] == 2
-    assert record["command"][0] == (launcher.split()[0] if launcher else "mpirun")
+    assert record["command"][0] == (launcher.split(maxsplit=1)[0] if launcher else "mpirun")
     states = [state for state, comment in on_cluster.jobs().values() if "silo" in comment]
     assert "FAILED" in states and "COMPLETED" in states

@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from harness import decks, stand_in  # noqa: F401
+from hypothesis import given
+from hypothesis import strategies as st
+
 from dembark.common.errors import DembarkError
 from dembark.validation.campaigns import sizes
 from dembark.validation.campaigns.expand import points
 from dembark.validation.campaigns.spec import locate, read
 from dembark.validation.cli import main
-from harness import decks, stand_in  # noqa: F401
-from hypothesis import given
-from hypothesis import strategies as st
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from harness import decks, stand_in  # noqa: F401
+
 from dembark.common.errors import DembarkError, RunError
 from dembark.validation import engines
 from dembark.validation.campaigns import store
@@ -16,7 +18,6 @@ from dembark.validation.campaigns.rates import Rates
 from dembark.validation.runs.plan import Series, campaign
 from dembark.validation.runs.schema import KEYS, TABLES, VERSION
 from dembark.validation.runs.table import Table
-from harness import decks, stand_in  # noqa: F401
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 

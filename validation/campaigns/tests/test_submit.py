@@ -13,13 +13,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
+
 from dembark.common.files import read_json
 from dembark.common.lock import lock
 from dembark.validation.campaigns import store
 from dembark.validation.campaigns.estimate import wall_clock
 from dembark.validation.campaigns.status import look
 from dembark.validation.cli import main
-from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 

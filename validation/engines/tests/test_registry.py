@@ -10,13 +10,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pytest
+
 from dembark.common.checkout import checkout
 from dembark.common.errors import DembarkError
 from dembark.validation import doctor, engines
 from dembark.validation.case import folders
+from dembark.validation.case.parameters import Value
 from dembark.validation.cli import main
 from dembark.validation.engines import DeckNumber, Engine, EngineFacts
-from dembark.validation.case.parameters import Value
 
 NAMED = re.compile("liggghts|yade|lammps", re.IGNORECASE)
 # The list of publications names what it cites.
@@ -175,8 +176,8 @@ def stub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def test_a_new_engine_is_found_everywhere(stub: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     from dembark.validation.campaigns import rates
     from dembark.validation.case import deck
-    from dembark.validation.runs.plan import series
     from dembark.validation.report import figures
+    from dembark.validation.runs.plan import series
 
     assert main(["cases"]) == 0 and "stub" in capsys.readouterr().out
     told = {finding.what: finding.found for finding in doctor.examine()}

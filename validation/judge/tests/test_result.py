@@ -4,11 +4,12 @@ import json
 from pathlib import Path
 
 import pytest
+
 from dembark.common.errors import RunError
+from dembark.postproc.statistics import Estimate
 from dembark.validation.judge import result
 from dembark.validation.judge.quantity import Quantity
 from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result
-from dembark.postproc.statistics import Estimate
 
 RECORD = Quantity("mass", "mass", "kg", Estimate(1.02, 0.01, "3 replicas"), reference=Estimate(1.0, 0.0), tolerance=0.05, evidence="identity").record()
 RESULT = Result("silo", "dry", "yade", (RECORD,), "quick", parameters={"gravity": 9.81}, profiles=({"name": "stress", "place": [0.0]},),

@@ -8,13 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
+
 from dembark.validation import pictures, verification
 from dembark.validation.judge import result
 from dembark.validation.judge.compare import compare
 from dembark.validation.judge.result import QuantityRecord, Result
 from dembark.validation.pictures.packings import png
 from dembark.validation.verification.item import Item, exact
-from matplotlib.figure import Figure
 
 CASES = ("silo", "plane_silo", "plug_flow", "gravity_channel", "column_collapse", "debarking_drum", "log_pile", "log_pair", "log_cradle",
          "liquid_exchange", "single_contact")

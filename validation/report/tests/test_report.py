@@ -10,6 +10,7 @@ import full_size
 import numpy as np
 import pdf_pages as pdf
 import pytest
+
 from dembark.common.errors import RunError
 from dembark.validation import report
 from dembark.validation.judge import result

@@ -10,10 +10,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
+
 from dembark.common.files import read_json
 from dembark.validation.case import folders
 from dembark.validation.runs.plan import campaign, studies, variants
-from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from harness import decks, engine_pid, lives, stand_in, wait_for  # noqa: F401
+
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import read_json
 from dembark.validation import engines
@@ -16,7 +18,6 @@ from dembark.validation.case import folders
 from dembark.validation.case.folders import find
 from dembark.validation.runs import restarts, simulate
 from dembark.validation.runs.plan import Resources, Run, series
-from harness import decks, engine_pid, lives, stand_in, wait_for  # noqa: F401
 
 # The stand-in has ten grains and a hundred steps; this is a state every twenty of them.
 OFTEN = Resources(restart_interval=2e-4)

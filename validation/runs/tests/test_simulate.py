@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+
 from dembark.common.errors import DembarkError, Interrupted, RunError
 from dembark.common.files import read_json
 from dembark.validation import engines

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from dembark.validation import verification
 from dembark.validation.judge.tally import of_folder
 from dembark.validation.verification import fields_balance, scenes

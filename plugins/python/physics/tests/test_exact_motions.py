@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dembark.physics.exact.chains import Chain
-from dembark.physics.exact.pairs import Pair
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from dembark.physics.exact.chains import Chain
+from dembark.physics.exact.pairs import Pair
 
 BEGIN = 5e-4
 PAIR = Pair((20.0, 80.0), 7.5e6, 0.25, (1.5, 0.0))

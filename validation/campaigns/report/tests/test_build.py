@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+
 from dembark.common.errors import DembarkError
 from dembark.validation.campaigns import report
 from dembark.validation.judge import result

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from dembark.validation.case import folders
+
 from dembark.validation.campaigns.report import against, figures, tables
 from dembark.validation.campaigns.report.sweeps import Sweep, numerical_errors, sweeps
+from dembark.validation.case import folders
 from dembark.validation.judge.result import QuantityRecord, Result
 from dembark.validation.report.gather import Page
 

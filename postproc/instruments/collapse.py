@@ -1,0 +1,99 @@
+"""A collapsed column as a run wrote it: energies row by row, deposit, and how well the energies fit together.
+
+Energies in J; works are positive when they make grains faster.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from dembark.postproc import DumpError, GrainFrame
+from dembark.postproc.replica import Array, Replica
+
+PARTS = ("normal_elastic", "normal_viscous", "tangential_elastic", "tangential_viscous", "capillary", "liquid_viscous")
+DISSIPATING = ("normal_viscous", "tangential_viscous", "liquid_viscous")
+# Share of the mass behind the front: single grains roll on after the others have come to rest.
+FRONT = 0.98
+
+
+@dataclass(frozen=True)
+class Collapse:
+    """One run: `rows`, the columns of time.csv; `opening`, the row in which the gate begins to move; `first`, `last`: grains then and at
+    the end; W and d in m. Shares are those of `fallen`, the potential energy lost since the opening in the last row."""
+
+    rows: Mapping[str, Array]
+    opening: int
+    first: GrainFrame
+    last: GrainFrame
+    width: float
+    diameter: float
+
+    def gained(self, name: str) -> Array:
+        """Change of a column since the opening."""
+        return self.rows[name][self.opening :] - self.rows[name][self.opening]
+
+    @property
+    def fallen(self) -> float:
+        """J."""
+        return float(-self.gained("potential_energy")[-1])
+
+    def lost_in(self, name: str) -> Array:
+        """Share that this way has taken since the opening."""
+        takers = {"friction": {"tangential_elastic": -1, "tangential_stored": -1}, "held": {"normal_stored": 1, "tangential_stored": 1},
+                  "kinetic": {"kinetic_energy": 1}, "gate": {"walls": -1}, "potential": {"potential_energy": -1}}
+        return np.sum([sign * self.gained(column) for column, sign in takers.get(name, {name: -1}).items()], axis=0) / self.fallen
+
+    def imbalance(self) -> float:
+        """Largest difference between kinetic energy and the works of known forces, over the energy turned over so far.
+
+        What the account found besides, `other` and `imposed`, counts as unexplained: this case has neither.
+        """
+        rows = self.rows
+        works = rows["gravity"] + rows["walls"] + sum(rows[name] for name in PARTS)
+        left = np.maximum(np.abs(rows["kinetic_energy"] - rows["first_kinetic"] - works), np.abs(rows["balance"]))
+        return float((left / rows["scale"]).max())
+
+    def potential_error(self, column: str = "potential_energy") -> float:
+        """Largest difference between gravity's work since the first row and the potential energy lost, over the largest such work."""
+        work, energy = self.rows["gravity"] - self.rows["gravity"][0], self.rows[column]
+        return float(np.abs(work + energy - energy[0]).max() / np.abs(work).max())
+
+    def given_back(self) -> float:
+        """Largest energy that a dissipating part gave from one row to the next, over the energy turned over; 0 when none ever did."""
+        return float(max(np.diff(self.rows[name], prepend=0.0).max() for name in DISSIPATING) / self.rows["scale"][-1])
+
+    def step_error(self) -> float:
+        """Share that the step added to or took from the normal springs, the largest since the opening."""
+        return float(np.abs(self.gained("step_error")).max() / self.fallen)
+
+    def height(self) -> float:
+        """m, of the column: twice that of its centre of mass."""
+        return float(2.0 * np.average(self.first.positions[:, 2], weights=self.first.masses))
+
+    def front(self) -> float:
+        """m, behind which a share FRONT of the mass lies at the end."""
+        order = np.argsort(self.last.positions[:, 0])
+        behind = np.cumsum(self.last.masses[order]) / self.last.masses.sum()
+        return float(self.last.positions[order[np.searchsorted(behind, FRONT)], 0])
+
+
+def surface(frame: GrainFrame, edges: Array) -> Array:
+    """m, highest point of a grain whose centre is in each cell of x (0 where there is none)."""
+    top = np.zeros(len(edges) - 1)
+    cell = np.searchsorted(edges, frame.positions[:, 0]) - 1
+    inside = (cell >= 0) & (cell < len(top))
+    np.maximum.at(top, cell[inside], (frame.positions[:, 2] + frame.radii)[inside])
+    return top
+
+
+def read(replica: Replica) -> Collapse:
+    """What was written; DumpError when the first frame has no row in time.csv."""
+    frames, rows = replica.grains(), replica.times()
+    opening = np.flatnonzero(rows["step"] == frames[0].step)
+    if len(opening) != 1 or opening[0] + 1 >= len(rows["step"]):
+        raise DumpError(f"{replica.folder}: time.csv has no row at step {frames[0].step}, the first of grains.dump, or none after it")
+    p = replica.parameters
+    return Collapse(rows, int(opening[0]), frames[0], frames[len(frames) - 1], p["column_width"], p["grain_diameter"])
