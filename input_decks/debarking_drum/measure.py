@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
 from dembark.postproc.instruments.drum import ANGLES, PLACES, Drum, estimates, fields, read
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.replica import Array, Replica

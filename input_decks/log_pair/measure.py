@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+
 from dembark.physics.exact.pairs import Pair, PairMotion
 from dembark.postproc.instruments.logs import LogRun, energy_curves, number, over_time, read, solver_values
 from dembark.postproc.measurement import Measurement, Value

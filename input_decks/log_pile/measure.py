@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.postproc.instruments.logs import LogRun, number, over_time, read, solver_values
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.replica import Array, Replica
 from dembark.postproc.resampling import profile
 from dembark.postproc.statistics import CONFIDENCE, Estimate, block_mean, exact, student
-from numpy.typing import NDArray
 
 WALLS = (-1, -2, -3)  # ground, left and right stake
 REST = 0.1  # the share of the run, at its end, in which the stack is at rest

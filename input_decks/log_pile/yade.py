@@ -1,7 +1,5 @@
 """Log pile: logs of unequal diameter fall between two stakes and come to rest."""
 
-from types import SimpleNamespace
-
 from yade import dembark
 
 p = dembark.parameters()

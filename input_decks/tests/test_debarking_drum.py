@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from benchmarks.drum_resume import FILES, Started, compare
 from dembark.common.errors import DembarkError
 from dembark.input_decks.common.setup import Setup

@@ -1,7 +1,5 @@
 """A sphere falls on a plane and bounces. p.name: a parameter or derived number of case.toml."""
 
-from types import SimpleNamespace
-
 from yade import dembark
 
 p = dembark.parameters()
