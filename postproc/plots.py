@@ -234,7 +234,8 @@ def _solid_figure(stress: WallStress, components: Sequence[str], values: Array) 
         for axes, (elevation, azimuth) in zip(views, _VIEWS, strict=True):
             paint = Poly3DCollection(corners, **_paint(values[stress.patches.owners, column]))
             axes.add_collection3d(paint)
-            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), xlabel="x / mm", ylabel="y / mm", zlabel="z / mm")
+            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), xlabel="x / mm", ylabel="y / mm",
+                     zlabel="z / mm")
             axes.set_box_aspect(high - low)
             axes.view_init(elev=elevation, azim=azimuth)
             axes.tick_params(labelsize=5, pad=-3)

@@ -49,13 +49,15 @@ def _show_version(wanted: bool) -> None:
 
         facts = provenance.commit()
         changed = ", with changes" if facts["dirty"] else ""
-        print(f"dembark {provenance.package_version('dembark')}" + (f" (commit {facts['commit'][:12]}{changed})" if facts["commit"] else ""))
+        print(f"dembark {provenance.package_version('dembark')}"
+              + (f" (commit {facts['commit'][:12]}{changed})" if facts["commit"] else ""))
         raise typer.Exit
 
 
 @app.callback()
 def _common(
-    version: Annotated[bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Show the version, and the commit of a checkout.")] = False,
+    version: Annotated[bool, typer.Option("--version", is_eager=True, callback=_show_version,
+                                          help="Show the version, and the commit of a checkout.")] = False,
     own: Annotated[list[Path] | None, typer.Option("--cases", metavar="FOLDER", help="Folder of your own cases; repeat for more.")] = None,
 ) -> None:
     """Options that need no command."""

@@ -115,7 +115,8 @@ def study(planned: Study, folders: Sequence[Path]) -> dict[str, Any]:
     case = _case(first["case"])
     if case and (case.folder / "measure.py").is_file():
         found = measuring.study(case, planned, points)
-        quantities, profiles, remarks = measuring.quantities(case, found), list(found.profiles), [*found.remarks, *measuring.statements(case)]
+        quantities, profiles, remarks = measuring.quantities(case, found), list(found.profiles), [*found.remarks,
+                                                                                                  *measuring.statements(case)]
         references = measuring.references(case)
     else:
         module = checks.find(first["case"], case.folder if case else None)

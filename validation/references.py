@@ -118,8 +118,8 @@ STARON = Reference(
     "L. Staron, E. J. Hinch, Study of the collapse of granular columns using two-dimensional discrete-grain simulation, J. Fluid Mech. 545 "
     "(2005) 1-27.",
     "abstract",
-    "the collapse is mostly controlled by the free fall of the column, and the energy left for the flow sideways is proportional to the initial "
-    "potential energy.",
+    "the collapse is mostly controlled by the free fall of the column, and the energy left for the flow sideways is proportional to the "
+    "initial potential energy.",
 )
 
 UTILI = Reference(

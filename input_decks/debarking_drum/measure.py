@@ -42,8 +42,8 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
     recorded = np.mean([drum.recorded / drum.lost.sum() for drum in drums])
     share = given["drum_speed"] / math.sqrt(given["gravity"] / first.radius)
     remarks = [
-        f"{first.logs} logs in a drum of radius {first.radius:.3g} m; its speed is {share:.0%} of the critical one, at which logs would stay "
-        "at the shell all around.",
+        f"{first.logs} logs in a drum of radius {first.radius:.3g} m; its speed is {share:.0%} of the critical one, at which logs would "
+        "stay at the shell all around.",
         "The last revolution of the first load of each engine lies as an animation (GIF) among the figures beside the report.",
         f"The records of contacts that ended hold {recorded:.0%} of the energy lost in the window; contacts that last are not in them.",
     ]

@@ -88,7 +88,8 @@ def test_many_lines_of_all_lengths_in_one_cell_equal_numpy(periodic, closed):
     contacts = ContactFrame(7, grains.wrapped[pairs[:, 0]], branch, random.normal(size=(700, 3)), grains.ids[pairs])
     grid = Grid((0, 0, 0), (1, 1, 1), (9, 7, 11), (periodic,) * 3)
     one, many, plain = (
-        coarse_grain(grains, contacts, grid, width=0.06, closed=closed, **how) for how in ({"threads": 1}, {"threads": 3}, {"backend": "numpy"})
+        coarse_grain(grains, contacts, grid, width=0.06, closed=closed, **how)
+        for how in ({"threads": 1}, {"threads": 3}, {"backend": "numpy"})
     )
     for part in ("grains", "contacts"):
         assert np.array_equal(getattr(one, part), getattr(many, part))
@@ -196,13 +197,15 @@ def test_line_integral_is_the_mean_over_many_points(name):
     np.testing.assert_allclose(found, mean, atol={"gaussian": 5e-5, "lucy": 1e-5, "heaviside": 2e-3}[name] * mean.max())
 
 
-@pytest.mark.parametrize("gradient", [[[0, 0, 0], [0, 0, 0], [3, 0, 0]], [[0, -2, 0], [2, 0, 0], [0, 0, 0]], [[1, 2, 3], [4, 5, 6], [7, 8, -6]]])
+@pytest.mark.parametrize("gradient",
+                         [[[0, 0, 0], [0, 0, 0], [3, 0, 0]], [[0, -2, 0], [2, 0, 0], [0, 0, 0]], [[1, 2, 3], [4, 5, 6], [7, 8, -6]]])
 def test_gradient_of_an_affine_velocity_is_exact_for_any_packing(gradient):
     gradient = np.array(gradient, float)
     place = np.random.default_rng(2).uniform(0, 1, (300, 3))
     grid = Grid((0, 0, 0), (1, 1, 1), (5, 4, 3))
     for name in NAMES:
-        fields = coarse_grain(grain_frame(place, velocities=place @ gradient.T + [5.0, -7.0, 9.0]), None, grid, kernel=name, width=0.3).fields(
+        fields = coarse_grain(grain_frame(place, velocities=place @ gradient.T + [5.0, -7.0, 9.0]), None, grid, kernel=name,
+                              width=0.3).fields(
             shear_corrected=True
         )
         np.testing.assert_allclose(fields.velocity_gradient, np.broadcast_to(gradient, (5, 4, 3, 3, 3)), atol=1e-8)
@@ -408,7 +411,8 @@ def test_wrong_input_is_refused_in_one_line():
         ("0 threads", lambda: coarse_grain(grains, contacts, grid, width=0.1, threads=0)),
         ("grain 99, step 7", lambda: coarse_grain(grains, ContactFrame(7, *np.zeros((3, 1, 3)), np.array([[1, 99]])), grid, width=0.1)),
         ("both must agree", lambda: coarse_grain(grains, contacts, Grid((0, 0, 0), (1, 1, 1), (2, 2, 2), (True, False, False)), width=0.1)),
-        ("forces with numbers", lambda: coarse_grain(grains, ContactFrame(7, contacts.first, contacts.branch, contacts.forces * np.nan, contacts.ids), grid, width=0.1)),
+        ("forces with numbers", lambda: coarse_grain(grains, ContactFrame(7, contacts.first, contacts.branch, contacts.forces * np.nan,
+                                                                          contacts.ids), grid, width=0.1)),
     ):  # fmt: skip
         with pytest.raises(DembarkError, match=match) as caught:
             call()

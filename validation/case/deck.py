@@ -56,7 +56,8 @@ def _setup_module(path: Path) -> ModuleType:
 
 
 def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
-    """Derived numbers, packing and meshes of a run with the parameters `values`; DembarkError with file and line when they cannot be made."""
+    """Derived numbers, packing and meshes of a run with the parameters `values`; DembarkError with file and line when they cannot be
+    made."""
     from dembark.input_decks.common.setup import Setup
 
     path = case.folder / "setup.py"
@@ -71,7 +72,8 @@ def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
         if missing:
             raise DembarkError(f"case {case.name} does not say its {' and '.join(missing)}", str(case.folder),
                                "add a setup.py, or expressions in a table [derived]")
-        return Setup(round(float(known["steps"])), float(known["time_step"]), None, {name: known[name] for name in case.derived})  # type: ignore[arg-type, misc]
+        return Setup(round(float(known["steps"])), float(known["time_step"]), None,
+                     {name: known[name] for name in case.derived})  # type: ignore[arg-type, misc]
     try:
         return _setup_module(path).setup(SimpleNamespace(**known))
     except DembarkError:
@@ -140,7 +142,8 @@ def _files(case: Case, engine: str, values: Mapping[str, Value], setup: Setup) -
     try:
         text = source.read_text(encoding="utf-8")
     except OSError as error:
-        raise DembarkError(f"{source} cannot be read", error.strerror or str(error), f"add the deck, or take {engine} from engines in case.toml") from None
+        raise DembarkError(f"{source} cannot be read", error.strerror or str(error),
+                           f"add the deck, or take {engine} from engines in case.toml") from None
     known: dict[str, Value] = {**values, **setup.numbers, "steps": setup.steps, "time_step": setup.time_step}
     numbers = {name: engines.DeckNumber(_plain(value), _meaning(case, name)) for name, value in known.items() if name != "replicas"}
     numbers |= {name: engines.DeckNumber(tuple(map(_plain, row))) for name, row in setup.tables.items()}

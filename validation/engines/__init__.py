@@ -16,7 +16,8 @@ from dembark.validation.engines.base import DeckNumber, Engine, EngineFacts, cal
 from dembark.validation.engines.liggghts import Liggghts
 from dembark.validation.engines.yade import Yade
 
-__all__ = ["ENGINES", "DeckNumber", "Engine", "EngineFacts", "call", "end_with_parent", "facts", "find", "mpi_launcher", "names", "registered",
+__all__ = ["ENGINES", "DeckNumber", "Engine", "EngineFacts", "call", "end_with_parent", "facts", "find", "mpi_launcher", "names",
+           "registered",
            "titles"]
 
 ENGINES: tuple[type[Engine], ...] = (Liggghts, Yade)

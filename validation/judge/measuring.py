@@ -42,7 +42,8 @@ def check(case: Case) -> ModuleType:
     module = deck.load_module(path, f"dembark_measure_{case.name}")
     for name in ("measure", *(["study"] if case.studies else [])):
         if not callable(getattr(module, name, None)):
-            raise DembarkError(f"{path} has no function {name}", "", "it needs measure(replicas) and, with [studies], study(name, points, along)")
+            raise DembarkError(f"{path} has no function {name}", "",
+                               "it needs measure(replicas) and, with [studies], study(name, points, along)")
     return module
 
 

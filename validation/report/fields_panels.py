@@ -50,7 +50,8 @@ def bar(figure: Figure, axes: Any, scale: tuple[float, float], paint: str, label
     one.outline.set_linewidth(0.4)
 
 
-def curve(axes: Any, engine: str, place: Array, value: Array, half: Array | None = None, *, upward: bool = False, marked: bool = True) -> Any:
+def curve(axes: Any, engine: str, place: Array, value: Array, half: Array | None = None, *, upward: bool = False,
+          marked: bool = True) -> Any:
     """A profile of an engine with the band of its interval; `upward`: the place is drawn upwards."""
     paint, style = colour(engine), {"marker": look(engine).marker, "markersize": 2.6} if marked else {}
     if half is not None:

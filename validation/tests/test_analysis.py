@@ -35,7 +35,8 @@ def test_what_is_too_small_is_named(tmp_path: Path, count: int, frames: int, for
 
 def test_an_error_in_a_measurement_is_told_with_its_line(tmp_path: Path) -> None:
     case = SimpleNamespace(name="mine", folder=tmp_path, studies=("size",))
-    (tmp_path / "measure.py").write_text("def measure(replicas):\n    return 1 / 0\n\ndef study(name, points, along):\n    return points[along]\n")
+    (tmp_path / "measure.py").write_text("def measure(replicas):\n    return 1 / 0\n\ndef study(name, points, along):\n    return "
+                                         "points[along]\n")
     with pytest.raises(ZeroDivisionError) as caught:
         measuring.measure(case, [])
     assert analysis.reasons(tmp_path, caught.value, case) == ("ZeroDivisionError: division by zero (measure.py, line 2)",)

@@ -155,7 +155,8 @@ def test_infinity_becomes_a_number_that_json_and_the_engines_can_carry(decks: Pa
 
 @pytest.mark.parametrize(("text", "unit", "value"), [
     ("20 mm", "m", 0.02), ("72 mN/m", "N/m", 0.072), ("5 MPa", "Pa", 5e6), ("30 deg", "rad", math.pi / 6), ("5 %", "1", 0.05),
-    ("1/2", "1", 0.5), ("2.5 g/cm^3", "kg/m^3", 2500.0), ("9.81 m s^-2", "m/s^2", 9.81), ("-4*mm", "m", -0.004), ("20°", "rad", math.pi / 9), ("20 degC", "K", 293.15), ("0.3", "m", 0.3)])
+    ("1/2", "1", 0.5), ("2.5 g/cm^3", "kg/m^3", 2500.0), ("9.81 m s^-2", "m/s^2", 9.81), ("-4*mm", "m", -0.004),
+    ("20°", "rad", math.pi / 9), ("20 degC", "K", 293.15), ("0.3", "m", 0.3)])
 def test_units(text: str, unit: str, value: float) -> None:
     assert to_si(text, unit) == pytest.approx(value, rel=1e-15)
 

@@ -18,7 +18,8 @@ GRAVITY = 9.81
 
 
 def grains(
-    places: Array, radii: Array, velocities: Array | None = None, *, low: Array, high: Array, periodic: bool = False, forces: Array | None = None
+    places: Array, radii: Array, velocities: Array | None = None, *, low: Array, high: Array, periodic: bool = False,
+    forces: Array | None = None
 ) -> GrainFrame:
     """Grains of DENSITY as one frame; no spin."""
     zero = np.zeros_like(places)

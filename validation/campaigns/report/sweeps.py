@@ -64,7 +64,8 @@ class Sweep:
         return max(found, key=lambda axis: (len(self.levels(axis)), -self.axes.index(axis)), default=None)
 
     def quantities(self) -> list[QuantityRecord]:
-        """The quantities worth a picture, once each: those that failed first, then those that are checked or that the engines must agree in."""
+        """The quantities worth a picture, once each: those that failed first, then those that are checked or that the engines must agree
+        in."""
         found: dict[str, QuantityRecord] = {}
         failed: set[str] = set()
         for one in (one for point in self.points for result in point.results.values() for one in result.quantities):

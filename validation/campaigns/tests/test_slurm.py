@@ -135,7 +135,8 @@ class Campaign:
     def start(self, index: int = 0, queue_of: Queue | None = None) -> Future[object]:
         (run,) = self.plan.series[index].runs
         one = queue_of or self.queue()
-        return one.start(run, self.results / self.plan.series[index].place, Resources(time=60, memory=1e8), lambda **facts: self.told.update(facts))
+        return one.start(run, self.results / self.plan.series[index].place, Resources(time=60, memory=1e8),
+                         lambda **facts: self.told.update(facts))
 
     def queue(self) -> Queue:
         self.queues.append(Queue(self.site, self.results, self.plan, self.said.append))
@@ -180,7 +181,8 @@ def test_jobs_of_a_dead_submitter_are_adopted_or_cancelled(campaign: Campaign, o
     campaign.script(f"echo x >> $out/started; sleep 4; {FINISH}")
     campaign.start()
     number = wait_for(lambda: campaign.told.get("job"), 60)
-    stray = on_cluster.call("sbatch", "--parsable", f"--job-name={queue.prefix(campaign.results)}00000000", "--output=/dev/null", "--wrap=sleep 60")
+    stray = on_cluster.call("sbatch", "--parsable", f"--job-name={queue.prefix(campaign.results)}00000000", "--output=/dev/null",
+                            "--wrap=sleep 60")
     campaign.queues[0]._end.set()
     campaign.queues[0]._thread.join()
     campaign.told.clear()
@@ -227,11 +229,13 @@ def test_a_refused_submission_fails_its_run_and_a_hopeless_one_is_told(campaign:
 
 
 def test_another_scheduler_is_served_by_its_commands(tmp_path: Path, decks: Path, stand_in: Path,  # noqa: F811
-                                                     monkeypatch: pytest.MonkeyPatch, wait_for: Callable[..., object]) -> None:  # noqa: F811
+                                                     monkeypatch: pytest.MonkeyPatch,
+                                                     wait_for: Callable[..., object]) -> None:  # noqa: F811
     """One like PBS, that tells no names: jobs are processes, their list is a folder."""
     spool = tmp_path / "spool"
     spool.mkdir()
-    for name, text in {"qsub": f'"${{@: -1}}" & echo $! > {spool}/$!; echo "$!.server"', "qdel": 'for j in "$@"; do kill ${j%.server}; done',
+    for name, text in {"qsub": f'"${{@: -1}}" & echo $! > {spool}/$!; echo "$!.server"',
+                       "qdel": 'for j in "$@"; do kill ${j%.server}; done',
                        "qstat": f'cd {spool}; for j in *; do kill -0 $j 2>/dev/null && echo "$j.server some R"; done; true'}.items():
         (tmp_path / name).write_text(f"#!/bin/bash\n{text}\n")
         (tmp_path / name).chmod(0o755)
