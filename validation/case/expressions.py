@@ -18,8 +18,7 @@ _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge, ast.Eq: operator.eq, ast.NotEq: operator.ne,
 }
 _FUNCTIONS: dict[str, Callable[..., Any]] = {"min": min, "max": max, "abs": abs, "sqrt": math.sqrt, "ceil": math.ceil, "floor": math.floor,
-                                             "round": round,
-                                           "sin": math.sin, "cos": math.cos}
+                                             "round": round, "sin": math.sin, "cos": math.cos}
 _CONSTANTS = {"pi": math.pi}
 
 

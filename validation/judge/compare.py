@@ -30,8 +30,8 @@ def compare(folder: Path) -> Comparison:
     """
     measured = sorted((result.read(path) for path in folder.glob(f"*/{result.METRICS}")), key=lambda one: one.engine)
     if len(measured) < 2:
-        raise RunError(f"nothing to compare in {folder}", f"there is a measurement of {measured[0].engine if measured else 'no engine'} "
-                                                          "only")
+        raise RunError(f"nothing to compare in {folder}",
+                       f"there is a measurement of {measured[0].engine if measured else 'no engine'} only")
     first = measured[0]
     pairs = [pair for index, one in enumerate(measured) for other in measured[index + 1 :] for pair in _pairs(one, other)]
     return Comparison(first.case, first.variant, tuple(one.engine for one in measured), tuple(pairs), first.profile, CAP)

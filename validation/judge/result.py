@@ -88,7 +88,7 @@ class ComparedRecord(QuantityRecord):
 class Result:
     """The replicas of one case, variant and engine, measured and judged; or a study of several variants, with a `title` of its own.
 
-    `profiles`: curves as `validation.checks.run.profile` makes them; `picture`: how to show the packing; `references`: cited works;
+    `profiles`: curves as `postproc.resampling.profile` makes them; `picture`: how to show the packing; `references`: cited works;
     `measured`: when and by which commit; `inputs`: hash of each replica's inputs; `replicas_missing`: numbers of those that did not finish.
     """
 
@@ -135,8 +135,10 @@ def as_json(value: QuantityRecord | Result | Comparison) -> dict[str, Any]:
         item = getattr(value, one.name)
         if one.name in _OPTIONAL and item == _default(one):
             continue
-        content[one.name] = [as_json(part) for part in item] if one.name == "quantities" else list(item) if isinstance(item,
-                                                                                                                       tuple) else item
+        if one.name == "quantities":
+            content[one.name] = [as_json(part) for part in item]
+        else:
+            content[one.name] = list(item) if isinstance(item, tuple) else item
     return content
 
 

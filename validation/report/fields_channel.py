@@ -95,7 +95,7 @@ def _profiles(datasets: Mapping[str, Any]) -> FieldFigure:
         "kernel."
     )
     columns = {engine: [one.x.values, one.velocity_lagrangian.values,
-                        *(one[f"{name}_profile{end}"].values for name in titles for end in ("", "_half"))] for engine,
-               one in datasets.items()}
+                        *(one[f"{name}_profile{end}"].values for name in titles for end in ("", "_half"))]
+               for engine, one in datasets.items()}
     header = ["x_m", "velocity_lagrangian", *(f"{name}{end}" for name in titles for end in ("", "_half_width"))]
     return FieldFigure("profiles", figure, "Eulerian beside Lagrangian profiles", caption, {"profiles": long_table(header, columns)})

@@ -26,8 +26,8 @@ def draw(datasets: Mapping[str, Any]) -> list[FieldFigure]:
 
 def _map(datasets: Mapping[str, Any]) -> FieldFigure:
     first = next(iter(datasets.values())).attrs
-    powers = {engine: np.log10(np.where(one.impact_power.values > 0.0, one.impact_power.values, np.nan)) for engine,
-              one in datasets.items()}
+    powers = {engine: np.log10(np.where(one.impact_power.values > 0.0, one.impact_power.values, np.nan))
+              for engine, one in datasets.items()}
     scale = limits(list(powers.values()))
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(min(7.2, 3.0 * len(datasets) + 0.8), 3.1), layout="constrained")
@@ -37,8 +37,7 @@ def _map(datasets: Mapping[str, Any]) -> FieldFigure:
             image(axes, powers[engine].T, (-radius, radius, -radius, radius), scale, SEQUENTIAL, smooth=False)
             size = 2.0 * one.log_radius.values
             axes.add_collection(EllipseCollection(size, size, np.zeros_like(size), units="x", facecolor="none", edgecolor="white",
-                                                  linewidth=0.5,
-                                                  offsets=np.column_stack([one.log_x.values, one.log_z.values]),
+                                                  linewidth=0.5, offsets=np.column_stack([one.log_x.values, one.log_z.values]),
                                                   transOffset=axes.transData))
             shell = axes.add_patch(Circle((0.0, 0.0), radius, fill=False, edgecolor=_SHELL, linewidth=1.6, clip_on=False))
             axes.images[0].set_clip_path(shell)

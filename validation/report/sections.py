@@ -121,7 +121,8 @@ def line(rows: Sequence[Row], what: str) -> str:
     if not closed:
         return f"{text}."
     worst = max(closed, key=badness)
-    return f"{text}; nearest to its limit: {worst.record.title} ({worst.place}, {worst.who}), at {100.0 * badness(worst):.2g} % of what is allowed."
+    return (f"{text}; nearest to its limit: {worst.record.title} ({worst.place}, {worst.who}), "
+            f"at {100.0 * badness(worst):.2g} % of what is allowed.")
 
 
 def sections(gathered: Gathered, folder: Path) -> list[Section]:

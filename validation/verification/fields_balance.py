@@ -41,8 +41,8 @@ def _fields(network: Network, kernel: str, width: float, spacing: float) -> Fiel
 def balance() -> Item:
     """Residual of the balance of momentum against the grid's spacing, and against the kernel's width."""
     network = scenes.heap()
-    by_spacing = {kernel: np.array([residual(network, kernel, width, spacing) for spacing in _SPACINGS]) for kernel,
-                  width in _WIDTHS.items()}
+    by_spacing = {kernel: np.array([residual(network, kernel, width, spacing) for spacing in _SPACINGS])
+                  for kernel, width in _WIDTHS.items()}
     widths = np.array([0.2, 0.3, 0.45])
     by_width = np.array([residual(network, "lucy", width, 0.07)[1] for width in widths])
     fall = by_spacing["lucy"][:, 1]

@@ -70,8 +70,8 @@ def _facts(campaign: Iterable[Result]) -> dict[str, str]:
     found: dict[str, dict[str, None]] = {}
     for one in campaign:
         if one.provenance.get("commit"):
-            found.setdefault("commit",
-                             {})[str(one.provenance["commit"])[:12] + (" (changed)" if one.provenance.get("dirty") else "")] = None
+            changed = " (changed)" if one.provenance.get("dirty") else ""
+            found.setdefault("commit", {})[str(one.provenance["commit"])[:12] + changed] = None
         for name, version in one.provenance.get("versions", {}).items():
             found.setdefault(name, {})[str(version)] = None
     return {name: ", ".join(values) for name, values in found.items()}

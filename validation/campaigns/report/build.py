@@ -51,11 +51,11 @@ def _sweep(sweep: Sweep, gathered: Gathered, drawn: Path) -> dict[str, Any]:
     tables.write_table_csv(drawn / f"{name}.csv", sweep)
     write_whole(drawn / f"{name}.tex", tables.latex(sweep, quantities).encode())
     study = figures.study_figure(sweep, chosen)
-    shown = [embed(study, drawn, f"{name}-study", "Quantities along the sweep with 95 % intervals; grey and dashed: the reference of each "
-                                                  "point.")] if study else []
+    shown = [embed(study, drawn, f"{name}-study",
+                   "Quantities along the sweep with 95 % intervals; grey and dashed: the reference of each point.")] if study else []
     maps = {engine: figures.map_figure(sweep, engine, chosen) for engine in sweep.engines}
-    shown += [embed(one, drawn, f"{name}-map-{engine}", f"{engine_name(engine)} over both parameters; a red frame marks a check that "
-                                                        "failed.")
+    shown += [embed(one, drawn, f"{name}-map-{engine}",
+                    f"{engine_name(engine)} over both parameters; a red frame marks a check that failed.")
               for engine, one in maps.items() if one]
     compared = {page.variant: page.comparison for page in gathered.pages if page.case == sweep.case}
     return {"sweep": sweep, "shown": len(chosen), "left_out": len(quantities) - len(chosen), "figures": shown,

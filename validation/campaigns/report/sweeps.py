@@ -94,7 +94,8 @@ def sweeps(facts: Sequence[Mapping[str, Any]], pages: Iterable[Page], cases: Map
 def _sweep(facts: Mapping[str, Any], number: int, measured: Mapping[tuple[str, str], Mapping[str, Result]], known: Case | None) -> Sweep:
     case, axes = facts["case"], tuple(facts["axes"])
     points = tuple(Point(point["values"], point["variant"], measured.get((case, point["variant"]), {})) for point in facts["points"])
-    title = facts.get("title") or f"{case.replace('_', ' ').capitalize()}: {' × '.join(axis.replace('_', ' ') for axis in axes) or 'one point'}"
+    along = " × ".join(axis.replace("_", " ") for axis in axes) or "one point"
+    title = facts.get("title") or f"{case.replace('_', ' ').capitalize()}: {along}"
     # A case that has gone since leaves its results without units of the axes.
     units = {axis: known.parameters[axis].unit for axis in axes if known and axis in known.parameters}
     return Sweep(case, title, axes, points, f"{case}-{number}", units)

@@ -165,8 +165,7 @@ def test_runs_that_a_profile_expects_are_missing_without_a_list_of_runs(tmp_path
 @pytest.mark.parametrize(
     ("value", "interval", "text"),
     [(2.0512, [1.94, 2.1624], "2.05 ± 0.11"), (539.0, [456.0, 622.0], "539 ± 83"), (4.1e-5, [2.7e-5, 5.5e-5], "(4.1 ± 1.4)·10⁻⁵"),
-     (0.25, None, "0.250"),
-     (-0.0008, [-0.003, 0.0014], "−0.0008 ± 0.0022"), (None, None, "–"), (0.0, [0.0, 0.0], "0"),
+     (0.25, None, "0.250"), (-0.0008, [-0.003, 0.0014], "−0.0008 ± 0.0022"), (None, None, "–"), (0.0, [0.0, 0.0], "0"),
      (0.3, [0.3 - 2e-11, 0.3 + 2e-11], "0.300 ± 2.0·10⁻¹¹")],
 )
 def test_value_has_the_digits_of_its_interval(value, interval, text):

@@ -93,9 +93,9 @@ def test_a_line_of_runs_may_give_an_engine_its_own_number_of_replicas(decks: Pat
 def test_a_study_is_made_of_its_variants_and_again_when_one_of_them_changes(tmp_path: Path, environment: dict[str, str],
                                                                             decks: Path) -> None:
     path = decks / "box" / "case.toml"
-    path.write_text(path.read_text().replace("[runs]\n", STUDY).replace('{variant = "dry"}, {variant = "wet", engines = ["liggghts"]}',
-                                                                        '{variant = "dry", engines = ["liggghts"]}, '
-                    '{variant = "large", engines = ["liggghts"]}, {variant = "huge", engines = ["liggghts"]}'))
+    path.write_text(path.read_text().replace("[runs]\n", STUDY).replace(
+        '{variant = "dry"}, {variant = "wet", engines = ["liggghts"]}',
+        '{variant = "dry", engines = ["liggghts"]}, {variant = "large", engines = ["liggghts"]}, {variant = "huge", engines = ["liggghts"]}'))
     code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
     results = tmp_path / "results" / "quick"
     assert code == 0, error

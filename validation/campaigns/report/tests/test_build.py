@@ -20,8 +20,8 @@ def fill(folder: Path, commit: str = "a" * 40, shift: float = 0.0, killed: str =
 
     At the point `killed` the runs failed, at `broken` YADE's quantity `contacts`, which has no tolerance, failed.
     """
-    points = {f"dry_f={friction}_r={radius}": {"wall_friction": friction, "cylinder_radius": radius} for friction in FRICTIONS
-              for radius in RADII}
+    points = {f"dry_f={friction}_r={radius}": {"wall_friction": friction, "cylinder_radius": radius}
+              for friction in FRICTIONS for radius in RADII}
     sweep = {"case": "silo", "name": "grid", "title": "Friction and radius", "axes": ["wall_friction", "cylinder_radius"],
              "points": [{"variant": name, "base": "dry", "values": values, "changes": values} for name, values in points.items()]}
     runs = []
