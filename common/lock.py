@@ -33,7 +33,7 @@ def lock(path: Path, message: str, cancel: threading.Event | None = None, beat: 
     Interrupted. Gives an event that is set if another process takes the lock, because this one was held up for so long.
     """
     lost, ended = threading.Event(), cancel or threading.Event()
-    lease = SoftFileLease(path, lease_duration=dead_after, heartbeat_interval=beat, on_compromise=lambda told: lost.set())
+    lease = SoftFileLease(path, lease_duration=dead_after, heartbeat_interval=beat, on_compromise=lambda _: lost.set())
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         _acquire(lease, path, ended, beat, dead_after)

@@ -16,15 +16,16 @@ from dembark.common.errors import DembarkError, Interrupted
 from dembark.common.lock import Busy, held, lock
 
 TIMES = {"beat": 0.1, "dead_after": 0.6}
-HOLDER = "import sys, time; from pathlib import Path; from dembark.common.lock import lock\nwith lock(Path(sys.argv[1]), 'x'): print('held', flush=True); time.sleep(60)"
+HOLDER = ("import sys, time; from pathlib import Path; from dembark.common.lock import lock\n"
+          "with lock(Path(sys.argv[1]), 'x'): print('held', flush=True); time.sleep(60)")
 
 
 def elsewhere(path: Path) -> None:
     """A lock as a process of another host leaves it."""
     with lock(path, "busy", **TIMES):
-        text = path.read_text()
+        text = path.read_text(encoding="utf-8")
     lines = ["host=another-host" if line.startswith("host=") else line for line in text.splitlines()]
-    path.write_text("\n".join(lines) + "\n")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from dembark.common.errors import DembarkError
 from dembark.postproc import ContactsDump, GrainsDump, read_times
 from dembark.postproc.replica import Replica
 from dembark.validation.case.deck import derived
+from dembark.validation.case.folders import find
 from dembark.validation.judge import measuring
 
 WALLS = {"silo": ("side", "base"), "plane_silo": ("left", "right", "base"), "plug_flow": ("left", "right", "base"),

@@ -83,7 +83,7 @@ def cubic_lattice(size: int, stiffness: tuple[float, float, float]) -> tuple[Gra
 def fcc_lattice(size: int, force: float) -> tuple[GrainFrame, ContactFrame]:
     """A periodic face-centred cubic lattice of cubes of edge 1, each grain pressed against its twelve neighbours by `force` (N)."""
     corner = np.stack(np.meshgrid(*[np.arange(size)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
-    place = (corner + [[0, 0, 0], [0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]]).reshape(-1, 3) + 0.1
+    place = (corner + np.array([[0, 0, 0], [0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]])).reshape(-1, 3) + 0.1
     grains = grain_frame(place, radii=np.sqrt(0.125), high=(size,) * 3, periodic=(True,) * 3)
     apart = place[None] - place[:, None]
     apart -= size * np.round(apart / size)

@@ -204,10 +204,8 @@ def test_gradient_of_an_affine_velocity_is_exact_for_any_packing(gradient):
     place = np.random.default_rng(2).uniform(0, 1, (300, 3))
     grid = Grid((0, 0, 0), (1, 1, 1), (5, 4, 3))
     for name in NAMES:
-        fields = coarse_grain(grain_frame(place, velocities=place @ gradient.T + [5.0, -7.0, 9.0]), None, grid, kernel=name,
-                              width=0.3).fields(
-            shear_corrected=True
-        )
+        moving = grain_frame(place, velocities=place @ gradient.T + [5.0, -7.0, 9.0])
+        fields = coarse_grain(moving, None, grid, kernel=name, width=0.3).fields(shear_corrected=True)
         np.testing.assert_allclose(fields.velocity_gradient, np.broadcast_to(gradient, (5, 4, 3, 3, 3)), atol=1e-8)
         np.testing.assert_allclose(fields.strain_rate, np.broadcast_to(0.5 * (gradient + gradient.T), (5, 4, 3, 3, 3)), atol=1e-8)
         curl = [gradient[2, 1] - gradient[1, 2], gradient[0, 2] - gradient[2, 0], gradient[1, 0] - gradient[0, 1]]
@@ -249,7 +247,7 @@ def test_velocities_about_a_given_field():
 
 def test_kinetic_stress_of_two_streams():
     place = np.repeat(np.random.default_rng(3).uniform(0, 1, (30, 3)), 2, axis=0)
-    speed = np.tile([[0.0, 0.0, 2.0], [0.0, 0.0, -2.0]], (30, 1)) + [7.0, 0.0, 0.0]
+    speed = np.tile([[0.0, 0.0, 2.0], [0.0, 0.0, -2.0]], (30, 1)) + np.array([7.0, 0.0, 0.0])
     fields = coarse_grain(grain_frame(place, velocities=speed), None, Grid((0, 0, 0), (1, 1, 1), (3, 2, 2)), width=0.2).fields()
     np.testing.assert_allclose(fields.kinetic_stress[..., 2, 2], 4.0 * fields.density, rtol=1e-12)
     np.testing.assert_allclose(fields.temperature, 4.0 / 3.0, rtol=1e-12)
@@ -411,8 +409,8 @@ def test_wrong_input_is_refused_in_one_line():
         ("0 threads", lambda: coarse_grain(grains, contacts, grid, width=0.1, threads=0)),
         ("grain 99, step 7", lambda: coarse_grain(grains, ContactFrame(7, *np.zeros((3, 1, 3)), np.array([[1, 99]])), grid, width=0.1)),
         ("both must agree", lambda: coarse_grain(grains, contacts, Grid((0, 0, 0), (1, 1, 1), (2, 2, 2), (True, False, False)), width=0.1)),
-        ("forces with numbers", lambda: coarse_grain(grains, ContactFrame(7, contacts.first, contacts.branch, contacts.forces * np.nan,
-                                                                          contacts.ids), grid, width=0.1)),
+        ("forces with numbers", lambda: coarse_grain(
+            grains, ContactFrame(7, contacts.first, contacts.branch, contacts.forces * np.nan, contacts.ids), grid, width=0.1)),
     ):  # fmt: skip
         with pytest.raises(DembarkError, match=match) as caught:
             call()

@@ -88,7 +88,7 @@ def test_what_is_no_number(word, fault):
 def test_threads_do_not_change_the_table():
     rng = np.random.default_rng(3)
     table = rng.normal(size=(40000, 3)) * 10.0 ** rng.integers(-8, 8, (40000, 3))
-    text = np.frombuffer("".join("%.12g %.17g  %.6g \r\n" % tuple(row) for row in table).encode(), np.uint8)
+    text = np.frombuffer("".join(f"{a:.12g} {b:.17g}  {c:.6g} \r\n" for a, b, c in table).encode(), np.uint8)
     results = []
     for threads in (1, 2, 5):
         values = np.full((40000, 3), np.nan)

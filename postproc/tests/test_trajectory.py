@@ -37,7 +37,7 @@ def test_registered_format_needs_no_more_than_its_name(drift):
         assert (world.trajectory[3].time, world.trajectory.dt) == (pytest.approx(0.3), pytest.approx(0.1))
     np.testing.assert_allclose(world.atoms.masses, GrainsDump(drift)[0].masses)
     np.testing.assert_allclose(world.dimensions, [1.0, 2.0, 3.0, 90.0, 90.0, 90.0])
-    np.testing.assert_allclose(world.copy().trajectory[4].positions, PLACES + [1.2, 0.0, 0.0], atol=1e-6)
+    np.testing.assert_allclose(world.copy().trajectory[4].positions, PLACES + np.array([1.2, 0.0, 0.0]), atol=1e-6)
 
 
 def test_the_same_positions_as_mdanalysis_reads(drift):
