@@ -119,7 +119,7 @@ def render(scenes: Iterable[Scene], scale: tuple[float, float], pixels: int = _P
         if not np.isfinite(low).all():
             raise RunError("there is nothing to render", f"{count} scenes without a grain or a slice")
         view = {"low": low.tolist(), "high": high.tolist(), "scale": scale, "pixels": pixels, "map": _MAP}
-        Path(folder, "view.json").write_text(json.dumps(view))
+        Path(folder, "view.json").write_text(json.dumps(view), encoding="utf-8")
         _call(folder)
         return [np.asarray(Image.open(path)) for path in sorted(Path(folder).glob("scene-*.png"))]
 

@@ -51,8 +51,8 @@ def measured(run: LogRun) -> Measurement:
     }
     shares = ", ".join(f"{value:.4f}" for value in due / speed)
     return Measurement(values, _curves(run, chain, motion), [
-        f"Exact velocities after, over that of the first log: {shares} ({motion.events} contacts close or open on the way). All act at the "
-        "same time; a row of separate pairs would hand on the whole speed."])
+        (f"Exact velocities after, over that of the first log: {shares} ({motion.events} contacts close or open on the way). All act at "
+         "the same time; a row of separate pairs would hand on the whole speed.")])
 
 
 def _curves(run: LogRun, chain: Chain, motion: ChainMotion) -> list[dict[str, Any]]:

@@ -66,8 +66,8 @@ def measured(run: LogRun) -> Measurement:
     values = {**_at_rest(run, stack, rest), **_energy(run, height), **solver_values(run), **_beginning(run), **_impacts(run)}
     remarks = [
         f"Measured at rest: the last {REST:.0%} of the run, {run.times[rest][-1] - run.times[rest][0]:.2f} s.",
-        "All engines are due to be the same to round-off, which grows at each impact; a bound is set to the state after the "
-        f"first {FIRST} impacts, all that comes later within the intervals.",
+        ("All engines are due to be the same to round-off, which grows at each impact; a bound is set to the state after the "
+         f"first {FIRST} impacts, all that comes later within the intervals."),
     ]
     if run.parameters["stake_friction"] > 0.0:
         remarks.append("The stakes are rough and carry a part of the weight.")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 import h5netcdf
 import numpy as np
@@ -89,7 +89,7 @@ class FieldsNetcdf:
         self._grid: Grid | None = None
         self._walls: list[WallStress] = []
 
-    def __enter__(self) -> FieldsNetcdf:
+    def __enter__(self) -> Self:
         return self
 
     def add(self, fields: Labelled, time: float, span: tuple[float, float] | None = None) -> None:

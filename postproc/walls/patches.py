@@ -97,7 +97,7 @@ def _rectangular(edges: tuple[Array, Array], area: _OfTwo, surface: _OfTwo, norm
 def plane_patches(wall: PlaneWall, u: Array, v: Array) -> Patches:
     """Rectangles of a plane between the borders `u` and `v` (m, rising)."""
     return _rectangular((u, v), lambda a, b: np.outer(np.diff(a), np.diff(b)), wall.points,
-                        lambda a, b: np.broadcast_to(wall.axes[0], (*a.shape, 3)), ("u", "v"), ("m", "m"), (np.inf, np.inf))
+                        lambda a, _: np.broadcast_to(wall.axes[0], (*a.shape, 3)), ("u", "v"), ("m", "m"), (np.inf, np.inf))
 
 
 def cylinder_patches(wall: CylinderWall, around: int, height: Array) -> Patches:
@@ -106,7 +106,7 @@ def cylinder_patches(wall: CylinderWall, around: int, height: Array) -> Patches:
         raise DembarkError(f"wall {wall.name}: {around} patches around", "", "it must be at least one")
     sign = -1.0 if wall.inward else 1.0
     return _rectangular((np.linspace(0.0, _TURN, around + 1), height), lambda a, b: wall.radius * np.outer(np.diff(a), np.diff(b)),
-                        wall.points, lambda a, b: sign * wall.outward(a), ("angle", "height"), ("rad", "m"), (_FACET, np.inf))
+                        wall.points, lambda a, _: sign * wall.outward(a), ("angle", "height"), ("rad", "m"), (_FACET, np.inf))
 
 
 def mesh_patches(wall: MeshWall, by: str = "triangle") -> Patches:

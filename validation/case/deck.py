@@ -38,7 +38,7 @@ def load_module(path: Path, name: str) -> ModuleType:
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # the file may be the user's: whatever is wrong in it is told in one line
+    except Exception as error:  # noqa: BLE001 - the file may be the user's: whatever is wrong in it is told in one line
         raise failed(path, error) from None
     return module
 
@@ -78,7 +78,7 @@ def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
         return _setup_module(path).setup(SimpleNamespace(**known))
     except DembarkError:
         raise
-    except Exception as error:  # as above
+    except Exception as error:  # noqa: BLE001 - as above
         raise failed(path, error) from None
 
 
@@ -94,7 +94,7 @@ def write(case: Case, engine: str, values: Mapping[str, Value], folder: Path) ->
 
 
 @cache
-def _check_sum(path: Path, changed: int) -> str:
+def _check_sum(path: Path, _changed: int) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 

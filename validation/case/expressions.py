@@ -87,7 +87,7 @@ class Expression:
         except _Unset:
             return None
 
-    def _value(self, node: ast.AST, values: Mapping[str, Any]) -> Any:
+    def _value(self, node: ast.AST, values: Mapping[str, Any]) -> Any:  # noqa: PLR0911 - one return for each kind of node
         match node:
             case ast.Name(id=name) if name in _CONSTANTS:
                 return _CONSTANTS[name]

@@ -26,12 +26,12 @@ _NUMBERS = ("scale", "radius", "drum_radius", "drum_speed", "speed")
 
 
 def measure(case: Case, replicas: Sequence[Replica]) -> Measurement:
-    """What measure(replicas) of the case returns; DembarkError or RunError in one line for whatever goes wrong in it."""
+    """What the measure.py of the case returns for `replicas`; DembarkError or RunError in one line for whatever goes wrong in it."""
     return _call(case, "measure", lambda function: function(replicas))
 
 
 def study(case: Case, planned: Study, points: Sequence[Mapping[str, Any]]) -> Measurement:
-    """What study(name, points, along) of the case returns; `points` are the contents of the variants' metrics.json."""
+    """What the measure.py of the case returns for the study `planned`; `points` are the contents of the variants' metrics.json."""
     return _call(case, "study", lambda function: function(planned.name, points, planned.along))
 
 

@@ -72,8 +72,8 @@ def csv_rows(rows: Iterable[Row]) -> Iterable[Sequence[Any]]:
     for row in rows:
         one = row.record
         yield (row.case, row.anchor.removeprefix(f"{row.case}-"), row.who, one.name, one.label, one.unit, one.value,
-               *(one.interval or (None, None)), one.reference, *(one.reference_interval or (None, None)), one.deviation, one.deviation_kind, one.tolerance, one.verdict,
-               one.evidence,
+               *(one.interval or (None, None)), one.reference, *(one.reference_interval or (None, None)), one.deviation,
+               one.deviation_kind, one.tolerance, one.verdict, one.evidence,
                one.reason, one.detail, one.source)
 
 

@@ -48,7 +48,7 @@ def validate(profile: str, cancel: threading.Event, cores: int | None = None, re
     planned, results = source.plan(profile, None, cases, engines), results_root.resolve() / profile
     count = cores or os.cpu_count() or 1
     with lock(results / LOCK, f"another validation works in {results}"):
-        return perform(planned, results, lambda table: Local(count, None, cancel), cancel, count)
+        return perform(planned, results, lambda _: Local(count, None, cancel), cancel, count)
 
 
 def perform(plan: Plan, results: Path, place: Place, cancel: threading.Event, cores: int = 1, log: Path | None = None,

@@ -58,7 +58,7 @@ class Queue:
     here = False
 
     def __init__(self, site: Site, results: Path, plan: Plan, say: Callable[[str], None], limit: int | None = None,
-                 known: Callable[[str], str] = lambda name: "") -> None:
+                 known: Callable[[str], str] = lambda _: "") -> None:
         self._site, self._results, self._plan, self._say, self._known = site, results, plan, say, known
         self._limit = limit or site.jobs["at_a_time"]
         self._prefix = prefix(results)
@@ -76,9 +76,11 @@ class Queue:
         return self._prefix + inputs[:8]
 
     def fits(self, used: Resources, busy: Sequence[Resources]) -> bool:
+        """See Backend; the scheduler looks after cores and memory, only the number of jobs is limited here."""
         return len(busy) < self._limit
 
     def start(self, run: Run, out: Path, used: Resources, tell: Tell) -> Future[object]:
+        """See Backend; the run is submitted as a job."""
         interval = [] if used.restart_interval is None else ["--restart-interval", str(used.restart_interval)]
         words = ["--inputs", run.inputs, "--ranks", str(used.ranks), "--threads", str(used.threads), *interval]
         report = out / f".{run.folder_name}.job.json"

@@ -85,7 +85,7 @@ def lattice() -> Item:
     widths = np.array([0.3, 0.4, 0.5, 0.6, 0.8])
     ripple: dict[str, list[float]] = {"gaussian": [], "lucy": []}
     mean_error = 0.0
-    for kernel in ripple:
+    for kernel, errors in ripple.items():
         # The ball of Lucy's kernel is soon as wide as the crystal.
         for width in widths if kernel == "gaussian" else widths[:2]:
             # Kernels of the same second moment, so that they smooth alike.
@@ -93,7 +93,7 @@ def lattice() -> Item:
             stress = _periodic(frame, links, kernel, scaled)
             mean = stress.mean(axis=(0, 1, 2))
             mean_error = max(mean_error, float(np.abs(mean / pressure - np.eye(3)).max()))
-            ripple[kernel].append(float(np.abs(np.trace(stress, axis1=-2, axis2=-1) / (3.0 * pressure) - 1.0).max()))
+            errors.append(float(np.abs(np.trace(stress, axis1=-2, axis2=-1) / (3.0 * pressure) - 1.0).max()))
     wave = 2.0 * np.pi * np.sqrt(3.0) / edge
     due = np.exp(-0.5 * (wave * widths) ** 2)
     seen = due > 1e-4

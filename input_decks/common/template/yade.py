@@ -14,7 +14,8 @@ O.engines = [
     InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()]),
     InteractionLoop(
         [Ig2_Wall_Sphere_ScGeom()],
-        [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(restitution=p.restitution, staticFriction=0, kineticFriction=0, criticalSlipDistance=0)],
+        [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(restitution=p.restitution, staticFriction=0, kineticFriction=0,
+                                                    criticalSlipDistance=0)],
         [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz()]),
     PyRunner(command="if O.iter: dump.write()", iterPeriod=p.stride),
     NewtonIntegrator(damping=0, gravity=weight),

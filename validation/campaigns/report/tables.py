@@ -45,9 +45,8 @@ def latex(sweep: Sweep, quantities: Sequence[QuantityRecord]) -> str:
     lines = [r"\begin{tabular}{" + "r" * len(sweep.axes) + "llrrrl}", r"\hline", " & ".join(map(_escape, head)) + r" \\", r"\hline"]
     for point in sweep.points:
         for engine, result in sorted(point.results.items()):
-            for one in result.quantities:
-                if one.name in names:
-                    lines.append(" & ".join(_escape(cell) for cell in _cells(sweep, point.values, engine, one)) + r" \\")
+            lines.extend(" & ".join(_escape(cell) for cell in _cells(sweep, point.values, engine, one)) + r" \\"
+                         for one in result.quantities if one.name in names)
     return "\n".join([*lines, r"\hline", r"\end{tabular}", ""])
 
 

@@ -179,7 +179,7 @@ def test_a_sweep_of_both_engines_survives_and_gives_the_numbers_of_one_without_f
     numbers, expected = quantities(results), quantities(clean)
     assert set(numbers) == set(expected) and rows == len(numbers)
     for key, quantity in numbers.items():
-        low, high = expected[key]["interval"] if expected[key]["interval"] else (expected[key]["value"],) * 2
+        low, high = expected[key]["interval"] or (expected[key]["value"],) * 2
         assert quantity["value"] is None or low <= quantity["value"] <= high, key
 
 

@@ -183,7 +183,7 @@ def test_a_mistake_gets_one_line_before_anything_starts(name: str, write, tmp_pa
     (["large", "--cores", "2"], "is to have 1e+03 GB of memory"),
     (["smal"], "did you mean small?"),
 ])
-def test_a_wrong_command_gets_one_line(words: list[str], expected: str, decks: Path, tmp_path: Path,  # noqa: F811
+def test_a_wrong_command_gets_one_line(words: list[str], expected: str, decks: Path, tmp_path: Path,
                                        monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
     (decks / "box/campaigns").mkdir()

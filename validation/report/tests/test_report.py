@@ -20,12 +20,13 @@ from dembark.validation.report.gather import Row, gather
 
 build_module = sys.modules[write_pdf.__module__]
 
-_opened: list[str] | None = None
+_listeners: list[list[str]] = []
 
 
 def _hook(event, arguments):
-    if _opened is not None and event == "open":
-        _opened.append(str(arguments[0]))
+    if event == "open":
+        for opened in _listeners:
+            opened.append(str(arguments[0]))
 
 
 sys.addaudithook(_hook)
@@ -35,7 +36,6 @@ sys.addaudithook(_hook)
 def results(tmp_path_factory):
     """Two cases in both engines with a failed identity, a failure without tolerance, a run that failed, a result that cannot be read, and
     trajectories that nobody may open."""
-    global _opened
     folder = full_size.write(tmp_path_factory.mktemp("results") / "quick", ("silo", "log_pile"), variants=2)
     full_size.change(folder / "silo/variant_0/yade/metrics.json", "quantity_0", verdict="fail", value=0.3, deviation=0.3,
                      label="lost momentum")
@@ -51,12 +51,12 @@ def results(tmp_path_factory):
         for name in ("grains.dump", "contacts.dump", "run.json", "time.csv"):
             (place / "replica-1" / name).write_text("not to be read")
     written = sorted(path for path in folder.rglob("*") if path.is_file())
-    pages = []
-    _opened = []
+    pages, opened = [], []
+    _listeners.append(opened)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(build_module, "write_pdf", lambda html, path: pages.append(html) or write_pdf(html, path))
         report.build(folder)
-    opened, _opened = _opened, None
+    _listeners.clear()
     return folder, pages[0], opened, written
 
 

@@ -58,7 +58,7 @@ def tasks(folder: Path) -> list[Task]:
 
 
 def write(path: Path, text: str) -> None:
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
 
 
 def fail(text: str) -> None:

@@ -95,15 +95,16 @@ def test_a_study_is_made_of_its_variants_and_again_when_one_of_them_changes(tmp_
     path = decks / "box" / "case.toml"
     path.write_text(path.read_text().replace("[runs]\n", STUDY).replace(
         '{variant = "dry"}, {variant = "wet", engines = ["liggghts"]}',
-        '{variant = "dry", engines = ["liggghts"]}, {variant = "large", engines = ["liggghts"]}, {variant = "huge", engines = ["liggghts"]}'))
-    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+        '{variant = "dry", engines = ["liggghts"]}, {variant = "large", engines = ["liggghts"]}, '
+        '{variant = "huge", engines = ["liggghts"]}'))
+    code, _, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
     results = tmp_path / "results" / "quick"
     assert code == 0, error
     assert read_json(results / "box/study-size/liggghts/metrics.json")["numbers"] == [10, 30, 40]
     assert "box/study-size/liggghts/metrics.json" in (results / "report.html").read_text()
 
     path.write_text(path.read_text().replace("grain_count = 40", "grain_count = 50"))
-    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    code, _, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
     assert code == 0 and read_json(results / "box/study-size/liggghts/metrics.json")["numbers"] == [10, 30, 50]
 
 

@@ -51,7 +51,7 @@ def work(below: Path) -> Path:
 
 @pytest.mark.parametrize("engine", ["liggghts", "yade"])
 def test_killed_run_goes_on_from_its_newest_state(tmp_path: Path, engine: str) -> None:
-    with pytest.raises(Killed, match="killed by SIGKILL at step 50 of 100.*it goes on from step 40 when it is started again"):
+    with pytest.raises(Killed, match=r"killed by SIGKILL at step 50 of 100.*it goes on from step 40 when it is started again"):
         run(tmp_path, engine, behaviour="kill")
     record = run(tmp_path, engine, behaviour="kill")
     assert (record["attempts"], record["resumed_at"], record["resume"], record["restart_every"]) == (2, [40], "exact", 20)
@@ -98,7 +98,7 @@ def test_failure_of_the_run_itself_begins_anew(tmp_path: Path) -> None:
 
 
 def test_full_disk_costs_no_state(tmp_path: Path) -> None:
-    with pytest.raises(RunError, match="disk is full.*goes on from step 40"):
+    with pytest.raises(RunError, match=r"disk is full.*goes on from step 40"):
         run(tmp_path, behaviour="full")
     assert run(tmp_path, behaviour="full")["resumed_at"] == [40]
 
@@ -123,7 +123,7 @@ def test_interruption_says_where_the_run_goes_on(tmp_path: Path, engine_pid: Cal
     thread = threading.Thread(target=work_on)
     thread.start()
     engine_pid(tmp_path)
-    wait_for(lambda: (work(tmp_path) / "state.40.restart.crc").exists())
+    wait_for((work(tmp_path) / "state.40.restart.crc").exists)
     cancel.set()
     thread.join(20)
     assert caught == ["box dry liggghts 1 was interrupted, it goes on from step 40 when it is started again"]
@@ -140,7 +140,7 @@ def test_killed_harness_leaves_what_the_next_attempt_needs(tmp_path: Path, engin
             f"simulate.simulate(one, Path({str(tmp_path / 'out')!r}), threading.Event(), used)")
     process = subprocess.Popen([sys.executable, "-c", text])
     pid = engine_pid(tmp_path)
-    wait_for(lambda: (work(tmp_path) / "state.40.restart.crc").exists())
+    wait_for((work(tmp_path) / "state.40.restart.crc").exists)
     with pytest.raises(DembarkError, match="by another process"):
         run(tmp_path, behaviour="hang")
     process.kill()
