@@ -10,9 +10,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from dembark.postproc.instruments.collapse import Collapse, read, surface
+
+from dembark.postproc.instruments.collapse import Collapse, deposits, read, shares
 from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.replica import Array, Replica
+from dembark.postproc.replica import Replica
 from dembark.postproc.resampling import profile
 from dembark.postproc.statistics import Estimate, exact, over_replicas
 from dembark.postproc.studies import fitted_exponent, measured, propagated
@@ -61,28 +62,13 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
         **{f"{name}_share": share(name) for name in ways},
         "aspect_ratio": Value(aspect),
         "run_out": beside(lambda one: one.front() / one.width - 1.0, run_out_law(aspect.value)),
-        "final_height": beside(lambda one: surface(one.last, np.array([0.0, 2.0 * one.diameter]))[0] / one.width, height_law(aspect.value)),
+        "final_height": beside(lambda one: one.height_at_wall() / one.width, height_law(aspect.value)),
     }
-    fallen, turned = (1e3 * float(np.mean(energies)) for energies in ([one.fallen for one in runs], [one.rows["scale"][-1] for one in runs]))
+    fallen, turned = 1e3 * np.mean([(one.fallen, one.rows["scale"][-1]) for one in runs], axis=0)
     remarks = [f"The collapse loses {fallen:.4g} mJ of potential energy; all works of the run, rain included, make {turned:.4g} mJ."]
     if len(runs) < 3:
         remarks.append("Shares and deposit vary from packing to packing; fewer than three tell nothing about by how much.")
-    return Measurement(values, [*_curves(runs, {"potential": "Potential energy lost"} | ways), _deposit(runs)], remarks)
-
-
-def _curves(runs: Sequence[Collapse], ways: Mapping[str, str]) -> list[dict[str, Any]]:
-    times: list[Array] = [one.gained("time") for one in runs]
-    place = np.linspace(0.0, times[0][-1], 101)
-    return [profile(name, title, "time since the gate moves (s)", "over the potential energy lost", place,
-                    [np.interp(place, time, one.lost_in(name)) for time, one in zip(times, runs, strict=True)])
-            for name, title in ways.items()]
-
-
-def _deposit(runs: Sequence[Collapse]) -> dict[str, Any]:
-    width, edges = runs[0].width, np.arange(0.0, 5.0 * runs[0].width, runs[0].diameter)
-    before = np.mean([surface(one.first, edges) for one in runs], axis=0) / width
-    return profile("deposit", "Deposit", "x / W", "height / W", 0.5 * (edges[1:] + edges[:-1]) / width,
-                   [surface(one.last, edges) / width for one in runs], reference=before, reference_label="when the gate opens")
+    return Measurement(values, [*shares(runs, {"potential": "Potential energy lost"} | ways), deposits(runs)], remarks)
 
 
 def study(name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:

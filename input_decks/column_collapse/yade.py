@@ -1,8 +1,6 @@
 """Column collapse: grains settle between a back wall and a gate, the gate moves away, and the energies of all forces are booked."""
 
 import math
-from types import SimpleNamespace
-
 from yade import dembark
 
 p = dembark.parameters()

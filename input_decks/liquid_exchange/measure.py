@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
 from dembark.physics.exact.liquid_row import Row, Rule, books
 from dembark.postproc.instruments.logs import number
 from dembark.postproc.measurement import Measurement

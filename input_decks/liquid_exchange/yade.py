@@ -1,8 +1,6 @@
 """Liquid exchange: a row of grains between two walls on given paths; they touch, share liquid and part."""
 
 import math
-from types import SimpleNamespace
-
 from yade import dembark
 
 p = dembark.parameters()

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
 from dembark.physics.exact.impacts import Impacts
 from dembark.postproc.instruments.impact_tests import head_on, mirrored, oblique, restitutions
 from dembark.postproc.instruments.impacts import Flight, Solutions, read

@@ -1,7 +1,5 @@
 """Single contact: spheres of two materials, each of which meets a plane or a sphere of its own. No gravity."""
 
-from types import SimpleNamespace
-
 from yade import dembark
 
 p = dembark.parameters()

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from dembark.input_decks.tests.measuring import defaults, judged, module
 from dembark.postproc import DumpError
 from dembark.postproc.instruments.collapse import PARTS
@@ -134,6 +135,18 @@ def test_published_laws_where_they_hold() -> None:
     assert column_collapse.height_law(1.0) is None and column_collapse.height_law(32.0) == pytest.approx(4.0)
 
 
+def test_a_high_column_stands_beside_the_experiments_without_a_verdict(tmp_path: Path) -> None:
+    """Half as wide it is four times as high."""
+    one = replica(tmp_path)
+    narrow = Replica(one.folder, {**one.record, "parameters": defaults("column_collapse", bridge_volume=8e-11, column_width=0.02)})
+    measured = found(narrow)
+    assert measured["aspect_ratio"]["value"] == pytest.approx(4.0)
+    assert measured["run_out"]["reference"] == pytest.approx(1.9 * 4.0 ** (2 / 3))
+    assert measured["final_height"]["reference"] == pytest.approx(4.0**0.4)
+    assert {(measured[name]["verdict"], measured[name]["source"]) for name in ("run_out", "final_height")} == {("info", "Lube et al. 2005")}
+    assert "spheres that roll" in measured["run_out"]["reason"]
+
+
 def points(order: float, spread: float) -> list[dict[str, Any]]:
     made = []
     for step in (0.2, 0.05, 0.1):
@@ -143,7 +156,8 @@ def points(order: float, spread: float) -> list[dict[str, Any]]:
     return made
 
 
-@pytest.mark.parametrize(("order", "spread", "verdict"), [(2.0, 0.05, "pass"), (1.0, 0.05, "fail"), (1.7, 0.05, "fail"), (2.0, 0.5, "info")])
+@pytest.mark.parametrize(("order", "spread", "verdict"),
+                         [(2.0, 0.05, "pass"), (1.0, 0.05, "fail"), (1.7, 0.05, "fail"), (2.0, 0.5, "info")])
 def test_order_of_the_step_error(order: float, spread: float, verdict: str) -> None:
     measured = column_collapse.study("step", points(order, spread), "time_step_fraction")
     one, (curve,) = judged("column_collapse", measured)["order_step_error"], measured.profiles

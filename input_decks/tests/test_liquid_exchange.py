@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from dembark.common.errors import DembarkError
 from dembark.input_decks.tests.measuring import judged, module, names
 from dembark.postproc import read_times

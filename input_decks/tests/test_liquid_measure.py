@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.physics.exact import liquid_row
 from dembark.physics.exact.liquid_row import Books

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from dembark.common.files import check_times, count_frames
 from dembark.input_decks.tests.measuring import module
 from dembark.physics.exact.contact_law import stepped

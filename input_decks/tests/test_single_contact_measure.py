@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.physics.exact.contact_law import stepped
 from dembark.postproc.instruments.impacts import Flight

@@ -5,13 +5,15 @@ Energies in J; works are positive when they make grains faster.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from dembark.postproc import DumpError, GrainFrame
 from dembark.postproc.replica import Array, Replica
+from dembark.postproc.resampling import profile
 
 PARTS = ("normal_elastic", "normal_viscous", "tangential_elastic", "tangential_viscous", "capillary", "liquid_viscous")
 DISSIPATING = ("normal_viscous", "tangential_viscous", "liquid_viscous")
@@ -79,8 +81,12 @@ class Collapse:
         behind = np.cumsum(self.last.masses[order]) / self.last.masses.sum()
         return float(self.last.positions[order[np.searchsorted(behind, FRONT)], 0])
 
+    def height_at_wall(self) -> float:
+        """m, of the deposit: the highest grain within 2 d of the back wall."""
+        return float(_surface(self.last, np.array([0.0, 2.0 * self.diameter]))[0])
 
-def surface(frame: GrainFrame, edges: Array) -> Array:
+
+def _surface(frame: GrainFrame, edges: Array) -> Array:
     """m, highest point of a grain whose centre is in each cell of x (0 where there is none)."""
     top = np.zeros(len(edges) - 1)
     cell = np.searchsorted(edges, frame.positions[:, 0]) - 1
@@ -97,3 +103,20 @@ def read(replica: Replica) -> Collapse:
         raise DumpError(f"{replica.folder}: time.csv has no row at step {frames[0].step}, the first of grains.dump, or none after it")
     p = replica.parameters
     return Collapse(rows, int(opening[0]), frames[0], frames[len(frames) - 1], p["column_width"], p["grain_diameter"])
+
+
+def shares(runs: Sequence[Collapse], ways: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Curves over time of the shares that `ways` have taken, by name with a title."""
+    times = [one.gained("time") for one in runs]
+    place = np.linspace(0.0, times[0][-1], 101)
+    return [profile(name, title, "time since the gate moves (s)", "over the potential energy lost", place,
+                    [np.interp(place, time, one.lost_in(name)) for time, one in zip(times, runs, strict=True)])
+            for name, title in ways.items()]
+
+
+def deposits(runs: Sequence[Collapse]) -> dict[str, Any]:
+    """Curve of the deposit's surface beside that of the column."""
+    width, edges = runs[0].width, np.arange(0.0, 5.0 * runs[0].width, runs[0].diameter)
+    before = np.mean([_surface(one.first, edges) for one in runs], axis=0) / width
+    return profile("deposit", "Deposit", "x / W", "height / W", 0.5 * (edges[1:] + edges[:-1]) / width,
+                   [_surface(one.last, edges) / width for one in runs], reference=before, reference_label="when the gate opens")

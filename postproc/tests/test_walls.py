@@ -16,7 +16,8 @@ from dembark.postproc.walls.patches import box_patches, cylinder_patches, inclus
 from dembark.postproc.walls.peaks import Blocks, Histogram, PeakFinder
 from dembark.postproc.walls.stress import wall_stress
 from dembark.validation import engines
-from dembark.validation.case import folders
+from dembark.validation.case import deck, folders
+from dembark.validation.case.resolve import portable, resolve
 
 RANDOM = np.random.default_rng(7)
 
@@ -368,11 +369,18 @@ SMALL = {"grain_count": 150, "grain_diameter": 0.006, "gravity": 200.0, "settle_
          "cylinder_radius": 0.02}
 
 
+def simulated(case, name, values, folder):
+    """Run a deck of `case` in `folder`; what was derived for it."""
+    engine, one = engines.find(name), folders.find(case)
+    made = deck.write(one, name, portable(resolve(one, changes=values)), folder)
+    done = engines.call(engine.command(folder / one.deck(name).name, {}), folder, engine.environment())
+    assert done.returncode == 0, done.stdout[-1000:] + done.stderr[-1000:]
+    return made
+
+
 @pytest.mark.parametrize("name", ["liggghts", "yade"])
 def test_integrated_stress_is_the_engines_own_wall_force(name, tmp_path):
-    engine = engines.find(name)
-    done = engines.call(engine.command(folders.find("silo").deck(name), SMALL), tmp_path, engine.environment())
-    assert done.returncode == 0, done.stdout[-1000:] + done.stderr[-1000:]
+    simulated("silo", name, SMALL, tmp_path)
     grains, history = GrainsDump(tmp_path / "grains.dump"), read_times(tmp_path / "time.csv")
     walls = [CylinderWall("side", SMALL["cylinder_radius"]), PlaneWall("base")]
     for wall in walls:
@@ -403,12 +411,10 @@ def test_integrated_stress_is_the_engines_own_wall_force(name, tmp_path):
 
 
 def test_moving_mesh_has_the_engines_own_force_and_is_where_the_grains_touch_it(tmp_path):
-    engine = engines.find("liggghts")
     values = {"grain_count": 120, "channel_width": 0.04, "channel_depth": 0.02, "settle_time": 0.03, "run_in": 0.02, "travel": 0.1,
               "frames": 4, "gravity": 200.0, "base_speed": 0.02}
-    done = engines.call(engine.command(folders.find("plug_flow").deck("liggghts"), values), tmp_path, engine.environment())
-    assert done.returncode == 0, done.stdout[-1000:] + done.stderr[-1000:]
-    steps, time_step = (float(word) for word in done.stdout.split("dembark: steps ")[1].split()[0:3:2])
+    made = simulated("plug_flow", "liggghts", values, tmp_path)
+    steps, time_step = made.steps, made.time_step
     history = read_times(tmp_path / "time.csv")
     since = np.ceil(values["settle_time"] / time_step) * time_step
     plate = MeshWall.from_stl("base", tmp_path / "plate.stl", motion=Motion((0.0, 0.0, -values["base_speed"]), since))

@@ -49,10 +49,12 @@ class Impacts:
 
     @property
     def reduced_radius(self) -> Array:
+        """R* (m)."""
         return 1.0 / (1.0 / self.radius).sum(axis=0)
 
     @property
     def reduced_mass(self) -> Array:
+        """m* (kg)."""
         return 1.0 / (1.0 / self.mass).sum(axis=0)
 
     @property
@@ -109,8 +111,8 @@ class Rebounds:
     duration: Array
 
     def numbers(self, one: Impacts) -> dict[str, Array]:
-        """By name, (n,) each: `overlap`, `force`, `duration`, and velocities after over the speed of approach: that of parting
-        (`restitution`), and of the sphere along the plane (`slide`), of its surface by its `spin`, and of its point of contact (`patch`)."""
+        """By name, (n,) each: `overlap`, `force`, `duration`, and velocities after over the speed of approach: of parting (`restitution`),
+        of the sphere along the plane (`slide`), of its surface by its `spin`, and of its point of contact (`patch`)."""
         slide, spin = self.slide[0] / one.closing, one.radius[0] * self.spin[0] / one.closing
         return {"restitution": (self.normal[0] - self.normal[1]) / one.closing, "slide": slide, "spin": spin, "patch": slide + spin,
                 "overlap": self.overlap, "force": self.force, "duration": self.duration}
