@@ -78,7 +78,6 @@ class Books:
 
     @property
     def total(self) -> Array:
-        """All of the liquid (m^3) after each step."""
         """All liquid (m^3)."""
         return self.grains.sum(axis=1) + self.bridges + self.wall
 
