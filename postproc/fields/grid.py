@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dembark.common.errors import DembarkError
-from dembark.postproc.grains import GrainFrame, cell
+from dembark.postproc.dumps.frames import cell
+from dembark.postproc.grains import GrainFrame
 
 Array = NDArray[np.float64]
 

@@ -31,7 +31,9 @@ class Places:
 class Wall(Protocol):
     """What the functions here need of a wall."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """Its name in files and messages."""
 
     def at(self, time: float) -> Wall:
         """The wall where it is at `time` (s)."""
