@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dembark.postproc.dumps.frames import cell
 from dembark.postproc.dumptext import DumpError
 from dembark.postproc.fields.coarse_graining import WallContacts
-from dembark.postproc.grains import GrainFrame, cell
+from dembark.postproc.grains import GrainFrame
 from dembark.postproc.walls.surfaces import Wall
 
 Array = NDArray[np.float64]

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
-from dembark.postproc.grains import GrainFrame, cell
+from dembark.postproc.dumps.frames import cell
+from dembark.postproc.grains import GrainFrame
 from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, PlaneWall, Wall
 
 Array = NDArray[np.float64]

@@ -72,8 +72,8 @@ def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
         if missing:
             raise DembarkError(f"case {case.name} does not say its {' and '.join(missing)}", str(case.folder),
                                "add a setup.py, or expressions in a table [derived]")
-        return Setup(round(float(known["steps"])), float(known["time_step"]), None,
-                     {name: known[name] for name in case.derived})  # type: ignore[arg-type, misc]
+        return Setup(round(float(known["steps"])), float(known["time_step"]), None,  # type: ignore[arg-type]
+                     {name: known[name] for name in case.derived})  # type: ignore[misc]
     try:
         return _setup_module(path).setup(SimpleNamespace(**known))
     except DembarkError:

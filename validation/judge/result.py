@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 from dembark.common.errors import RunError
 from dembark.common.files import read_json, write_json
@@ -207,7 +207,7 @@ def _value(content: Mapping[str, Any], kind: type[Kind], where: str, notes: dict
             part = ComparedRecord if kind is Comparison else QuantityRecord
             item = tuple(_value(one, part, where, notes) for one in item)
         given[key] = tuple(item) if isinstance(item, list) else item
-    return cast(Kind, kind(**given))
+    return kind(**given)
 
 
 def results(folder: Path) -> tuple[list[Result], list[Comparison], list[str]]:

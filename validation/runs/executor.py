@@ -157,7 +157,7 @@ class Executor:
         """All `tasks` that are not finished, in their order, and all `steps` that are not up to date; Interrupted when cancelled."""
         self._tasks = [task for task in tasks if self._table.state(task.name).state != "finished"]
         self._steps = list(steps)
-        self._open = {one.name for one in (*self._tasks, *self._steps)}
+        self._open = {one.name for one in self._tasks} | {one.name for one in self._steps}
         try:
             while not self._cancel.is_set():
                 before = len(self._open)

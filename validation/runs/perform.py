@@ -78,7 +78,7 @@ def perform(plan: Plan, results: Path, place: Place, cancel: threading.Event, co
 
     def before_report() -> None:
         write_summary()
-        collect([one.place for one in (*plan.series, *studies(plan.series))], plan.whole)
+        collect([*(one.place for one in plan.series), *(one.place for one in studies(plan.series))], plan.whole)
 
     def after(step: Step) -> None:
         if step.kind in ("measure", "study"):

@@ -193,6 +193,7 @@ def finished(folder: Path, run: Run) -> bool:
 def variants(all_series: Sequence[Series]) -> dict[Path, list[Series | PlannedStudy]]:
     """Series, and studies, by the folder of their case and variant; those with more than one are compared."""
     groups: dict[Path, list[Series | PlannedStudy]] = {}
-    for one in (*all_series, *studies(all_series)):
+    every: list[Series | PlannedStudy] = [*all_series, *studies(all_series)]
+    for one in every:
         groups.setdefault(one.place.parent, []).append(one)
     return groups

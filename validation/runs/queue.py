@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import write_whole
@@ -218,7 +219,7 @@ class Queue:
             job.future.set_exception(Killed(f"{job.title} failed", f"its job {job.number} ended {how}", f"see {log}"))
 
 
-def asked(site: Site, used: Resources) -> dict[str, int]:
+def asked(site: Site, used: Resources) -> dict[str, Any]:
     """What a job asks for, with the site's values where the plan has none."""
     return {"ranks": used.ranks, "threads": used.threads, "cores": used.cores,
             "memory_mb": math.ceil((used.memory or site.jobs["memory"]) / 1e6), "minutes": math.ceil((used.time or site.jobs["time"]) / 60),
