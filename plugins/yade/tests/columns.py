@@ -10,7 +10,7 @@ def uniform(number, seed, use):
 
 
 def dilute_column(counts, spacing, origin, count, diameter, spread, seed, jitter):
-    """(x, y, z, radius) in m of `count` grains on a lattice of `counts` cells, x fastest, each shifted by up to `jitter` along each axis."""
+    """Rows (x, y, z, radius) in m of `count` grains on a lattice of `counts` cells, each shifted by up to `jitter` along each axis."""
     sites = [[low + (n + 0.5) * spacing for low, n in zip(origin, (i, j, k), strict=True)]
              for k in range(counts[2]) for j in range(counts[1]) for i in range(counts[0])]
     kept = [(number, site) for number, site in enumerate(sites, 1) if (number + seed) * 15485863 % len(sites) < count]

@@ -9,7 +9,7 @@ import sys
 from yade import dembark, utils
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(sys.argv[0] if sys.argv[0].endswith(".py") else __file__)))
-from columns import dilute_column  # noqa: E402 - a script of YADE finds its neighbours by path
+from columns import dilute_column
 
 PAIR = dict(restitution=0.6, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5)
 WET = dict(bridgeVolume=2e-10, surfaceTension=0.072, contactAngle=0.35)
