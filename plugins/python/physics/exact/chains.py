@@ -122,10 +122,10 @@ def _next_event(piece: _Piece, closed: NDArray[np.bool_], probe: float, later: f
         end = min(begin + probe, later)
         gaps = piece.gaps + np.diff(piece(end)[0])
         found = []
-        for contact in np.flatnonzero((gaps < 0.0) != closed):
+        for contact in np.flatnonzero((gaps < 0.0) != closed).tolist():
             low, high = piece.gap(begin, contact), float(gaps[contact])
             # A contact that has just changed has a gap of round-off, of either sign.
-            found.append((brentq(piece.gap, begin, end, (contact,), xtol=1e-18, rtol=1e-14) if low * high < 0.0 else begin, int(contact)))
+            found.append((brentq(piece.gap, begin, end, (contact,), xtol=1e-18, rtol=1e-14) if low * high < 0.0 else begin, contact))
         if found:
             return min(found)
         begin = end
