@@ -10,4 +10,5 @@ from dembark.postproc.grains import GrainFrame, GrainsDump
 from dembark.postproc.history import read_times
 from dembark.postproc.trajectory import universe
 
-__all__ = ["ContactFrame", "ContactsDump", "DumpError", "DumpWarning", "GrainFrame", "GrainsDump", "TextDump", "open_dump", "read_times", "universe"]
+__all__ = ["ContactFrame", "ContactsDump", "DumpError", "DumpWarning", "GrainFrame", "GrainsDump", "TextDump", "open_dump", "read_times",
+           "universe"]

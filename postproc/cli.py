@@ -14,10 +14,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
 from dembark.common.errors import DembarkError, Interrupted
 from dembark.postproc.dumptext import DumpError
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False,
                   context_settings={"help_option_names": ["-h", "--help"]})
@@ -145,7 +146,7 @@ def progress(name: str, total: int, interval: float = 10.0) -> Iterator[Advance]
 class Advance:
     """Counts frames that are done."""
 
-    def __init__(self, bar: Progress, task: int, name: str, total: int, interval: float) -> None:
+    def __init__(self, bar: Progress, task: TaskID, name: str, total: int, interval: float) -> None:
         self._bar, self._task, self._name, self._total, self._interval = bar, task, name, total, interval
         self._done, self._told = 0, clock.monotonic()
 

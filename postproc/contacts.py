@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.postproc.dumps.frames import Array, DumpError, RawFrame, integers, less_edges, numbered, take
 from dembark.postproc.dumps.opening import Trajectory, open_dump
 from dembark.postproc.dumps.typed import TypedDump
-from numpy.typing import NDArray
 
 Column = int | str | Sequence[int | str]
 

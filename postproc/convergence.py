@@ -24,8 +24,9 @@ class Convergence:
     """What a series of refinements says about the value at the finest setting.
 
     `kind`: "monotone" (an `order` was observed), "oscillating", "diverging", "scatter" when a change is not larger than its own 95 %
-    interval, or "bound" when two refinements leave no more than a bound. `extrapolated`: value at h = 0, None unless monotone. `uncertainty`: half-width of the numerical uncertainty of
-    the finest value, in its unit, with the safety factor 1.25; None when diverging.
+    interval, or "bound" when two refinements leave no more than a bound. `extrapolated`: value at h = 0, None unless monotone.
+    `uncertainty`: half-width of the numerical uncertainty of the finest value, in its unit, with the safety factor 1.25; None when
+    diverging.
     """
 
     kind: str
@@ -69,7 +70,8 @@ def observed_order(h: Sequence[float], values: Sequence[float]) -> float:
     return 0.5 * (low + high)
 
 
-def convergence(h: Sequence[float], values: Sequence[float], halves: Sequence[float] | None = None, formal_order: float = 1.0) -> Convergence:
+def convergence(h: Sequence[float], values: Sequence[float], halves: Sequence[float] | None = None,
+                formal_order: float = 1.0) -> Convergence:
     """Judge `values` at refinements `h` (any order, at least two different ones) with half-widths `halves` of their 95 % intervals.
 
     The finest three decide. With only two, or where a change is within its joint interval, no order can be observed: then the bound

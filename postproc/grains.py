@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.postproc.dumps.frames import Array, DumpError, RawFrame, cell, integers, less_edges, numbered, take
 from dembark.postproc.dumps.opening import Trajectory, open_dump
 from dembark.postproc.dumps.typed import TypedDump
 from dembark.postproc.spheres import volume
-from numpy.typing import NDArray
 
 _VECTORS = {
     "velocities": ("vx", "vy", "vz"),

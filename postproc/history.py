@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from dembark.postproc.dumptext import DumpError
 from numpy.typing import NDArray
+
+from dembark.postproc.dumptext import DumpError
 
 
 def read_times(path: str | Path) -> dict[str, NDArray[np.float64]]:

@@ -9,13 +9,6 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from dembark.common.errors import DembarkError
-from dembark.common.files import disk_error
-from dembark.postproc.output.whole import Labelled, WholeFile
-from dembark.postproc.style import STYLE
-from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, PlaneWall
-from dembark.postproc.walls.peaks import Histogram
-from dembark.postproc.walls.stress import WallStress
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
@@ -24,6 +17,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
+
+from dembark.common.errors import DembarkError
+from dembark.common.files import disk_error
+from dembark.postproc.output.whole import Labelled, WholeFile
+from dembark.postproc.style import STYLE
+from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, PlaneWall
+from dembark.postproc.walls.peaks import Histogram
+from dembark.postproc.walls.stress import WallStress
 
 Array = NDArray[np.float64]
 
@@ -233,7 +234,8 @@ def _solid_figure(stress: WallStress, components: Sequence[str], values: Array) 
         for axes, (elevation, azimuth) in zip(views, _VIEWS, strict=True):
             paint = Poly3DCollection(corners, **_paint(values[stress.patches.owners, column]))
             axes.add_collection3d(paint)
-            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), xlabel="x / mm", ylabel="y / mm", zlabel="z / mm")
+            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), xlabel="x / mm", ylabel="y / mm",
+                     zlabel="z / mm")
             axes.set_box_aspect(high - low)
             axes.view_init(elev=elevation, azim=azimuth)
             axes.tick_params(labelsize=5, pad=-3)
@@ -308,4 +310,3 @@ def save(folder: str | Path, figures: Mapping[str, Figure]) -> list[Path]:
     except OSError as error:
         raise disk_error(error, folder) from None
     return found
-

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from dembark.postproc.spheres import slice_volumes
 from numpy.typing import NDArray
+
+from dembark.postproc.spheres import slice_volumes
 
 Array = NDArray[np.float64]
 

@@ -16,17 +16,18 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from PIL import Image
+
 from dembark.common.errors import RunError
 from dembark.postproc.fields.coarse_graining import interpolate
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.output.whole import Labelled, WholeFile
 from dembark.postproc.plots import labelled, scalar
 from dembark.postproc.style import STYLE
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
-from PIL import Image
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -118,7 +119,7 @@ def render(scenes: Iterable[Scene], scale: tuple[float, float], pixels: int = _P
         if not np.isfinite(low).all():
             raise RunError("there is nothing to render", f"{count} scenes without a grain or a slice")
         view = {"low": low.tolist(), "high": high.tolist(), "scale": scale, "pixels": pixels, "map": _MAP}
-        Path(folder, "view.json").write_text(json.dumps(view))
+        Path(folder, "view.json").write_text(json.dumps(view), encoding="utf-8")
         _call(folder)
         return [np.asarray(Image.open(path)) for path in sorted(Path(folder).glob("scene-*.png"))]
 

@@ -7,14 +7,16 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from dembark.postproc.statistics import Estimate, combined
 from numpy.typing import NDArray
+
+from dembark.postproc.statistics import Estimate, combined
 
 Array = NDArray[np.float64]
 
 
 def measured(point: Mapping[str, Any], name: str, factor: float = 1.0) -> Estimate:
-    """The quantity `name` of the result `point` (the content of a metrics.json), times `factor`; half-width inf where it has no interval."""
+    """The quantity `name` of the result `point` (the content of a metrics.json), times `factor`; half-width inf where it has no
+    interval."""
     one = next(quantity for quantity in point["quantities"] if quantity["name"] == name)
     half = 0.5 * (one["interval"][1] - one["interval"][0]) if one["interval"] else math.inf
     return Estimate(one["value"] * factor, half * factor, one.get("basis", ""))

@@ -1,9 +1,11 @@
 """How figures look, in the report and elsewhere."""
 
+from typing import Any
+
 INK, GRID = "#22262b", "#e3e6ea"
 
 # Settings for matplotlib.rc_context.
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.size": 7.5,
     "axes.titlesize": 8.5,
     "axes.titleweight": "bold",

@@ -7,8 +7,6 @@ from typing import Any, ClassVar
 
 import MDAnalysis
 import numpy as np
-from dembark.postproc.dumps.frames import Array, DumpError, cell
-from dembark.postproc.grains import GrainFrame, GrainsDump
 from MDAnalysis.coordinates.base import ReaderBase
 from MDAnalysis.core import topologyattrs
 from MDAnalysis.core.topology import Topology
@@ -16,6 +14,9 @@ from MDAnalysis.lib.mdamath import triclinic_box
 from MDAnalysis.lib.util import store_init_arguments
 from MDAnalysis.topology.base import TopologyReaderBase
 from numpy.typing import NDArray
+
+from dembark.postproc.dumps.frames import Array, DumpError, cell
+from dembark.postproc.grains import GrainFrame, GrainsDump
 
 _KEPT = ("columns", "density", "skip_truncated", "varying")
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from dembark.common.errors import DembarkError
 from dembark.common.units import finite, to_si
 from dembark.postproc.grains import GrainFrame

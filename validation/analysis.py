@@ -37,7 +37,8 @@ def warnings_kept() -> Iterator[list[str]]:
 
 
 def reasons(folder: Path, error: Exception, case: Case) -> tuple[str, ...]:
-    """Parts of one line about `error`, which the measure.py of `case` raised for the runs in `folder`: what is too small, error and line."""
+    """Parts of one line about `error`, which the measure.py of `case` raised for the runs in `folder`: what is too small, error and
+    line."""
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if Path(frame.filename) == case.folder / "measure.py"] or frames
     told = f"{type(error).__name__}: {error} ({Path(own[-1].filename).name}, line {own[-1].lineno})"
@@ -45,7 +46,8 @@ def reasons(folder: Path, error: Exception, case: Case) -> tuple[str, ...]:
     worst = next(filter(None, small), "")
     if not worst:
         return (told,)
-    return (f"the run is too small or too short to be measured: {worst}", "take more grains or frames, or a longer time to settle", f"({told})")
+    return (f"the run is too small or too short to be measured: {worst}", "take more grains or frames, or a longer time to settle",
+            f"({told})")
 
 
 def too_small(replica: Path) -> str:

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 _ABOUT = f"""Granular contact laws and their validation, in {engines.titles("and")}.
 
-Your own cases: 'dembark new-case NAME' writes one, '--cases FOLDER' (before the command) or DEMBARK_CASES finds them beside those that ship."""
+Your own cases: 'dembark new-case NAME' writes one, '--cases FOLDER' (before the command) or DEMBARK_CASES finds them beside those \
+that ship."""
 
 app = typer.Typer(name="dembark", help=_ABOUT,
                   pretty_exceptions_enable=False, rich_markup_mode=None, context_settings={"help_option_names": ["-h", "--help"]})
@@ -49,13 +50,15 @@ def _show_version(wanted: bool) -> None:
 
         facts = provenance.commit()
         changed = ", with changes" if facts["dirty"] else ""
-        print(f"dembark {provenance.package_version('dembark')}" + (f" (commit {facts['commit'][:12]}{changed})" if facts["commit"] else ""))
+        print(f"dembark {provenance.package_version('dembark')}"
+              + (f" (commit {facts['commit'][:12]}{changed})" if facts["commit"] else ""))
         raise typer.Exit
 
 
 @app.callback()
 def _common(
-    version: Annotated[bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Show the version, and the commit of a checkout.")] = False,
+    _version: Annotated[bool, typer.Option("--version", is_eager=True, callback=_show_version,
+                                          help="Show the version, and the commit of a checkout.")] = False,
     own: Annotated[list[Path] | None, typer.Option("--cases", metavar="FOLDER", help="Folder of your own cases; repeat for more.")] = None,
 ) -> None:
     """Options that need no command."""

@@ -15,7 +15,8 @@ def compare(case_variant_folder: Path) -> dict[str, Any]:
     return as_json(write(case_variant_folder / COMPARISON, judge.compare(case_variant_folder)))
 
 
-def pair(reference: Mapping[str, Any], value: Mapping[str, Any], reference_engine: str, engine: str, comparisons: int = 1) -> dict[str, Any]:
+def pair(reference: Mapping[str, Any], value: Mapping[str, Any], reference_engine: str, engine: str,
+         comparisons: int = 1) -> dict[str, Any]:
     """One quantity of two engines from entries of their `metrics.json`, see `judge.compare.pair`."""
     one, other = (from_json({"verdict": "info", **entry}, QuantityRecord) for entry in (reference, value))
     return as_json(judge.pair(one, other, reference_engine, engine, comparisons))

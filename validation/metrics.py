@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from dembark.common.errors import DembarkError, RunError
+from dembark.common.errors import RunError
 from dembark.common.files import read_json, write_json
-from dembark.postproc import DumpError
 from dembark.postproc.replica import Replica
-from dembark.validation import checks, engines
+from dembark.validation import engines
 from dembark.validation.case import deck
-from dembark.validation.case.folders import find as find_case
-from dembark.validation.case.model import Case, Study
+from dembark.validation.case.folders import find
+from dembark.validation.case.model import Study
 from dembark.validation.judge import measuring
 
 
@@ -26,8 +24,7 @@ def replicas(folder: Path) -> list[Replica]:
 
 def _whole(record: dict[str, Any]) -> dict[str, Any]:
     """The record with what those of earlier versions lack: how the engine counts bodies, and the numbers derived from the parameters."""
-    case = None if "derived" in record else _case(record["case"])
-    derived = deck.derived(case, record["parameters"]) if case and (case.derived or (case.folder / "setup.py").is_file()) else {}
+    derived = {} if "derived" in record else deck.derived(find(record["case"]), record["parameters"])
     return {"impact_id_offset": engines.facts(record["engine"]).impact_id_offset, "derived": derived, **record}
 
 
@@ -40,45 +37,7 @@ def measure(run_folder: Path) -> dict[str, Any]:
     if not runs:
         raise RunError(f"nothing to measure in {run_folder}", "it has no finished replica-*/run.json")
     first = runs[0].record
-    case = _case(first["case"])
-    if case and (case.folder / "measure.py").is_file():
-        return _declared(run_folder, case, runs)
-    module = checks.find(first["case"], case.folder if case else None)
-    try:
-        quantities, profiles, remarks = module.quantities(runs)
-        fields = module.fields(runs, quantities) if hasattr(module, "fields") else None
-    except DumpError as error:
-        raise RunError(f"{run_folder} could not be measured", str(error)) from None
-    if fields is not None:
-        quantities, remarks = [*quantities, *fields.quantities], [*remarks, *fields.remarks]
-        _write_fields(run_folder, fields.dataset)
-    content = {
-        "case": first["case"],
-        "variant": first["variant"],
-        "engine": first["engine"],
-        "profile": first["profile"],
-        "parameters": {key: value for key, value in first["parameters"].items() if key != "seed"},
-        "quantities": [quantity.as_json() for quantity in quantities],
-        "profiles": profiles,
-        "remarks": remarks,
-        "picture": module.picture(first["parameters"]),
-        "references": [asdict(one) for one in module.REFERENCES],
-        "provenance": _provenance(runs),
-    }
-    write_json(run_folder / "metrics.json", content)
-    return content
-
-
-def _write_fields(run_folder: Path, fields: Any) -> None:
-    # Labelled arrays take a second to import, which commands that measure nothing need not wait for.
-    from dembark.postproc.output import labelled
-
-    labelled.write(run_folder / "fields.nc", fields)
-
-
-def _declared(run_folder: Path, case: Case, runs: list[Replica]) -> dict[str, Any]:
-    """Measure by the measure.py of the case, and judge by what its case.toml declares."""
-    first = runs[0].record
+    case = find(first["case"])
     found = measuring.measure(case, runs)
     if found.fields is not None:
         _write_fields(run_folder, found.fields)
@@ -100,10 +59,17 @@ def _declared(run_folder: Path, case: Case, runs: list[Replica]) -> dict[str, An
     return content
 
 
+def _write_fields(run_folder: Path, fields: Any) -> None:
+    # Labelled arrays take a second to import, which commands that measure nothing need not wait for.
+    from dembark.postproc.output import labelled
+
+    labelled.write(run_folder / "fields.nc", fields)
+
+
 def study(planned: Study, folders: Sequence[Path]) -> dict[str, Any]:
     """A study of one engine from the measured variants in `folders`: content of a `metrics.json`.
 
-    RunError when one of them has no measurement or the case has no `study` among its checks.
+    RunError when one of them has no measurement or the case has no `study` in its measure.py.
     """
     points = []
     for folder in folders:
@@ -112,15 +78,8 @@ def study(planned: Study, folders: Sequence[Path]) -> dict[str, Any]:
             raise RunError(f"study {planned.name} is incomplete", f"{folder} has no metrics.json", "every variant of a study is needed")
         points.append(content)
     first = points[0]
-    case = _case(first["case"])
-    if case and (case.folder / "measure.py").is_file():
-        found = measuring.study(case, planned, points)
-        quantities, profiles, remarks = measuring.quantities(case, found), list(found.profiles), [*found.remarks, *measuring.statements(case)]
-        references = measuring.references(case)
-    else:
-        module = checks.find(first["case"], case.folder if case else None)
-        quantities, profiles, remarks = module.study(planned.name, points, planned.along)
-        references = [asdict(one) for one in module.REFERENCES]
+    case = find(first["case"])
+    found = measuring.study(case, planned, points)
     return {
         "case": first["case"],
         "variant": planned.folder_name,
@@ -129,21 +88,13 @@ def study(planned: Study, folders: Sequence[Path]) -> dict[str, Any]:
         "title": planned.title,
         "description": planned.description,
         "parameters": {},
-        "quantities": [quantity.as_json() for quantity in quantities],
-        "profiles": profiles,
-        "remarks": remarks,
+        "quantities": [quantity.as_json() for quantity in measuring.quantities(case, found)],
+        "profiles": list(found.profiles),
+        "remarks": [*found.remarks, *measuring.statements(case)],
         "picture": None,
-        "references": references,
+        "references": measuring.references(case),
         "provenance": {"variants": list(planned.variants)},
     }
-
-
-def _case(name: str) -> Case | None:
-    # Results stay measurable where the case files are no longer at hand.
-    try:
-        return find_case(name)
-    except DembarkError:
-        return None
 
 
 def _provenance(runs: list[Replica]) -> dict[str, Any]:

@@ -44,7 +44,7 @@ def package_version(name: str) -> str | None:
 def cpu() -> str:
     """Name of the processor."""
     try:
-        found = re.search(r"^model name\s*:\s*(.+)$", Path("/proc/cpuinfo").read_text(encoding="utf-8"), re.M)
+        found = re.search(r"^model name\s*:\s*(.+)$", Path("/proc/cpuinfo").read_text(encoding="utf-8"), re.MULTILINE)
     except OSError:
         found = None
     return found.group(1) if found else platform.processor() or platform.machine()
@@ -55,7 +55,7 @@ def build_flags(engine: Engine) -> dict[str, str]:
     for path in (folder / "CMakeCache.txt" for folder in engine.build_folders()):
         if path.is_file():
             wanted = r"^(CMAKE_(?:CXX_COMPILER|BUILD_TYPE|CXX_FLAGS|CXX_FLAGS_RELEASE)):[A-Z]+=(.*)$"
-            return dict(re.findall(wanted, path.read_text(encoding="utf-8", errors="replace"), re.M))
+            return dict(re.findall(wanted, path.read_text(encoding="utf-8", errors="replace"), re.MULTILINE))
     return {}
 
 

@@ -16,13 +16,8 @@ from dembark.common.errors import DembarkError, Interrupted
 from dembark.common.lock import Busy, held, lock
 
 TIMES = {"beat": 0.1, "dead_after": 0.6}
-HOLDER = """import sys, time
-from pathlib import Path
-from dembark.common.lock import lock
-with lock(Path(sys.argv[1]), "x"):
-    print("held", flush=True)
-    time.sleep(60)
-"""
+HOLDER = ("import sys, time; from pathlib import Path; from dembark.common.lock import lock\n"
+          "with lock(Path(sys.argv[1]), 'x'): print('held', flush=True); time.sleep(60)")
 
 
 def elsewhere(path: Path) -> None:

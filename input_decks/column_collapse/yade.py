@@ -1,7 +1,6 @@
 """Column collapse: grains settle between a back wall and a gate, the gate moves away, and the energies of all forces are booked."""
 
 import math
-from types import SimpleNamespace
 
 from yade import dembark
 
@@ -28,7 +27,8 @@ def potentials():
 
 
 # As in LIGGGHTS, which has no numerical damping.
-energies = {"kinetic_energy": "kinetic"} | {name: name for name in EnergyAccount().keys() if name not in ("kinetic", "numerical_damping")}
+names = EnergyAccount().keys()
+energies = {"kinetic_energy": "kinetic"} | {name: name for name in names if name not in ("kinetic", "numerical_damping")}
 history = dembark.EnergyWriter("time.csv", energies, more=("potential_energy", "weight_height"), more_values=potentials)
 record = dembark.Recorder(p, walls, boundary="ff pp ff", gravity=weight, history=history, report=p.stride)
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
-from dembark.common.errors import DembarkError
 from numpy.typing import ArrayLike, NDArray
+
+from dembark.common.errors import DembarkError
 
 Array = NDArray[np.float64]
 # Multiplication by a prime modulo the number of sites is a permutation.

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from types import SimpleNamespace
 
 import numpy as np
-from dembark.input_decks.common.packing import Packing, largest
 from numpy.typing import NDArray
+
+from dembark.input_decks.common.packing import Packing, largest
 
 Number = float | int | str
 Array = NDArray[np.float64]

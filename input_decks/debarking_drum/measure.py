@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
 from dembark.postproc.instruments.drum import ANGLES, PLACES, Drum, estimates, fields, read
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.replica import Array, Replica
@@ -41,8 +42,8 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
     recorded = np.mean([drum.recorded / drum.lost.sum() for drum in drums])
     share = given["drum_speed"] / math.sqrt(given["gravity"] / first.radius)
     remarks = [
-        f"{first.logs} logs in a drum of radius {first.radius:.3g} m; its speed is {share:.0%} of the critical one, at which logs would stay "
-        "at the shell all around.",
+        (f"{first.logs} logs in a drum of radius {first.radius:.3g} m; its speed is {share:.0%} of the critical one, at which logs would "
+         "stay at the shell all around."),
         "The last revolution of the first load of each engine lies as an animation (GIF) among the figures beside the report.",
         f"The records of contacts that ended hold {recorded:.0%} of the energy lost in the window; contacts that last are not in them.",
     ]
@@ -114,5 +115,5 @@ def study(name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measure
         if np.isfinite(halves).all():
             curve |= {"low": (middle - halves).tolist(), "high": (middle + halves).tolist(), "band": "95 % interval"}
         curves.append(curve)
-    return Measurement(values, curves, ["Every point is a drum of the same size; the logs of each are loaded anew and run in for the same "
-                                        "number of revolutions."])
+    remark = "Every point is a drum of the same size; the logs of each are loaded anew and run in for the same number of revolutions."
+    return Measurement(values, curves, [remark])

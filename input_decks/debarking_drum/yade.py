@@ -1,7 +1,5 @@
 """Debarking drum: logs of unequal diameters tumble in a turning drum, in cross-section (the plane x-z)."""
 
-from types import SimpleNamespace
-
 from yade import dembark
 
 p = dembark.parameters()

@@ -1,7 +1,6 @@
 """Gravity-driven channel: grains fall between two flat frictional walls, periodic along the flow and in the third direction."""
 
 import math
-from types import SimpleNamespace
 
 from yade import dembark
 

@@ -1,7 +1,6 @@
 """Liquid exchange: a row of grains between two walls on given paths; they touch, share liquid and part."""
 
 import math
-from types import SimpleNamespace
 
 from yade import dembark
 
@@ -17,14 +16,14 @@ left = O.bodies.append(utils.wall((0, 0, 0), axis=0, sense=1, material=material)
 right = O.bodies.append(utils.wall((p.end, 0, 0), axis=0, sense=-1, material=material))
 
 liquid = CapillaryLiquid(share=p.liquid_share, shareFactor=p.liquid_share_factor, returnRule=p.liquid_return, maxBridge=p.largest_bridge)
-for grain, volume in zip(grains, p.volumes):
+for grain, volume in zip(grains, p.volumes, strict=False):
     liquid.setVolume(grain, volume)
 liquid.addWall([left], pool=p.wall_liquid, share=p.wall_share, part=p.wall_part)
 
 
 def move() -> None:
     """Put the grains where they are at this step."""
-    for grain, middle, period in zip(grains, middles, p.periods):
+    for grain, middle, period in zip(grains, middles, p.periods, strict=False):
         state, angle = O.bodies[grain].state, 2 * math.pi / period * O.time
         state.pos = (middle + p.reach * math.sin(angle), 0, 0)
         state.vel = (p.reach * 2 * math.pi / period * math.cos(angle), 0, 0)

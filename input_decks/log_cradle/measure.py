@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
 from dembark.physics.exact.chains import Chain, ChainMotion
 from dembark.postproc.instruments.logs import LogRun, energy_curves, number, over_time, read, solver_values
 from dembark.postproc.measurement import Measurement
@@ -50,8 +51,8 @@ def measured(run: LogRun) -> Measurement:
     }
     shares = ", ".join(f"{value:.4f}" for value in due / speed)
     return Measurement(values, _curves(run, chain, motion), [
-        f"Exact velocities after, over that of the first log: {shares} ({motion.events} contacts close or open on the way). All act at the "
-        "same time; a row of separate pairs would hand on the whole speed."])
+        (f"Exact velocities after, over that of the first log: {shares} ({motion.events} contacts close or open on the way). All act at "
+         "the same time; a row of separate pairs would hand on the whole speed.")])
 
 
 def _curves(run: LogRun, chain: Chain, motion: ChainMotion) -> list[dict[str, Any]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
+
 from dembark.input_decks.common import packing
 from dembark.input_decks.common.setup import Setup, strides
 

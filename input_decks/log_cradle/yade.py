@@ -1,7 +1,5 @@
 """Log cradle: equal logs in a row along x, the first of which moves."""
 
-from types import SimpleNamespace
-
 from yade import dembark
 
 p = dembark.parameters()

@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+
 from dembark.physics.exact.pairs import Pair, PairMotion
 from dembark.postproc.instruments.logs import LogRun, energy_curves, number, over_time, read, solver_values
 from dembark.postproc.measurement import Measurement, Value
@@ -26,7 +27,8 @@ def pair(p: Mapping[str, Any]) -> Pair:
     wall = p["target"] == "wall"
     mass, radius, speed, offset = (math.inf, 0.0, 0.0, 0.0) if wall else (p["mass_2"], p["radius_2"], p["velocity_2"], p["offset"])
     stiffness = 1.0 / (1.0 / p["stiffness_1"] + 1.0 / p["stiffness_2"])
-    return Pair((p["mass_1"], mass), stiffness, p["radius_1"] + radius, (p["velocity_1"], speed), offset, p["damping"], p["contact_damping"])
+    return Pair((p["mass_1"], mass), stiffness, p["radius_1"] + radius, (p["velocity_1"], speed), offset, p["damping"],
+                p["contact_damping"])
 
 
 def measure(replicas: Sequence[Replica]) -> Measurement:

@@ -1,7 +1,5 @@
 """Log pair: one impact of two logs, or of a log and a wall, in the plane z = 0."""
 
-from types import SimpleNamespace
-
 from yade import dembark
 
 p = dembark.parameters()

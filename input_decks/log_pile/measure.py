@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.postproc.instruments.logs import LogRun, number, over_time, read, solver_values
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.replica import Array, Replica
 from dembark.postproc.resampling import profile
 from dembark.postproc.statistics import CONFIDENCE, Estimate, block_mean, exact, student
-from numpy.typing import NDArray
 
 WALLS = (-1, -2, -3)  # ground, left and right stake
 REST = 0.1  # the share of the run, at its end, in which the stack is at rest
@@ -65,8 +66,8 @@ def measured(run: LogRun) -> Measurement:
     values = {**_at_rest(run, stack, rest), **_energy(run, height), **solver_values(run), **_beginning(run), **_impacts(run)}
     remarks = [
         f"Measured at rest: the last {REST:.0%} of the run, {run.times[rest][-1] - run.times[rest][0]:.2f} s.",
-        "All engines are due to be the same to round-off, which grows at each impact; a bound is set to the state after the "
-        f"first {FIRST} impacts, all that comes later within the intervals.",
+        ("All engines are due to be the same to round-off, which grows at each impact; a bound is set to the state after the "
+         f"first {FIRST} impacts, all that comes later within the intervals."),
     ]
     if run.parameters["stake_friction"] > 0.0:
         remarks.append("The stakes are rough and carry a part of the weight.")

@@ -6,6 +6,7 @@ import math
 from types import SimpleNamespace
 
 import numpy as np
+
 from dembark.input_decks.common import packing
 from dembark.input_decks.common.setup import Setup, strides
 

@@ -1,7 +1,5 @@
 """Log pile: logs of unequal diameter fall between two stakes and come to rest."""
 
-from types import SimpleNamespace
-
 from yade import dembark
 
 p = dembark.parameters()
@@ -12,6 +10,7 @@ dembark.logs([wood])
 
 
 def plane(name: str, place: tuple, axis: int, sense: int, material: int, **more: float) -> LogWall:
+    """A wall of one body through `place`, across `axis`, that bounds the side `sense` of it."""
     body = O.bodies.append(utils.wall(place, axis=axis, sense=sense, material=material))
     return LogWall(bodies=[body], stiffness=p.wall_stiffness, name=name, **more)
 

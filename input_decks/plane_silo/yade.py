@@ -1,7 +1,5 @@
 """Plane silo: grains rain between two vertical walls (periodic in the third direction), settle, and the walls creep upward."""
 
-from types import SimpleNamespace
-
 from yade import dembark
 
 p = dembark.parameters()

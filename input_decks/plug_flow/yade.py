@@ -1,7 +1,5 @@
 """Plug flow: grains rain into a vertical channel (periodic in the third direction), settle, and the plate that carries them sinks."""
 
-from types import SimpleNamespace
-
 from yade import dembark
 
 p = dembark.parameters()

@@ -1,7 +1,5 @@
 """Silo: grains rain into a vertical cylinder, settle, and the wall creeps upward so that its friction is mobilised."""
 
-from types import SimpleNamespace
-
 from yade import dembark
 
 p = dembark.parameters()

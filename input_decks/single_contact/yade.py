@@ -1,7 +1,5 @@
 """Single contact: spheres of two materials, each of which meets a plane or a sphere of its own. No gravity."""
 
-from types import SimpleNamespace
-
 from yade import dembark
 
 p = dembark.parameters()
@@ -9,7 +7,7 @@ O.dt = p.time_step
 levels = len(p.restitutions)
 # Materials by type: A, one for each restitution coefficient; B likewise; those of the partners of A and B.
 materials = [O.materials.append(FrictMat(young=young, poisson=poisson, density=density))
-             for young, poisson, density in zip(p.youngs_moduli, p.poisson_ratios, p.densities)]
+             for young, poisson, density in zip(p.youngs_moduli, p.poisson_ratios, p.densities, strict=False)]
 partners = materials[2 * levels:]
 for kind, diameter, _, place, velocity, spin in dembark.packing():
     # A sphere meets those of its own mask only: A or B.

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from dembark.common.errors import DembarkError
 from dembark.postproc.replica import Replica
 from dembark.validation import engines

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from benchmarks.drum_resume import FILES, Started, compare
 from dembark.common.errors import DembarkError
 from dembark.input_decks.common.setup import Setup
@@ -101,7 +102,7 @@ def test_radius_given_decides_how_many_logs(engine: str, tmp_path: Path) -> None
 
 
 def test_too_many_logs_are_refused_in_one_line() -> None:
-    with pytest.raises(DembarkError, match="filling 0.5 is too high, the drum has places for"):
+    with pytest.raises(DembarkError, match=r"filling 0\.5 is too high, the drum has places for"):
         setup(filling=0.5, log_diameter_min=0.24)
 
 

@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from dembark.common.errors import DembarkError
 from dembark.postproc import ContactsDump, GrainsDump, read_times
-from dembark.validation.checks import column_collapse
-from dembark.validation.checks.run import Replica
+from dembark.postproc.replica import Replica
+from dembark.validation.case.deck import derived
+from dembark.validation.case.folders import find
+from dembark.validation.judge import measuring
 
 WALLS = {"silo": ("side", "base"), "plane_silo": ("left", "right", "base"), "plug_flow": ("left", "right", "base"),
          "gravity_channel": ("left", "right"), "column_collapse": ("back", "base", "gate")}
@@ -136,8 +139,9 @@ def test_the_gravity_channel_holds_its_solid_fraction(engine: str, finished: Any
 @pytest.mark.parametrize("variant", VARIANTS["column_collapse"])
 def test_energies_of_a_collapse_balance(engine: str, variant: str, finished: Any) -> None:
     run = finished("column_collapse", engine, variant)
-    record = {"parameters": run.values, "time_step": run.setup.time_step, "engine": engine}
-    found, _, _ = column_collapse.quantities([Replica(run.folder, record)])
+    case = find("column_collapse")
+    record = {"parameters": run.values, "time_step": run.setup.time_step, "engine": engine, "derived": derived(case, run.values)}
+    found = measuring.quantities(case, measuring.measure(case, [Replica(run.folder, record)]))
     measured = {one.name: one.estimate.value for one in found}
     verdicts = {one.name: one.judged()[0] for one in found if one.tolerance is not None}
     assert verdicts == dict.fromkeys(("energy_balance", "potential_error", "dissipation_sign"), "pass"), measured

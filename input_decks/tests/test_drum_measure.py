@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.postproc import DumpError
 from dembark.postproc.instruments.drum import Drum, _along_shell, estimates, read

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from dembark.common.errors import DembarkError
+from dembark.input_decks.tests.measuring import judged, module, names
 from dembark.postproc import read_times
-from dembark.validation.checks import liquid_exchange
 
 ENGINES = ("liggghts", "yade")
 SHORT = {"duration": 0.2, "rows": 200}
@@ -20,8 +21,8 @@ SHORT = {"duration": 0.2, "rows": 200}
 def test_books_are_those_of_the_rule(tmp_path: Path, engine: str, variant: str, decks: Any) -> None:
     one = decks("liquid_exchange", engine, tmp_path, SHORT, variant)
     one.run()
-    found, _, _ = liquid_exchange.quantities([one.replica()])
-    assert {quantity.name: quantity.judged() for quantity in found if quantity.judged()[0] != "pass"} == {}
+    found = judged("liquid_exchange", module("liquid_exchange").measure([one.replica()]))
+    assert names(found, "pass") == set(found), found
     times = read_times(tmp_path / "time.csv")
     assert len(times["step"]) == 200 and np.abs(np.diff(times["bridge_count"])).sum() > 5
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from dembark.common.errors import DembarkError
 from dembark.common.files import check_impacts, check_times, count_frames
 from dembark.postproc.instruments.logs import LogRun, read

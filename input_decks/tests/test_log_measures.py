@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dembark.postproc.instruments.logs import LogRun, TouchFrame
+
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.postproc.instruments.logs import LogRun, TouchFrame
 
 log_pair, log_cradle, log_pile = (module(name) for name in ("log_pair", "log_cradle", "log_pile"))
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from dembark.validation import engines
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from dembark.common.errors import DembarkError, Killed
 from dembark.common.files import check_times, count_frames, read_json
 from dembark.postproc import ContactsDump, GrainsDump, read_times

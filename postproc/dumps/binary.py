@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+
 from dembark.postproc.dumps.frames import HINT, Array, CutOffError, Dump, DumpError, Entry, RawFrame, before_tilt, numbered
 from dembark.postproc.dumps.source import Source
 

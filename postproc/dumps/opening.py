@@ -24,7 +24,6 @@ def open_dump(path: Trajectory, skip_truncated: bool = False, *, stream: bool = 
     leaves a cut-off last frame out, `stream` reads forward without an index (see Dump). DumpError for a missing, foreign or truncated
     file.
     """
-
     files = files_of(path)
     if files is None:
         return _open_one(Path(path), columns=columns, skip_truncated=skip_truncated, stream=stream)

@@ -17,7 +17,7 @@ def files_of(path: str | Path | Sequence[str | Path]) -> list[Path] | None:
     if isinstance(path, str | Path):
         if Path(path).exists() or not glob.has_magic(str(path)):
             return None
-        found = [Path(name) for name in glob.glob(str(path)) if BOX not in Path(name).name]
+        found = [Path(name) for name in glob.glob(str(path)) if BOX not in Path(name).name]  # noqa: PTH207 - it may be absolute
     else:
         found = [Path(name) for name in path]
     if not found:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+
 from dembark.postproc.dumps.frames import DumpError
 
 _WINDOW = 1 << 22
@@ -65,7 +66,7 @@ class Source:
                 yield handle
             return
         if self._gzip is None:
-            self._gzip = gzip.open(self.path, "rb")
+            self._gzip = gzip.open(self.path, "rb")  # noqa: SIM115 - it stays open for the next frame
             weakref.finalize(self, self._gzip.close)
         with self._damage():
             self._gzip.seek(place)

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 import numpy as np
-from dembark.postproc.dumps.frames import Dump, RawFrame
 from numpy.typing import NDArray
+
+from dembark.postproc.dumps.frames import Dump, RawFrame
 
 Frame = TypeVar("Frame")
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from dembark.postproc.dumps.frames import HINT, Array, CutOffError, Dump, DumpError, Entry, RawFrame, numbered
 from dembark.postproc.dumps.source import Source
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.postproc.fields import sums as column
 from dembark.postproc.fields.sums import symmetric_parts
 from dembark.postproc.spheres import volume
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

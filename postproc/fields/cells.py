@@ -15,6 +15,8 @@ from dataclasses import dataclass, fields
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.common.errors import DembarkError
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.fields.coarse_graining import WallContacts
@@ -22,7 +24,6 @@ from dembark.postproc.fields.grid import Grid, check_periods
 from dembark.postproc.fields.sums import full_tensor, ratio, symmetric_parts
 from dembark.postproc.grains import GrainFrame, cell
 from dembark.postproc.spheres import volume
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark import _fields
 from dembark.common.errors import DembarkError
 from dembark.postproc.contacts import ContactFrame
@@ -16,7 +18,6 @@ from dembark.postproc.fields.grid import Grid, check_periods
 from dembark.postproc.fields.kernels import Kernel
 from dembark.postproc.fields.sums import FieldSums
 from dembark.postproc.grains import GrainFrame
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -7,14 +7,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
 from dembark import _fields
 from dembark.common.errors import DembarkError
 from dembark.postproc.fields.carried import Contacts, Grains
 from dembark.postproc.fields.grid import Grid, periodic_images
 from dembark.postproc.fields.kernels import NAMES, Kernel, ball_shares, cumulative, line_nodes, unit_gauss
 from dembark.postproc.grains import GrainFrame, cell
-from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

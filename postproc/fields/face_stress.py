@@ -14,13 +14,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BarycentricInterpolator
+
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.postproc.fields.grid import Grid, check_periods, periodic_images
 from dembark.postproc.fields.kernels import Kernel, cumulative, unit_gauss
 from dembark.postproc.grains import GrainFrame
-from numpy.typing import NDArray
-from scipy.interpolate import BarycentricInterpolator
 
 Array = NDArray[np.float64]
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from dembark.common.errors import DembarkError
-from dembark.postproc.grains import GrainFrame, cell
 from numpy.typing import ArrayLike, NDArray
+
+from dembark.common.errors import DembarkError
+from dembark.postproc.dumps.frames import cell
+from dembark.postproc.grains import GrainFrame
 
 Array = NDArray[np.float64]
 

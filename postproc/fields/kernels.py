@@ -15,10 +15,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from dembark.common.errors import DembarkError
-from dembark.postproc.fields.grid import Grid
 from numpy.typing import NDArray
 from scipy.special import erf
+
+from dembark.common.errors import DembarkError
+from dembark.postproc.fields.grid import Grid
 
 Array = NDArray[np.float64]
 

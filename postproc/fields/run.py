@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.common.errors import DembarkError
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.fields.cells import CellAverage, CellTotals, cell_grid, cell_totals
@@ -21,10 +23,18 @@ from dembark.postproc.output.vtkhdf import FieldsVtkhdf, GrainsVtkhdf
 from dembark.postproc.output.whole import Selection
 from dembark.postproc.sources import Reading, Source
 from dembark.postproc.walls import Inclusion, wall_contacts
-from dembark.postproc.walls.run import begin, check_inclusions, check_meshes, check_outputs, choose_walls, recorders_of, source_lines, wall_lines
+from dembark.postproc.walls.run import (
+    begin,
+    check_inclusions,
+    check_meshes,
+    check_outputs,
+    choose_walls,
+    recorders_of,
+    source_lines,
+    wall_lines,
+)
 from dembark.postproc.walls.stress import WallStress
 from dembark.postproc.words import WallWord, counts, length, near, span
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Attributes = Mapping[str, str | float | int]

@@ -10,10 +10,11 @@ from operator import add
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.common.errors import DembarkError
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import Kernel
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 

@@ -12,12 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
+
 from dembark.postproc import DumpError
 from dembark.postproc.output.labelled import labelled, variable, with_interval
 from dembark.postproc.replica import Array, Replica, once
 from dembark.postproc.resampling import TimeBlocks, resampled, time_blocks
 from dembark.postproc.statistics import Estimate, over_replicas
-from numpy.typing import NDArray
 
 # Edges of the histograms of places, in degrees from the lowest point of the drum, positive the way it turns.
 ANGLES = np.linspace(-180.0, 180.0, 37)

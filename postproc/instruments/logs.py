@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.postproc import DumpError
 from dembark.postproc.dumptext import TextDump
 from dembark.postproc.measurement import Value
 from dembark.postproc.replica import Array, Replica
 from dembark.postproc.resampling import profile
 from dembark.postproc.statistics import exact
-from numpy.typing import NDArray
 
 # Points of a curve, twice as many at most.
 POINTS = 100

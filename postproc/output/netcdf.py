@@ -9,18 +9,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 import h5netcdf
 import numpy as np
 import xarray
+from numpy.typing import NDArray
+
 from dembark.common.errors import DembarkError
 from dembark.common.files import disk_error
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.output.whole import Labelled, SteadyFile, WholeFile
 from dembark.postproc.walls.peaks import Histogram
 from dembark.postproc.walls.stress import COMPONENTS, WallStress
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Attributes = Mapping[str, str | float | int]
@@ -88,7 +89,7 @@ class FieldsNetcdf:
         self._grid: Grid | None = None
         self._walls: list[WallStress] = []
 
-    def __enter__(self) -> FieldsNetcdf:
+    def __enter__(self) -> Self:
         return self
 
     def add(self, fields: Labelled, time: float, span: tuple[float, float] | None = None) -> None:

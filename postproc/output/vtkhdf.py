@@ -14,13 +14,14 @@ from typing import Any, Self
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.common.errors import DembarkError
 from dembark.common.files import disk_error
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.output.whole import Labelled, SteadyFile, WholeFile
 from dembark.postproc.walls.stress import COMPONENTS, WallStress
-from numpy.typing import NDArray
 
 Array = NDArray[Any]
 Attributes = Mapping[str, str | float | int]

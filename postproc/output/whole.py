@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.common.errors import DembarkError
 from dembark.common.files import disk_error
 from dembark.postproc.fields.grid import Grid
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer

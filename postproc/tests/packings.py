@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.postproc.grains import GrainFrame, cell
@@ -13,7 +14,8 @@ FREE = (False, False, False)
 
 
 def grain_frame(
-    positions: Any, *, radii: Any = 0.5, masses: Any = 1.0, velocities: Any = 0.0, omegas: Any = 0.0, low: Any = (0, 0, 0), high: Any = (1, 1, 1),
+    positions: Any, *, radii: Any = 0.5, masses: Any = 1.0, velocities: Any = 0.0, omegas: Any = 0.0, low: Any = (0, 0, 0),
+    high: Any = (1, 1, 1),
     periodic: Any = FREE, tilt: Any = (0, 0, 0), extra: Any = None,
 ) -> GrainFrame:  # fmt: skip
     """A frame of n grains; numbers stand for all of them."""
@@ -55,7 +57,8 @@ def random_frame(seed: int, count: int = 12, contacts: int = 18, **how: Any) -> 
     random = np.random.default_rng(seed)
     grains = grain_frame(
         random.uniform(0, 1, (count, 3)), radii=random.uniform(0.02, 0.05, count), masses=random.uniform(1, 2, count),
-        velocities=random.normal(size=(count, 3)), omegas=random.normal(size=(count, 3)), extra={"liquid_volume": random.uniform(size=count)},
+        velocities=random.normal(size=(count, 3)), omegas=random.normal(size=(count, 3)),
+        extra={"liquid_volume": random.uniform(size=count)},
         **how,
     )  # fmt: skip
     pairs = random.integers(0, count, (contacts, 2))
@@ -80,7 +83,7 @@ def cubic_lattice(size: int, stiffness: tuple[float, float, float]) -> tuple[Gra
 def fcc_lattice(size: int, force: float) -> tuple[GrainFrame, ContactFrame]:
     """A periodic face-centred cubic lattice of cubes of edge 1, each grain pressed against its twelve neighbours by `force` (N)."""
     corner = np.stack(np.meshgrid(*[np.arange(size)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
-    place = (corner + [[0, 0, 0], [0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]]).reshape(-1, 3) + 0.1
+    place = (corner + np.array([[0, 0, 0], [0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]])).reshape(-1, 3) + 0.1
     grains = grain_frame(place, radii=np.sqrt(0.125), high=(size,) * 3, periodic=(True,) * 3)
     apart = place[None] - place[:, None]
     apart -= size * np.round(apart / size)
@@ -99,7 +102,8 @@ def packing_at_rest(seed: int = 3, size: int = 3, gravity: float = 9.81) -> tupl
     grains = grain_frame(place, masses=random.uniform(0.5, 2.0, size**3), high=(size,) * 3)
     number = np.arange(size**3).reshape(size, size, size)
     pairs = np.concatenate(
-        [np.stack([np.take(number, range(size - 1), way).ravel(), np.take(number, range(1, size), way).ravel()], axis=1) for way in range(3)]
+        [np.stack([np.take(number, range(size - 1), way).ravel(), np.take(number, range(1, size), way).ravel()], axis=1)
+         for way in range(3)]
     )
     walls = []
     for way, sides in ((0, (0, size)), (1, (0, size)), (2, (0,))):

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from dembark.common.errors import DembarkError
-from dembark.postproc.fields.cells import cell_average, cell_grid, cell_totals
-from dembark.postproc.fields.grid import Grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from packings import cubic_lattice, fcc_lattice, grain_frame, packing_at_rest, random_frame
+
+from dembark.common.errors import DembarkError
+from dembark.postproc.fields.cells import cell_average, cell_grid, cell_totals
+from dembark.postproc.fields.grid import Grid
 
 
 @settings(max_examples=30, deadline=None)
@@ -33,8 +34,8 @@ def test_lattice_under_load_has_its_exact_stress():
 
 
 def test_streaming_part_is_about_the_mean_of_the_cell():
-    grains, contacts = random_frame(2)
-    still = np.tile([[0.0, 0.0, 2.0], [0.0, 0.0, -2.0]], (6, 1)) + [5.0, 0.0, 0.0]
+    grains, _ = random_frame(2)
+    still = np.tile([[0.0, 0.0, 2.0], [0.0, 0.0, -2.0]], (6, 1)) + np.array([5.0, 0.0, 0.0])
     frame = grain_frame(grains.wrapped, velocities=still, masses=0.5)
     found = cell_average([(frame, None)], Grid((0, 0, 0), (1, 1, 1), (1, 1, 1)), least_contacts=0)
     np.testing.assert_allclose(found.stress[0, 0, 0], np.diag([0.0, 0.0, 4.0 * 6.0]), atol=1e-12)

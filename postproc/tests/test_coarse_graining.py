@@ -4,6 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from packings import contact_frame, cubic_lattice, fcc_lattice, grain_frame, packing_at_rest, random_frame
+
 from dembark.common.errors import DembarkError
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.fields.coarse_graining import WallContacts, coarse_grain, interpolate
@@ -11,9 +15,6 @@ from dembark.postproc.fields.face_stress import face_stress
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import NAMES, Kernel
 from dembark.postproc.fields.sums import Fields, moving_average
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
-from packings import contact_frame, cubic_lattice, fcc_lattice, grain_frame, packing_at_rest, random_frame
 
 flags = st.tuples(st.booleans(), st.booleans(), st.booleans())
 shapes = st.tuples(st.integers(1, 5), st.integers(1, 4), st.integers(1, 9))
@@ -87,7 +88,8 @@ def test_many_lines_of_all_lengths_in_one_cell_equal_numpy(periodic, closed):
     contacts = ContactFrame(7, grains.wrapped[pairs[:, 0]], branch, random.normal(size=(700, 3)), grains.ids[pairs])
     grid = Grid((0, 0, 0), (1, 1, 1), (9, 7, 11), (periodic,) * 3)
     one, many, plain = (
-        coarse_grain(grains, contacts, grid, width=0.06, closed=closed, **how) for how in ({"threads": 1}, {"threads": 3}, {"backend": "numpy"})
+        coarse_grain(grains, contacts, grid, width=0.06, closed=closed, **how)
+        for how in ({"threads": 1}, {"threads": 3}, {"backend": "numpy"})
     )
     for part in ("grains", "contacts"):
         assert np.array_equal(getattr(one, part), getattr(many, part))
@@ -195,15 +197,15 @@ def test_line_integral_is_the_mean_over_many_points(name):
     np.testing.assert_allclose(found, mean, atol={"gaussian": 5e-5, "lucy": 1e-5, "heaviside": 2e-3}[name] * mean.max())
 
 
-@pytest.mark.parametrize("gradient", [[[0, 0, 0], [0, 0, 0], [3, 0, 0]], [[0, -2, 0], [2, 0, 0], [0, 0, 0]], [[1, 2, 3], [4, 5, 6], [7, 8, -6]]])
+@pytest.mark.parametrize("gradient",
+                         [[[0, 0, 0], [0, 0, 0], [3, 0, 0]], [[0, -2, 0], [2, 0, 0], [0, 0, 0]], [[1, 2, 3], [4, 5, 6], [7, 8, -6]]])
 def test_gradient_of_an_affine_velocity_is_exact_for_any_packing(gradient):
     gradient = np.array(gradient, float)
     place = np.random.default_rng(2).uniform(0, 1, (300, 3))
     grid = Grid((0, 0, 0), (1, 1, 1), (5, 4, 3))
     for name in NAMES:
-        fields = coarse_grain(grain_frame(place, velocities=place @ gradient.T + [5.0, -7.0, 9.0]), None, grid, kernel=name, width=0.3).fields(
-            shear_corrected=True
-        )
+        moving = grain_frame(place, velocities=place @ gradient.T + [5.0, -7.0, 9.0])
+        fields = coarse_grain(moving, None, grid, kernel=name, width=0.3).fields(shear_corrected=True)
         np.testing.assert_allclose(fields.velocity_gradient, np.broadcast_to(gradient, (5, 4, 3, 3, 3)), atol=1e-8)
         np.testing.assert_allclose(fields.strain_rate, np.broadcast_to(0.5 * (gradient + gradient.T), (5, 4, 3, 3, 3)), atol=1e-8)
         curl = [gradient[2, 1] - gradient[1, 2], gradient[0, 2] - gradient[2, 0], gradient[1, 0] - gradient[0, 1]]
@@ -245,7 +247,7 @@ def test_velocities_about_a_given_field():
 
 def test_kinetic_stress_of_two_streams():
     place = np.repeat(np.random.default_rng(3).uniform(0, 1, (30, 3)), 2, axis=0)
-    speed = np.tile([[0.0, 0.0, 2.0], [0.0, 0.0, -2.0]], (30, 1)) + [7.0, 0.0, 0.0]
+    speed = np.tile([[0.0, 0.0, 2.0], [0.0, 0.0, -2.0]], (30, 1)) + np.array([7.0, 0.0, 0.0])
     fields = coarse_grain(grain_frame(place, velocities=speed), None, Grid((0, 0, 0), (1, 1, 1), (3, 2, 2)), width=0.2).fields()
     np.testing.assert_allclose(fields.kinetic_stress[..., 2, 2], 4.0 * fields.density, rtol=1e-12)
     np.testing.assert_allclose(fields.temperature, 4.0 / 3.0, rtol=1e-12)
@@ -407,7 +409,8 @@ def test_wrong_input_is_refused_in_one_line():
         ("0 threads", lambda: coarse_grain(grains, contacts, grid, width=0.1, threads=0)),
         ("grain 99, step 7", lambda: coarse_grain(grains, ContactFrame(7, *np.zeros((3, 1, 3)), np.array([[1, 99]])), grid, width=0.1)),
         ("both must agree", lambda: coarse_grain(grains, contacts, Grid((0, 0, 0), (1, 1, 1), (2, 2, 2), (True, False, False)), width=0.1)),
-        ("forces with numbers", lambda: coarse_grain(grains, ContactFrame(7, contacts.first, contacts.branch, contacts.forces * np.nan, contacts.ids), grid, width=0.1)),
+        ("forces with numbers", lambda: coarse_grain(
+            grains, ContactFrame(7, contacts.first, contacts.branch, contacts.forces * np.nan, contacts.ids), grid, width=0.1)),
     ):  # fmt: skip
         with pytest.raises(DembarkError, match=match) as caught:
             call()

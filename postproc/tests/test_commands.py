@@ -10,16 +10,17 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 import xarray
-from dembark.common.errors import DembarkError
-from dembark.postproc.cli import progress
-from dembark.postproc.fields import run as field_run
-from dembark.postproc.words import counts, frame_numbers, length, parse_wall, span
-from dembark.validation.cli import main
 from dumps import contacts_text, grains_text, write_times
 from hypothesis import given
 from hypothesis import strategies as st
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
+
+from dembark.common.errors import DembarkError
+from dembark.postproc.cli import progress
+from dembark.postproc.fields import run as field_run
+from dembark.postproc.words import counts, frame_numbers, length, parse_wall, span
+from dembark.validation.cli import main
 
 RADIUS, WEIGHT, STEPS = 0.005, 0.02, (100, 200, 300, 400)
 BOX = ((0.0, 0.04), (0.0, 0.04), (0.0, 0.06))
@@ -198,7 +199,8 @@ def files_no_larger_than(size):
 @pytest.mark.parametrize("words", [
     ["fields", "run", "--width", "0.5d", "--out", "f.nc"], ["fields", "run", "--width", "0.5d", "--average", "1", "--out", "f.nc"],
     ["fields", "run", "--width", "0.5d", "--vtkhdf", "f.vtkhdf"],
-    ["fields", "run", "--width", "0.5d", "--average", "1", "--grains", "g.vtkhdf", "--vtkhdf", "f.vtkhdf"], ["walls", "run", "--patch", "0.1d", "--out", "w.nc"],
+    ["fields", "run", "--width", "0.5d", "--average", "1", "--grains", "g.vtkhdf", "--vtkhdf", "f.vtkhdf"],
+    ["walls", "run", "--patch", "0.1d", "--out", "w.nc"],
     ["walls", "run", "--patch", "0.1d", "--vtkhdf", "w.vtkhdf"]], ids=lambda words: " ".join(words[:1] + words[-4:]))
 def test_a_full_disk_gets_one_line_and_leaves_nothing(run, words, capsys):
     """Wherever the writing ends: in the header, in the fields, in the groups of the walls."""
@@ -284,7 +286,8 @@ MISTAKES = [
     (["walls", "run", "--patch", "2,5d"], "--patch: '2,5d' has a comma"),
     (["walls", "run", "--wall", "base:cylinder:radius=2,5cm"], "write the decimal point: 2.5cm"),
     (["walls", "run", "--wall", "base:plane:since=0,1"], "since: '0,1' has a comma"),
-    (["walls", "run", "--wall", "base:mesh:file=run/base.stl:unit=furlongs"], "unit=furlongs, in --wall base, it must be m, dm, cm, mm, um, in, ft or d"),
+    (["walls", "run", "--wall", "base:mesh:file=run/base.stl:unit=furlongs"],
+     "unit=furlongs, in --wall base, it must be m, dm, cm, mm, um, in, ft or d"),
     (["walls", "run", "--plot", "run/run.json"], "name a folder"),
     (["walls", "empty", "--out", "w.nc"], "no grains.dump"),
 ]

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 import pytest
-from dembark.postproc.convergence import SAFETY, convergence, observed_order, refinement
 from hypothesis import given
 from hypothesis import strategies as st
+
+from dembark.postproc.convergence import SAFETY, convergence, observed_order, refinement
 
 
 @given(

@@ -4,10 +4,11 @@ import shutil
 
 import numpy as np
 import pytest
+from dumps import contacts_text
+
 from dembark.common.errors import DembarkError
 from dembark.postproc import ContactsDump, DumpError, GrainsDump, open_dump, universe
 from dembark.validation import engines
-from dumps import contacts_text
 
 COLUMNS = "id type x y z ix iy iz vx vy vz radius mass fx fy fz omegax omegay omegaz".split()
 PAIRS = {"first": (1, 2, 3), "second": (4, 5, 6), "ids": (7, 8), "forces": (10, 11, 12), "delta": 13}
@@ -193,7 +194,8 @@ def test_truncated_vtk_file(run, tmp_path):
         (lambda run: ContactsDump(run / "pairs.dump")[1], "has 13 columns instead of 12; say by columns="),
         (lambda run: ContactsDump(run / "pairs.dump", columns={"first": (1, 2, 3)}), "columns= must name forces, ids"),
         (lambda run: ContactsDump(run / "pairs.dump", columns=PAIRS | {"branch": (1, 2, 3)}), "either second or branch"),
-        (lambda run: ContactsDump(run / "pairs.dump", columns=PAIRS | {"ids": (7, 99)})[1], "column 99 for ids, but there are columns 1 to 13"),
+        (lambda run: ContactsDump(run / "pairs.dump", columns=PAIRS | {"ids": (7, 99)})[1],
+         "column 99 for ids, but there are columns 1 to 13"),
         (lambda run: ContactsDump(run / "pairs.dump", columns=PAIRS | {"ids": (7,)})[1], "gives 1 columns for ids, not 2"),
         (lambda run: ContactsDump(run / "pairs.dump", columns=PAIRS | {"area": "c_x"})[1], "column c_x is missing"),
         (lambda run: GrainsDump(run / "pairs.dump")[1], "column id is missing"),

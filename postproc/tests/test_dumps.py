@@ -6,11 +6,12 @@ import warnings
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from dembark import _dumps
 from dembark.postproc import DumpError, DumpWarning, TextDump, open_dump
 from dembark.postproc.dumps import source
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 HEAD = "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS pp ff pp\n0 1\n0 2\n-1 1\nITEM: ATOMS {columns}\n"
 
@@ -87,7 +88,7 @@ def test_what_is_no_number(word, fault):
 def test_threads_do_not_change_the_table():
     rng = np.random.default_rng(3)
     table = rng.normal(size=(40000, 3)) * 10.0 ** rng.integers(-8, 8, (40000, 3))
-    text = np.frombuffer("".join("%.12g %.17g  %.6g \r\n" % tuple(row) for row in table).encode(), np.uint8)
+    text = np.frombuffer("".join(f"{a:.12g} {b:.17g}  {c:.6g} \r\n" for a, b, c in table).encode(), np.uint8)
     results = []
     for threads in (1, 2, 5):
         values = np.full((40000, 3), np.nan)
@@ -269,7 +270,7 @@ def test_gzipped_dump(write, tmp_path):
     damaged = bytearray(gzip.compress(text))
     damaged[len(damaged) // 2] ^= 255
     path.write_bytes(damaged)
-    with pytest.raises(DumpError, match="compression is damaged|truncated|line|header"):
+    with pytest.raises(DumpError, match=r"compression is damaged|truncated|line|header"):
         list(open_dump(path))
 
 

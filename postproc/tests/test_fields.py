@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from dembark.postproc import profiles, stress
-from dembark.postproc.spheres import slice_volumes, volume, volume_below
 from hypothesis import given
 from hypothesis import strategies as st
+
+from dembark.postproc import profiles, stress
+from dembark.postproc.spheres import slice_volumes, volume, volume_below
 
 
 @given(st.floats(1e-4, 1.0), st.floats(-2.0, 2.0))

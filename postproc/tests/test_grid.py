@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from packings import grain_frame
+
 from dembark.common.errors import DembarkError
 from dembark.postproc.fields.grid import Grid, periodic_images
-from packings import grain_frame
 
 
 def test_cells_fill_the_box():

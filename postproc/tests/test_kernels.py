@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from dembark.common.errors import DembarkError
 from dembark.postproc.fields.deposit import point_shares
 from dembark.postproc.fields.grid import Grid

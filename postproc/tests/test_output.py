@@ -7,6 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray
+from scenes import frame_of
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+from vtkmodules.vtkIOHDF import vtkHDFReader
+
 from dembark.common.errors import DembarkError, RunError
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
@@ -25,10 +30,6 @@ from dembark.postproc.output import (
 from dembark.postproc.walls import CylinderWall, MeshWall, Motion, PlaneWall
 from dembark.postproc.walls.patches import cylinder_patches, mesh_patches, plane_patches
 from dembark.postproc.walls.stress import wall_stress
-from scenes import frame_of
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
-from vtkmodules.vtkIOHDF import vtkHDFReader
 
 GRID = Grid((-1.0, 0.0, 2.0), (1.0, 3.0, 6.0), (2, 3, 4), (False, True, False))
 
@@ -204,13 +205,22 @@ def test_a_wall_may_be_called_like_a_field(tmp_path):
 def test_a_file_is_whole_or_not_there(tmp_path, make, suffix):
     path = tmp_path / f"f.{suffix}"
     path.write_text("before")
-    with pytest.raises(KeyboardInterrupt), make(path) as file:
-        file.add(fields_of(), 0.0)
-        raise KeyboardInterrupt
+
+    def interrupted():
+        with make(path) as file:
+            file.add(fields_of(), 0.0)
+            raise KeyboardInterrupt
+
+    def on_two_grids():
+        with make(path) as file:
+            file.add(fields_of(), 0.0)
+            file.add(fields_of(grid=Grid((0.0,) * 3, (1.0,) * 3, (2, 3, 4))), 1.0)
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
     assert path.read_text() == "before" and list(tmp_path.iterdir()) == [path]
-    with pytest.raises(DembarkError, match="another grid"), make(path) as file:
-        file.add(fields_of(), 0.0)
-        file.add(fields_of(grid=Grid((0.0,) * 3, (1.0,) * 3, (2, 3, 4))), 1.0)
+    with pytest.raises(DembarkError, match="another grid"):
+        on_two_grids()
     with pytest.raises(DembarkError, match="nothing to write"), make(path):
         pass
     with pytest.raises(DembarkError, match="folder"):
@@ -237,6 +247,10 @@ def test_full_disk_is_told_in_one_line(tmp_path, monkeypatch):
 
 
 def test_grains_with_other_columns_are_refused(tmp_path):
-    with pytest.raises(DembarkError, match="force_of_side"), GrainsVtkhdf(tmp_path / "g.vtkhdf") as file:
-        file.add(frame_of([[0.0, 0.0, 0.0]], walls={"side": np.zeros((1, 3))}), 0.0)
-        file.add(frame_of([[0.0, 0.0, 0.0]]), 1.0)
+    def with_and_without():
+        with GrainsVtkhdf(tmp_path / "g.vtkhdf") as file:
+            file.add(frame_of([[0.0, 0.0, 0.0]], walls={"side": np.zeros((1, 3))}), 0.0)
+            file.add(frame_of([[0.0, 0.0, 0.0]]), 1.0)
+
+    with pytest.raises(DembarkError, match="force_of_side"):
+        with_and_without()

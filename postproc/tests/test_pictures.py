@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+from scenes import contacts_of, frame_of
+
 from dembark.common.errors import DembarkError, RunError
 from dembark.postproc import plots, render
 from dembark.postproc.fields.coarse_graining import coarse_grain
@@ -11,9 +15,6 @@ from dembark.postproc.fields.grid import Grid
 from dembark.postproc.walls import CylinderWall, MeshWall, PlaneWall
 from dembark.postproc.walls.patches import box_patches, mesh_patches
 from dembark.postproc.walls.stress import wall_stress
-from matplotlib.figure import Figure
-from PIL import Image
-from scenes import contacts_of, frame_of
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from dembark.postproc import ContactsDump, DumpError, GrainsDump, read_times, universe
 from dumps import contacts_text, grains_text, write_times
+
+from dembark.postproc import ContactsDump, DumpError, GrainsDump, read_times, universe
 
 PLACES = np.array([[0.01, 0.02, 0.03], [-0.04, 0.05, 0.123456789012], [0.07, -0.08, 0.09]])
 RADII = np.array([0.0025, 0.002, 0.003])

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from dembark.postproc.statistics import (
     Estimate,
     block_mean,

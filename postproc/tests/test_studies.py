@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from dembark.postproc.studies import fitted_exponent, measured, propagated
 
 

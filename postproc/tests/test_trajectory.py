@@ -5,9 +5,10 @@ import warnings
 import MDAnalysis
 import numpy as np
 import pytest
-from dembark.postproc import DumpError, GrainsDump, universe
 from dumps import grains_text
 from MDAnalysis import transformations
+
+from dembark.postproc import DumpError, GrainsDump, universe
 
 BOX = ((0.0, 1.0), (-1.0, 1.0), (0.0, 3.0))
 PLACES = np.array([[0.1, -0.2, 0.5], [0.5, 0.5, 1.5], [0.9, 0.9, 2.5]])
@@ -36,7 +37,7 @@ def test_registered_format_needs_no_more_than_its_name(drift):
         assert (world.trajectory[3].time, world.trajectory.dt) == (pytest.approx(0.3), pytest.approx(0.1))
     np.testing.assert_allclose(world.atoms.masses, GrainsDump(drift)[0].masses)
     np.testing.assert_allclose(world.dimensions, [1.0, 2.0, 3.0, 90.0, 90.0, 90.0])
-    np.testing.assert_allclose(world.copy().trajectory[4].positions, PLACES + [1.2, 0.0, 0.0], atol=1e-6)
+    np.testing.assert_allclose(world.copy().trajectory[4].positions, PLACES + np.array([1.2, 0.0, 0.0]), atol=1e-6)
 
 
 def test_the_same_positions_as_mdanalysis_reads(drift):

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
+
+from dembark.postproc.dumps.frames import cell
 from dembark.postproc.dumptext import DumpError
 from dembark.postproc.fields.coarse_graining import WallContacts
-from dembark.postproc.grains import GrainFrame, cell
+from dembark.postproc.grains import GrainFrame
 from dembark.postproc.walls.surfaces import Wall
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 

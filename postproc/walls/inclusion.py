@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.common.errors import DembarkError
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.dumptext import DumpError
 from dembark.postproc.fields.coarse_graining import rows_of
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.walls.surfaces import CylinderWall, Places
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from dembark.postproc.dumptext import DumpError
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+
+from dembark.postproc.dumptext import DumpError
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

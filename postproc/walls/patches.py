@@ -6,10 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from dembark.common.errors import DembarkError
-from dembark.postproc.grains import GrainFrame, cell
-from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, PlaneWall, Wall
 from numpy.typing import NDArray
+
+from dembark.common.errors import DembarkError
+from dembark.postproc.dumps.frames import cell
+from dembark.postproc.grains import GrainFrame
+from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, PlaneWall, Wall
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -96,7 +98,7 @@ def _rectangular(edges: tuple[Array, Array], area: _OfTwo, surface: _OfTwo, norm
 def plane_patches(wall: PlaneWall, u: Array, v: Array) -> Patches:
     """Rectangles of a plane between the borders `u` and `v` (m, rising)."""
     return _rectangular((u, v), lambda a, b: np.outer(np.diff(a), np.diff(b)), wall.points,
-                        lambda a, b: np.broadcast_to(wall.axes[0], (*a.shape, 3)), ("u", "v"), ("m", "m"), (np.inf, np.inf))
+                        lambda a, _: np.broadcast_to(wall.axes[0], (*a.shape, 3)), ("u", "v"), ("m", "m"), (np.inf, np.inf))
 
 
 def cylinder_patches(wall: CylinderWall, around: int, height: Array) -> Patches:
@@ -105,7 +107,7 @@ def cylinder_patches(wall: CylinderWall, around: int, height: Array) -> Patches:
         raise DembarkError(f"wall {wall.name}: {around} patches around", "", "it must be at least one")
     sign = -1.0 if wall.inward else 1.0
     return _rectangular((np.linspace(0.0, _TURN, around + 1), height), lambda a, b: wall.radius * np.outer(np.diff(a), np.diff(b)),
-                        wall.points, lambda a, b: sign * wall.outward(a), ("angle", "height"), ("rad", "m"), (_FACET, np.inf))
+                        wall.points, lambda a, _: sign * wall.outward(a), ("angle", "height"), ("rad", "m"), (_FACET, np.inf))
 
 
 def mesh_patches(wall: MeshWall, by: str = "triangle") -> Patches:

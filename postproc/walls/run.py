@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+
 from dembark.common.errors import DembarkError
 from dembark.postproc.dumptext import DumpError
 from dembark.postproc.grains import GrainFrame
@@ -191,10 +192,10 @@ def wall_lines(one: WallStress, source: Source) -> list[str]:
     """A wall's load in lines, with what was checked."""
     x, y, z = one.force.mean(axis=0)
     largest = int(np.argmax(one.mean[:, 0]))
-    lines = [f"{one.wall.name}: mean force on the grains ({x:.4g}, {y:.4g}, {z:.4g}) N on {len(one.patches)} patches of "
-             f"{1e6 * one.patches.areas.mean():.4g} mm2; the patches' sum differs from it by {one.imbalance():.1e}",
-             f"  normal stress: largest mean {_pressure(one.mean[largest, 0])} ± {_pressure(one.half[largest, 0])} at "
-             f"({', '.join(f'{1e3 * place:.4g}' for place in one.patches.centres[largest])}) mm"]
+    lines = [(f"{one.wall.name}: mean force on the grains ({x:.4g}, {y:.4g}, {z:.4g}) N on {len(one.patches)} patches of "
+              f"{1e6 * one.patches.areas.mean():.4g} mm2; the patches' sum differs from it by {one.imbalance():.1e}"),
+             (f"  normal stress: largest mean {_pressure(one.mean[largest, 0])} ± {_pressure(one.half[largest, 0])} at "
+              f"({', '.join(f'{1e3 * place:.4g}' for place in one.patches.centres[largest])}) mm")]
     if one.outside.any():
         share = np.abs(one.outside).sum() / max(np.abs(one.force).sum(), 1e-300)
         lines.append(f"  note: {100.0 * share:.2g} % of the force acts outside the patches")

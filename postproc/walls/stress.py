@@ -9,6 +9,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.common.errors import DembarkError
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.dumptext import DumpError
@@ -16,7 +18,6 @@ from dembark.postproc.grains import GrainFrame
 from dembark.postproc.walls import Inclusion, Places, Wall, into_box, touching
 from dembark.postproc.walls.patches import Patches
 from dembark.postproc.walls.peaks import Blocks, Histogram, PeakFinder
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 

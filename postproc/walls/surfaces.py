@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.common.errors import DembarkError
 from dembark.postproc.walls.mesh import TriangleTree, read_stl
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Vector = Sequence[float] | Array
@@ -30,7 +31,9 @@ class Places:
 class Wall(Protocol):
     """What the functions here need of a wall."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """Its name in files and messages."""
 
     def at(self, time: float) -> Wall:
         """The wall where it is at `time` (s)."""

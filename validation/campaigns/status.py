@@ -83,5 +83,3 @@ def time_left(states: Sequence[State]) -> float | None:
     if not left:
         return 0.0
     return wall_clock(left, at_once) if at_once else None
-
-

@@ -55,7 +55,7 @@ def _memory() -> float:
 
 def _place(chosen: Options, results: Path, plan: Plan, cancel: threading.Event, say: Say) -> Place:
     if chosen.executor == "local":
-        return lambda table: Local(cores_here(chosen), _memory(), cancel)
+        return lambda _: Local(cores_here(chosen), _memory(), cancel)
     there = site.find(chosen.executor)
     return lambda table: Queue(there, results, plan, say, chosen.jobs, lambda name: table.state(name).job)
 

@@ -42,7 +42,8 @@ def deck(
     out: Annotated[Path, typer.Option(help="New or empty folder for the deck.")],
     profile: Annotated[str, typer.Option(help="Size of the run: quick, standard, full, ...")] = "quick",
     variant: Annotated[str | None, typer.Option(help="Variant of the case; default: the first one.")] = None,
-    change: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help='Change a key: --set "grain_diameter=4 mm".')] = None,
+    change: Annotated[list[str] | None,
+                      typer.Option("--set", metavar="KEY=VALUE", help='Change a key: --set "grain_diameter=4 mm".')] = None,
 ) -> None:
     """Write a deck with all its numbers, packing and meshes: a folder that runs with the plain engine command."""
     from dembark.validation import engines

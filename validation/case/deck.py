@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import jinja2
 import numpy as np
+
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
 from dembark.validation.case.folders import package_root
@@ -37,7 +38,7 @@ def load_module(path: Path, name: str) -> ModuleType:
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # the file may be the user's: whatever is wrong in it is told in one line
+    except Exception as error:  # noqa: BLE001 - the file may be the user's: whatever is wrong in it is told in one line
         raise failed(path, error) from None
     return module
 
@@ -55,7 +56,8 @@ def _setup_module(path: Path) -> ModuleType:
 
 
 def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
-    """Derived numbers, packing and meshes of a run with the parameters `values`; DembarkError with file and line when they cannot be made."""
+    """Derived numbers, packing and meshes of a run with the parameters `values`; DembarkError with file and line when they cannot be
+    made."""
     from dembark.input_decks.common.setup import Setup
 
     path = case.folder / "setup.py"
@@ -70,12 +72,13 @@ def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
         if missing:
             raise DembarkError(f"case {case.name} does not say its {' and '.join(missing)}", str(case.folder),
                                "add a setup.py, or expressions in a table [derived]")
-        return Setup(round(float(known["steps"])), float(known["time_step"]), None, {name: known[name] for name in case.derived})  # type: ignore[arg-type, misc]
+        return Setup(round(float(known["steps"])), float(known["time_step"]), None,  # type: ignore[arg-type]
+                     {name: known[name] for name in case.derived})  # type: ignore[misc]
     try:
         return _setup_module(path).setup(SimpleNamespace(**known))
     except DembarkError:
         raise
-    except Exception as error:  # as above
+    except Exception as error:  # noqa: BLE001 - as above
         raise failed(path, error) from None
 
 
@@ -91,7 +94,7 @@ def write(case: Case, engine: str, values: Mapping[str, Value], folder: Path) ->
 
 
 @cache
-def _check_sum(path: Path, changed: int) -> str:
+def _check_sum(path: Path, _changed: int) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
@@ -139,7 +142,8 @@ def _files(case: Case, engine: str, values: Mapping[str, Value], setup: Setup) -
     try:
         text = source.read_text(encoding="utf-8")
     except OSError as error:
-        raise DembarkError(f"{source} cannot be read", error.strerror or str(error), f"add the deck, or take {engine} from engines in case.toml") from None
+        raise DembarkError(f"{source} cannot be read", error.strerror or str(error),
+                           f"add the deck, or take {engine} from engines in case.toml") from None
     known: dict[str, Value] = {**values, **setup.numbers, "steps": setup.steps, "time_step": setup.time_step}
     numbers = {name: engines.DeckNumber(_plain(value), _meaning(case, name)) for name, value in known.items() if name != "replicas"}
     numbers |= {name: engines.DeckNumber(tuple(map(_plain, row))) for name, row in setup.tables.items()}

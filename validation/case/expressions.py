@@ -17,8 +17,8 @@ _UNARY: dict[type[ast.unaryop], Callable[[Any], Any]] = {ast.USub: operator.neg,
 _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge, ast.Eq: operator.eq, ast.NotEq: operator.ne,
 }
-_FUNCTIONS: dict[str, Callable[..., Any]] = {"min": min, "max": max, "abs": abs, "sqrt": math.sqrt, "ceil": math.ceil, "floor": math.floor, "round": round,
-                                           "sin": math.sin, "cos": math.cos}
+_FUNCTIONS: dict[str, Callable[..., Any]] = {"min": min, "max": max, "abs": abs, "sqrt": math.sqrt, "ceil": math.ceil, "floor": math.floor,
+                                             "round": round, "sin": math.sin, "cos": math.cos}
 _CONSTANTS = {"pi": math.pi}
 
 
@@ -87,7 +87,7 @@ class Expression:
         except _Unset:
             return None
 
-    def _value(self, node: ast.AST, values: Mapping[str, Any]) -> Any:
+    def _value(self, node: ast.AST, values: Mapping[str, Any]) -> Any:  # noqa: PLR0911 - one return for each kind of node
         match node:
             case ast.Name(id=name) if name in _CONSTANTS:
                 return _CONSTANTS[name]

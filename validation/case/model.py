@@ -57,7 +57,8 @@ class Study:
 
 @dataclass(frozen=True)
 class Declared:
-    """A quantity as its case declares it, before anything is measured; `name` and `label` may hold one `*` for a part that the measurement names.
+    """A quantity as its case declares it, before anything is measured; `name` and `label` may hold one `*` for a part that the measurement
+    names.
 
     evidence : experiment, theory, code or identity: what its reference is; empty where there is none
     tolerance : largest allowed deviation from the reference, relative unless `absolute`; "bound": a bound that the theory gives for the

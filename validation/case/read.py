@@ -12,7 +12,14 @@ from dembark.validation import engines
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.folders import package_root
 from dembark.validation.case.model import (
-    EVIDENCE, OUTPUTS, STANDARD_OUTPUTS, Case, Constraint, Declared, PlannedRun, Study,
+    EVIDENCE,
+    OUTPUTS,
+    STANDARD_OUTPUTS,
+    Case,
+    Constraint,
+    Declared,
+    PlannedRun,
+    Study,
 )
 from dembark.validation.case.parameters import Parameter, Value, checked, nearest, pick
 from dembark.validation.case.tables import TableReader, load_toml
@@ -37,6 +44,7 @@ class CaseReader(TableReader):
     """Turns the tables of one case.toml into a Case; each mistake names the table it is in."""
 
     def case(self, data: Mapping[str, Any]) -> Case:
+        """The whole case; `data` is the content of the file."""
         tables = {"case": dict, "parameters": dict, "profiles": dict, "variants": dict, "runs": dict, "constraints": list, "studies": dict,
                   "derived": dict, "quantities": dict, "picture": dict}
         self.table(data, "top level", tables, ("case",))
@@ -81,6 +89,7 @@ class CaseReader(TableReader):
         return result
 
     def derived(self, data: Mapping[str, Any], parameters: Mapping[str, Parameter]) -> dict[str, Expression]:
+        """[derived]: expressions, each in the parameters and those before it."""
         found: dict[str, Expression] = {}
         for name, text in data.items():
             if not isinstance(text, str) or not name.isidentifier() or name in parameters:
@@ -89,6 +98,7 @@ class CaseReader(TableReader):
         return found
 
     def quantity(self, name: str, entry: Mapping[str, Any]) -> Declared:
+        """[quantities.NAME]: what a measured quantity is and how it is judged."""
         table = f"quantities.{name}"
         keys = {"label": str, "unit": str, "evidence": str, "tolerance": (int, float, str), "why": str, "absolute": bool, "source": str,
                 "detail": str, "agreement": (int, float), "compared": bool}
@@ -105,6 +115,7 @@ class CaseReader(TableReader):
         return Declared(name=name, **entry)
 
     def parameter(self, name: str, entry: Mapping[str, Any]) -> Parameter:
+        """[parameters.NAME], its own value checked."""
         table, number = f"parameters.{name}", (int, float)
         if not isinstance(entry, dict) or not name.isidentifier():
             raise self.fail(table, "a parameter is a table with an identifier as name")
@@ -124,15 +135,18 @@ class CaseReader(TableReader):
         return parameter
 
     def check(self, table: str, parameter: Parameter, value: Value) -> Value:
+        """`value` in the parameter's unit and type; DembarkError that names `table` when it is not allowed."""
         try:
             return checked(parameter, value)
         except DembarkError as error:
             raise self.fail(table, str(error)) from None
 
     def changes(self, kind: str, tables: Mapping[str, Any], parameters: Mapping[str, Parameter]) -> dict[str, dict[str, Value]]:
+        """All tables [KIND.NAME], profiles or variants: changed parameters by name."""
         return {name: self.overrides(f"{kind}.{name}", entry, parameters) for name, entry in tables.items()}
 
     def overrides(self, table: str, entry: Any, parameters: Mapping[str, Parameter]) -> dict[str, Value]:
+        """One table of changed parameters."""
         if not isinstance(entry, dict):
             raise self.fail(table, "overrides are a table of key = value")
         for key in entry:
@@ -142,6 +156,7 @@ class CaseReader(TableReader):
 
     def runs(self, data: Mapping[str, Any], profiles: Mapping[str, Any], variants: Mapping[str, Any],
              engines: tuple[str, ...], parameters: Mapping[str, Parameter]) -> dict[str, tuple[PlannedRun, ...]]:
+        """[runs]: what each profile runs."""
         result = {}
         for profile, entries in data.items():
             pick(profile, profiles, "profile", f"[runs] of {self.path}")
@@ -160,6 +175,7 @@ class CaseReader(TableReader):
         return result
 
     def replicas(self, entry: Mapping[str, Any], engines: tuple[str, ...], parameters: Mapping[str, Parameter]) -> dict[str, int]:
+        """`replicas` of an entry of [runs]: how many, by engine."""
         counts = entry.get("replicas", {})
         for engine, count in counts.items():
             pick(engine, engines, "engine", f"replicas in [runs] of {self.path}")
@@ -169,6 +185,7 @@ class CaseReader(TableReader):
         return dict(counts)
 
     def study(self, name: str, entry: Any, parameters: Mapping[str, Parameter], variants: Mapping[str, Any]) -> Study:
+        """[studies.NAME]: variants along a parameter."""
         table = f"studies.{name}"
         if not isinstance(entry, dict):
             raise self.fail(table, "a study is a table with title, along and variants")
@@ -181,12 +198,14 @@ class CaseReader(TableReader):
         return Study(name, entry["title"], entry.get("description", "").strip(), entry["along"], tuple(entry["variants"]))
 
     def constraint(self, entry: Any, parameters: Mapping[str, Parameter]) -> Constraint:
+        """An entry of [[constraints]]."""
         if not isinstance(entry, dict):
             raise self.fail("constraints", "a constraint is a table with expression and message")
         self.table(entry, "constraints", {"expression": str, "message": str}, ("expression", "message"))
         return Constraint(self.expression("constraints", entry["expression"], parameters), entry["message"])
 
     def expression(self, table: str, text: str, parameters: Mapping[str, Parameter | Expression]) -> Expression:
+        """`text` as an expression that uses nothing but `parameters`."""
         try:
             expression = Expression(text)
         except DembarkError as error:

@@ -16,8 +16,8 @@ from dembark.validation.engines.base import DeckNumber, Engine, EngineFacts, cal
 from dembark.validation.engines.liggghts import Liggghts
 from dembark.validation.engines.yade import Yade
 
-__all__ = ["ENGINES", "DeckNumber", "Engine", "EngineFacts", "call", "end_with_parent", "facts", "find", "mpi_launcher", "names", "registered",
-           "titles"]
+__all__ = ["ENGINES", "DeckNumber", "Engine", "EngineFacts", "call", "end_with_parent", "facts", "find", "mpi_launcher", "names",
+           "registered", "titles"]
 
 ENGINES: tuple[type[Engine], ...] = (Liggghts, Yade)
 
@@ -38,7 +38,7 @@ def find(name: str) -> Engine:
     return registered(name).find()
 
 
-def titles(joint: str, which: Callable[[EngineFacts], bool] = lambda one: True) -> str:
+def titles(joint: str, which: Callable[[EngineFacts], bool] = lambda _: True) -> str:
     """Titles for a sentence, of the engines for which `which` holds, with `joint` before the last: `A, B and C`."""
     found = [engine.facts.title for engine in ENGINES if which(engine.facts)]
     return f" {joint} ".join([", ".join(found[:-1]), found[-1]]) if len(found) > 1 else "".join(found)

@@ -21,8 +21,8 @@ from dembark.validation.case.parameters import Value
 
 # An environment variable for each engine: which program it was that told its version, and the version.
 _TOLD = "DEMBARK_TOLD_BY_"
-DECK_NOTE = ("Written by dembark; SI units. The numbers without a comment follow from the others: to change a parameter, write the deck anew with "
-             "'dembark deck'.")
+DECK_NOTE = ("Written by dembark; SI units. The numbers without a comment follow from the others: to change a parameter, write the deck "
+             "anew with 'dembark deck'.")
 
 
 @dataclass(frozen=True)

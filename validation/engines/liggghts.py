@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import jinja2
+
 from dembark.common.errors import DembarkError
 from dembark.validation.case.parameters import Value
 from dembark.validation.engines.base import (
@@ -78,7 +79,8 @@ class Liggghts(Engine):
     @classmethod
     def deck_text(cls, source: str, numbers: Mapping[str, DeckNumber], folders: Sequence[Path]) -> str:
         """See Engine. The source is a Jinja template with << >> around expressions, for ${ } and { } have a meaning in decks."""
-        environment = jinja2.Environment(loader=jinja2.FileSystemLoader([str(folder) for folder in folders]), undefined=jinja2.StrictUndefined,
+        environment = jinja2.Environment(loader=jinja2.FileSystemLoader([str(folder) for folder in folders]),
+                                         undefined=jinja2.StrictUndefined,
                                          variable_start_string="<<", variable_end_string=">>", trim_blocks=True, lstrip_blocks=True,
                                          keep_trailing_newline=True, autoescape=False)
         # Tables are for the template; a variable holds one number.

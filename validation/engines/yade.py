@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from dembark.common.errors import DembarkError
-from dembark.validation.engines.base import DECK_NOTE, DeckNumber, Engine, EngineFacts, built, is_program, named_program, texts
 from dembark.validation.case.parameters import Value
+from dembark.validation.engines.base import DECK_NOTE, DeckNumber, Engine, EngineFacts, built, is_program, named_program, texts
 
 
 class Yade(Engine):
@@ -64,7 +64,7 @@ class Yade(Engine):
     @classmethod
     def deck_text(cls, source: str, numbers: Mapping[str, DeckNumber], folders: Sequence[Path]) -> str:
         """See Engine. The numbers take the place of the line `p = dembark.parameters()`."""
-        lines = [f"# {DECK_NOTE}", "p = SimpleNamespace("]
+        lines = [f"# {DECK_NOTE}", "from types import SimpleNamespace", "", "p = SimpleNamespace("]
         lines += [f"    {name}={number.value!r}," + (f"  # {number.meaning}" if number.meaning else "") for name, number in numbers.items()]
         before, marker, after = source.partition("p = dembark.parameters()\n")
         if not marker:

@@ -13,9 +13,9 @@ import re
 from pathlib import Path
 
 from dembark.common.errors import RunError
+from dembark.postproc.statistics import joint_half, joint_limit
 from dembark.validation.judge import result
 from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result
-from dembark.postproc.statistics import joint_half, joint_limit
 
 CAP = 0.10
 PACKINGS = 3
@@ -30,7 +30,8 @@ def compare(folder: Path) -> Comparison:
     """
     measured = sorted((result.read(path) for path in folder.glob(f"*/{result.METRICS}")), key=lambda one: one.engine)
     if len(measured) < 2:
-        raise RunError(f"nothing to compare in {folder}", f"there is a measurement of {measured[0].engine if measured else 'no engine'} only")
+        raise RunError(f"nothing to compare in {folder}",
+                       f"there is a measurement of {measured[0].engine if measured else 'no engine'} only")
     first = measured[0]
     pairs = [pair for index, one in enumerate(measured) for other in measured[index + 1 :] for pair in _pairs(one, other)]
     return Comparison(first.case, first.variant, tuple(one.engine for one in measured), tuple(pairs), first.profile, CAP)
@@ -69,10 +70,12 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
         else:
             halves, scale = (value.half or 0.0, reference.half or 0.0), abs(reference.value)
             half = joint_half(*halves)
-            verdict, reason = _judged(abs(deviation), (halves[0] / scale, halves[1] / scale), (_packings(value), _packings(reference)), comparisons)
+            verdict, reason = _judged(abs(deviation), (halves[0] / scale, halves[1] / scale), (_packings(value), _packings(reference)),
+                                      comparisons)
     return ComparedRecord(
         name=value.name, label=value.label, unit=value.unit, value=value.value, interval=value.interval, reference=reference.value,
-        reference_interval=reference.interval, deviation=deviation, deviation_kind=kind, tolerance=tolerance, verdict=verdict, reason=reason,
+        reference_interval=reference.interval, deviation=deviation, deviation_kind=kind, tolerance=tolerance, verdict=verdict,
+        reason=reason,
         detail="agreement of the engines", source=reference_engine, engine=engine, reference_engine=reference_engine, joint_half_width=half)
 
 

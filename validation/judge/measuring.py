@@ -26,12 +26,12 @@ _NUMBERS = ("scale", "radius", "drum_radius", "drum_speed", "speed")
 
 
 def measure(case: Case, replicas: Sequence[Replica]) -> Measurement:
-    """What measure(replicas) of the case returns; DembarkError or RunError in one line for whatever goes wrong in it."""
+    """What the measure.py of the case returns for `replicas`; DembarkError or RunError in one line for whatever goes wrong in it."""
     return _call(case, "measure", lambda function: function(replicas))
 
 
 def study(case: Case, planned: Study, points: Sequence[Mapping[str, Any]]) -> Measurement:
-    """What study(name, points, along) of the case returns; `points` are the contents of the variants' metrics.json."""
+    """What the measure.py of the case returns for the study `planned`; `points` are the contents of the variants' metrics.json."""
     return _call(case, "study", lambda function: function(planned.name, points, planned.along))
 
 
@@ -42,7 +42,8 @@ def check(case: Case) -> ModuleType:
     module = deck.load_module(path, f"dembark_measure_{case.name}")
     for name in ("measure", *(["study"] if case.studies else [])):
         if not callable(getattr(module, name, None)):
-            raise DembarkError(f"{path} has no function {name}", "", "it needs measure(replicas) and, with [studies], study(name, points, along)")
+            raise DembarkError(f"{path} has no function {name}", "",
+                               "it needs measure(replicas) and, with [studies], study(name, points, along)")
     return module
 
 

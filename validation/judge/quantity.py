@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from dembark.validation.judge.result import QuantityRecord, as_json
 from dembark.postproc.statistics import Estimate
+from dembark.validation.judge.result import QuantityRecord, as_json
 
 
 @dataclass(frozen=True)
@@ -19,8 +19,8 @@ class Quantity:
     reference of one run are correlated, so it is not that of the two values). `tolerance` None means: nothing to pass or fail;
     `verdict` is one that was reached by another rule, told in `detail`. `reason` tells why a verdict is info, `detail` what the
     number means. `compared`: the engines must agree in it; within `agreement`, in the unit of the value, where nothing is random and
-    there is no interval to compare. `evidence` says what the reference is: experiment, theory, code (another code) or identity (a conservation
-    law, the scheme against itself); "" only for quantities that have none.
+    there is no interval to compare. `evidence` says what the reference is: experiment, theory, code (another code) or identity (a
+    conservation law, the scheme against itself); "" only for quantities that have none.
     """
 
     name: str
@@ -71,7 +71,8 @@ class Quantity:
             name=self.name, label=self.label, value=_number(self.estimate.value), unit=self.unit, interval=_pair(self.estimate),
             basis=self.estimate.basis, reference=None if reference is None else _number(reference.value),
             reference_interval=None if reference is None else _pair(reference),
-            deviation=_number(self.deviation), deviation_kind="absolute" if self.absolute else "relative", tolerance=_number(self.tolerance),
+            deviation=_number(self.deviation), deviation_kind="absolute" if self.absolute else "relative",
+            tolerance=_number(self.tolerance),
             verdict=verdict, reason=reason, detail=self.detail, source=self.source, evidence=self.evidence, compared=self.compared,
             deviation_half_width=_number(self.deviation_half), agreement=self.agreement)
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 from dembark.common.errors import RunError
 from dembark.common.files import read_json, write_json
@@ -24,9 +24,9 @@ Kind = TypeVar("Kind", bound="QuantityRecord | Result | Comparison")
 class QuantityRecord:
     """A quantity as it stands in `metrics.json`: numbers in `unit` (None where there is none), 95 % intervals as (low, high).
 
-    `verdict` is pass, fail or info, with its `reason`; `tolerance` None means that nothing was due to be checked. `deviation` is value minus
-    reference, over the reference when `deviation_kind` is "relative". `evidence`: what the reference is, one of EVIDENCE; "" is not stated.
-    `compared`: the engines are to agree in it, within `agreement` (in `unit`) where nothing is random.
+    `verdict` is pass, fail or info, with its `reason`; `tolerance` None means that nothing was due to be checked. `deviation` is value
+    minus reference, over the reference when `deviation_kind` is "relative". `evidence`: what the reference is, one of EVIDENCE; "" is not
+    stated. `compared`: the engines are to agree in it, within `agreement` (in `unit`) where nothing is random.
     """
 
     name: str
@@ -53,7 +53,8 @@ class QuantityRecord:
         """RunError for a verdict or a kind of evidence that does not exist."""
         for key, allowed in (("verdict", VERDICTS), ("evidence", ("", *EVIDENCE))):
             if getattr(self, key) not in allowed:
-                raise RunError(f"{key} = {getattr(self, key)!r}", f"quantity {self.name!r}", f"give one of {', '.join(filter(None, allowed))}")
+                raise RunError(f"{key} = {getattr(self, key)!r}", f"quantity {self.name!r}",
+                               f"give one of {', '.join(filter(None, allowed))}")
 
     @property
     def title(self) -> str:
@@ -87,7 +88,7 @@ class ComparedRecord(QuantityRecord):
 class Result:
     """The replicas of one case, variant and engine, measured and judged; or a study of several variants, with a `title` of its own.
 
-    `profiles`: curves as `validation.checks.run.profile` makes them; `picture`: how to show the packing; `references`: cited works;
+    `profiles`: curves as `postproc.resampling.profile` makes them; `picture`: how to show the packing; `references`: cited works;
     `measured`: when and by which commit; `inputs`: hash of each replica's inputs; `replicas_missing`: numbers of those that did not finish.
     """
 
@@ -134,7 +135,10 @@ def as_json(value: QuantityRecord | Result | Comparison) -> dict[str, Any]:
         item = getattr(value, one.name)
         if one.name in _OPTIONAL and item == _default(one):
             continue
-        content[one.name] = [as_json(part) for part in item] if one.name == "quantities" else list(item) if isinstance(item, tuple) else item
+        if one.name == "quantities":
+            content[one.name] = [as_json(part) for part in item]
+        else:
+            content[one.name] = list(item) if isinstance(item, tuple) else item
     return content
 
 
@@ -203,7 +207,7 @@ def _value(content: Mapping[str, Any], kind: type[Kind], where: str, notes: dict
             part = ComparedRecord if kind is Comparison else QuantityRecord
             item = tuple(_value(one, part, where, notes) for one in item)
         given[key] = tuple(item) if isinstance(item, list) else item
-    return cast(Kind, kind(**given))
+    return kind(**given)
 
 
 def results(folder: Path) -> tuple[list[Result], list[Comparison], list[str]]:
@@ -211,7 +215,8 @@ def results(folder: Path) -> tuple[list[Result], list[Comparison], list[str]]:
     found: list[Result] = []
     compared: list[Comparison] = []
     problems: list[str] = []
-    for path in sorted(path for name in (f"*/*/*/{METRICS}", f"*/*/{COMPARISON}") for path in folder.glob(name) if "superseded" not in path.parts):
+    for path in sorted(path for name in (f"*/*/*/{METRICS}", f"*/*/{COMPARISON}") for path in folder.glob(name)
+                       if "superseded" not in path.parts):
         try:
             if path.name == METRICS:
                 found.append(read(path))

@@ -8,14 +8,15 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
 from dembark.postproc import ContactFrame, ContactsDump, GrainFrame, GrainsDump, render
 from dembark.postproc.fields.coarse_graining import WallContacts, rows_of
 from dembark.postproc.spheres import volume
 from dembark.postproc.style import STYLE
 from dembark.postproc.walls import CylinderWall, PlaneWall, wall_contacts
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 HEIGHT = 3.3  # inches
 _DOTS = 180

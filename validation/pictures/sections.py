@@ -8,11 +8,6 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
-from dembark.common.files import read_json
-from dembark.postproc import GrainFrame, GrainsDump
-from dembark.postproc.dumptext import TextDump
-from dembark.postproc.style import STYLE
-from dembark.validation.pictures.packings import HEIGHT, png
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
@@ -21,6 +16,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
+
+from dembark.common.files import read_json
+from dembark.postproc import GrainFrame, GrainsDump
+from dembark.postproc.dumptext import TextDump
+from dembark.postproc.style import STYLE
+from dembark.validation.pictures.packings import HEIGHT, png
 
 _MAP = "cividis"
 _PIXELS = 300
@@ -32,9 +33,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Section:
-    """Frames of logs in a plane, in m and s: `places` (frames, n, 2), `radii` (n,), `speeds` (frames, n) over `rim_speed`, `times` (frames,).
+    """Frames of logs in a plane, in m and s: `places` (frames, n, 2), `radii` (n,), `speeds` (frames, n) over `rim_speed`, `times`
+    (frames,).
 
-    `links` (m, 2, 2) are contacts of the last frame with `forces` (m,) in N. `drum_radius` 0: there is no drum. The drum turns by `drum_speed` (rad/s) about the axis across the plane, clockwise when positive.
+    `links` (m, 2, 2) are contacts of the last frame with `forces` (m,) in N. `drum_radius` 0: there is no drum. The drum turns by
+    `drum_speed` (rad/s) about the axis across the plane, clockwise when positive.
     """
 
     places: Array
@@ -83,11 +86,13 @@ def scene(folder: Path, cross_section: str, drum_radius: float = 0.0, drum_speed
     return Section(
         np.array([frame.positions[:, axes] for frame in frames_shown]), frames_shown[0].radii,
         np.array([np.linalg.norm(frame.velocities, axis=1) / scale for frame in frames_shown]),
-        np.array([frame.step for frame in frames_shown]) * float(record.get("time_step", 1.0)), drum_radius, drum_speed, label, links, forces)
+        np.array([frame.step for frame in frames_shown]) * float(record.get("time_step", 1.0)), drum_radius, drum_speed, label, links,
+        forces)
 
 
 def _chains(folder: Path, frame: GrainFrame, axes: list[int]) -> tuple[Array, Array]:
-    """Ends (m, 2, 2) in m and normal forces (m,) in N of the contacts in the last frame of contacts.dump: from log to log, or to the wall."""
+    """Ends (m, 2, 2) in m and normal forces (m,) in N of the contacts in the last frame of contacts.dump: from log to log, or to the
+    wall."""
     dump = TextDump(folder / "contacts.dump")
     values = dump.frame(len(dump) - 1).values
     place = {int(number): row for number, row in zip(frame.ids, frame.positions[:, axes], strict=True)}
@@ -156,7 +161,8 @@ def animate(section: Section, path: Path, *, duration: int = 60) -> Path:
         draw = ImageDraw.Draw(image)
         if section.drum_radius > 0.0:
             radius, middle = section.drum_radius * scale, at(np.zeros(2))
-            draw.ellipse([middle[0] - radius, middle[1] - radius, middle[0] + radius, middle[1] + radius], outline=_SHELL, width=2 * _OVERSAMPLING)
+            draw.ellipse([middle[0] - radius, middle[1] - radius, middle[0] + radius, middle[1] + radius], outline=_SHELL,
+                         width=2 * _OVERSAMPLING)
             for mark in range(12):
                 angle = 2.0 * math.pi * mark / 12.0 - section.drum_speed * time
                 way = np.array([math.cos(angle), math.sin(angle)])

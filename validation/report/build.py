@@ -9,14 +9,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
+from markupsafe import Markup, escape
+
 from dembark.common.errors import RunError
 from dembark.common.files import disk_error, write_whole
 from dembark.validation.judge.result import Result
 from dembark.validation.report import front, numbers, scatter, sections
 from dembark.validation.report.gather import Gathered, gather
 from dembark.validation.report.look import colour, engine_name
-from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
-from markupsafe import Markup, escape
 
 _HERE = Path(__file__).parent
 _SIGNS = {"passed": "✓ pass", "failed": "✗ FAIL", "open": "○ open", "information": ""}
@@ -31,12 +32,14 @@ def build(folder: Path) -> Path:
     gathered = gather(folder)
     if not gathered.pages:
         raise RunError(f"nothing to report in {folder}", "it has no measured run and no case expects one for this profile")
-    return write(gathered, lambda drawn: {"title": f"Validation report, profile {folder.name}", "sections": sections.sections(gathered, drawn),
+    return write(gathered,
+                 lambda drawn: {"title": f"Validation report, profile {folder.name}", "sections": sections.sections(gathered, drawn),
                                           "verification": sections.verification(gathered, drawn)})
 
 
 def write(gathered: Gathered, chapters: Any) -> Path:
-    """Lay out a report: first pages and provenance of `gathered`, and between them what `chapters(folder of figures)` adds to the context."""
+    """Lay out a report: first pages and provenance of `gathered`, and between them what `chapters(folder of figures)` adds to the
+    context."""
     folder = gathered.folder
     drawn = folder / "figures"
     try:
@@ -51,7 +54,8 @@ def write(gathered: Gathered, chapters: Any) -> Path:
         ratio = figure and sections.embed(figure, drawn, "scatter", "", ["scatter.csv"])
         measured = [one for page in gathered.pages if not page.is_study for _, one in sorted(page.results.items())]
         context = {**_EMPTY, **own, **first, "style": Markup((_HERE / "style.css").read_text(encoding="utf-8")),
-                   "scatter": ratio, "measured": measured, "references": _references(gathered), "machine": machine(measured), "description": gathered.summary.get("description", "")}
+                   "scatter": ratio, "measured": measured, "references": _references(gathered), "machine": machine(measured),
+                   "description": gathered.summary.get("description", "")}
         template = _environment().get_template("report.html.j2")
         write_pdf(template.render(context, full=False), folder / "report.pdf")
         return write_whole(folder / "report.html", template.render(context, full=True).encode())
@@ -64,7 +68,8 @@ _EMPTY: Mapping[str, Any] = {"sections": (), "sweeps": (), "errors": (), "agains
 
 
 def _environment() -> Environment:
-    found = Environment(loader=FileSystemLoader(_HERE), autoescape=select_autoescape(["html", "j2"]), undefined=StrictUndefined, trim_blocks=True,
+    found = Environment(loader=FileSystemLoader(_HERE), autoescape=select_autoescape(["html", "j2"]), undefined=StrictUndefined,
+                        trim_blocks=True,
                         lstrip_blocks=True)
     found.filters |= {"plain": numbers.plain, "compact": numbers.compact, "subscripts": _subscripts, "percent": numbers.percent,
                       "duration": numbers.duration, "engine": engine_name}

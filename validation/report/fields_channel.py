@@ -7,11 +7,12 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
+
+from dembark.postproc.style import STYLE
 from dembark.validation.report.fields import FieldFigure
 from dembark.validation.report.fields_panels import DIVERGING, SEQUENTIAL, bar, curve, image, limits, long_table
-from dembark.postproc.style import STYLE
 from dembark.validation.report.look import colour, engine_name
-from matplotlib.figure import Figure
 
 # Name in the dataset, label, colour map, and whether the scale is even about zero.
 _MAPS = (
@@ -89,10 +90,12 @@ def _profiles(datasets: Mapping[str, Any]) -> FieldFigure:
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="lower center", ncols=4, fontsize=6.8)
     caption = (
-        "The same over the whole height of the window, across the channel, with 95 % intervals over time blocks. Full lines: Eulerian, momentum over "
-        "mass in cells at rest; dotted: Lagrangian, displacements of single grains over the same time, smoothed by the same kernel."
+        "The same over the whole height of the window, across the channel, with 95 % intervals over time blocks. Full lines: Eulerian, "
+        "momentum over mass in cells at rest; dotted: Lagrangian, displacements of single grains over the same time, smoothed by the same "
+        "kernel."
     )
     columns = {engine: [one.x.values, one.velocity_lagrangian.values,
-                        *(one[f"{name}_profile{end}"].values for name in titles for end in ("", "_half"))] for engine, one in datasets.items()}
+                        *(one[f"{name}_profile{end}"].values for name in titles for end in ("", "_half"))]
+               for engine, one in datasets.items()}
     header = ["x_m", "velocity_lagrangian", *(f"{name}{end}" for name in titles for end in ("", "_half_width"))]
     return FieldFigure("profiles", figure, "Eulerian beside Lagrangian profiles", caption, {"profiles": long_table(header, columns)})

@@ -7,13 +7,14 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from dembark.validation.report.fields import FieldFigure
-from dembark.validation.report.fields_panels import SEQUENTIAL, bar, curve, image, limits, long_table
-from dembark.postproc.style import STYLE
-from dembark.validation.report.look import engine_name
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
+
+from dembark.postproc.style import STYLE
+from dembark.validation.report.fields import FieldFigure
+from dembark.validation.report.fields_panels import SEQUENTIAL, bar, curve, image, limits, long_table
+from dembark.validation.report.look import engine_name
 
 _SHELL = "#4a4f57"
 
@@ -25,7 +26,8 @@ def draw(datasets: Mapping[str, Any]) -> list[FieldFigure]:
 
 def _map(datasets: Mapping[str, Any]) -> FieldFigure:
     first = next(iter(datasets.values())).attrs
-    powers = {engine: np.log10(np.where(one.impact_power.values > 0.0, one.impact_power.values, np.nan)) for engine, one in datasets.items()}
+    powers = {engine: np.log10(np.where(one.impact_power.values > 0.0, one.impact_power.values, np.nan))
+              for engine, one in datasets.items()}
     scale = limits(list(powers.values()))
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(min(7.2, 3.0 * len(datasets) + 0.8), 3.1), layout="constrained")
@@ -34,8 +36,9 @@ def _map(datasets: Mapping[str, Any]) -> FieldFigure:
             radius = one.attrs["drum_radius"]
             image(axes, powers[engine].T, (-radius, radius, -radius, radius), scale, SEQUENTIAL, smooth=False)
             size = 2.0 * one.log_radius.values
-            axes.add_collection(EllipseCollection(size, size, np.zeros_like(size), units="x", facecolor="none", edgecolor="white", linewidth=0.5,
-                                                  offsets=np.column_stack([one.log_x.values, one.log_z.values]), transOffset=axes.transData))
+            axes.add_collection(EllipseCollection(size, size, np.zeros_like(size), units="x", facecolor="none", edgecolor="white",
+                                                  linewidth=0.5, offsets=np.column_stack([one.log_x.values, one.log_z.values]),
+                                                  transOffset=axes.transData))
             shell = axes.add_patch(Circle((0.0, 0.0), radius, fill=False, edgecolor=_SHELL, linewidth=1.6, clip_on=False))
             axes.images[0].set_clip_path(shell)
             axes.set(aspect="equal", xlim=(-1.04 * radius, 1.04 * radius), ylim=(-1.04 * radius, 1.04 * radius))
@@ -44,12 +47,14 @@ def _map(datasets: Mapping[str, Any]) -> FieldFigure:
         bar(figure, list(panels), scale, SEQUENTIAL, "log₁₀ of the power lost in impacts (W/m²)", shrink=0.8, aspect=22, pad=0.02)
     caption = (
         f"Energy lost in impacts (approach of {first['impact_speed']:g} m/s or more) per time and area of the cross-section, over "
-        f"{first['revolutions']} revolutions{_loads(first)}, from the records of {first['impacts']} impacts; each counts where it began. White: "
-        f"nothing was hit. Circles: logs of the last frame. The drum turns clockwise; logs are {first['log_length']:g} m long."
+        f"{first['revolutions']} revolutions{_loads(first)}, from the records of {first['impacts']} impacts; each counts where it began. "
+        f"White: nothing was hit. Circles: logs of the last frame. The drum turns clockwise; logs are {first['log_length']:g} m long."
     )
-    columns = {engine: [*(np.broadcast_to(axis, one.impact_power.shape) for axis in (one.x.values[:, None], one.z.values)), one.impact_power.values]
+    columns = {engine: [*(np.broadcast_to(axis, one.impact_power.shape) for axis in (one.x.values[:, None], one.z.values)),
+                        one.impact_power.values]
                for engine, one in datasets.items()}
-    return FieldFigure("map", figure, "Impact power over the cross-section", caption, {"power": long_table(["x_m", "z_m", "power_W_per_m2"], columns)})
+    return FieldFigure("map", figure, "Impact power over the cross-section", caption,
+                       {"power": long_table(["x_m", "z_m", "power_W_per_m2"], columns)})
 
 
 def _loads(attributes: Mapping[str, Any]) -> str:
@@ -83,14 +88,16 @@ def _shell(datasets: Mapping[str, Any]) -> FieldFigure:
                 axes.set_ylabel("peak force (N)")
         bar(figure, list(panels), scale, SEQUENTIAL, "log₁₀ of impacts per turn", aspect=18, pad=0.02)
     caption = (
-        "Left: energy lost in impacts on the shell per time and area of it, along its angle, with 95 % intervals over quarter revolutions. Right: "
-        "histogram of peak forces of impacts on the shell, angle by angle: number per revolution in bins of 10° and a fifth of a decade."
+        "Left: energy lost in impacts on the shell per time and area of it, along its angle, with 95 % intervals over quarter revolutions. "
+        "Right: histogram of peak forces of impacts on the shell, angle by angle: number per revolution in bins of 10° and a fifth of a "
+        "decade."
     )
     tables = {
         "shell_power": long_table(["angle_deg", "power_W_per_m2", "half_width"], {
             engine: [one.angle.values, one.shell_power.values, one.shell_power_half.values] for engine, one in datasets.items()}),
         "shell_peaks": long_table(["angle_deg", "peak_force_N", "impacts_per_revolution"], {
-            engine: [*(np.broadcast_to(axis, one.shell_peaks.shape) for axis in (one.angle.values[:, None], one.force.values)), one.shell_peaks.values]
+            engine: [*(np.broadcast_to(axis, one.shell_peaks.shape) for axis in (one.angle.values[:, None], one.force.values)),
+                     one.shell_peaks.values]
             for engine, one in datasets.items()}),
     }
     return FieldFigure("shell", figure, "Impacts along the shell", caption, tables)

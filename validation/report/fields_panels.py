@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from dembark.validation.report.look import colour, engine_name, look
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+
+from dembark.validation.report.look import colour, engine_name, look
 
 Array = NDArray[np.float64]
 
@@ -49,7 +50,8 @@ def bar(figure: Figure, axes: Any, scale: tuple[float, float], paint: str, label
     one.outline.set_linewidth(0.4)
 
 
-def curve(axes: Any, engine: str, place: Array, value: Array, half: Array | None = None, *, upward: bool = False, marked: bool = True) -> Any:
+def curve(axes: Any, engine: str, place: Array, value: Array, half: Array | None = None, *, upward: bool = False,
+          marked: bool = True) -> Any:
     """A profile of an engine with the band of its interval; `upward`: the place is drawn upwards."""
     paint, style = colour(engine), {"marker": look(engine).marker, "markersize": 2.6} if marked else {}
     if half is not None:

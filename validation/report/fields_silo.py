@@ -7,12 +7,13 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from dembark.validation.report.fields import FieldFigure
-from dembark.validation.report.fields_panels import DIVERGING, SEQUENTIAL, bar, curve, image, limits, long_table
-from dembark.postproc.style import STYLE
-from dembark.validation.report.look import engine_name
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+
+from dembark.postproc.style import STYLE
+from dembark.validation.report.fields import FieldFigure
+from dembark.validation.report.fields_panels import DIVERGING, SEQUENTIAL, bar, curve, image, limits, long_table
+from dembark.validation.report.look import engine_name
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,8 @@ def _panels(one: Any) -> dict[str, Array]:
     }
 
 
-_LABELS = {"stress_zz_kPa": "σ$_{zz}$ (kPa)", "stress_rr_kPa": "σ$_{rr}$ (kPa)", "stress_zr_kPa": "σ$_{rz}$ (kPa)", "k": "K = σ$_{rr}$/σ$_{zz}$",
+_LABELS = {"stress_zz_kPa": "σ$_{zz}$ (kPa)", "stress_rr_kPa": "σ$_{rr}$ (kPa)", "stress_zr_kPa": "σ$_{rz}$ (kPa)",
+           "k": "K = σ$_{rr}$/σ$_{zz}$",
            "solid_fraction": "solid fraction"}
 
 
@@ -74,11 +76,11 @@ def _maps(datasets: Mapping[str, Any]) -> FieldFigure:
             bar(figure, list(axes), scale, paint, label, location="bottom", pad=0.075, aspect=11, fraction=0.035)
     first = next(iter(datasets.values())).attrs
     caption = (
-        "Cut through the silo, axis in the middle: coarse-grained fields with the lines of the contacts with wall and base, averaged around the "
-        f"axis and over {first['frames']} frames of {first['replicas']} packing{'s' if first['replicas'] > 1 else ''}. Gaussian kernel of width "
-        "1 d; the average around the axis is taken in closed form before anything is put on the grid, so that mass and momentum are "
-        "conserved exactly. Each value is divided by the part of its kernel that lies inside the vessel. Same colour scale for all engines; "
-        "compression positive, σ_rz is negative where the wall carries weight."
+        "Cut through the silo, axis in the middle: coarse-grained fields with the lines of the contacts with wall and base, averaged "
+        f"around the axis and over {first['frames']} frames of {first['replicas']} packing{'s' if first['replicas'] > 1 else ''}. Gaussian "
+        "kernel of width 1 d; the average around the axis is taken in closed form before anything is put on the grid, so that mass and "
+        "momentum are conserved exactly. Each value is divided by the part of its kernel that lies inside the vessel. Same colour scale "
+        "for all engines; compression positive, σ_rz is negative where the wall carries weight."
     )
     columns = {engine: [*(np.broadcast_to(axis, panels[engine]["k"].shape) for axis in (one.radius.values[:, None], one.height.values)),
                         *panels[engine].values()] for engine, one in shown.items()}
@@ -92,21 +94,25 @@ def _profiles(datasets: Mapping[str, Any]) -> FieldFigure:
     bands = first.band_bounds.values
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 2.75))
-        grid = figure.add_gridspec(1, 1 + len(bands), width_ratios=[1.25, *[1.0] * len(bands)], left=0.065, right=0.985, bottom=0.26, top=0.88,
+        grid = figure.add_gridspec(1, 1 + len(bands), width_ratios=[1.25, *[1.0] * len(bands)], left=0.065, right=0.985, bottom=0.26,
+                                   top=0.88,
                                    wspace=0.32)
         left = figure.add_subplot(grid[0])
         for engine, one in shown.items():
             d = one.attrs["grain_diameter"]
             curve(left, engine, one.height.values / d, 1e-3 * one.stress_zz_section.values, 1e-3 * one.stress_zz_section_half.values,
                   upward=True, marked=False)
-            left.plot(1e-3 * one.janssen.values, one.height.values / d, color=left.lines[-1].get_color(), linestyle=(0, (4, 2)), linewidth=1.0,
+            left.plot(1e-3 * one.janssen.values, one.height.values / d, color=left.lines[-1].get_color(), linestyle=(0, (4, 2)),
+                      linewidth=1.0,
                       label=f"Janssen ({engine_name(engine)})")
         left.set(xlabel="σ$_{zz}$ (kPa)", ylabel="height z / d", title="σ$_{zz}$ of the section", xlim=(0.0, None), ylim=(0.0, None))
         right = [figure.add_subplot(grid[1 + number]) for number in range(len(bands))]
         for number, axes in enumerate(right):
             for engine, one in shown.items():
-                curve(axes, engine, one.radius.values / one.attrs["vessel_radius"], one.k_profile.values[number], one.k_profile_half.values[number])
-                axes.plot([1.0], [_wall_ratio(one, bands[number])], "*", markersize=7, color=axes.lines[-1].get_color(), markeredgecolor="white",
+                curve(axes, engine, one.radius.values / one.attrs["vessel_radius"], one.k_profile.values[number],
+                      one.k_profile_half.values[number])
+                axes.plot([1.0], [_wall_ratio(one, bands[number])], "*", markersize=7, color=axes.lines[-1].get_color(),
+                          markeredgecolor="white",
                           markeredgewidth=0.4, clip_on=False, zorder=5)
             low, high = bands[number] / first.attrs["grain_diameter"]
             axes.set(xlabel="r / R", title=f"z = {low:.0f} … {high:.0f} d", xlim=(0.0, 1.0))
@@ -119,11 +125,13 @@ def _profiles(datasets: Mapping[str, Any]) -> FieldFigure:
         handles, labels = left.get_legend_handles_labels()
         right[0].plot([], [], "*", color="#4a4f57", markersize=7, markeredgecolor="white", label="with the wall's own normal stress")
         more = right[0].get_legend_handles_labels()
-        figure.legend([*handles, more[0][-1]], [*labels, more[1][-1]], loc="lower center", ncols=5, fontsize=6.8, handlelength=1.6, columnspacing=1.2)
+        figure.legend([*handles, more[0][-1]], [*labels, more[1][-1]], loc="lower center", ncols=5, fontsize=6.8, handlelength=1.6,
+                      columnspacing=1.2)
     caption = (
-        "Left: vertical stress of the coarse-grained field, mean over the cross-section, and Janssen's law with measured K, μ_mob and ρ_b, nothing "
-        "fitted. Right: ratio of radial to vertical stress from the axis to the wall, averaged over the heights given; stars: the normal stress that "
-        "the wall itself feels there over σ_zz of the outermost ring. Bands: 95 % intervals, on the left of what varies in time only."
+        "Left: vertical stress of the coarse-grained field, mean over the cross-section, and Janssen's law with measured K, μ_mob and ρ_b, "
+        "nothing fitted. Right: ratio of radial to vertical stress from the axis to the wall, averaged over the heights given; stars: the "
+        "normal stress that the wall itself feels there over σ_zz of the outermost ring. Bands: 95 % intervals, on the left of what varies "
+        "in time only."
     )
     tables = {
         "section": long_table(["height_m", "sigma_zz_Pa", "half_width_Pa", "janssen_Pa", "wall_normal_Pa", "wall_shear_Pa"], {

@@ -12,11 +12,12 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+
 from dembark.postproc.style import STYLE
 from dembark.validation.report.look import MARKS, PALETTE, colour, engine_name
 from dembark.validation.verification.item import Item, Panel
-from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
 
 WIDE = 7.2  # inches
 _INK = "#4a4f57"
@@ -98,7 +99,8 @@ def _panel(axes: Any, entries: Sequence[tuple[str, Mapping[str, Any]]], handles:
             fill = axes.fill_betweenx if upward else axes.fill_between
             fill(place, _numbers(one["low"]), _numbers(one["high"]), color=paint, alpha=0.18, linewidth=0)
         # Where engines agree to the last digit the line below must still be seen.
-        handles.setdefault(engine_name(engine), line(_numbers(one["value"]), color=paint, linewidth=0.9 if number else 2.4, alpha=1.0 if number else 0.6))
+        handles.setdefault(engine_name(engine),
+                           line(_numbers(one["value"]), color=paint, linewidth=0.9 if number else 2.4, alpha=1.0 if number else 0.6))
     across, along = symbols(first["across"]), symbols(first["along"])
     axes.set(**({"xlabel": across, "ylabel": along} if upward else {"xlabel": along, "ylabel": across}))
     labels = sorted({one["reference_label"] for _, one in entries if one.get("reference_label")})
@@ -116,7 +118,8 @@ def _panel(axes: Any, entries: Sequence[tuple[str, Mapping[str, Any]]], handles:
 def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
     """Whether two engines have one and the same reference, so that one line will do."""
     values, others = (_numbers(each.get("reference") or []) for each in (one, other))
-    return len(values) == len(others) and bool(np.allclose(values, others, rtol=1e-3, atol=1e-3 * np.nanmax(np.abs(others)), equal_nan=True))
+    return len(values) == len(others) and bool(np.allclose(values, others, rtol=1e-3, atol=1e-3 * np.nanmax(np.abs(others)),
+                                                           equal_nan=True))
 
 
 def _clipped(text: str, length: int) -> str:
@@ -158,7 +161,8 @@ def _draw(axes: Any, panel: Panel) -> None:
         if curve.theory:
             axes.plot(curve.place, curve.value, color=_INK, linewidth=0.9, linestyle=_DASHES[0], label=curve.label)
         else:
-            axes.plot(curve.place, curve.value, color=PALETTE[number % len(PALETTE)], marker=MARKS[number % len(MARKS)], markersize=3.2, linewidth=1.1,
+            axes.plot(curve.place, curve.value, color=PALETTE[number % len(PALETTE)], marker=MARKS[number % len(MARKS)], markersize=3.2,
+                      linewidth=1.1,
                       label=curve.label)
             number += 1
     axes.set(yscale="log", xlabel=panel.along, ylabel=panel.across)

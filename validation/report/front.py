@@ -17,7 +17,8 @@ FAILED, OPEN, MISSING = 8, 14, 6
 # What a failure says most about comes first.
 _WEIGHT = ("experiment", "theory", "identity", "", "code")
 
-CSV_HEADER = ("case", "variant", "engine", "quantity", "label", "unit", "value", "low", "high", "reference", "reference_low", "reference_high",
+CSV_HEADER = ("case", "variant", "engine", "quantity", "label", "unit", "value", "low", "high", "reference", "reference_low",
+              "reference_high",
               "deviation", "deviation_kind", "tolerance", "verdict", "evidence", "reason", "detail", "source")
 
 
@@ -70,8 +71,9 @@ def csv_rows(rows: Iterable[Row]) -> Iterable[Sequence[Any]]:
     """All quantities as rows of a table, see CSV_HEADER."""
     for row in rows:
         one = row.record
-        yield (row.case, row.anchor.removeprefix(f"{row.case}-"), row.who, one.name, one.label, one.unit, one.value, *(one.interval or (None, None)),
-               one.reference, *(one.reference_interval or (None, None)), one.deviation, one.deviation_kind, one.tolerance, one.verdict, one.evidence,
+        yield (row.case, row.anchor.removeprefix(f"{row.case}-"), row.who, one.name, one.label, one.unit, one.value,
+               *(one.interval or (None, None)), one.reference, *(one.reference_interval or (None, None)), one.deviation,
+               one.deviation_kind, one.tolerance, one.verdict, one.evidence,
                one.reason, one.detail, one.source)
 
 

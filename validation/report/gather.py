@@ -143,7 +143,8 @@ def _cases() -> Mapping[str, Case]:
 def _expected(folder: Path, cases: Mapping[str, Case], summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str]]:
     """(case, variant, engine, why it is missing or '') of every run that should be there."""
     for run in summary.get("runs", ()):
-        reason = "" if run["state"] == "finished" else f"{engine_name(run['engine'])}, replica {run['replica']}: {run.get('message') or run['state']}"
+        told = run.get("message") or run["state"]
+        reason = "" if run["state"] == "finished" else f"{engine_name(run['engine'])}, replica {run['replica']}: {told}"
         yield run["case"], run["variant"], run["engine"], reason
     if not summary:
         for case in cases.values():

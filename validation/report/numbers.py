@@ -50,7 +50,8 @@ def deviation(one: QuantityRecord) -> str:
     if one.deviation is None:
         return "–"
     if one.deviation_kind == "relative" and abs(one.deviation) <= _PERCENT:
-        text = f"{100.0 * one.deviation:+.{1 if abs(one.deviation) >= 0.001 else 2}f}" if abs(one.deviation) >= 1e-4 else plain(100.0 * one.deviation, 2)
+        per_cent = 100.0 * one.deviation
+        text = f"{per_cent:+.{1 if abs(one.deviation) >= 0.001 else 2}f}" if abs(one.deviation) >= 1e-4 else plain(per_cent, 2)
         return f"{text} %".replace("-", "−")
     absolute = one.deviation_kind == "absolute" or one.value is None or one.reference is None
     difference = one.deviation if absolute else one.value - one.reference  # type: ignore[operator]
@@ -63,7 +64,9 @@ def allowed(one: QuantityRecord) -> str:
         return ""
     if one.tolerance == 0.0:
         return "exact"
-    return f"±{plain(100.0 * one.tolerance, 2)} %" if one.deviation_kind == "relative" else f"±{with_unit(plain(one.tolerance, 2), one.unit)}"
+    if one.deviation_kind == "relative":
+        return f"±{plain(100.0 * one.tolerance, 2)} %"
+    return f"±{with_unit(plain(one.tolerance, 2), one.unit)}"
 
 
 def compact(value: float | str | None) -> str:

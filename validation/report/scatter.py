@@ -9,13 +9,14 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from dembark.postproc.statistics import Scatter, scatter
 from dembark.postproc.style import STYLE
 from dembark.validation.report.figures import WIDE, symbols
 from dembark.validation.report.gather import Row
 from dembark.validation.report.look import look
-from dembark.postproc.statistics import Scatter, scatter
-from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
 
 KINDS = ("experiment", "theory")
 _INK = "#4a4f57"
@@ -25,7 +26,8 @@ LINES = 24
 
 @dataclass(frozen=True)
 class Point:
-    """A measured value over its reference, of one quantity of a case in one variant and engine, with the relative half-width of the ratio."""
+    """A measured value over its reference, of one quantity of a case in one variant and engine, with the relative half-width of the
+    ratio."""
 
     line: tuple[str, str]
     engine: str
@@ -56,7 +58,8 @@ def points(rows: Iterable[Row]) -> list[Point]:
 
 
 def statistics(found: Sequence[Point]) -> Scatter | None:
-    """Bias and scatter of an engine's points; None for fewer than three. sigma_E is the references' own: half of their 95 % half-widths, rms."""
+    """Bias and scatter of an engine's points; None for fewer than three. sigma_E is the references' own: half of their 95 % half-widths,
+    rms."""
     if len(found) < 3:
         return None
     sigma = math.sqrt(sum((0.5 * one.reference_half) ** 2 for one in found) / len(found))
@@ -64,7 +67,8 @@ def statistics(found: Sequence[Point]) -> Scatter | None:
 
 
 def lines(found: Sequence[Point]) -> list[tuple[str, str]]:
-    """(case, quantity) of the points in the order of the figure, those farthest from the reference first to be kept when there is no room."""
+    """(case, quantity) of the points in the order of the figure, those farthest from the reference first to be kept when there is no
+    room."""
     worst: dict[tuple[str, str], float] = {}
     for one in found:
         worst[one.line] = max(worst.get(one.line, 0.0), abs(math.log(one.ratio)))
@@ -90,7 +94,8 @@ def figure(found: Sequence[Point], tolerance: float = 0.10) -> Figure | None:
         ends = 10.0 ** np.array([math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)) + 1e-9)])
         left.fill_between(ends, ends * (1 - tolerance), ends * (1 + tolerance), color=_INK, alpha=0.12, linewidth=0)
         left.plot(ends, ends, color=_INK, linewidth=0.6)
-        left.set(xscale="log", yscale="log", xlim=ends, ylim=ends, xlabel="reference", ylabel="measured", title="Measured against reference")
+        left.set(xscale="log", yscale="log", xlim=ends, ylim=ends, xlabel="reference", ylabel="measured",
+                 title="Measured against reference")
         for axis in (left.xaxis, left.yaxis):
             axis.set_minor_formatter(NullFormatter())
         right.axvspan(1 - tolerance, 1 + tolerance, color=_INK, alpha=0.12, linewidth=0)
@@ -121,7 +126,8 @@ def _engine(left: Any, right: Any, engine: str, place: int, found: Sequence[Poin
     shift = 0.22 * (place - 0.5 * (engines - 1))
     label = title if known is None else f"{title}: δ = {known.bias:.3f}, σ = {known.model:.3f}, {known.count} points"
     right.errorbar([one.ratio for one in found], [number[one.line] + shift for one in found],
-                   xerr=[one.ratio * math.hypot(one.half, one.reference_half) for one in found], fmt=mark, color=paint, markersize=2.8, elinewidth=0.6,
+                   xerr=[one.ratio * math.hypot(one.half, one.reference_half) for one in found], fmt=mark, color=paint, markersize=2.8,
+                   elinewidth=0.6,
                    markeredgecolor="white", markeredgewidth=0.3, label=label)
     if known is not None:
         right.axvline(known.bias, color=paint, linewidth=0.8)

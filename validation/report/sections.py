@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
 from dembark.validation import pictures
 from dembark.validation.judge.tally import Counts, tally
 from dembark.validation.report import fields, figures, front
 from dembark.validation.report.gather import Gathered, Page, Row, beside
 from dembark.validation.report.look import engine_name
-from markupsafe import Markup
-from matplotlib.figure import Figure
 
 # Of a case in the PDF: variants with figures (of the first all main ones, of the others one), panels of a figure, and rows of one quantity
 # before only the worst is shown.
@@ -54,7 +55,8 @@ class Part:
 
 @dataclass
 class Section:
-    """A case: `decided` quantities by evidence, one line each for identities and for the engines beside each other, figures, and `parts`."""
+    """A case: `decided` quantities by evidence, one line each for identities and for the engines beside each other, figures, and
+    `parts`."""
 
     case: str
     title: str
@@ -73,7 +75,8 @@ def embed(figure: Figure, folder: Path, name: str, caption: str, files: Sequence
     """The figure inside the document, in the PDF if `main`, and as a file `name`.svg beside its data."""
     data = figures.svg(figure)
     (folder / f"{name}.svg").write_bytes(data)
-    return Shown(_image(data, "svg+xml", name), caption, [f"figures/{file}" for file in files], _image(figures.png(figure), "png", name) if main else "")
+    return Shown(_image(data, "svg+xml", name), caption, [f"figures/{file}" for file in files],
+                 _image(figures.png(figure), "png", name) if main else "")
 
 
 def _image(data: bytes, kind: str, alt: str) -> Markup:
@@ -88,7 +91,8 @@ def badness(row: Row) -> float:
 
 
 def decided(rows: Iterable[Row]) -> list[Decided]:
-    """Checks against experiment and theory, and those that do not state their evidence, by quantity; of many only what failed and the worst."""
+    """Checks against experiment and theory, and those that do not state their evidence, by quantity; of many only what failed and the
+    worst."""
     by_name: dict[str, list[Row]] = {}
     for row in rows:
         if row.record.standing != "information" and row.record.evidence not in ("identity", "code"):
@@ -98,7 +102,8 @@ def decided(rows: Iterable[Row]) -> list[Decided]:
         few = len(group) <= ROWS
         shown = group if few else sorted(group, key=badness, reverse=True)
         failed = sum(row.record.standing == "failed" for row in group)
-        found.append(Decided(shown if few else shown[: min(ROWS, max(1, failed))], 0 if few else len(group), tally(row.record for row in group)))
+        found.append(Decided(shown if few else shown[: min(ROWS, max(1, failed))], 0 if few else len(group),
+                             tally(row.record for row in group)))
     return found
 
 
@@ -116,7 +121,8 @@ def line(rows: Sequence[Row], what: str) -> str:
     if not closed:
         return f"{text}."
     worst = max(closed, key=badness)
-    return f"{text}; nearest to its limit: {worst.record.title} ({worst.place}, {worst.who}), at {100.0 * badness(worst):.2g} % of what is allowed."
+    return (f"{text}; nearest to its limit: {worst.record.title} ({worst.place}, {worst.who}), "
+            f"at {100.0 * badness(worst):.2g} % of what is allowed.")
 
 
 def sections(gathered: Gathered, folder: Path) -> list[Section]:
@@ -130,12 +136,14 @@ def _section(gathered: Gathered, name: str, pages: list[Page], folder: Path) -> 
     known = gathered.cases.get(name)
     parts = [_part(page, pages, folder) for page in pages]
     variants = [part for part in parts if not part.page.is_study]
-    printed = [[one for one in part.figures if one.printed] for part in (*variants[:VARIANTS], *(part for part in parts if part.page.is_study))]
+    printed = [[one for one in part.figures if one.printed]
+               for part in (*variants[:VARIANTS], *(part for part in parts if part.page.is_study))]
     main = [one for number, found in enumerate(printed) for one in (found[:1] if number else found)]
     kinds = {kind: [row for row in rows if row.record.evidence == kind] for kind in ("identity", "code")}
     lines = [line(kinds["identity"], "Identities"), line(kinds["code"], "Engines beside each other")]
     drawn = next((shown for part in variants if (shown := _pictures(part.page))), [])
-    return Section(name, known.title if known else name.replace("_", " "), known.description if known else "", known.source if known else (),
+    return Section(name, known.title if known else name.replace("_", " "), known.description if known else "",
+                   known.source if known else (),
                    [f"{page.words}: {text}" for page in pages for text in page.missing], decided(rows), [one for one in lines if one],
                    front.open_lines(rows), drawn, main, parts)
 
@@ -160,7 +168,8 @@ def _part(page: Page, pages: list[Page], folder: Path) -> Part:
                for engine, one in sorted(page.results.items()) for text in one.remarks]
     bases = [f"{engine_name(engine)}: {', '.join(dict.fromkeys(filter(None, (record.basis for record in one.quantities))))}"
              for engine, one in sorted(page.results.items())]
-    return Part(page, [[row for row in rows if row.record.name == name] for name in names], [*_profiles(page, folder), *_fields(page, folder)],
+    return Part(page, [[row for row in rows if row.record.name == name] for name in names],
+                [*_profiles(page, folder), *_fields(page, folder)],
                 beside(page, pages), list(dict.fromkeys(remarks)), bases)
 
 
@@ -204,5 +213,6 @@ def verification(gathered: Gathered, folder: Path) -> list[dict[str, Any]]:
         figure, stem = figures.verification_figure(item), f"verification-{item.name}"
         if figure is not None:
             figures.write_csv(folder / f"{stem}.csv", *figures.verification_table(item))
-        found.append({"item": item, "figure": figure and embed(figure, folder, stem, item.caption or item.title, [f"{stem}.csv"], main=False)})
+        found.append({"item": item,
+                      "figure": figure and embed(figure, folder, stem, item.caption or item.title, [f"{stem}.csv"], main=False)})
     return found

@@ -61,17 +61,21 @@ class Local:
         self._pool = ThreadPoolExecutor(max(1, cores))
 
     def fits(self, used: Resources, busy: Sequence[Resources]) -> bool:
+        """See Backend; it must not ask for more cores or memory than are left, unless nothing else is under way."""
         memory = sum(one.memory or 0.0 for one in (used, *busy))
         return not busy or (used.cores + sum(one.cores for one in busy) <= self._cores and (self._memory is None or memory <= self._memory))
 
     def start(self, run: Run, out: Path, used: Resources, tell: Tell) -> Future[object]:
+        """See Backend; the run begins when a thread is free."""
         tell(state="running", host=socket.gethostname())
         return self._pool.submit(simulate, run, out, self._cancel, used, tell)
 
     def start_step(self, step: Step) -> Future[object] | None:
+        """See Backend; all steps are left to processes of this machine."""
         return None
 
     def close(self) -> None:
+        """See Backend; it waits for what is under way."""
         self._pool.shutdown()
 
 
@@ -140,7 +144,7 @@ class Executor:
     """
 
     def __init__(self, table: Table, backend: Backend, cancel: threading.Event, retries: int = RETRIES, cores: int = 1,
-                 before: Callable[[], None] = lambda: None, after: Callable[[Step], None] = lambda step: None) -> None:
+                 before: Callable[[], None] = lambda: None, after: Callable[[Step], None] = lambda _: None) -> None:
         self._table, self._backend, self._cancel, self._retries, self._cores = table, backend, cancel, retries, max(1, cores)
         self._before, self._after = before, after
         self._workers = Workers(self._cores)
@@ -153,7 +157,7 @@ class Executor:
         """All `tasks` that are not finished, in their order, and all `steps` that are not up to date; Interrupted when cancelled."""
         self._tasks = [task for task in tasks if self._table.state(task.name).state != "finished"]
         self._steps = list(steps)
-        self._open = {one.name for one in (*self._tasks, *self._steps)}
+        self._open = {one.name for one in self._tasks} | {one.name for one in self._steps}
         try:
             while not self._cancel.is_set():
                 before = len(self._open)

@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -30,7 +31,7 @@ def cancelled_by_signal() -> threading.Event:
     """An event that SIGINT and SIGTERM set from now on, instead of ending this process at once."""
     event = threading.Event()
 
-    def handler(number: int, frame: FrameType | None) -> None:
+    def handler(_number: int, _frame: FrameType | None) -> None:
         event.set()
 
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -46,14 +47,14 @@ class Report:
         self._facts: dict[str, Any] = {}
 
     def __call__(self, **facts: Any) -> None:
+        """Add `facts` to what was told; they are written at once when `state` is among them."""
         self._facts |= facts
         if "state" not in facts and time.monotonic() - self._written < 1.0:
             return
         self._written = time.monotonic()
-        try:
+        # Telling the progress is never worth a run: a full disk is reported by what needs the space.
+        with suppress(DembarkError):
             write_json(self._path, self._facts)
-        except DembarkError:
-            pass  # telling the progress is never worth a run: a full disk is reported by what needs the space
 
 
 def read_report(path: Path) -> dict[str, Any]:

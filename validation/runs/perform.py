@@ -48,7 +48,7 @@ def validate(profile: str, cancel: threading.Event, cores: int | None = None, re
     planned, results = source.plan(profile, None, cases, engines), results_root.resolve() / profile
     count = cores or os.cpu_count() or 1
     with lock(results / LOCK, f"another validation works in {results}"):
-        return perform(planned, results, lambda table: Local(count, None, cancel), cancel, count)
+        return perform(planned, results, lambda _: Local(count, None, cancel), cancel, count)
 
 
 def perform(plan: Plan, results: Path, place: Place, cancel: threading.Event, cores: int = 1, log: Path | None = None,
@@ -78,7 +78,7 @@ def perform(plan: Plan, results: Path, place: Place, cancel: threading.Event, co
 
     def before_report() -> None:
         write_summary()
-        collect([one.place for one in (*plan.series, *studies(plan.series))], plan.whole)
+        collect([*(one.place for one in plan.series), *(one.place for one in studies(plan.series))], plan.whole)
 
     def after(step: Step) -> None:
         if step.kind in ("measure", "study"):
@@ -144,4 +144,3 @@ def refuse_foreign(one: Series, out: Path) -> None:
 
 def _ours(out: Path) -> bool:
     return all(path.name in ("failed", "superseded", "metrics.json") or path.name.startswith(".replica-") for path in out.iterdir())
-

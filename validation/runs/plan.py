@@ -15,9 +15,9 @@ from dembark.validation import engines
 from dembark.validation.case.deck import require_measure, sources
 from dembark.validation.case.folders import discover
 from dembark.validation.case.model import Case, Study
-from dembark.validation.engines import Engine
 from dembark.validation.case.parameters import Value, pick
 from dembark.validation.case.resolve import for_replica, portable, resolve
+from dembark.validation.engines import Engine
 
 # How often a run that was ended from outside is started again.
 RETRIES = 3
@@ -193,6 +193,7 @@ def finished(folder: Path, run: Run) -> bool:
 def variants(all_series: Sequence[Series]) -> dict[Path, list[Series | PlannedStudy]]:
     """Series, and studies, by the folder of their case and variant; those with more than one are compared."""
     groups: dict[Path, list[Series | PlannedStudy]] = {}
-    for one in (*all_series, *studies(all_series)):
+    every: list[Series | PlannedStudy] = [*all_series, *studies(all_series)]
+    for one in every:
         groups.setdefault(one.place.parent, []).append(one)
     return groups

@@ -12,6 +12,7 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
+from typing import Self
 
 from rich.console import Console
 from rich.live import Live
@@ -35,7 +36,9 @@ class OutputParser:
     def feed(self, chunk: bytes) -> bool:
         """Take some bytes of the output, lines or parts of them; True when something changed."""
         *lines, self._unfinished = (self._unfinished + chunk).split(b"\n")
-        return any([self.read(line.decode(errors="replace")) for line in lines])
+        # Every line is read, also after one that changed something.
+        changes = [self.read(line.decode(errors="replace")) for line in lines]
+        return any(changes)
 
     def read(self, line: str) -> bool:
         """Take one line; True when something changed."""
@@ -63,7 +66,7 @@ def duration(seconds: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60} min"
 
 
-def describe(state: State) -> str:
+def describe(state: State) -> str:  # noqa: PLR0911 - one return for each state
     """One plain line about a run."""
     took = duration(state.ended - state.began)
     match state.state:
@@ -133,7 +136,7 @@ class Monitor:
         self._live: Live | None = None
         self._thread = threading.Thread(target=self._watch, daemon=True)
 
-    def __enter__(self) -> Monitor:
+    def __enter__(self) -> Self:
         if self._console.is_terminal:
             self._live = Live(get_renderable=self._table, console=self._console, refresh_per_second=2)
             self._live.start()

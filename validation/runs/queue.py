@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import write_whole
@@ -58,7 +59,7 @@ class Queue:
     here = False
 
     def __init__(self, site: Site, results: Path, plan: Plan, say: Callable[[str], None], limit: int | None = None,
-                 known: Callable[[str], str] = lambda name: "") -> None:
+                 known: Callable[[str], str] = lambda _: "") -> None:
         self._site, self._results, self._plan, self._say, self._known = site, results, plan, say, known
         self._limit = limit or site.jobs["at_a_time"]
         self._prefix = prefix(results)
@@ -76,9 +77,11 @@ class Queue:
         return self._prefix + inputs[:8]
 
     def fits(self, used: Resources, busy: Sequence[Resources]) -> bool:
+        """See Backend; the scheduler looks after cores and memory, only the number of jobs is limited here."""
         return len(busy) < self._limit
 
     def start(self, run: Run, out: Path, used: Resources, tell: Tell) -> Future[object]:
+        """See Backend; the run is submitted as a job."""
         interval = [] if used.restart_interval is None else ["--restart-interval", str(used.restart_interval)]
         words = ["--inputs", run.inputs, "--ranks", str(used.ranks), "--threads", str(used.threads), *interval]
         report = out / f".{run.folder_name}.job.json"
@@ -216,7 +219,7 @@ class Queue:
             job.future.set_exception(Killed(f"{job.title} failed", f"its job {job.number} ended {how}", f"see {log}"))
 
 
-def asked(site: Site, used: Resources) -> dict[str, int]:
+def asked(site: Site, used: Resources) -> dict[str, Any]:
     """What a job asks for, with the site's values where the plan has none."""
     return {"ranks": used.ranks, "threads": used.threads, "cores": used.cores,
             "memory_mb": math.ceil((used.memory or site.jobs["memory"]) / 1e6), "minutes": math.ceil((used.time or site.jobs["time"]) / 60),

@@ -13,7 +13,7 @@ from typing import Any
 
 from dembark import common, postproc, validation
 from dembark.common.errors import DembarkError, RunError
-from dembark.common.files import read_json, retire, write_json
+from dembark.common.files import retire, write_json
 from dembark.validation import analysis, pictures, provenance
 from dembark.validation.runs.plan import Plan, PlannedStudy, Run, finished, studies, variants
 

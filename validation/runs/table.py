@@ -97,7 +97,7 @@ class Table:
         # Why the store could not be written: no reason to lose a run, for all of it is made again from the files.
         self.problem = ""
         # Called with each state that has changed.
-        self.listener: Callable[[State], None] = lambda state: None
+        self.listener: Callable[[State], None] = lambda _: None
 
     def enter(self, runs: Mapping[str, Run], base: Path, steps: Mapping[str, str], whole: bool = True) -> None:
         """Take up `runs` by their folders below `base`, and `steps` (kinds by name), with the states that the files there tell.
@@ -255,4 +255,3 @@ def summary(states: Iterable[State], runs: Mapping[str, Run]) -> list[dict[str, 
         found.append({"case": run.case.name, "variant": run.variant, "engine": run.engine.name, "replica": run.replica, "folder": folder,
                       "inputs": run.inputs, "state": told, "message": "" if told == "finished" else state.message})
     return found
-

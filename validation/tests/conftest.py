@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from dembark.validation import engines
 from dembark.validation.case import folders
 
@@ -124,7 +125,8 @@ def decks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (root / "box" / "liggghts.in").write_text("# A deck that knows restart_every and resume.\n")
     (root / "box" / "yade.py").write_text("p = dembark.parameters()\ndembark.run(p.steps)\n")
     # What measures stands in for the real thing, too.
-    (root / "box" / "measure.py").write_text("from dembark.postproc.measurement import Measurement\ndef measure(replicas):\n    return Measurement({})\n")
+    (root / "box" / "measure.py").write_text("from dembark.postproc.measurement import Measurement\ndef measure(replicas):\n"
+                                             "    return Measurement({})\n")
     monkeypatch.setenv("DEMBARK_DECKS", str(root))
     folders.load.cache_clear()
     return root
@@ -172,7 +174,7 @@ def lives() -> Callable[[int], bool]:
     """`lives(pid)`: whether the process runs (an ended one that nobody waited for does not)."""
     def look(pid: int) -> bool:
         try:
-            return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+            return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
         except OSError:
             return False
     return look

@@ -25,7 +25,8 @@ def study(planned, folders):
 
 
 def compare(folder):
-    return {"case": folder.parent.name, "variant": folder.name, "engines": sorted(path.parent.name for path in folder.glob("*/metrics.json")), "quantities": []}
+    return {"case": folder.parent.name, "variant": folder.name,
+            "engines": sorted(path.parent.name for path in folder.glob("*/metrics.json")), "quantities": []}
 
 
 def build(folder):

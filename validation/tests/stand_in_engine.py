@@ -1,12 +1,13 @@
 #!/usr/bin/python3
 """Stands in for both engines where a test is about the handling of processes and files, not about physics.
 
-Called like LIGGGHTS (`-in deck -log none -var key value ...`) or YADE (`-j1 -n -x deck key=value ...`); it reads its numbers in the deck and obeys the deck contract
-unless the parameter `behaviour` asks for a fault. It writes its process id to `pid` in the working folder first.
+Called like LIGGGHTS (`-in deck -log none -var key value ...`) or YADE (`-j1 -n -x deck key=value ...`); it reads its numbers in the deck
+and obeys the deck contract unless the parameter `behaviour` asks for a fault. It writes its process id to `pid` in the working folder
+first.
 """
 
-import glob
 import os
+import pathlib
 import signal
 import sys
 import time
@@ -20,23 +21,23 @@ print("LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0-stand-in, compiled 2022)")
 if "/dev/null" in words:
     sys.exit(0)
 if "-in" in words:
-    with open(words[words.index("-in") + 1]) as file:
+    with pathlib.Path(words[words.index("-in") + 1]).open(encoding="utf-8") as file:
         values = {line.split()[1]: line.split(" index ")[1].split(" # ")[0].strip() for line in file if line.startswith("variable ")}
     values |= {words[i + 1]: words[i + 2] for i, word in enumerate(words) if word == "-var"}
 else:
-    with open(words[words.index("-x") + 1]) as file:
+    with pathlib.Path(words[words.index("-x") + 1]).open(encoding="utf-8") as file:
         numbers = [line.split("  # ")[0].strip().rstrip(",").split("=", 1) for line in file if line.startswith("    ")]
     values = {key: text.strip("'") for key, text in numbers if text != "None"}
     values |= dict(word.split("=", 1) for word in words if "=" in word)
 behaviour, frames, grains = values["behaviour"], int(values["frames"]), int(values["grain_count"])
-with open("pid", "w") as file:
+with pathlib.Path("pid").open("w", encoding="utf-8") as file:
     file.write(str(os.getpid()))
-with open("values", "w") as file:
+with pathlib.Path("values").open("w", encoding="utf-8") as file:
     file.write("\n".join(f"{key}={value}" for key, value in sorted(values.items())))
 every, begin = int(values.get("restart_every", 0)), 0
 suffix = "restart" if "-in" in words else "yade.gz"
 if values.get("resume") == "yes":
-    begin = max(int(name.split(".")[1]) for name in glob.glob(f"state.*.{suffix}") if os.path.exists(name + ".crc"))
+    begin = max(int(path.name.split(".")[1]) for path in pathlib.Path().glob(f"state.*.{suffix}") if pathlib.Path(f"{path}.crc").exists())
 print("dembark: steps 100 time_step 1e-5", flush=True)
 if begin:
     print(f"dembark: resumed at step {begin} {behaviour.removeprefix('kill ') if behaviour.startswith('kill ') else 'exact'}ly", flush=True)
@@ -44,9 +45,9 @@ if begin:
 for step in range(begin, 101, 10):
     if every and step > begin and step % every == 0:
         name = f"state.{step}.{suffix}"
-        with open(name, "wb") as file:
+        with pathlib.Path(name).open("wb") as file:
             file.write(b"state" * step)
-        with open(name + ".crc", "w") as file:
+        with pathlib.Path(name + ".crc").open("w", encoding="utf-8") as file:
             file.write(f"{5 * step} {zlib.crc32(b'state' * step):08x} 1 1 1\n")
     print(f"      {step}  {step * 1e-5}  0.5", flush=True)
     time.sleep(float(values.get("pause", 0)))
@@ -67,13 +68,13 @@ def dump(name, key, columns, entries):
     box = "ITEM: BOX BOUNDS ff ff ff\n" + "0 1\n" * 3
     text = "".join(f"ITEM: TIMESTEP\n{frame}\nITEM: NUMBER OF {key}\n{entries}\n{box}ITEM: {columns}\n" + "1 2 3\n" * entries
                    for frame in range(frames))
-    with open(name, "w") as file:
+    with pathlib.Path(name).open("w", encoding="utf-8") as file:
         file.write(text[: {"truncate": -len(text) // 2, "short": -len(text) // frames}.get(behaviour, len(text))])
 
 
 dump("grains.dump", "ATOMS", "ATOMS id x y", grains)
 dump("contacts.dump", "ENTRIES", "ENTRIES a b c", 0 if grains < 4 else 4)
-with open("time.csv", "w") as file:
+with pathlib.Path("time.csv").open("w", encoding="utf-8") as file:
     energy = "nan" if behaviour == "unstable" else "0.5"
     file.write("step,time,kinetic_energy\n0,0,1\n" + f"100,1e-3,{energy}\n")
 if behaviour == "silent":

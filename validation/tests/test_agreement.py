@@ -3,9 +3,10 @@
 import math
 
 import pytest
+
 from dembark.postproc.statistics import exact
-from dembark.validation.judge.quantity import Quantity
 from dembark.validation.compare import pair
+from dembark.validation.judge.quantity import Quantity
 
 
 def entry(value, agreement, half=0.0):

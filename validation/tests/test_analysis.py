@@ -8,13 +8,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
 from dembark.common.errors import DembarkError
 from dembark.validation import analysis, show
 from dembark.validation.judge import measuring
 from dembark.validation.judge.result import QuantityRecord, Result
 
-HEADER = "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n" \
-    "ITEM: ATOMS id type x y z vx vy vz radius mass f_force_side[1] f_force_side[2] f_force_side[3]\n"
+HEADER = ("ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
+          "ITEM: ATOMS id type x y z vx vy vz radius mass f_force_side[1] f_force_side[2] f_force_side[3]\n")
 
 
 def replica(folder: Path, count: int, frames: int, force: float) -> Path:
@@ -34,7 +35,8 @@ def test_what_is_too_small_is_named(tmp_path: Path, count: int, frames: int, for
 
 def test_an_error_in_a_measurement_is_told_with_its_line(tmp_path: Path) -> None:
     case = SimpleNamespace(name="mine", folder=tmp_path, studies=("size",))
-    (tmp_path / "measure.py").write_text("def measure(replicas):\n    return 1 / 0\n\ndef study(name, points, along):\n    return points[along]\n")
+    (tmp_path / "measure.py").write_text("def measure(replicas):\n    return 1 / 0\n\n"
+                                         "def study(name, points, along):\n    return points[along]\n")
     with pytest.raises(ZeroDivisionError) as caught:
         measuring.measure(case, [])
     assert analysis.reasons(tmp_path, caught.value, case) == ("ZeroDivisionError: division by zero (measure.py, line 2)",)

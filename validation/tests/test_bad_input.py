@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
 from dembark.validation import engines
 from dembark.validation.case import folders
 from dembark.validation.cli import main

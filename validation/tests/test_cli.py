@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
 from dembark.common.files import read_json
 from dembark.validation import engines
 from dembark.validation.case import folders
@@ -147,7 +147,7 @@ def test_a_folder_with_other_things_is_refused(dembark: Dembark, tmp_path: Path)
     (tmp_path / "mine/thesis.tex").touch()
     done = dembark("run", "box", "--engine", "liggghts", "--out", "mine")
     assert done.returncode == 2 and "not empty" in done.stderr
-    assert os.listdir(tmp_path / "mine") == ["thesis.tex"]
+    assert [path.name for path in (tmp_path / "mine").iterdir()] == ["thesis.tex"]
 
 
 def test_a_failed_run_gets_exit_code_1_and_no_metrics(dembark: Dembark, tmp_path: Path) -> None:

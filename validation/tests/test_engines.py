@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+
 from dembark.common.errors import Interrupted, RunError
 from dembark.common.files import read_json
 from dembark.validation import engines, provenance
@@ -141,7 +142,6 @@ def test_a_program_is_asked_for_its_version_once_by_all_processes_and_again_when
         engines.find.cache_clear()
         versions.append(engines.find("liggghts").version)
     assert versions == ["3.8.0", "3.8.0", "3.8.11"] and asked.read_text().count("x") == 2
-
 
 
 def plan(engine: str, **changes: object) -> Run:

@@ -6,11 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from dembark.common.errors import DembarkError, RunError
+from dembark.common.errors import RunError
 from dembark.postproc.statistics import Estimate, over_replicas
-from dembark.validation.checks import find
-from dembark.validation.judge.quantity import Quantity, judge
 from dembark.validation.compare import pair
+from dembark.validation.judge.quantity import Quantity, judge
 from dembark.validation.metrics import measure
 
 
@@ -95,10 +94,3 @@ def test_a_bound_that_is_not_finite_is_none_in_the_file() -> None:
 def test_no_replica_is_told(tmp_path):
     with pytest.raises(RunError, match="nothing to measure"):
         measure(tmp_path)
-
-
-def test_a_case_may_bring_its_own_checks(tmp_path):
-    (tmp_path / "checks.py").write_text("REFERENCES = ()\nquantities = picture = None\n")
-    assert find("drum", tmp_path).REFERENCES == ()
-    with pytest.raises(DembarkError, match="no checks"):
-        find("drum")

@@ -11,6 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
+
 from dembark.common.files import read_json, write_json
 from dembark.validation.judge.result import QuantityRecord, as_json, from_json
 from dembark.validation.judge.tally import VERIFICATION as FILE
@@ -37,8 +38,10 @@ def write(results: Path, found: list[Item] | None = None) -> None:
     """Compute all items, unless they are `found` already, and write them to `verification.json` in a results folder."""
     chosen = items() if found is None else found
     quantities = [as_json(one) for item in chosen for one in item.quantities]
-    described = [{**{key: getattr(item, key) for key in ("name", "title", "text", "caption")}, "quantities": [one.name for one in item.quantities],
-                  "panels": [asdict(panel) | {"curves": [_plain(curve) for curve in panel.curves]} for panel in item.panels]} for item in chosen]
+    described = [{**{key: getattr(item, key) for key in ("name", "title", "text", "caption")},
+                  "quantities": [one.name for one in item.quantities],
+                  "panels": [asdict(panel) | {"curves": [_plain(curve) for curve in panel.curves]} for panel in item.panels]}
+                 for item in chosen]
     write_json(results / FILE, {"quantities": quantities, "items": described})
 
 

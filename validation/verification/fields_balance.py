@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import Kernel
@@ -40,18 +41,20 @@ def _fields(network: Network, kernel: str, width: float, spacing: float) -> Fiel
 def balance() -> Item:
     """Residual of the balance of momentum against the grid's spacing, and against the kernel's width."""
     network = scenes.heap()
-    by_spacing = {kernel: np.array([residual(network, kernel, width, spacing) for spacing in _SPACINGS]) for kernel, width in _WIDTHS.items()}
+    by_spacing = {kernel: np.array([residual(network, kernel, width, spacing) for spacing in _SPACINGS])
+                  for kernel, width in _WIDTHS.items()}
     widths = np.array([0.2, 0.3, 0.45])
     by_width = np.array([residual(network, "lucy", width, 0.07)[1] for width in widths])
     fall = by_spacing["lucy"][:, 1]
     return Item(
         "balance",
         "Static balance: ∇·σ = ρ g + wall forces",
-        f"A heap of {len(network.frame.ids)} grains at random places stands on a base; its {len(network.links.ids)} contacts carry forces of any "
-        "direction under which each grain is in equilibrium to round-off. The fields must then satisfy ∇·σ − ρ g − t = 0 in every cell, t being "
-        "the coarse-grained force of the base (Weinhart et al. 2012). The divergence is taken by central differences, which err with the "
-        "square of the spacing over the width of the kernel; nothing else is left out.",
-        [order("balance_order", "residual (rms, Lucy's kernel): exponent of the spacing", _SPACINGS[-2:], fall[-2:], 2.0, "central differences",
+        f"A heap of {len(network.frame.ids)} grains at random places stands on a base; its {len(network.links.ids)} contacts carry forces "
+        "of any direction under which each grain is in equilibrium to round-off. The fields must then satisfy ∇·σ − ρ g − t = 0 in every "
+        "cell, t being the coarse-grained force of the base (Weinhart et al. 2012). The divergence is taken by central differences, which "
+        "err with the square of the spacing over the width of the kernel; nothing else is left out.",
+        [order("balance_order", "residual (rms, Lucy's kernel): exponent of the spacing", _SPACINGS[-2:], fall[-2:], 2.0,
+               "central differences",
                "the two finest grids")],
         [Panel("Residual against the spacing", "spacing / width", "rms of |∇·σ − ρ g − t| / max ρ g", [
             *(Curve(kernel, _SPACINGS / _WIDTHS[kernel], found[:, 1]) for kernel, found in by_spacing.items()),
@@ -76,12 +79,12 @@ def wall_forces() -> Item:
     return Item(
         "wall_forces",
         "Force on a wall",
-        "The same heap: what the patches of the base carry, what the wall's part of the coarse-grained balance holds, and the sum over the base's "
-        "contacts must be one force, and its vertical part the weight.",
-        [exact("wall_force_patches", "normal stress of the patches, integrated, over the force of the contacts, − 1", of_patches[0] / total[2] - 1.0,
+        "The same heap: what the patches of the base carry, what the wall's part of the coarse-grained balance holds, and the sum over the "
+        "base's contacts must be one force, and its vertical part the weight.",
+        [exact("wall_force_patches", "normal stress of the patches, integrated, over the force of the contacts, − 1",
+               of_patches[0] / total[2] - 1.0,
                "Newton's third law"),
          exact("wall_force_field", "wall's force density, integrated, − force of the contacts, over the weight",
                float(np.abs(of_field - total).max()) / weight, "Weinhart et al. 2012"),
          exact("wall_force_weight", "vertical force of the contacts over the weight, − 1", total[2] / weight - 1.0, "Newton's second law")],
     )
-

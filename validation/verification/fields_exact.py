@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import NAMES, Kernel
@@ -24,13 +25,14 @@ def conservation() -> Item:
     products = np.abs(network.links.forces[:, :, None] * network.links.branch[:, None, :])
     scales = mass, (frame.masses[:, None] * np.abs(frame.velocities)).sum(axis=0).max(), products.sum(axis=0).max()
     widths = np.array([0.02, 0.1, 0.5])
-    errors = {kernel: np.array([_totals(frame, network, kernel, width, (mass, momentum, carried), scales) for width in widths]) for kernel in NAMES}
+    errors = {kernel: np.array([_totals(frame, network, kernel, width, (mass, momentum, carried), scales) for width in widths])
+              for kernel in NAMES}
     worst = np.max([found.max(axis=0) for found in errors.values()], axis=0)
     return Item(
         "conservation",
         "Conservation of mass, momentum and stress",
-        f"What {len(frame.ids)} grains of unequal size and {len(network.links.ids)} contacts carry must be found in the cells, to round-off, whatever "
-        "the kernel and however narrow or wide it is against the cells (0.15 of the system's size).",
+        f"What {len(frame.ids)} grains of unequal size and {len(network.links.ids)} contacts carry must be found in the cells, to "
+        "round-off, whatever the kernel and however narrow or wide it is against the cells (0.15 of the system's size).",
         [exact("mass_error", "mass: Σ ρ V / Σ m − 1, the worst kernel and width", worst[0], GOLDHIRSCH),
          exact("momentum_error", "momentum: |Σ ρ v V − Σ m v|, over Σ m |v|", worst[1], GOLDHIRSCH),
          exact("stress_error", "contact stress: |Σ σ V + Σ f l|, over Σ |f l|", worst[2], GOLDHIRSCH)],
@@ -41,7 +43,8 @@ def conservation() -> Item:
     )
 
 
-def _totals(frame: object, network: scenes.Network, kernel: str, width: float, due: tuple[Array, ...], scales: tuple[float, ...]) -> list[float]:
+def _totals(frame: object, network: scenes.Network, kernel: str, width: float, due: tuple[Array, ...],
+            scales: tuple[float, ...]) -> list[float]:
     margin = Kernel(kernel, width).reach
     count = int(np.ceil((1.0 + 2.0 * margin) / 0.15))
     grid = Grid([-margin] * 3, [0.15 * count - margin] * 3, (count,) * 3)
@@ -67,7 +70,8 @@ def threads() -> Item:
         "Independence of the number of threads",
         "The compiled coarse graining on 1, 2, 3 and 7 threads, bit by bit, and beside the plain implementation in numpy, which shares no "
         "compiled code with it.",
-        [exact("thread_differences", "sums that differ in any bit on 2, 3 or 7 threads from those on 1", different, "same order of additions",
+        [exact("thread_differences", "sums that differ in any bit on 2, 3 or 7 threads from those on 1", different,
+               "same order of additions",
                tolerance=0.0),
          exact("backend_difference", "compiled against plain, largest difference over the largest sum", gap, "two implementations")],
     )
@@ -81,7 +85,7 @@ def lattice() -> Item:
     widths = np.array([0.3, 0.4, 0.5, 0.6, 0.8])
     ripple: dict[str, list[float]] = {"gaussian": [], "lucy": []}
     mean_error = 0.0
-    for kernel in ripple:
+    for kernel, errors in ripple.items():
         # The ball of Lucy's kernel is soon as wide as the crystal.
         for width in widths if kernel == "gaussian" else widths[:2]:
             # Kernels of the same second moment, so that they smooth alike.
@@ -89,17 +93,18 @@ def lattice() -> Item:
             stress = _periodic(frame, links, kernel, scaled)
             mean = stress.mean(axis=(0, 1, 2))
             mean_error = max(mean_error, float(np.abs(mean / pressure - np.eye(3)).max()))
-            ripple[kernel].append(float(np.abs(np.trace(stress, axis1=-2, axis2=-1) / (3.0 * pressure) - 1.0).max()))
+            errors.append(float(np.abs(np.trace(stress, axis1=-2, axis2=-1) / (3.0 * pressure) - 1.0).max()))
     wave = 2.0 * np.pi * np.sqrt(3.0) / edge
     due = np.exp(-0.5 * (wave * widths) ** 2)
     seen = due > 1e-4
     return Item(
         "lattice",
         "Crystal under pressure",
-        "A periodic face-centred cubic crystal whose neighbours at the distance d press on each other with the force f is under the pressure "
-        "2√2 f/d². The mean of the field must be that to round-off, isotropic and without shear. What remains of the single contacts is a "
-        "ripple, which a Gaussian of width w damps by exp(−k² w²/2), k = 2π√3/a being the crystal's longest wave.",
-        [exact("lattice_pressure", "mean stress over 2√2 f/d², − unit tensor, the worst component", mean_error, "sum over the 12 neighbours")],
+        "A periodic face-centred cubic crystal whose neighbours at the distance d press on each other with the force f is under the "
+        "pressure 2√2 f/d². The mean of the field must be that to round-off, isotropic and without shear. What remains of the single "
+        "contacts is a ripple, which a Gaussian of width w damps by exp(−k² w²/2), k = 2π√3/a being the crystal's longest wave.",
+        [exact("lattice_pressure", "mean stress over 2√2 f/d², − unit tensor, the worst component", mean_error,
+               "sum over the 12 neighbours")],
         [Panel("Ripple of the pressure against the width", "standard deviation of the kernel / d", "largest |p / p̄ − 1|", [
             *(Curve(kernel, widths[: len(found)], np.array(found)) for kernel, found in ripple.items()),
             Curve("∝ exp(−k² w²/2)", widths[seen], ripple["gaussian"][0] * (due / due[0])[seen], theory=True)], linear=True)],
@@ -122,17 +127,19 @@ def shear() -> Item:
     spin = np.array([0.3, -0.7, 0.2])
     grid = Grid([0.0] * 3, [1.0] * 3, (8,) * 3)
     sheared = coarse_grain(scenes.grains(place, radii, place @ gradient.T, low=np.zeros(3), high=np.ones(3)), None, grid, width=0.15)
-    turning = coarse_grain(scenes.grains(place, radii, np.cross(spin, place), low=np.zeros(3), high=np.ones(3)), None, grid, width=0.15).fields()
+    turning = coarse_grain(scenes.grains(place, radii, np.cross(spin, place), low=np.zeros(3), high=np.ones(3)), None, grid,
+                           width=0.15).fields()
     one = sheared.fields(shear_corrected=True)
     widths = np.array([0.03, 0.042, 0.06])
     errors = np.array([_wave_error(width) for width in widths])
     return Item(
         "shear",
         "Shear, rotation and granular temperature",
-        "Grains of unequal size at random places with the velocities of a uniform gradient must give this gradient in every cell, those of a rigid "
-        "rotation no strain rate and twice the spin as vorticity; and what the mean flow does within a kernel must not count as temperature. "
-        "A wave v = sin(2π y) is recovered up to what the kernel averages away, an error with the square of its width.",
-        [exact("gradient_error", "uniform gradient: largest error of any component, over the largest", _worst(one.velocity_gradient - gradient),
+        "Grains of unequal size at random places with the velocities of a uniform gradient must give this gradient in every cell, those of "
+        "a rigid rotation no strain rate and twice the spin as vorticity; and what the mean flow does within a kernel must not count as "
+        "temperature. A wave v = sin(2π y) is recovered up to what the kernel averages away, an error with the square of its width.",
+        [exact("gradient_error", "uniform gradient: largest error of any component, over the largest",
+               _worst(one.velocity_gradient - gradient),
                "affine velocity field", tolerance=1e-9, detail="round-off, times what fitting a gradient to few grains magnifies it by"),
          exact("rotation_error", "rigid rotation: largest strain rate, and error of the vorticity, over the spin",
                max(_worst(turning.strain_rate), _worst(turning.vorticity - 2.0 * spin)) / float(np.linalg.norm(spin)), "rigid rotation",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import erf
+
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import CUTOFF
@@ -11,7 +13,6 @@ from dembark.postproc.fields.rings import coarse_grain as ring_fields
 from dembark.validation.verification import scenes
 from dembark.validation.verification.item import Array, Curve, Item, Panel, exact
 from dembark.validation.verification.scenes import GRAVITY, Network
-from scipy.special import erf
 
 _WIDTH = 0.15
 _RADIUS = 0.75
@@ -33,8 +34,10 @@ def rings() -> Item:
         "Fields over radius and height, as on the pages of silos, are averaged around the axis before they are put on a grid. Mass must be "
         "conserved, the vertical momentum that flows through the faces of each ring must balance weight and base of the heap at rest, and "
         "averages of the three-dimensional fields over the same shells must come to the same stresses as their cubes become small.",
-        [exact("ring_mass", "mass in the rings over that of the grains, − 1", fields.mass.sum() / network.frame.masses.sum() - 1.0, "closed form"),
-         exact("ring_balance", "balance of vertical momentum, the worst ring, over max ρ g", float(unbalanced), "momentum balance", tolerance=1e-3,
+        [exact("ring_mass", "mass in the rings over that of the grains, − 1", fields.mass.sum() / network.frame.masses.sum() - 1.0,
+               "closed form"),
+         exact("ring_balance", "balance of vertical momentum, the worst ring, over max ρ g", float(unbalanced), "momentum balance",
+               tolerance=1e-3,
                detail="Gauss's rule along the lines, and the table of the kernel; the limit is that of the cases")],
         [Panel("Rings against cubes", "spacing of the cubes / width", "largest difference / largest stress", [
             Curve("σ$_{zz}$, σ$_{rr}$, σ$_{rz}$", spacings / _WIDTH, errors),

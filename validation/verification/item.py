@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+
 from dembark.postproc.statistics import Estimate
 from dembark.validation.judge.quantity import Quantity
 from dembark.validation.judge.result import QuantityRecord
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
@@ -52,7 +53,8 @@ class Item:
     caption: str = ""
 
 
-def exact(name: str, label: str, error: float, source: str, *, tolerance: float = ROUND_OFF, detail: str = "", unit: str = "1") -> QuantityRecord:
+def exact(name: str, label: str, error: float, source: str, *, tolerance: float = ROUND_OFF, detail: str = "",
+          unit: str = "1") -> QuantityRecord:
     """An error that is due to be zero to `tolerance`."""
     return _judged(name, label, unit, float(error), 0.0, tolerance, source, detail, "identity")
 
@@ -63,6 +65,8 @@ def order(name: str, label: str, steps: Array, errors: Array, due: float, source
     return _judged(name, label, "1", slope, due, ORDER_TOLERANCE, source, detail, "theory")
 
 
-def _judged(name: str, label: str, unit: str, value: float, due: float, tolerance: float, source: str, detail: str, evidence: str) -> QuantityRecord:
-    return Quantity(name, label, unit, Estimate(value, 0.0), reference=Estimate(due, 0.0), absolute=True, tolerance=tolerance, source=source,
+def _judged(name: str, label: str, unit: str, value: float, due: float, tolerance: float, source: str, detail: str,
+            evidence: str) -> QuantityRecord:
+    return Quantity(name, label, unit, Estimate(value, 0.0), reference=Estimate(due, 0.0), absolute=True, tolerance=tolerance,
+                    source=source,
                     detail=detail, compared=False, evidence=evidence).record()

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from dembark.postproc import ContactFrame, GrainFrame
-from dembark.postproc.fields.coarse_graining import WallContacts
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+
+from dembark.postproc import ContactFrame, GrainFrame
+from dembark.postproc.fields.coarse_graining import WallContacts
 
 Array = NDArray[np.float64]
 
@@ -17,7 +18,8 @@ GRAVITY = 9.81
 
 
 def grains(
-    places: Array, radii: Array, velocities: Array | None = None, *, low: Array, high: Array, periodic: bool = False, forces: Array | None = None
+    places: Array, radii: Array, velocities: Array | None = None, *, low: Array, high: Array, periodic: bool = False,
+    forces: Array | None = None
 ) -> GrainFrame:
     """Grains of DENSITY as one frame; no spin."""
     zero = np.zeros_like(places)

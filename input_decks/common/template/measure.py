@@ -1,6 +1,7 @@
 """The rebound, from the energy before and after the impact."""
 
 import numpy as np
+
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.statistics import Estimate
 

@@ -1,7 +1,5 @@
 """A sphere falls on a plane and bounces. p.name: a parameter or derived number of case.toml."""
 
-from types import SimpleNamespace
-
 from yade import dembark
 
 p = dembark.parameters()
@@ -14,8 +12,11 @@ dump = dembark.DumpWriter({"plane": plane}, ((-1, 1), (-1, 1), (-1, 1)), gravity
 O.engines = [
     ForceResetter(),
     InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()]),
-    InteractionLoop([Ig2_Wall_Sphere_ScGeom()], [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
-        restitution=p.restitution, staticFriction=0, kineticFriction=0, criticalSlipDistance=0)], [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz()]),
+    InteractionLoop(
+        [Ig2_Wall_Sphere_ScGeom()],
+        [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(restitution=p.restitution, staticFriction=0, kineticFriction=0,
+                                                    criticalSlipDistance=0)],
+        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz()]),
     PyRunner(command="if O.iter: dump.write()", iterPeriod=p.stride),
     NewtonIntegrator(damping=0, gravity=weight),
 ]

@@ -8,6 +8,9 @@ import sys
 
 from yade import dembark, utils
 
+sys.path.insert(0, os.path.dirname(os.path.realpath(sys.argv[0] if sys.argv[0].endswith(".py") else __file__)))
+from columns import dilute_column
+
 PAIR = dict(restitution=0.6, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5)
 WET = dict(bridgeVolume=2e-11, surfaceTension=0.072, contactAngle=0.35, liquidViscosity=5e-3, minimumGap=1e-5)
 DENSITY, R = 2500.0, 0.0025
@@ -148,8 +151,7 @@ def drum():
     shape = Body()
     shape.shape, shape.state.blockedDOFs = CylinderWall(radius=0.02, axis=(0, 1, 0)), "xyzXYZ"
     shape.state.vel, shape.state.angVel = Vector3(0, 0.02, 0), Vector3(0, 12, 0)
-    sites = dembark.lattice((4, 3, 4), (0.0055,) * 3, (-0.011, -0.008, -0.011))
-    grains = [grain((x, y, z), r) for x, y, z, r in dembark.column(sites, 40, 0.005, 0.1, 3, 0.0001)]
+    grains = [grain((x, y, z), r) for x, y, z, r in dilute_column((4, 3, 4), 0.0055, (-0.011, -0.008, -0.011), 40, 0.005, 0.1, 3, 0.0001)]
     held, guided = grain((0, 0.0, -0.0174), R, (0.05, 0, 0), fixed=True), grain((0.0005, 0, 0.0165), R, (0, 0, -0.2))
     guided.state.blockedDOFs = "zX"
     account = scene_with([shape, held, guided, *grains], gravity=(0, 0, -9.81), step=1e-5)

@@ -8,6 +8,9 @@ import sys
 
 from yade import dembark, utils
 
+sys.path.insert(0, os.path.dirname(os.path.realpath(sys.argv[0] if sys.argv[0].endswith(".py") else __file__)))
+from columns import dilute_column
+
 PAIR = dict(restitution=0.6, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5)
 WET = dict(bridgeVolume=2e-10, surfaceTension=0.072, contactAngle=0.35)
 DENSITY, YOUNG, POISSON = 2500.0, 5e6, 0.3
@@ -117,9 +120,8 @@ def cylinder_fill():
     wall = Body()
     wall.shape = CylinderWall(radius=0.02)
     wall.state.blockedDOFs = "xyzXYZ"
-    sites = dembark.lattice((3, 3, 3), (0.008,) * 3, (-0.012, -0.012, 0))
     grains = [moving((x, y, z), r, (0.8 * math.sin(x * 1e4), 0.8 * math.cos(y * 1e4 + z), 0))
-              for x, y, z, r in dembark.column(sites, 20, 0.005, 0.2, 3, 0.0005)]
+              for x, y, z, r in dilute_column((3, 3, 3), 0.008, (-0.012, -0.012, 0), 20, 0.005, 0.2, 3, 0.0005)]
     scene_with([wall, *grains], {"restitution": 1.0, "staticFriction": 0.0, "kineticFriction": 0.0}, tangentialDamping=False)
     # Of a Hertz contact 2/5 of force times overlap is stored.
     energy = lambda: (sum(0.5 * b.state.mass * b.state.vel.squaredNorm() for b in O.bodies if isinstance(b.shape, Sphere))

@@ -31,7 +31,7 @@ def prefix(tmp_path):
 def overlay(prefix, place):
     return subprocess.run(["cmake", f"-DPREFIX={prefix}", f"-DOVERLAY={place}", "-DSUBDIR=lib/x/yade",
                            f"-DPLUGIN={prefix.parent}/libdembark_yade.so",
-                           f"-DMODULES={HERE}/python", "-P", HERE / "overlay.cmake"], capture_output=True, text=True, check=False)
+                           f"-DMODULE={HERE}/python/dembark", "-P", HERE / "overlay.cmake"], capture_output=True, text=True, check=False)
 
 
 def test_overlay_finds_itself_and_leaves_the_prefix_alone(prefix, tmp_path):
@@ -39,7 +39,7 @@ def test_overlay_finds_itself_and_leaves_the_prefix_alone(prefix, tmp_path):
     place = tmp_path / "build/overlay"
     assert overlay(prefix, place).returncode == 0
     assert (place / "lib/x/yade/libdembark_yade.so").read_text() == "plugin"
-    assert (place / "lib/x/yade/py/yade/dembark.py").is_file()
+    assert (place / "lib/x/yade/py/yade/dembark/__init__.py").is_file()
     assert (place / "lib/x/yade/libyade.so").resolve() == prefix / "lib/x/yade/libyade.so"
     # Also with the variable that names the engine below.
     done = subprocess.run([place / "bin/yade"], capture_output=True, text=True, check=True, env=os.environ | {"YADE_PREFIX": str(prefix)})

@@ -1,4 +1,4 @@
-"""The Python side: dumps, histories, parameters and columns, and the lines for wrong input."""
+"""The Python side: dumps, histories, packings, and the lines for wrong input."""
 
 import json
 import textwrap
@@ -87,71 +87,61 @@ def test_history_sums_walls_and_energy(dumps):
         assert values[6:9] == pytest.approx(moving[:, 22:25].sum(axis=0), rel=1e-5, abs=1e-9)
 
 
-CASE = """
-[parameters.grain_count]
-value = 20
-type = "int"
-min = 1
-[parameters.diameter]
-value = 5e-3
-unit = "m"
-type = "float"
-min = 0.0
-exclusive_min = true
-[parameters.static_friction]
-optional = true
-type = "float"
-min = 0.0
-[parameters.shape]
-value = "round"
-type = "choice"
-values = ["round", "square"]
-"""
-
-
 def script(yade, name, body):
     path = yade.folder / f"{name}.py"
     path.write_text("from yade import dembark\n" + textwrap.dedent(body))
     return path
 
 
-def test_parameters_and_column(yade):
-    (yade.folder / "case.toml").write_text(CASE)
-    path = script(yade, "column", """
+PACKING = """dembark packing
+
+3 atoms
+2 atom types
+-1 1 xlo xhi
+-1 1 ylo yhi
+-1 2 zlo zhi
+
+Atoms
+
+2 1 0.006 2500 0.1 0 0
+1 1 0.005 2500 0 0 0.5
+3 2 0.004 2500 0.2 0 0
+
+Velocities
+
+1 0 0 -0.25 0 3 0
+"""
+
+
+def test_a_packing_becomes_spheres_in_its_order(yade):
+    (yade.folder / "packing.data").write_text(PACKING)
+    path = script(yade, "packed", """
         import json
-        plain = dembark.parameters("case.toml", [])
-        given = dembark.parameters("case.toml", ["static_friction=0.4", "shape=square", "diameter=4e-3", "grain_count=7"])
-        unset = dembark.parameters("case.toml", ["static_friction=-1"])
-        sites = dembark.lattice((4, 3, 2), (0.0069, 0.0069, 0.0069), (0, 0, 0.01), lambda x, y, z: x < 0.024)
-        columns = [dembark.column(sites, 17, 0.005, 0.2, seed, 0.0003) for seed in (1, 1, 2)]
-        json.dump([vars(plain), vars(given), vars(unset), sites, columns], open("column.json", "w"))
+        O.dt = 1e-3
+        one, other = (O.materials.append(FrictMat(density=2500)) for _ in range(2))
+        ids = dembark.grains(one, gravity=(0, 0, -10), held=(other, 2))
+        bodies = [(list(b.state.pos), b.shape.radius, list(b.state.vel), list(b.state.angVel), b.dynamic, b.mask) for b in O.bodies]
+        json.dump([ids, bodies], open("packed.json", "w"))
         print("done")
         """)
     done = yade(path)
     assert "done" in done.stdout, done.stderr
-    plain, given, unset, sites, columns = json.loads((yade.folder / "column.json").read_text())
-    restarts = {"restart_every": 0, "resume": False}
-    assert plain == {"grain_count": 20, "diameter": 0.005, "static_friction": None, "shape": "round"} | restarts
-    assert given == {"grain_count": 7, "diameter": 0.004, "static_friction": 0.4, "shape": "square"} | restarts
-    assert unset["static_friction"] is None
-    assert len(sites) == 3 * 3 * 2
-    assert sites[0] == pytest.approx([0.00345, 0.00345, 0.01345])
-    assert columns[0] == columns[1] != columns[2]
-    for grains in map(np.array, columns):
-        assert len(grains) == 17
-        assert np.all(np.abs(grains[:, 3] / 0.0025 - 1.0) <= 0.2)
-        gaps = np.linalg.norm(grains[:, None, :3] - grains[None, :, :3], axis=2) - grains[:, None, 3] - grains[None, :, 3]
-        assert gaps[~np.eye(17, dtype=bool)].min() > 0.0
+    ids, bodies = json.loads((yade.folder / "packed.json").read_text())
+    assert ids == {"1": [0, 1], "2": [2]}
+    # Velocities are half a step behind positions.
+    assert bodies[0] == [[0, 0, 0.5], 0.0025, [0, 0, -0.245], [0, 3, 0], True, 1]
+    assert bodies[1][1] == 0.003 and bodies[1][2] == [0, 0, 0.005] and bodies[2][4:] == [False, 2]
 
 
-@pytest.mark.parametrize(("word", "parts"), [
-    ("diameter=-1", ("diameter=-1", "> 0 m")), ("diameter=wide", ("diameter=wide", "number (m)")), ("diameter=nan", ("must be a number",)),
-    ("grain_count=2.5", ("integer",)), ("shape=flat", ("round, square",)), ("size=3", ("size is unknown", "diameter")),
-    ("diameter", ("key=value",))])
-def test_wrong_parameter_is_one_line_and_code_2(yade, word, parts):
-    (yade.folder / "case.toml").write_text(CASE)
-    done = yade(script(yade, "wrong", "dembark.parameters('case.toml')\nprint('went on')\n"), word)
+@pytest.mark.parametrize(("word", "parts"), [("restart_every=often", ("restart_every=often", "number of steps")),
+                                             ("resume=perhaps", ("resume=perhaps", "yes or no"))])
+def test_a_wrong_word_for_restarts_is_one_line_and_code_2(yade, word, parts):
+    done = yade(script(yade, "wrong", "dembark.run(1)\nprint('went on')\n"), word)
     assert_one_line(done, parts)
+
+
+def test_a_deck_without_numbers_says_where_they_come_from(yade):
+    assert_one_line(yade(script(yade, "bare", "p = dembark.parameters()\nprint('went on')\n")), ("dembark deck",))
 
 
 def assert_one_line(done, parts, code=2):
@@ -197,12 +187,6 @@ def test_cylinder_in_a_periodic_cell_is_one_line(yade):
         print("went on")
         """)
     assert_one_line(yade(path), ("CylinderWall", "periodic"))
-
-
-def test_parameters_are_found_beside_the_script(yade):
-    (yade.folder / "case.toml").write_text(CASE)
-    done = yade(script(yade, "beside", "print('count', dembark.parameters().grain_count)\n"), "grain_count=3")
-    assert "count 3" in done.stdout, done.stderr
 
 
 @pytest.mark.parametrize(("call", "parts", "code"), [

@@ -1,6 +1,7 @@
 """What is measured of a channel knows the grains of its walls."""
 
 import numpy as np
+
 from dembark.postproc.instruments.channel import free_grains
 from dembark.postproc.tests.scenes import contacts_of, frame_of
 

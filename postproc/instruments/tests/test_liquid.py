@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from dembark.postproc.instruments.liquid import liquid_values
 from dembark.postproc.replica import Replica
 

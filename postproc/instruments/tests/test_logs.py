@@ -1,6 +1,7 @@
 """Files of a run of logs are read as arrays, or refused."""
 
 import pytest
+
 from dembark.postproc import DumpError
 from dembark.postproc.instruments.logs import read_touches
 

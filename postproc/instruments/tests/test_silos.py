@@ -4,6 +4,7 @@ import types
 
 import numpy as np
 import pytest
+
 from dembark.postproc.instruments import janssen
 from dembark.postproc.instruments.column import wall_pull
 from dembark.postproc.instruments.silo import moving_mean

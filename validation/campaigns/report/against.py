@@ -18,8 +18,8 @@ Key = tuple[str, str, str, str]
 
 @dataclass(frozen=True)
 class Difference:
-    """A quantity `before` and `after`: "changed" beyond the joint 95 % interval, "same" within it, "unknown" where an interval is missing, "new"
-    or "gone". `change` is relative; `significance` is the change over the joint half-width; None where there is none."""
+    """A quantity `before` and `after`: "changed" beyond the joint 95 % interval, "same" within it, "unknown" where an interval is missing,
+    "new" or "gone". `change` is relative; `significance` is the change over the joint half-width; None where there is none."""
 
     case: str
     variant: str
@@ -70,7 +70,8 @@ def _facts(campaign: Iterable[Result]) -> dict[str, str]:
     found: dict[str, dict[str, None]] = {}
     for one in campaign:
         if one.provenance.get("commit"):
-            found.setdefault("commit", {})[str(one.provenance["commit"])[:12] + (" (changed)" if one.provenance.get("dirty") else "")] = None
+            changed = " (changed)" if one.provenance.get("dirty") else ""
+            found.setdefault("commit", {})[str(one.provenance["commit"])[:12] + changed] = None
         for name, version in one.provenance.get("versions", {}).items():
             found.setdefault(name, {})[str(version)] = None
     return {name: ", ".join(values) for name, values in found.items()}

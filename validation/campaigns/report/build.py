@@ -51,9 +51,11 @@ def _sweep(sweep: Sweep, gathered: Gathered, drawn: Path) -> dict[str, Any]:
     tables.write_table_csv(drawn / f"{name}.csv", sweep)
     write_whole(drawn / f"{name}.tex", tables.latex(sweep, quantities).encode())
     study = figures.study_figure(sweep, chosen)
-    shown = [embed(study, drawn, f"{name}-study", "Quantities along the sweep with 95 % intervals; grey and dashed: the reference of each point.")] if study else []
+    shown = [embed(study, drawn, f"{name}-study",
+                   "Quantities along the sweep with 95 % intervals; grey and dashed: the reference of each point.")] if study else []
     maps = {engine: figures.map_figure(sweep, engine, chosen) for engine in sweep.engines}
-    shown += [embed(one, drawn, f"{name}-map-{engine}", f"{engine_name(engine)} over both parameters; a red frame marks a check that failed.")
+    shown += [embed(one, drawn, f"{name}-map-{engine}",
+                    f"{engine_name(engine)} over both parameters; a red frame marks a check that failed.")
               for engine, one in maps.items() if one]
     compared = {page.variant: page.comparison for page in gathered.pages if page.case == sweep.case}
     return {"sweep": sweep, "shown": len(chosen), "left_out": len(quantities) - len(chosen), "figures": shown,
@@ -75,9 +77,11 @@ def _comparison(gathered: Gathered, name: str, against: Path, drawn: Path) -> di
     rows = other.differences(before, after)
     write_csv(drawn / "against.csv",
               ("case", "variant", "engine", "quantity", "before", "after", "relative_change", "change_over_joint_half_width", "state"),
-              ([row.case, row.variant, row.engine, row.name, *(one and one.value for one in (row.before, row.after)), row.change, row.significance,
+              ([row.case, row.variant, row.engine, row.name, *(one and one.value for one in (row.before, row.after)), row.change,
+                row.significance,
                 row.state] for row in rows))
-    shown = embed(figures.against_figure(rows), drawn, "against", "Change of each quantity over its joint half-width; grey: within the interval.",
+    shown = embed(figures.against_figure(rows), drawn, "against",
+                  "Change of each quantity over its joint half-width; grey: within the interval.",
                   ["against.csv"])
     return {"name": against.name, "own_name": name, "rows": [row for row in rows if row.state == "changed"], "figure": shown,
             "counts": {state: sum(row.state == state for row in rows) for state in other.STATES}, "facts": other.facts(before, after)}

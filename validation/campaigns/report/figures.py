@@ -8,13 +8,14 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
+
 from dembark.postproc.style import STYLE
 from dembark.validation.campaigns.report.against import Difference
 from dembark.validation.campaigns.report.sweeps import Sweep, words
 from dembark.validation.judge.result import QuantityRecord
 from dembark.validation.report.figures import symbols
 from dembark.validation.report.look import colour, engine_name
-from matplotlib.figure import Figure
 
 _INK = "#4a4f57"
 _DASHES = ["-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (8, 3))]
@@ -113,7 +114,8 @@ def map_figure(sweep: Sweep, engine: str, quantities: Sequence[QuantityRecord]) 
                 bright = not np.isnan(value) and image.norm(value) < 0.55
                 axes.text(column, row, text, ha="center", va="center", fontsize=6.0, color="white" if bright else "black")
             for row, column in failed:
-                axes.add_patch(matplotlib.patches.Rectangle((column - 0.47, row - 0.47), 0.94, 0.94, fill=False, edgecolor="#b0321e", linewidth=1.4))
+                axes.add_patch(matplotlib.patches.Rectangle((column - 0.47, row - 0.47), 0.94, 0.94, fill=False, edgecolor="#b0321e",
+                                                            linewidth=1.4))
             axes.set_xticks(range(len(columns)), [_short(one) for one in columns])
             axes.set_yticks(range(len(rows)), [_short(one) for one in rows])
             axes.set(xlabel=sweep.label(across), ylabel=sweep.label(down))

@@ -64,7 +64,8 @@ class Sweep:
         return max(found, key=lambda axis: (len(self.levels(axis)), -self.axes.index(axis)), default=None)
 
     def quantities(self) -> list[QuantityRecord]:
-        """The quantities worth a picture, once each: those that failed first, then those that are checked or that the engines must agree in."""
+        """The quantities worth a picture, once each: those that failed first, then those that are checked or that the engines must agree
+        in."""
         found: dict[str, QuantityRecord] = {}
         failed: set[str] = set()
         for one in (one for point in self.points for result in point.results.values() for one in result.quantities):
@@ -93,7 +94,8 @@ def sweeps(facts: Sequence[Mapping[str, Any]], pages: Iterable[Page], cases: Map
 def _sweep(facts: Mapping[str, Any], number: int, measured: Mapping[tuple[str, str], Mapping[str, Result]], known: Case | None) -> Sweep:
     case, axes = facts["case"], tuple(facts["axes"])
     points = tuple(Point(point["values"], point["variant"], measured.get((case, point["variant"]), {})) for point in facts["points"])
-    title = facts.get("title") or f"{case.replace('_', ' ').capitalize()}: {' × '.join(axis.replace('_', ' ') for axis in axes) or 'one point'}"
+    along = " × ".join(axis.replace("_", " ") for axis in axes) or "one point"
+    title = facts.get("title") or f"{case.replace('_', ' ').capitalize()}: {along}"
     # A case that has gone since leaves its results without units of the axes.
     units = {axis: known.parameters[axis].unit for axis in axes if known and axis in known.parameters}
     return Sweep(case, title, axes, points, f"{case}-{number}", units)

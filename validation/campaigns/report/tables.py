@@ -19,14 +19,16 @@ _SPECIAL = {"&": r"\&", "%": r"\%", "#": r"\#", "_": r"\_", "$": r"\$", "{": r"\
             "^": r"\textasciicircum{}", "\\": r"\textbackslash{}", "−": "$-$", "±": r"$\pm$", "·": r"$\cdot$", "–": "--", "λ": r"$\lambda$",
             "σ": r"$\sigma$", "ρ": r"$\rho$", "μ": r"$\mu$", "θ": r"$\theta$", "τ": r"$\tau$", "ω": r"$\omega$", "π": r"$\pi$",
             "√": r"$\surd$", "≥": r"$\ge$", "≤": r"$\le$", "→": r"$\to$", "½": r"$\frac12$", "¼": r"$\frac14$", "¾": r"$\frac34$",
-            "²": "$^2$", "³": "$^3$", "⁻": "$^{-}$", "∝": r"$\propto$", "°": r"$^\circ$", "∞": r"$\infty$", "×": r"$\times$", "ṽ": r"$\tilde v$"}
+            "²": "$^2$", "³": "$^3$", "⁻": "$^{-}$", "∝": r"$\propto$", "°": r"$^\circ$", "∞": r"$\infty$", "×": r"$\times$",
+            "ṽ": r"$\tilde v$"}
 _POWERS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 
 def rows(sweep: Sweep) -> list[list[Any]]:
     """One row for each quantity of each point and engine: case, variant, engine, the swept values, and the quantity as in COLUMNS."""
     none = (None, None)
-    return [[sweep.case, point.variant, engine, *(point.values[axis] for axis in sweep.axes), one.name, one.unit, one.value, *(one.interval or none),
+    return [[sweep.case, point.variant, engine, *(point.values[axis] for axis in sweep.axes), one.name, one.unit, one.value,
+             *(one.interval or none),
              one.reference, *(one.reference_interval or none), one.deviation, one.tolerance, one.verdict, one.evidence]
             for point in sweep.points for engine, result in sorted(point.results.items()) for one in result.quantities]
 
@@ -43,9 +45,8 @@ def latex(sweep: Sweep, quantities: Sequence[QuantityRecord]) -> str:
     lines = [r"\begin{tabular}{" + "r" * len(sweep.axes) + "llrrrl}", r"\hline", " & ".join(map(_escape, head)) + r" \\", r"\hline"]
     for point in sweep.points:
         for engine, result in sorted(point.results.items()):
-            for one in result.quantities:
-                if one.name in names:
-                    lines.append(" & ".join(_escape(cell) for cell in _cells(sweep, point.values, engine, one)) + r" \\")
+            lines.extend(" & ".join(_escape(cell) for cell in _cells(sweep, point.values, engine, one)) + r" \\"
+                         for one in result.quantities if one.name in names)
     return "\n".join([*lines, r"\hline", r"\end{tabular}", ""])
 
 

@@ -8,7 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-import slurm_cluster  # noqa: E402
+import slurm_cluster
 
 
 @pytest.fixture(scope="session")

@@ -12,5 +12,6 @@ _MODULE = importlib.util.module_from_spec(_SPEC)
 sys.modules[_SPEC.name] = _MODULE
 _SPEC.loader.exec_module(_MODULE)
 
-decks, stand_in, environment, wait_for, lives = (getattr(_MODULE, name) for name in ("decks", "stand_in", "environment", "wait_for", "lives"))
+decks, stand_in, environment, wait_for, lives = (getattr(_MODULE, name)
+                                                 for name in ("decks", "stand_in", "environment", "wait_for", "lives"))
 engine_pid = _MODULE.engine_pid

@@ -6,10 +6,11 @@ import re
 from pathlib import Path
 
 import pytest
+
 from dembark.validation.campaigns import store
+from dembark.validation.campaigns.spec import shipped
 from dembark.validation.runs import schema
 from dembark.validation.runs.schema import TABLES
-from dembark.validation.campaigns.spec import shipped
 
 PAGE = (Path(__file__).resolve().parents[3] / "docs/campaigns.md").read_text(encoding="utf-8")
 

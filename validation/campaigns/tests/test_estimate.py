@@ -6,13 +6,15 @@ import math
 from types import SimpleNamespace
 
 import pytest
+from harness import decks, stand_in  # noqa: F401
+
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
 from dembark.validation.campaigns.estimate import estimates
+from dembark.validation.campaigns.rates import Rates
 from dembark.validation.case.folders import discover, find
 from dembark.validation.case.resolve import resolve
 from dembark.validation.runs.plan import Resources, series
-from harness import decks, stand_in  # noqa: F401
 
 
 def test_every_case_says_how_many_particles_it_has() -> None:

@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from harness import decks, stand_in  # noqa: F401
+from hypothesis import given
+from hypothesis import strategies as st
+
 from dembark.common.errors import DembarkError
 from dembark.validation.campaigns import source
 from dembark.validation.campaigns.expand import LONGEST_NAME, plan, points, variant_name
 from dembark.validation.campaigns.spec import read
 from dembark.validation.runs.plan import campaign
-from harness import decks, stand_in  # noqa: F401
-from hypothesis import given
-from hypothesis import strategies as st
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 

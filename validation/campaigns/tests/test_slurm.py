@@ -9,14 +9,16 @@ from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
+from harness import decks, stand_in, wait_for  # noqa: F401
+from slurm_cluster import Cluster
+
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.validation import engines
 from dembark.validation.campaigns import source
+from dembark.validation.engines.liggghts import Liggghts
 from dembark.validation.runs import queue, site, slurm
 from dembark.validation.runs.plan import Plan, Resources
 from dembark.validation.runs.queue import Queue
-from harness import decks, stand_in, wait_for  # noqa: F401
-from slurm_cluster import Cluster
 
 SLURM = site.find("slurm")
 QUICK = 'base = "slurm"\n[jobs]\npoll = "0.3 s"\nlatency = "1 s"\n'
@@ -49,7 +51,7 @@ def test_a_mistake_in_a_sites_file_is_told_in_one_line(tmp_path: Path, text: str
 def test_a_site_that_is_not_there_and_the_template() -> None:
     with pytest.raises(DembarkError, match="did you mean slurm"):
         site.find("slrum")
-    with pytest.raises(DembarkError, match="<partition>.*fill it in"):
+    with pytest.raises(DembarkError, match=r"<partition>.*fill it in"):
         site.find(str(site.SHIPPED / "site.toml"))
 
 
@@ -57,7 +59,7 @@ def test_the_preamble_sets_the_environment(tmp_path: Path) -> None:
     text = "preamble = '''\necho Loading openmpi\nexport SITE=\"two\nlines\" DEMBARK_MPIRUN=\"srun --mpi=pmix\"\necho $UNSET\n'''\n"
     found = written(tmp_path, text + QUICK).environment()
     assert found["SITE"] == "two\nlines" and found["DEMBARK_MPIRUN"] == "srun --mpi=pmix" and not any("openmpi" in key for key in found)
-    with pytest.raises(DembarkError, match="preamble of .*site.toml fails.*module"):
+    with pytest.raises(DembarkError, match=r"preamble of .*site\.toml fails.*module"):
         written(tmp_path, "preamble = 'module load nothing'\n" + QUICK).environment()
 
 
@@ -133,7 +135,8 @@ class Campaign:
     def start(self, index: int = 0, queue_of: Queue | None = None) -> Future[object]:
         (run,) = self.plan.series[index].runs
         one = queue_of or self.queue()
-        return one.start(run, self.results / self.plan.series[index].place, Resources(time=60, memory=1e8), lambda **facts: self.told.update(facts))
+        return one.start(run, self.results / self.plan.series[index].place, Resources(time=60, memory=1e8),
+                         lambda **facts: self.told.update(facts))
 
     def queue(self) -> Queue:
         self.queues.append(Queue(self.site, self.results, self.plan, self.said.append))
@@ -141,7 +144,7 @@ class Campaign:
 
 
 @pytest.fixture
-def campaign(tmp_path: Path, decks: Path, stand_in: Path, on_cluster: Cluster,  # noqa: F811
+def campaign(tmp_path: Path, decks: Path, stand_in: Path, on_cluster: Cluster,
              monkeypatch: pytest.MonkeyPatch) -> Iterator[Campaign]:
     one = Campaign(tmp_path, source.plan("quick"), monkeypatch)
     yield one
@@ -174,11 +177,12 @@ def test_how_a_job_ended_is_told_by_its_files(campaign: Campaign, text: str, err
 
 
 def test_jobs_of_a_dead_submitter_are_adopted_or_cancelled(campaign: Campaign, on_cluster: Cluster,
-                                                           wait_for: Callable[..., object]) -> None:  # noqa: F811
+                                                           wait_for: Callable[..., object]) -> None:
     campaign.script(f"echo x >> $out/started; sleep 4; {FINISH}")
     campaign.start()
     number = wait_for(lambda: campaign.told.get("job"), 60)
-    stray = on_cluster.call("sbatch", "--parsable", f"--job-name={queue.prefix(campaign.results)}00000000", "--output=/dev/null", "--wrap=sleep 60")
+    stray = on_cluster.call("sbatch", "--parsable", f"--job-name={queue.prefix(campaign.results)}00000000", "--output=/dev/null",
+                            "--wrap=sleep 60")
     campaign.queues[0]._end.set()
     campaign.queues[0]._thread.join()
     campaign.told.clear()
@@ -189,7 +193,7 @@ def test_jobs_of_a_dead_submitter_are_adopted_or_cancelled(campaign: Campaign, o
     assert campaign.said == ["1 jobs of an earlier start cancelled", f"waiting for 1 jobs of an earlier start: {number}"]
 
 
-def test_what_is_under_way_is_taken_back(campaign: Campaign, wait_for: Callable[..., object]) -> None:  # noqa: F811
+def test_what_is_under_way_is_taken_back(campaign: Campaign, wait_for: Callable[..., object]) -> None:
     campaign.script("sleep 60")
     future = campaign.start()
     wait_for(lambda: campaign.told.get("job"), 60)
@@ -201,7 +205,7 @@ def test_what_is_under_way_is_taken_back(campaign: Campaign, wait_for: Callable[
 
 
 def test_a_scheduler_that_is_away_is_waited_for(campaign: Campaign, on_cluster: Cluster, monkeypatch: pytest.MonkeyPatch,
-                                               wait_for: Callable[..., object]) -> None:  # noqa: F811
+                                               wait_for: Callable[..., object]) -> None:
     monkeypatch.setattr(queue, "_SILENCE", 0.5)
     campaign.script(f"sleep 1; {FINISH}")
     on_cluster.stop_controller()
@@ -212,11 +216,11 @@ def test_a_scheduler_that_is_away_is_waited_for(campaign: Campaign, on_cluster: 
 
 
 def test_a_refused_submission_fails_its_run_and_a_hopeless_one_is_told(campaign: Campaign, on_cluster: Cluster,
-                                                                      wait_for: Callable[..., object]) -> None:  # noqa: F811
+                                                                      wait_for: Callable[..., object]) -> None:
     campaign.script("sleep 60")
     (run,) = campaign.plan.series[0].runs
     one, out = campaign.queue(), campaign.results / campaign.plan.series[0].place
-    with pytest.raises(RunError, match="its job was refused, .*configuration is not available"):
+    with pytest.raises(RunError, match=r"its job was refused, .*configuration is not available"):
         one.start(run, out, Resources(memory=1e12), lambda **facts: None).result(60)
     one.start(run, out, Resources(time=36000, memory=1e8), lambda **facts: None)
     wait_for(lambda: campaign.said, 60)
@@ -224,12 +228,14 @@ def test_a_refused_submission_fails_its_run_and_a_hopeless_one_is_told(campaign:
     one.close()
 
 
-def test_another_scheduler_is_served_by_its_commands(tmp_path: Path, decks: Path, stand_in: Path,  # noqa: F811
-                                                     monkeypatch: pytest.MonkeyPatch, wait_for: Callable[..., object]) -> None:  # noqa: F811
+def test_another_scheduler_is_served_by_its_commands(tmp_path: Path, decks: Path, stand_in: Path,
+                                                     monkeypatch: pytest.MonkeyPatch,
+                                                     wait_for: Callable[..., object]) -> None:
     """One like PBS, that tells no names: jobs are processes, their list is a folder."""
     spool = tmp_path / "spool"
     spool.mkdir()
-    for name, text in {"qsub": f'"${{@: -1}}" & echo $! > {spool}/$!; echo "$!.server"', "qdel": 'for j in "$@"; do kill ${j%.server}; done',
+    for name, text in {"qsub": f'"${{@: -1}}" & echo $! > {spool}/$!; echo "$!.server"',
+                       "qdel": 'for j in "$@"; do kill ${j%.server}; done',
                        "qstat": f'cd {spool}; for j in *; do kill -0 $j 2>/dev/null && echo "$j.server some R"; done; true'}.items():
         (tmp_path / name).write_text(f"#!/bin/bash\n{text}\n")
         (tmp_path / name).chmod(0o755)
@@ -287,4 +293,3 @@ DEMBARK_MPIRUN="srun --mpi=pmix" {sys.executable} {program} 2
     on_cluster.call("sbatch", "--wait", "--ntasks=2", "--time=2", f"--output={log}", str(script), check=False)
     text = log.read_text()
     assert text.count("1 by 1 by 1 MPI processor grid") == 1 and text.count("1 by 1 by 2 MPI processor grid") == 2, text
-

@@ -154,7 +154,8 @@ def test_a_campaign_survives_kills_of_a_run_the_scheduler_and_the_submitter(
 
 
 @pytest.mark.slow
-def test_runs_of_a_lost_node_go_on_elsewhere(campaign: Campaign, on_cluster: Cluster, cluster_file: Path, wait_for: Callable[..., object]) -> None:
+def test_runs_of_a_lost_node_go_on_elsewhere(campaign: Campaign, on_cluster: Cluster, cluster_file: Path,
+                                             wait_for: Callable[..., object]) -> None:
     process = campaign.submit(cluster_file)
     try:
         wait_for(lambda: process.poll() is None and engines_at_work(campaign.results, 1), 400)

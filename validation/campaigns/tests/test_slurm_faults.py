@@ -179,7 +179,7 @@ def test_a_sweep_of_both_engines_survives_and_gives_the_numbers_of_one_without_f
     numbers, expected = quantities(results), quantities(clean)
     assert set(numbers) == set(expected) and rows == len(numbers)
     for key, quantity in numbers.items():
-        low, high = expected[key]["interval"] if expected[key]["interval"] else (expected[key]["value"],) * 2
+        low, high = expected[key]["interval"] or (expected[key]["value"],) * 2
         assert quantity["value"] is None or low <= quantity["value"] <= high, key
 
 
@@ -200,6 +200,6 @@ def test_a_run_with_mpi_loses_a_rank_and_goes_on(tmp_path: Path, on_cluster: Clu
             on_cluster.call("scancel", number, check=False)
     (record,) = records(results).values()
     assert record["attempts"] == 2 and record["resumed_at"][0] > 0 and record["provenance"]["ranks"] == 2
-    assert record["command"][0] == (launcher.split()[0] if launcher else "mpirun")
+    assert record["command"][0] == (launcher.split(maxsplit=1)[0] if launcher else "mpirun")
     states = [state for state, comment in on_cluster.jobs().values() if "silo" in comment]
     assert "FAILED" in states and "COMPLETED" in states

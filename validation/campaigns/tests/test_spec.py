@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from harness import decks, stand_in  # noqa: F401
+from hypothesis import given
+from hypothesis import strategies as st
+
 from dembark.common.errors import DembarkError
 from dembark.validation.campaigns import sizes
 from dembark.validation.campaigns.expand import points
 from dembark.validation.campaigns.spec import locate, read
 from dembark.validation.cli import main
-from harness import decks, stand_in  # noqa: F401
-from hypothesis import given
-from hypothesis import strategies as st
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
@@ -182,7 +183,7 @@ def test_a_mistake_gets_one_line_before_anything_starts(name: str, write, tmp_pa
     (["large", "--cores", "2"], "is to have 1e+03 GB of memory"),
     (["smal"], "did you mean small?"),
 ])
-def test_a_wrong_command_gets_one_line(words: list[str], expected: str, decks: Path, tmp_path: Path,  # noqa: F811
+def test_a_wrong_command_gets_one_line(words: list[str], expected: str, decks: Path, tmp_path: Path,
                                        monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
     (decks / "box/campaigns").mkdir()

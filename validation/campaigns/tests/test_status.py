@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
+
 from dembark.common.lock import lock
 from dembark.validation.campaigns import folder
 from dembark.validation.campaigns.status import look

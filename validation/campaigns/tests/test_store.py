@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from harness import decks, stand_in  # noqa: F401
+
 from dembark.common.errors import DembarkError, RunError
 from dembark.validation import engines
 from dembark.validation.campaigns import store
@@ -16,14 +18,14 @@ from dembark.validation.campaigns.rates import Rates
 from dembark.validation.runs.plan import Series, campaign
 from dembark.validation.runs.schema import KEYS, TABLES, VERSION
 from dembark.validation.runs.table import Table
-from harness import decks, stand_in  # noqa: F401
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
 
 def quantity(name: str, value: float | None, interval: list[float] | None = None) -> dict[str, Any]:
     return {"name": name, "label": name.upper(), "unit": "1", "value": value, "interval": interval, "reference": 2.0,
-            "reference_interval": None, "deviation": None, "deviation_kind": "relative", "tolerance": 0.1, "verdict": "pass", "reason": "", "detail": "",
+            "reference_interval": None, "deviation": None, "deviation_kind": "relative", "tolerance": 0.1, "verdict": "pass", "reason": "",
+            "detail": "",
             "source": "",
             "basis": "replicas", "compared": True, "agreement": None, "deviation_half_width": None}
 
@@ -103,7 +105,7 @@ def test_rows_of_several_commits_stay_and_the_same_commit_replaces_its_own(tmp_p
     assert not store.read_quantities(tmp_path, name="renamed")
 
 
-def test_runs_of_other_inputs_are_superseded_not_lost(tmp_path: Path, decks: Path) -> None:  # noqa: F811
+def test_runs_of_other_inputs_are_superseded_not_lost(tmp_path: Path, decks: Path) -> None:
     from dembark.validation.case import folders
 
     before = campaign("quick")
@@ -128,12 +130,12 @@ def test_a_series_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     put(tmp_path, one, [quantity("k", 1.0), quantity("l", 1.0)])
     collect(tmp_path, "boxes", [one])
     put(tmp_path, one, [quantity("k", 5.0), {**quantity("l", 5.0), "name": None}])
-    with pytest.raises(RunError, match="store.sqlite cannot be written"):
+    with pytest.raises(RunError, match=r"store\.sqlite cannot be written"):
         collect(tmp_path, "boxes", [one])
     assert {row["name"]: row["value"] for row in store.read_quantities(tmp_path)} == {"k": 1.0, "l": 1.0}
 
 
-def test_a_curve_is_that_of_the_last_measurement(tmp_path: Path, decks: Path) -> None:  # noqa: F811
+def test_a_curve_is_that_of_the_last_measurement(tmp_path: Path, decks: Path) -> None:
     (tmp_path / "c.toml").write_text('[campaign]\nname = "c"\nprofile = "quick"\n[[sweeps]]\ncase = "box"\nengines = ["yade"]\n'
                                      'grid = { grain_count = [30, 10, 20] }\n')
     from dembark.validation.campaigns import source

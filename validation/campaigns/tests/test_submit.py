@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import signal
 import subprocess
@@ -13,13 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
+
 from dembark.common.files import read_json
 from dembark.common.lock import lock
 from dembark.validation.campaigns import store
 from dembark.validation.campaigns.estimate import wall_clock
 from dembark.validation.campaigns.status import look
 from dembark.validation.cli import main
-from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
@@ -50,12 +50,12 @@ restart_interval = "0.0001 s"
 """
 
 
-def start(folder: Path, environment: dict[str, str], *words: str) -> subprocess.Popen[str]:  # noqa: F811
+def start(folder: Path, environment: dict[str, str], *words: str) -> subprocess.Popen[str]:
     return subprocess.Popen([sys.executable, "-m", "dembark.validation.cli", *words], cwd=folder, env=environment,
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-def dembark(folder: Path, environment: dict[str, str], *words: str) -> tuple[int, str, str]:  # noqa: F811
+def dembark(folder: Path, environment: dict[str, str], *words: str) -> tuple[int, str, str]:
     process = start(folder, environment, *words)
     out, error = process.communicate(timeout=300)
     assert "Traceback" not in error, error
@@ -89,7 +89,7 @@ def test_a_dry_run_says_what_it_will_cost_and_leaves_nothing(
     assert not (tmp_path / "results").exists()
 
 
-def test_faults_are_tried_again_and_a_changed_file_repeats_nothing(tmp_path: Path, environment: dict[str, str]) -> None:  # noqa: F811
+def test_faults_are_tried_again_and_a_changed_file_repeats_nothing(tmp_path: Path, environment: dict[str, str]) -> None:
     (tmp_path / "c.toml").write_text(CAMPAIGN)
     code, out, error = dembark(tmp_path, environment, "submit", "c.toml")
     results = tmp_path / "results/campaigns/boxes"
@@ -136,18 +136,18 @@ def test_a_folder_with_other_things_is_refused(tmp_path: Path, monkeypatch: pyte
         assert main(list(words)) == 2
         error = capsys.readouterr().err
         assert expected in error and error.count("\n") == 1
-    assert os.listdir(tmp_path / "mine") == ["thesis.tex"]
+    assert [path.name for path in (tmp_path / "mine").iterdir()] == ["thesis.tex"]
 
 
 def test_a_campaign_goes_on_after_its_submitter_was_killed(
-        tmp_path: Path, environment: dict[str, str], wait_for: Callable[..., Any], engine_pid: Callable[[Path], int],  # noqa: F811
-        lives: Callable[[int], bool]) -> None:  # noqa: F811
+        tmp_path: Path, environment: dict[str, str], wait_for: Callable[..., Any], engine_pid: Callable[[Path], int],
+        lives: Callable[[int], bool]) -> None:
     head, _, _ = CAMPAIGN.partition('[[sweeps]]\ncase = "box"\nvariant')
     text = head.replace('"kill", "exit", "ok"', '"hang", "ok"') + '[resources]\nrestart_interval = "0.0001 s"\n'
     (tmp_path / "c.toml").write_text(text)
     process = start(tmp_path, environment, "submit", "c.toml", "--out", "o", "--cores", "2")
     results = tmp_path / "o"
-    wait_for(lambda: (results / "box/dry_behaviour=ok/liggghts/metrics.json").is_file(), 120)
+    wait_for((results / "box/dry_behaviour=ok/liggghts/metrics.json").is_file, 120)
     pid = engine_pid(results / "box/dry_behaviour=hang")
     state = look(results)
     assert state.running and [one.state for one in state.states].count("running") == 1
@@ -179,7 +179,7 @@ def test_two_submissions_of_one_campaign_do_not_mix(
     (tmp_path / "c.toml").write_text(CAMPAIGN)
     with lock(tmp_path / "o/.lock", "held"):
         assert main(["submit", "c.toml", "--out", "o"]) == 2
-    assert "is being run by another process" in capsys.readouterr().err and os.listdir(tmp_path / "o") == []
+    assert "is being run by another process" in capsys.readouterr().err and list((tmp_path / "o").iterdir()) == []
 
 
 @pytest.mark.parametrize(("costs", "cores", "expected"), [

@@ -10,13 +10,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pytest
+
 from dembark.common.checkout import checkout
 from dembark.common.errors import DembarkError
 from dembark.validation import doctor, engines
 from dembark.validation.case import folders
+from dembark.validation.case.parameters import Value
 from dembark.validation.cli import main
 from dembark.validation.engines import DeckNumber, Engine, EngineFacts
-from dembark.validation.case.parameters import Value
 
 NAMED = re.compile("liggghts|yade|lammps", re.IGNORECASE)
 # The list of publications names what it cites.
@@ -175,13 +176,13 @@ def stub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def test_a_new_engine_is_found_everywhere(stub: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     from dembark.validation.campaigns import rates
     from dembark.validation.case import deck
+    from dembark.validation.report.look import Look, look
     from dembark.validation.runs.plan import series
-    from dembark.validation.report import figures
 
     assert main(["cases"]) == 0 and "stub" in capsys.readouterr().out
     told = {finding.what: finding.found for finding in doctor.examine()}
     assert told["the stub"] == f"4.2 ({Stub.program})"
-    assert (figures.engine_name("stub"), figures.colour("stub"), figures.marker("stub")) == ("The Stub", "#000000", "x")
+    assert look("stub") == Look("The Stub", "#000000", "x")
     assert rates.Rates().of("box", "stub").value == 1e3
     monkeypatch.chdir(stub)
     for words, expected in ((["--engine", "stbu"], "did you mean stub?"),

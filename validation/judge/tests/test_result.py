@@ -4,13 +4,15 @@ import json
 from pathlib import Path
 
 import pytest
+
 from dembark.common.errors import RunError
+from dembark.postproc.statistics import Estimate
 from dembark.validation.judge import result
 from dembark.validation.judge.quantity import Quantity
 from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result
-from dembark.postproc.statistics import Estimate
 
-RECORD = Quantity("mass", "mass", "kg", Estimate(1.02, 0.01, "3 replicas"), reference=Estimate(1.0, 0.0), tolerance=0.05, evidence="identity").record()
+RECORD = Quantity("mass", "mass", "kg", Estimate(1.02, 0.01, "3 replicas"), reference=Estimate(1.0, 0.0), tolerance=0.05,
+                  evidence="identity").record()
 RESULT = Result("silo", "dry", "yade", (RECORD,), "quick", parameters={"gravity": 9.81}, profiles=({"name": "stress", "place": [0.0]},),
                 remarks=("note",), provenance={"commit": "a"}, inputs=("f00",))
 
@@ -24,7 +26,8 @@ def test_a_result_comes_back_as_it_was_written(tmp_path: Path) -> None:
 
 
 def test_a_comparison_comes_back_as_it_was_written(tmp_path: Path) -> None:
-    both = Comparison("silo", "dry", ("liggghts", "yade"), (ComparedRecord("mass", 1.0, "pass", engine="yade", reference_engine="liggghts"),))
+    both = Comparison("silo", "dry", ("liggghts", "yade"),
+                      (ComparedRecord("mass", 1.0, "pass", engine="yade", reference_engine="liggghts"),))
     result.write(tmp_path / "comparison.json", both)
     assert result.read_comparison(tmp_path / "comparison.json") == both and both.quantities[0].evidence == "code"
 

@@ -6,11 +6,12 @@ import shutil
 
 import numpy as np
 import pytest
-from dembark.validation import pictures
-from dembark.validation.pictures import sections as cross_section
 from dumps import grains_text
 from matplotlib.figure import Figure
 from PIL import Image
+
+from dembark.validation import pictures
+from dembark.validation.pictures import sections as cross_section
 
 
 @pytest.fixture

@@ -5,12 +5,13 @@ import sys
 
 import numpy as np
 import pytest
+from PIL import Image
+
 from dembark.common.errors import RunError
 from dembark.postproc import render
 from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.validation.pictures import packings
 from dembark.validation.verification import scenes
-from PIL import Image
 
 
 def test_pressure_in_a_grain_between_two_others():

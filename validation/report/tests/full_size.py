@@ -8,13 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
+
 from dembark.validation import pictures, verification
 from dembark.validation.judge import result
 from dembark.validation.judge.compare import compare
 from dembark.validation.judge.result import QuantityRecord, Result
 from dembark.validation.pictures.packings import png
 from dembark.validation.verification.item import Item, exact
-from matplotlib.figure import Figure
 
 CASES = ("silo", "plane_silo", "plug_flow", "gravity_channel", "column_collapse", "debarking_drum", "log_pile", "log_pair", "log_cradle",
          "liquid_exchange", "single_contact")
@@ -30,7 +31,8 @@ def quantity(number: int, seed: int) -> QuantityRecord:
     unsure = number % 9 == 8
     half = 0.4 if unsure else 0.02 * abs(value)
     return QuantityRecord(
-        f"quantity_{number}", value, "info" if unsure else "pass", f"quantity σ_zz number {number} of the packing, over its weight", "kPa", (value - half, value + half),
+        f"quantity_{number}", value, "info" if unsure else "pass", f"quantity σ_zz number {number} of the packing, over its weight", "kPa",
+        (value - half, value + half),
         "5 replicas", reference, None, value - reference, "absolute" if kind == "identity" else "relative", 0.1,
         f"its interval (±{half:.2g}) is wider than what is allowed" if unsure else "", "a detail", "a source", kind, number % 2 == 0)
 
@@ -39,7 +41,8 @@ def profile(number: int, seed: int) -> dict[str, object]:
     """A curve with a band, every second beside a reference."""
     place = np.linspace(0.0, 10.0, 60)
     value = 1.0 - np.exp(-place / (2.0 + number)) + 0.01 * np.sin(place + seed)
-    return {"name": f"curve_{number}", "title": f"Curve {number}", "along": "depth / d", "across": "σ_zz (kPa)", "vertical": number % 3 == 0,
+    return {"name": f"curve_{number}", "title": f"Curve {number}", "along": "depth / d", "across": "σ_zz (kPa)",
+            "vertical": number % 3 == 0,
             "place": place.tolist(), "value": value.tolist(), "low": (value - 0.02).tolist(), "high": (value + 0.02).tolist(), "note": "",
             **({"reference": (1.0 - np.exp(-place / (2.0 + number))).tolist(), "reference_label": "Janssen"} if number % 2 else {})}
 

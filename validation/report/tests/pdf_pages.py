@@ -30,7 +30,8 @@ def page_count(pdf: bytes) -> int:
     for stream in re.findall(rb"stream\r?\n(.*?)\r?\nendstream", pdf, re.DOTALL):
         with suppress(zlib.error):
             parts.append(zlib.decompress(stream))
-    return max(int(count) for part in parts for count in re.findall(rb"/Type\s*/Pages\b[^>]*?/Count (\d+)|/Count (\d+)[^>]*?/Type\s*/Pages\b", part) for count in count if count)
+    counts = re.compile(rb"/Type\s*/Pages\b[^>]*?/Count (\d+)|/Count (\d+)[^>]*?/Type\s*/Pages\b")
+    return max(int(count) for part in parts for pair in counts.findall(part) for count in pair if count)
 
 
 def text(html: str) -> str:

@@ -5,11 +5,12 @@ import csv
 import numpy as np
 import pytest
 import xarray
+from synthetic import plug_flow, silo
+
 from dembark.validation import report
 from dembark.validation.metrics import measure
 from dembark.validation.report import fields, figures, sections
 from dembark.validation.report.gather import gather
-from synthetic import plug_flow, silo
 
 
 @pytest.fixture(scope="module")

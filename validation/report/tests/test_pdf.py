@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from dembark.validation.report.build import write_pdf
 
 

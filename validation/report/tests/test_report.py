@@ -10,6 +10,7 @@ import full_size
 import numpy as np
 import pdf_pages as pdf
 import pytest
+
 from dembark.common.errors import RunError
 from dembark.validation import report
 from dembark.validation.judge import result
@@ -19,12 +20,13 @@ from dembark.validation.report.gather import Row, gather
 
 build_module = sys.modules[write_pdf.__module__]
 
-_opened: list[str] | None = None
+_listeners: list[list[str]] = []
 
 
 def _hook(event, arguments):
-    if _opened is not None and event == "open":
-        _opened.append(str(arguments[0]))
+    if event == "open":
+        for opened in _listeners:
+            opened.append(str(arguments[0]))
 
 
 sys.addaudithook(_hook)
@@ -34,10 +36,11 @@ sys.addaudithook(_hook)
 def results(tmp_path_factory):
     """Two cases in both engines with a failed identity, a failure without tolerance, a run that failed, a result that cannot be read, and
     trajectories that nobody may open."""
-    global _opened
     folder = full_size.write(tmp_path_factory.mktemp("results") / "quick", ("silo", "log_pile"), variants=2)
-    full_size.change(folder / "silo/variant_0/yade/metrics.json", "quantity_0", verdict="fail", value=0.3, deviation=0.3, label="lost momentum")
-    full_size.change(folder / "log_pile/variant_1/liggghts/metrics.json", "quantity_6", verdict="fail", tolerance=None, label="too few contacts")
+    full_size.change(folder / "silo/variant_0/yade/metrics.json", "quantity_0", verdict="fail", value=0.3, deviation=0.3,
+                     label="lost momentum")
+    full_size.change(folder / "log_pile/variant_1/liggghts/metrics.json", "quantity_6", verdict="fail", tolerance=None,
+                     label="too few contacts")
     runs = json.loads((folder / "runs.json").read_text())
     runs["runs"].append({"case": "plug_flow", "variant": "smooth", "engine": "yade", "replica": 1, "state": "failed",
                          "message": "the engine was killed by SIGKILL <at> step 7"})
@@ -48,12 +51,12 @@ def results(tmp_path_factory):
         for name in ("grains.dump", "contacts.dump", "run.json", "time.csv"):
             (place / "replica-1" / name).write_text("not to be read")
     written = sorted(path for path in folder.rglob("*") if path.is_file())
-    pages = []
-    _opened = []
+    pages, opened = [], []
+    _listeners.append(opened)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(build_module, "write_pdf", lambda html, path: pages.append(html) or write_pdf(html, path))
         report.build(folder)
-    opened, _opened = _opened, None
+    _listeners.clear()
     return folder, pages[0], opened, written
 
 
@@ -136,7 +139,8 @@ def test_scatter_is_of_checks_against_experiment_and_theory_only():
 
 
 def test_open_checks_are_one_line_for_each_case_and_reason():
-    rows = [row(8, reason="its interval (±0.4) is wider than what is allowed"), row(17, reason="its interval (±0.5) is wider than what is allowed"),
+    rows = [row(8, reason="its interval (±0.4) is wider than what is allowed"),
+            row(17, reason="its interval (±0.5) is wider than what is allowed"),
             row(26, reason="the run is too short")]
     first, second = front.open_lines(rows)
     assert (first.count, first.reason) == (2, "its interval is wider than what is allowed") and "1 more" in first.names
@@ -160,21 +164,24 @@ def test_runs_that_a_profile_expects_are_missing_without_a_list_of_runs(tmp_path
 
 @pytest.mark.parametrize(
     ("value", "interval", "text"),
-    [(2.0512, [1.94, 2.1624], "2.05 ± 0.11"), (539.0, [456.0, 622.0], "539 ± 83"), (4.1e-5, [2.7e-5, 5.5e-5], "(4.1 ± 1.4)·10⁻⁵"), (0.25, None, "0.250"),
-     (-0.0008, [-0.003, 0.0014], "−0.0008 ± 0.0022"), (None, None, "–"), (0.0, [0.0, 0.0], "0"), (0.3, [0.3 - 2e-11, 0.3 + 2e-11], "0.300 ± 2.0·10⁻¹¹")],
+    [(2.0512, [1.94, 2.1624], "2.05 ± 0.11"), (539.0, [456.0, 622.0], "539 ± 83"), (4.1e-5, [2.7e-5, 5.5e-5], "(4.1 ± 1.4)·10⁻⁵"),
+     (0.25, None, "0.250"), (-0.0008, [-0.003, 0.0014], "−0.0008 ± 0.0022"), (None, None, "–"), (0.0, [0.0, 0.0], "0"),
+     (0.3, [0.3 - 2e-11, 0.3 + 2e-11], "0.300 ± 2.0·10⁻¹¹")],
 )
 def test_value_has_the_digits_of_its_interval(value, interval, text):
     assert numbers.with_interval(value, interval) == text
 
 
-@pytest.mark.parametrize(("value", "text"), [(1e300, "1·10³⁰⁰"), (0.005, "0.005"), (60, "60"), (5e6, "5·10⁶"), ("exact", "exact"), (None, "not set")])
+@pytest.mark.parametrize(("value", "text"),
+                         [(1e300, "1·10³⁰⁰"), (0.005, "0.005"), (60, "60"), (5e6, "5·10⁶"), ("exact", "exact"), (None, "not set")])
 def test_parameters_without_needless_zeros(value, text):
     assert numbers.compact(value) == text
 
 
 @pytest.mark.parametrize(
     ("changes", "text"),
-    [({"deviation": 0.0123}, "+1.2 %"), ({"deviation": 2.7e-7}, "2.7·10⁻⁵ %"), ({"deviation": 60.35, "value": 0.6135, "reference": 0.01}, "0.60 kPa"),
+    [({"deviation": 0.0123}, "+1.2 %"), ({"deviation": 2.7e-7}, "2.7·10⁻⁵ %"),
+     ({"deviation": 60.35, "value": 0.6135, "reference": 0.01}, "0.60 kPa"),
      ({"deviation": 0.002, "deviation_kind": "absolute"}, "0.0020 kPa"), ({"deviation": None}, "–")],
 )
 def test_deviations_are_no_percentages_near_a_reference_of_zero(changes, text):

@@ -12,13 +12,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from harness import decks, stand_in  # noqa: F401
+
 from dembark.common.errors import Interrupted, Killed, RunError
 from dembark.validation.runs.executor import Executor, Local, Task
 from dembark.validation.runs.plan import Resources, Run, campaign
 from dembark.validation.runs.simulate import Tell
 from dembark.validation.runs.steps import Step
 from dembark.validation.runs.table import Table
-from harness import decks, stand_in  # noqa: F401
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
@@ -57,7 +58,7 @@ def tasks(folder: Path) -> list[Task]:
 
 
 def write(path: Path, text: str) -> None:
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
 
 
 def fail(text: str) -> None:

@@ -10,10 +10,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
+
 from dembark.common.files import read_json
 from dembark.validation.case import folders
 from dembark.validation.runs.plan import campaign, studies, variants
-from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
@@ -89,18 +90,21 @@ def test_a_line_of_runs_may_give_an_engine_its_own_number_of_replicas(decks: Pat
     assert {one.runs[0].engine.name: len(one.runs) for one in campaign("standard")} == {"liggghts": 3, "yade": 1}
 
 
-def test_a_study_is_made_of_its_variants_and_again_when_one_of_them_changes(tmp_path: Path, environment: dict[str, str], decks: Path) -> None:
+def test_a_study_is_made_of_its_variants_and_again_when_one_of_them_changes(tmp_path: Path, environment: dict[str, str],
+                                                                            decks: Path) -> None:
     path = decks / "box" / "case.toml"
-    path.write_text(path.read_text().replace("[runs]\n", STUDY).replace('{variant = "dry"}, {variant = "wet", engines = ["liggghts"]}', '{variant = "dry", engines = ["liggghts"]}, '
-                    '{variant = "large", engines = ["liggghts"]}, {variant = "huge", engines = ["liggghts"]}'))
-    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    path.write_text(path.read_text().replace("[runs]\n", STUDY).replace(
+        '{variant = "dry"}, {variant = "wet", engines = ["liggghts"]}',
+        '{variant = "dry", engines = ["liggghts"]}, {variant = "large", engines = ["liggghts"]}, '
+        '{variant = "huge", engines = ["liggghts"]}'))
+    code, _, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
     results = tmp_path / "results" / "quick"
     assert code == 0, error
     assert read_json(results / "box/study-size/liggghts/metrics.json")["numbers"] == [10, 30, 40]
     assert "box/study-size/liggghts/metrics.json" in (results / "report.html").read_text()
 
     path.write_text(path.read_text().replace("grain_count = 40", "grain_count = 50"))
-    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    code, _, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
     assert code == 0 and read_json(results / "box/study-size/liggghts/metrics.json")["numbers"] == [10, 30, 50]
 
 

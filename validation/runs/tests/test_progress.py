@@ -6,9 +6,10 @@ import io
 import time
 from pathlib import Path
 
+from rich.console import Console
+
 from dembark.validation.runs.progress import Monitor, OutputParser, describe, duration, headline, state_table
 from dembark.validation.runs.table import State, Table
-from rich.console import Console
 
 
 def test_steps_are_read_and_other_numbers_are_not() -> None:

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from harness import decks, engine_pid, lives, stand_in, wait_for  # noqa: F401
+
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import read_json
 from dembark.validation import engines
@@ -16,7 +18,6 @@ from dembark.validation.case import folders
 from dembark.validation.case.folders import find
 from dembark.validation.runs import restarts, simulate
 from dembark.validation.runs.plan import Resources, Run, series
-from harness import decks, engine_pid, lives, stand_in, wait_for  # noqa: F401
 
 # The stand-in has ten grains and a hundred steps; this is a state every twenty of them.
 OFTEN = Resources(restart_interval=2e-4)
@@ -50,7 +51,7 @@ def work(below: Path) -> Path:
 
 @pytest.mark.parametrize("engine", ["liggghts", "yade"])
 def test_killed_run_goes_on_from_its_newest_state(tmp_path: Path, engine: str) -> None:
-    with pytest.raises(Killed, match="killed by SIGKILL at step 50 of 100.*it goes on from step 40 when it is started again"):
+    with pytest.raises(Killed, match=r"killed by SIGKILL at step 50 of 100.*it goes on from step 40 when it is started again"):
         run(tmp_path, engine, behaviour="kill")
     record = run(tmp_path, engine, behaviour="kill")
     assert (record["attempts"], record["resumed_at"], record["resume"], record["restart_every"]) == (2, [40], "exact", 20)
@@ -97,7 +98,7 @@ def test_failure_of_the_run_itself_begins_anew(tmp_path: Path) -> None:
 
 
 def test_full_disk_costs_no_state(tmp_path: Path) -> None:
-    with pytest.raises(RunError, match="disk is full.*goes on from step 40"):
+    with pytest.raises(RunError, match=r"disk is full.*goes on from step 40"):
         run(tmp_path, behaviour="full")
     assert run(tmp_path, behaviour="full")["resumed_at"] == [40]
 
@@ -122,7 +123,7 @@ def test_interruption_says_where_the_run_goes_on(tmp_path: Path, engine_pid: Cal
     thread = threading.Thread(target=work_on)
     thread.start()
     engine_pid(tmp_path)
-    wait_for(lambda: (work(tmp_path) / "state.40.restart.crc").exists())
+    wait_for((work(tmp_path) / "state.40.restart.crc").exists)
     cancel.set()
     thread.join(20)
     assert caught == ["box dry liggghts 1 was interrupted, it goes on from step 40 when it is started again"]
@@ -139,7 +140,7 @@ def test_killed_harness_leaves_what_the_next_attempt_needs(tmp_path: Path, engin
             f"simulate.simulate(one, Path({str(tmp_path / 'out')!r}), threading.Event(), used)")
     process = subprocess.Popen([sys.executable, "-c", text])
     pid = engine_pid(tmp_path)
-    wait_for(lambda: (work(tmp_path) / "state.40.restart.crc").exists())
+    wait_for((work(tmp_path) / "state.40.restart.crc").exists)
     with pytest.raises(DembarkError, match="by another process"):
         run(tmp_path, behaviour="hang")
     process.kill()

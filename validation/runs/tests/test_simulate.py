@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
+
 from dembark.common.errors import DembarkError, Interrupted, RunError
 from dembark.common.files import read_json
 from dembark.validation import engines
@@ -23,8 +25,6 @@ from dembark.validation.runs.plan import Run, series
 FindPid = Callable[[Path], int]
 Lives = Callable[[int], bool]
 Command = tuple[subprocess.Popen[str], Path]
-
-from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
@@ -45,7 +45,7 @@ def run(out: Path, engine: str = "liggghts", cancel: threading.Event | None = No
 def test_a_run_leaves_its_files_and_its_record(tmp_path: Path, engine: str) -> None:
     folder, state = run(tmp_path / "out", engine, static_friction=0.4)
     assert state == "finished"
-    assert {"engine.log", "grains.dump", "contacts.dump", "time.csv", "run.json"} <= set(os.listdir(folder))
+    assert {"engine.log", "grains.dump", "contacts.dump", "time.csv", "run.json"} <= {path.name for path in folder.iterdir()}
     record = read_json(folder / "run.json")
     assert (record["steps"], record["time_step"], record["frames"], record["replica"]) == (100, 1e-5, 3, 1)
     assert record["parameters"]["static_friction"] == 0.4 and record["parameters"]["kinetic_friction"] is None
@@ -83,7 +83,7 @@ def test_a_finished_run_is_not_repeated_unless_an_input_changes(tmp_path: Path, 
     assert run(out, grain_diameter=0.006)[1] == "kept"
     (decks / "box" / "liggghts.in").write_text("# another deck\n")
     assert run(out, grain_diameter=0.006)[1] == "finished"
-    stand_in.write_text(stand_in.read_text() + "# another build\n")
+    stand_in.write_text(stand_in.read_text(encoding="utf-8") + "# another build\n", encoding="utf-8")
     assert run(out, grain_diameter=0.006)[1] == "finished"
 
 
@@ -128,7 +128,7 @@ def test_cancelling_ends_the_engine_and_clears_up(tmp_path: Path, engine_pid: Fi
     cancel.set()
     thread.join(20)
     assert caught and not lives(pid)
-    assert [name for name in os.listdir(out) if "lock" not in name] == []
+    assert [path for path in out.iterdir() if "lock" not in path.name] == []
 
 
 @pytest.fixture
@@ -173,7 +173,7 @@ def test_two_processes_do_not_compute_the_same_run(command: Command, engine_pid:
 
 
 def test_too_little_room_is_told_before_the_start(tmp_path: Path) -> None:
-    with pytest.raises(RunError, match="disk is too full.*needs about"):
+    with pytest.raises(RunError, match=r"disk is too full.*needs about"):
         run(tmp_path, grain_count=10**9, frames=10**6)
     assert not list(tmp_path.glob("replica-*"))
 
@@ -186,7 +186,7 @@ def test_a_disk_that_fills_up_is_named_as_the_cause(tmp_path: Path) -> None:
         pytest.skip("this machine allows no mounts")
     try:
         (out / "filler").write_bytes(bytes(7 << 20))
-        with pytest.raises(RunError, match="disk is full|disk is too full"):
+        with pytest.raises(RunError, match=r"disk is full|disk is too full"):
             run(out, pause=0.5)
         assert not list(out.glob("replica-*")) and not list(out.glob(".*work*"))
     finally:

@@ -7,11 +7,12 @@ import sqlite3
 from pathlib import Path
 
 import pytest
+from harness import decks, stand_in  # noqa: F401
+
 from dembark.common.errors import DembarkError
 from dembark.validation.runs import schema
 from dembark.validation.runs.plan import Run, campaign
 from dembark.validation.runs.table import ALLOWED, State, Table, read
-from harness import decks, stand_in  # noqa: F401
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 

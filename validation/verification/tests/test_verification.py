@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from dembark.validation import verification
 from dembark.validation.judge.tally import of_folder
 from dembark.validation.verification import fields_balance, scenes
@@ -53,7 +54,8 @@ def test_order_of_convergence(due, verdict):
 def test_items_come_back_as_they_were_written(tmp_path):
     steps = np.array([0.1, 0.05])
     curve = Curve("error", steps, steps**2)
-    item = Item("wave", "Wave", "A wave.", [order("order", "order", steps, steps**2, 2.0, "theory")], [Panel("Wave", "h", "error", [curve])])
+    item = Item("wave", "Wave", "A wave.", [order("order", "order", steps, steps**2, 2.0, "theory")],
+                [Panel("Wave", "h", "error", [curve])])
     verification.write(tmp_path, [item])
     (found,) = verification.read(tmp_path)
     assert found.quantities == item.quantities and found.panels[0].curves[0].value == [*curve.value]

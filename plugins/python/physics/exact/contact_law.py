@@ -68,6 +68,8 @@ def solved(one: Impacts, parts: int = 1000) -> Rebounds:
     law = _Law(one)
     state, part, elapsed = law.start(0.0), one.duration / parts, np.zeros(len(one))
     deepest, strongest, going = np.zeros(len(one)), np.zeros(len(one)), np.ones(len(one), bool)
+    # An overlap is a difference of distances, and means nothing below their round-off.
+    nothing = 4.0 * np.finfo(float).eps * one.arm.sum(axis=0)
     while going.any():
         overlap, parting = law.overlap(state)[0], law.parting(state)
         to_end = np.where(parting > 0.0, overlap / np.where(parting > 0.0, parting, 1.0), np.inf)
@@ -81,7 +83,7 @@ def solved(one: Impacts, parts: int = 1000) -> Rebounds:
         _, state[10], force = law.forces(state)
         overlap = law.overlap(state)[0]
         deepest, strongest = np.maximum(deepest, overlap), np.maximum(strongest, force)
-        going &= (overlap > _FIRST * deepest) | (elapsed < part)
+        going &= (overlap > np.maximum(_FIRST * deepest, nothing)) | (elapsed < part)
     return Rebounds(state[4:6], state[6:8], state[8:10], deepest, strongest, elapsed)
 
 

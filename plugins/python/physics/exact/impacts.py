@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gamma
+from scipy.special import betaincinv, gamma
 
 Array = NDArray[np.float64]
 
@@ -49,12 +49,12 @@ class Impacts:
 
     @property
     def reduced_radius(self) -> Array:
-        """R* of the two bodies (m)."""
+        """R* (m)."""
         return 1.0 / (1.0 / self.radius).sum(axis=0)
 
     @property
     def reduced_mass(self) -> Array:
-        """m* of the two bodies (kg)."""
+        """m* (kg)."""
         return 1.0 / (1.0 / self.mass).sum(axis=0)
 
     @property
@@ -93,11 +93,9 @@ class Impacts:
 
     def pulse(self, times: Array) -> Array:
         """Force (times, n) in N at `times` (times, n) in s since the touch: t = ∫ dδ / (v √(1 − (δ/δ_max)^(5/2))) after Hertz, elastic."""
-        # With δ/δ_max = (sin a)^(4/5) the integrand is 4/5 (sin a)^(-1/5), which is smooth but for the beginning.
-        turn = np.linspace(0.0, 0.5 * np.pi, 4001)
-        time = np.concatenate([[0.0], np.cumsum(np.sin(0.5 * (turn[1:] + turn[:-1])) ** -0.2)])
-        from_end = 1.0 - np.abs(2.0 * times / self.duration - 1.0)
-        return self.force(self.peak_overlap * np.interp(from_end, time / time[-1], np.sin(turn) ** 0.8, left=0.0))
+        # In (δ/δ_max)^(5/2) this is an incomplete beta function.
+        from_end = np.maximum(0.0, 1.0 - np.abs(2.0 * times / self.duration - 1.0))
+        return self.force(self.peak_overlap * betaincinv(0.4, 0.5, from_end) ** 0.4)
 
 
 @dataclass(frozen=True)
@@ -113,8 +111,8 @@ class Rebounds:
     duration: Array
 
     def numbers(self, one: Impacts) -> dict[str, Array]:
-        """By name, (n,) each: `overlap`, `force`, `duration`, and velocities after over the speed of approach: that of parting
-        (`restitution`), of the sphere along the plane (`slide`), of its surface by its `spin`, and of its point of contact (`patch`)."""
+        """By name, (n,) each: `overlap`, `force`, `duration`, and velocities after over the speed of approach: of parting (`restitution`),
+        of the sphere along the plane (`slide`), of its surface by its `spin`, and of its point of contact (`patch`)."""
         slide, spin = self.slide[0] / one.closing, one.radius[0] * self.spin[0] / one.closing
         return {"restitution": (self.normal[0] - self.normal[1]) / one.closing, "slide": slide, "spin": spin, "patch": slide + spin,
                 "overlap": self.overlap, "force": self.force, "duration": self.duration}

@@ -78,7 +78,7 @@ class Books:
 
     @property
     def total(self) -> Array:
-        """All liquid (m^3), (steps,)."""
+        """All liquid (m^3)."""
         return self.grains.sum(axis=1) + self.bridges + self.wall
 
 
@@ -93,11 +93,11 @@ def books(row: Row, rule: Rule, time_step: float, steps: Sequence[int] | Array) 
     part[0], part[-1] = (row.wall_part, 1.0 - row.wall_part), (1.0, 0.0)
 
     def of_bodies(amounts: Array) -> Array:
-        return np.bincount(sides.ravel(), amounts.ravel(), len(radii)).astype(np.float64)
+        return np.asarray(np.bincount(sides.ravel(), amounts.ravel(), len(radii)), float)
 
     owned, volume, back = np.array([row.wall, *row.volumes, 0.0]), np.zeros(len(sides)), np.zeros(sides.shape)
     rupture, wanted, found = np.zeros(len(sides)), {int(step) for step in steps}, []
-    for step, gap in enumerate(row.gaps(time_step * np.arange(1, max(wanted) + 1, dtype=np.float64)), start=1):
+    for step, gap in enumerate(row.gaps(time_step * np.arange(1.0, max(wanted) + 1)), start=1):
         broken = (volume > 0.0) & (gap > rupture)
         owned, volume = owned + of_bodies(back * broken[:, None]), np.where(broken, 0.0, volume)
         demand = ask * ((volume == 0.0) & (gap < 0.0))[:, None]

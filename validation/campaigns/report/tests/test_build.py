@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+
 from dembark.common.errors import DembarkError
 from dembark.validation.campaigns import report
 from dembark.validation.judge import result
@@ -19,19 +20,22 @@ def fill(folder: Path, commit: str = "a" * 40, shift: float = 0.0, killed: str =
 
     At the point `killed` the runs failed, at `broken` YADE's quantity `contacts`, which has no tolerance, failed.
     """
-    points = {f"dry_f={friction}_r={radius}": {"wall_friction": friction, "cylinder_radius": radius} for friction in FRICTIONS for radius in RADII}
+    points = {f"dry_f={friction}_r={radius}": {"wall_friction": friction, "cylinder_radius": radius}
+              for friction in FRICTIONS for radius in RADII}
     sweep = {"case": "silo", "name": "grid", "title": "Friction and radius", "axes": ["wall_friction", "cylinder_radius"],
              "points": [{"variant": name, "base": "dry", "values": values, "changes": values} for name, values in points.items()]}
     runs = []
     for name, values in points.items():
         for engine in ("liggghts", "yade"):
-            runs.append({"case": "silo", "variant": name, "engine": engine, "replica": 1, "state": "failed" if name == killed else "finished",
+            runs.append({"case": "silo", "variant": name, "engine": engine, "replica": 1,
+                         "state": "failed" if name == killed else "finished",
                          "message": "the engine was killed" if name == killed else ""})
             place = folder / "silo" / name / engine
             place.mkdir(parents=True)
             value = values["wall_friction"] * values["cylinder_radius"] + shift
             verdict = "fail" if engine == "yade" and name == broken else "pass"
-            quantities = (QuantityRecord("k", value, "pass", "K_ratio", "1", (value - 1e-3, value + 1e-3), "", value * 1.02, None, -0.02, tolerance=0.1,
+            quantities = (QuantityRecord("k", value, "pass", "K_ratio", "1", (value - 1e-3, value + 1e-3), "", value * 1.02, None, -0.02,
+                                         tolerance=0.1,
                                          evidence="theory"),
                           QuantityRecord("contacts", 2.0, verdict, "contacts of a log", compared=False, evidence="theory"))
             if name != killed:

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from dembark.validation.case import folders
+
 from dembark.validation.campaigns.report import against, figures, tables
 from dembark.validation.campaigns.report.sweeps import Sweep, numerical_errors, sweeps
+from dembark.validation.case import folders
 from dembark.validation.judge.result import QuantityRecord, Result
 from dembark.validation.report.gather import Page
 
@@ -114,7 +115,8 @@ def test_two_campaigns_differ_where_intervals_say_so() -> None:
 
 
 def test_a_deterministic_quantity_changes_with_its_last_digits() -> None:
-    (row,) = against.differences([content("dry", "yade", quantity("k", 1.0, 0.0))], [content("dry", "yade", quantity("k", 1.0 + 1e-9, 0.0))])
+    (row,) = against.differences([content("dry", "yade", quantity("k", 1.0, 0.0))],
+                                 [content("dry", "yade", quantity("k", 1.0 + 1e-9, 0.0))])
     assert row.state == "changed"
     (row,) = against.differences([content("dry", "yade", quantity("k", 1.0, 0.0, agreement=1e-6))],
                                  [content("dry", "yade", quantity("k", 1.0 + 1e-9, 0.0, agreement=1e-6))])
@@ -128,4 +130,5 @@ def test_axes_of_figures_have_units_and_what_failed_comes_first() -> None:
     assert [found.name for found in one.quantities()] == ["failed", "p"]
     drawn = figures.study_figure(one, one.quantities())
     assert drawn is not None
-    assert [(axes.get_xlabel(), axes.get_ylabel()) for axes in drawn.axes] == [("cylinder radius / m", "dimensionless"), ("cylinder radius / m", "Pa")]
+    assert [(axes.get_xlabel(), axes.get_ylabel()) for axes in drawn.axes] == [("cylinder radius / m", "dimensionless"),
+                                                                               ("cylinder radius / m", "Pa")]

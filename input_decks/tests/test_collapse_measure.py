@@ -1,24 +1,22 @@
-"""Checks of case column_collapse on runs with known energies and a known deposit, right and spoiled."""
+"""What is measured of column_collapse in runs with known energies and a known deposit, right and spoiled."""
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from dembark.postproc import DumpError
-from dembark.validation.checks import collapse, column_collapse
-from dembark.validation.checks.quantity import Quantity
-from dembark.validation.checks.run import Replica
-from dumps import grains_text, write_times
 
-CASE = Path(__file__).resolve().parents[3] / "input_decks/column_collapse/case.toml"
-with CASE.open("rb") as file:
-    TABLES = tomllib.load(file)
-WIDTH, D = 0.04, 0.005
+from dembark.input_decks.tests.measuring import defaults, judged, module
+from dembark.postproc import DumpError
+from dembark.postproc.instruments.collapse import PARTS
+from dembark.postproc.replica import Replica
+from dembark.postproc.tests.dumps import grains_text, write_times
+
+column_collapse = module("column_collapse")
+D = 0.005
 OPENING, ROWS, EVERY = 100, 500, 20
 # Of the potential energy lost in the collapse, 0.01 J.
 SHARES = {"normal_viscous": 0.25, "tangential_viscous": 0.1, "liquid_viscous": 0.15, "capillary": 0.05, "walls": 0.02}
@@ -39,10 +37,10 @@ def rows() -> Rows:
     table["normal_viscous"] = table["normal_viscous"] - 0.05 * rain - 1e-6
     table["step_error"] = -1e-5 * fall
     table["normal_elastic"] = table["step_error"] - table["normal_stored"]
-    others = sum(table[name] for name in ("gravity", "walls", "first_kinetic", *collapse.PARTS) if name != "tangential_elastic")
+    others = sum(table[name] for name in ("gravity", "walls", "first_kinetic", *PARTS) if name != "tangential_elastic")
     table["tangential_elastic"] = table["kinetic_energy"] - others
     table |= {"other": np.zeros(ROWS), "imposed": np.zeros(ROWS), "balance": np.zeros(ROWS), "potential_energy": 0.1 - table["gravity"]}
-    table["scale"] = 1e-6 + sum(np.abs(table[name]) for name in ("gravity", "walls", *collapse.PARTS))
+    table["scale"] = 1e-6 + sum(np.abs(table[name]) for name in ("gravity", "walls", *PARTS))
     table["weight_height"] = table["potential_energy"] + 1e-9 * fall
     return table
 
@@ -59,29 +57,29 @@ def replica(folder: Path, spoil: Callable[[Rows], None] = lambda _: None, *, fir
 
     radii = np.full(128, 0.5 * D)
     (folder / "grains.dump").write_text(grains_text(first, block(8, 16), radii) + grains_text(ROWS * EVERY, block(32, 4), radii))
-    parameters = {key: one.get("value") for key, one in TABLES["parameters"].items()} | {"bridge_volume": 8e-11 if wet else 0.0}
+    parameters = defaults("column_collapse", bridge_volume=8e-11 if wet else 0.0)
     return Replica(folder, {"parameters": parameters, "time_step": 1e-5, "engine": "liggghts"})
 
 
-def found(*replicas: Replica) -> dict[str, Quantity]:
-    quantities, curves, remarks = column_collapse.quantities(replicas)
-    assert remarks and len({curve["name"] for curve in curves}) == len(curves)
-    return {one.name: one for one in quantities}
+def found(*replicas: Replica) -> dict[str, dict[str, Any]]:
+    measured = column_collapse.measure(replicas)
+    assert measured.remarks and len({curve["name"] for curve in measured.profiles}) == len(measured.profiles)
+    return judged("column_collapse", measured)
 
 
 def test_right_energies_pass(tmp_path: Path) -> None:
     measured = found(replica(tmp_path))
-    assert {one.name: one.judged()[0] for one in measured.values() if one.tolerance is not None} == dict.fromkeys(
+    assert {name: one["verdict"] for name, one in measured.items() if one["tolerance"] is not None} == dict.fromkeys(
         ("energy_balance", "potential_error", "dissipation_sign"), "pass")
-    shares = {name.removesuffix("_share"): one.estimate.value for name, one in measured.items() if name.endswith("_share")}
+    shares = {name.removesuffix("_share"): one["value"] for name, one in measured.items() if name.endswith("_share")}
     expected = {name: share for name, share in SHARES.items() if name != "walls"} | {"gate": 0.02, "kinetic": 0.04, "held": 0.03}
     expected["friction"] = 1.0 - sum(expected.values()) - 1e-3
     assert shares == pytest.approx(expected, abs=1e-9)
-    assert measured["step_error"].estimate.value == pytest.approx(1e-3, rel=1e-9)
-    assert measured["height_error"].estimate.value == pytest.approx(1e-9 / (rows()["gravity"][-1] - rows()["gravity"][0]), rel=1e-3)
-    assert measured["aspect_ratio"].estimate.value == pytest.approx(2.0)
-    assert measured["run_out"].estimate.value == pytest.approx(31.5 / 8 - 1.0) and measured["run_out"].reference is None
-    assert measured["final_height"].estimate.value == pytest.approx(0.5)
+    assert measured["step_error"]["value"] == pytest.approx(1e-3, rel=1e-9)
+    assert measured["height_error"]["value"] == pytest.approx(1e-9 / (rows()["gravity"][-1] - rows()["gravity"][0]), rel=1e-3)
+    assert measured["aspect_ratio"]["value"] == pytest.approx(2.0)
+    assert measured["run_out"]["value"] == pytest.approx(31.5 / 8 - 1.0) and measured["run_out"]["reference"] is None
+    assert measured["final_height"]["value"] == pytest.approx(0.5)
 
 
 def spoiled(**changes: Callable[[np.ndarray], np.ndarray]) -> Callable[[Rows], None]:
@@ -108,21 +106,21 @@ def bump(size: float) -> Callable[[np.ndarray], np.ndarray]:
     ("dissipation_sign", spoiled(tangential_viscous=np.negative)),
 ])
 def test_spoiled_energies_fail(tmp_path: Path, name: str, spoil: Callable[[Rows], None]) -> None:
-    assert found(replica(tmp_path, spoil))[name].judged()[0] == "fail"
+    assert found(replica(tmp_path, spoil))[name]["verdict"] == "fail"
 
 
 def test_numbers_that_are_none_fail(tmp_path: Path) -> None:
     for name in ("energy_balance", "potential_error"):
         column = "kinetic_energy" if name == "energy_balance" else "gravity"
-        assert found(replica(tmp_path / name, spoiled(**{column: lambda x: x * np.nan})))[name].judged()[0] == "fail"
+        assert found(replica(tmp_path / name, spoiled(**{column: lambda x: x * np.nan})))[name]["verdict"] == "fail"
 
 
 def test_worst_run_counts_and_three_give_intervals(tmp_path: Path) -> None:
     runs = [replica(tmp_path / str(k), wet=False) for k in range(2)]
     bad = replica(tmp_path / "bad", spoiled(kinetic_energy=lambda x: x + 1e-5), wet=False)
     measured = found(*runs, bad)
-    assert measured["energy_balance"].judged()[0] == "fail" and measured["energy_balance"].estimate.value > 1e-6
-    assert np.isfinite(measured["kinetic_share"].estimate.half) and not np.isfinite(found(*runs)["kinetic_share"].estimate.half)
+    assert measured["energy_balance"]["verdict"] == "fail" and measured["energy_balance"]["value"] > 1e-6
+    assert measured["kinetic_share"]["interval"] and not found(*runs)["kinetic_share"]["interval"]
     assert "capillary_share" not in measured
 
 
@@ -137,6 +135,18 @@ def test_published_laws_where_they_hold() -> None:
     assert column_collapse.height_law(1.0) is None and column_collapse.height_law(32.0) == pytest.approx(4.0)
 
 
+def test_a_high_column_stands_beside_the_experiments_without_a_verdict(tmp_path: Path) -> None:
+    """Half as wide it is four times as high."""
+    one = replica(tmp_path)
+    narrow = Replica(one.folder, {**one.record, "parameters": defaults("column_collapse", bridge_volume=8e-11, column_width=0.02)})
+    measured = found(narrow)
+    assert measured["aspect_ratio"]["value"] == pytest.approx(4.0)
+    assert measured["run_out"]["reference"] == pytest.approx(1.9 * 4.0 ** (2 / 3))
+    assert measured["final_height"]["reference"] == pytest.approx(4.0**0.4)
+    assert {(measured[name]["verdict"], measured[name]["source"]) for name in ("run_out", "final_height")} == {("info", "Lube et al. 2005")}
+    assert "spheres that roll" in measured["run_out"]["reason"]
+
+
 def points(order: float, spread: float) -> list[dict[str, Any]]:
     made = []
     for step in (0.2, 0.05, 0.1):
@@ -146,10 +156,12 @@ def points(order: float, spread: float) -> list[dict[str, Any]]:
     return made
 
 
-@pytest.mark.parametrize(("order", "spread", "verdict"), [(2.0, 0.05, "pass"), (1.0, 0.05, "fail"), (1.7, 0.05, "fail"), (2.0, 0.5, "info")])
+@pytest.mark.parametrize(("order", "spread", "verdict"),
+                         [(2.0, 0.05, "pass"), (1.0, 0.05, "fail"), (1.7, 0.05, "fail"), (2.0, 0.5, "info")])
 def test_order_of_the_step_error(order: float, spread: float, verdict: str) -> None:
-    (found,), (curve,), _ = column_collapse.study("step", points(order, spread), "time_step_fraction")
-    assert found.estimate.value == pytest.approx(order) and found.judged()[0] == verdict
+    measured = column_collapse.study("step", points(order, spread), "time_step_fraction")
+    one, (curve,) = judged("column_collapse", measured)["order_step_error"], measured.profiles
+    assert one["value"] == pytest.approx(order) and one["verdict"] == verdict
     # Two ends of a straight line in logarithms, log 4 apart.
-    assert found.estimate.half == pytest.approx(np.sqrt(2.0) * spread / np.log(4.0))
+    assert one["interval"][1] - order == pytest.approx(np.sqrt(2.0) * spread / np.log(4.0))
     assert curve["place"] == sorted(curve["place"])

@@ -1,9 +1,8 @@
-"""The reference of case liquid_exchange against numbers worked out by hand, and verdicts on books that are right and wrong."""
+"""The rule of liquid_exchange against numbers worked out by hand, and verdicts on books that are right and wrong."""
 
 from __future__ import annotations
 
 import math
-import tomllib
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,26 +10,32 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.validation.checks import liquid_exchange
-from dembark.validation.checks.run import Replica
+from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.physics.exact import liquid_row
+from dembark.physics.exact.liquid_row import Books
+from dembark.postproc.replica import Replica
+from dembark.validation.case.folders import find
 
-CASE = Path(__file__).resolve().parents[3] / "input_decks/liquid_exchange/case.toml"
-with CASE.open("rb") as file:
-    TABLES = tomllib.load(file)
+liquid_exchange = module("liquid_exchange")
+VARIANTS = find("liquid_exchange").variants
 STEPS = list(range(20, 8001, 20))
 COLUMNS = "step,time,kinetic_energy,liquid_grains,liquid_bridges,liquid_walls,liquid_lost,bridge_count"
 
 
 def values(variant: str, **changes: Any) -> dict[str, Any]:
-    return {key: table.get("value") for key, table in TABLES["parameters"].items()} | TABLES["variants"][variant] | changes
+    return defaults("liquid_exchange") | VARIANTS[variant] | changes
+
+
+def by_the_rule(p: dict[str, Any], steps: list[int]) -> Books:
+    return liquid_row.books(*liquid_exchange.case(p), p["time_step"], steps)
 
 
 @cache
-def due(variant: str) -> liquid_exchange.Books:
-    return liquid_exchange.expected(values(variant), STEPS, 1)
+def due(variant: str) -> Books:
+    return by_the_rule(values(variant), STEPS)
 
 
-@pytest.mark.parametrize("variant", TABLES["variants"])
+@pytest.mark.parametrize("variant", VARIANTS)
 def test_reference_keeps_all_liquid_and_is_busy(variant: str) -> None:
     books = due(variant)
     assert np.abs(books.total / books.total[0] - 1.0).max() < 1e-14
@@ -52,7 +57,7 @@ def test_first_bridge_by_hand() -> None:
 def test_what_is_asked_at_once_is_shared() -> None:
     """All overlap in the first step: both wet grains give all they have, halves to each side, and the wall its share."""
     p = values("all_of_it", gap=-0.01, time_step=1e-9)
-    books = liquid_exchange.expected(p, [1], 1)
+    books = by_the_rule(p, [1])
     first, fourth = (p["liquid_content"] * math.pi / 6.0 * (size * p["grain_diameter"]) ** 3 for size in (1.0, 0.8))
     assert books.count[0] == 4.0  # of six; two dry sides make none
     assert books.grains[0].sum() == pytest.approx(0.0, abs=1e-24)
@@ -75,19 +80,16 @@ def replica(folder: Path, variant: str, spoil: str = "") -> Replica:
     return Replica(folder, {"parameters": p, "time_step": p["time_step"], "engine": "liggghts"})
 
 
-@pytest.mark.parametrize("variant", TABLES["variants"])
-def test_right_books_pass(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, variant: str) -> None:
-    run = replica(tmp_path, variant)
-    monkeypatch.setattr(liquid_exchange, "expected", lambda *words: due(variant))
-    found, curves, remarks = liquid_exchange.quantities([run])
-    assert {one.judged()[0] for one in found} == {"pass"}
-    assert len(curves) == 6 and remarks
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_right_books_pass(tmp_path: Path, variant: str) -> None:
+    measured = liquid_exchange.measure([replica(tmp_path, variant)])
+    found = judged("liquid_exchange", measured)
+    assert len(found) == 17 and names(found, "pass") == set(found)
+    assert len(measured.profiles) == 6 and measured.remarks
 
 
-@pytest.mark.parametrize(("spoil", "names"), [("grain", {"liquid_3_error", "total_liquid_error"}), ("lost", {"lost", "total_liquid_error"}),
+@pytest.mark.parametrize(("spoil", "wrong"), [("grain", {"liquid_3_error", "total_liquid_error"}), ("lost", {"lost", "total_liquid_error"}),
                                               ("count", {"bridge_count_error"})])
-def test_wrong_books_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, spoil: str, names: set[str]) -> None:
-    run = replica(tmp_path, "cap", spoil)
-    monkeypatch.setattr(liquid_exchange, "expected", lambda *words: due("cap"))
-    found, _, _ = liquid_exchange.quantities([run])
-    assert {one.name for one in found if one.judged()[0] == "fail"} == names
+def test_wrong_books_fail(tmp_path: Path, spoil: str, wrong: set[str]) -> None:
+    found = judged("liquid_exchange", liquid_exchange.measure([replica(tmp_path, "cap", spoil)]))
+    assert names(found, "fail") == wrong

@@ -1,0 +1,87 @@
+"""Column collapse: the energies that the engine's account booked, row by row, and the deposit.
+
+Balances run over all rows of time.csv, shares over the collapse, from the row in which the gate begins to move.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from dembark.postproc.instruments.collapse import Collapse, deposits, read, shares
+from dembark.postproc.measurement import Measurement, Value
+from dembark.postproc.replica import Replica
+from dembark.postproc.resampling import profile
+from dembark.postproc.statistics import Estimate, exact, over_replicas
+from dembark.postproc.studies import fitted_exponent, measured, propagated
+
+# What takes the energy, with the titles of the curves; liquid does so in wet columns.
+WAYS = {"kinetic": "Kinetic energy", "friction": "Lost by friction", "normal_viscous": "Lost by normal damping",
+        "tangential_viscous": "Lost by tangential damping", "held": "Held by springs", "gate": "Taken by the gate"}
+WET = {"liquid_viscous": "Lost in the viscous liquid", "capillary": "Taken by liquid bridges"}
+
+
+def run_out_law(aspect: float) -> float | None:
+    """(L - W)/W by Lube et al. (2005) for H/W = `aspect`; None between its two branches."""
+    return 1.2 * aspect if aspect < 1.8 else 1.9 * aspect ** (2.0 / 3.0) if aspect > 2.8 else None
+
+
+def height_law(aspect: float) -> float | None:
+    """Final height over W of a high column by Lube et al. (2005); None for a low one."""
+    return aspect**0.4 if aspect > 2.8 else None
+
+
+def measure(replicas: Sequence[Replica]) -> Measurement:
+    """Values, curves and remarks from all replicas of a series."""
+    runs = [read(replica) for replica in replicas]
+    ways = WAYS | (WET if replicas[0].parameters["bridge_volume"] > 0.0 else {})
+
+    def over(number: Callable[[Collapse], float]) -> Estimate:
+        return over_replicas([Estimate(number(one), math.inf, "one run of a chaotic motion says nothing about its spread") for one in runs])
+
+    def share(name: str) -> Value:
+        return Value(over(lambda one: float(one.lost_in(name)[-1])))
+
+    def worst(number: Callable[[Collapse], float]) -> Value:
+        return Value(exact(np.max([number(one) for one in runs])), exact(0.0))  # of numbers that are none: none
+
+    def beside(number: Callable[[Collapse], float], law: float | None) -> Value:
+        other = "experiments with sand, sugar and rice between side walls, not with spheres that roll"
+        return Value(over(number), None if law is None else exact(law), reason="" if law is None else other)
+
+    aspect = over(lambda one: one.height() / one.width)
+    values = {
+        "energy_balance": worst(Collapse.imbalance),
+        "potential_error": worst(Collapse.potential_error),
+        "dissipation_sign": worst(Collapse.given_back),
+        "step_error": Value(over(Collapse.step_error)),
+        "height_error": Value(over(lambda one: one.potential_error("weight_height"))),
+        **{f"{name}_share": share(name) for name in ways},
+        "aspect_ratio": Value(aspect),
+        "run_out": beside(lambda one: one.front() / one.width - 1.0, run_out_law(aspect.value)),
+        "final_height": beside(lambda one: one.height_at_wall() / one.width, height_law(aspect.value)),
+    }
+    fallen, turned = 1e3 * np.mean([(one.fallen, one.rows["scale"][-1]) for one in runs], axis=0)
+    remarks = [f"The collapse loses {fallen:.4g} mJ of potential energy; all works of the run, rain included, make {turned:.4g} mJ."]
+    if len(runs) < 3:
+        remarks.append("Shares and deposit vary from packing to packing; fewer than three tell nothing about by how much.")
+    return Measurement(values, [*shares(runs, {"potential": "Potential energy lost"} | ways), deposits(runs)], remarks)
+
+
+def study(name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
+    """Exponent of the step's energy error, with the interval that those of the errors give it."""
+    del name
+    points = sorted(points, key=lambda point: float(point["parameters"][along]))
+    steps, errors = np.array([point["parameters"][along] for point in points]), [measured(point, "step_error") for point in points]
+    sizes, halves = np.array([one.value for one in errors]), np.array([one.half for one in errors])
+    # On logarithmic axes the slope of a straight line is linear in the errors.
+    order = propagated(lambda logs: fitted_exponent(steps, np.exp(logs)), np.log(sizes), halves / sizes, "the errors")
+    told = ", ".join(f"{error:.2e} at {step:g}" for step, error in zip(steps, sizes, strict=True))
+    return Measurement(
+        {"order_step_error": Value(order, exact(2.0), detail=f"errors {told} of the Rayleigh time")},
+        [profile("step_error", "Energy error of the step", "log₁₀ time step over the Rayleigh time", "log₁₀ error", np.log10(steps),
+                 [np.log10(sizes)], reference=np.log10(sizes[-1] * (steps / steps[-1]) ** 2), reference_label="slope 2")],
+        ["Works balance the kinetic energy to round-off at each of these steps; this is what the step makes of the energy."])

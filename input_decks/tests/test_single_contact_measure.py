@@ -1,0 +1,70 @@
+"""What is measured of single contacts passes for runs by the scheme and fails for runs that are not right."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.physics.exact.contact_law import stepped
+from dembark.postproc.instruments.impacts import Flight
+from dembark.validation.case import deck
+from dembark.validation.case.folders import find
+
+single_contact = module("single_contact")
+
+
+def parameters(variant, **changes):
+    return defaults("single_contact") | find("single_contact").variants[variant] | changes
+
+
+def flown(p):
+    """A run by the scheme that was written down again."""
+    one = single_contact.impacts(p)
+    after = stepped(one, p["time_step"], p["lead_steps"] % 1.0, p["duration"])
+    depth = np.concatenate([np.linspace(-0.2, 1.0, 201), np.linspace(1.0, -0.2, 200)])[:, None] * one.peak_overlap
+    times = np.arange(len(depth)) * p["time_step"]
+    after = replace(after, overlap=one.peak_overlap, force=one.peak_force)
+    return Flight(times, depth, one.force(depth), after, None if p["partner"] == "plane" else 0.0)
+
+
+def verdicts(p, flight):
+    return judged("single_contact", single_contact.measured(p, flight))
+
+
+@pytest.mark.parametrize("variant", ["test_1", "test_3", "test_4", "test_7", "test_8_b"])
+def test_what_the_scheme_does_passes_and_what_is_wrong_is_seen(variant):
+    p = parameters(variant)
+    p |= {"points": min(p["points"], 5), "time_step": 8.0 * p["time_step"]}
+    flight, one = flown(p), single_contact.impacts(p)
+    found = verdicts(p, flight)
+    assert not names(found, "fail"), found
+    assert len(names(found, "pass")) >= 4
+    slow = names(verdicts(p, replace(flight, after=replace(flight.after, normal=0.99 * flight.after.normal))), "fail")
+    assert "scheme_deviation" in slow and any("restitution" in name for name in slow)
+    if variant not in ("test_1", "test_3"):
+        turned = replace(flight, after=replace(flight.after, spin=flight.after.spin + 0.1 * one.closing / one.radius[0]))
+        assert any("spin" in name for name in names(verdicts(p, turned), "fail"))
+
+
+@pytest.mark.parametrize("points", [1, 3])
+def test_a_wrong_force_at_its_overlap_is_seen(points):
+    p = parameters("test_1", points=points)
+    p |= {"time_step": 8.0 * p["time_step"]}
+    flight = flown(p)
+    # That of the first sphere of material B.
+    wrong = replace(flight, forces=flight.forces * np.where(np.arange(2 * points) == points, 1.001, 1.0))
+    assert names(verdicts(p, wrong), "fail") == {"force_law_error_b"}
+
+
+@pytest.mark.parametrize("variant", find("single_contact").variants)
+def test_the_set_up_of_the_decks_is_what_they_are_compared_with(variant):
+    """Start and materials of the bodies follow from the parameters twice: for the decks, and for the reference."""
+    p = parameters(variant)
+    one, bodies = single_contact.impacts(p), deck.prepare(find("single_contact"), p).packing
+    count = 1 if p["partner"] == "plane" else 2
+    due = np.stack([np.zeros((2, len(one))), one.slide, one.normal], axis=2)[:count].reshape(-1, 3)
+    np.testing.assert_allclose(bodies.velocities, due, rtol=1e-12)
+    np.testing.assert_allclose(bodies.spins[:, 0], one.spin[:count].ravel(), rtol=1e-12)
+    np.testing.assert_allclose(0.5 * bodies.diameters, one.radius[:count].ravel(), rtol=1e-12)
+    np.testing.assert_allclose(np.pi / 6.0 * bodies.densities * bodies.diameters**3, one.mass[:count].ravel(), rtol=1e-12)
