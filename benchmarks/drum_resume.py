@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
+from dembark.common.choices import Value
 from dembark.validation import engines
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
-from dembark.validation.case.parameters import Value
 from dembark.validation.case.resolve import portable, resolve, settings
 from dembark.validation.runs.restarts import newest
 

@@ -88,9 +88,9 @@ def run(
     strict: Strict = False,
 ) -> None:
     """Run a case in one engine, measure it and show each quantity beside its reference."""
+    from dembark.common.choices import pick
     from dembark.validation import show
     from dembark.validation.case.folders import find
-    from dembark.validation.case.parameters import pick
     from dembark.validation.case.resolve import resolve, settings
     from dembark.validation.judge import measuring
     from dembark.validation.judge.result import METRICS, Result, from_json

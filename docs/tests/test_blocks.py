@@ -41,7 +41,7 @@ RUNNERS = {
     "py": "validation/campaigns/tests/test_docs.py", "python yade": "test_yade_blocks.py", "YADE fragment": "test_yade_blocks.py",
     "LIGGGHTS fragment": "test_liggghts_blocks.py", "syntax": "test_liggghts_blocks.py", "python grains.bin": "test_liggghts_blocks.py",
     "output": "test_liggghts_blocks.py, test_docs.py", "toml": "test_toml", "shell": "test_shell", "file": "test_shell",
-    "listing": "test_listing",
+    "listing": "test_listing", "picture": "test_architecture.py",
 }
 SHELL_PAGES = list(dict.fromkeys(block.page for block in blocks("shell")))
 

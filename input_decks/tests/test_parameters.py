@@ -8,11 +8,12 @@ from typing import Any
 
 import pytest
 
+from dembark.common.choices import Value
 from dembark.validation import engines
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
 from dembark.validation.case.model import Case
-from dembark.validation.case.parameters import Parameter, Value
+from dembark.validation.case.parameters import Parameter
 from dembark.validation.case.resolve import merged, portable
 
 SCENE = Path(__file__).resolve().parents[2] / "plugins/yade/python/dembark/scene.py"

@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from dembark.common.choices import Value, pick
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
 from dembark.validation.campaigns.spec import CampaignSpec, SweepSpec
-from dembark.validation.case.parameters import Value, checked, pick
+from dembark.validation.case.parameters import checked
 from dembark.validation.case.resolve import merged, resolve
 from dembark.validation.runs.plan import Resources, Series, series
 

@@ -8,13 +8,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from dembark.common.choices import Value, nearest, pick
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
 from dembark.validation.campaigns import sizes
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.folders import discover, files, find
 from dembark.validation.case.model import Case
-from dembark.validation.case.parameters import Value, checked, nearest, pick
+from dembark.validation.case.parameters import checked
 from dembark.validation.case.tables import TableReader, load_toml
 from dembark.validation.runs.plan import RETRIES, Resources
 

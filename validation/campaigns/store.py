@@ -14,9 +14,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json, write_whole
-from dembark.validation.case.parameters import pick
 from dembark.validation.runs import schema
 from dembark.validation.runs.schema import KEYS, TABLES, clear, put
 

@@ -46,10 +46,10 @@ def deck(
                       typer.Option("--set", metavar="KEY=VALUE", help='Change a key: --set "grain_diameter=4 mm".')] = None,
 ) -> None:
     """Write a deck with all its numbers, packing and meshes: a folder that runs with the plain engine command."""
+    from dembark.common.choices import pick
     from dembark.validation import engines
     from dembark.validation.case.deck import write
     from dembark.validation.case.folders import find
-    from dembark.validation.case.parameters import pick
     from dembark.validation.case.resolve import portable, resolve, settings
 
     one = find(case)

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 import jinja2
 import numpy as np
 
+from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
 from dembark.validation.case.folders import package_root
-from dembark.validation.case.parameters import Value
 
 if TYPE_CHECKING:
     from dembark.input_decks.common.setup import Array, Setup

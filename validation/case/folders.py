@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
 from dembark.validation.case.model import Case
-from dembark.validation.case.parameters import pick
 
 # Folders of the user's own cases, as in PATH; `dembark --cases FOLDER` adds to it.
 VARIABLE = "DEMBARK_CASES"

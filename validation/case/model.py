@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from dembark.common.choices import Value
 from dembark.validation import engines
 from dembark.validation.case.expressions import Expression
-from dembark.validation.case.parameters import Parameter, Value
+from dembark.validation.case.parameters import Parameter
 
 STUDY_PREFIX = "study-"
 # What a deck may be asked to write, and the file that it goes to; a case asks for the first three unless it says otherwise.

@@ -2,30 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable
 from dataclasses import dataclass
 
+from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
 from dembark.common.units import finite, to_si
 
-Value = float | int | str | None
 UNSET = "auto"
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """`known are ...` or `did you mean ...?`, for the end of an error line."""
-    names = sorted(known)
-    close = difflib.get_close_matches(name, names, n=3, cutoff=0.55)
-    return f"did you mean {' or '.join(close)}?" if close else f"known are {', '.join(names) or 'none'}"
-
-
-def pick(name: str, known: Iterable[str], what: str, where: str) -> str:
-    """`name` if it is among `known`, else DembarkError naming near matches."""
-    names = list(known)
-    if name not in names:
-        raise DembarkError(f"unknown {what} {name!r}", where, nearest(name, names))
-    return name
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
+from dembark.common.choices import Value, nearest, pick
 from dembark.common.errors import DembarkError
 from dembark.common.units import known_unit
 from dembark.validation import engines
@@ -21,7 +22,7 @@ from dembark.validation.case.model import (
     PlannedRun,
     Study,
 )
-from dembark.validation.case.parameters import Parameter, Value, checked, nearest, pick
+from dembark.validation.case.parameters import Parameter, checked
 from dembark.validation.case.tables import TableReader, load_toml
 
 

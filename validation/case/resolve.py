@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
+from dembark.common.choices import Value, nearest, pick
 from dembark.common.errors import DembarkError
 from dembark.validation.case.model import Case
-from dembark.validation.case.parameters import Value, checked, nearest, pick
+from dembark.validation.case.parameters import checked
 
 UNLIMITED = 1e300
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from dembark.common.choices import nearest
 from dembark.common.errors import DembarkError
-from dembark.validation.case.parameters import nearest
 
 Types = type | tuple[type, ...]
 _WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", list: "a list [...]", dict: "a table {...}"}

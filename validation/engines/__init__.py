@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 
-from dembark.validation.case.parameters import pick
+from dembark.common.choices import pick
 from dembark.validation.engines.base import DeckNumber, Engine, EngineFacts, call, end_with_parent, mpi_launcher
 from dembark.validation.engines.liggghts import Liggghts
 from dembark.validation.engines.yade import Yade

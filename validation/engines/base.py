@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import ClassVar, Self
 
 from dembark.common.checkout import checkout
+from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
-from dembark.validation.case.parameters import Value
 
 # An environment variable for each engine: which program it was that told its version, and the version.
 _TOLD = "DEMBARK_TOLD_BY_"

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import jinja2
 
+from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
-from dembark.validation.case.parameters import Value
 from dembark.validation.engines.base import (
     DECK_NOTE,
     DeckNumber,

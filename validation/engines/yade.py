@@ -6,8 +6,8 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
-from dembark.validation.case.parameters import Value
 from dembark.validation.engines.base import DECK_NOTE, DeckNumber, Engine, EngineFacts, built, is_program, named_program, texts
 
 

@@ -9,13 +9,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from dembark.common.choices import pick
 from dembark.common.errors import DembarkError, RunError
 from dembark.postproc import DumpError
 from dembark.postproc.measurement import Measurement, Value
 from dembark.validation.case import deck
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.model import Case, Declared, Study
-from dembark.validation.case.parameters import pick
 from dembark.validation.judge.quantity import Quantity
 
 if TYPE_CHECKING:

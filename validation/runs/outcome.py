@@ -8,10 +8,10 @@ import signal
 from collections.abc import Sequence
 from pathlib import Path
 
+from dembark.common.choices import Value
 from dembark.common.errors import Killed, RunError
 from dembark.common.files import DISK_FULL, check_impacts, check_times, count_frames
 from dembark.validation.case.model import OUTPUTS
-from dembark.validation.case.parameters import Value
 from dembark.validation.runs.plan import Run
 from dembark.validation.runs.progress import OutputParser
 

@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from dembark.common.choices import Value, pick
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
 from dembark.validation import engines
 from dembark.validation.case.deck import require_measure, sources
 from dembark.validation.case.folders import discover
 from dembark.validation.case.model import Case, Study
-from dembark.validation.case.parameters import Value, pick
 from dembark.validation.case.resolve import for_replica, portable, resolve
 from dembark.validation.engines import Engine
 

@@ -17,12 +17,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from dembark.common.choices import Value
 from dembark.common.errors import Interrupted, Killed, RunError
 from dembark.common.files import DISK_FULL, disk_error, move_into_place, sweep, write_json
 from dembark.common.lock import lock
 from dembark.validation import provenance
 from dembark.validation.case import deck
-from dembark.validation.case.parameters import Value
 from dembark.validation.runs import outcome, restarts
 from dembark.validation.runs.plan import Resources, Run, finished
 from dembark.validation.runs.process import chunks, running

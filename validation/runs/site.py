@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dembark.common.choices import nearest
 from dembark.common.errors import DembarkError
 from dembark.validation.campaigns import sizes
-from dembark.validation.case.parameters import nearest
 from dembark.validation.case.tables import TableReader, load_toml
 
 SHIPPED = Path(__file__).with_name("sites")

@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 from dembark.common.checkout import checkout
+from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
 from dembark.validation import doctor, engines
 from dembark.validation.case import folders
-from dembark.validation.case.parameters import Value
 from dembark.validation.cli import main
 from dembark.validation.engines import DeckNumber, Engine, EngineFacts
 
