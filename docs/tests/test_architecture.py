@@ -8,7 +8,8 @@ import subprocess
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-FOLDERS = {"common": "common", "postproc": "postproc", "input_decks": "input_decks", "validation": "validation", "plugins/python/physics": "physics"}
+FOLDERS = {"common": "common", "postproc": "postproc", "input_decks": "input_decks", "validation": "validation",
+           "plugins/python/physics": "physics"}
 
 
 def package(module: str) -> str:
@@ -33,7 +34,8 @@ def imported(text: str) -> set[str]:
 def actual() -> dict[str, set[str]]:
     """What the packages import, without their tests and the compiled modules."""
     result: dict[str, set[str]] = {}
-    files = subprocess.run(["git", "ls-files", *(f"{folder}/**.py" for folder in FOLDERS)], cwd=ROOT, capture_output=True, text=True, check=True)
+    words = ["git", "ls-files", *(f"{folder}/**.py" for folder in FOLDERS)]
+    files = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
     for line in files.stdout.split():
         folder = next(name for name in FOLDERS if line.startswith(f"{name}/"))
         if "/tests/" in line or line.endswith("yade.py") or not (ROOT / line).is_file():
@@ -58,7 +60,8 @@ def test_packages_import_only_what_the_table_says() -> None:
 def test_the_picture_names_folders_that_exist() -> None:
     page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
     picture = page.split("```picture")[1].split("```")[0]
-    named = {name.replace("/<case>", "").rstrip("/") for name in re.findall(r"\b(?:input_decks|validation|postproc|plugins)[/\w<>]*", picture)}
+    names = re.findall(r"\b(?:input_decks|validation|postproc|plugins)[/\w<>]*", picture)
+    named = {name.replace("/<case>", "").rstrip("/") for name in names}
     assert len(named) > 8
     assert [name for name in sorted(named) if not (ROOT / name).exists() and not name.endswith("measure")] == []
 
