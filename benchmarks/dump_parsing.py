@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import MDAnalysis
 import numpy as np
@@ -173,11 +174,11 @@ def measure(path: Path, expected: float, rounds: int, say: Callable[[str], None]
     return samples
 
 
-def rows(samples: dict[str, list[Sample]], megabytes: float) -> list[dict[str, object]]:
+def rows(samples: dict[str, list[Sample]], megabytes: float) -> list[dict[str, Any]]:
     """One entry a subject: times, how many times faster than the reference in the same round, peak of memory."""
     found = []
     for name, own in samples.items():
-        row: dict[str, object] = {"subject": name, "memory": max(one.memory for one in own)}
+        row: dict[str, Any] = {"subject": name, "memory": max(one.memory for one in own)}
         for clock in ("elapsed", "processor"):
             times = [getattr(one, clock) for one in own]
             row[clock] = spread(times)
@@ -192,7 +193,7 @@ HEADS = ["reader", "elapsed / s", "MB/s", "times as fast", "processor / s", "tim
          f"goal {GOAL:g} x"]
 
 
-def texts(row: dict) -> list[str]:
+def texts(row: dict[str, Any]) -> list[str]:
     """Cells of a row as a reader wants them."""
     def ratio(clock: str) -> str:
         part = row[f"{clock}_ratio"]

@@ -92,13 +92,13 @@ def measure(
     grid = Grid(grains.low, grains.high, (cells,) * 3, (True,) * 3)
     rows = []
     for kernel, width in cases:
-        how = {"kernel": kernel, "width": width * DIAMETER}
+        spread = partial(coarse_grain, kernel=kernel, width=width * DIAMETER)
         for threads in sorted({1, len(os.sched_getaffinity(0))}):
             say(f"{kernel}, {width:g} d, compiled on {threads}")
-            samples = [timed(partial(coarse_grain, grains, contacts, grid, threads=threads, **how)) for _ in range(rounds)]
+            samples = [timed(partial(spread, grains, contacts, grid, threads=threads)) for _ in range(rounds)]
             rows.append(row("native", kernel, width, threads, samples, len(contacts.ids)))
         say(f"{kernel}, {width:g} d, numpy on {len(few_contacts.ids)} contacts")
-        samples = [timed(partial(coarse_grain, few_grains, few_contacts, grid, backend="numpy", **how))]
+        samples = [timed(partial(spread, few_grains, few_contacts, grid, backend="numpy"))]
         rows.append(row("numpy", kernel, width, 1, samples, len(few_contacts.ids)))
     return rows
 

@@ -13,6 +13,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -71,8 +72,9 @@ def own(problem: Problem, clock: Callable[[], float], row: Row, **how: Any) -> L
         if spent > 0.02 or count == 200:
             break
     row.seconds.append(spent / count)
-    row.facts = {"pivots": result.pivots, "block_steps": result.block_steps, "islands": result.islands, "guarded": result.guarded,
-                 "status": result.status, "active": int(result.active.sum()), "certificate": certificate(problem, result.z)}
+    row.facts = {"pivots": result.pivots, "block_steps": result.block_steps, "islands": result.islands,
+                 "used_fallback": result.used_fallback, "status": result.status, "active": int(result.active.sum()),
+                 "certificate": certificate(problem, result.z)}
     return result
 
 
@@ -101,9 +103,9 @@ def beside(case: str, problem: Problem, rounds: int, wall: bool, with_peers: boo
     theirs = {name: Row(case, n, f"Siconos {name}") for name in PEERS}
     say(f"{case}, {n} contacts: {rounds} rounds")
     for turn in range(rounds):
-        tasks: list[Callable[[], Any]] = [lambda name=name: own(problem, clock, mine[name], method=name) for name in mine]
+        tasks: list[Callable[[], object]] = [partial(own, problem, clock, row, method=name) for name, row in mine.items()]
         if with_peers:
-            tasks.append(lambda: peers(problem, theirs, wall))
+            tasks.append(partial(peers, problem, theirs, wall))
         for task in tasks if turn % 2 == 0 else reversed(tasks):
             task()
     return [row.summary() for row in [*mine.values(), *theirs.values()] if row.seconds]
@@ -118,7 +120,7 @@ def cold_networks(sizes: tuple[int, ...], rounds: int, wall: bool, with_peers: b
     """Sparse planar networks from nothing: checks, islands, order, answer; the peers, which store them dense, once, while they can."""
     clock = time.perf_counter if wall else time.process_time
     rows: list[dict[str, Any]] = []
-    going = dict.fromkeys(PEERS if with_peers else ())
+    going: dict[str, dict[str, Any] | None] = dict.fromkeys(PEERS if with_peers else ())
     for n in sizes:
         say(f"sparse network, {n} contacts: {rounds} rounds")
         problem = network(n)
@@ -133,8 +135,9 @@ def cold_networks(sizes: tuple[int, ...], rounds: int, wall: bool, with_peers: b
         if theirs:
             say(f"sparse network, {n} contacts, stored dense: Siconos {', '.join(theirs)}")
             peers(problem, theirs, wall)
-        going = {name: row.summary() for name, row in theirs.items()}
-        rows += going.values()
+        found = {name: row.summary() for name, row in theirs.items()}
+        going = {**found}
+        rows += found.values()
     return rows
 
 
@@ -265,7 +268,7 @@ def measure(out: Path, rounds: int, wall: bool, say: Callable[[str], None], quic
     for n in SIZES[:3] if quick else SIZES:
         rows += beside("coupled", coupled(n), rounds, wall, version is not None, say)
         planar = network(n)
-        rows += beside("network, stored dense", Problem(planar.M.toarray(), planar.q), rounds, wall, version is not None, say)
+        rows += beside("network, stored dense", Problem(planar.dense, planar.q), rounds, wall, version is not None, say)
     rows += cold_networks(NETWORKS[:1] if quick else NETWORKS, rounds, wall, version is not None, say)
     rows += warm(200 if quick else 1000, 10 if quick else 100, wall, say)
     facts["load_after"] = os.getloadavg()[0]

@@ -16,6 +16,11 @@ class Problem:
     M: NDArray[np.float64] | sparse.csc_array
     q: NDArray[np.float64]
 
+    @property
+    def dense(self) -> NDArray[np.float64]:
+        """M with all its zeros."""
+        return np.asarray(self.M if isinstance(self.M, np.ndarray) else self.M.toarray(), float)
+
 
 def coupled(contacts: int, seed: int = 1) -> Problem:
     """A full matrix: every contact feels every other, as where all bodies press on one common body. Half of the contacts close."""

@@ -13,6 +13,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from dembark.common.errors import DembarkError, RunError
 from dembark.validation.engines import Engine
@@ -55,12 +56,12 @@ class Comparison:
                 say(f"{self.title}: round {turn + 1} of {rounds}, {subject.name}")
                 subject.samples.append(subject.take())
 
-    def rows(self) -> list[dict[str, object]]:
+    def rows(self) -> list[dict[str, Any]]:
         """One entry a subject: times, and ratios to the reference's sample of the same round."""
         reference = self.subjects[0].samples
         result = []
         for subject in self.subjects:
-            row: dict[str, object] = {"comparison": self.title, "subject": subject.name, "steps": self.steps}
+            row: dict[str, Any] = {"comparison": self.title, "subject": subject.name, "steps": self.steps}
             for part in ("pair", "loop"):
                 times = [getattr(sample, part) for sample in subject.samples]
                 row[part] = spread(times)

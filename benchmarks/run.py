@@ -7,6 +7,7 @@ import os
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -72,7 +73,7 @@ def yade_comparison(bed: Path, relax: int, steps: int) -> Comparison:
     ], steps, {"Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz": 1.1})
 
 
-def texts(row: dict) -> list[str]:
+def texts(row: dict[str, Any]) -> list[str]:
     """Cells of a row as a reader wants them."""
     def times(part: str) -> str:
         return f"{row[part]['median']:.3f} ({row[part]['min']:.3f}-{row[part]['max']:.3f})"
@@ -84,7 +85,7 @@ def texts(row: dict) -> list[str]:
 HEADS = ["comparison", "models", "pair time / s", "pair ratio", "loop time / s", "loop ratio", "goal (pair)"]
 
 
-def markdown(rows: list[dict], facts: dict) -> str:
+def markdown(rows: list[dict[str, Any]], facts: dict[str, Any]) -> str:
     """The table of all rows and what it was measured with."""
     table = ["| " + " | ".join(HEADS) + " |", "|" + " --- |" * len(HEADS)]
     table += ["| " + " | ".join(texts(row)) + " |" for row in rows]

@@ -96,7 +96,7 @@ def sweep(target: Path) -> None:
 
 
 def count_frames(path: Path, count_key: str) -> int:
-    """Frames in a LAMMPS-format dump whose size line is `ITEM: NUMBER OF <count_key>`; RunError unless every frame is whole."""
+    """Frames in a text dump whose size line is `ITEM: NUMBER OF <count_key>`; RunError unless every frame is whole."""
     if not path.is_file() or path.stat().st_size == 0:
         raise RunError(f"the engine wrote no {path.name}")
     pattern = re.compile(rb"\n\d+\nITEM: NUMBER OF " + count_key.encode() + rb"\n(\d+)\n")

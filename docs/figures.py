@@ -5,8 +5,10 @@ The first error map shows figures/capillary_errors.csv, which capillary_errors.p
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -17,9 +19,12 @@ import capillary_ratio_errors
 import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.colors import BoundaryNorm
+from numpy.typing import NDArray
 
 from dembark.physics import CAPILLARY_MODELS, FinnieRabinowicz, capillary_force, rupture_distance
 from dembark.physics.young_laplace import bridge, rupture_gap
+
+Map = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], str]  # volumes, gaps, percent and title
 
 FOLDER = Path(__file__).with_name("figures")
 STYLE = {"font.size": 8, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False, "lines.linewidth": 1.2,
@@ -96,53 +101,55 @@ def capillary() -> None:
     save(figure, "capillary_force")
 
 
+def maps(name: str, size: float, steps: Sequence[float], label: str, rows: Sequence[Any], angles: Sequence[int],
+         cell: Callable[[Any, int], Map]) -> None:
+    """Maps of `cell(row, angle)`, (volumes, gaps, percent, title), one for each of `rows` and `angles`: grey where percent is NaN. The
+    colours change at `steps` (%) and their opposites; `size` is the height in inches."""
+    bounds = [*(-step for step in reversed(steps)), *steps]
+    norm = BoundaryNorm(bounds, 256, extend="both")
+    figure, axes = plt.subplots(len(rows), len(angles), figsize=(7.2, size), sharex=True, sharey=True)
+    for row, line in zip(rows, axes, strict=True):
+        for angle, axis in zip(angles, line, strict=True):
+            volumes, gaps, percent, title = cell(row, angle)
+            drawn = axis.pcolormesh(volumes, gaps, percent.T, cmap="RdBu_r", norm=norm, shading="nearest")
+            axis.set_facecolor("0.75")
+            axis.set_xscale("log")
+            axis.set_title(title, fontsize=7)
+    for axis in axes[-1]:
+        axis.set_xlabel("V / R³")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("gap / rupture distance")
+    figure.colorbar(drawn, ax=axes, label=label, shrink=0.5, ticks=bounds)
+    save(figure, name)
+
+
 def error_map() -> None:
     """Deviation of each model over volume and gap for three contact angles."""
     columns = capillary_errors.read()
     volumes = np.unique(columns["volume_over_R3"])
     shares = np.unique(columns["gap_over_rupture"][columns["gap_over_rupture"] < 1.0])
-    bounds = [-50, -20, -10, -5, -2, -1, 1, 2, 5, 10, 20, 50]
-    norm = BoundaryNorm(bounds, 256, extend="both")
-    figure, axes = plt.subplots(len(CAPILLARY_MODELS), len(capillary_errors.ANGLES), figsize=(7.2, 9.0), sharex=True, sharey=True)
-    for model, row in zip(CAPILLARY_MODELS, axes, strict=True):
-        for angle, axis in zip(capillary_errors.ANGLES, row, strict=True):
-            chosen = (columns["contact_angle_deg"] == angle) & (columns["gap_over_rupture"] < 1.0)
-            percent = 100.0 * columns[model][chosen].reshape(len(volumes), len(shares))
-            drawn = axis.pcolormesh(volumes, shares, np.where(percent <= -100.0, np.nan, percent).T, cmap="RdBu_r", norm=norm,
-                                    shading="nearest")
-            axis.set_facecolor("0.75")
-            axis.set_xscale("log")
-            worst = np.abs(percent[percent > -100.0]).max()
-            axis.set_title(f"{model}, θ = {angle}°, worst {worst:.{0 if worst > 1.0 else 3}f} %", fontsize=7)
-    for axis in axes[-1]:
-        axis.set_xlabel("V / R³")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("gap / rupture distance")
-    figure.colorbar(drawn, ax=axes, label="model / exact solution − 1 (%); grey: the model's bridge has ruptured", shrink=0.5, ticks=bounds)
-    save(figure, "capillary_errors")
+
+    def cell(model: str, angle: int) -> Map:
+        chosen = (columns["contact_angle_deg"] == angle) & (columns["gap_over_rupture"] < 1.0)
+        percent = 100.0 * columns[model][chosen].reshape(len(volumes), len(shares))
+        worst = np.abs(percent[percent > -100.0]).max()
+        title = f"{model}, θ = {angle}°, worst {worst:.{0 if worst > 1.0 else 3}f} %"
+        return volumes, shares, np.where(percent <= -100.0, np.nan, percent), title
+
+    maps("capillary_errors", 9.0, [1, 2, 5, 10, 20, 50], "model / exact solution − 1 (%); grey: the model's bridge has ruptured",
+         CAPILLARY_MODELS, capillary_errors.ANGLES, cell)
 
 
 def ratio_map() -> None:
     """Error of the effective radius over volume and gap for unequal spheres and walls."""
-    ratios, angles = capillary_ratio_errors.RATIOS, capillary_ratio_errors.ANGLES
-    bounds = [-50, -20, -10, -5, -2, -1, -0.5, 0.5, 1, 2, 5, 10, 20, 50]
-    norm = BoundaryNorm(bounds, 256, extend="both")
-    figure, axes = plt.subplots(len(ratios), len(angles), figsize=(7.2, 7.2), sharex=True, sharey=True)
-    for ratio, row in zip(ratios, axes, strict=True):
-        for angle, axis in zip(angles, row, strict=True):
-            force, end = capillary_ratio_errors.effective_radius_errors(ratio, angle)
-            drawn = axis.pcolormesh(capillary_ratio_errors.VOLUMES, capillary_ratio_errors.SHARES, 100.0 * force.T, cmap="RdBu_r",
-                                    norm=norm,
-                                    shading="nearest")
-            axis.set_xscale("log")
-            name = "wall" if ratio == 0.0 else f"radii 1:{1.0 / ratio:.0f}"
-            axis.set_title(f"{name}, {angle}°, rupture to {100.0 * end[np.argmax(np.abs(end))]:+.0f} %", fontsize=7)
-    for axis in axes[-1]:
-        axis.set_xlabel("V / R³")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("gap / rupture distance")
-    figure.colorbar(drawn, ax=axes, label="equal spheres of R = 2R* / exact − 1 (%)", shrink=0.5, ticks=bounds)
-    save(figure, "capillary_ratio_errors")
+    def cell(ratio: float, angle: int) -> Map:
+        force, end = capillary_ratio_errors.effective_radius_errors(ratio, angle)
+        name = "wall" if ratio == 0.0 else f"radii 1:{1.0 / ratio:.0f}"
+        title = f"{name}, {angle}°, rupture to {100.0 * end[np.argmax(np.abs(end))]:+.0f} %"
+        return capillary_ratio_errors.VOLUMES, capillary_ratio_errors.SHARES, 100.0 * force, title
+
+    maps("capillary_ratio_errors", 7.2, [0.5, 1, 2, 5, 10, 20, 50], "equal spheres of R = 2R* / exact − 1 (%)",
+         capillary_ratio_errors.RATIOS, capillary_ratio_errors.ANGLES, cell)
 
 
 def main() -> None:

@@ -42,7 +42,7 @@ copy() {  # copy FILE TARGET
   changed=$((changed + 1))
 }
 # The models and what they include; the rest of that folder is liggghts-dembark's own way into a finished library.
-for file in "$here"/plugins/liggghts/*_model_*.h "$here"/plugins/liggghts/{bridge_reach,energy_books,model_properties,settings_choice}.h; do
+for file in "$here"/plugins/liggghts/*_model_*.h "$here"/plugins/liggghts/{bridge_reach,contact_data,energy_tally,model_properties,settings_choice}.h "$here"/plugins/liggghts/engine_access.{h,cpp}; do
   copy "$file" "$src/$(basename "$file")"
 done
 # Liquid that grains and walls own.
@@ -61,7 +61,7 @@ done
 eigen=$(pkg-config --cflags eigen3 2>/dev/null || true)
 [ -n "$eigen" ] || { [ -d /usr/include/eigen3/Eigen ] && eigen=-I/usr/include/eigen3; }
 if [ -n "$eigen" ]; then
-  for file in "$here"/plugins/liggghts/fix_lcp_*.h "$here"/plugins/liggghts/fix_lcp_*.cpp; do
+  for file in "$here"/plugins/liggghts/fix_lcp_*.{h,cpp} "$here"/plugins/liggghts/mesh_triangles.h; do
     copy "$file" "$src/$(basename "$file")"
   done
 else

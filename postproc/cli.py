@@ -18,7 +18,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from dembark.common.errors import DembarkError, Interrupted
-from dembark.postproc.dumptext import DumpError
+from dembark.postproc.contacts import ContactColumnsError
+from dembark.postproc.dumps.frames import ColumnsError, DumpError
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False,
                   context_settings={"help_option_names": ["-h", "--help"]})
@@ -43,10 +44,11 @@ def run(words: Sequence[str]) -> int:
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         code = app(args=list(words), prog_name="dembark", standalone_mode=False)
-    except DumpError as error:
+    except ColumnsError as error:
         # The readers name their own parameter; here it is an option.
-        option = "--contact-columns" if "first, second" in str(error) else "--columns"
-        raise DembarkError(str(error).replace("columns=", option)) from None
+        raise DembarkError(error.named("--contact-columns" if isinstance(error, ContactColumnsError) else "--columns")) from None
+    except DumpError as error:
+        raise DembarkError(str(error)) from None
     finally:
         signal.signal(signal.SIGTERM, before)
     if code == Interrupted.exit_code:

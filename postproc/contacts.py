@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.dumps.frames import Array, DumpError, RawFrame, integers, less_edges, numbered, take
+from dembark.postproc.dumps.frames import Array, ColumnsError, RawFrame, integers, less_edges, numbered, take
 from dembark.postproc.dumps.opening import Trajectory, open_dump
 from dembark.postproc.dumps.typed import TypedDump
 
@@ -27,6 +27,10 @@ _LINES: Mapping[str, Column] = {
 }
 # The flag `periodic`, counted from 0: the nearest image says the same.
 _DECK_LEFT_OUT = {8}
+
+
+class ContactColumnsError(ColumnsError):
+    """The same of a dump of contacts, where `columns` says what each column is."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,7 @@ class ContactsDump(TypedDump[ContactFrame]):
         if columns is not None:
             lacking = [name for name in ("first", "forces", "ids") if name not in columns]
             if lacking or ("second" in columns) == ("branch" in columns):
-                raise DumpError(f"{self.path}: columns= must name {', '.join(lacking) or 'either second or branch'}")
+                raise ContactColumnsError(f"{self.path}: columns= must name {', '.join(lacking) or 'either second or branch'}")
 
     def _frame(self, raw: RawFrame) -> ContactFrame:
         where = f"{self.path}, step {raw.step}"
@@ -83,7 +87,7 @@ def _schema(raw: RawFrame, where: str) -> Mapping[str, Column]:
         return _LINES
     if len(raw.columns) != _DECK_COLUMNS:
         advice = "say by columns= which are first, second, ids, forces"
-        raise DumpError(f"{where}: has {len(raw.columns)} columns instead of {_DECK_COLUMNS}; {advice}")
+        raise ContactColumnsError(f"{where}: has {len(raw.columns)} columns instead of {_DECK_COLUMNS}; {advice}")
     return _DECK
 
 
@@ -91,8 +95,8 @@ def _indices(raw: RawFrame, name: str, column: Column, where: str) -> list[int]:
     words = [column] if isinstance(column, int | str) else list(column)
     width = _WIDTHS.get(name, len(words))
     if len(words) != width or not words:
-        raise DumpError(f"{where}: columns= gives {len(words)} columns for {name}, not {width or 1}")
+        raise ContactColumnsError(f"{where}: columns= gives {len(words)} columns for {name}, not {width or 1}")
     outside = [word for word in words if isinstance(word, int) and not 1 <= word <= len(raw.columns)]
     if outside:
-        raise DumpError(f"{where}: columns= gives column {outside[0]} for {name}, but there are columns 1 to {len(raw.columns)}")
+        raise ContactColumnsError(f"{where}: columns= gives column {outside[0]} for {name}, but there are columns 1 to {len(raw.columns)}")
     return [word - 1 if isinstance(word, int) else numbered(raw.columns, [word], where)[0] for word in words]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +15,9 @@ from dembark.postproc.dumps.opening import Trajectory, open_dump
 from dembark.postproc.dumps.typed import TypedDump
 from dembark.postproc.spheres import volume
 
-_VECTORS = {
-    "velocities": ("vx", "vy", "vz"),
-    "omegas": ("omegax", "omegay", "omegaz"),
-    "forces": ("fx", "fy", "fz"),
-}
-_OPTIONAL = {**{name: " ".join(columns) for name, columns in _VECTORS.items()}, "types": "type"}
+Column = TypeVar("Column")
+
+_VECTORS = ("vx", "vy", "vz"), ("omegax", "omegay", "omegaz"), ("fx", "fy", "fz")
 _WRAPPED, _UNWRAPPED, _IMAGES = ("x", "y", "z"), ("xu", "yu", "zu"), ("ix", "iy", "iz")
 _SCALED, _SCALED_UNWRAPPED = ("xs", "ys", "zs"), ("xsu", "ysu", "zsu")
 _WALL = re.compile(r"f_force_(\w+)\[([123])\]")
@@ -29,7 +27,30 @@ class AbsentColumnError(DumpError, AttributeError):
     """A quantity was asked for that the dump does not hold."""
 
 
-@dataclass(frozen=True, repr=False)
+class _Held(Generic[Column]):
+    """A field of GrainFrame that may be None, which asking for it refuses (AbsentColumnError): the dump has no columns of these names."""
+
+    def __init__(self, columns: str) -> None:
+        self._columns = columns
+
+    def __set_name__(self, owner: type[GrainFrame], name: str) -> None:
+        self._name = name
+
+    def __get__(self, frame: GrainFrame | None, owner: type[GrainFrame]) -> Column:
+        if frame is None:
+            # The field has no default.
+            raise AttributeError(self._name)
+        found = frame.__dict__[self._name]
+        if found is None:
+            where = frame.where or f"step {frame.step}"
+            raise AbsentColumnError(f"{where}: {self._name} are not known, the dump has no {self._columns}")
+        return cast("Column", found)
+
+    def __set__(self, frame: GrainFrame, value: Column | None) -> None:
+        frame.__dict__[self._name] = value
+
+
+@dataclass(frozen=True, repr=False, kw_only=True)
 class GrainFrame:
     """All n grains at one step, sorted by id; SI units.
 
@@ -46,50 +67,36 @@ class GrainFrame:
     high: Array
     periodic: NDArray[np.bool_]
     ids: NDArray[np.int64]
-    types: NDArray[np.int64]
     positions: Array
     wrapped: Array
-    velocities: Array
-    omegas: Array
-    forces: Array
     radii: Array
     masses: Array
     wall_forces: Mapping[str, Array]
+    types: _Held[NDArray[np.int64]] = _Held("type")
+    velocities: _Held[Array] = _Held("vx vy vz")
+    omegas: _Held[Array] = _Held("omegax omegay omegaz")
+    forces: _Held[Array] = _Held("fx fy fz")
     tilt: Array = field(default_factory=lambda: np.zeros(3))
     extra: Mapping[str, Array] = field(default_factory=dict)
     where: str = ""
-
-    def __post_init__(self) -> None:
-        for name in _OPTIONAL:
-            if getattr(self, name) is None:
-                object.__delattr__(self, name)
-
-    def __getattr__(self, name: str) -> Array:
-        # Only called for what is not there.
-        if name in _OPTIONAL:
-            raise AbsentColumnError(f"{self.where or f'step {self.step}'}: {name} are not known, the dump has no {_OPTIONAL[name]}")
-        raise AttributeError(name)
 
     def __repr__(self) -> str:
         return f"GrainFrame(step={self.step}, {len(self.ids)} grains)"
 
     def has(self, name: str) -> bool:
         """Whether the dump held `name`: velocities, omegas, forces or types."""
-        return name in self.__dict__
+        return self.__dict__[name] is not None
 
     def select(self, mask: NDArray[np.bool_]) -> GrainFrame:
         """The same frame with only the grains where `mask` (n,) is true."""
-        each = ("ids", "types", "positions", "wrapped", "velocities", "omegas", "forces", "radii", "masses")
-        return GrainFrame(
-            step=self.step,
-            low=self.low,
-            high=self.high,
-            periodic=self.periodic,
+        def of(name: str) -> Any:
+            return self.__dict__[name][mask] if self.has(name) else None
+
+        return replace(
+            self, ids=self.ids[mask], positions=self.positions[mask], wrapped=self.wrapped[mask], radii=self.radii[mask],
+            masses=self.masses[mask], types=of("types"), velocities=of("velocities"), omegas=of("omegas"), forces=of("forces"),
             wall_forces={name: force[mask] for name, force in self.wall_forces.items()},
-            tilt=self.tilt,
             extra={name: values[mask] for name, values in self.extra.items()},
-            where=self.where,
-            **{name: getattr(self, name)[mask] if self.has(name) else None for name in each},
         )
 
 
@@ -127,7 +134,8 @@ def _positions(table: _Table) -> tuple[Array, Array]:
     """Unwrapped positions, and those inside the box."""
     raw = table.raw
     edges = cell(raw.low, raw.high, raw.tilt)
-    wrapped = unwrapped = None
+    wrapped: Array | None = None
+    unwrapped: Array | None = None
     if table.has(_WRAPPED):
         wrapped = table(*_WRAPPED)
     elif table.has(_SCALED):
@@ -136,12 +144,12 @@ def _positions(table: _Table) -> tuple[Array, Array]:
         unwrapped = table(*_UNWRAPPED)
     elif table.has(_SCALED_UNWRAPPED):
         unwrapped = raw.low + table(*_SCALED_UNWRAPPED) @ edges
-    if wrapped is None and unwrapped is None:
-        raise DumpError(f"{table.where}: column x, y, z is missing, and so are xu, xs and xsu; there are {' '.join(raw.columns)}")
-    if unwrapped is None:
-        unwrapped = wrapped + table(*_IMAGES) @ np.where(raw.periodic[:, None], edges, 0.0) if table.has(_IMAGES) else wrapped.copy()
-    elif wrapped is None:
+    if wrapped is None:
+        if unwrapped is None:
+            raise DumpError(f"{table.where}: column x, y, z is missing, and so are xu, xs and xsu; there are {' '.join(raw.columns)}")
         wrapped = raw.low + less_edges(unwrapped - raw.low, raw, np.floor)
+    elif unwrapped is None:
+        unwrapped = wrapped + table(*_IMAGES) @ np.where(raw.periodic[:, None], edges, 0.0) if table.has(_IMAGES) else wrapped.copy()
     table.taken.update(_IMAGES)
     return unwrapped, wrapped
 
@@ -168,25 +176,15 @@ def grain_frame(raw: RawFrame, where: str, density: float | None = None) -> Grai
         radii = table("radius")
     walls = dict.fromkeys(match.group(1) for name in raw.columns if (match := _WALL.fullmatch(name)) and table.has(_wall(match.group(1))))
     positions, wrapped = _positions(table)
-    parts = {
-        "ids": table.ids,
-        "types": table.integers("type") if table.has(["type"]) else None,
-        "radii": radii,
-        "masses": _masses(table, radii, density),
-        "wall_forces": {wall: table(*_wall(wall)) for wall in walls},
-        **{name: table(*columns) if table.has(columns) else None for name, columns in _VECTORS.items()},
-    }
+    masses, wall_forces = _masses(table, radii, density), {wall: table(*_wall(wall)) for wall in walls}
+    types = table.integers("type") if table.has(["type"]) else None
+    velocities, omegas, forces = (table(*names) if table.has(names) else None for names in _VECTORS)
+    # Last: what none of the others has taken.
+    extra = {name: table(name) for name in raw.columns if name not in table.taken}
     return GrainFrame(
-        step=raw.step,
-        low=raw.low,
-        high=raw.high,
-        periodic=raw.periodic,
-        positions=positions,
-        wrapped=wrapped,
-        tilt=raw.tilt,
-        extra={name: table(name) for name in raw.columns if name not in table.taken},
-        where=where,
-        **parts,
+        step=raw.step, low=raw.low, high=raw.high, periodic=raw.periodic, tilt=raw.tilt, ids=table.ids, types=types, positions=positions,
+        wrapped=wrapped, velocities=velocities, omegas=omegas, forces=forces, radii=radii, masses=masses, wall_forces=wall_forces,
+        extra=extra, where=where,
     )
 
 

@@ -67,7 +67,8 @@ def scalar(fields: Labelled, name: str) -> tuple[Array, str, str]:
     if len(part) != values.ndim - 3 or any(letter not in _AXES for letter in part):
         right = {3: base, 4: f"{base}:x or {base}:magnitude", 5: f"{base}:xy"}[values.ndim]
         raise DembarkError(f"{name!r} is no scalar", "", f"write {right}")
-    return values[(..., *(_AXES.index(letter) for letter in part))], unit, label
+    component: tuple[Any, ...] = (..., *(_AXES.index(letter) for letter in part))
+    return values[component], unit, label
 
 
 def _known(fields: Labelled, arrays: Mapping[str, Array], name: str) -> tuple[Array, str]:
@@ -216,7 +217,7 @@ def _mesh_map(figure: Figure, axes: Axes, stress: WallStress, values: Array, lab
     # Seen along the direction in which the mesh is thinnest.
     thinnest = int(np.argmin(np.ptp(patches.vertices, axis=0)))
     right, up = (other for other in range(3) if other != thinnest)
-    paint = PolyCollection(1e3 * patches.vertices[patches.cells][:, :, [right, up]], **_paint(values[patches.owners]))
+    paint = PolyCollection(list(1e3 * patches.vertices[patches.cells][:, :, [right, up]]), **_paint(values[patches.owners]))
     axes.add_collection(paint)
     axes.autoscale_view()
     axes.set(xlabel=f"{_AXES[right]} / mm", ylabel=f"{_AXES[up]} / mm", aspect="equal")

@@ -21,8 +21,8 @@ def draw(folder: Path) -> None:
     style = {"clim": scale, "cmap": view["map"], "nan_color": "#b9bec5", "show_scalar_bar": False}
     for path in sorted(folder.glob("scene-*.npz")):
         data = np.load(path)
-        plotter = pyvista.Plotter(off_screen=True, window_size=window)
-        plotter.set_background("white")
+        plotter = pyvista.Plotter(off_screen=True, window_size=list(window))
+        plotter.background_color = pyvista.Color("white")
         if len(data["radii"]):
             cloud = pyvista.PolyData(data["positions"])
             cloud["diameter"], cloud["value"] = 2.0 * data["radii"], data["values"]
@@ -35,11 +35,11 @@ def draw(folder: Path) -> None:
             surface = pyvista.PolyData(data["corners"].reshape(-1, 3), faces.ravel())
             surface.cell_data["value"] = data["corner_values"]
             plotter.add_mesh(surface, scalars="value", lighting=False, **style)
-        plotter.enable_parallel_projection()
+        plotter.camera.parallel_projection = True
         plotter.camera_position = [tuple(middle + np.array([0.25, -1.0, 0.18]) * 10.0 * size.max()), tuple(middle), (0.0, 0.0, 1.0)]
         plotter.camera.parallel_scale = 0.5 * max(size[2] + 0.18 * size[1], (size[0] + 0.35 * size[1]) * window[1] / window[0]) * 1.06
         plotter.enable_anti_aliasing("ssaa")
-        Image.fromarray(plotter.screenshot(return_img=True)).save(path.with_suffix(".png"))
+        Image.fromarray(np.asarray(plotter.screenshot(return_img=True))).save(path.with_suffix(".png"))
         plotter.close()
 
 

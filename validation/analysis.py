@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TextIO
 
 from dembark.postproc import DumpError, GrainsDump
 from dembark.validation.case.model import Case
@@ -21,19 +20,14 @@ _FEW_FRAMES = 4
 def warnings_kept() -> Iterator[list[str]]:
     """A list that takes the numerical warnings of the block, as remarks with file and line, instead of the screen."""
     found: list[str] = []
-
-    def keep(message: Warning | str, category: type[Warning], filename: str, lineno: int, file: TextIO | None = None,
-             line: str | None = None) -> None:
-        if issubclass(category, RuntimeWarning):
-            found.append(f"numerical warning: {message} ({Path(filename).name}, line {lineno})")
-        else:
-            shown(message, category, filename, lineno, file, line)
-
-    with warnings.catch_warnings():
-        # The filters stay as they are: where a warning is to be an error, it is one.
-        shown = warnings.showwarning
-        warnings.showwarning = keep
+    # The filters stay as they are: where a warning is to be an error, it is one.
+    with warnings.catch_warnings(record=True) as caught:
         yield found
+    for one in caught:
+        if issubclass(one.category, RuntimeWarning):
+            found.append(f"numerical warning: {one.message} ({Path(one.filename).name}, line {one.lineno})")
+        else:
+            warnings.showwarning(one.message, one.category, one.filename, one.lineno)
 
 
 def reasons(folder: Path, error: Exception, case: Case) -> tuple[str, ...]:

@@ -5,20 +5,17 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from dembark.common.errors import DembarkError, RunError
 from dembark.validation import engines
 from dembark.validation.campaigns import cli as campaigns
 from dembark.validation.case import cli as cases
 from dembark.validation.case import folders
-
-if TYPE_CHECKING:
-    from dembark.validation.runs.perform import Outcome
 
 _ABOUT = f"""Granular contact laws and their validation, in {engines.titles("and")}.
 
@@ -36,12 +33,6 @@ _INTERVAL = "Wall time between the states that an interrupted run goes on from: 
 Profile = Annotated[str, typer.Option(help="Size of the runs: quick, standard, full, ...")]
 Strict = Annotated[bool, typer.Option("--strict", help="End with exit code 1 when a check failed.")]
 Results = Annotated[Path, typer.Option(help="Folder of all results; a profile's own are in a folder below it.")]
-
-
-def _console() -> Console:
-    # Piped into a file, a table shall not be squeezed into 80 columns, unless COLUMNS says so.
-    console = Console(highlight=False)
-    return console if console.is_terminal or os.environ.get("COLUMNS", "").isdecimal() else Console(highlight=False, width=200)
 
 
 def _show_version(wanted: bool) -> None:
@@ -93,7 +84,7 @@ def run(
     from dembark.validation.case.folders import find
     from dembark.validation.case.resolve import resolve, settings
     from dembark.validation.judge import measuring
-    from dembark.validation.judge.result import METRICS, Result, from_json
+    from dembark.validation.judge.result import METRICS
     from dembark.validation.judge.tally import tally
     from dembark.validation.runs import restarts
     from dembark.validation.runs.job import cancelled_by_signal
@@ -106,20 +97,22 @@ def run(
     pick(engine, engines.names(), "engine", "in --engine")
     engines.facts(engine).check_ranks(ranks)
     interval = _interval(restart_interval)
-    # Everything the user wrote is checked before an engine is looked for.
+    # Everything that the user wrote is checked before an engine is looked for.
     resolve(one, profile, chosen, changes)
     if out is None and changes:
         raise DembarkError("--out is missing", "with --set the run is not the one of the profile", "name a folder for its results")
-    measuring.check(one)
-    planned = series(one, chosen, profile, engines.find(engine), changes)
+    with ThreadPoolExecutor(1) as beside:
+        # To tell its version an engine starts, which takes as long as the imports of what measures.
+        found = beside.submit(engines.find, engine)
+        measuring.check(one)
+    planned = series(one, chosen, profile, found.result(), changes)
     if restart_interval is not None and not restarts.supported(planned.runs[0]):
         raise DembarkError(f"--restart-interval {restart_interval}", f"{one.deck(engine)} writes no states to go on from",
                            "leave it out; see docs/restarts.md for what a deck needs")
     folder = (out or Path("results") / profile / planned.place).resolve()
     used = Resources(ranks, threads, restart_interval=interval)
-    metrics = perform_series(planned, folder, cancelled_by_signal(), used, jobs, force)
-    console = _console()
-    result = from_json(metrics, Result)
+    result = perform_series(planned, folder, cancelled_by_signal(), used, jobs, force)
+    console = show.console()
     console.print(show.quantity_table(result))
     for line in show.open_lines(result):
         console.print(line, markup=False, soft_wrap=True)
@@ -153,28 +146,11 @@ def validate(
     """Run all cases of a profile in their engines and build the report; finished runs are kept."""
     from dembark.validation.runs import perform
     from dembark.validation.runs.job import cancelled_by_signal
+    from dembark.validation.show import show_outcome
 
     outcome = perform.validate(profile, cancelled_by_signal(), cores, results, tuple(case or ()), tuple(engine or ()))
     show_outcome(outcome, "the validation", "start again: what is finished is kept")
     _strictly(outcome.tally.failed, strict)
-
-
-def show_outcome(outcome: Outcome, what: str, advice: str) -> None:
-    """What a workflow came to, for people; RunError with `advice` when something of it is missing."""
-    console = _console()
-    for line in outcome.unfinished:
-        console.print(f"not finished: {line}", markup=False, style="red", soft_wrap=True)
-    for line in outcome.problems:
-        console.print(f"problem: {line}", markup=False, style="red", soft_wrap=True)
-    console.print(f"{outcome.runs - len(outcome.unfinished)} of {outcome.runs} runs finished; {outcome.tally.sentence}",
-                  style="bold red" if outcome.tally.failed else "bold", soft_wrap=True)
-    for line in outcome.tally.sentences:
-        console.print(f"  {line}", markup=False, soft_wrap=True)
-    if outcome.report:
-        console.print(str(outcome.report), markup=False, soft_wrap=True)
-    if not outcome.complete:
-        count = len(outcome.unfinished) + len(outcome.problems) + (outcome.report is None)
-        raise RunError(f"{what} is incomplete", f"{count} things went wrong (above)", advice)
 
 
 @app.command("report")
@@ -184,6 +160,7 @@ def make_report(
     results: Results = Path("results"),
 ) -> None:
     """Build the report of a profile or a campaign again from the results that are there."""
+    from dembark.validation import show
     from dembark.validation.runs.steps import build_report
 
     folder = directory.resolve() if directory else results.resolve() / profile
@@ -192,11 +169,11 @@ def make_report(
     if not any(folder.glob("*/*/*/metrics.json")):
         raise DembarkError(f"no results in {folder}", "", f"run 'dembark validate --profile {profile}' first, or give --results")
     build_report(folder)
-    _console().print(f"{folder / 'report.html'}\n{folder / 'report.pdf'}", markup=False, soft_wrap=True)
+    show.console().print(f"{folder / 'report.html'}\n{folder / 'report.pdf'}", markup=False, soft_wrap=True)
 
 
-cases.register(app)
-campaigns.register(app)
+app.add_typer(cases.app)
+app.add_typer(campaigns.app)
 
 
 @app.command()
@@ -206,7 +183,7 @@ def doctor() -> None:
     from dembark.validation.doctor import examine
 
     findings = examine()
-    _console().print(show.finding_table(findings))
+    show.console().print(show.finding_table(findings))
     if any(finding.required and not finding.found for finding in findings):
         raise typer.Exit(1)
 
@@ -214,20 +191,19 @@ def doctor() -> None:
 _PASSED_ON = {"ignore_unknown_options": True, "allow_extra_args": True, "help_option_names": []}
 
 
-@app.command(add_help_option=False, context_settings=_PASSED_ON)
-def fields(context: typer.Context) -> None:
-    """Stress, velocity and more on a grid, from dumps of any engine."""
-    from dembark.postproc import cli
+def _on_dumps(name: str) -> Callable[[typer.Context], None]:
+    """The command `name` of dembark.postproc, with the words given to it."""
+    def work(context: typer.Context) -> None:
+        from dembark.postproc import cli
 
-    raise typer.Exit(cli.run(["fields", *context.args]))
+        raise typer.Exit(cli.run([name, *context.args]))
+
+    return work
 
 
-@app.command(add_help_option=False, context_settings=_PASSED_ON)
-def walls(context: typer.Context) -> None:
-    """Stress on walls and inclusions, from dumps of any engine."""
-    from dembark.postproc import cli
-
-    raise typer.Exit(cli.run(["walls", *context.args]))
+for _name, _help in (("fields", "Stress, velocity and more on a grid, from dumps of any engine."),
+                     ("walls", "Stress on walls and inclusions, from dumps of any engine.")):
+    app.command(_name, add_help_option=False, context_settings=_PASSED_ON, help=_help)(_on_dumps(_name))
 
 
 def _start(name: str) -> Callable[[typer.Context], None]:

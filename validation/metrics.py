@@ -1,19 +1,25 @@
-"""From the finished replicas of one case, variant and engine to quantities with intervals and verdicts."""
+"""From the finished replicas of one case, variant and engine, or the variants of a study, to a Result with intervals and verdicts."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from statistics import fmean
+from typing import TYPE_CHECKING, Any
 
 from dembark.common.errors import RunError
-from dembark.common.files import read_json, write_json
+from dembark.common.files import read_json
+from dembark.postproc.measurement import Measurement
 from dembark.postproc.replica import Replica
-from dembark.validation import engines
+from dembark.validation import analysis, engines, provenance
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
-from dembark.validation.case.model import Study
+from dembark.validation.case.model import Case, Study
 from dembark.validation.judge import measuring
+from dembark.validation.judge.result import METRICS, Result, as_json, read
+
+if TYPE_CHECKING:
+    import xarray
 
 
 def replicas(folder: Path) -> list[Replica]:
@@ -24,94 +30,79 @@ def replicas(folder: Path) -> list[Replica]:
 
 def _whole(record: dict[str, Any]) -> dict[str, Any]:
     """The record with what those of earlier versions lack: how the engine counts bodies, and the numbers derived from the parameters."""
-    derived = {} if "derived" in record else deck.derived(find(record["case"]), record["parameters"])
+    derived = {} if "derived" in record else deck.derived(deck.prepare(find(record["case"]), record["parameters"]))
     return {"impact_id_offset": engines.facts(record["engine"]).impact_id_offset, "derived": derived, **record}
 
 
-def measure(run_folder: Path) -> dict[str, Any]:
-    """Measure the replicas in `run_folder`, write its `metrics.json` and return what it holds.
+def measure(folder: Path, wanted: int | None = None) -> Result:
+    """Measure the replicas in `folder`, of which there are to be `wanted`, and write their `fields.nc`.
 
     RunError when there is no finished replica, or one of their files cannot be read: a result is whole or not there.
     """
-    runs = replicas(run_folder)
+    runs = replicas(folder)
     if not runs:
-        raise RunError(f"nothing to measure in {run_folder}", "it has no finished replica-*/run.json")
-    first = runs[0].record
-    case = find(first["case"])
-    found = measuring.measure(case, runs)
-    if found.fields is not None:
-        _write_fields(run_folder, found.fields)
-    known = {**first["parameters"], **first.get("derived", {})}
-    content = {
-        "case": first["case"],
-        "variant": first["variant"],
-        "engine": first["engine"],
-        "profile": first["profile"],
-        "parameters": {key: value for key, value in first["parameters"].items() if key != "seed"},
-        "quantities": [quantity.as_json() for quantity in measuring.quantities(case, found)],
-        "profiles": list(found.profiles),
-        "remarks": [*found.remarks, *measuring.statements(case)],
-        "picture": measuring.picture(case, known),
-        "references": measuring.references(case),
-        "provenance": _provenance(runs),
-    }
-    write_json(run_folder / "metrics.json", content)
-    return content
+        raise RunError(f"nothing to measure in {folder}", "it has no finished replica-*/run.json")
+    first, case = runs[0].record, find(runs[0].record["case"])
+    with analysis.warnings_kept() as warnings:
+        found = measuring.measure(case, runs)
+        if found.fields is not None:
+            _write_fields(folder, found.fields)
+        quantities = measuring.quantities(case, found)
+    parameters = {key: value for key, value in first["parameters"].items() if key != "seed"}
+    if wanted is not None and "replicas" in parameters:
+        # Those of an earlier request for fewer or more are kept, and know its number.
+        parameters["replicas"] = wanted
+    numbers = {int(one.record["replica"]) for one in runs}
+    return Result(
+        case.name, first["variant"], first["engine"], quantities, first["profile"], parameters=parameters, profiles=tuple(found.profiles),
+        remarks=(*_remarks(case, found), *warnings), picture=_picture(case, first),
+        references=measuring.references(case), provenance=_provenance(runs), measured=provenance.measured(),
+        inputs=tuple(one.record["inputs"] for one in runs if "inputs" in one.record),
+        replicas_missing=tuple(number for number in range(1, (wanted or 0) + 1) if number not in numbers))
 
 
-def _write_fields(run_folder: Path, fields: Any) -> None:
+def picture(folder: Path) -> Mapping[str, Any] | None:
+    """How the report shows the replicas in `folder`, see `measuring.picture`."""
+    runs = replicas(folder)
+    return _picture(find(runs[0].record["case"]), runs[0].record) if runs else None
+
+
+def _picture(case: Case, record: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    return measuring.picture(case, {**record["parameters"], **record["derived"]})
+
+
+def _remarks(case: Case, found: Measurement) -> tuple[str, ...]:
+    return *found.remarks, *measuring.statements(case)
+
+
+def _write_fields(folder: Path, fields: xarray.Dataset) -> None:
     # Labelled arrays take a second to import, which commands that measure nothing need not wait for.
     from dembark.postproc.output import labelled
 
-    labelled.write(run_folder / "fields.nc", fields)
+    labelled.write(folder / "fields.nc", fields)
 
 
-def study(planned: Study, folders: Sequence[Path]) -> dict[str, Any]:
-    """A study of one engine from the measured variants in `folders`: content of a `metrics.json`.
+def study(planned: Study, folders: Sequence[Path]) -> Result:
+    """A study of one engine from the measured variants in `folders`.
 
     RunError when one of them has no measurement or the case has no `study` in its measure.py.
     """
-    points = []
-    for folder in folders:
-        content = read_json(folder / "metrics.json")
-        if content is None:
-            raise RunError(f"study {planned.name} is incomplete", f"{folder} has no metrics.json", "every variant of a study is needed")
-        points.append(content)
-    first = points[0]
-    case = find(first["case"])
-    found = measuring.study(case, planned, points)
-    return {
-        "case": first["case"],
-        "variant": planned.folder_name,
-        "engine": first["engine"],
-        "profile": first["profile"],
-        "title": planned.title,
-        "description": planned.description,
-        "parameters": {},
-        "quantities": [quantity.as_json() for quantity in measuring.quantities(case, found)],
-        "profiles": list(found.profiles),
-        "remarks": [*found.remarks, *measuring.statements(case)],
-        "picture": None,
-        "references": measuring.references(case),
-        "provenance": {"variants": list(planned.variants)},
-    }
+    absent = [folder for folder in folders if not (folder / METRICS).is_file()]
+    if absent:
+        raise RunError(f"study {planned.name} is incomplete", f"{absent[0]} has no {METRICS}", "every variant of a study is needed")
+    points = [read(folder / METRICS) for folder in folders]
+    first, case = points[0], find(points[0].case)
+    found = measuring.study(case, planned, [as_json(point) for point in points])
+    return Result(
+        case.name, planned.folder_name, first.engine, measuring.quantities(case, found), first.profile, planned.title, planned.description,
+        profiles=tuple(found.profiles), remarks=_remarks(case, found), references=measuring.references(case),
+        provenance={"variants": list(planned.variants)}, measured=provenance.measured())
 
 
 def _provenance(runs: list[Replica]) -> dict[str, Any]:
-    facts = dict(runs[0].record.get("provenance", {}))
-    wall = [float(one.record["provenance"]["wall_time"]) for one in runs if one.record.get("provenance", {}).get("wall_time")]
-    speed = [
-        float(one.record["provenance"]["particle_steps_per_second"])
-        for one in runs
-        if one.record.get("provenance", {}).get("particle_steps_per_second")
-    ]
-    facts |= {
-        "seeds": [one.record.get("seed") for one in runs],
-        "replicas": len(runs),
-        "wall_time": sum(wall) if wall else None,
-        "particle_steps_per_second": sum(speed) / len(speed) if speed else None,
-        "steps": runs[0].record["steps"],
-        "time_step": runs[0].record["time_step"],
-    }
-    facts.pop("seed", None)
-    return facts
+    """That of the first replica, with what concerns all: seeds, wall time, mean speed."""
+    record, every = runs[0].record, [one.record.get("provenance", {}) for one in runs]
+    wall, speed = ([float(facts[key]) for facts in every if facts.get(key)] for key in ("wall_time", "particle_steps_per_second"))
+    return {**{key: value for key, value in every[0].items() if key != "seed"},
+            "seeds": [one.record.get("seed") for one in runs], "replicas": len(runs), "wall_time": sum(wall) if wall else None,
+            "particle_steps_per_second": fmean(speed) if speed else None, "steps": record["steps"], "time_step": record["time_step"]}

@@ -8,6 +8,7 @@ import re
 import shutil
 import socket
 import subprocess
+from datetime import UTC, datetime
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -31,6 +32,11 @@ def commit() -> dict[str, Any]:
     head = _git(root, "rev-parse", "HEAD") if root else None
     dirty = bool(_git(root, "status", "--porcelain", "--untracked-files=no")) if root and head else None
     return {"commit": head, "dirty": dirty}
+
+
+def measured() -> dict[str, Any]:
+    """When, and by which commit, something is measured; the runs themselves may be older."""
+    return {**commit(), "at": datetime.now(UTC).isoformat(timespec="seconds")}
 
 
 def package_version(name: str) -> str | None:

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from dembark.common.errors import RunError
 from dembark.validation.case.model import Case
 from dembark.validation.doctor import Finding
 from dembark.validation.judge.result import Result
 
+if TYPE_CHECKING:
+    from dembark.validation.runs.perform import Outcome
+
 _SHOWN = {"passed": "[green]pass[/]", "failed": "[bold red]FAIL[/]", "open": "[yellow]open[/]", "information": ""}
+
+
+def console() -> Console:
+    """That of this process; a table that is piped into a file is not squeezed into 80 columns, unless COLUMNS says so."""
+    found = Console(highlight=False)
+    return found if found.is_terminal or os.environ.get("COLUMNS", "").isdecimal() else Console(highlight=False, width=200)
 
 
 def _plain(*columns: str, title: str = "") -> Table:
@@ -93,3 +105,21 @@ def open_lines(result: Result) -> list[str]:
         if one.verdict == "info" and one.reason:
             reasons.setdefault((one.standing, one.reason), []).append(one.title)
     return [f"{standing}: {', '.join(names)}: {reason}" for (standing, reason), names in reasons.items()]
+
+
+def show_outcome(outcome: Outcome, what: str, advice: str) -> None:
+    """What a workflow came to, for people; RunError with `advice` when something of it is missing."""
+    here = console()
+    for line in outcome.unfinished:
+        here.print(f"not finished: {line}", markup=False, style="red", soft_wrap=True)
+    for line in outcome.problems:
+        here.print(f"problem: {line}", markup=False, style="red", soft_wrap=True)
+    here.print(f"{outcome.runs - len(outcome.unfinished)} of {outcome.runs} runs finished; {outcome.tally.sentence}",
+                  style="bold red" if outcome.tally.failed else "bold", soft_wrap=True)
+    for line in outcome.tally.sentences:
+        here.print(f"  {line}", markup=False, soft_wrap=True)
+    if outcome.report:
+        here.print(str(outcome.report), markup=False, soft_wrap=True)
+    if not outcome.complete:
+        count = len(outcome.unfinished) + len(outcome.problems) + (outcome.report is None)
+        raise RunError(f"{what} is incomplete", f"{count} things went wrong (above)", advice)

@@ -147,8 +147,10 @@ def test_resumed_run_says_what_its_page_says(liggghts: engines.Engine, tmp_path:
     whole = {name: (tmp_path / name).read_bytes() for name in ("time.csv", "grains.dump")}
     assert exactly in run(liggghts, text, tmp_path, resuming="1").splitlines()
     assert all((tmp_path / name).read_bytes() == content for name, content in whole.items())
-    run(liggghts, text, tmp_path, ranks=2)
-    assert approximately in run(liggghts, text, tmp_path, resuming="1").splitlines()
+    other = tmp_path / "two"
+    other.mkdir()
+    run(liggghts, text, other, ranks=2)
+    assert approximately in run(liggghts, text, other, resuming="1").splitlines()
 
 
 def test_binary_dump(liggghts: engines.Engine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ import typer
 from blocks import PAGES, ROOT, blocks, commands, logical_lines
 
 from dembark.postproc import cli as postproc
-from dembark.validation import cli
+from dembark.validation import cli, engines
 from dembark.validation.case.folders import discover
 
 TEXTS = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page in PAGES}
@@ -27,7 +27,7 @@ BUILT = ("build/",)
 def code(*folders: str) -> str:
     """The source of these folders, tests left out."""
     files = (path for folder in folders for path in sorted((ROOT / folder).rglob("*")))
-    kinds = {".py", ".h", ".hpp", ".cpp", ".sh", ".txt", ".cmake", ""}
+    kinds = {".py", ".toml", ".h", ".hpp", ".cpp", ".sh", ".txt", ".cmake", ""}
     return "\n".join(path.read_text(encoding="utf-8", errors="replace") for path in files
                      if path.is_file() and path.suffix in kinds and "tests" not in path.parts)
 
@@ -138,6 +138,7 @@ def test_variables_of_the_environment_exist() -> None:
     assert {name for name in named if name not in known} == set()
     # What a user may set is told.
     read = set(re.findall(r"environ(?:\.get\(|\[)\"(DEMBARK_[A-Z_]+)\"", code("validation", "postproc")))
+    read |= {variable for name in engines.names() for variable in engines.facts(name).variables}
     assert read <= named
 
 
@@ -151,11 +152,11 @@ def test_readme_names_every_style() -> None:
     main = (ROOT / "plugins/liggghts/main.cpp").read_text(encoding="utf-8")
     headers = code("plugins/liggghts")
     styles = {f"fix {name}" for name in re.findall(r'fixes\["([\w/]+)"\]', main)}
-    styles |= set(re.findall(r'command_map|CommandTable\(\)\)\)\)\["(\w+)"\]', main))
+    styles |= set(re.findall(r'commands\(\*lammps->input\)\["(\w+)"\]', main))
     styles |= {f"tangential {name}" for name in re.findall(r"^TANGENTIAL_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
     styles |= {f"cohesion {name}" for name in re.findall(r"^COHESION_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
     table = {name for cell in rows(TEXTS["README.md"], "style") for name in re.findall(r"`([^`]+)`", cell)}
-    assert len(styles - {""}) == 7 and table == styles - {""}
+    assert len(styles) == 7 and table == styles
 
 
 def test_readme_and_pages_name_every_class_of_yade() -> None:

@@ -65,10 +65,10 @@ O.run(10, True)
 """
 CASE = '[parameters.grain_count]\nvalue = 10\ntype = "int"\n'
 # What complete scripts print, by the class that they show.
-SAID = {"LogImpact": "impacts: ", "CapillaryLiquid": "all liquid: 1e-09", "EnergyAccount": "balance: True",
+SAID = {"LcpImpact": "impacts: ", "CapillaryLiquid": "all liquid: 1e-09", "EnergyAccount": "balance: True",
         "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz": "bridges: 1"}
 # Headings of the pages of YADE below which a table of attributes or methods stands, and pages about one class.
-CLASSES = {"docs/yade_log_impact.md": "LogImpact", "docs/yade_energy_account.md": "EnergyAccount"}
+CLASSES = {"docs/yade_lcp_impact.md": "LcpImpact", "docs/yade_energy_account.md": "EnergyAccount"}
 # Words in the first column of other tables: of the dict for friction, and of a body's blocked degrees of freedom.
 NO_ATTRIBUTES = {"static", "kinetic", "slip", "strength", "area", "healing", "xyzXYZ", "XYZ", "zXY", "zXYZ"}
 

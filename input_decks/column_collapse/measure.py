@@ -3,8 +3,6 @@
 Balances run over all rows of time.csv, shares over the collapse, from the row in which the gate begins to move.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -12,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from dembark.postproc.instruments.collapse import Collapse, deposits, read, shares
+from dembark.postproc.instruments.growth import Growth, ordered
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.replica import Replica
-from dembark.postproc.resampling import profile
 from dembark.postproc.statistics import Estimate, exact, over_replicas
-from dembark.postproc.studies import fitted_exponent, measured, propagated
 
 # What takes the energy, with the titles of the curves; liquid does so in wet columns.
 WAYS = {"kinetic": "Kinetic energy", "friction": "Lost by friction", "normal_viscous": "Lost by normal damping",
@@ -71,17 +68,12 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
     return Measurement(values, [*shares(runs, {"potential": "Potential energy lost"} | ways), deposits(runs)], remarks)
 
 
-def study(name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
+def study(_name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
     """Exponent of the step's energy error, with the interval that those of the errors give it."""
-    del name
-    points = sorted(points, key=lambda point: float(point["parameters"][along]))
-    steps, errors = np.array([point["parameters"][along] for point in points]), [measured(point, "step_error") for point in points]
-    sizes, halves = np.array([one.value for one in errors]), np.array([one.half for one in errors])
-    # On logarithmic axes the slope of a straight line is linear in the errors.
-    order = propagated(lambda logs: fitted_exponent(steps, np.exp(logs)), np.log(sizes), halves / sizes, "the errors")
-    told = ", ".join(f"{error:.2e} at {step:g}" for step, error in zip(steps, sizes, strict=True))
+    points, steps = ordered(points, along)
+    errors = Growth.of(points, "step_error", steps)
+    told = ", ".join(f"{error:.2e} at {step:g}" for step, error in zip(steps, errors.values, strict=True))
     return Measurement(
-        {"order_step_error": Value(order, exact(2.0), detail=f"errors {told} of the Rayleigh time")},
-        [profile("step_error", "Energy error of the step", "log₁₀ time step over the Rayleigh time", "log₁₀ error", np.log10(steps),
-                 [np.log10(sizes)], reference=np.log10(sizes[-1] * (steps / steps[-1]) ** 2), reference_label="slope 2")],
+        {"order_step_error": Value(errors.exponent, exact(2.0), detail=f"errors {told} of the Rayleigh time")},
+        [errors.convergence("step_error", "Energy error of the step", "time step over the Rayleigh time", 2.0)],
         ["Works balance the kinetic energy to round-off at each of these steps; this is what the step makes of the energy."])

@@ -1,17 +1,14 @@
 """Column collapse: a dilute column between a back wall and a gate, and the steps of its output."""
 
-from __future__ import annotations
-
 import math
-from types import SimpleNamespace
 
 import numpy as np
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Setup, contacts, rectangle, time_step
+from dembark.input_decks.common.setup import Parameters, Setup, contacts, rectangle, time_step
 
 
-def setup(p: SimpleNamespace) -> Setup:
+def setup(p: Parameters) -> Setup:
     """A row of time.csv every `every` steps, a frame every 20 rows; the gate begins to move at a row, which is the first frame."""
     step = time_step(p)
     every = math.ceil(p.collapse_time / step / (20 * (p.frames - 1)))

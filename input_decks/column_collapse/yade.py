@@ -5,17 +5,9 @@ import math
 from yade import dembark
 
 p = dembark.parameters()
-O.dt = p.time_step
 weight = (0, 0, -p.gravity)
-dembark.periodic(axes=[1], room=8 * p.grain_diameter)
-grain, wall = materials = dembark.materials(p)
-dembark.grains(grain, weight)
-
-walls = {
-    "back": dembark.plane(0, 0.0, 1, wall, p.grain_diameter),
-    "base": dembark.plane(2, 0.0, 1, wall, p.grain_diameter),
-    "gate": dembark.plane(0, p.column_width, -1, wall, p.grain_diameter),
-}
+materials, _ = dembark.begin(p, weight, along=[1])
+walls = dembark.planes(p, materials, back=(0, 0.0, 1), base=(2, 0.0, 1), gate=(0, p.column_width, -1))
 
 
 def potentials():
@@ -40,9 +32,5 @@ def step():
     record()
 
 
-O.engines = dembark.engine_loop(
-    p, dembark.contact_loop(p, materials, [Ig2_Box_Sphere_ScGeom()]), bounds=[Bo1_Sphere_Aabb(), Bo1_Box_Aabb()],
-    verlet=0.1 * p.grain_diameter, gravity=weight, account=EnergyAccount(), periodic=True, record="step()")
-
-dembark.announce(p.steps)
+O.engines = dembark.slab_loop(p, materials, weight, account=EnergyAccount(), record="step()")
 dembark.run(p.steps)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
+from types import SimpleNamespace as Parameters
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,9 +37,9 @@ class Packing:
 
     def joined(self, places: Array, diameter: float, density: float, kind: int) -> Packing:
         """With bodies of one `diameter` (m), `density` (kg/m^3) and type `kind` at `places` (n, 3) in m after those of this packing."""
-        more = {"diameters": diameter, "densities": density, "types": kind}
-        return replace(self, positions=np.vstack([self.positions, places]),
-                       **{name: np.append(getattr(self, name), np.full(len(places), value)) for name, value in more.items()})
+        count = len(places)
+        return replace(self, positions=np.vstack([self.positions, places]), diameters=np.append(self.diameters, np.full(count, diameter)),
+                       densities=np.append(self.densities, np.full(count, density)), types=np.append(self.types, np.full(count, kind)))
 
     def text(self) -> str:
         """A LAMMPS data file of atom style granular, with all digits: id type diameter density x y z; id vx vy vz wx wy wz."""
@@ -79,18 +79,18 @@ def cylinder(radius: float, spacing: float, low: float, layers: int) -> Array:
     return np.vstack([np.column_stack((plane, np.full(len(plane), low + spacing * k))) for k in range(layers)])
 
 
-def largest(p: SimpleNamespace) -> float:
+def largest(p: Parameters) -> float:
     """Diameter (m) of the largest grain."""
     return float(p.grain_diameter * (1.0 + p.grain_diameter_spread))
 
 
-def grains(p: SimpleNamespace, sites: Array, box: object, count: int | None = None) -> Packing:
-    """`count` (else p.grain_count) grains on some of the `sites` (n, 3), chosen by the seed, each shifted by up to 0.05 d_max an axis.
+def grains(p: Parameters, sites: Array, box: object) -> Packing:
+    """p.grain_count grains on some of the `sites` (n, 3), chosen by the seed, each shifted by up to 0.05 d_max an axis.
 
     Diameters are uniform within the spread about the mean. Grains do not touch when sites are 1.15 d_max apart.
     DembarkError when there are fewer sites than grains.
     """
-    total, count = len(sites), p.grain_count if count is None else count
+    total, count = len(sites), p.grain_count
     if count > total:
         raise DembarkError(f"{count} grains have no room", f"the dilute column has {total} sites", "take fewer grains or a larger vessel")
     numbers = np.arange(1, total + 1)
@@ -105,13 +105,13 @@ def bodies(box: ArrayLike, positions: ArrayLike, radii: ArrayLike, masses: Array
            velocities: ArrayLike | None = None, spins: ArrayLike | None = None) -> Packing:
     """Bodies of given `masses` (n,) in kg, which need not be spheres: engines read the density of a sphere of that mass. See Packing."""
     size, mass = np.broadcast_arrays(np.asarray(radii, float), np.asarray(masses, float))
-    motion = [None if given is None else np.asarray(given, float) for given in (velocities, spins)]
+    velocity, spin = (None if given is None else np.asarray(given, float) for given in (velocities, spins))
     kinds = np.ones(len(size), np.int64) if types is None else np.asarray(types, np.int64)
     density = mass / (4.0 / 3.0 * np.pi * size**3)
-    return Packing(np.asarray(box, float), np.asarray(positions, float), 2.0 * size, density, kinds, *motion, type_count)
+    return Packing(np.asarray(box, float), np.asarray(positions, float), 2.0 * size, density, kinds, velocity, spin, type_count)
 
 
-def slab(p: SimpleNamespace, width: float, depth: float, margin: float, foot: float, count: int | None = None) -> tuple[Array, float]:
+def slab(p: Parameters, width: float, depth: float, margin: float, foot: float) -> tuple[Array, float]:
     """Sites (n, 3) in m of a dilute column in a slab and its height (m): 0 < x < `width` less `margin` at both walls, period `depth` in y.
 
     Cells are at least 1.15 d_max wide, 1.3 times more than grains, from z = `foot` on. With a shift of up to 0.05 d_max no two grains
@@ -119,7 +119,7 @@ def slab(p: SimpleNamespace, width: float, depth: float, margin: float, foot: fl
     """
     least = 1.15 * largest(p)
     n_x, n_y = int((width - 2.0 * margin) / least), int(depth / least)
-    layers = int(np.ceil(1.3 * (p.grain_count if count is None else count) / (n_x * n_y)))
+    layers = int(np.ceil(1.3 * p.grain_count / (n_x * n_y)))
     cell = ((width - 2.0 * margin) / n_x, depth / n_y, least)
     return lattice((n_x, n_y, layers), cell, (margin, 0.0, foot)), layers * least
 

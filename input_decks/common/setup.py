@@ -1,11 +1,9 @@
 """Derived numbers of a run, made once for every engine: time step, output steps, friction, liquid."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from types import SimpleNamespace
+from types import SimpleNamespace as Parameters
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,14 +30,14 @@ class Setup:
     tables: Mapping[str, tuple[Number, ...]] = field(default_factory=dict)
 
 
-def rayleigh_time(p: SimpleNamespace) -> float:
+def rayleigh_time(p: Parameters) -> float:
     """Rayleigh time (s) of the smallest grain: pi R sqrt(rho / G) / (0.1631 nu + 0.8766)."""
     radius = 0.5 * p.grain_diameter * (1.0 - p.grain_diameter_spread)
     shear_modulus = p.youngs_modulus / (2.0 * (1.0 + p.poisson_ratio))
     return math.pi * radius * math.sqrt(p.grain_density / shear_modulus) / (0.1631 * p.poisson_ratio + 0.8766)
 
 
-def time_step(p: SimpleNamespace) -> float:
+def time_step(p: Parameters) -> float:
     """The fraction `time_step_fraction` of the Rayleigh time (s)."""
     return p.time_step_fraction * rayleigh_time(p)
 
@@ -56,14 +54,14 @@ def strides(duration: float, time_step: float, count: int) -> dict[str, Number]:
     return {"stride": stride, "steps": stride * count}
 
 
-def friction(p: SimpleNamespace) -> dict[str, Number]:
+def friction(p: Parameters) -> dict[str, Number]:
     """Static and kinetic coefficients of grains and walls; `static_friction` and `kinetic_friction` replace all where they are set."""
     grain, wall = (p.grain_friction, p.wall_friction) if p.static_friction is None else (p.static_friction, p.static_friction)
     kinetic = [mu * p.kinetic_friction_ratio if p.kinetic_friction is None else p.kinetic_friction for mu in (grain, wall)]
     return {"grain_static": grain, "wall_static": wall, "grain_kinetic": kinetic[0], "wall_kinetic": kinetic[1]}
 
 
-def liquid(p: SimpleNamespace) -> dict[str, Number]:
+def liquid(p: Parameters) -> dict[str, Number]:
     """Whether there are bridges (`wet`) of liquid that grains carry (`carried`), and `reach` (m), which no bridge of a wall exceeds.
 
     Walls look for grains within the skin only. The bound is generous: rupture is near (1 + angle/2) volume^(1/3) between grains, a
@@ -74,7 +72,7 @@ def liquid(p: SimpleNamespace) -> dict[str, Number]:
     return {"wet": int(volume > 0.0), "carried": int(content > 0.0), "reach": 1.3 * (1.0 + 0.5 * p.contact_angle) * volume ** (1.0 / 3.0)}
 
 
-def contacts(p: SimpleNamespace, skin: float = 0.1) -> dict[str, Number]:
+def contacts(p: Parameters, skin: float = 0.1) -> dict[str, Number]:
     """What the contacts of a deck need: friction, liquid, and the neighbour search's skin: `skin` mean diameters beyond all bridges."""
     wet = liquid(p)
     return {**friction(p), **wet, "skin": skin * p.grain_diameter + wet["reach"]}

@@ -6,20 +6,18 @@ speed) is what is stored plus what is lost; over many revolutions what is stored
 lost; and the mean force of the shell is the weight.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from dembark.postproc.instruments.drum import ANGLES, PLACES, Drum, estimates, fields, read
+from dembark.postproc.instruments.drum import PLACES, Drum, estimates, fields, read
+from dembark.postproc.instruments.growth import Growth, ordered
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.replica import Array, Replica
 from dembark.postproc.resampling import pooled, profile
 from dembark.postproc.statistics import Estimate
-from dembark.postproc.studies import fitted_exponent, measured, propagated
 
 FORCES = np.logspace(1.0, 6.0, 51)  # edges of the histogram of peak forces, N
 CURVES = {"impacts_per_log": ("Impacts per log and revolution", "1"), "peak_force_mean": ("Mean peak force", "kN"),
@@ -59,61 +57,33 @@ def _profiles(drums: Sequence[Drum], limit: float) -> list[dict[str, Any]]:
     forces = FORCES[max(0, hit[0] - 1) : hit[-1] + 3] if len(hit) else FORCES
     turned = (np.arange(20 * drums[0].revolutions) + 0.5) / 20.0
 
-    def of_all(curve: Callable[[Drum], Array]) -> list[Array]:
-        return [curve(drum) for drum in drums]
-
-    def per_log(drum: Drum, number: Array) -> Array:
-        return np.asarray(number / (drum.logs * drum.revolutions))
-
-    def density(drum: Drum) -> Array:
-        return per_log(drum, np.histogram(drum.peak, forces)[0]) / np.diff(np.log10(forces))
-
-    def exceeding(drum: Drum) -> Array:
-        number = np.array([np.count_nonzero(drum.peak > force) for force in forces], float)
-        return np.log10(per_log(drum, np.where(number > 0.0, number, np.nan)))
-
-    def at_angle(drum: Drum, angles: Array) -> Array:
-        return per_log(drum, np.histogram(angles, ANGLES)[0]) * 10.0 / float(np.diff(ANGLES)[0])
-
-    def hardness(drum: Drum) -> Array:
-        inside = np.digitize(drum.angle, ANGLES) - 1
-        chosen = [drum.peak[inside == k] for k in range(len(PLACES))]
-        return np.array([peaks.mean() / 1000.0 if len(peaks) >= 10 else np.nan for peaks in chosen])
-
-    def power(drum: Drum, rows: Array) -> Array:
-        return drum.pieces(rows, 20 * drum.revolutions) / (drum.period / 20.0)
+    def curve(name: str, title: str, along: str, across: str, place: Array, get: Callable[[Drum], Array], **more: Any) -> dict[str, Any]:
+        return profile(name, title, along, across, place, [get(drum) for drum in drums], **more)
 
     note, around, number = f"approach ≥ {limit:g} m/s", "angle past the lowest point (°)", "per log, turn and 10°"
     return [
-        profile("peak_forces", "Peak forces of impacts", "log₁₀ of the peak force (N)", "per log, turn and decade",
-                np.log10(np.sqrt(forces[1:] * forces[:-1])), of_all(density), note=note),
-        profile("peak_forces_exceeded", "Impacts harder than F", "log₁₀ of F (N)", "log₁₀ of number per log, turn", np.log10(forces),
-                of_all(exceeding), note=note),
-        profile("impacts_at_angle", "Where logs meet", around, number, PLACES, of_all(lambda drum: at_angle(drum, drum.angle)),
-                note="all impacts"),
-        profile("shell_impacts_at_angle", "Where logs meet the shell", around, number, PLACES,
-                of_all(lambda drum: at_angle(drum, drum.angle[drum.shell])), note="impacts on the shell"),
-        profile("peak_force_at_angle", "How hard they meet", around, "mean peak force (kN)", PLACES, of_all(hardness)),
-        profile("power", "Power", "revolutions of the window", "power of the drum (W)", turned, of_all(lambda drum: power(drum, drum.work)),
-                reference=np.mean(of_all(lambda drum: power(drum, drum.lost)), axis=0), reference_label="power that is lost"),
+        curve("peak_forces", "Peak forces of impacts", "log₁₀ of the peak force (N)", "per log, turn and decade",
+              np.log10(np.sqrt(forces[1:] * forces[:-1])),
+              lambda one: one.per_log(np.histogram(one.peak, forces)[0]) / np.diff(np.log10(forces)), note=note),
+        curve("peak_forces_exceeded", "Impacts harder than F", "log₁₀ of F (N)", "log₁₀ of number per log, turn", np.log10(forces),
+              lambda one: np.log10(one.exceeding(forces)), note=note),
+        curve("impacts_at_angle", "Where logs meet", around, number, PLACES, lambda one: one.at_angle(one.angle), note="all impacts"),
+        curve("shell_impacts_at_angle", "Where logs meet the shell", around, number, PLACES,
+              lambda one: one.at_angle(one.angle[one.shell]), note="impacts on the shell"),
+        curve("peak_force_at_angle", "How hard they meet", around, "mean peak force (kN)", PLACES, lambda one: 1e-3 * one.peak_at_angle()),
+        curve("power", "Power", "revolutions of the window", "power of the drum (W)", turned, lambda one: one.power(one.work, 20),
+              reference=np.mean([one.power(one.lost, 20) for one in drums], axis=0), reference_label="power that is lost"),
     ]
 
 
-def study(name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
+def study(_name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
     """The studies `filling` and `speed`: curves of impacts, peak forces and power, and the power of `along` that each grows with."""
-    del name
-    points = sorted(points, key=lambda point: point["parameters"][along])
-    place = np.array([point["parameters"][along] for point in points], float)
+    points, place = ordered(points, along)
     label = {"filling": "filling", "drum_speed": "speed of the drum (rad/s)"}.get(along, along.replace("_", " "))
     values, curves = {}, []
     for quantity, (title, unit) in CURVES.items():
-        entries = [measured(point, quantity, 1e-3 if unit[0] == "k" else 1.0) for point in points]
-        middle, halves = (np.array([getattr(one, part) for one in entries]) for part in ("value", "half"))
-        values[f"{quantity}_exponent"] = Value(propagated(lambda y: fitted_exponent(place, y), middle, halves),
-                                               detail=f"slope of a line through {len(points)} points on logarithmic axes")
-        curve = profile(quantity, title, label, title.lower() + ("" if unit == "1" else f" ({unit})"), place, [middle])
-        if np.isfinite(halves).all():
-            curve |= {"low": (middle - halves).tolist(), "high": (middle + halves).tolist(), "band": "95 % interval"}
-        curves.append(curve)
+        grown = Growth.of(points, quantity, place, 1e-3 if unit[0] == "k" else 1.0)
+        values[f"{quantity}_exponent"] = Value(grown.exponent, detail=f"slope of a line through {len(points)} points on logarithmic axes")
+        curves.append(grown.curve(quantity, title, label, title.lower() + ("" if unit == "1" else f" ({unit})")))
     remark = "Every point is a drum of the same size; the logs of each are loaded anew and run in for the same number of revolutions."
     return Measurement(values, curves, [remark])

@@ -1,28 +1,24 @@
 """Debarking drum: its radius, or the number of its logs, output steps, and logs on the lowest places in the drum."""
 
-from __future__ import annotations
-
 import math
-from types import SimpleNamespace
 
 import numpy as np
 
 from dembark.common.errors import DembarkError
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Setup
+from dembark.input_decks.common.setup import Parameters, Setup
 
 # Rows of output in a revolution, each a whole number of steps.
 ROWS = 200
 
 
-def setup(p: SimpleNamespace) -> Setup:
+def setup(p: Parameters) -> Setup:
     """Diameters are the middles of n equal parts of their range: the same set for every seed, so that the filling is met exactly.
 
     Places are a lattice of triangles, a little wider than the thickest log; the seed says which log has which diameter.
     """
     mean, span = 0.5 * (p.log_diameter_min + p.log_diameter_max), p.log_diameter_max - p.log_diameter_min
-    n = p.log_count if p.drum_radius is None else math.floor(4.0 * p.filling * p.drum_radius**2 / (mean**2 + span**2 / 12.0) + 0.5)
-    square = mean**2 + span**2 / 12.0 * (1.0 - 1.0 / n**2)
+    n, square = p.logs, mean**2 + span**2 / 12.0 * (1.0 - 1.0 / p.logs**2)
     radius = 0.5 * math.sqrt(n * square / p.filling) if p.drum_radius is None else p.drum_radius
 
     period = 2.0 * math.pi / p.drum_speed

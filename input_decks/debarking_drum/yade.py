@@ -8,7 +8,7 @@ weight = (0, 0, -p.gravity)
 dembark.logs([O.materials.append(FrictMat(label="wood"))], axis="y")
 drum = O.bodies.append(dembark.drum((0, 0, 0), p.inner_radius, axis="y", omega=p.drum_speed))
 O.engines = dembark.log_loop(
-    LogImpact(stiffness=p.log_stiffness, contactDamping=p.contact_damping, theta=p.theta, friction=p.friction,
+    LcpImpact(stiffness=p.log_stiffness, contactDamping=p.contact_damping, theta=p.theta, friction=p.friction,
               tangentialRatio=p.tangential_ratio, velocityAtStart=True, impactsFile="impacts.txt", label="hits",
               walls=[dict(bodies=[drum], stiffness=p.shell_stiffness, friction=p.shell_friction, name="shell")]),
     "record()", gravity=weight)
@@ -46,5 +46,4 @@ def load_sums() -> None:
     sums[:] = [float.fromhex(word) for word in O.tags["sums"].split()]
 
 
-dembark.announce(p.steps)
 dembark.run(p.steps, saving=save_sums, loaded=load_sums)

@@ -5,13 +5,9 @@ import math
 from yade import dembark
 
 p = dembark.parameters()
-O.dt = p.time_step
 weight = (0, 0, -p.gravity)
-dembark.periodic(axes=[1, 2], room=8 * p.grain_diameter)
-grain, wall = materials = dembark.materials(p)
-dembark.grains(grain)
-
-walls = {"left": dembark.plane(0, 0.0, 1, wall, p.grain_diameter), "right": dembark.plane(0, p.channel_width, -1, wall, p.grain_diameter)}
+materials, _ = dembark.begin(p, along=[1, 2])
+walls = dembark.planes(p, materials, left=(0, 0.0, 1), right=(0, p.channel_width, -1))
 # The period shrinks, and the grains with it, until they fill the channel; there is no gravity yet. Each step multiplies the
 # period by 1 + rate times the step.
 O.cell.velGrad = Matrix3(0, 0, 0, 0, 0, 0, 0, 0, math.expm1(p.squeeze * O.dt) / O.dt)
@@ -44,9 +40,5 @@ def release():
 
 
 # Compressed with friction the grains would jam at a solid fraction at which they flow later; friction comes with gravity.
-O.engines = dembark.engine_loop(
-    p, dembark.contact_loop(p, materials, [Ig2_Box_Sphere_ScGeom()], static=(0, 0), kinetic=(0, 0)),
-    bounds=[Bo1_Sphere_Aabb(), Bo1_Box_Aabb()], verlet=0.3 * p.grain_diameter, gravity=(0, 0, 0), periodic=True, record="step()")
-
-dembark.announce(p.steps)
+O.engines = dembark.slab_loop(p, materials, (0, 0, 0), verlet=0.3, static=(0, 0), kinetic=(0, 0), record="step()")
 dembark.run(p.steps)

@@ -3,8 +3,6 @@
 The reference follows from the parameters alone, so that the set-up of the decks is checked, too.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

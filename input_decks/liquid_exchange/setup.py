@@ -1,19 +1,16 @@
 """Liquid exchange: five grains of different sizes in a row between two walls, their paths, and the liquid that they begin with."""
 
-from __future__ import annotations
-
 import math
-from types import SimpleNamespace
 
 import numpy as np
 
 from dembark.input_decks.common.packing import Packing
-from dembark.input_decks.common.setup import Setup, strides
+from dembark.input_decks.common.setup import Parameters, Setup, strides
 
 DENSITY = 2500.0
 
 
-def setup(p: SimpleNamespace) -> Setup:
+def setup(p: Parameters) -> Setup:
     """Grains begin in the middle of their paths; the left wall is at x = 0, and grains 1 and 4 are wet."""
     output = strides(p.duration, p.time_step, p.rows)
     diameters = p.grain_diameter * np.array([1.0, 0.7, 1.2, 0.8, 1.0])

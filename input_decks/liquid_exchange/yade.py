@@ -63,5 +63,4 @@ O.engines = [
     NewtonIntegrator(damping=0),
 ]
 
-dembark.announce(p.steps)
 dembark.run(p.steps, outputs=("time.csv",))

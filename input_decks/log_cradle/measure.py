@@ -1,7 +1,5 @@
 """Log cradle: the velocities after an impact through a row of logs against the exact motion of the row."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,7 +9,7 @@ import numpy as np
 from dembark.physics.exact.chains import Chain, ChainMotion
 from dembark.postproc.instruments.logs import LogRun, energy_curves, number, over_time, read, solver_values
 from dembark.postproc.measurement import Measurement
-from dembark.postproc.replica import Array, Replica
+from dembark.postproc.replica import Replica
 
 # Curves are drawn of so many logs at most.
 SHOWN = 5
@@ -56,7 +54,7 @@ def measured(run: LogRun) -> Measurement:
 
 
 def _curves(run: LogRun, chain: Chain, motion: ChainMotion) -> list[dict[str, Any]]:
-    n, along, forces, due = len(run.masses), run.velocities[:, :, 0], contact_forces(run) / 1e3, motion.forces / 1e3
+    n, along, forces, due = len(run.masses), run.velocities[:, :, 0], run.neighbour_forces() / 1e3, motion.forces / 1e3
     return [
         *(over_time(f"velocity_{log + 1}", f"Velocity of log {log + 1}", "v (m/s)", run.times, along[:, log], motion.velocities[:, log])
           for log in np.unique(np.linspace(0, n - 1, min(n, SHOWN)).round().astype(int))),
@@ -64,11 +62,3 @@ def _curves(run: LogRun, chain: Chain, motion: ChainMotion) -> list[dict[str, An
           for one in sorted({0, n - 2})),
         *energy_curves(run, 0.5 * (motion.forces**2 / chain.stiffness).sum(axis=1)),
     ]
-
-
-def contact_forces(run: LogRun) -> Array:
-    """Normal forces (frames, n - 1) in N of neighbours."""
-    forces = np.zeros((len(run.touches), len(run.masses) - 1))
-    for frame, touch in enumerate(run.touches):
-        forces[frame, touch.ids.min(axis=1) - 1] = touch.forces
-    return forces

@@ -1,16 +1,12 @@
 """Log cradle: a row of equal logs along x, the first of which moves."""
 
-from __future__ import annotations
-
-from types import SimpleNamespace
-
 import numpy as np
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Setup, strides
+from dembark.input_decks.common.setup import Parameters, Setup, strides
 
 
-def setup(p: SimpleNamespace) -> Setup:
+def setup(p: Parameters) -> Setup:
     """The first log begins at the origin; nothing leaves the box on the way."""
     output = strides(p.duration, p.time_step, p.frames - 1)
     spacing = 2.0 * p.radius + p.gap

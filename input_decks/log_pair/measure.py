@@ -5,8 +5,6 @@ phase of the touch within a step adds is at most (omega tau)^2 / 8 of the speed 
 the scheme's own recursion over all phases); twice that is allowed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,11 +13,10 @@ from typing import Any
 import numpy as np
 
 from dembark.physics.exact.pairs import Pair, PairMotion
+from dembark.postproc.instruments.growth import Growth, ordered
 from dembark.postproc.instruments.logs import LogRun, energy_curves, number, over_time, read, solver_values
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.replica import Array, Replica
-from dembark.postproc.resampling import profile
-from dembark.postproc.studies import fitted_exponent
 
 
 def pair(p: Mapping[str, Any]) -> Pair:
@@ -106,19 +103,16 @@ def _curves(run: LogRun, bodies: Pair, motion: PairMotion) -> list[dict[str, Any
     ]
 
 
-def study(name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
+def study(_name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
     """Orders of convergence: exponents of the errors over the time step, fitted to all points."""
-    del name
-    points = sorted(points, key=lambda point: point["parameters"][along])
-    steps, theta = np.array([point["parameters"][along] for point in points]), points[0]["parameters"]["theta"]
-    order = 1.0 if theta > 0.5 else 2.0
-    values, curves = {}, []
+    points, steps = ordered(points, along)
+    theta = points[0]["parameters"]["theta"]
+    order, values, curves = 1.0 if theta > 0.5 else 2.0, {}, []
     for quantity, label in (("peak_force", "Error of the peak force"), ("velocity_curve_error", "Largest error of the velocity")):
-        errors = np.array([_error(point, quantity) for point in points])
-        told = ", ".join(f"{error:.2e} at {step:.3g} s" for error, step in zip(errors, steps, strict=True))
-        values[f"order_{quantity}"] = number(fitted_exponent(steps, errors), order, detail=f"relative errors {told}")
-        curves.append(profile(f"convergence_{quantity}", label, "log₁₀ τ (s)", "log₁₀ error", np.log10(steps), [np.log10(errors)],
-                              reference=np.log10(errors[0] * (steps / steps[0]) ** order), reference_label=f"slope {order:g}"))
+        errors = Growth(steps, np.array([_error(point, quantity) for point in points]), np.zeros(len(steps)))
+        told = ", ".join(f"{error:.2e} at {step:.3g} s" for error, step in zip(errors.values, steps, strict=True))
+        values[f"order_{quantity}"] = number(errors.exponent.value, order, detail=f"relative errors {told}")
+        curves.append(errors.convergence(f"convergence_{quantity}", label, "τ (s)", order))
     return Measurement(values, curves,
                        [f"θ = {theta:g}. Each impact begins at the end of a step, so that the errors differ by the step alone."])
 

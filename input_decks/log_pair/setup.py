@@ -1,15 +1,12 @@
 """Log pair: two logs, or one before a wall, that touch after the lead time."""
 
-from __future__ import annotations
-
 import math
-from types import SimpleNamespace
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Setup, strides
+from dembark.input_decks.common.setup import Parameters, Setup, strides
 
 
-def setup(p: SimpleNamespace) -> Setup:
+def setup(p: Parameters) -> Setup:
     """Log 2 begins at the origin; a wall stands with its surface there. Nothing leaves the box on the way."""
     output = strides(p.duration, p.time_step, p.frames - 1)
     touch = p.radius_1 + p.radius_2

@@ -6,12 +6,8 @@ p = dembark.parameters()
 O.dt = p.time_step
 first, second = (O.materials.append(FrictMat(label=name)) for name in ("log 1", "log 2"))
 dembark.logs([first, second])
-walls = []
-if p.target == "wall":
-    target = O.bodies.append(utils.wall((0, 0, 0), axis=0, sense=-1, material=second))
-    walls.append(LogWall(bodies=[target], stiffness=p.stiffness_2, name="target"))
-
-impacts = LogImpact(
+walls = [dembark.log_wall((0, 0, 0), 0, -1, second, name="target", stiffness=p.stiffness_2)] if p.target == "wall" else []
+impacts = LcpImpact(
     stiffness={first: p.stiffness_1, second: p.stiffness_2}, damping=p.damping, contactDamping=p.contact_damping, theta=p.theta,
     walls=walls, impactsFile="impacts.txt",
     # The velocities of the packing belong to the time zero, as in LIGGGHTS.
@@ -19,5 +15,4 @@ impacts = LogImpact(
 writer = dembark.LogWriter(impacts)
 O.engines = dembark.log_loop(impacts, "writer.write()", p.stride)
 
-dembark.announce(p.steps)
 dembark.run(p.steps)

@@ -1,57 +1,20 @@
 """Log pile: forces of a stack at rest, its contacts, and the state after the first impacts, in which engines are due to be the same."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dembark.postproc.instruments.logs import LogRun, number, over_time, read, solver_values
+from dembark.postproc.instruments.logs import Loads, LogRun, beginning, impact_values, loads, number, over_time, read, solver_values
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.replica import Array, Replica
 from dembark.postproc.resampling import profile
-from dembark.postproc.statistics import CONFIDENCE, Estimate, block_mean, exact, student
+from dembark.postproc.statistics import block_mean, exact
 
 WALLS = (-1, -2, -3)  # ground, left and right stake
 REST = 0.1  # the share of the run, at its end, in which the stack is at rest
 FIRST = 10  # impacts from the beginning in which two engines have to be the same
-
-
-@dataclass(frozen=True)
-class Stack:
-    """Forces of all frames.
-
-    `walls` (frames, 3, 2): of ground, left and right stake on the logs, along x and y, over the weight of all logs. `net` (frames, n, 2):
-    sum of contacts and weight on each log, in N. `contacts` (frames,): how many carry; `mobilised` (frames,): mean of |T| / N.
-    """
-
-    walls: Array
-    net: Array
-    contacts: Array
-    mobilised: Array
-
-
-def forces(run: LogRun) -> Stack:
-    """Sums of the contact forces of each frame, counted contact by contact."""
-    frames, logs = run.positions.shape[:2]
-    walls, net, gravity = np.zeros((frames, 3, 2)), np.zeros((frames, logs, 2)), run.parameters["gravity"]
-    mobilised = np.full(frames, math.nan)
-    net[:, :, 1] = -run.masses * gravity
-    for frame, touch in enumerate(run.touches):
-        on_first = (touch.normals * touch.forces[:, None] + touch.friction)[:, :2]
-        first, second = touch.ids.T
-        np.add.at(net[frame], first - 1, on_first)
-        pair = second > 0
-        np.add.at(net[frame], second[pair] - 1, -on_first[pair])
-        walls[frame] = [on_first[second == wall].sum(axis=0) for wall in WALLS]
-        if len(touch.forces):
-            mobilised[frame] = float(np.mean(np.linalg.norm(touch.friction, axis=1) / touch.forces))
-    contacts = np.array([len(touch.forces) for touch in run.touches], float)
-    return Stack(walls / float(run.masses.sum() * gravity), net, contacts, mobilised)
 
 
 def measure(replicas: Sequence[Replica]) -> Measurement:
@@ -61,9 +24,9 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
 
 def measured(run: LogRun) -> Measurement:
     """The same from a run that was read."""
-    stack, rest = forces(run), slice(int((1.0 - REST) * len(run.times)), None)
+    stack, rest = loads(run, WALLS), slice(int((1.0 - REST) * len(run.times)), None)
     height = run.positions[:, :, 1] @ run.masses * run.parameters["gravity"]
-    values = {**_at_rest(run, stack, rest), **_energy(run, height), **solver_values(run), **_beginning(run), **_impacts(run)}
+    values = {**_at_rest(run, stack, rest), **_energy(run, height), **solver_values(run), **_beginning(run), **impact_values(run)}
     remarks = [
         f"Measured at rest: the last {REST:.0%} of the run, {run.times[rest][-1] - run.times[rest][0]:.2f} s.",
         ("All engines are due to be the same to round-off, which grows at each impact; a bound is set to the state after the "
@@ -74,11 +37,12 @@ def measured(run: LogRun) -> Measurement:
     return Measurement(values, _curves(run, stack), remarks)
 
 
-def _at_rest(run: LogRun, stack: Stack, rest: slice) -> dict[str, Value]:
+def _at_rest(run: LogRun, stack: Loads, rest: slice) -> dict[str, Value]:
     """Forces on ground, stakes and each log, and the number of contacts: at least as many unknowns as equations."""
-    p, walls, logs = run.parameters, stack.walls[rest], run.positions.shape[1]
+    p, weights, logs = run.parameters, run.masses * run.parameters["gravity"], len(run.masses)
+    walls, down = stack.walls[rest] / weights.sum(), np.stack([0.0 * weights, weights], axis=1)
     speed = math.sqrt(float((run.velocities[rest] ** 2).sum(axis=2).mean()) / (p["gravity"] * 2.0 * p["radius"]))
-    net = np.linalg.norm(stack.net[rest].mean(axis=0), axis=1) / (run.masses * p["gravity"])
+    net = np.linalg.norm(stack.net[rest].mean(axis=0) - down, axis=1) / weights
     rough, per_log, one = p["friction"] > 0.0, block_mean(stack.contacts[rest] / logs), exact(1.0)
     least = 1.5 if rough else 2.0
     told = "3/2: three equations a log, two unknowns a contact" if rough else "2: two equations a log, one unknown a contact"
@@ -107,20 +71,11 @@ def _energy(run: LogRun, height: Array) -> dict[str, Value]:
     }
 
 
-def beginning(run: LogRun) -> tuple[int, NDArray[np.int64], Array]:
-    """(frame, logs, impacts): the last frame before impact FIRST + 1 begins, the logs of the first FIRST impacts, and these by time."""
-    order = run.impacts[np.lexsort((run.impacts[:, 1], run.impacts[:, 0], run.impacts[:, 2]))]
-    until = order[FIRST, 2] if len(order) > FIRST else run.times[-1] + 0.5 * run.time_step
-    frame = int(np.flatnonzero(run.times < until - 0.5 * run.time_step)[-1])
-    ids = np.unique(order[:FIRST, :2].astype(np.int64))
-    return frame, ids[ids > 0] - 1, order[:FIRST]
-
-
 def _beginning(run: LogRun) -> dict[str, Value]:
     """The state after the first impacts; what two engines may differ by is a share of the value, for velocities of the speed."""
     if not len(run.impacts):
         return {}
-    frame, logs, first = beginning(run)
+    frame, logs, first = beginning(run, FIRST)
 
     def rms(vectors: Array) -> float:
         return math.sqrt(float((vectors**2).sum(axis=1).mean()))
@@ -135,25 +90,9 @@ def _beginning(run: LogRun) -> dict[str, Value]:
         "first_sideways": number(sideways, scale=max(abs(sideways), speed), detail=told)}
 
 
-def _impacts(run: LogRun) -> dict[str, Value]:
-    """Numbers over all impacts, with the intervals of as many independent ones."""
-    count, z = len(run.impacts), student(1e9, CONFIDENCE)
-    if count < 2:
-        return {}
-    basis, peak, impulse = f"{count} impacts as independent ones", np.log(run.impacts[:, 4]), np.sort(run.impacts[:, 5])
-    middle, mean, reach = float(np.median(impulse)), float(np.exp(peak.mean())), 0.5 * z * math.sqrt(count)
-    # The interval of a median is that of its order statistics.
-    low, high = impulse[max(0, math.floor(0.5 * count - reach))], impulse[min(count - 1, math.ceil(0.5 * count + reach))]
-    return {
-        "impact_count": Value(Estimate(float(count), z * math.sqrt(count), "counting statistics")),
-        "impact_peak": Value(Estimate(mean, float(mean * z * peak.std() / math.sqrt(count)), basis)),
-        "impact_impulse": Value(Estimate(middle, float(max(high - middle, middle - low)), basis)),
-    }
-
-
-def _curves(run: LogRun, stack: Stack) -> list[dict[str, Any]]:
-    times, p, lift, last = run.times, run.parameters, stack.walls[:, :, 1].sum(axis=1), slice(-100, None)
-    energy = run.masses.sum() * p["gravity"] * p["radius"]
+def _curves(run: LogRun, stack: Loads) -> list[dict[str, Any]]:
+    times, p, weight, last = run.times, run.parameters, run.masses.sum() * run.parameters["gravity"], slice(-100, None)
+    lift, energy = stack.walls[:, :, 1].sum(axis=1) / weight, weight * p["radius"]
     peaks = np.log10(np.maximum(run.impacts[:, 4], 1e-300)) if len(run.impacts) else np.zeros(1)
     counts, edges = np.histogram(peaks, bins=np.arange(math.floor(peaks.min()), math.ceil(peaks.max()) + 0.125, 0.125))
     kinetic = np.log10(np.maximum(run.history["kinetic_energy"] / energy, 1e-12))

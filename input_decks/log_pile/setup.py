@@ -1,17 +1,14 @@
 """Log pile: rows of logs of unequal diameters above the ground, between two stakes."""
 
-from __future__ import annotations
-
 import math
-from types import SimpleNamespace
 
 import numpy as np
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Setup, strides
+from dembark.input_decks.common.setup import Parameters, Setup, strides
 
 
-def setup(p: SimpleNamespace) -> Setup:
+def setup(p: Parameters) -> Setup:
     """Places with a log each, none touching: 0.2 of the largest radius between two, of which the shift takes a half."""
     output = strides(p.duration, p.time_step, p.frames - 1)
     largest = p.radius * (1.0 + p.radius_spread)

@@ -4,8 +4,6 @@ The walls have the area 2 dz for each W dz of the slab, a cylinder's 2 pi R dz f
 R's place, lambda = W / (2 K mu_mob). K is the mean normal stress of both walls over the mean sigma_zz of the cross-section W x period.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,15 +1,12 @@
 """Plane silo: a dilute column above the floor between two walls, and the steps of its output."""
 
-from __future__ import annotations
-
 import math
-from types import SimpleNamespace
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Setup, contacts, time_step, window
+from dembark.input_decks.common.setup import Parameters, Setup, contacts, time_step, window
 
 
-def setup(p: SimpleNamespace) -> Setup:
+def setup(p: Parameters) -> Setup:
     """Settling, then the measuring window; walls and floor are 0.15 d_max from the cells of the column."""
     step = time_step(p)
     steps = window(math.ceil(p.settle_time / step), math.ceil(p.measure_time / step / p.frames), p.frames)

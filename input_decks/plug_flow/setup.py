@@ -1,17 +1,14 @@
 """Plug flow: a dilute column above a plate between two walls, which may have grains glued to them, and the steps of its output."""
 
-from __future__ import annotations
-
 import math
-from types import SimpleNamespace
 
 import numpy as np
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Setup, contacts, rectangle, time_step, window
+from dembark.input_decks.common.setup import Parameters, Setup, contacts, rectangle, time_step, window
 
 
-def setup(p: SimpleNamespace) -> Setup:
+def setup(p: Parameters) -> Setup:
     """Settling, the plate's run-in and the measuring window. Box and glued grains reach as far down as the plate sinks."""
     step = time_step(p)
     settle_steps = math.ceil(p.settle_time / step)
@@ -32,7 +29,7 @@ def setup(p: SimpleNamespace) -> Setup:
     return Setup(steps["steps"], step, bodies, {**steps, **contacts(p), "settle_steps": settle_steps}, {"plate": plate})
 
 
-def glued(p: SimpleNamespace, low: float, high: float) -> packing.Array:
+def glued(p: Parameters, low: float, high: float) -> packing.Array:
     """Places (n, 3) in m of the walls' grains, left and right in turn: 1.1 d apart in the wall's plane, up to d/10 off it."""
     columns, rise = int(p.channel_depth / (1.1 * p.grain_diameter)), 1.1 * p.grain_diameter
     first = math.ceil(low / rise - 0.5)

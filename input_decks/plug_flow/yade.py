@@ -5,17 +5,10 @@ from yade import dembark
 p = dembark.parameters()
 # Bodies with a common bit may touch: grains all others, walls and glued grains not each other.
 GRAINS, WALLS, GLUED = 3, 1, 2
-O.dt = p.time_step
 weight = (0, 0, -p.gravity)
-dembark.periodic(axes=[1], room=8 * p.grain_diameter)
-grain, wall = materials = dembark.materials(p)
-glue = dembark.grains(grain, weight, mask=GRAINS, held=(wall, GLUED)).get(2, [])
-
-walls = {
-    "left": dembark.plane(0, 0.0, 1, wall, p.grain_diameter, WALLS),
-    "right": dembark.plane(0, p.channel_width, -1, wall, p.grain_diameter, WALLS),
-    "base": dembark.plane(2, 0.0, 1, wall, p.grain_diameter, WALLS),
-}
+materials, ids = dembark.begin(p, weight, along=[1], mask=GRAINS, held=GLUED)
+walls = dembark.planes(p, materials, WALLS, left=(0, 0.0, 1), right=(0, p.channel_width, -1), base=(2, 0.0, 1))
+glue = ids.get(2, [])
 liquid = CapillaryLiquid(content=p.liquid_content) if p.carried else None
 record = dembark.Recorder(p, walls, boundary="ff pp ff", gravity=weight, glued={"left": glue[::2], "right": glue[1::2]}, liquid=liquid)
 
@@ -27,9 +20,5 @@ def step():
     record()
 
 
-O.engines = dembark.engine_loop(
-    p, dembark.contact_loop(p, materials, [Ig2_Box_Sphere_ScGeom()]), bounds=[Bo1_Sphere_Aabb(), Bo1_Box_Aabb()],
-    verlet=0.1 * p.grain_diameter, gravity=weight, liquid=liquid, periodic=True, record="step()")
-
-dembark.announce(p.steps)
+O.engines = dembark.slab_loop(p, materials, weight, liquid=liquid, record="step()")
 dembark.run(p.steps)

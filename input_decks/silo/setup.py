@@ -1,15 +1,12 @@
 """Silo: a dilute column above the floor of a cylinder, and the steps of its output."""
 
-from __future__ import annotations
-
 import math
-from types import SimpleNamespace
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Setup, contacts, time_step, window
+from dembark.input_decks.common.setup import Parameters, Setup, contacts, time_step, window
 
 
-def setup(p: SimpleNamespace) -> Setup:
+def setup(p: Parameters) -> Setup:
     """Sites of a cubic lattice, 1.3 times more than grains; no grain touches another or a wall, even when it is shifted.
 
     Neighbours are 0.15 d_max apart, and so are walls, which is beyond the reach of the neighbour search: no engine starts with a candidate

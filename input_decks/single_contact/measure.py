@@ -5,8 +5,6 @@ Each engine is held against three things: the same scheme written down again, fr
 theories of another contact (rigid bodies that slide throughout; partial slip after Mindlin and Deresiewicz).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,17 +1,14 @@
 """Single contact: spheres of two materials side by side, each before a partner of its own, and the materials by type."""
 
-from __future__ import annotations
-
 import math
-from types import SimpleNamespace
 
 import numpy as np
 
 from dembark.input_decks.common.packing import Packing
-from dembark.input_decks.common.setup import Setup, strides
+from dembark.input_decks.common.setup import Parameters, Setup, strides
 
 
-def setup(p: SimpleNamespace) -> Setup:
+def setup(p: Parameters) -> Setup:
     """Bodies 1 ... points are of material A, then those of B, then the partners in the same order; the point of touch is the origin of z.
 
     Types: A, one for each restitution coefficient; B likewise; the partners of A; those of B. Nothing leaves the box on the way.

@@ -35,5 +35,4 @@ O.engines = [
     NewtonIntegrator(damping=0),
 ]
 
-dembark.announce(p.steps)
 dembark.run(p.steps)

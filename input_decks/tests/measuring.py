@@ -8,9 +8,12 @@ from types import ModuleType
 from typing import Any
 
 from dembark.postproc.measurement import Measurement
+from dembark.validation import metrics
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
+from dembark.validation.judge import compare as judge
 from dembark.validation.judge import measuring
+from dembark.validation.judge.result import COMPARISON, METRICS, QuantityRecord, as_json, from_json, write
 
 
 def module(case: str) -> ModuleType:
@@ -25,7 +28,23 @@ def defaults(case: str, **changes: Any) -> dict[str, Any]:
 
 def judged(case: str, found: Measurement) -> dict[str, dict[str, Any]]:
     """The measured quantities with their verdicts, by name."""
-    return {one.name: one.as_json() for one in measuring.quantities(find(case), found)}
+    return {one.name: as_json(one) for one in measuring.quantities(find(case), found)}
+
+
+def measure(folder: Path) -> dict[str, Any]:
+    """Content of the `metrics.json` of the runs in `folder`, which is written."""
+    return as_json(write(folder / METRICS, metrics.measure(folder)))
+
+
+def compare(folder: Path) -> dict[str, Any]:
+    """Content of the `comparison.json` of a case and variant, which is written."""
+    return as_json(write(folder / COMPARISON, judge.compare(folder)))
+
+
+def pair(*entries: Mapping[str, Any], engines: tuple[str, str] = ("liggghts", "yade")) -> dict[str, Any]:
+    """One quantity of two engines from entries of their `metrics.json`, compared."""
+    one, other = (from_json(entry, QuantityRecord) for entry in entries)
+    return as_json(judge.pair(one, other, *engines))
 
 
 def names(found: Mapping[str, Mapping[str, Any]], verdict: str) -> set[str]:

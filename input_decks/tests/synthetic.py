@@ -9,39 +9,49 @@ from typing import Any
 import numpy as np
 
 from dembark.physics import capillary_force
-from dembark.postproc.tests.dumps import contacts_text, grains_text, write_times
+from dembark.postproc.tests.dumps import BOX, contacts_text, grains_text, write_times
 
 GRAVITY, DIAMETER, DENSITY = 9.81, 0.005, 2500.0
 FRAMES = 40
+# From a grain to its neighbour across the channel.
+BESIDE = np.array([DIAMETER, 0.0, 0.0])
 
 
-def finish(
-    folder: Path, engine: str, replica: int, case: str, variant: str, parameters: dict[str, Any], grains: list[str], contacts: list[str]
-) -> None:
-    (folder / "grains.dump").write_text("".join(grains))
-    (folder / "contacts.dump").write_text("".join(contacts))
-    provenance = {"commit": "0" * 40, "dirty": False, "versions": {"python": "3.11"}, "flags": {}, "wall_time": 10.0,
-                  "particle_steps_per_second": 1e6}
-    friction = parameters["wall_friction"]
-    record = {"case": case, "variant": variant, "profile": "quick", "engine": engine, "replica": replica, "seed": replica,
-              "parameters": {**parameters, "seed": replica}, "derived": {"wall_static": friction, "wall_kinetic": friction}, "steps": 10000,
-              "time_step": 1e-5, "frames": len(grains), "inputs": "", "provenance": provenance}
-    (folder / "run.json").write_text(json.dumps(record))
+class Written:
+    """The folder of a replica as it is written: frames of the dumps in a `box` with its `flags`, then the rest."""
+
+    def __init__(self, results: Path, case: str, variant: str, engine: str, replica: int, box: Any = BOX, flags: str = "ff ff ff") -> None:
+        self.folder = results / case / variant / engine / f"replica-{replica}"
+        self.folder.mkdir(parents=True)
+        self.names = {"case": case, "variant": variant, "profile": "quick", "engine": engine, "replica": replica, "seed": replica}
+        self.space: dict[str, Any] = {"box": box, "flags": flags}
+        self.grains: list[str] = []
+        self.contacts: list[str] = []
+
+    def frame(self, step: int, place: Any, radii: Any, touching: tuple[Any, Any, Any, Any], **more: Any) -> None:
+        """Grains at `place` with `more` as in grains_text, and contacts: (places of the first, of the second, rows of both, forces)."""
+        first, second, rows, forces = touching
+        self.grains.append(grains_text(int(step), place, radii, **more, **self.space))
+        self.contacts.append(contacts_text(int(step), first, second, np.column_stack(rows) + 1, forces, **self.space))
+
+    def finish(self, times: dict[str, Any], parameters: dict[str, Any]) -> Path:
+        """The history `times` and the record of a run with `parameters`; returns the engine's folder."""
+        (self.folder / "grains.dump").write_text("".join(self.grains))
+        (self.folder / "contacts.dump").write_text("".join(self.contacts))
+        write_times(self.folder / "time.csv", times)
+        friction, seed = parameters["wall_friction"], self.names["seed"]
+        provenance = {"commit": "0" * 40, "dirty": False, "versions": {"python": "3.11"}, "flags": {}, "wall_time": 10.0,
+                      "particle_steps_per_second": 1e6}
+        own = {"grain_diameter": DIAMETER, "gravity": GRAVITY, "grain_density": DENSITY, **parameters, "seed": seed}
+        record = {**self.names, "parameters": own,
+                  "derived": {"wall_static": friction, "wall_kinetic": friction}, "steps": 10000, "time_step": 1e-5,
+                  "frames": len(self.grains), "inputs": "", "provenance": provenance}
+        (self.folder / "run.json").write_text(json.dumps(record))
+        return self.folder.parent
 
 
-def silo(
-    results: Path,
-    *,
-    engine: str = "liggghts",
-    replica: int = 1,
-    variant: str = "dry",
-    k: float = 0.8,
-    friction: float = 0.25,
-    noise: float = 0.0,
-    seed: int = 0,
-    lost_wall_force: float = 0.0,
-    bridge_volume: float = 0.0,
-) -> Path:
+def silo(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: str = "dry", k: float = 0.8, friction: float = 0.25,
+         noise: float = 0.0, seed: int = 0, lost_wall_force: float = 0.0, bridge_volume: float = 0.0) -> Path:
     """Write a replica whose wall and base forces follow Janssen's law; returns the engine's folder.
 
     `noise`: relative scatter of the wall forces among grains and frames; `lost_wall_force`: share that is missing in time.csv;
@@ -62,9 +72,7 @@ def silo(
     stress = weight * length * -np.expm1(-(top - place[:, 2]) / length)
     push = k * stress * 2.0 * np.pi * radius * DIAMETER / ring
     outward = place[:, :2] / np.hypot(place[:, 0], place[:, 1])[:, None]
-    folder = results / "silo" / variant / engine / f"replica-{replica}"
-    folder.mkdir(parents=True)
-    grains, contacts, lift, steps = [], [], [], 5000 + 100 * np.arange(FRAMES)
+    run, lift, steps = Written(results, "silo", variant, engine, replica), [], 5000 + 100 * np.arange(FRAMES)
     below, above = np.arange(len(place) - ring), np.arange(ring, len(place))
     for step in steps:
         own = push * (1.0 + noise * random.standard_normal(len(push)))
@@ -72,46 +80,19 @@ def silo(
         carried = np.cumsum((mass * GRAVITY - side[:, 2]).reshape(levels, ring)[::-1], axis=0)[::-1].ravel()
         base = np.zeros_like(side)
         base[:ring, 2] = carried[:ring]
-        grains.append(grains_text(int(step), place, np.full(len(place), 0.5 * DIAMETER), masses=mass, walls={"side": side, "base": base}))
         forces = np.column_stack([np.zeros((len(above), 2)), carried[above]])
-        contacts.append(contacts_text(int(step), place[above], place[below], np.column_stack([above, below]) + 1, forces))
+        run.frame(step, place, np.full(len(place), 0.5 * DIAMETER), (place[above], place[below], (above, below), forces), masses=mass,
+                  walls={"side": side, "base": base})
         lift.append((side[:, 2].sum(), base[:, 2].sum()))
     side_fz, base_fz = np.array(lift).T
-    write_times(
-        folder / "time.csv",
-        {
-            "step": steps,
-            "time": steps * 1e-5,
-            "kinetic_energy": 0 * side_fz,
-            "side_fz": (1.0 - lost_wall_force) * side_fz,
-            "base_fz": base_fz,
-        },
-    )
-    parameters = {
-        "cylinder_radius": radius,
-        "grain_diameter": DIAMETER,
-        "gravity": GRAVITY,
-        "wall_friction": 0.5,
-        "grain_density": DENSITY,
-        "grain_count": len(place),
-        **liquid,
-    }
-    finish(folder, engine, replica, "silo", variant, parameters, grains, contacts)
-    return folder.parent
+    return run.finish(
+        {"step": steps, "time": steps * 1e-5, "kinetic_energy": 0 * side_fz, "side_fz": (1.0 - lost_wall_force) * side_fz,
+         "base_fz": base_fz},
+        {"cylinder_radius": radius, "wall_friction": 0.5, "grain_count": len(place), **liquid})
 
 
-def plug_flow(
-    results: Path,
-    *,
-    engine: str = "liggghts",
-    replica: int = 1,
-    variant: str = "smooth",
-    slip: float = 0.4,
-    decay: float = 2.0,
-    noise: float = 0.02,
-    seed: int = 0,
-    tilt: float = 0.0,
-) -> Path:
+def plug_flow(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: str = "smooth", slip: float = 0.4,
+              decay: float = 2.0, noise: float = 0.02, seed: int = 0, tilt: float = 0.0) -> Path:
     """Write a replica with v / v_core = 1 - slip exp(-distance / (decay d)) and flux v0 rho_b; returns the engine's folder.
 
     `tilt`: a linear variation of the core's velocity from wall to wall, which a flat core must not have.
@@ -125,13 +106,10 @@ def plug_flow(
     profile *= len(profile) / profile.sum()
     radii = np.full(len(place), 0.5 * DIAMETER)
     mass = DENSITY * 4.0 / 3.0 * np.pi * radii**3
-    folder = results / "plug_flow" / variant / engine / f"replica-{replica}"
-    folder.mkdir(parents=True)
-    steps = 100000 + 5000 * np.arange(FRAMES)
+    run = Written(results, "plug_flow", variant, engine, replica, ((-1.0, 1.0), (0.0, depth), (-1.0, 1.0)), "ff pp ff")
+    steps = 100000 + 20000 * np.arange(FRAMES)
     left, right = ((from_wall < 0.6) & (side * (place[:, 0] - 0.5 * width) > 0.0) for side in (-1, 1))
     push, weight = 0.01, mass.sum() * GRAVITY
-    grains, contacts = [], []
-    box, flags = ((-1.0, 1.0), (0.0, depth), (-1.0, 1.0)), "ff pp ff"
     neighbour = np.nonzero(place[:, 0] < width - DIAMETER)[0]
     for step in steps:
         now = place - np.array([0.0, 0.0, 1.0]) * (profile * speed * step_length * (step - steps[0]))[:, None] * 0.1
@@ -140,36 +118,14 @@ def plug_flow(
         walls["right"][right] = [-push, 0.0, 0.3 * push]
         velocity = np.zeros_like(place)
         velocity[:, 2] = -speed * (profile + noise * random.standard_normal(len(place)))
-        grains.append(grains_text(int(step), now, radii, velocities=velocity, masses=mass, walls=walls, box=box, flags=flags))
-        first = now[neighbour]
-        second = first + np.array([DIAMETER, 0.0, 0.0])
-        forces = np.tile([-push, 0.0, 0.0], (len(neighbour), 1))
-        contacts.append(contacts_text(int(step), first, second, np.column_stack([neighbour, neighbour]) + 1, forces, box=box, flags=flags))
+        first, forces = now[neighbour], np.tile([-push, 0.0, 0.0], (len(neighbour), 1))
+        run.frame(step, now, radii, (first, first + BESIDE, (neighbour, neighbour), forces), velocities=velocity, masses=mass,
+                  walls=walls)
     count = 2000
     rows = np.linspace(1, steps[-1], count).astype(int)
     friction = 0.3 * push * left.sum() * (1.0 + 0.01 * random.standard_normal(count))
-    zero = np.zeros(count)
-    write_times(
-        folder / "time.csv",
-        {
-            "step": rows,
-            "time": rows * step_length,
-            "kinetic_energy": zero,
-            "left_fz": friction,
-            "right_fz": friction,
-            "base_fz": weight - 2.0 * friction,
-        },
-    )
-    parameters = {
-        "channel_width": width,
-        "channel_depth": depth,
-        "grain_diameter": DIAMETER,
-        "base_speed": speed,
-        "gravity": GRAVITY,
-        "grain_density": DENSITY,
-        "settle_time": 0.5,
-        "wall_friction": 0.5,
-        "grain_count": len(place),
-    }
-    finish(folder, engine, replica, "plug_flow", variant, parameters, grains, contacts)
-    return folder.parent
+    return run.finish(
+        {"step": rows, "time": rows * step_length, "kinetic_energy": np.zeros(count), "left_fz": friction, "right_fz": friction,
+         "base_fz": weight - 2.0 * friction},
+        {"channel_width": width, "channel_depth": depth, "base_speed": speed, "settle_time": 0.5, "wall_friction": 0.5,
+         "grain_count": len(place)})

@@ -6,15 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.input_decks.tests.synthetic import DENSITY, DIAMETER, FRAMES, GRAVITY, finish
-from dembark.postproc.tests.dumps import contacts_text, grains_text, write_times
+from dembark.input_decks.tests.synthetic import BESIDE, DENSITY, DIAMETER, FRAMES, GRAVITY, Written
 
 STEP = 1e-5
 
 
-def plane_silo(
-    results: Path, *, replica: int = 1, k: float = 0.7, friction: float = 0.2, noise: float = 0.0, seed: int = 0, tilt: float = 0.0
-) -> Path:
+def plane_silo(results: Path, *, replica: int = 1, k: float = 0.7, friction: float = 0.2, noise: float = 0.0, seed: int = 0,
+               tilt: float = 0.0) -> Path:
     """Write a replica whose walls and base follow Janssen's law with lambda = W / (2 k friction); returns the engine's folder.
 
     `tilt`: the left wall carries 1 + tilt, the right one 1 - tilt of its share, which the mean over both does not show.
@@ -29,11 +27,9 @@ def plane_silo(
     length, weight = width / (2.0 * k * friction), mass.sum() * GRAVITY / (width * depth * top)
     stress = weight * length * -np.expm1(-(top - place[:, 2]) / length)
     side = {name: np.isclose(place[:, 0], where) for name, where in (("left", 0.5 * DIAMETER), ("right", width - 0.5 * DIAMETER))}
-    folder = results / "plane_silo" / "dry" / "liggghts" / f"replica-{replica}"
-    folder.mkdir(parents=True)
-    box, flags = ((-1.0, 1.0), (0.0, depth), (-1.0, 10.0)), "ff pp ff"
+    run = Written(results, "plane_silo", "dry", "liggghts", replica, ((-1.0, 1.0), (0.0, depth), (-1.0, 10.0)), "ff pp ff")
     above, below = np.arange(layer, len(place)), np.arange(len(place) - layer)
-    grains, contacts, steps, lift = [], [], 5000 + 100 * np.arange(FRAMES), []
+    steps, lift = 5000 + 100 * np.arange(FRAMES), []
     for step in steps:
         walls = {}
         for name, sign in (("left", 1.0), ("right", -1.0)):
@@ -45,41 +41,22 @@ def plane_silo(
         carried = np.repeat(np.cumsum((mass * GRAVITY - held).reshape(levels, layer).sum(axis=1)[::-1])[::-1] / layer, layer)
         base = np.zeros_like(place)
         base[:layer, 2] = carried[:layer]
-        radii, forced = np.full(len(place), 0.5 * DIAMETER), {**walls, "base": base}
-        grains.append(grains_text(int(step), place, radii, masses=mass, walls=forced, box=box, flags=flags))
         forces = np.column_stack([np.zeros((len(above), 2)), carried[above]])
-        ids = np.column_stack([above, below]) + 1
-        contacts.append(contacts_text(int(step), place[above], place[below], ids, forces, box=box, flags=flags))
+        run.frame(step, place, np.full(len(place), 0.5 * DIAMETER), (place[above], place[below], (above, below), forces), masses=mass,
+                  walls={**walls, "base": base})
         lift.append([wall[:, 2].sum() for wall in (walls["left"], walls["right"], base)])
     table = dict(zip(("left_fz", "right_fz", "base_fz"), np.array(lift).T, strict=True))
-    write_times(folder / "time.csv", {"step": steps, "time": steps * STEP, "kinetic_energy": 0.0 * steps, **table})
-    parameters = {
-        "silo_width": width, "slab_depth": depth, "grain_diameter": DIAMETER, "gravity": GRAVITY, "wall_friction": 0.3,
-        "grain_density": DENSITY,
-    }
-    finish(folder, "liggghts", replica, "plane_silo", "dry", parameters, grains, contacts)
-    return folder.parent
+    return run.finish({"step": steps, "time": steps * STEP, "kinetic_energy": 0.0 * steps, **table},
+                      {"silo_width": width, "slab_depth": depth, "wall_friction": 0.3})
 
 
-def gravity_channel(
-    results: Path,
-    *,
-    cells: int = 20,
-    variant: str = "w20",
-    replica: int = 1,
-    greatest: float = 3.0,
-    slip: float = 2.0,
-    decay: float = 1.5,
-    noise: float = 0.02,
-    friction: float = 1.0,
-    acceleration: float = 0.0,
-    drift: float = 0.0,
-    seed: int = 0,
-) -> Path:
+def gravity_channel(results: Path, *, cells: int = 20, variant: str = "w20", replica: int = 1, greatest: float = 3.0, slip: float = 2.0,
+                    decay: float = 1.5, noise: float = 0.02, friction: float = 1.0, acceleration: float = 0.0, drift: float = 0.0,
+                    swing: float = 0.2, seed: int = 0) -> Path:
     """Write a replica with u = u_max - (u_max - u_slip) exp(-(distance - d/2) / (decay d)), velocities over sqrt(g W), W = `cells` d.
 
     `friction`: mean friction of the walls over the weight; `acceleration` (over g): the whole flow's; `drift`: relative growth of the
-    kinetic energy over the window. Returns the engine's folder.
+    kinetic energy over the window; `swing`: standard deviation of the friction's rows over its mean. Returns the engine's folder.
     """
     random = np.random.default_rng(seed)
     width, depth, length = cells * DIAMETER, 5 * DIAMETER, 5 * DIAMETER
@@ -91,17 +68,14 @@ def gravity_channel(
     radii = np.full(len(place), 0.5 * DIAMETER)
     mass = DENSITY * 4.0 / 3.0 * np.pi * radii**3
     weight = mass.sum() * GRAVITY
-    folder = results / "gravity_channel" / variant / "liggghts" / f"replica-{replica}"
-    folder.mkdir(parents=True)
     steps = 100000 + 2000 * np.arange(FRAMES)
     # The period does not begin at zero: its middle stays when it shrinks.
-    box, flags = ((-1.0, 1.0), (0.0, depth), (0.02, 0.02 + length)), "ff pp pp"
+    run = Written(results, "gravity_channel", variant, "liggghts", replica, ((-1.0, 1.0), (0.0, depth), (0.02, 0.02 + length)), "ff pp pp")
     sides = {"left": from_wall < 0.6, "right": from_wall < 0.6}
     sides["left"] &= place[:, 0] < 0.5 * width
     sides["right"] &= place[:, 0] > 0.5 * width
     push = 0.5 * weight / 0.3 / sides["left"].sum()
     neighbour = np.nonzero(place[:, 0] < width - DIAMETER)[0]
-    grains, contacts = [], []
     for step in steps:
         elapsed = (step - steps[0]) * STEP
         speed = fall + acceleration * GRAVITY * elapsed
@@ -114,20 +88,11 @@ def gravity_channel(
         velocity = np.zeros_like(place)
         velocity[:, 2] = -speed + noise * scale * random.standard_normal(len(place))
         velocity[:, 2] -= velocity[:, 2].mean() + speed.mean()
-        grains.append(
-            grains_text(int(step), now, radii, velocities=velocity, masses=mass, walls=walls, images=images, box=box, flags=flags)
-        )
-        forces = np.tile([-push, 0.0, 0.0], (len(neighbour), 1))
-        second = now[neighbour] + [DIAMETER, 0.0, 0.0]
-        ids = np.column_stack([neighbour, neighbour]) + 1
-        contacts.append(contacts_text(int(step), now[neighbour], second, ids, forces, box=box, flags=flags))
+        first, forces = now[neighbour], np.tile([-push, 0.0, 0.0], (len(neighbour), 1))
+        run.frame(step, now, radii, (first, first + BESIDE, (neighbour, neighbour), forces), velocities=velocity, masses=mass,
+                  walls=walls, images=images)
     rows = np.arange(20, steps[-1] + 1, 20)
-    held = 0.5 * weight * (friction - acceleration) * (1.0 + 0.3 * random.standard_normal(len(rows)))
+    held = 0.5 * weight * (friction - acceleration) * (1.0 + swing * random.standard_normal(len(rows)))
     energy = 1.0 + 0.02 * random.standard_normal(len(rows)) + drift * np.linspace(-1.0, 1.0, len(rows)).clip(0.0)
-    write_times(folder / "time.csv", {"step": rows, "time": rows * STEP, "kinetic_energy": energy, "left_fz": held, "right_fz": held})
-    parameters = {
-        "channel_width": width, "channel_depth": depth, "grain_diameter": DIAMETER, "gravity": GRAVITY, "wall_friction": 0.5,
-        "grain_density": DENSITY,
-    }
-    finish(folder, "liggghts", replica, "gravity_channel", variant, parameters, grains, contacts)
-    return folder.parent
+    return run.finish({"step": rows, "time": rows * STEP, "kinetic_energy": energy, "left_fz": held, "right_fz": held},
+                      {"channel_width": width, "channel_depth": depth, "wall_friction": 0.5})

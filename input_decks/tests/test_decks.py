@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shutil
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +14,9 @@ import pytest
 from dembark.common.errors import DembarkError
 from dembark.postproc import ContactsDump, GrainsDump, read_times
 from dembark.postproc.replica import Replica
-from dembark.validation.case.deck import derived
+from dembark.validation.case.deck import derived, prepare
 from dembark.validation.case.folders import find
+from dembark.validation.case.resolve import resolve
 from dembark.validation.judge import measuring
 
 WALLS = {"silo": ("side", "base"), "plane_silo": ("left", "right", "base"), "plug_flow": ("left", "right", "base"),
@@ -47,20 +50,16 @@ RUNS = [(case, engine, variant) for case in CASES for engine in ("liggghts", "ya
 @pytest.fixture(scope="module")
 def finished(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Tiny runs by (case, engine, variant), each done once: the deck that was run."""
-    done: dict[tuple[str, str, str], Any] = {}
-
+    @cache
     def get(case: str, engine: str, variant: str) -> Any:
-        key = (case, engine, variant)
-        if key not in done:
-            one = decks(case, engine, tmp_path_factory.mktemp("-".join(key)), TINY[case] | CHANGES[variant])
-            lines = [line.strip() for line in one.run().splitlines() if line.strip()]
-            start = next(re.fullmatch(r"dembark: steps (\d+) time_step (\S+)", line) for line in lines if line.startswith("dembark:"))
-            assert start is not None
-            assert int(start.group(1)) == one.setup.steps and float(start.group(2)) == pytest.approx(one.setup.time_step, rel=1e-12)
-            progress = [int(words[0]) for line in lines if (words := line.split())[0].isdigit()]
-            assert progress and max(progress) <= one.setup.steps
-            done[key] = one
-        return done[key]
+        one = decks(case, engine, tmp_path_factory.mktemp(f"{case}-{engine}-{variant}"), TINY[case] | CHANGES[variant])
+        lines = [line.strip() for line in one.run().splitlines() if line.strip()]
+        start = next(re.fullmatch(r"dembark: steps (\d+) time_step (\S+)", line) for line in lines if line.startswith("dembark:"))
+        assert start is not None
+        assert int(start.group(1)) == one.setup.steps and float(start.group(2)) == pytest.approx(one.setup.time_step, rel=1e-12)
+        progress = [int(words[0]) for line in lines if (words := line.split())[0].isdigit()]
+        assert progress and max(progress) <= one.setup.steps
+        return one
 
     return get
 
@@ -140,10 +139,10 @@ def test_the_gravity_channel_holds_its_solid_fraction(engine: str, finished: Any
 def test_energies_of_a_collapse_balance(engine: str, variant: str, finished: Any) -> None:
     run = finished("column_collapse", engine, variant)
     case = find("column_collapse")
-    record = {"parameters": run.values, "time_step": run.setup.time_step, "engine": engine, "derived": derived(case, run.values)}
+    record = {"parameters": run.values, "time_step": run.setup.time_step, "engine": engine, "derived": derived(prepare(case, run.values))}
     found = measuring.quantities(case, measuring.measure(case, [Replica(run.folder, record)]))
-    measured = {one.name: one.estimate.value for one in found}
-    verdicts = {one.name: one.judged()[0] for one in found if one.tolerance is not None}
+    measured = {one.name: one.value for one in found}
+    verdicts = {one.name: one.verdict for one in found if one.tolerance is not None}
     assert verdicts == dict.fromkeys(("energy_balance", "potential_error", "dissipation_sign"), "pass"), measured
     # All of it happens, and the shares are all that becomes of the potential energy but for the error of the step.
     ways = ["friction_share", "normal_viscous_share", "tangential_viscous_share"] + ["liquid_viscous_share"] * (variant == "viscous")
@@ -157,3 +156,22 @@ def test_energies_of_a_collapse_balance(engine: str, variant: str, finished: Any
 def test_viscosity_without_liquid_is_refused(decks: Any, tmp_path: Path) -> None:
     with pytest.raises(DembarkError, match="liquid_viscosity"):
         decks("column_collapse", "liggghts", tmp_path, {"liquid_viscosity": 0.01})
+
+
+@pytest.mark.parametrize("path", sorted(Path(__file__).parents[1].glob("*/liggghts.in")), ids=lambda path: path.parent.name)
+def test_a_template_that_is_run_as_it_is_says_what_to_do(path: Path, decks: Any, tmp_path: Path) -> None:
+    """The engine shows the first command that it does not know."""
+    one = decks("log_pair", "liggghts", tmp_path, {})
+    shutil.copyfile(path, tmp_path / "liggghts.in")
+    assert one.start().wait(60) != 0
+    assert f"This is a template. Write the deck with: dembark deck {path.parent.name} --engine liggghts" in one.said()
+
+
+@pytest.mark.parametrize("case", ["gravity_channel", "debarking_drum", "silo", "single_contact", "liquid_exchange"])
+def test_the_number_of_particles_is_that_of_the_packing(case: str) -> None:
+    one = find(case)
+    for variant in one.variants:
+        values = resolve(one, "quick", variant)
+        packed = prepare(one, values).packing
+        assert packed is not None
+        assert one.particle_count(values) == len(packed.diameters), variant

@@ -29,7 +29,7 @@ def parameters(**changes: Any) -> dict[str, Any]:
 
 
 def derived(**changes: Any) -> dict[str, Any]:
-    return deck.derived(find("debarking_drum"), parameters(**changes))
+    return deck.derived(deck.prepare(find("debarking_drum"), parameters(**changes)))
 
 
 def replica(folder: Path, *, seed: int = 0, certificate: float = 1e-15, leak: float = 0.0, lift: float = 1.0,

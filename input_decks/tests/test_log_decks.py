@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -43,15 +44,12 @@ def test_the_case_file_asks_for_all_that_is_written(case: str) -> None:
 @pytest.fixture(scope="module")
 def finished(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Tiny runs by (scene, engine), each done once: (the deck that was run, what the logs did)."""
-    done: dict[tuple[str, str], tuple[Any, LogRun]] = {}
-
+    @cache
     def get(scene: str, engine: str) -> tuple[Any, LogRun]:
-        if (scene, engine) not in done:
-            one = decks(CASE_OF[scene], engine, tmp_path_factory.mktemp(f"{scene}-{engine}"), TINY[scene])
-            said = re.search(r"dembark: steps (\d+) time_step (\S+)", one.run())
-            assert said and int(said[1]) == one.setup.steps and float(said[2]) == TINY[scene]["time_step"]
-            done[scene, engine] = one, read(one.replica())
-        return done[scene, engine]
+        one = decks(CASE_OF[scene], engine, tmp_path_factory.mktemp(f"{scene}-{engine}"), TINY[scene])
+        said = re.search(r"dembark: steps (\d+) time_step (\S+)", one.run())
+        assert said and int(said[1]) == one.setup.steps and float(said[2]) == TINY[scene]["time_step"]
+        return one, read(one.replica())
 
     return get
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
-from dembark.postproc.instruments.logs import LogRun, TouchFrame
+from dembark.postproc.instruments.logs import LogRun, TouchFrame, beginning, impact_values, loads
 
 log_pair, log_cradle, log_pile = (module(name) for name in ("log_pair", "log_cradle", "log_pile"))
 
@@ -224,8 +224,29 @@ def test_rough_stakes_may_carry_a_part_of_the_weight():
 
 def test_the_beginning_is_the_state_before_the_eleventh_impact():
     run = stack()
-    frame, logs, first = log_pile.beginning(run)
+    frame, logs, first = beginning(run, 10)
     assert logs.tolist() == [0, 1] and len(first) == 10
     assert run.times[frame] < run.impacts[10, 2] <= run.times[frame + 1]
     shuffled = replace(run, impacts=run.impacts[::-1])
-    assert log_pile.beginning(shuffled)[0] == frame
+    assert beginning(shuffled, 10)[0] == frame
+
+
+def test_loads_are_the_sums_of_the_contacts():
+    run = stack(lift=0.98)
+    found, weight = loads(run, (-1, -2, -3)), 50.0 * run.parameters["gravity"]
+    np.testing.assert_allclose(found.walls[0], [[0.0, 4 * 0.98 * weight], [100.0, 0.0], [-100.0, 0.0]])
+    np.testing.assert_allclose(found.net[0], np.tile([0.0, 0.98 * weight], (4, 1)), atol=1e-12)
+    assert found.contacts[0] == 9 and found.mobilised[0] == 0.0
+    sliding = [replace(one, friction=0.3 * one.forces[:, None] * [0.0, 1.0, 0.0]) for one in run.touches]
+    assert loads(replace(run, touches=sliding), (-1,)).mobilised == pytest.approx(0.3)
+
+
+def test_intervals_of_impacts_are_those_of_as_many_independent_ones():
+    run, rng = stack(), np.random.default_rng(3)
+    many = np.column_stack([np.ones((900, 4)), np.exp(rng.normal(2.0, 0.5, 900)), rng.uniform(0.0, 2.0, 900), np.zeros((900, 5))])
+    found = {name: one.estimate for name, one in impact_values(replace(run, impacts=many)).items()}
+    assert found["impact_count"].value == 900 and found["impact_count"].half == pytest.approx(1.96 * 30, rel=1e-3)
+    assert found["impact_peak"].half == pytest.approx(1.96 * 0.5 / 30 * np.exp(2.0), rel=0.1)
+    # The median of uniform numbers scatters by 1 / sqrt(n); of the two sides of its interval the wider one counts.
+    assert abs(found["impact_impulse"].value - 1.0) < found["impact_impulse"].half < 0.1 and found["impact_impulse"].half > 0.05
+    assert impact_values(replace(run, impacts=many[:1])) == {}

@@ -12,8 +12,7 @@ from dembark.common.choices import Value
 from dembark.validation import engines
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
-from dembark.validation.case.model import Case
-from dembark.validation.case.parameters import Parameter
+from dembark.validation.case.model import Case, Parameter
 from dembark.validation.case.resolve import merged, portable
 
 SCENE = Path(__file__).resolve().parents[2] / "plugins/yade/python/dembark/scene.py"

@@ -7,8 +7,8 @@ import pytest
 import xarray
 
 from dembark.common.errors import RunError
+from dembark.input_decks.tests.measuring import measure
 from dembark.input_decks.tests.synthetic import DIAMETER, plug_flow
-from dembark.validation.metrics import measure
 
 
 def by_name(content):

@@ -140,11 +140,14 @@ def test_resuming_without_a_state_says_so(engine: str, prepared: Any) -> None:
 
 
 @pytest.mark.parametrize("engine", ["liggghts", "yade"])
-def test_run_begun_anew_forgets_the_states_of_another(engine: str, prepared: Any) -> None:
-    for duration, every, newest in ((0.2, 900, 1800), (0.1, 500, 1000)):
-        run = prepared("log_pile", engine, PILE | {"duration": duration, "restart_every": every})
-        run.go()
-        assert run.newest() == newest
+def test_run_begun_anew_leaves_the_states_of_another(engine: str, prepared: Any) -> None:
+    values = PILE | {"duration": 0.1, "restart_every": 500}
+    prepared("log_pile", engine, values).go()
+    again = prepared("log_pile", engine, values)
+    states = {path.name: path.read_bytes() for path in again.folder.glob("state.*")}
+    assert again.deck.start(restart_every=500).wait(60) != 0
+    assert "there is a state of an earlier run, state.1000" in again.deck.said() and "Traceback" not in again.deck.said()
+    assert {path.name: path.read_bytes() for path in again.folder.glob("state.*")} == states
 
 
 def test_other_number_of_ranks_goes_on_approximately(both: Any) -> None:

@@ -7,12 +7,10 @@ import pytest
 import xarray
 
 from dembark.common.errors import RunError
-from dembark.input_decks.tests.measuring import judged, module
+from dembark.input_decks.tests.measuring import compare, judged, measure, module, pair
 from dembark.input_decks.tests.synthetic import DIAMETER, silo
 from dembark.physics import capillary_force
 from dembark.postproc.instruments.janssen import two_parameter
-from dembark.validation.compare import compare, pair
-from dembark.validation.metrics import measure
 
 SILO = module("silo")
 
@@ -98,7 +96,7 @@ def test_engines_that_agree_and_engines_that_do_not(tmp_path):
 def test_height_of_one_packing_has_no_interval_and_decides_nothing(tmp_path):
     height = by_name(measure(silo(tmp_path, noise=0.1)))["filling_height"]
     assert height["interval"] is None
-    found = pair(height, height | {"value": 1.003 * height["value"]}, "liggghts", "yade")
+    found = pair(height, height | {"value": 1.003 * height["value"]})
     assert found["verdict"] == "info"
     assert "other packings" in found["reason"]
 

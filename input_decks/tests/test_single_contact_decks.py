@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from dembark.common.errors import DembarkError
 from dembark.common.files import check_times, count_frames
 from dembark.input_decks.tests.measuring import module
 from dembark.physics.exact.contact_law import stepped
 from dembark.postproc import GrainsDump
 from dembark.postproc.instruments.impacts import Flight, read
+from dembark.validation.case.folders import find
+from dembark.validation.case.resolve import resolve
 
 impacts = module("single_contact").impacts
 ENGINES = ("liggghts", "yade")
@@ -27,15 +31,11 @@ SCENES: dict[str, dict[str, Any]] = {
 @pytest.fixture(scope="module")
 def finished(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Short runs by (scene, engine), each done once: (the deck that was run, what the spheres did)."""
-    done: dict[tuple[str, str], tuple[Any, Flight]] = {}
-
+    @cache
     def get(scene: str, name: str) -> tuple[Any, Flight]:
-        if (scene, name) not in done:
-            one = decks("single_contact", name, tmp_path_factory.mktemp(f"{scene}-{name}"), SCENES[scene], scene)
-            one.run()
-            p = one.values
-            done[scene, name] = one, read(one.replica(), impacts(p), p["lead_steps"] * p["time_step"])
-        return done[scene, name]
+        one = decks("single_contact", name, tmp_path_factory.mktemp(f"{scene}-{name}"), SCENES[scene], scene)
+        one.run()
+        return one, read(one.replica(), impacts(one.values), one.values["lead_steps"] * one.values["time_step"])
 
     return get
 
@@ -75,3 +75,13 @@ def test_resumed_run_does_the_same(engine: str, decks: Any, tmp_path: Path) -> N
     assert "exactly" in resumed.run(restart_every=70, resume="yes")
     for name in ("time.csv", "grains.dump"):
         assert (whole.folder / name).read_bytes() == (resumed.folder / name).read_bytes()
+
+
+@pytest.mark.parametrize("partner", ["mirror", "rest"])
+@pytest.mark.parametrize("sweep", ["direction", "slide"])
+def test_spheres_that_slide_past_each_other_are_refused(partner: str, sweep: str) -> None:
+    """Their line of centres turns during the contact, by an angle that the reference does not know."""
+    with pytest.raises(DembarkError, match="turn their line of centres") as caught:
+        resolve(find("single_contact"), "quick", None, {"partner": partner, "sweep": sweep})
+    assert "\n" not in str(caught.value)
+    assert resolve(find("single_contact"), "quick", None, {"partner": "plane", "sweep": sweep})

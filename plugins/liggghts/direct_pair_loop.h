@@ -8,8 +8,8 @@
 #define DEMBARK_DIRECT_PAIR_LOOP_H
 
 #include <cstdint>
-#include <cstring>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "atom.h"
@@ -21,125 +21,91 @@
 #include "pair_gran_base.h"
 #include "update.h"
 
-#include "dembark/normal_force.hpp"
-#include "dembark/vec3.hpp"
+#include "dembark/contact.hpp"
+#include "bridge_reach.h"
+#include "contact_data.h"
+#include "energy_tally.h"
+#include "model_properties.h"
 #include "pair_packs.h"
 
 namespace dembark_liggghts {
 
-template <int Cohesion>
-using DirectStyle =
-    LIGGGHTS::ContactModels::GranStyle<LIGGGHTS::ContactModels::HERTZ, LIGGGHTS::ContactModels::TANGENTIAL_FINNIE_RABINOWICZ, Cohesion,
-                                       LIGGGHTS::ContactModels::ROLLING_OFF, LIGGGHTS::ContactModels::SURFACE_DEFAULT>;
-template <int Cohesion>
-using DirectModel = LIGGGHTS::ContactModels::ContactModel<DirectStyle<Cohesion>>;
-template <int Cohesion>
-using StockLoop = LIGGGHTS::PairStyles::Granular<DirectModel<Cohesion>>;
-
-// The models are private to the loop and to each other; an explicit instantiation may name a private member.
-template <int Cohesion>
-struct ModelsOfLoop {
-  typedef DirectModel<Cohesion> StockLoop<Cohesion>::* type;
-};
-template <int Cohesion>
-struct TangentialOfModels {
-  typedef LIGGGHTS::ContactModels::TangentialModel<LIGGGHTS::ContactModels::TANGENTIAL_FINNIE_RABINOWICZ> DirectModel<Cohesion>::* type;
-};
-template <int Cohesion>
-struct CohesionOfModels {
-  typedef LIGGGHTS::ContactModels::CohesionModel<Cohesion> DirectModel<Cohesion>::* type;
-};
-template <class Tag, typename Tag::type Member>
-struct OpenMember {
-  friend typename Tag::type open(Tag) { return Member; }
-};
-constexpr int dry = LIGGGHTS::ContactModels::COHESION_OFF, capillary = LIGGGHTS::ContactModels::COHESION_CAPILLARY;
-ModelsOfLoop<dry>::type open(ModelsOfLoop<dry>);
-ModelsOfLoop<capillary>::type open(ModelsOfLoop<capillary>);
-TangentialOfModels<dry>::type open(TangentialOfModels<dry>);
-TangentialOfModels<capillary>::type open(TangentialOfModels<capillary>);
-CohesionOfModels<dry>::type open(CohesionOfModels<dry>);
-CohesionOfModels<capillary>::type open(CohesionOfModels<capillary>);
-template struct OpenMember<ModelsOfLoop<dry>, &StockLoop<dry>::cmodel>;
-template struct OpenMember<ModelsOfLoop<capillary>, &StockLoop<capillary>::cmodel>;
-template struct OpenMember<TangentialOfModels<dry>, &DirectModel<dry>::tangentialModel>;
-template struct OpenMember<TangentialOfModels<capillary>, &DirectModel<capillary>::tangentialModel>;
-template struct OpenMember<CohesionOfModels<dry>, &DirectModel<dry>::cohesionModel>;
-template struct OpenMember<CohesionOfModels<capillary>, &DirectModel<capillary>::cohesionModel>;
-
-/// The engine's `Granular<...>` for this combination, with a loop of its own for the plain step. `Cohesion`: COHESION_OFF or
-/// COHESION_CAPILLARY.
-template <int Cohesion>
-class DirectPairLoop : public StockLoop<Cohesion> {
-  typedef StockLoop<Cohesion> Stock;
-  typedef dembark::Vec3<double> Vec3;
-  static constexpr bool wet = Cohesion == capillary;
-  static constexpr int own_flags = LIGGGHTS::ContactModels::CONTACT_NORMAL_MODEL | LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL |
-                                   LIGGGHTS::ContactModels::CONTACT_TANGENTIAL_MODEL;
+/// The engine's `Granular<...>` for the combination `Style`, with a loop of its own for the plain step.
+template <class Style>
+class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactModels::ContactModel<Style>> {
+  typedef LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactModels::ContactModel<Style>> Stock;
+  static constexpr bool wet = Style::COHESION == LIGGGHTS::ContactModels::COHESION_CAPILLARY;
+  static constexpr int bridge_flag = LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL;
+  static constexpr int dry_flags = LIGGGHTS::ContactModels::CONTACT_NORMAL_MODEL | LIGGGHTS::ContactModels::CONTACT_TANGENTIAL_MODEL;
 
   LAMMPS_NS::LAMMPS* lmp_;
   double **youngs_modulus_ = nullptr, **shear_modulus_ = nullptr, **damping_factor_ = nullptr;  // effective ones, by types
-  int types_ = 1;    // that grains or walls have, and one: the engine's tables end there, whatever the box was made for
-  double dt_ = 0.0;  // of this step
+  PairTable<dembark::FinnieRabinowicz> friction_;
+  PairTable<dembark::Liquid> liquids_;
+  int friction_offset_ = 0, bridge_offset_ = 0;  // in the history of a contact
+  double dt_ = 0.0;                              // of this step
   bool update_history_ = false;
-  bool plain_settings_ = true, limit_force_ = false, tangential_damping_ = true;
+  bool plain_settings_ = true, tallied_ = false, limit_force_ = false, tangential_damping_ = true;
+  dembark::Presliding presliding_ = dembark::Presliding::linear;
+  dembark::capillary::Model model_ = dembark::capillary::Model::exact;
   PairPacks* const packs_ = choose_pair_packs();
   const std::unique_ptr<PairBlock> block_ = std::make_unique<PairBlock>();
   std::vector<PairLaw> laws_;  // of this step
 
   bool plain_step(LAMMPS_NS::PairGran* pair, int eflag, int vflag, int addflag) const {
     const LAMMPS_NS::Atom* atom = lmp_->atom;
-    return plain_settings_ && !eflag && !vflag && !(pair->cpl() && addflag) && pair->computeflag() && pair->listgranhistory &&
+    return plain_settings_ && !tallied_ && !eflag && !vflag && !(pair->cpl() && addflag) && pair->computeflag() && pair->listgranhistory &&
            !pair->storeContactForces() && !pair->storeContactForcesStress() && !pair->storeSumDelta() && !pair->store_sum_normal_force() &&
            !pair->fr_pair() && atom->rmass && lmp_->force->nktv2p == 1.0 && atom->sphere_flag && !atom->shapetype_flag &&
            lmp_->modify->n_fixes_style("insert/stream/predefined") == 0;
   }
 
-  static Vec3 vector(const double* v) { return {v[0], v[1], v[2]}; }
-
-  DirectModel<Cohesion>& models() { return this->*open(ModelsOfLoop<Cohesion>()); }
-  auto& friction() { return models().*open(TangentialOfModels<Cohesion>()); }
-  auto& cohesion() { return models().*open(CohesionOfModels<Cohesion>()); }
-
-  // False when a law has to be left to its scalar form.
-  bool collect_laws(double dt) {
-    bool linear = true;
-    laws_.assign(types_ * types_, {});
-    for (int i = 1; i < types_; ++i)
-      for (int j = 1; j < types_; ++j) {
-        const dembark::FinnieRabinowicz& law = friction().law(i, j);
-        laws_[i * types_ + j] = {youngs_modulus_[i][j], shear_modulus_[i][j],         damping_factor_[i][j],       law.static_friction,
-                                 law.kinetic_friction,  law.interface_shear_strength, dembark::kept_slip(law, dt), 0.0};
-        linear = linear && law.presliding == dembark::Presliding::linear;
+  void collect_laws() {
+    const int types = friction_.types();
+    laws_.assign(std::size_t(types + 1) * (types + 1), {});
+    for (int i = 1; i <= types; ++i)
+      for (int j = 1; j <= types; ++j) {
+        const dembark::FinnieRabinowicz& law = friction_(i, j);
+        laws_[i * (types + 1) + j] = {
+            youngs_modulus_[i][j], shear_modulus_[i][j],         damping_factor_[i][j],        law.static_friction,
+            law.kinetic_friction,  law.interface_shear_strength, dembark::kept_slip(law, dt_), 0.0};
       }
-    return linear;
   }
 
-  static void scalar_friction(void* caller, const PairBlock& block, int k, const FrictionInput& in, double* force) {
-    DirectPairLoop& loop = *static_cast<DirectPairLoop*>(caller);
-    const int* const type = loop.lmp_->atom->type;
+  static void friction(void* caller, const PairBlock& block, int k, const FrictionInput& in, double* force) {
+    const DirectPairLoop& loop = *static_cast<DirectPairLoop*>(caller);
+    const LAMMPS_NS::Atom* const atom = loop.lmp_->atom;
+    const int i = block.grain[k], j = block.partner[k];
     // What is no number never sticks in a pack: pairs without a normal end up here.
-    if (!(in.normal[0] == in.normal[0])) loop.friction().refuse_coincidence(block.grain[k], block.partner[k]);
-    const Vec3 t = loop.friction().step(block.history[k], type[block.grain[k]], type[block.partner[k]], vector(in.normal), vector(in.spin),
-                                        vector(in.velocity), in.normal_force, in.stiffness, in.damping, in.radius_overlap, loop.dt_,
-                                        loop.update_history_);
+    if (!(in.normal[0] == in.normal[0])) refuse_coincidence(loop.lmp_->error, atom->tag, i, j);
+    double* const history = block.history[k] + loop.friction_offset_;
+    dembark::FrictionState<double> state = load_friction(history);
+    const Vec3 t = contact_friction(loop.friction_(atom->type[i], atom->type[j]), vector(in.normal), in.twist,
+                                    {in.normal_force, in.stiffness, in.damping, in.area, 0.0}, vector(in.velocity), loop.dt_, state);
+    if (loop.update_history_) store_friction(history, state);
     force[0] = t.x;
     force[1] = t.y;
     force[2] = t.z;
   }
 
   static void bridges(void* caller, const PairBlock& block, int first, int count, const double* gap, double* pull) {
-    DirectPairLoop& loop = *static_cast<DirectPairLoop*>(caller);
+    const DirectPairLoop& loop = *static_cast<DirectPairLoop*>(caller);
     const LAMMPS_NS::Atom* const atom = loop.lmp_->atom;
-    const auto& cohesion = loop.cohesion();
     for (int n = 0; n < count; ++n) {
-      const int k = first + n, i = block.grain[k], j = block.partner[k], type_i = atom->type[i], type_j = atom->type[j];
-      const double radius_i = atom->radius[i], radius_j = atom->radius[j];
-      if (block.pick[k] & 1)
-        pull[n] = cohesion.touching_force(block.history[k], type_i, type_j, radius_i, radius_j, radius_i + radius_j, loop.update_history_);
-      else if (cohesion.gap_force(block.history[k], type_i, type_j, radius_i, radius_j, gap[n], pull[n]))
-        *block.flags[k] |= LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL;
-      else pull[n] = 0.0;
+      const int k = first + n, i = block.grain[k], j = block.partner[k];
+      const bool touching = block.pick[k] & 1;
+      double* const history = block.history[k] + loop.bridge_offset_;
+      double volume = history[0], rupture_distance = history[1];
+      const bool was_there = volume > 0.0;
+      pull[n] = bridge_step(loop.liquids_(atom->type[i], atom->type[j]), atom->radius[i], atom->radius[j], gap[n], touching, volume,
+                            rupture_distance);
+      const bool is_there = volume > 0.0;
+      if (is_there && !touching) *block.flags[k] |= bridge_flag;
+      if (is_there == was_there) continue;
+      if (is_there) check_reach(loop.lmp_->neighbor, loop.lmp_->error, rupture_distance, atom->radius[i] + atom->radius[j], false);
+      if (!loop.update_history_) continue;
+      history[0] = volume;
+      history[1] = rupture_distance;
     }
   }
 
@@ -149,24 +115,34 @@ class DirectPairLoop : public StockLoop<Cohesion> {
   void settings(int count, char** words, LIGGGHTS::IContactHistorySetup* history) override {
     Stock::settings(count, words, history);
     for (int k = 0; k + 1 < count; k += 2) {
-      const bool on = std::strcmp(words[k + 1], "on") == 0, off = std::strcmp(words[k + 1], "off") == 0;
-      if (std::strcmp(words[k], "limitForce") == 0) limit_force_ = on;
-      else if (std::strcmp(words[k], "tangential_damping") == 0) tangential_damping_ = on;
-      else if (std::strcmp(words[k], "presliding") != 0 && std::strcmp(words[k], "capillary_model") != 0 && !off) plain_settings_ = false;
+      const std::string word = words[k], value = words[k + 1];
+      if (word == "limitForce") limit_force_ = value == "on";
+      else if (word == "tangential_damping") tangential_damping_ = value == "on";
+      else if (word == "presliding") presliding_ = value == "linear" ? dembark::Presliding::linear : dembark::Presliding::exponential;
+      else if (word == "capillary_model") dembark::capillary::model_from_name(words[k + 1], model_);
+      else if (value != "off") plain_settings_ = false;
     }
   }
 
   void init_granular() override {
+    namespace models = LIGGGHTS::ContactModels;
     Stock::init_granular();
     PropertyRegistry& registry = lmp_->force->registry;
     registry.connect("Yeff", youngs_modulus_, "model hertz");
     registry.connect("Geff", shear_modulus_, "model hertz");
     registry.connect("betaeff", damping_factor_, "model hertz");
-    types_ = registry.max_type() + 1;
+    const PropertyReader read(registry, lmp_->modify, lmp_->error, "pair_style gran");
+    friction_ = read_friction(read, presliding_);
+    friction_offset_ = Stock::get_history_offset(models::TangentialModel<models::TANGENTIAL_FINNIE_RABINOWICZ>::history_name);
+    if (wet && plain_settings_) {
+      liquids_ = read_liquids(read, model_, false, false);
+      bridge_offset_ = Stock::get_history_offset(models::CohesionModel<models::COHESION_CAPILLARY>::history_name);
+    }
+    tallied_ = find_energy_tally(lmp_->modify);
   }
 
   void compute_force(LAMMPS_NS::PairGran* pair, int eflag, int vflag, int addflag) override {
-    if (friction().books() || !plain_step(pair, eflag, vflag, addflag)) {
+    if (!plain_step(pair, eflag, vflag, addflag)) {
       Stock::compute_force(pair, eflag, vflag, addflag);
       return;
     }
@@ -176,6 +152,7 @@ class DirectPairLoop : public StockLoop<Cohesion> {
     const LAMMPS_NS::Atom* const atom = lmp_->atom;
     update_history_ = pair->shearupdate();
     dt_ = update_history_ ? lmp_->update->dt : 0.0;
+    collect_laws();
 
     PairStep step;
     step.x = atom->x[0];
@@ -190,27 +167,25 @@ class DirectPairLoop : public StockLoop<Cohesion> {
     step.owned = lmp_->force->newton_pair ? atom->nlocal + atom->nghost : atom->nlocal;
     step.count = list->inum;
     step.stride = pair->dnum();
-    step.offset = friction().offset();
+    step.offset = friction_offset_;
     step.grains = list->ilist;
     step.numneigh = list->numneigh;
     step.neighbors = list->firstneigh;
     step.flags = pair->listgranhistory->firstneigh;
     step.histories = pair->listgranhistory->firstdouble;
-    step.own_flags = own_flags;
-    step.touching_flags = wet ? own_flags : own_flags & ~LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL;
-    // The scalar law knows what a step of no length is.
-    step.pack_friction = collect_laws(dt_) && dt_ > 0.0;
+    step.own_flags = dry_flags | bridge_flag;
+    step.touching_flags = wet ? step.own_flags : dry_flags;
+    // The scalar law knows the other curve, and what a step of no length is.
+    step.pack_friction = presliding_ == dembark::Presliding::linear && dt_ > 0.0;
     step.laws = laws_.data();
-    step.types = types_;
+    step.types = friction_.types() + 1;
     step.dt = dt_;
-    step.reach_squared = lmp_->neighbor->contactDistanceFactor * lmp_->neighbor->contactDistanceFactor;
     step.limit_force = limit_force_;
     step.tangential_damping = tangential_damping_;
     step.frozen = pair->freeze_group_bit();
     step.caller = this;
-    step.friction = &scalar_friction;
-    step.bridges = nullptr;
-    if constexpr (wet) step.bridges = &bridges;
+    step.friction = &friction;
+    step.bridges = wet ? &bridges : nullptr;
     // The factor of relaxed contacts (PairGran::relax) is 1 in this version of the engine.
     packs_(step, *block_);
   }

@@ -2,18 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 
 #include "atom.h"
 #include "comm.h"
 #include "error.h"
+#include "fix_contact_history_mesh.h"
+#include "fix_mesh_surface.h"
 #include "fix_property_atom.h"
 #include "fix_wall_gran.h"
 #include "force.h"
 #include "memory.h"
 #include "modify.h"
+#include "neigh_list.h"
 #include "neighbor.h"
+#include "pair_gran.h"
 #include "update.h"
 
 #include "dembark/normal_force.hpp"
@@ -26,6 +31,12 @@ namespace capillary = dembark::capillary;
 namespace {
 
 const char *const property_name = "capillaryLiquid";
+
+std::string words(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
 
 }  // namespace
 
@@ -44,7 +55,16 @@ FixCapillaryLiquid::FixCapillaryLiquid(LAMMPS *lmp, int narg, char **arg) : Fix(
   grow_arrays(atom->nmax);
   atom->add_callback(0);
   atom->add_callback(1);
-  std::fill(books_.begin(), books_.end(), 0.0);
+  // Reduced on one rank, so that the walls hold the same numbers on all of them.
+  ledger_.sum_over_processes = [this](std::vector<long double> &sums) {
+    std::vector<long double> mine(sums);
+    MPI_Reduce(mine.data(), sums.data(), int(sums.size()), MPI_LONG_DOUBLE, MPI_SUM, 0, world);
+    MPI_Bcast(sums.data(), int(sums.size()), MPI_LONG_DOUBLE, 0, world);
+  };
+  ledger_.copy_to_others = [this](std::vector<double> &grants) {
+    granted_ = &grants;
+    comm->forward_comm_fix(this);
+  };
 }
 
 FixCapillaryLiquid::~FixCapillaryLiquid() {
@@ -55,6 +75,11 @@ FixCapillaryLiquid::~FixCapillaryLiquid() {
 void FixCapillaryLiquid::refuse(const std::string &what) {
   error->fix_error(FLERR, this, what.c_str());
   std::abort();  // fix_error() does not return
+}
+
+void FixCapillaryLiquid::stop(const std::string &what) {
+  error->one(FLERR, ("fix capillary/liquid: " + what).c_str());
+  std::abort();  // one() does not return
 }
 
 void FixCapillaryLiquid::parse(int narg, char **arg) {
@@ -74,51 +99,46 @@ void FixCapillaryLiquid::parse(int narg, char **arg) {
       if (!(value >= 0.0)) refuse(word + (word == "content" ? " (liquid volume over grain volume)" : " (m^3 a grain)") + " must be >= 0");
       k += 2;
     } else if (word == "share") {
-      const std::string kind = k + 1 < narg ? arg[k + 1] : "";
-      if (kind != "cap" && kind != "fraction") refuse("share must be followed by cap or fraction");
-      share_.kind = kind == "cap" ? capillary::ShareRule::Kind::cap : capillary::ShareRule::Kind::fraction;
-      share_.factor = number(k + 2, "the number of share");
-      if (const char *wrong = share_.error()) refuse(wrong);
+      if (k + 1 >= narg || !ledger_.share.set_kind(arg[k + 1])) refuse("share must be followed by cap or fraction");
+      ledger_.share.factor = number(k + 2, "the number of share");
+      if (const char *wrong = ledger_.share.error()) refuse(wrong);
       k += 3;
     } else if (word == "return") {
-      const std::vector<std::string> names = capillary::return_names();
-      const auto found = k + 1 < narg ? std::find(names.begin(), names.end(), arg[k + 1]) : names.end();
-      if (found == names.end()) refuse("return must be followed by equal, radius or taken");
-      return_ = static_cast<capillary::Return>(found - names.begin());
+      if (k + 1 >= narg || !capillary::return_from_name(arg[k + 1], ledger_.split))
+        refuse("return must be followed by equal, radius or taken");
       k += 2;
     } else if (word == "max_bridge") {
-      largest_ = number(k + 1, "max_bridge");
-      if (!(largest_ > 0.0)) refuse("max_bridge (m^3) must be > 0");
+      ledger_.largest_bridge = number(k + 1, "max_bridge");
+      if (!(ledger_.largest_bridge > 0.0)) refuse("max_bridge (m^3) must be > 0");
       k += 2;
     } else if (word == "wall") {
       if (k + 4 >= narg)
         refuse("wall must be followed by the ID of a fix wall/gran, its liquid (m^3), the share it gives and the part it gets back");
-      Wall wall;
-      wall.id = arg[k + 1];
-      wall.pool = number(k + 2, "the liquid of the wall");
-      wall.share = number(k + 3, "the share of the wall");
-      wall.part = number(k + 4, "the part of the wall");
-      wall.named = true;
-      if (!(wall.pool >= 0.0)) refuse("the liquid of wall " + wall.id + " (m^3) must be >= 0");
-      if (!(wall.share >= 0.0 && wall.share <= 1.0)) refuse("the share that wall " + wall.id + " gives to a bridge must lie in 0...1");
-      if (!(wall.part >= 0.0 && wall.part <= 1.0)) refuse("the part of a bridge that wall " + wall.id + " gets back must lie in 0...1");
-      for (const Wall &other : walls_)
-        if (other.id == wall.id) refuse("wall " + wall.id + " is given twice");
-      walls_.push_back(wall);
+      const double pool = number(k + 2, "the liquid of the wall"), share = number(k + 3, "the share of the wall");
+      parse_wall(arg[k + 1], pool, share, number(k + 4, "the part of the wall"));
       k += 5;
     } else refuse("keyword '" + word + "' is unknown; there are content, volume, share, return, max_bridge, wall");
   }
+}
+
+void FixCapillaryLiquid::parse_wall(const std::string &wall_id, double pool, double share, double part) {
+  if (!(pool >= 0.0)) refuse("the liquid of wall " + wall_id + " (m^3) must be >= 0");
+  if (!(share >= 0.0 && share <= 1.0)) refuse("the share that wall " + wall_id + " gives to a bridge must lie in 0...1");
+  if (!(part >= 0.0 && part <= 1.0)) refuse("the part of a bridge that wall " + wall_id + " gets back must lie in 0...1");
+  if (ledger_.wall(wall_id)) refuse("wall " + wall_id + " is given twice");
+  ledger_.walls.push_back({wall_id, pool, share, part});
+  unmet_.push_back(wall_id);
 }
 
 // The contact models work between these stages.
 int FixCapillaryLiquid::setmask() { return PRE_FORCE | END_OF_STEP; }
 
 void FixCapillaryLiquid::post_create() {
-  // -1: a grain whose liquid is still to be reckoned from its radius.
-  const char *words[] = {property_name, "all", "property/atom", property_name, "scalar", "yes", "no", "no", "-1."};
+  const char *arguments[] = {property_name, "all", "property/atom", property_name, "scalar", "yes", "no", "no", "-1."};
+  static_assert(capillary::GrainLiquid::unset == -1.0, "the default of the property above");
   property_ = static_cast<FixPropertyAtom *>(modify->find_fix_property(property_name, "property/atom", "scalar", 0, 0, style, false));
   if (property_) return;
-  property_ = modify->add_fix_property_atom(9, const_cast<char **>(words), style);
+  property_ = modify->add_fix_property_atom(9, const_cast<char **>(arguments), style);
   if (!property_->recent_restart)
     for (int i = 0; i < atom->nlocal; ++i) property_->set_arrays(i);
   property_->just_created = 0;  // it has its values: `set` may follow
@@ -131,21 +151,40 @@ void FixCapillaryLiquid::pre_delete(bool unfix) {
 void FixCapillaryLiquid::init() {
   if (force->newton_pair) refuse("newton must be off: each rank settles the contacts of the grains that it owns");
   if (std::strcmp(update->integrate_style, "verlet") != 0) refuse("only run_style verlet is supported");
-  if (!places_.count(nullptr)) refuse("it needs pair_style gran ... cohesion capillary ... carried_liquid on");
+  if (!offsets_.count(nullptr)) refuse("it needs pair_style gran ... cohesion capillary ... carried_liquid on");
   // The engine would set new arrays back in the middle of the set-up.
   just_created = 0;
   find_walls();
-  totals_step_ = -1;
 }
 
-double *FixCapillaryLiquid::liquid() const { return property_->vector_atom; }
+/// Walls that bridges may form to: those named in the arguments, and all others, dry.
+void FixCapillaryLiquid::find_walls() {
+  std::vector<std::string> names;
+  walls_.clear();
+  for (int k = 0; k < modify->nfix; ++k) {
+    FixWallGran *const fix = dynamic_cast<FixWallGran *>(modify->fix[k]);
+    if (!fix || !fix->contact_match("cohesion", "capillary")) continue;
+    names.push_back(fix->id);
+    walls_.push_back({fix});
+  }
+  const auto there = [&](const std::string &name) { return std::find(names.begin(), names.end(), name) != names.end(); };
+  for (const std::string &name : unmet_)
+    if (!there(name)) refuse("there is no fix wall/gran " + name + " with cohesion capillary");
+  unmet_.clear();
+  for (const capillary::LiquidWall &wall : ledger_.walls) {
+    const std::string line = "fix capillary/liquid: wall " + wall.name + " is gone, and with it " + words(wall.pool) + " m^3 of liquid";
+    if (!there(wall.name) && wall.pool > 0.0 && comm->me == 0) error->warning(FLERR, line.c_str());
+  }
+  ledger_.change_walls(names, grains());
+}
+
+capillary::GrainLiquid FixCapillaryLiquid::grains() const { return {property_->vector_atom, atom->nlocal}; }
 
 bool FixCapillaryLiquid::collecting() const { return !update->setupflag; }
 
 int FixCapillaryLiquid::wall_number(const Fix *wall) const {
   for (std::size_t w = 0; w < walls_.size(); ++w)
     if (static_cast<const Fix *>(walls_[w].fix) == wall) return int(w);
-  error->one(FLERR, "fix capillary/liquid: a wall was made after the run was set up");
   return -1;
 }
 
@@ -157,119 +196,178 @@ double FixCapillaryLiquid::initial(int i) const {
 
 double FixCapillaryLiquid::likely_bridge(double largest_radius) const {
   double mine = std::max(volume_, content_ * (4.0 / 3.0) * dembark::pi * largest_radius * largest_radius * largest_radius), all = 0.0;
-  for (int i = 0; i < atom->nlocal; ++i) mine = std::max(mine, liquid()[i]);
+  for (int i = 0; i < atom->nlocal; ++i) mine = std::max(mine, grains().volume[i]);
   MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_MAX, world);
-  const double share = std::max(2.0 * share_(1.0, 1.0), share_(1.0, capillary::flat<double>));
+  const double share = std::max(2.0 * ledger_.share(1.0, 1.0), ledger_.share(1.0, capillary::flat<double>));
   // Liquid gathers on some grains: twice as much as at the start is foreseen.
-  return std::min(largest_, 2.0 * all * std::min(share, 1.0));
+  return std::min(ledger_.largest_bridge, 2.0 * all * std::min(share, 1.0));
 }
 
-void FixCapillaryLiquid::broke(int i, int j, double volume, double imbalance) {
-  const double back_i = capillary::returned(volume, imbalance), back_j = capillary::returned(volume, -imbalance);
-  liquid()[i] += back_i;
-  book(i)[0] -= back_i;
-  if (j >= atom->nlocal) return;
-  liquid()[j] += back_j;
-  book(j)[0] -= back_j;
+template <class Visit>
+void FixCapillaryLiquid::each_pair_bridge(Visit visit) const {
+  PairGran *const pair = static_cast<PairGran *>(force->pair_match("gran", 0));
+  if (!pair || !pair->list || !pair->list->listgranhistory) return;
+  const Offsets at = offsets_.at(nullptr);
+  const NeighList &list = *pair->list;
+  const std::size_t stride = std::size_t(pair->dnum());
+  for (int ii = 0; ii < list.inum; ++ii) {
+    const int i = list.ilist[ii];
+    const double *history = list.listgranhistory->firstdouble[i];
+    for (int k = 0; k < list.numneigh[i]; ++k, history += stride)
+      if (history[at.volume] > 0.0) visit(i, list.firstneigh[i][k] & NEIGHMASK, history[at.volume], history[at.imbalance]);
+  }
 }
 
-void FixCapillaryLiquid::broke_wall(int i, int wall, double volume, double imbalance) {
-  const double back = capillary::returned(volume, imbalance);
-  liquid()[i] += back;
-  book(i)[1 + wall] -= volume;
-  wall_returned_[wall] += volume - back;
+template <class Visit>
+void FixCapillaryLiquid::each_wall_bridge(const Wall &wall, int i, Visit visit) const {
+  const auto look = [&](double *contact) {
+    if (contact[wall.at.volume] > 0.0) visit(contact[wall.at.volume], contact[wall.at.imbalance]);
+  };
+  if (wall.history) look(wall.history->array_atom[i]);
+  if (!wall.fix->is_mesh_wall()) return;
+  for (int m = 0; m < wall.fix->n_meshes(); ++m)
+    if (FixContactHistoryMesh *const history = wall.fix->mesh_list()[m]->contactHistory())
+      for (int k = 0; k < history->nneighs(i); ++k) look(history->contacthistory(i, k));
 }
 
-/// All that broke is back with the grains already. Walls get theirs, then what the step asked is granted from what is there.
-void FixCapillaryLiquid::end_of_step() {
-  check_walls();
-  grant_all();
-  for (const Request &request : requests_) form(request);
+void FixCapillaryLiquid::setup_pre_force(int) {
   requests_.clear();
-  demands_.clear();
-  settle_walls();
-  totals_step_ = -1;
+  broken_.clear();
+  for (Wall &wall : walls_) {
+    wall.at = offsets_.at(wall.fix);
+    const std::string history = "history_" + std::string(wall.fix->id);
+    if (!wall.fix->is_mesh_wall())
+      wall.history = static_cast<FixPropertyAtom *>(modify->find_fix_property(history.c_str(), "property/atom", "vector", 0, 0, style));
+  }
+  after_new_list();
 }
 
-void FixCapillaryLiquid::grant_all() {
-  const std::size_t n = walls_.size();
-  demands_.resize(std::size_t(atom->nlocal));
-  // What all ranks have to know: whether any pair asks, and of each wall what it got back and what is asked of it.
-  std::vector<double> mine(1 + 2 * n, 0.0), all(1 + 2 * n, 0.0);
-  for (const Request &r : requests_) {
-    demands_.add(std::size_t(r.i), share_(r.radius_i, r.radius_j));
-    if (r.j < 0) mine[1 + n + r.wall] += walls_[r.wall].share;
-    else {
-      mine[0] = 1.0;
-      if (r.j < atom->nlocal) demands_.add(std::size_t(r.j), share_(r.radius_j, r.radius_i));
-    }
-  }
-  std::copy_n(wall_returned_.begin(), n, mine.begin() + 1);
-  // Reduced on one rank, so that the walls hold the same numbers on all of them.
-  MPI_Reduce(mine.data(), all.data(), int(mine.size()), MPI_DOUBLE, MPI_SUM, 0, world);
-  MPI_Bcast(all.data(), int(all.size()), MPI_DOUBLE, 0, world);
-  wall_grants_.assign(n, 0.0);
-  for (std::size_t w = 0; w < n; ++w) {
-    walls_[w].pool += all[1 + w];
-    wall_grants_[w] = walls_[w].share * capillary::grant(walls_[w].pool, all[1 + n + w]);
-    wall_returned_[w] = 0.0;
-  }
-  if (all[0] == 0.0 && requests_.empty()) return;
-  // -1: nothing was asked of this grain where it is owned.
-  for (int i = 0; i < atom->nlocal; ++i) {
-    const double demand = demands_.of(std::size_t(i));
-    grants_[i] = demand > 0.0 ? capillary::grant(liquid()[i], demand) : -1.0;
-  }
-  if (all[0] != 0.0) comm->forward_comm_fix(this);
+void FixCapillaryLiquid::pre_force(int) {
+  if (neighbor->ago == 0) after_new_list();
 }
 
-void FixCapillaryLiquid::form(const Request &r) {
-  const double given_i = share_(r.radius_i, r.radius_j) * grants_[r.i];
-  capillary::NewBridge<double> bridge;
-  if (r.j < 0) bridge = capillary::form_wall_bridge(given_i, wall_grants_[r.wall], walls_[r.wall].part, return_, largest_);
-  else {
-    // Both owners have to see the contact in the same step.
-    if (grants_[r.j] < 0.0) return;
-    bridge = capillary::form_bridge(given_i, share_(r.radius_j, r.radius_i) * grants_[r.j], r.radius_i, r.radius_j, return_, largest_);
-  }
-  if (!(bridge.volume > 0.0)) return;
-  const double rupture = r.force->rupture_distance(r.radius_i, r.radius_j, bridge.volume);
-  dembark_liggghts::check_reach(neighbor, error, rupture, r.j < 0 ? r.radius_i : r.radius_i + r.radius_j, r.primitive_wall);
-  r.bridge[0] = bridge.volume;
-  r.bridge[1] = rupture;
-  *r.imbalance = bridge.imbalance;
-  liquid()[r.i] = capillary::remaining(liquid()[r.i], bridge.from_i);
-  if (r.j < 0) {
-    book(r.i)[1 + r.wall] += bridge.volume;
-    wall_taken_[r.wall] += bridge.from_j;
-    return;
-  }
-  book(r.i)[0] += capillary::returned(bridge.volume, bridge.imbalance);
-  if (r.j >= atom->nlocal) return;
-  liquid()[r.j] = capillary::remaining(liquid()[r.j], bridge.from_j);
-  book(r.j)[0] += capillary::returned(bridge.volume, -bridge.imbalance);
+/// Grains have come, left or gone to other ranks, and the lists may have lost bridges to partners that left or jumped out of reach.
+void FixCapillaryLiquid::after_new_list() {
+  const int wrong = ledger_.admit(grains(), [this](int i) { return initial(i); });
+  if (wrong >= 0)
+    stop("grain " + std::to_string(atom->tag[wrong]) + " has liquid " + words(grains().volume[wrong]) + " m^3; it must be >= 0");
+  double excess = 0.0;
+  const int full = ledger_.reconcile_pairs(grains(), [this](auto visit) { each_pair_bridge(visit); }, excess);
+  if (full >= 0)
+    stop("the bridges of grain " + std::to_string(atom->tag[full]) + " hold " + words(excess) +
+         " more than was given to them; is the box smaller than two cut-offs?");
+  const double missing = ledger_.audit(grains(), !update->setupflag && update->ntimestep > update->firststep);
+  if (missing != 0.0) error->all(FLERR, ("fix capillary/liquid: " + words(missing) + " of the liquid is missing").c_str());
 }
 
-void FixCapillaryLiquid::settle_walls() {
-  const std::size_t n = walls_.size();
-  if (std::all_of(wall_grants_.begin(), wall_grants_.end(), [](double grant) { return grant == 0.0; })) return;
-  std::vector<double> all(n, 0.0);
-  MPI_Reduce(wall_taken_.data(), all.data(), int(n), MPI_DOUBLE, MPI_SUM, 0, world);
-  MPI_Bcast(all.data(), int(n), MPI_DOUBLE, 0, world);
-  for (std::size_t w = 0; w < n; ++w) walls_[w].pool = capillary::remaining(walls_[w].pool, all[w]);
-  std::fill(wall_taken_.begin(), wall_taken_.end(), 0.0);
+void FixCapillaryLiquid::end_of_step() {
+  ledger_.give_back(broken_, grains());
+  ledger_.reconcile_walls(grains(), [this](int i, std::size_t wall, auto visit) { each_wall_bridge(walls_[wall], i, visit); });
+  ledger_.form(requests_, grains(), [this](const Request &r, const capillary::NewBridge<double> &bridge) {
+    const double rupture = r.force->rupture_distance(r.radius, r.other_radius, bridge.volume);
+    const double size = r.sides.wall ? r.radius : r.radius + r.other_radius;
+    dembark_liggghts::check_reach(neighbor, error, rupture, size, r.primitive_wall);
+    r.bridge[0] = bridge.volume;
+    r.bridge[1] = rupture;
+    *r.imbalance = bridge.imbalance;
+  });
+}
+
+/// Number of all bridges. Collective.
+double FixCapillaryLiquid::count_bridges() const {
+  double mine = 0.0, all = 0.0;
+  each_pair_bridge([&](int, int j, double, double) { mine += j < atom->nlocal ? 1.0 : 0.5; });
+  for (std::size_t w = 0; w < walls_.size(); ++w) {
+    // Between two runs a wall may be gone already.
+    if (modify->find_fix_id(ledger_.walls[w].name.c_str()) != walls_[w].fix) continue;
+    for (int i = 0; i < atom->nlocal; ++i)
+      if (ledger_.row(i)[1 + 2 * w] + ledger_.row(i)[2 + 2 * w] > 0.0) each_wall_bridge(walls_[w], i, [&](double, double) { mine += 1.0; });
+  }
+  MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, world);
+  return all;
+}
+
+double FixCapillaryLiquid::compute_vector(int n) {
+  if (n == 3) return ledger_.lost;
+  if (n == 4) return count_bridges();
+  if (n == 5) return ledger_.added;
+  const capillary::LiquidLedger::Totals now = ledger_.totals(grains());
+  const double held = now.grains + now.bridges + now.walls;
+  const double values[] = {now.grains, now.bridges, now.walls, 0.0, 0.0, 0.0, held, held - ledger_.expected};
+  return values[n];
 }
 
 int FixCapillaryLiquid::pack_comm(int n, int *list, double *buffer, int, int *) {
-  for (int k = 0; k < n; ++k) buffer[k] = grants_[list[k]];
+  for (int k = 0; k < n; ++k) buffer[k] = (*granted_)[list[k]];
   return 1;
 }
 
-void FixCapillaryLiquid::unpack_comm(int n, int first, double *buffer) { std::copy_n(buffer, n, grants_.begin() + first); }
+void FixCapillaryLiquid::unpack_comm(int n, int first, double *buffer) { std::copy_n(buffer, n, granted_->begin() + first); }
 
-double FixCapillaryLiquid::compute_vector(int n) {
-  const Totals &now = totals();
-  const double held = now.grains + now.bridges + now.walls;
-  const double values[] = {now.grains, now.bridges, now.walls, lost_, now.count, added_, held, held - reference_};
-  return values[n];
+void FixCapillaryLiquid::grow_arrays(int n) { ledger_.resize(std::size_t(n)); }
+
+void FixCapillaryLiquid::copy_arrays(int i, int j, int) { std::copy_n(ledger_.row(i), ledger_.row_size(), ledger_.row(j)); }
+
+void FixCapillaryLiquid::set_arrays(int i) { ledger_.clear_row(i); }
+
+int FixCapillaryLiquid::pack_exchange(int i, double *buffer) {
+  std::copy_n(ledger_.row(i), ledger_.row_size(), buffer);
+  return int(ledger_.row_size());
 }
+
+int FixCapillaryLiquid::unpack_exchange(int i, double *buffer) {
+  std::copy_n(buffer, ledger_.row_size(), ledger_.row(i));
+  return int(ledger_.row_size());
+}
+
+int FixCapillaryLiquid::pack_restart(int i, double *buffer) {
+  buffer[0] = size_restart(i);
+  return 1 + pack_exchange(i, buffer + 1);
+}
+
+void FixCapillaryLiquid::unpack_restart(int i, int nth) {
+  const double *from = atom->extra[i];
+  for (int k = 0; k < nth; ++k) from += static_cast<int>(*from);
+  std::copy_n(from + 1, std::min(ledger_.row_size(), static_cast<std::size_t>(*from) - 1), ledger_.row(i));
+}
+
+int FixCapillaryLiquid::size_restart(int) { return 1 + int(ledger_.row_size()); }
+
+int FixCapillaryLiquid::maxsize_restart() { return size_restart(0); }
+
+void FixCapillaryLiquid::write_restart(FILE *file) {
+  if (comm->me != 0) return;
+  const std::vector<double> numbers = ledger_.saved(false);
+  const double count = double(numbers.size());
+  std::string names;
+  for (const capillary::LiquidWall &wall : ledger_.walls) names += wall.name + '\n';
+  const int bytes = int((1 + numbers.size()) * sizeof(double) + names.size() + 1);
+  fwrite(&bytes, sizeof(int), 1, file);
+  fwrite(&count, sizeof(double), 1, file);
+  fwrite(numbers.data(), sizeof(double), numbers.size(), file);
+  fwrite(names.c_str(), 1, names.size() + 1, file);
+}
+
+/// The walls of the file, with what they held; init() finds their fixes. What the arguments say of a wall, but for its liquid, holds.
+void FixCapillaryLiquid::restart(char *buffer) {
+  double count;
+  std::memcpy(&count, buffer, sizeof count);
+  std::vector<double> numbers(static_cast<std::size_t>(count));
+  std::memcpy(numbers.data(), buffer + sizeof count, numbers.size() * sizeof(double));
+  const char *name = buffer + (1 + numbers.size()) * sizeof(double);
+  const std::vector<capillary::LiquidWall> given = ledger_.walls;
+  ledger_.restore(numbers.data(), numbers.size());
+  for (capillary::LiquidWall &wall : ledger_.walls) {
+    const char *const end = std::strchr(name, '\n');
+    wall = {std::string(name, end), wall.pool};
+    name = end + 1;
+  }
+  for (const capillary::LiquidWall &wall : given) {
+    capillary::LiquidWall *const same = ledger_.wall(wall.name);
+    if (same) *same = {wall.name, same->pool, wall.share, wall.part};
+    else ledger_.walls.push_back(wall);
+  }
+  ledger_.resize(std::size_t(atom->nmax));
+}
+
+double FixCapillaryLiquid::memory_usage() { return double((ledger_.row_size() + 2) * std::size_t(atom->nmax) * sizeof(double)); }

@@ -1,36 +1,55 @@
 #include "fix_energy_account.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <type_traits>
 
 #include "atom.h"
+#include "comm.h"
 #include "domain.h"
 #include "error.h"
 #include "fix_gravity.h"
+#include "fix_wall_gran.h"
+#include "force.h"
 #include "modify.h"
 #include "neighbor.h"
+#include "pair_gran.h"
 #include "update.h"
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
-using dembark::contact_part_count;
+using dembark::EnergyBody;
+using dembark::EnergyLedger;
+using dembark::Powers;
 
 namespace {
-
-typedef dembark::Vec3<double> Vec3;
 
 // Sums over the same atoms in another order differ by less.
 constexpr double round_off = 1e-14;
 
-Vec3 vector(const double *v) { return {v[0], v[1], v[2]}; }
+// The sums of ranks, and restart files, are those of its numbers.
+constexpr std::size_t ledger_size = sizeof(EnergyLedger) / sizeof(double);
+static_assert(std::is_trivially_copyable<EnergyLedger>::value && ledger_size * sizeof(double) == sizeof(EnergyLedger), "numbers only");
+
+/// Which model of a pair style or a wall has no parts that are known, or nothing.
+template <class Host>
+std::string unknown_model(Host &host) {
+  if (!host.contact_match("tangential", "finnie_rabinowicz")) return "tangential finnie_rabinowicz";
+  if (!host.contact_match("normal", "hertz") && !host.contact_match("normal", "hooke")) return "model hertz or hooke";
+  if (!host.contact_match("surface", "default")) return "surface default";
+  return "";
+}
+
+bool is(const Fix *fix, const char *style) { return std::strcmp(fix->style, style) == 0; }
+
+dembark::Dofs dofs(const double *along, const double *about) { return {along[0], along[1], along[2], about[0], about[1], about[2]}; }
 
 }  // namespace
 
 FixEnergyAccount::FixEnergyAccount(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg) {
   for (int k = 0; k < modify->nfix; ++k)
-    if (modify->fix[k] != this && std::strcmp(modify->fix[k]->style, style) == 0 && std::strcmp(modify->fix[k]->id, id) != 0)
+    if (modify->fix[k] != this && is(modify->fix[k], style) && std::strcmp(modify->fix[k]->id, id) != 0)
       refuse("there can be one such fix only, and there is fix " + std::string(modify->fix[k]->id));
   if (std::strcmp(arg[1], "all") != 0) refuse("the group must be 'all': each contact has two sides");
   if (narg > 3) refuse("it has no keywords, and there is '" + std::string(arg[3]) + "'");
@@ -54,89 +73,108 @@ void FixEnergyAccount::init() {
   check_motion();
 }
 
+void FixEnergyAccount::check_models() {
+  if (force->newton_pair) refuse("newton must be off: each rank tallies for the grains that it owns");
+  if (force->ftm2v != 1.0 || force->mvv2e != 1.0 || force->nktv2p != 1.0) refuse("units must be si or cgs");
+  if (!atom->sphere_flag || !atom->rmass || atom->superquadric_flag || atom->shapetype_flag)
+    refuse("it accounts for spheres only: atom_style granular");
+  PairGran *const pair = dynamic_cast<PairGran *>(force->pair);
+  if (!pair) refuse("it needs pair_style gran model hertz|hooke tangential finnie_rabinowicz ...");
+  const std::string known = "the parts of the contact forces are known with ", needed = unknown_model(*pair);
+  if (!needed.empty()) refuse(known + needed + " only; the pair style has another model");
+  for (int k = 0; k < modify->nfix; ++k)
+    if (FixWallGran *const wall = dynamic_cast<FixWallGran *>(modify->fix[k])) {
+      const std::string missed = unknown_model(*wall);
+      if (!missed.empty()) refuse(known + missed + " only; fix " + wall->id + " has another model");
+    }
+}
+
+void FixEnergyAccount::check_motion() {
+  moving_ = frozen_ = 0;
+  gravities_.clear();
+  std::vector<Fix *> movers;
+  for (int k = 0; k < modify->nfix; ++k) {
+    Fix *const fix = modify->fix[k];
+    const std::string named = "fix " + std::string(fix->id) + " (" + fix->style + ")";
+    if (std::strncmp(fix->style, "rigid", 5) == 0 || std::strncmp(fix->style, "multisphere", 11) == 0)
+      refuse("it accounts for single grains, and " + named + " moves bodies made of several");
+    if (is(fix, "gravity")) gravities_.push_back(static_cast<FixGravity *>(fix));
+    if (is(fix, "freeze")) frozen_ |= fix->groupbit;
+    if (!fix->time_integrate) continue;
+    if (is(fix, "nve/sphere")) {
+      moving_ |= fix->groupbit;
+      if (k > modify->my_index(this)) refuse("it must come after " + named + ", which changes the velocities");
+    } else if (!is(fix, "move") && !is(fix, "nve/noforce"))
+      refuse(named + " moves atoms; only fix nve/sphere, fix move and fix nve/noforce are accounted for");
+    movers.push_back(fix);
+  }
+  if (!moving_) refuse("no grain follows its forces: it needs fix nve/sphere");
+  for (int i = 0; i < atom->nlocal; ++i) {
+    const Fix *mover = nullptr;
+    for (const Fix *fix : movers) {
+      if (!(atom->mask[i] & fix->groupbit)) continue;
+      if (mover) {
+        const std::string line = "Fix energy/account (id " + std::string(id) + "): atom " + std::to_string(atom->tag[i]) +
+                                 " is moved by both fix " + mover->id + " and fix " + fix->id + "; make their groups disjoint";
+        error->one(FLERR, line.c_str());
+      }
+      mover = fix;
+    }
+  }
+}
+
 void *FixEnergyAccount::extract(const char *name, int &) {
-  return std::strcmp(name, dembark_liggghts::energy_books_name) == 0 ? &books_ : nullptr;
+  return std::strcmp(name, dembark_liggghts::energy_tally_name) == 0 ? &tally_ : nullptr;
 }
 
 /// Driven grains are to the others what walls are.
-bool FixEnergyAccount::follows_forces(int i) const { return (atom->mask[i] & moving_) && !(atom->mask[i] & frozen_); }
+inline dembark::BodyMotion FixEnergyAccount::motion(int i) const {
+  // Moment of inertia as in fix nve/sphere.
+  const double mass = atom->rmass[i], inertia = (domain->dimension == 2 ? 0.5 : 0.4) * mass * atom->radius[i] * atom->radius[i];
+  dembark::BodyMotion grain;
+  grain.mass = {mass, mass, mass, inertia, inertia, inertia};
+  grain.velocity = dofs(atom->v[i], atom->omega[i]);
+  grain.blocked = (atom->mask[i] & moving_) && !(atom->mask[i] & frozen_) ? 0 : EnergyBody::all_blocked;
+  return grain;
+}
 
-/// Moment of inertia over m r^2, as in fix nve/sphere.
-double FixEnergyAccount::shape() const { return domain->dimension == 2 ? 0.5 : 0.4; }
+inline EnergyBody FixEnergyAccount::body(int i) const {
+  EnergyBody grain{motion(i)};
+  dembark::Dofs weight{};
+  for (std::size_t g = 0; g < gravities_.size(); ++g)
+    if (atom->mask[i] & gravities_[g]->groupbit)
+      for (int k = 0; k < 3; ++k) weight[k] += atom->rmass[i] * accelerations_[g][k];
+  grain.set_forces(dofs(atom->f[i], atom->torque[i]), weight);
+  return grain;
+}
 
 /// J, of this rank's grains that follow their forces. In long double, so that the order of the atoms does not show.
 double FixEnergyAccount::kinetic() const {
-  const double c = shape();
   long double sum = 0.0;
   for (int i = 0; i < atom->nlocal; ++i) {
-    if (!follows_forces(i)) continue;
-    const Vec3 v = vector(atom->v[i]), spin = vector(atom->omega[i]);
-    sum += 0.5 * atom->rmass[i] * (dot(v, v) + c * atom->radius[i] * atom->radius[i] * dot(spin, spin));
+    const dembark::BodyMotion grain = motion(i);
+    sum += grain.kinetic(grain.velocity);
   }
   return double(sum);
 }
 
-/// P and Q of the whole forces.
-void FixEnergyAccount::measure_all_forces(double &power, double &rate) const {
-  const double c = shape();
-  power = rate = 0.0;
-  for (int i = 0; i < atom->nlocal; ++i) {
-    if (!follows_forces(i)) continue;
-    const Vec3 force = vector(atom->f[i]), torque = vector(atom->torque[i]);
-    const double mass = atom->rmass[i], inertia = c * mass * atom->radius[i] * atom->radius[i];
-    power += dot(force, vector(atom->v[i])) + dot(torque, vector(atom->omega[i]));
-    rate += dot(force, force) / mass + dot(torque, torque) / inertia;
-  }
-}
-
-/// P and Q of all forces as they are, with the velocities as they are.
+/// Powers of all forces as they are, with the velocities as they are.
 void FixEnergyAccount::measure_powers() {
-  if (books_.size() != std::size_t(atom->nlocal))
+  if (tally_.size() != std::size_t(atom->nlocal))
     error->one(FLERR, "Fix energy/account: atoms came or went between the forces and the end of a step");
-  const double c = shape();
-  std::vector<Vec3> weights(gravities_.size());
-  for (std::size_t g = 0; g < gravities_.size(); ++g) {
-    double acceleration[3];
-    gravities_[g]->get_gravity(acceleration);
-    weights[g] = vector(acceleration);
-  }
-  Works power{}, rate{};
+  now_.now = Powers();
+  accelerations_.resize(gravities_.size());
+  for (std::size_t g = 0; g < gravities_.size(); ++g) gravities_[g]->get_gravity(accelerations_[g].data());
   for (int i = 0; i < atom->nlocal; ++i) {
-    const dembark_liggghts::EnergyBooks::Loads &loads = books_.of(i);
-    const Vec3 v = vector(atom->v[i]), spin = vector(atom->omega[i]);
-    if (!follows_forces(i)) {
-      for (std::size_t p = 0; p < contact_part_count; ++p) {
-        const double taken = dot(loads[p].force, v) + dot(loads[p].torque, spin);
-        power[p] += taken;
-        power[walls] -= taken;
-      }
-      continue;
-    }
-    const double mass = atom->rmass[i], inertia = c * mass * atom->radius[i] * atom->radius[i];
-    const Vec3 push = vector(atom->f[i]) * (1.0 / mass), turn = vector(atom->torque[i]) * (1.0 / inertia);
-    for (std::size_t p = 0; p < contact_part_count; ++p) {
-      power[p] += dot(loads[p].force, v) + dot(loads[p].torque, spin);
-      rate[p] += dot(loads[p].force, push) + dot(loads[p].torque, turn);
-    }
-    for (std::size_t g = 0; g < gravities_.size(); ++g) {
-      if (!(atom->mask[i] & gravities_[g]->groupbit)) continue;
-      power[gravity] += mass * dot(weights[g], v);
-      rate[gravity] += mass * dot(weights[g], push);
-    }
+    const EnergyBody grain = body(i);
+    const dembark_liggghts::EnergyTally::Loads &loads = tally_.of(i);
+    now_.now.add_body(grain);
+    now_.now.add_loads(grain, [&](std::size_t part) { return dembark::dofs(loads[part].force, loads[part].torque); });
   }
-  measure_all_forces(power[all_forces], rate[all_forces]);
-  for (std::size_t p = 0; p < contact_part_count; ++p) {
-    power[p] -= books_.wall_power[p];
-    power[walls] += books_.wall_power[p];
+  for (std::size_t part = 0; part < dembark::contact_part_count; ++part) {
+    now_.now.power[part] -= tally_.wall_power[part];
+    now_.now.power[Powers::walls] += tally_.wall_power[part];
   }
-  now_.power = power;
-  now_.rate = rate;
-}
-
-/// The kick that ended with the velocities of the powers (sign -1), or that begins with them (1).
-void FixEnergyAccount::kick(double sign) {
-  const double half = 0.5 * update->dt, square = sign * 0.5 * half * half;
-  for (std::size_t k = 0; k < works; ++k) now_.work[k] += half * now_.power[k] + square * now_.rate[k];
 }
 
 /// Adds a change (J) to a sum unless it is none but that of the order of summation. Collective.
@@ -148,25 +186,23 @@ void FixEnergyAccount::impose(double change, double of, double &sum) const {
 }
 
 /// What the input script changed before the run: velocities, or the overlaps of contacts. Collective.
-void FixEnergyAccount::take_setup(State &state, bool &begun) const {
+void FixEnergyAccount::take_setup(EnergyLedger &ledger, bool &begun) const {
   const double kinetic_now = kinetic();
   if (begun) {
-    impose(kinetic_now - state.kinetic, kinetic_now + state.kinetic, state.imposed);
-    impose(books_.normal_stored - state.normal_stored, books_.normal_stored + state.normal_stored, state.first_stored);
+    impose(kinetic_now - ledger.kinetic, kinetic_now + ledger.kinetic, ledger.imposed);
+    impose(tally_.normal_stored - ledger.normal_stored, tally_.normal_stored + ledger.normal_stored, ledger.first_stored);
   } else {
-    state.first_kinetic = kinetic_now;
-    state.first_stored = books_.normal_stored;
+    ledger.first_kinetic = kinetic_now;
+    ledger.first_stored = tally_.normal_stored;
   }
   begun = true;
-  state.kinetic = kinetic_now;
-  state.normal_stored = books_.normal_stored;
-  state.tangential_stored = books_.tangential_stored;
+  ledger.kinetic = kinetic_now;
+  ledger.set_stored(tally_.normal_stored, tally_.tangential_stored);
 }
 
 void FixEnergyAccount::setup_pre_force(int) {
-  books_.clear(atom->nlocal);
+  tally_.clear(atom->nlocal);
   fresh_ = true;
-  totalled_ = false;
 }
 
 /// What was changed since the velocities were last looked at, but by no force.
@@ -177,9 +213,9 @@ void FixEnergyAccount::note_changes() {
 }
 
 void FixEnergyAccount::pre_initial_integrate() {
-  double power, rate;
-  measure_all_forces(power, rate);
-  int same = power == now_.power[all_forces] && rate == now_.rate[all_forces];
+  Powers forces;
+  for (int i = 0; i < atom->nlocal; ++i) forces.add_forces(motion(i), dofs(atom->f[i], atom->torque[i]));
+  int same = forces.power[Powers::all] == now_.now.power[Powers::all] && forces.rate[Powers::all] == now_.now.rate[Powers::all];
   if (!fresh_) {
     note_changes();
     if (!same) measure_powers();
@@ -187,7 +223,7 @@ void FixEnergyAccount::pre_initial_integrate() {
   }
   take_setup(now_, begun_);
   if (resumed_) {
-    // The forces may have been put back to those of the restart file after the set-up; then its powers hold, whatever was booked since.
+    // The forces may have been put back to those of the restart file after the set-up; then its powers hold, whatever was tallied since.
     int all = 0;
     MPI_Allreduce(&same, &all, 1, MPI_INT, MPI_MIN, world);
     resumed_ = all;
@@ -197,7 +233,7 @@ void FixEnergyAccount::pre_initial_integrate() {
 }
 
 void FixEnergyAccount::post_integrate() {
-  kick(1.0);
+  now_.kick(0.5 * update->dt, 1);
   kinetic_before_ = kinetic();
 }
 
@@ -206,55 +242,64 @@ void FixEnergyAccount::pre_force(int) {
     const double kinetic_now = kinetic();
     impose(kinetic_now - kinetic_before_, kinetic_now + kinetic_before_, now_.imposed);
   }
-  books_.clear(atom->nlocal);
+  tally_.clear(atom->nlocal);
 }
 
 /// The grains have got their velocities: init() has seen to the order.
 void FixEnergyAccount::final_integrate() {
   measure_powers();
-  kick(-1.0);
+  now_.kick(0.5 * update->dt, -1);
   now_.kinetic = kinetic();
 }
 
 void FixEnergyAccount::end_of_step() {
   note_changes();
-  now_.normal_stored = books_.normal_stored;
-  now_.tangential_stored = books_.tangential_stored;
+  now_.set_stored(tally_.normal_stored, tally_.tangential_stored);
   shown_ = now_;
-  totalled_ = false;
 }
 
-/// Of all ranks.
-const std::array<double, FixEnergyAccount::state_size> &FixEnergyAccount::totals() {
-  if (totalled_) return totals_;
-  State mine = shown_;
+/// The energies in their order, without numerical damping, which LIGGGHTS has not. Collective.
+double FixEnergyAccount::compute_vector(int n) {
+  constexpr int numerical_damping = 4 + int(Powers::walls);
+  if (!begun_ && !fresh_) return 0.0;
+  EnergyLedger mine = shown_, all;
   if (fresh_) {
     mine = now_;
     bool begun = begun_;
     take_setup(mine, begun);
   }
-  MPI_Allreduce(&mine, totals_.data(), int(state_size), MPI_DOUBLE, MPI_SUM, world);
-  totalled_ = !fresh_;
-  return totals_;
+  MPI_Allreduce(&mine, &all, int(ledger_size), MPI_DOUBLE, MPI_SUM, world);
+  return all.energies()[n < numerical_damping ? n : n + 1];
 }
 
-double FixEnergyAccount::compute_vector(int n) {
-  if (!begun_ && !fresh_) return 0.0;
-  State all;
-  std::memcpy(&all, totals().data(), sizeof all);
-  double contacts = 0.0, sizes = 0.0;
-  for (std::size_t k = 0; k < gravity; ++k) {
-    contacts += all.work[k];
-    sizes += std::abs(all.work[k]);
+/// Collective. The sums of each rank by themselves: added up otherwise, they would round otherwise.
+void FixEnergyAccount::write_restart(FILE *file) {
+  const int ranks = comm->nprocs;
+  std::vector<double> all(comm->me == 0 ? std::size_t(ranks) * ledger_size : 0);
+  MPI_Gather(&now_, int(ledger_size), MPI_DOUBLE, all.data(), int(ledger_size), MPI_DOUBLE, 0, world);
+  if (comm->me != 0) return;
+  const double head[] = {double(begun_), double(ranks)};
+  const int bytes = int(sizeof head + all.size() * sizeof(double));
+  fwrite(&bytes, sizeof(int), 1, file);
+  fwrite(head, sizeof head, 1, file);
+  fwrite(all.data(), sizeof(double), all.size(), file);
+}
+
+/// On another number of ranks the first has the sums of all.
+void FixEnergyAccount::restart(char *buffer) {
+  double head[2];
+  std::memcpy(head, buffer, sizeof head);
+  begun_ = head[0] != 0.0;
+  const int ranks = int(head[1]);
+  resumed_ = ranks == comm->nprocs;
+  std::array<double, ledger_size> sum{}, part;
+  for (int r = 0; r < ranks; ++r) {
+    if (resumed_ ? r != comm->me : comm->me != 0) continue;
+    std::memcpy(part.data(), buffer + sizeof head + std::size_t(r) * sizeof part, sizeof part);
+    for (std::size_t k = 0; k < ledger_size; ++k) sum[k] += part[k];
   }
-  const double other = all.work[all_forces] - all.work[gravity] - contacts;
-  const double balance = all.kinetic - all.first_kinetic - all.work[all_forces] - all.imposed;
-  const double scale = all.first_kinetic + sizes + std::abs(all.work[gravity]) + std::abs(other) + std::abs(all.imposed);
-  const double step_error = all.work[0] + all.normal_stored - all.first_stored;
-  const double values[] = {all.kinetic, all.first_kinetic, all.work[gravity],     all.work[0],     all.work[1], all.work[2],
-                           all.work[3], all.work[4],       all.work[5],           all.work[walls], other,       all.imposed,
-                           balance,     all.normal_stored, all.tangential_stored, step_error,      scale};
-  return values[n];
+  std::memcpy(&now_, sum.data(), sizeof now_);
+  shown_ = now_;
 }
 
-double FixEnergyAccount::memory_usage() { return double(books_.size() * sizeof(dembark_liggghts::EnergyBooks::Loads)); }
+double FixEnergyAccount::memory_usage() { return double(tally_.size() * sizeof(dembark_liggghts::EnergyTally::Loads)); }

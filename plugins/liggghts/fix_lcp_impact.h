@@ -1,7 +1,7 @@
 // fix ID group lcp/impact: contact forces between logs, and of logs with walls, from one linear complementarity problem a step.
 //
 // The model is engine-neutral and lies in dembark/impact/; this class carries bodies, forces, walls, restarts and output between
-// LIGGGHTS and the model. It holds no physics.
+// LIGGGHTS and the model. It holds no physics. One rank, the first, has all bodies and solves; the others send atoms and get forces.
 #ifdef FIX_CLASS
 
 FixStyle(lcp/impact,FixLcpImpact)
@@ -11,17 +11,20 @@ FixStyle(lcp/impact,FixLcpImpact)
 #ifndef LMP_FIX_LCP_IMPACT_H
 #define LMP_FIX_LCP_IMPACT_H
 
-#include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "fix.h"
 
+#include "dembark/impact/impact_file.hpp"
+#include "dembark/impact/last_forces.hpp"
+#include "dembark/impact/periodic.hpp"
 #include "dembark/impact/system.hpp"
+#include "dembark/impact/triangles.hpp"
 #include "fix_lcp_impact_mesh.h"
 #include "fix_lcp_impact_options.h"
-#include "fix_lcp_impact_record.h"
 
 namespace LAMMPS_NS {
 
@@ -45,60 +48,56 @@ class FixLcpImpact : public Fix {
 
  private:
   typedef dembark::Vec3<double> Vec;
+  static constexpr int local_columns = 13;
 
-  dembark::impact::Settings settings() const;
-  void build_system();
   void check_order();
   void find_meshes();
-  void open_record();
-  void read_atom(int i, double *row) const;
-  void gather_bodies();
+  void take_time_step();
+  dembark::impact::PeriodicBox box() const;
+  void gather_atoms();
+  void take_bodies();
   void gather_meshes(double dt);
   void find_contacts(double reach, std::vector<dembark::impact::Contact> &contacts);
-  void add_periodic_images(double reach, std::vector<dembark::impact::Body> &bodies, std::vector<int> &origin);
-  double inertia_factor() const;
   void solve(double kick);
   void apply();
-  void find_local_readers();
   bool local_is_read() const;
   void fill_local();
   const std::vector<dembark::impact::ContactResult> &results() const;
-  void take_snapshot();
-  bool same_bodies() const;
-  std::vector<double> pack() const;
+  void keep_end_of_step();
+  void archive(dembark::impact::Archive &);
+  void on_root(const std::function<void()> &work);
   void refuse(const std::string &line);
 
   dembark_liggghts::ImpactOptions options_;
-  std::unique_ptr<dembark::impact::System> system_;
-  dembark::impact::StepReport report_;
-  std::vector<double> restored_;  // state of the model from a restart file, until there is a system
-
-  // All bodies of the group, sorted by tag, the same on every rank; of each own atom its index there.
-  std::vector<dembark::impact::Body> bodies_;
-  std::vector<int> own_atom_, own_body_;
-  std::vector<double> own_row_, all_row_;
-  std::vector<std::size_t> order_;
-  std::vector<Vec> force_, torque_;                      // of the contacts, on bodies_
-  std::vector<dembark::impact::ContactResult> results_;  // of the step of a restart file
-  dembark::impact::PairFinder pairs_;
-
+  int me_;
+  dembark::impact::StepReport report_;            // the same on all ranks
   std::vector<class FixMeshSurface *> mesh_fix_;  // per wall, null for planes and cylinders
   std::vector<dembark_liggghts::ImpactMesh> mesh_;
 
-  // What the forces of the last step were computed for: a set-up that finds it again takes those forces.
+  // Own atoms, in the order in which their rows are gathered, and how many numbers each rank sends.
+  std::vector<int> own_atom_, counts_, offsets_;
+  std::vector<double> own_row_, all_row_;
+
+  // On the first rank: all bodies of the group by number, the row of each, and the forces of the contacts.
+  std::unique_ptr<dembark::impact::System> system_;
+  dembark::impact::PeriodicPairs pairs_;
+  dembark::impact::TriangleFinder triangles_;
+  std::vector<dembark::impact::Body> bodies_;
+  std::vector<std::size_t> order_;
+  std::vector<Vec> force_, torque_;
+  dembark::impact::ImpactFile file_;
+  long long file_kept_;  // bytes, from a restart file; -1: none
+
+  std::vector<dembark::impact::ContactResult> results_;  // of the step of a restart file
+
+  dembark::impact::LastForces last_;
+  bool kept_;  // last_ is that of the last step
   bigint last_step_;
-  std::vector<double> last_bodies_;  // tag, position, velocity, spin at the end of the step
-  std::vector<Vec> last_force_, last_torque_;
   double last_dt_;
   // Time of a step: the engine's own clock does not survive a restart with another time step.
   double clock_time_;
   bigint clock_step_;
-
-  dembark_liggghts::ImpactRecord record_;
-  std::string record_name_;
-  long long record_kept_;  // bytes, from a restart file; -1: none
-  int me_, local_capacity_;
-  bool local_always_;  // something besides dumps may read the local array
+  int local_capacity_;
 };
 
 }  // namespace LAMMPS_NS

@@ -22,6 +22,7 @@
 #include "update.h"
 #include "write_restart.h"
 
+#include "engine_access.h"
 #include "state_files.h"
 
 using namespace LAMMPS_NS;
@@ -29,23 +30,8 @@ using namespace FixConst;
 
 namespace {
 
-constexpr double format = 1.0;
-
-// The slots of mesh contacts are protected; an explicit instantiation may name a protected member.
-struct PartnerCounts {
-  typedef int *FixContactHistory::*type;
-  friend type open(PartnerCounts);
-};
-struct Partners {
-  typedef int **FixContactHistory::*type;
-  friend type open(Partners);
-};
-template <class Tag, typename Tag::type Member>
-struct Reach {
-  friend typename Tag::type open(Tag) { return Member; }
-};
-template struct Reach<PartnerCounts, &FixContactHistory::npartner_>;
-template struct Reach<Partners, &FixContactHistory::partner_>;
+constexpr double format = 2.0;
+constexpr int header = 4;  // length of all, format, step, ranks; then how many numbers each rank has
 
 PairGran *granular_pair(Force *force) { return static_cast<PairGran *>(force->pair_match("gran", 0)); }
 
@@ -91,6 +77,24 @@ std::vector<double> structure(Atom *atom, Force *force, Modify *modify) {
   return {double(atom->nlocal), double(atom->nghost), double(hash >> 32), double(hash & 0xffffffffu)};
 }
 
+struct Saver {
+  std::vector<double> &to;
+  void numbers(const double *from, int count) { to.insert(to.end(), from, from + count); }
+  template <class Integer>
+  void integer(Integer from) {
+    to.push_back(double(from));
+  }
+};
+
+struct Loader {
+  const double *from;
+  void numbers(double *to, int count) { std::copy_n(from, count, to), from += count; }
+  template <class Integer>
+  void integer(Integer &to) {
+    to = static_cast<Integer>(*from++);
+  }
+};
+
 }  // namespace
 
 FixResumeExact::FixResumeExact(LAMMPS *lmp, int narg, char **arg)
@@ -111,7 +115,7 @@ int FixResumeExact::setmask() { return PRE_INITIAL_INTEGRATE | PRE_EXCHANGE | PR
 
 void FixResumeExact::init() {
   if (std::strcmp(update->integrate_style, "verlet") != 0) error->fix_error(FLERR, this, "only run_style verlet is supported");
-  if (!begun_ && state_step_ < 0 && every_ > 0 && comm->me == 0) dembark_liggghts::forget_states(base_);
+  if (!begun_ && state_step_ < 0 && every_ > 0) refuse_other_states();
   begun_ = true;
   set_next();
   const int acting = PRE_FORCE | POST_FORCE | INITIAL_INTEGRATE | FINAL_INTEGRATE;
@@ -120,6 +124,21 @@ void FixResumeExact::init() {
       const std::string line = "it must come after fix " + std::string(modify->fix[i]->id) + ", whose set-up it has to undo";
       error->fix_error(FLERR, this, line.c_str());
     }
+}
+
+/// States of another run would be resumed later in the place of those of this one, for their steps may be higher. Collective.
+void FixResumeExact::refuse_other_states() {
+  long long newest = -1;
+  if (comm->me == 0) {
+    const std::vector<long long> steps = dembark_liggghts::whole_states(base_);
+    if (steps.empty()) dembark_liggghts::delete_broken_states(base_);
+    else newest = steps.front();
+  }
+  MPI_Bcast(&newest, 1, MPI_LONG_LONG, 0, world);
+  if (newest < 0) return;
+  const std::string line = "there is a state of an earlier run, " + dembark_liggghts::state_name(base_, newest) +
+                           "; go on from it by resume_state, move it away, or give the states another name than " + base_;
+  error->fix_error(FLERR, this, line.c_str());
 }
 
 void FixResumeExact::set_next() {
@@ -138,12 +157,13 @@ void FixResumeExact::setup(int) {
   if (state_step_ < 0) return;
   std::string why;
   if (update->ntimestep != state_step_) why = "the run does not begin at the step of the state";
+  else if (!lacking_.empty()) why = lacking_;
   else if (saved_ranks_ != comm->nprocs)
     why = "the state is of " + std::to_string(saved_ranks_) + " ranks, the run has " + std::to_string(comm->nprocs);
   else {
-    int good = !kept_.empty() && fits(kept_.data(), kept_.data() + kept_.size()), all = 0;
+    int good = fits(), all = 0;
     MPI_Allreduce(&good, &all, 1, MPI_INT, MPI_MIN, world);
-    if (all) put_back(kept_.data());
+    if (all) put_back();
     else why = "the atoms or their candidates for contacts are others than in the state";
   }
   // Output of the step of the state was written before the state.
@@ -170,7 +190,8 @@ void FixResumeExact::write_state() {
   if (contact_list(force)) granular_pair(force)->get_fix_history()->pre_exchange();
   std::string part = base_ + ".part";
   WriteRestart(lmp).write(&part[0]);
-  const std::string broken = broken_file(part);
+  std::string broken = broken_file(part);
+  append_parts(part, broken);
   if (comm->me != 0) return;
   for (const std::string &path : outputs_) dembark_liggghts::sync_file(path);
   const std::string wrong = broken.empty() ? dembark_liggghts::keep_state(part, base_, update->ntimestep, comm->procgrid) : broken;
@@ -188,144 +209,147 @@ std::string FixResumeExact::broken_file(const std::string &part) const {
     if (!there || std::fread(&found, sizeof(int), 1, file) != 1) found = -1;
     std::fclose(file);
   }
-  return found == last ? "" : "file " + part + " could not be written whole. No space left on the disk?";
+  return found == last ? "" : dembark_liggghts::not_whole(part);
 }
 
-/// What this rank has to know to go on: structure, order of sorting, forces, histories of pairs, properties, histories of meshes.
+/// What this rank has to know to go on: structure, forces, properties, histories of meshes, histories of pairs.
 void FixResumeExact::save(std::vector<double> &to) const {
-  const int n = atom->nlocal;
-  const std::vector<double> facts = structure(atom, force, modify);
-  to.insert(to.end(), facts.begin(), facts.end());
-  to.push_back(double(atom->nextsort));
-  if (n) {
-    to.insert(to.end(), atom->f[0], atom->f[0] + 3 * n);
-    to.insert(to.end(), atom->torque[0], atom->torque[0] + 3 * n);
-  }
-  if (const NeighList *const list = contact_list(force)) {
-    // Nearly all candidates have no history: only those that have one are kept, by their place.
-    const std::size_t width = granular_pair(force)->dnum();
-    const std::size_t count_at = to.size();
-    to.push_back(0.0);
-    for (int ii = 0; ii < list->inum; ++ii) {
-      const int i = list->ilist[ii], *const flags = list->listgranhistory->firstneigh[i];
-      const double *const histories = list->listgranhistory->firstdouble[i];
-      for (int k = 0; k < list->numneigh[i]; ++k) {
-        const double *const history = histories + width * k;
-        if (!flags[k] && std::all_of(history, history + width, [](double v) { return v == 0.0; })) continue;
-        to[count_at] += 1.0;
-        to.push_back(i);
-        to.push_back(k);
-        to.push_back(flags[k]);
-        to.insert(to.end(), history, history + width);
-      }
+  to = structure(atom, force, modify);
+  Saver out{to};
+  of_atoms(out);
+  const NeighList *const list = contact_list(force);
+  if (!list) return;
+  // Nearly all candidates have no history: only those that have one are kept, by their place.
+  const std::size_t width = granular_pair(force)->dnum();
+  for (int ii = 0; ii < list->inum; ++ii) {
+    const int i = list->ilist[ii], *const flags = list->listgranhistory->firstneigh[i];
+    const double *const histories = list->listgranhistory->firstdouble[i];
+    for (int k = 0; k < list->numneigh[i]; ++k) {
+      const double *const history = histories + width * k;
+      if (!flags[k] && std::all_of(history, history + width, [](double v) { return v == 0.0; })) continue;
+      to.insert(to.end(), {double(i), double(k), double(flags[k])});
+      to.insert(to.end(), history, history + width);
     }
   }
-  for (FixPropertyAtom *property : atom_properties(modify))
-    for (int i = 0; i < n; ++i) {
-      const double *const from = property->array_atom ? property->array_atom[i] : property->vector_atom + i;
-      to.insert(to.end(), from, from + property->get_nvalues());
-    }
-  for (FixContactHistoryMesh *history : mesh_histories(modify)) {
-    const int width = history->get_dnum();
-    for (int i = 0; i < n; ++i) {
-      to.push_back(history->n_partner(i));
-      for (int k = 0; k < history->nneighs(i); ++k) {
-        to.push_back(history->get_partner_idTri(i, k));
-        to.insert(to.end(), history->contacthistory(i, k), history->contacthistory(i, k) + width);
-      }
-    }
-  }
-}
-
-bool FixResumeExact::fits(const double *from, const double *end) const {
-  const std::vector<double> facts = structure(atom, force, modify);
-  return end - from > std::ptrdiff_t(facts.size()) && std::equal(facts.begin(), facts.end(), from);
 }
 
 /// The opposite of save(), for a rank that fits.
-void FixResumeExact::put_back(const double *from) {
-  const int n = atom->nlocal;
-  from += structure(atom, force, modify).size();
-  atom->nextsort = static_cast<bigint>(*from++);
-  if (n) {
-    std::copy(from, from + 3 * n, atom->f[0]);
-    std::copy(from + 3 * n, from + 6 * n, atom->torque[0]);
-    from += 6 * n;
+void FixResumeExact::put_back() {
+  Loader in{kept_.data() + structure(atom, force, modify).size()};
+  of_atoms(in);
+  NeighList *const list = contact_list(force);
+  if (!list) return;
+  const std::size_t width = granular_pair(force)->dnum();
+  for (int ii = 0; ii < list->inum; ++ii) {
+    const int i = list->ilist[ii];
+    std::fill_n(list->listgranhistory->firstneigh[i], list->numneigh[i], 0);
+    std::fill_n(list->listgranhistory->firstdouble[i], width * list->numneigh[i], 0.0);
   }
-  if (NeighList *const list = contact_list(force)) {
-    const std::size_t width = granular_pair(force)->dnum();
-    for (int ii = 0; ii < list->inum; ++ii) {
-      const int i = list->ilist[ii];
-      std::fill_n(list->listgranhistory->firstneigh[i], list->numneigh[i], 0);
-      std::fill_n(list->listgranhistory->firstdouble[i], width * list->numneigh[i], 0.0);
-    }
-    for (std::size_t count = static_cast<std::size_t>(*from++); count > 0; --count) {
-      const int i = static_cast<int>(from[0]), k = static_cast<int>(from[1]);
-      list->listgranhistory->firstneigh[i][k] = static_cast<int>(from[2]);
-      std::copy(from + 3, from + 3 + width, list->listgranhistory->firstdouble[i] + width * k);
-      from += 3 + width;
-    }
-  }
-  for (FixPropertyAtom *property : atom_properties(modify))
-    for (int i = 0; i < n; ++i) {
-      const int width = property->get_nvalues();
-      std::copy(from, from + width, property->array_atom ? property->array_atom[i] : property->vector_atom + i);
-      from += width;
-    }
-  for (FixContactHistoryMesh *history : mesh_histories(modify)) {
-    const int width = history->get_dnum();
-    for (int i = 0; i < n; ++i) {
-      (history->*open(PartnerCounts()))[i] = static_cast<int>(*from++);
-      for (int k = 0; k < history->nneighs(i); ++k) {
-        (history->*open(Partners()))[i][k] = static_cast<int>(*from++);
-        std::copy(from, from + width, history->contacthistory(i, k));
-        from += width;
-      }
-    }
+  for (const double *from = in.from, *const end = kept_.data() + kept_.size(); from < end; from += 3 + width) {
+    const int i = static_cast<int>(from[0]), k = static_cast<int>(from[1]);
+    list->listgranhistory->firstneigh[i][k] = static_cast<int>(from[2]);
+    std::copy_n(from + 3, width, list->listgranhistory->firstdouble[i] + width * k);
   }
 }
 
-/// Collective: the parts of all ranks, one after the other.
+/// Saves or loads what is stored atom by atom.
+template <class Stream>
+void FixResumeExact::of_atoms(Stream &stream) const {
+  const int n = atom->nlocal;
+  stream.integer(atom->nextsort);
+  if (n) stream.numbers(atom->f[0], 3 * n);
+  if (n) stream.numbers(atom->torque[0], 3 * n);
+  for (FixPropertyAtom *property : atom_properties(modify))
+    for (int i = 0; i < n; ++i)
+      stream.numbers(property->array_atom ? property->array_atom[i] : property->vector_atom + i, property->get_nvalues());
+  for (FixContactHistoryMesh *history : mesh_histories(modify))
+    for (int i = 0; i < n; ++i) {
+      stream.integer(dembark_liggghts::partner_counts(*history)[i]);
+      for (int k = 0; k < history->nneighs(i); ++k) {
+        stream.integer(dembark_liggghts::partners(*history)[i][k]);
+        stream.numbers(history->contacthistory(i, k), history->get_dnum());
+      }
+    }
+}
+
+bool FixResumeExact::fits() const {
+  const std::vector<double> facts = structure(atom, force, modify);
+  return kept_.size() > facts.size() && std::equal(facts.begin(), facts.end(), kept_.begin());
+}
+
+/// How long the parts of all ranks are. The engine counts the bytes of a fix in 31 bits, so the parts themselves come after its end of the
+/// file, which it does not read.
 void FixResumeExact::write_restart(FILE *file) {
-  std::vector<double> mine, all;
-  save(mine);
-  int count = int(mine.size());
-  std::vector<int> counts(std::size_t(comm->nprocs), 0), offsets(std::size_t(comm -> nprocs), 0);
-  MPI_Allgather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, world);
-  std::int64_t total = 0;
-  for (std::size_t r = 0; r < counts.size(); ++r) {
-    offsets[r] = int(total);
-    total += counts[r];
-  }
-  const std::int64_t header = 4 + comm->nprocs;
-  if (std::int64_t((total + header) * sizeof(double)) > INT32_MAX) {
-    // The engine counts the bytes of a fix in 31 bits. Without the parts a resumed run is approximate.
-    if (comm->me == 0) error->warning(FLERR, "fix resume/exact: too many atoms for an exact state; a resumed run will be approximate");
-    counts.assign(counts.size(), 0);
-    total = count = 0;
-  }
-  all.resize(comm->me == 0 ? std::size_t(total) : 0);
-  MPI_Gatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), offsets.data(), MPI_DOUBLE, 0, world);
+  save(part_);
+  const double mine = double(part_.size());
+  std::vector<double> numbers(std::size_t(header + comm->nprocs));
+  MPI_Gather(&mine, 1, MPI_DOUBLE, numbers.data() + header, 1, MPI_DOUBLE, 0, world);
   if (comm->me != 0) return;
-  std::vector<double> head = {double(header + total), format, double(update->ntimestep), double(comm->nprocs)};
-  head.insert(head.end(), counts.begin(), counts.end());
-  const int bytes = int((total + header) * sizeof(double));
+  numbers[0] = double(numbers.size());
+  numbers[1] = format;
+  numbers[2] = double(update->ntimestep);
+  numbers[3] = double(comm->nprocs);
+  const int bytes = int(numbers.size() * sizeof(double));
   fwrite(&bytes, sizeof(int), 1, file);
-  fwrite(head.data(), sizeof(double), head.size(), file);
-  fwrite(all.data(), sizeof(double), all.size(), file);
+  fwrite(numbers.data(), sizeof(double), numbers.size(), file);
+}
+
+/// Collective: the parts of all ranks to the end of the file, one after the other; `wrong` (rank 0) tells when that is not possible.
+void FixResumeExact::append_parts(const std::string &path, std::string &wrong) {
+  if (comm->me != 0) {
+    const long long mine = static_cast<long long>(part_.size());
+    MPI_Send(&mine, 1, MPI_LONG_LONG, 0, 0, world);
+    MPI_Send(part_.data(), int(mine), MPI_DOUBLE, 0, 0, world);
+  } else {
+    std::FILE *const file = wrong.empty() ? std::fopen(path.c_str(), "ab") : nullptr;
+    bool whole = file;
+    for (int r = 0; r < comm->nprocs; ++r) {
+      if (r > 0) {
+        long long count = 0;
+        MPI_Recv(&count, 1, MPI_LONG_LONG, r, 0, world, MPI_STATUS_IGNORE);
+        part_.resize(std::size_t(count));
+        MPI_Recv(part_.data(), int(count), MPI_DOUBLE, r, 0, world, MPI_STATUS_IGNORE);
+      }
+      whole = whole && std::fwrite(part_.data(), sizeof(double), part_.size(), file) == part_.size();
+    }
+    if (file && std::fclose(file) != 0) whole = false;
+    if (!whole && wrong.empty()) wrong = dembark_liggghts::not_whole(path);
+  }
+  part_.clear();
+  part_.shrink_to_fit();
+}
+
+/// Collective: this rank's part of the state whose parts are `counts` numbers long. Returns why there is none.
+std::string FixResumeExact::read_parts(const double *counts) {
+  const std::string path = dembark_liggghts::state_that_was_read(base_, update->ntimestep);
+  int whole = 1;
+  if (comm->me == 0) {
+    double total = 0.0;
+    for (int r = 0; r < comm->nprocs; ++r) total += counts[r];
+    std::FILE *const file = std::fopen(path.c_str(), "rb");
+    whole = file && std::fseek(file, -long(total) * long(sizeof(double)), SEEK_END) == 0;
+    std::vector<double> part;
+    for (int r = 0; r < comm->nprocs; ++r) {
+      part.assign(std::size_t(counts[r]), 0.0);
+      whole = whole && std::fread(part.data(), sizeof(double), part.size(), file) == part.size();
+      if (r > 0) MPI_Send(part.data(), int(part.size()), MPI_DOUBLE, r, 0, world);
+      else kept_ = part;
+    }
+    if (file) std::fclose(file);
+  } else {
+    kept_.resize(std::size_t(counts[comm->me]));
+    MPI_Recv(kept_.data(), int(kept_.size()), MPI_DOUBLE, 0, 0, world, MPI_STATUS_IGNORE);
+  }
+  MPI_Bcast(&whole, 1, MPI_INT, 0, world);
+  return whole ? "" : "file " + path + " does not hold the forces and histories of its ranks";
 }
 
 void FixResumeExact::restart(char *buffer) {
   const double *const numbers = reinterpret_cast<const double *>(buffer);
   state_step_ = update->ntimestep;
-  if (numbers[1] == format && static_cast<bigint>(numbers[2]) == update->ntimestep) {
-    saved_ranks_ = static_cast<int>(numbers[3]);
-    if (saved_ranks_ == comm->nprocs) {
-      const double *part = numbers + 4 + saved_ranks_;
-      for (int r = 0; r < comm->me; ++r) part += static_cast<std::ptrdiff_t>(numbers[4 + r]);
-      kept_.assign(part, part + static_cast<std::ptrdiff_t>(numbers[4 + comm->me]));
-    }
-  }
+  saved_ranks_ = static_cast<int>(numbers[3]);
+  if (numbers[1] != format) lacking_ = "the state was written by another version of dembark";
+  else if (static_cast<bigint>(numbers[2]) == update->ntimestep && saved_ranks_ == comm->nprocs) lacking_ = read_parts(numbers + header);
   if (comm->me != 0) return;
   for (const std::string &path : outputs_) {
     const std::string wrong = dembark_liggghts::cut_output(path, update->ntimestep);
@@ -333,4 +357,4 @@ void FixResumeExact::restart(char *buffer) {
   }
 }
 
-double FixResumeExact::memory_usage() { return double(kept_.size() * sizeof(double)); }
+double FixResumeExact::memory_usage() { return double((kept_.size() + part_.size()) * sizeof(double)); }

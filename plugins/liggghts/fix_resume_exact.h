@@ -35,16 +35,23 @@ class FixResumeExact : public Fix {
 
  private:
   void write_state();
+  void refuse_other_states();
   std::string broken_file(const std::string &part) const;
+  void append_parts(const std::string &path, std::string &wrong);
+  std::string read_parts(const double *counts);
   void save(std::vector<double> &to) const;
-  bool fits(const double *from, const double *end) const;
-  void put_back(const double *from);
+  template <class Stream>
+  void of_atoms(Stream &stream) const;
+  bool fits() const;
+  void put_back();
   void set_next();
 
   bigint every_, state_step_;  // the step of the state that the run goes on from, -1: none
   std::string base_;
   std::vector<std::string> outputs_;
   std::vector<double> kept_;  // this rank's part of the state, until it is put back
+  std::vector<double> part_;  // the same of a state that is being written
+  std::string lacking_;       // why there is no part
   int saved_ranks_, sort_frequency_;
   bool begun_;
 };

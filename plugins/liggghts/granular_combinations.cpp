@@ -22,6 +22,7 @@
 #include "fix_wall_gran_base.h"
 
 #include "direct_pair_loop.h"
+#include "engine_access.h"
 #include "mesh_wall.h"
 
 namespace dembark_liggghts {
@@ -59,25 +60,7 @@ std::string available() {
 }
 
 template <class Host>
-using Creator = Host* (*)(LAMMPS*, typename Host::ParentType*, std::int64_t);
-
-// The tables of the factories are private; an explicit instantiation may name a private member.
-template <class Host>
-using Table = std::map<std::pair<std::string, int>, Creator<Host>> Utils::AbstractFactory<Host>::*;
-struct PairTable {
-  typedef Table<PairStyles::IGranularPairStyle> type;
-  friend type table(PairTable);
-};
-struct WallTable {
-  typedef Table<Walls::IGranularWall> type;
-  friend type table(WallTable);
-};
-template <class Tag, typename Tag::type Member>
-struct Reach {
-  friend typename Tag::type table(Tag) { return Member; }
-};
-template struct Reach<PairTable, &Utils::AbstractFactory<PairStyles::IGranularPairStyle>::styleTable>;
-template struct Reach<WallTable, &Utils::AbstractFactory<Walls::IGranularWall>::styleTable>;
+using Creator = typename GranularCreators<Host>::mapped_type;
 
 template <class Host>
 Creator<Host> stock_fallback = nullptr;
@@ -104,7 +87,7 @@ struct PairLoop {
 };
 template <int Cohesion>
 struct PairLoop<GranStyle<HERTZ, TANGENTIAL_FINNIE_RABINOWICZ, Cohesion, ROLLING_OFF, SURFACE_DEFAULT>> {
-  typedef DirectPairLoop<Cohesion> type;
+  typedef DirectPairLoop<GranStyle<HERTZ, TANGENTIAL_FINNIE_RABINOWICZ, Cohesion, ROLLING_OFF, SURFACE_DEFAULT>> type;
 };
 
 template <int Normal, int Tangential, int Cohesion, int Rolling, int Surface>
@@ -115,9 +98,9 @@ void add_combination() {
   Walls::Factory::instance().addStyle("gran", Style::HASHCODE, &create<Walls::IGranularWall, MeshWall<ContactModel<Style>>>);
 }
 
-template <class Host, class Tag, class Factory>
-void guard_fallback(Factory& factory) {
-  Creator<Host>& creator = (factory.*table(Tag()))[{"gran", static_cast<int>(GranStyle<>::HASHCODE)}];
+template <class Host>
+void guard_fallback(GranularCreators<Host>& creators) {
+  Creator<Host>& creator = creators[{"gran", static_cast<int>(GranStyle<>::HASHCODE)}];
   stock_fallback<Host> = creator;
   creator = &fallback_or_refuse<Host>;
 }
@@ -133,8 +116,8 @@ void register_contact_models() {
 #include "granular_combinations_list.h"
 #undef GRAN_MODEL
 
-  guard_fallback<PairStyles::IGranularPairStyle, PairTable>(PairStyles::Factory::instance());
-  guard_fallback<Walls::IGranularWall, WallTable>(Walls::Factory::instance());
+  guard_fallback(pair_loops());
+  guard_fallback(wall_loops());
 }
 
 }  // namespace dembark_liggghts

@@ -6,14 +6,13 @@
 
 #include <csignal>
 #include <cstdio>
-#include <map>
-#include <string>
 
 #include "input.h"
 #include "lammps.h"
 #include "modify.h"
 #include "signal_handling.h"
 
+#include "engine_access.h"
 #include "fix_capillary_liquid.h"
 #include "fix_energy_account.h"
 #include "fix_lcp_impact.h"
@@ -22,24 +21,6 @@
 #include "resume_state.h"
 
 namespace {
-
-// The tables of fix styles and of commands are private; an explicit instantiation may name a private member.
-typedef LAMMPS_NS::Fix* (*FixCreator)(LAMMPS_NS::LAMMPS*, int, char**);
-struct FixTable {
-  typedef std::map<std::string, FixCreator>* LAMMPS_NS::Modify::* type;
-  friend type table(FixTable);
-};
-typedef void (*CommandCreator)(LAMMPS_NS::LAMMPS*, int, char**);
-struct CommandTable {
-  typedef std::map<std::string, CommandCreator>* LAMMPS_NS::Input::* type;
-  friend type table(CommandTable);
-};
-template <class Tag, typename Tag::type Member>
-struct Reach {
-  friend typename Tag::type table(Tag) { return Member; }
-};
-template struct Reach<FixTable, &LAMMPS_NS::Modify::fix_map>;
-template struct Reach<CommandTable, &LAMMPS_NS::Input::command_map>;
 
 template <class Style>
 LAMMPS_NS::Fix* create_fix(LAMMPS_NS::LAMMPS* lammps, int narg, char** arg) {
@@ -63,12 +44,12 @@ int main(int argc, char** argv) {
   LAMMPS_NS::LAMMPS* lammps = new LAMMPS_NS::LAMMPS(argc, argv, MPI_COMM_WORLD);
   // The library enters its own combinations in this constructor; ours come after, where its fallback can be replaced.
   dembark_liggghts::register_contact_models();
-  std::map<std::string, FixCreator>& fixes = *(lammps->modify->*table(FixTable()));
+  auto& fixes = dembark_liggghts::fix_styles(*lammps->modify);
   fixes["capillary/liquid"] = &create_fix<LAMMPS_NS::FixCapillaryLiquid>;
   fixes["energy/account"] = &create_fix<LAMMPS_NS::FixEnergyAccount>;
   fixes["lcp/impact"] = &create_fix<LAMMPS_NS::FixLcpImpact>;
   fixes["resume/exact"] = &create_fix<LAMMPS_NS::FixResumeExact>;
-  (*(lammps->input->*table(CommandTable())))["resume_state"] = [](LAMMPS_NS::LAMMPS* host, int narg, char** arg) {
+  dembark_liggghts::commands(*lammps->input)["resume_state"] = [](LAMMPS_NS::LAMMPS* host, int narg, char** arg) {
     LAMMPS_NS::ResumeState(host).command(narg, arg);
   };
   lammps->input->file();

@@ -1,144 +1,99 @@
-// Walls of liggghts-dembark's combinations: on a mesh, a grain has a contact where its distance to the surface has a minimum.
+// Walls of liggghts-dembark's combinations: on a mesh, a grain has the contacts of dembark/surface.
 //
 // The engine computes a contact with each triangle that a grain overlaps. Of coplanar triangles it keeps one and hands its history on.
-// Beside an edge between triangles that are not coplanar it counts the edge as well as the face (twice the force, as far as
-// sqrt(2 R overlap) from a convex edge), a slight groove counts both faces, and a contact that goes over any such edge begins anew.
-// Here the edge or corner of a face that the grain touches beside it has no force, nor has the farther face of a slight groove, and the
-// history moves along.
+// Beside an edge between triangles that are not coplanar it counts the edge as well as the face, a slight groove counts both faces, and a
+// contact that goes over any such edge begins anew. Here those contacts alone have a force that are minima of the distance to the surface,
+// and the history moves along.
 #ifndef DEMBARK_MESH_WALL_H
 #define DEMBARK_MESH_WALL_H
 
-#include <cmath>
+#include <algorithm>
 #include <cstdint>
+#include <stdexcept>
 #include <vector>
 
 #include "atom.h"
+#include "error.h"
 #include "fix_contact_history_mesh.h"
 #include "fix_mesh_surface.h"
 #include "fix_wall_gran_base.h"
-#include "tri_mesh.h"
+#include "neighbor.h"
+#include "update.h"
 
-#include "dembark/vec3.hpp"
+#include "dembark/surface/surface_contacts.hpp"
+#include "mesh_triangles.h"
 
 namespace dembark_liggghts {
-
-/// The triangles of one mesh around one grain.
-class MeshAround {
-  typedef dembark::Vec3<double> Vec3;
-  LAMMPS_NS::TriMesh& mesh_;
-  int grain_;
-  double radius_;
-  double* centre_;
-  std::vector<int>& visited_;
-
-  static constexpr int face = 7;             // the engine's sign of a closest point inside a triangle
-  static constexpr double smooth = 0.99875;  // cos(0.05 rad): planes at a smaller angle make one smooth surface
-  static constexpr double reach = 0.06;      // of the radius: how far from an edge a sphere can touch both sides of such a groove
-
-  struct Closest {
-    Vec3 point;
-    double distance;
-    int sign;
-  };
-
-  Closest closest(int triangle, double* to) const {
-    double delta[3] = {}, weight[3];
-    int sign = 0;
-    const double distance = mesh_.resolveTriSphereContactBary(grain_, triangle, 0.0, to, delta, weight, sign, false);
-    return {{to[0] + delta[0], to[1] + delta[1], to[2] + delta[2]}, distance, sign};
-  }
-
-  Vec3 normal(int triangle) const {
-    double n[3];
-    mesh_.surfaceNorm(triangle, n);
-    return {n[0], n[1], n[2]};
-  }
-
-  /// Calls `visit(local index)` for the edge neighbours of a triangle that this rank has, all images.
-  template <class Visit>
-  void neighbours(int triangle, Visit visit) const {
-    for (int k = 0; k < mesh_.nNeighs(triangle); ++k) {
-      const int id = mesh_.neighFaces(triangle, k);
-      for (int image = 0; image < mesh_.map_size(id); ++image) {
-        const int other = mesh_.map(id, image);
-        if (other >= 0) visit(other);
-      }
-    }
-  }
-
- public:
-  MeshAround(LAMMPS_NS::TriMesh& mesh, int grain, double radius, double* centre, std::vector<int>& work)
-      : mesh_(mesh), grain_(grain), radius_(radius), centre_(centre), visited_(work) {}
-
-  /// The triangle that has the contact in place of this one, or itself: the closest point of a triangle is none of the surface when
-  /// another triangle there is nearer, and a slight groove is touched on its nearer side only.
-  int better(int triangle) const {
-    const Closest mine = closest(triangle, centre_);
-    const Vec3 own = normal(triangle);
-    double point[3] = {mine.point.x, mine.point.y, mine.point.z};
-    int best = triangle;
-    double distance = INFINITY;
-    visited_.assign(1, triangle);
-    for (std::size_t next = 0; next < visited_.size(); ++next)
-      neighbours(visited_[next], [&](int other) {
-        for (const int known : visited_)
-          if (known == other) return;
-        const double apart = closest(other, point).distance;
-        if (apart > reach * radius_) return;
-        visited_.push_back(other);
-        const Closest there = closest(other, centre_);
-        bool nearer;
-        if (mine.sign != face) nearer = apart < 1e-6 * radius_ && (there.sign == face || there.distance < mine.distance * (1.0 - 1e-13));
-        else
-          nearer = there.sign == face && std::abs(dot(own, normal(other))) >= smooth &&
-                   !mesh_.areCoplanarNodeNeighs(mesh_.id(triangle), mesh_.id(other)) &&
-                   (there.distance < mine.distance || (there.distance == mine.distance && mesh_.id(other) < mesh_.id(triangle)));
-        if (nearer && there.distance < distance) best = other, distance = there.distance;
-      });
-    return best;
-  }
-
-  /// Whether the contact that was on triangle `from` is on triangle `to` now.
-  bool moved(int from, int to) const {
-    int now = from;
-    for (int step = 0; step < 16; ++step) {
-      const int next = better(now);
-      if (next == now) break;
-      now = next;
-    }
-    const Vec3 apart = closest(now, centre_).point - closest(to, centre_).point;
-    return norm(apart) < 1e-6 * radius_;
-  }
-};
 
 /// The engine's `Walls::Granular<Models>`, with mended meshes.
 template <class Models>
 class MeshWall : public LIGGGHTS::Walls::Granular<Models> {
   typedef LIGGGHTS::Walls::Granular<Models> Stock;
-  LAMMPS_NS::LAMMPS* lmp_;
-  std::vector<int> work_;
+  typedef LAMMPS_NS::FixContactHistoryMesh Histories;
 
-  static bool empty(const double* history, int count) {
-    for (int k = 0; k < count; ++k)
-      if (history[k] != 0.0) return false;
-    return true;
+  /// The triangles of a mesh that this rank knows, by their local index.
+  struct Surface {
+    LAMMPS_NS::TriMesh* mesh;
+    LAMMPS_NS::bigint when;
+    std::vector<dembark::Triangle> triangles;
+    dembark::SurfaceContacts contacts;
+  };
+
+  LAMMPS_NS::LAMMPS* lmp_;
+  std::vector<Surface> surfaces_;
+
+  /// As the mesh is now: the engine numbers it anew with the neighbour lists, and moves it in any step.
+  const dembark::SurfaceContacts& surface_of(LAMMPS_NS::TriMesh& mesh) {
+    auto found = std::find_if(surfaces_.begin(), surfaces_.end(), [&mesh](const Surface& s) { return s.mesh == &mesh; });
+    // Planes that form an angle of less than 0.05 rad are one smooth surface.
+    if (found == surfaces_.end()) found = surfaces_.insert(found, {&mesh, -1, {}, dembark::SurfaceContacts(0.05, 1e-6)});
+    const bool moves = mesh.isMoving() || mesh.isDeforming();
+    const LAMMPS_NS::bigint now = moves ? lmp_->update->ntimestep : lmp_->neighbor->lastcall;
+    const std::size_t count = std::size_t(mesh.sizeLocal() + mesh.sizeGhost());
+    if (found->when != now || found->triangles.size() != count) {
+      found->triangles.resize(count);
+      for (std::size_t i = 0; i < count; ++i) found->triangles[i] = triangle_of(mesh, int(i));
+      try {
+        found->contacts.update(found->triangles);
+      } catch (const std::invalid_argument& e) {
+        lmp_->error->one(FLERR, (std::string("mesh ") + mesh.mesh_id() + ": " + e.what()).c_str());
+      }
+      found->when = now;
+    }
+    return found->contacts;
   }
 
-  /// A contact that begins takes over the history of the one that the grain had at a triangle beside it and has no more.
-  void inherit(const MeshAround& around, LAMMPS_NS::FixContactHistoryMesh& contacts, LAMMPS_NS::TriMesh& mesh, int grain, int triangle,
-               double* history) const {
-    const int count = contacts.get_dnum();
-    for (int k = 0; k < contacts.nneighs(grain); ++k) {
-      const int id = contacts.partner(grain, k);
+  /// Whether the engine computes a contact with triangle `other` in a step in which it does so with `triangle`: it leaves out edges that
+  /// are not active, and a face beside which another one of its plane has a contact already.
+  static bool computed(LAMMPS_NS::TriMesh& mesh, const Histories* histories, int grain, double* centre, int triangle, int other) {
+    double delta[3], weight[3];
+    int sign = 0;
+    if (mesh.resolveTriSphereContactBary(grain, other, 0.0, centre, delta, weight, sign) >= LARGE_TRIMESH) return false;
+    constexpr int face = 7;
+    if (!histories || sign != face || !mesh.areCoplanarNodeNeighs(mesh.id(triangle), mesh.id(other))) return true;
+    for (int k = 0; k < histories->nneighs(grain); ++k)
+      if (histories->get_partner_idTri(grain, k) == mesh.id(other)) return true;
+    return false;
+  }
+
+  /// A contact that begins takes over the history of the one that the grain had on a triangle from which it came.
+  static void inherit(const dembark::SurfaceContacts& surface, Histories& histories, LAMMPS_NS::TriMesh& mesh, int grain,
+                      const dembark::Vec3<double>& centre, double radius, int triangle, int owner, double* history) {
+    const int count = histories.get_dnum();
+    const auto empty = [count](const double* h) { return std::all_of(h, h + count, [](double x) { return x == 0.0; }); };
+    if (!empty(history)) return;
+    for (int k = 0; k < histories.nneighs(grain); ++k) {
+      const int id = histories.get_partner_idTri(grain, k);
       if (id < 0 || id == mesh.id(triangle)) continue;
-      double* const old = contacts.contacthistory(grain, k);
-      const int other = mesh.map(id, 0);
-      if (other < 0 || empty(old, count) || !around.moved(other, triangle)) continue;
-      for (int n = 0; n < count; ++n) {
-        history[n] = old[n];
-        old[n] = 0.0;
+      double* const old = histories.contacthistory(grain, k);
+      if (empty(old)) continue;
+      for (int image = 0; image < mesh.map_size(id); ++image) {
+        const int from = mesh.map(id, image);
+        if (from < 0 || surface.follow(from, centre, radius) != owner) continue;
+        std::copy(old, old + count, history);
+        std::fill(old, old + count, 0.0);
+        return;
       }
-      return;
     }
   }
 
@@ -149,12 +104,14 @@ class MeshWall : public LIGGGHTS::Walls::Granular<Models> {
                      LAMMPS_NS::FixMeshSurface* fix = nullptr, int number = 0, LAMMPS_NS::TriMesh* mesh = nullptr,
                      int triangle = 0) override {
     if (mesh && !lmp_->atom->shapetype_flag && !lmp_->atom->superquadric_flag) {
-      const int grain = contact.i;
-      const MeshAround around(*mesh, grain, contact.radi, lmp_->atom->x[grain], work_);
-      if (around.better(triangle) != triangle) return;
-      LAMMPS_NS::FixContactHistoryMesh* const contacts = fix->contactHistory();
-      if (contacts && contact.contact_history && empty(contact.contact_history, contacts->get_dnum()))
-        inherit(around, *contacts, *mesh, grain, triangle, contact.contact_history);
+      double* const x = lmp_->atom->x[contact.i];
+      const dembark::Vec3<double> centre{x[0], x[1], x[2]};
+      const dembark::SurfaceContacts& surface = surface_of(*mesh);
+      const int owner = surface.follow(triangle, centre, contact.radi);
+      Histories* const histories = fix->contactHistory();
+      if (owner != triangle && computed(*mesh, histories, contact.i, x, triangle, owner)) return;
+      if (histories && contact.contact_history)
+        inherit(surface, *histories, *mesh, contact.i, centre, contact.radi, triangle, owner, contact.contact_history);
     }
     Stock::compute_force(wall, contact, touching, velocity, fix, number, mesh, triangle);
   }

@@ -3,6 +3,7 @@
 #define DEMBARK_MODEL_PROPERTIES_H
 
 #include <string>
+#include <vector>
 
 #include "atom.h"
 #include "error.h"
@@ -10,9 +11,26 @@
 #include "modify.h"
 #include "property_registry.h"
 
+#include "dembark/contact.hpp"
+
 namespace dembark_liggghts {
 
-/// One property of the engine. A missing one without default, a wrong shape or an asymmetric pair table ends the run with one line.
+/// One value a pair of types. Types go from 1 to types().
+template <class Value>
+class PairTable {
+  int row_ = 1;
+  std::vector<Value> values_;
+
+ public:
+  PairTable() = default;
+  explicit PairTable(int types) : row_(types + 1), values_(std::size_t(row_) * row_) {}
+  int types() const { return row_ - 1; }
+  Value& operator()(int i, int j) { return values_[std::size_t(i * row_ + j)]; }
+  const Value& operator()(int i, int j) const { return values_[std::size_t(i * row_ + j)]; }
+};
+
+/// Properties of the engine for one model. A missing one without default, a wrong shape or an asymmetric pair table ends the run with one
+/// line.
 class PropertyReader {
   LAMMPS_NS::LAMMPS* lmp_;
   LAMMPS_NS::Modify* modify_;
@@ -24,16 +42,14 @@ class PropertyReader {
     return modify_->find_fix_property(name, "property/global", shape, n, m, model_.c_str(), false);
   }
 
-  LAMMPS_NS::FixPropertyGlobal* find(const char* name, const char* shape, bool required) {
+  LAMMPS_NS::FixPropertyGlobal* find(const char* name, const std::string& shape, bool required) const {
     // The engine's look-up accepts a scalar only with length 0 and otherwise checks the length.
-    const int n = std::string(shape) == "scalar" ? 0 : types_;
-    const int m = std::string(shape) == "peratomtypepair" ? types_ : 0;
-    LAMMPS_NS::Fix* fix = look_up(name, shape, n, m);
-    if (fix) return static_cast<LAMMPS_NS::FixPropertyGlobal*>(fix);
+    const int n = shape == "scalar" ? 0 : types_, m = shape == "peratomtypepair" ? types_ : 0;
+    if (LAMMPS_NS::Fix* const fix = look_up(name, shape.c_str(), n, m)) return static_cast<LAMMPS_NS::FixPropertyGlobal*>(fix);
     // One that is there in another form is a mistake, also where none is needed.
     std::string other;
     for (const char* form : {"scalar", "peratomtype", "peratomtypepair"})
-      if (std::string(form) != shape && look_up(name, form, 0, 0)) other = form;
+      if (form != shape && look_up(name, form, 0, 0)) other = form;
     if (!required && other.empty()) return nullptr;
     const std::string values = n == 0   ? "VALUE"
                                : m == 0 ? "VALUE (one a type)"
@@ -50,25 +66,25 @@ class PropertyReader {
 
   int types() const { return types_; }
 
-  void fail(const std::string& what) { error_->all(FLERR, (model_ + ": " + what).c_str()); }
+  void fail(const std::string& what) const { error_->all(FLERR, (model_ + ": " + what).c_str()); }
 
   /// Whether a table of pairs of types is there.
-  bool given(const char* name) { return find(name, "peratomtypepair", false) != nullptr; }
+  bool given(const char* name) const { return find(name, "peratomtypepair", false); }
 
-  double scalar(const char* name) { return find(name, "scalar", true)->compute_scalar(); }
-  double scalar(const char* name, double otherwise) {
-    LAMMPS_NS::FixPropertyGlobal* fix = find(name, "scalar", false);
+  double scalar(const char* name) const { return find(name, "scalar", true)->compute_scalar(); }
+  double scalar(const char* name, double otherwise) const {
+    LAMMPS_NS::FixPropertyGlobal* const fix = find(name, "scalar", false);
     return fix ? fix->compute_scalar() : otherwise;
   }
-  double per_type(const char* name, int type) { return find(name, "peratomtype", true)->compute_vector(type - 1); }
-  double per_pair(const char* name, int i, int j) { return symmetric(find(name, "peratomtypepair", true), name, i, j); }
-  double per_pair(const char* name, int i, int j, double otherwise) {
-    LAMMPS_NS::FixPropertyGlobal* fix = find(name, "peratomtypepair", false);
+  double per_type(const char* name, int type) const { return find(name, "peratomtype", true)->compute_vector(type - 1); }
+  double per_pair(const char* name, int i, int j) const { return symmetric(find(name, "peratomtypepair", true), name, i, j); }
+  double per_pair(const char* name, int i, int j, double otherwise) const {
+    LAMMPS_NS::FixPropertyGlobal* const fix = find(name, "peratomtypepair", false);
     return fix ? symmetric(fix, name, i, j) : otherwise;
   }
 
  private:
-  double symmetric(LAMMPS_NS::FixPropertyGlobal* fix, const char* name, int i, int j) {
+  double symmetric(LAMMPS_NS::FixPropertyGlobal* fix, const char* name, int i, int j) const {
     const double value = fix->compute_array(i - 1, j - 1);
     if (value != fix->compute_array(j - 1, i - 1))
       fail(std::string(name) + " differs between types " + std::to_string(i) + "-" + std::to_string(j) + " and " + std::to_string(j) + "-" +
@@ -76,6 +92,50 @@ class PropertyReader {
     return value;
   }
 };
+
+/// The friction laws of all pairs of types.
+inline PairTable<dembark::FinnieRabinowicz> read_friction(const PropertyReader& read, dembark::Presliding presliding) {
+  PairTable<dembark::FinnieRabinowicz> laws(read.types());
+  for (int i = 1; i <= read.types(); ++i)
+    for (int j = 1; j <= read.types(); ++j) {
+      dembark::FinnieRabinowicz& law = laws(i, j);
+      law.static_friction = read.per_pair("staticFriction", i, j);
+      law.kinetic_friction = read.per_pair("kineticFriction", i, j);
+      law.critical_slip_distance = read.per_pair("criticalSlipDistance", i, j);
+      law.interface_shear_strength = read.per_pair("interfaceShearStrength", i, j, dembark::unlimited_strength);
+      law.healing_time = read.scalar("healingTime", 0.0);
+      law.presliding = presliding;
+      if (law.error()) read.fail(std::string(law.error()) + " (types " + std::to_string(i) + "-" + std::to_string(j) + ")");
+    }
+  return laws;
+}
+
+/// The liquids of all pairs of types. `carried`: bridges take their volume from the grains, none is given.
+inline PairTable<dembark::Liquid> read_liquids(const PropertyReader& read, dembark::capillary::Model model, bool viscous, bool carried) {
+  dembark::Liquid same;
+  same.surface_tension = read.scalar("surfaceTension");
+  if (!(same.surface_tension >= 0.0 && same.surface_tension < INFINITY)) read.fail("surfaceTension (N/m) must be >= 0 and finite");
+  same.viscous.viscosity = viscous ? read.scalar("liquidViscosity") : read.scalar("liquidViscosity", 0.0);
+  if (!viscous && same.viscous.viscosity != 0.0)
+    read.fail("liquidViscosity is given, but viscous forces are off; write 'viscous_liquid on' after the models, or leave it out");
+  if (viscous) same.viscous.minimum_gap = read.scalar("minimumGap");
+  if (const char* wrong = same.viscous.error()) read.fail(std::string("liquidViscosity, minimumGap: ") + wrong);
+  PairTable<dembark::Liquid> liquids(read.types());
+  for (int i = 1; i <= read.types(); ++i)
+    for (int j = 1; j <= read.types(); ++j) {
+      dembark::Liquid& liquid = liquids(i, j) = same;
+      const std::string pair = std::to_string(i) + "-" + std::to_string(j);
+      if (!carried) liquid.bridge_volume = read.per_pair("bridgeVolume", i, j);
+      if (!(liquid.bridge_volume >= 0.0 && liquid.bridge_volume < INFINITY))
+        read.fail("bridgeVolume (m^3) must be >= 0 and finite (types " + pair + ")");
+      const double angle = 0.5 * (read.per_type("contactAngle", i) + read.per_type("contactAngle", j));
+      if (!(angle >= 0.0 && angle <= 0.5 * dembark::pi))
+        read.fail("contactAngle is in radians (stock models take degrees) and must lie in 0...pi/2; the mean of types " +
+                  std::to_string(i) + " and " + std::to_string(j) + " is " + std::to_string(angle));
+      liquid.force = &dembark::capillary::shared_bridge_force(model, angle);
+    }
+  return liquids;
+}
 
 }  // namespace dembark_liggghts
 

@@ -1,6 +1,6 @@
 // One step of the pairs of spheres under Hertz's law, Finnie-Rabinowicz friction and capillary bridges, computed in packs of contacts
-// with the widest vectors that the processor has. What the loop needs of the engine comes as bare arrays: the file is compiled once for
-// each instruction set, and nothing that is compiled for a newer processor may be shared with other files.
+// with the widest vectors that the processor has. What the loop needs of the engine comes as bare arrays, so that pair_packs.hpp can be
+// compiled once for each instruction set; this file includes nothing, so that all that the loop inlines is compiled for the same one.
 #ifndef DEMBARK_PAIR_PACKS_H
 #define DEMBARK_PAIR_PACKS_H
 
@@ -24,13 +24,12 @@ struct PairBlock {
   alignas(64) int grain[room], partner[room], kind[room];  // pairs with a force
   int* flags[room];
   double* history[room];
-  alignas(64) double force[room][4], moment[room][4];  // force (on the first) and its lever arm on the first; moment and arm on the second
 };
 
 /// A contact whose lane is left to the scalar law.
 struct FrictionInput {
-  double normal[3], spin[3], velocity[3];
-  double normal_force, stiffness, damping, radius_overlap;
+  double normal[3], velocity[3];
+  double twist, normal_force, stiffness, damping, area;
 };
 
 struct PairStep {
@@ -49,27 +48,28 @@ struct PairStep {
   int touching_flags, own_flags;
   const PairLaw* laws;  // one a pair of types, row by row
   int types;            // in a row; with 2, only the pair 1-1 is there
-  double dt, reach_squared;
+  double dt;
   bool limit_force, tangential_damping, pack_friction;  // the last: false leaves all friction to the scalar law
   int frozen;                                           // group bit
   void* caller;
   // Scalar friction of pair k, on the first grain; its state is stored there.
   void (*friction)(void* caller, const PairBlock& block, int k, const FrictionInput& input, double* force);
-  // Pull of the bridges of pairs first ... first + count - 1, or nullptr without liquid. A gap <= 0 touches.
+  // Pull of the bridges of pairs first ... first + count - 1, or nullptr without liquid.
   void (*bridges)(void* caller, const PairBlock& block, int first, int count, const double* gap, double* pull);
 };
 
+/// The loop with packs of the type `P`.
+template <class P>
+void pair_packs(const PairStep& step, PairBlock& block);
+
 typedef void PairPacks(const PairStep& step, PairBlock& block);
-
-PairPacks pair_packs_baseline;
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define DEMBARK_PAIR_PACKS_X86 1
-PairPacks pair_packs_avx2, pair_packs_avx512;
-#endif
-
 /// The one for this processor, or a narrower one: the environment variable DEMBARK_LANES may hold 2, 4 or 8.
 PairPacks* choose_pair_packs();
 
 }  // namespace dembark_liggghts
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define DEMBARK_PAIR_PACKS_X86 1
+#endif
 
 #endif

@@ -1,10 +1,11 @@
 #include <cmath>
+#include <type_traits>
 
 #include "pair_packs.h"
 #ifdef DEMBARK_PAIR_PACKS_X86
 #include <immintrin.h>
 #pragma GCC target("avx2")
-#define DEMBARK_LANES 4
-#define PAIR_PACKS pair_packs_avx2
 #include "pair_packs.hpp"
+
+template void dembark_liggghts::pair_packs<dembark::Pack<4, dembark::Avx2>>(const PairStep&, PairBlock&);
 #endif

@@ -1,10 +1,11 @@
 #include <cmath>
+#include <type_traits>
 
 #include "pair_packs.h"
 #ifdef DEMBARK_PAIR_PACKS_X86
 #include <immintrin.h>
 #pragma GCC target("avx512f,avx512dq,avx512vl,avx512bw,avx2,prefer-vector-width=512")
-#define DEMBARK_LANES 8
-#define PAIR_PACKS pair_packs_avx512
 #include "pair_packs.hpp"
+
+template void dembark_liggghts::pair_packs<dembark::Pack<8, dembark::Avx512>>(const PairStep&, PairBlock&);
 #endif

@@ -1,6 +1,3 @@
-#include <cmath>
-
-#include "pair_packs.h"
-#define DEMBARK_LANES 2
-#define PAIR_PACKS pair_packs_baseline
 #include "pair_packs.hpp"
+
+template void dembark_liggghts::pair_packs<dembark::Pack<2>>(const PairStep&, PairBlock&);

@@ -35,6 +35,7 @@ void ResumeState::command(int narg, char **arg) {
   int *const wanted = comm->user_procgrid;
   if (grid[0] * grid[1] * grid[2] == comm->nprocs && !wanted[0] && !wanted[1] && !wanted[2]) std::copy(grid, grid + 3, wanted);
   std::string name = dembark_liggghts::state_name(arg[0], step);
+  dembark_liggghts::name_state_that_is_read(name);
   char *words[] = {&name[0]};
   ReadRestart(lmp).command(1, words);
 }

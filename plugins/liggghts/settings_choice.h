@@ -1,28 +1,13 @@
 // A keyword with named values for the contact models of LIGGGHTS, e.g. `presliding linear|exponential`.
-//
-// Stock LIGGGHTS lets a model register on/off and numeric keywords only; the table it keeps them in is private. An explicit
-// instantiation may name a private member (C++17 [temp.spec]/6), which reaches it without a change of LIGGGHTS.
 #ifndef DEMBARK_SETTINGS_CHOICE_H
 #define DEMBARK_SETTINGS_CHOICE_H
 
-#include <map>
 #include <string>
 #include <vector>
 
-#include "settings.h"
+#include "engine_access.h"
 
 namespace dembark_liggghts {
-
-struct SettingTable {
-  typedef std::map<std::string, Setting*> Settings::* type;
-  friend type member(SettingTable);
-};
-
-template <class Tag, typename Tag::type Member>
-struct Reach {
-  friend typename Tag::type member(Tag) { return Member; }
-};
-template struct Reach<SettingTable, &Settings::settings>;
 
 class ChoiceSetting : public EnumSetting<int> {
   std::string choices_;
@@ -43,7 +28,7 @@ class ChoiceSetting : public EnumSetting<int> {
 
 /// Register keyword `name`; `target` gets the index of the chosen value, at once that of the default `values[0]`.
 inline void register_choice(Settings& settings, const std::string& name, int& target, const std::vector<std::string>& values) {
-  Setting*& slot = (settings.*member(SettingTable()))[name];
+  Setting*& slot = keywords(settings)[name];
   if (!slot) slot = new ChoiceSetting(name, values);
   ChoiceSetting* setting = static_cast<ChoiceSetting*>(slot);
   setting->registerTarget(target);

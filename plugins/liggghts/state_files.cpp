@@ -20,6 +20,7 @@ namespace {
 
 const std::string suffix = ".restart", mark_suffix = ".crc";
 constexpr std::size_t kept_states = 2;
+std::string read_state;
 
 struct Close {
   void operator()(std::FILE* f) const { std::fclose(f); }
@@ -170,9 +171,18 @@ std::string keep_state(const std::string& part, const std::string& base, long lo
   return "";
 }
 
-void forget_states(const std::string& base) {
-  for (const long long step : all_states(base)) delete_state(base, step);
+void delete_broken_states(const std::string& base) {
+  for (const long long step : all_states(base))
+    if (!whole(state_name(base, step))) delete_state(base, step);
 }
+
+void name_state_that_is_read(const std::string& path) { read_state = path; }
+
+std::string state_that_was_read(const std::string& base, long long step) {
+  return read_state.empty() ? state_name(base, step) : read_state;
+}
+
+std::string not_whole(const std::string& path) { return "file " + path + " could not be written whole. No space left on the disk?"; }
 
 std::string cut_output(const std::string& path, long long step) {
   std::fflush(nullptr);  // of whatever stream writes to the file

@@ -21,8 +21,16 @@ bool processor_grid(const std::string& state, int (&grid)[3]);
 /// Make the finished file `part` to the state of `step`, mark it, and delete all but the last two. What went wrong, or nothing.
 std::string keep_state(const std::string& part, const std::string& base, long long step, const int (&grid)[3]);
 
-/// Delete all states: those of another run, which begins anew in the same folder.
-void forget_states(const std::string& base);
+/// Delete the states that are not whole.
+void delete_broken_states(const std::string& base);
+
+/// The state that this process reads, for the fixes that are made afterwards; `state_that_was_read` is the one of `step` at `base` when
+/// none was named.
+void name_state_that_is_read(const std::string& path);
+std::string state_that_was_read(const std::string& base, long long step);
+
+/// The line about a file that ends too early.
+std::string not_whole(const std::string& path);
 
 /// Cut `path` after the last frame (of a dump) or row (of a table that begins with the step) at or before `step`. What went wrong, or
 /// nothing. A file that does not exist is left alone.

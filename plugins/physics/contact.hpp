@@ -1,6 +1,8 @@
-// One whole contact: kinematics, normal force, Finnie-Rabinowicz friction and liquid bridge, for two spheres or a sphere and a
-// wall. YADE and Python call this; LIGGGHTS does the kinematics and the normal force itself, with the same formulas, and calls the
-// laws one by one.
+// One whole contact: kinematics, normal force, Finnie-Rabinowicz friction and liquid bridge, for two spheres or a sphere and a wall.
+//
+// contact_step() is the contact as YADE and Python have it. An engine that computes contacts model by model (LIGGGHTS), or many at once,
+// calls the stages that it is made of: surface_motion(), hertz() or hooke() and adjusted(), contact_friction(), bridge_step() and
+// bridge_resistance(), assemble().
 //
 // Conventions: the unit normal points from body 2 to body 1; forces are those on body 1. A wall is body 2 with an infinite radius
 // and an infinite mass; its velocity is that of its surface at the contact. Lever arms reach to the middle of the overlap,
@@ -26,6 +28,11 @@ struct Liquid {
   double surface_tension = 0.0;                   ///< N/m
   double bridge_volume = 0.0;                     ///< m^3, of each bridge that forms
   capillary::ViscousLiquid viscous{};
+
+  /// Largest time step (s) with which a bridge between these bodies can be integrated.
+  double stable_time_step(double effective_radius, double effective_mass) const {
+    return viscous.on() ? capillary::viscous_time_step(viscous, 2.0 * effective_radius, effective_mass) : INFINITY;
+  }
 };
 
 struct ContactParameters {
@@ -36,6 +43,12 @@ struct ContactParameters {
   bool limit_force = false;  ///< no attraction by damping: F >= 0
   FinnieRabinowicz friction{};
   Liquid liquid{};
+
+  /// The normal law, as it is without the switches above.
+  NormalResponse<double> respond(double effective_radius, double effective_mass, double overlap, double normal_velocity) const {
+    if (normal_law == NormalLaw::hertz) return hertz(elasticity, effective_radius, effective_mass, overlap, normal_velocity);
+    return hooke(HookeParameters(elasticity, characteristic_velocity), effective_radius, effective_mass, overlap, normal_velocity);
+  }
 };
 
 /// What an engine stores per contact, from touching to the end of contact and bridge.
@@ -53,95 +66,102 @@ struct ContactBodies {
   Vec3<double> angular_velocity_1{}, angular_velocity_2{};
   double radius_1 = 0.0, radius_2 = INFINITY;
   double mass_1 = 0.0, mass_2 = INFINITY;
+
+  double effective_radius() const { return reduced(radius_1, radius_2); }
+  double effective_mass() const { return reduced(mass_1, mass_2); }
 };
 
 struct ContactForce {
-  bool interacting = false;             ///< touching, or held by a bridge: the engine has to keep the contact
-  Vec3<double> normal{};                ///< unit, from 2 to 1
-  double overlap = 0.0;                 ///< m, negative = gap
-  double normal_force = 0.0;            ///< N, repulsive force of the normal law, without the bridge
-  double capillary_force = 0.0;         ///< N, positive = attractive
-  Vec3<double> tangential{};            ///< N, on body 1, friction
-  double viscous_normal = 0.0;          ///< N, of the liquid, on body 1 along the normal
-  Vec3<double> viscous_tangential{};    ///< N, of the liquid, on body 1
-  Vec3<double> force{};                 ///< N, on body 1, everything; body 2 gets its negative
-  Vec3<double> torque_1{}, torque_2{};  ///< N m
+  bool interacting = false;                                   ///< touching, or held by a bridge: the engine has to keep the contact
+  Vec3<double> normal{};                                      ///< unit, from 2 to 1
+  double overlap = 0.0;                                       ///< m, negative = gap
+  double normal_force = 0.0;                                  ///< N, repulsive force of the normal law, without the bridge
+  double capillary_force = 0.0;                               ///< N, positive = attractive
+  Vec3<double> tangential{};                                  ///< N, on body 1, friction
+  double normal_stiffness = 0.0, tangential_stiffness = 0.0;  ///< N/m, of the springs at this overlap; 0 apart
+  double viscous_normal = 0.0;                                ///< N, of the liquid, on body 1 along the normal
+  Vec3<double> viscous_tangential{};                          ///< N, of the liquid, on body 1
+  Vec3<double> force{};                                       ///< N, on body 1, everything; body 2 gets its negative
+  Vec3<double> torque_1{}, torque_2{};                        ///< N m
 };
 
-/// Motion of body 1 against body 2 at the contact.
-struct RelativeMotion {
-  double normal_velocity = 0.0;        ///< m/s, > 0 when parting
-  Vec3<double> tangential_velocity{};  ///< m/s, of the surfaces
-  double arm_1 = 0.0, arm_2 = 0.0;     ///< m, from the centres to the middle of overlap or gap; 0 for a wall
-};
+typedef SurfaceMotion<double> RelativeMotion;
 
 inline RelativeMotion relative_motion(const ContactBodies& b, const Vec3<double>& normal, double overlap) {
   const double arm_1 = b.radius_1 - 0.5 * overlap, arm_2 = std::isinf(b.radius_2) ? 0.0 : b.radius_2 - 0.5 * overlap;
-  const ContactMotion<double> motion =
-      contact_motion(normal, b.velocity_1 - b.velocity_2, arm_1 * b.angular_velocity_1 + arm_2 * b.angular_velocity_2);
-  return {motion.normal, motion.tangential, arm_1, arm_2};
+  return surface_motion(normal, b.velocity_1 - b.velocity_2, arm_1, b.angular_velocity_1, arm_2, b.angular_velocity_2);
+}
+
+/// Friction of touching surfaces (N, on body 1): the spring turns with the pair by `twist` (rad, of contact_twist), then it sticks or
+/// slips.
+inline Vec3<double> contact_friction(const FinnieRabinowicz& law, const Vec3<double>& normal, double twist,
+                                     const NormalResponse<double>& response, const Vec3<double>& velocity, double dt,
+                                     FrictionState<double>& state) {
+  state.displacement = rotate_to_plane(state.displacement, normal, twist);
+  return friction_step(law, response.force, response.tangential_stiffness, response.tangential_damping, response.contact_area, velocity, dt,
+                       state);
+}
+
+/// Attraction (N) of the bridge between spheres of these radii (m; infinite = a wall): it forms at the touch, holds on over the gap (m, < 0
+/// = overlap) and ruptures beyond its distance. `volume` (m^3, 0 = no bridge) and `rupture_distance` (m) are its state.
+inline double bridge_step(const Liquid& liquid, double radius_1, double radius_2, double gap, bool touching, double& volume,
+                          double& rupture_distance) {
+  if (!(volume > 0.0)) {
+    if (!touching || !liquid.force || !(liquid.bridge_volume > 0.0)) return 0.0;
+    volume = liquid.bridge_volume;
+    rupture_distance = liquid.force->rupture_distance(radius_1, radius_2, volume);
+  }
+  if (liquid.force && !(gap > rupture_distance)) return liquid.force->force(radius_1, radius_2, gap, volume, liquid.surface_tension);
+  volume = rupture_distance = 0.0;
+  return 0.0;
+}
+
+/// What the liquid of a bridge of `volume` (m^3) resists with, into `out`.
+inline void bridge_resistance(const Liquid& liquid, const ContactBodies& b, double volume, const RelativeMotion& motion,
+                              ContactForce& out) {
+  const auto resistance = capillary::viscous_resistance(liquid.viscous, 2.0 * b.effective_radius(), -out.overlap, volume);
+  out.viscous_normal = -resistance.normal * motion.normal_velocity;
+  out.viscous_tangential = -resistance.tangential * motion.tangential_velocity;
+}
+
+/// Forces along the surface turn the bodies, those along the normal do not.
+inline void assemble(const RelativeMotion& motion, ContactForce& out) {
+  const Vec3<double> along_surface = out.tangential + out.viscous_tangential, moment = cross(out.normal, along_surface);
+  out.torque_1 = -motion.arm_1 * moment;
+  out.torque_2 = -motion.arm_2 * moment;
+  out.force = (out.normal_force - out.capillary_force + out.viscous_normal) * out.normal + along_surface;
 }
 
 /// One step of one contact. `dt` in s. With `update` false (the set-up of a run) forces are those of the present state, which
 /// stays as it is.
 inline ContactForce contact_step(const ContactParameters& p, const ContactBodies& b, double dt, ContactState& stored, bool update = true) {
   ContactForce out;
-  const bool wall = std::isinf(b.radius_2);
   const double distance = norm(b.separation);
-  out.overlap = b.radius_1 + (wall ? 0.0 : b.radius_2) - distance;
+  out.overlap = b.radius_1 + (std::isinf(b.radius_2) ? 0.0 : b.radius_2) - distance;
   // Coincident centres have no direction; any will do to drive them apart.
   out.normal = distance > 0.0 ? b.separation * (1.0 / distance) : Vec3<double>{0.0, 0.0, 1.0};
 
   ContactState scratch = stored;
   ContactState& state = update ? stored : scratch;
   const bool touching = out.overlap > 0.0;
-  const double bridge_radius = 2.0 * reduced(b.radius_1, b.radius_2);
-
-  if (!p.liquid.force) state.bridge_volume = state.rupture_distance = 0.0;  // the liquid was switched off
-  else if (touching || state.bridge_volume > 0.0) {
-    if (!(state.bridge_volume > 0.0) && p.liquid.bridge_volume > 0.0) {
-      state.bridge_volume = p.liquid.bridge_volume;
-      state.rupture_distance = p.liquid.force->rupture_distance(b.radius_1, b.radius_2, state.bridge_volume);
-    }
-    if (state.bridge_volume > 0.0) {
-      if (-out.overlap > state.rupture_distance) state.bridge_volume = state.rupture_distance = 0.0;
-      else out.capillary_force = p.liquid.force->force(b.radius_1, b.radius_2, -out.overlap, state.bridge_volume, p.liquid.surface_tension);
-    }
-  }
-
+  out.capillary_force = bridge_step(p.liquid, b.radius_1, b.radius_2, -out.overlap, touching, state.bridge_volume, state.rupture_distance);
   const bool viscous = p.liquid.viscous.on() && state.bridge_volume > 0.0;
   RelativeMotion motion;
   if (touching || viscous) motion = relative_motion(b, out.normal, out.overlap);
-
-  if (viscous) {
-    const auto resistance = capillary::viscous_resistance(p.liquid.viscous, bridge_radius, -out.overlap, state.bridge_volume);
-    out.viscous_normal = -resistance.normal * motion.normal_velocity;
-    out.viscous_tangential = -resistance.tangential * motion.tangential_velocity;
-  }
+  if (viscous) bridge_resistance(p.liquid, b, state.bridge_volume, motion, out);
 
   if (touching) {
-    const double effective_radius = reduced(b.radius_1, b.radius_2), effective_mass = reduced(b.mass_1, b.mass_2);
-    NormalResponse<double> response = p.normal_law == NormalLaw::hertz
-                                          ? hertz(p.elasticity, effective_radius, effective_mass, out.overlap, motion.normal_velocity)
-                                          : hooke(HookeParameters(p.elasticity, p.characteristic_velocity), effective_radius,
-                                                  effective_mass, out.overlap, motion.normal_velocity);
-    if (p.limit_force && response.force < 0.0) response.force = 0.0;
+    const NormalResponse<double> response = adjusted(
+        p.respond(b.effective_radius(), b.effective_mass(), out.overlap, motion.normal_velocity), p.limit_force, p.tangential_damping);
+    const double step = update ? dt : 0.0, twist = contact_twist(out.normal, b.angular_velocity_1, b.angular_velocity_2, step);
     out.normal_force = response.force;
-
-    const double step = update ? dt : 0.0;
-    const double twist = 0.5 * dot(b.angular_velocity_1 + b.angular_velocity_2, out.normal) * step;
-    state.friction.displacement = rotate_to_plane(state.friction.displacement, out.normal, twist);
-    out.tangential =
-        friction_step(p.friction, response.force, response.tangential_stiffness, p.tangential_damping ? response.tangential_damping : 0.0,
-                      response.contact_area, motion.tangential_velocity, step, state.friction);
+    out.normal_stiffness = response.normal_stiffness;
+    out.tangential_stiffness = response.tangential_stiffness;
+    out.tangential = contact_friction(p.friction, out.normal, twist, response, motion.tangential_velocity, step, state.friction);
   } else {
     state.friction = {};
   }
-
-  const Vec3<double> along_surface = out.tangential + out.viscous_tangential, moment = cross(out.normal, along_surface);
-  out.torque_1 = -motion.arm_1 * moment;
-  out.torque_2 = -motion.arm_2 * moment;
-  out.force = (out.normal_force - out.capillary_force + out.viscous_normal) * out.normal + along_surface;
+  assemble(motion, out);
   out.interacting = touching || state.bridge_volume > 0.0;
   return out;
 }

@@ -54,54 +54,24 @@ inline void split_touching(ContactParts& parts, const Vec3<double>& normal, doub
   parts.tangential_stored = 0.5 * stiffness * dot(displacement, displacement);
 }
 
+/// What the liquid of a bridge does.
+inline void split_bridge(ContactParts& parts, const ContactForce& force) {
+  parts[ContactPart::capillary] = -force.capillary_force * force.normal;
+  parts[ContactPart::liquid_viscous] = force.viscous_normal * force.normal + force.viscous_tangential;
+}
+
 /// The parts of `force`, which `contact_step` has returned when it left `displacement` (xi). Of the bodies only radii and masses count.
 inline ContactParts contact_parts(const ContactParameters& p, const ContactBodies& bodies, const ContactForce& force,
                                   const Vec3<double>& displacement) {
   ContactParts parts;
-  parts[ContactPart::capillary] = -force.capillary_force * force.normal;
-  parts[ContactPart::liquid_viscous] = force.viscous_normal * force.normal + force.viscous_tangential;
+  split_bridge(parts, force);
   if (!(force.overlap > 0.0)) return parts;
 
-  const double effective_radius = reduced(bodies.radius_1, bodies.radius_2), effective_mass = reduced(bodies.mass_1, bodies.mass_2);
-  const bool is_hertz = p.normal_law == NormalLaw::hertz;
   // At rest there is no damping: what is left of the law is its spring.
-  const NormalResponse<double> spring =
-      is_hertz ? hertz(p.elasticity, effective_radius, effective_mass, force.overlap, 0.0)
-               : hooke(HookeParameters(p.elasticity, p.characteristic_velocity), effective_radius, effective_mass, force.overlap, 0.0);
-  split_touching(parts, force.normal, force.overlap, spring.force, is_hertz ? 1.5 : 1.0, force.normal_force, spring.tangential_stiffness,
-                 force.tangential, displacement);
+  const NormalResponse<double> spring = p.respond(bodies.effective_radius(), bodies.effective_mass(), force.overlap, 0.0);
+  split_touching(parts, force.normal, force.overlap, spring.force, p.normal_law == NormalLaw::hertz ? 1.5 : 1.0, force.normal_force,
+                 spring.tangential_stiffness, force.tangential, displacement);
   return parts;
-}
-
-struct ContactEnergies {
-  double normal_stored = 0.0;       ///< J, as in ContactParts
-  double tangential_stored = 0.0;   ///< J
-  double normal_elastic = 0.0;      ///< W, power of the parts of the force on both bodies together
-  double normal_viscous = 0.0;      ///< W
-  double tangential_elastic = 0.0;  ///< W
-  double tangential_viscous = 0.0;  ///< W
-  double capillary = 0.0;           ///< W
-  double liquid_viscous = 0.0;      ///< W
-
-  double power() const { return normal_elastic + normal_viscous + tangential_elastic + tangential_viscous + capillary + liquid_viscous; }
-};
-
-/// Energies of a contact of which `contact_step` has returned `force` and left `displacement` (xi). `mean` are the bodies at the same
-/// positions, with the velocities V(n) of (1).
-inline ContactEnergies contact_energies(const ContactParameters& p, const ContactBodies& mean, const ContactForce& force,
-                                        const Vec3<double>& displacement) {
-  const ContactParts parts = contact_parts(p, mean, force, displacement);
-  const RelativeMotion motion = relative_motion(mean, force.normal, force.overlap);
-  const Vec3<double> velocity = motion.normal_velocity * force.normal + motion.tangential_velocity;
-  const auto power = [&](ContactPart part) { return dot(parts[part], velocity); };
-  return {parts.normal_stored,
-          parts.tangential_stored,
-          power(ContactPart::normal_elastic),
-          power(ContactPart::normal_viscous),
-          power(ContactPart::tangential_elastic),
-          power(ContactPart::tangential_viscous),
-          power(ContactPart::capillary),
-          power(ContactPart::liquid_viscous)};
 }
 
 }  // namespace dembark

@@ -50,6 +50,7 @@ struct NormalResponse {
   Real tangential_stiffness;  ///< k_t, N/m
   Real tangential_damping;    ///< gamma_t, N s/m
   Real contact_area;          ///< pi R* delta, m^2: the apparent area of the Hertz contact
+  Real normal_stiffness;      ///< S_n or k_n, N/m: what the spring's force grows with the overlap
 };
 
 /// beta = ln e / sqrt(ln^2 e + pi^2), in (-1, 0].
@@ -91,7 +92,7 @@ DEMBARK_HOT NormalResponse<Real> hertz(const Parameters& p, Real effective_radiu
   const Real k_t = 8.0 * p.effective_shear_modulus * root;
   const auto damping = -2.0 * sqrt_five_sixths * p.damping;
   return {4.0 / 3.0 * p.effective_youngs_modulus * root * overlap - damping * sqrt(stiffness * effective_mass) * normal_velocity, k_t,
-          damping * sqrt(k_t * effective_mass), pi * effective_radius * overlap};
+          damping * sqrt(k_t * effective_mass), pi * effective_radius * overlap, stiffness};
 }
 
 template <class Real>
@@ -103,7 +104,15 @@ inline NormalResponse<Real> hooke(const HookeParameters& p, Real effective_radiu
   const Real k_n = 16.0 / 15.0 * rigidity *
                    pow(15.0 * effective_mass * p.characteristic_velocity * p.characteristic_velocity / (16.0 * rigidity), Real(0.2));
   const Real damping = -2.0 * p.damping * sqrt(effective_mass * k_n);
-  return {k_n * overlap - damping * normal_velocity, k_n, damping, pi * effective_radius * overlap};
+  return {k_n * overlap - damping * normal_velocity, k_n, damping, pi * effective_radius * overlap, k_n};
+}
+
+/// A response without what the user switched off: attraction by damping, or tangential damping.
+template <class Real>
+DEMBARK_HOT NormalResponse<Real> adjusted(NormalResponse<Real> response, bool limit_force, bool tangential_damping) {
+  if (limit_force) response.force = select(response.force < 0.0, Real(0.0), response.force);
+  if (!tangential_damping) response.tangential_damping = 0.0;
+  return response;
 }
 
 }  // namespace dembark

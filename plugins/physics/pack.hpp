@@ -3,9 +3,12 @@
 // in each lane, so that a lane gets the bits that the scalar law gives.
 //
 // N is 2, 4 or 8. The vector extensions of GCC and Clang do the rest; where the processor has narrower vectors the compiler splits.
+// A pack names the instruction set that its code is compiled for: code for a newer processor is of types of its own, so that no other
+// part of the program can come by it.
 #pragma once
 
 #include <cmath>
+#include <type_traits>
 
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -14,6 +17,10 @@
 #include "vec3.hpp"  // DEMBARK_HOT
 
 namespace dembark {
+
+struct Portable {};  ///< what every processor has that the program runs on
+struct Avx2 {};
+struct Avx512 {};  ///< F, DQ, VL and BW
 
 namespace detail {
 
@@ -38,7 +45,7 @@ struct Vectors<8> {
 }  // namespace detail
 
 /// A truth value in each lane: all bits or none.
-template <int N>
+template <int N, class Set = Portable>
 struct Mask {
   typedef typename detail::Vectors<N>::Truths Lanes;
   Lanes lanes;
@@ -49,9 +56,10 @@ struct Mask {
   DEMBARK_HOT friend Mask operator!(const Mask& a) { return {~a.lanes}; }
 };
 
-template <int N>
+template <int N, class Set = Portable>
 struct Pack {
   static constexpr int size = N;
+  typedef Set InstructionSet;
   typedef typename detail::Vectors<N>::Doubles Lanes;
   Lanes lanes;
 
@@ -86,50 +94,43 @@ struct Pack {
   DEMBARK_HOT friend Pack operator*(const Pack& a, const Pack& b) { return a.lanes * b.lanes; }
   DEMBARK_HOT friend Pack operator/(const Pack& a, const Pack& b) { return a.lanes / b.lanes; }
   DEMBARK_HOT friend Pack operator-(const Pack& a) { return -a.lanes; }
-  DEMBARK_HOT friend Mask<N> operator<(const Pack& a, const Pack& b) { return {a.lanes < b.lanes}; }
-  DEMBARK_HOT friend Mask<N> operator>(const Pack& a, const Pack& b) { return {a.lanes > b.lanes}; }
+  DEMBARK_HOT friend Mask<N, Set> operator<(const Pack& a, const Pack& b) { return {a.lanes < b.lanes}; }
+  DEMBARK_HOT friend Mask<N, Set> operator>(const Pack& a, const Pack& b) { return {a.lanes > b.lanes}; }
 };
 
-template <int N>
-DEMBARK_HOT Pack<N> sqrt(const Pack<N>& a) {
-#if DEMBARK_LANES == 8
-  if constexpr (N == 8) return typename Pack<N>::Lanes(_mm512_maskz_sqrt_pd(0xFF, __m512d(a.lanes)));
-#endif
-#if DEMBARK_LANES == 4
-  if constexpr (N == 4) return typename Pack<N>::Lanes(_mm256_sqrt_pd(__m256d(a.lanes)));
-#endif
+template <int N, class Set>
+DEMBARK_HOT Pack<N, Set> sqrt(const Pack<N, Set>& a) {
 #if defined(__x86_64__)
-  if constexpr (N == 2) return typename Pack<N>::Lanes(_mm_sqrt_pd(__m128d(a.lanes)));
+  typedef typename Pack<N, Set>::Lanes Lanes;
+  if constexpr (std::is_same_v<Set, Avx512> && N == 8) return Lanes(_mm512_maskz_sqrt_pd(0xFF, __m512d(a.lanes)));
+  else if constexpr (std::is_same_v<Set, Avx2> && N == 4) return Lanes(_mm256_sqrt_pd(__m256d(a.lanes)));
+  else if constexpr (N == 2) return Lanes(_mm_sqrt_pd(__m128d(a.lanes)));
 #endif
-  Pack<N> root;
+  Pack<N, Set> root;
   for (int k = 0; k < N; ++k) root.lanes[k] = std::sqrt(a.lanes[k]);
   return root;
 }
 
 /// `yes` where the mask holds, else `no`.
-template <int N>
-DEMBARK_HOT Pack<N> select(const Mask<N>& mask, const Pack<N>& yes, const Pack<N>& no) {
-  return typename Pack<N>::Lanes(mask.lanes ? yes.lanes : no.lanes);
+template <int N, class Set>
+DEMBARK_HOT Pack<N, Set> select(const Mask<N, Set>& mask, const Pack<N, Set>& yes, const Pack<N, Set>& no) {
+  return typename Pack<N, Set>::Lanes(mask.lanes ? yes.lanes : no.lanes);
 }
 
 /// The lanes in which the mask holds, as bits.
-template <int N>
-DEMBARK_HOT unsigned bits(const Mask<N>& mask) {
-  unsigned found = 0;
-#if DEMBARK_LANES == 8
-  if constexpr (N == 8) return _mm512_movepi64_mask(__m512i(mask.lanes));
-#endif
-#if DEMBARK_LANES == 4
-  if constexpr (N == 4) return _mm256_movemask_pd(__m256d(mask.lanes));
-#endif
+template <int N, class Set>
+DEMBARK_HOT unsigned bits(const Mask<N, Set>& mask) {
 #if defined(__x86_64__)
-  if constexpr (N == 2) return _mm_movemask_pd(__m128d(mask.lanes));
+  if constexpr (std::is_same_v<Set, Avx512> && N == 8) return _mm512_movepi64_mask(__m512i(mask.lanes));
+  else if constexpr (std::is_same_v<Set, Avx2> && N == 4) return _mm256_movemask_pd(__m256d(mask.lanes));
+  else if constexpr (N == 2) return _mm_movemask_pd(__m128d(mask.lanes));
 #endif
+  unsigned found = 0;
   for (int k = 0; k < N; ++k) found |= unsigned(mask.lanes[k] != 0) << k;
   return found;
 }
-template <int N>
-DEMBARK_HOT bool any(const Mask<N>& mask) {
+template <int N, class Set>
+DEMBARK_HOT bool any(const Mask<N, Set>& mask) {
   return bits(mask) != 0;
 }
 

@@ -34,9 +34,6 @@ nb::object numpy(const std::vector<double>& values, std::initializer_list<std::s
 Vec3<double> vector(const Table& t, std::size_t row, std::size_t at) { return {t(row, at), t(row, at + 1), t(row, at + 2)}; }
 void append(std::vector<double>& out, const Vec3<double>& v) { out.insert(out.end(), {v.x, v.y, v.z}); }
 
-/// Number of a body, or -1, -2, ... of the first, second, ... wall.
-double shown(std::int64_t key) { return key < 0 ? -1.0 - double(wall_number(key)) : double(key); }
-
 /// bodies, a row each: mass, inertia, radius, material, then position, velocity, spin, force, torque.
 std::vector<Body> bodies_of(const Table& t) {
   std::vector<Body> bodies(t.shape(0));
@@ -80,9 +77,9 @@ void sample(Scene& scene, const StepReport& r, const std::vector<std::int64_t>& 
   for (const Body& b : scene.bodies()) append(h.position, b.position);
   for (const auto& v : scene.velocity()) append(h.velocity, v);
   for (const auto& w : scene.spin()) append(h.spin, w);
-  h.report.insert(h.report.end(), {double(r.contacts), double(r.active), double(r.impacts_begun), r.peak_force, r.impulse_sum,
-                                   r.dissipated_energy, r.elastic_energy, double(r.pivots), double(r.block_steps), double(r.pivots_total),
-                                   r.certificate, r.worst_certificate, r.peak_force_so_far, scene.kinetic_energy_of_half_step()});
+  const auto values = r.values();
+  h.report.insert(h.report.end(), values.begin(), values.end());
+  h.report.push_back(scene.kinetic_energy_of_half_step());
   const auto& contacts = scene.system().contacts();
   for (std::size_t k = 0; k < left.size(); ++k) {
     double force = 0.0;
@@ -129,9 +126,9 @@ void bind_impact(nb::module_& m) {
              for (std::int64_t i = 0; i <= steps; ++i) {
                const StepReport& r = scene.forces();
                for (const Impact& f : scene.system().take_finished()) {
-                 impacts.insert(impacts.end(),
-                                {double(f.a), shown(f.b), f.time, f.duration, f.peak_force, f.impulse, f.relative_speed, f.dissipated});
-                 append(impacts, f.place);
+                 impacts.insert(impacts.end(), {double(f.a), double(shown_id(f.b)), f.time, f.duration, f.peak_force, f.impulse,
+                                                f.relative_speed, f.dissipated});
+                 append(impacts, f.point);
                }
                if (i % every == 0 || i == steps) sample(scene, r, left, right, h);
                if (i < steps) scene.advance();
@@ -142,16 +139,16 @@ void bind_impact(nb::module_& m) {
                                    numpy(h.spin, {samples, n, 3}), numpy(h.report, {samples, 14}), numpy(h.column, {samples, left.size()}),
                                    numpy(impacts, {impacts.size() / 11, 11}));
            })
-      // Rows: a, b, gap, N, D, tangential, normal, place.
+      // Rows: a, b, gap, N, D, tangential, normal, point.
       .def("contacts",
            [](const Scene& scene) {
              std::vector<double> out;
              const auto& contacts = scene.system().contacts();
              for (const ContactResult& c : contacts) {
-               out.insert(out.end(), {double(c.key_a), shown(c.key_b), c.gap, c.normal_force, c.opening});
+               out.insert(out.end(), {double(c.key_a), double(shown_id(c.key_b)), c.gap, c.normal_force, c.deformed_gap});
                append(out, c.tangential);
                append(out, c.normal);
-               append(out, c.place);
+               append(out, c.point);
              }
              return numpy(out, {contacts.size(), 14});
            })

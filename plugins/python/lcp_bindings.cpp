@@ -41,7 +41,7 @@ nb::ndarray<nb::numpy, double, nb::ndim<1>> numpy(const Eigen::VectorXd& v) {
 
 nb::tuple tuple_of(const LcpResult& r) {
   const LcpCertificate& c = r.certificate;
-  return nb::make_tuple(numpy(r.z), numpy(r.w), r.pivots, r.block_steps, r.islands, r.guarded,
+  return nb::make_tuple(numpy(r.z), numpy(r.w), r.pivots, r.block_steps, r.islands, r.used_fallback,
                         nb::make_tuple(c.z_violation, c.w_violation, c.complementarity), r.status == LcpStatus::solved);
 }
 

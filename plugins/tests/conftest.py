@@ -3,6 +3,7 @@
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -13,6 +14,14 @@ from rig.motion import Motion
 from rig.scenarios import SCENARIOS
 
 from dembark.common.errors import DembarkError
+
+
+def skip_without(driver: ModuleType) -> None:
+    """Skips the test when the engine of a driver is not there."""
+    try:
+        driver.engine()
+    except DembarkError as error:
+        pytest.skip(str(error))
 
 
 class Motions:
@@ -27,10 +36,7 @@ class Motions:
             if driver == "python":
                 self.done[driver, name] = python_driver.run(SCENARIOS[name])
                 return self.done[driver, name]
-            try:
-                {"liggghts": liggghts_driver, "yade": yade_driver}[driver].engine()
-            except DembarkError as error:
-                pytest.skip(str(error))
+            skip_without({"liggghts": liggghts_driver, "yade": yade_driver}[driver])
             if driver == "liggghts":
                 # A run takes longer to start than to compute.
                 with ThreadPoolExecutor(4) as pool:
@@ -45,3 +51,13 @@ class Motions:
 @pytest.fixture(scope="session")
 def motions(tmp_path_factory: pytest.TempPathFactory) -> Motions:
     return Motions(tmp_path_factory.mktemp("rig"))
+
+
+@pytest.fixture(scope="session")
+def liggghts_is_there() -> None:
+    skip_without(liggghts_driver)
+
+
+@pytest.fixture(scope="session")
+def yade_is_there() -> None:
+    skip_without(yade_driver)

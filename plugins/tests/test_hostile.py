@@ -9,8 +9,6 @@ from rig import liggghts_driver, python_driver, walls, yade_driver
 from rig.motion import QUANTITIES, deviation
 from rig.scenarios import ALL_OF_IT, STILL, Grain, Material, Path, Scenario
 
-from dembark.common.errors import DembarkError
-
 R = 5e-3
 # Down by 0.1 mm and sideways beyond the slip distance, and up again to 0.9 mm.
 PUSH = Path(displacement=("0.00003*sin(2*PI*300*t)", "0.00002*t", "-0.0005*(1-cos(2*PI*100*t))"),
@@ -80,11 +78,7 @@ def expected():
 
 
 @pytest.fixture(scope="module")
-def liggghts(tmp_path_factory):
-    try:
-        liggghts_driver.engine()
-    except DembarkError as error:
-        pytest.skip(str(error))
+def liggghts(liggghts_is_there, tmp_path_factory):
     folder = tmp_path_factory.mktemp("hostile")
     # The engine refuses moduli out of its range unless told that they are meant.
     meant = "units si\nhard_particles yes\nsoft_particles yes\n"
@@ -93,11 +87,7 @@ def liggghts(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def yade(tmp_path_factory):
-    try:
-        yade_driver.engine()
-    except DembarkError as error:
-        pytest.skip(str(error))
+def yade(yade_is_there, tmp_path_factory):
     return yade_driver.run_all(CASES.values(), tmp_path_factory.mktemp("hostile"))
 
 

@@ -13,15 +13,20 @@ BRIDGES = [name for name in SCENARIOS if name.startswith("approach, bridge")]
 drivers = pytest.mark.parametrize("driver", DRIVERS)
 
 
+def partner(case, motion):
+    """Radius of what the first grain meets, inf for the wall, and the gap to it over time."""
+    radius = np.inf if case.wall else case.grains[1].radius
+    distance = motion.position[:, 0, 2] if case.wall else np.linalg.norm(motion.position[:, 0] - motion.position[:, 1], axis=1)
+    return radius, distance - case.grains[0].radius - (0.0 if case.wall else radius)
+
+
 @drivers
 @pytest.mark.parametrize("name", BRIDGES)
 def test_bridge_forms_at_touching_and_breaks_at_rupture(motions, driver, name):
     """Two approaches and retreats: no force before touching, attraction over the gap on the way out, none beyond rupture."""
     case, motion = SCENARIOS[name], motions(driver, name)
     m = case.material
-    radius = np.inf if case.wall else case.grains[1].radius
-    distance = motion.position[:, 0, 2] if case.wall else np.linalg.norm(motion.position[:, 0] - motion.position[:, 1], axis=1)
-    gap = distance - case.grains[0].radius - (0.0 if case.wall else radius)
+    radius, gap = partner(case, motion)
     end = rupture_distance(m.bridge_volume, m.contact_angle, case.grains[0].radius, radius, model=m.capillary_model)
     leaving = np.diff(gap, append=gap[-1]) > 0.0
     apart = gap > 0.0
@@ -154,9 +159,7 @@ def test_liquid_resists_only_while_there_is_a_bridge(motions, driver, name):
     """The force is that of the dry contact before the first touch and after each rupture; in between it opposes the motion."""
     case, motion = SCENARIOS[name], motions(driver, name)
     m = case.material
-    radius = np.inf if case.wall else case.grains[1].radius
-    distance = motion.position[:, 0, 2] if case.wall else np.linalg.norm(motion.position[:, 0] - motion.position[:, 1], axis=1)
-    gap = distance - case.grains[0].radius - (0.0 if case.wall else radius)
+    radius, gap = partner(case, motion)
     end = rupture_distance(m.bridge_volume, m.contact_angle, case.grains[0].radius, radius)
     first = int(np.argmax(gap < 0.0))
     broken = first + int(np.argmax(gap[first:] > end * (1.0 + 1e-9)))

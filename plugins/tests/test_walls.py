@@ -10,8 +10,6 @@ from rig.motion import deviation
 from rig.scenarios import ALL_OF_IT, SCENARIOS, Grain, Path, Scenario
 from rig.walls import CYLINDER, FLOOR, Surface
 
-from dembark.common.errors import DembarkError
-
 TOLERANCE = 1e-9
 
 
@@ -68,11 +66,7 @@ def _deck(case: Scenario, word: str, folder, name: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def liggghts(tmp_path_factory):
-    try:
-        liggghts_driver.engine()
-    except DembarkError as error:
-        pytest.skip(str(error))
+def liggghts(liggghts_is_there, tmp_path_factory):
     folder, decks, cases = tmp_path_factory.mktemp("walls"), {}, {}
     for kind, name, case in parts():
         word = SURFACES[kind][1]
@@ -83,11 +77,7 @@ def liggghts(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def yade(tmp_path_factory):
-    try:
-        yade_driver.engine()
-    except DembarkError as error:
-        pytest.skip(str(error))
+def yade(yade_is_there, tmp_path_factory):
     cases = {(kind, name): case for kind, name, case in parts()}
     found = yade_driver.run_all(cases.values(), tmp_path_factory.mktemp("walls"),
                                 {case.name: SURFACES[kind][2] for (kind, _), case in cases.items()})

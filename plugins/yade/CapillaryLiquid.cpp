@@ -21,12 +21,13 @@ namespace capillary = ::dembark::capillary;
 
 namespace {
 
-template <class Item>
-bool byBodies(const Item& a, const Item& b) {
-	return std::make_pair(a.first, a.second) < std::make_pair(b.first, b.second);
-}
-
 const Sphere* sphereOf(const shared_ptr<Body>& body) { return body ? dynamic_cast<const Sphere*>(body->shape.get()) : nullptr; }
+
+/// The contact of an interaction that has a bridge.
+FinnieRabinowiczPhys* bridgeOf(const Interaction& interaction) {
+	auto* const phys = interaction.isReal() ? dynamic_cast<FinnieRabinowiczPhys*>(interaction.phys.get()) : nullptr;
+	return phys && phys->bridgeVolume > 0.0 ? phys : nullptr;
+}
 
 /// The law of the scene whose bridges carry liquid.
 Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz* lawOf(Scene& scene) {
@@ -52,13 +53,13 @@ void LiquidExchange::begin(long step) {
 	current = step;
 }
 
-void LiquidExchange::ask(long step, const Request& request) {
+void LiquidExchange::requestBridge(long step, const Request& request) {
 	const std::lock_guard<std::mutex> lock(guard);
 	begin(step);
 	requests.push_back(request);
 }
 
-void LiquidExchange::giveBack(long step, const Broken& bridge) {
+void LiquidExchange::bridgeBroke(long step, const Broken& bridge) {
 	const std::lock_guard<std::mutex> lock(guard);
 	begin(step);
 	broken.push_back(bridge);
@@ -70,38 +71,65 @@ void LiquidExchange::take(long step, std::vector<Request>& asked, std::vector<Br
 	back.swap(broken);
 	requests.clear();
 	broken.clear();
-	std::sort(asked.begin(), asked.end(), byBodies<Request>);
-	std::sort(back.begin(), back.end(), byBodies<Broken>);
 }
 
 void CapillaryLiquid::postLoad(CapillaryLiquid&) {
-	if (share == "cap") rule.kind = capillary::ShareRule::Kind::cap;
-	else if (share == "fraction") rule.kind = capillary::ShareRule::Kind::fraction;
-	else fail("CapillaryLiquid.share is '" + share + "'; it must be cap or fraction");
-	rule.factor = shareFactor;
-	if (const char* wrong = rule.error()) fail(std::string("CapillaryLiquid.shareFactor: ") + wrong + ", not " + text(shareFactor));
-	const std::vector<std::string> names = capillary::return_names();
-	const auto                     found = std::find(names.begin(), names.end(), returnRule);
-	if (found == names.end()) fail("CapillaryLiquid.returnRule is '" + returnRule + "'; it must be equal, radius or taken");
-	splitting = static_cast<capillary::Return>(found - names.begin());
+	if (!ledger.share.set_kind(share)) fail("CapillaryLiquid.share is '" + share + "'; it must be cap or fraction");
+	ledger.share.factor = shareFactor;
+	if (const char* wrong = ledger.share.error())
+		fail(std::string("CapillaryLiquid.shareFactor: ") + wrong + ", not " + text(shareFactor));
+	if (!capillary::return_from_name(returnRule, ledger.split))
+		fail("CapillaryLiquid.returnRule is '" + returnRule + "'; it must be equal, radius or taken");
 	if (!(content >= 0.0 && content < 1.0))
 		fail("CapillaryLiquid.content is " + text(content) + "; it must be >= 0 and < 1 (liquid volume over solid volume)");
 	checkVolume("maxBridge", maxBridge);
+	ledger.largest_bridge = maxBridge > 0.0 ? maxBridge : capillary::flat<double>;
+	if (saved.empty()) return;
+	ledger.restore(saved.data(), saved.size());
+	for (std::size_t w = 0; w < ledger.walls.size(); ++w) ledger.walls[w].name = std::to_string(w);
+	saved.clear();
+	seen.clear();
+	vanished = true;
 }
 
-/// Bodies that are new get their liquid.
-void CapillaryLiquid::meet() {
-	const auto& bodies = *Omega::instance().getScene()->bodies;
-	for (std::size_t id = liquid.size(); id < bodies.size(); ++id) {
-		const Sphere* sphere = sphereOf(bodies[id]);
-		liquid.push_back(sphere ? content * (4.0 / 3.0 * ::dembark::pi) * sphere->radius * sphere->radius * sphere->radius : 0.0);
+void CapillaryLiquid::preSave(CapillaryLiquid&) { saved = ledger.saved(true); }
+
+/// Bodies that are new get their liquid, those that were erased take theirs along. Of a scene that was loaded all are as they were.
+void CapillaryLiquid::meetBodies() {
+	const auto&       bodies = *Omega::instance().getScene()->bodies;
+	const std::size_t known = liquid.size(), count = std::max(bodies.size(), known);
+	const bool        loaded = seen.empty();
+	seen.resize(count);
+	liquid.resize(count, 0.0);
+	walls.resize(count, -1);
+	if (ledger.walls.empty()) ledger.walls.push_back({"0"});
+	ledger.resize(count);
+	bool come = false;
+	for (std::size_t id = 0; id < count; ++id) {
+		const shared_ptr<Body> none, &body = id < bodies.size() ? bodies[id] : none;
+		const Seen             now = body ? Seen{body.get(), body->iterBorn} : Seen{};
+		if (loaded && id < known && body) seen[id] = now;
+		const bool left = seen[id].body ? !(now == seen[id]) : loaded && id < known && !body;
+		if (!left && now == seen[id]) continue;
+		if (left) {
+			ledger.remove(static_cast<int>(id), grains());
+			walls[id] = -1;
+			vanished  = true;
+		}
+		seen[id]   = now;
+		liquid[id] = sphereOf(body) ? capillary::GrainLiquid::unset : 0.0;
+		come       = true;
 	}
-	if (walls.size() < liquid.size()) walls.resize(liquid.size(), -1);
+	if (come)
+		ledger.admit(grains(), [&](int id) {
+			const Real radius = sphereOf(bodies[id])->radius;
+			return content * (4.0 / 3.0 * ::dembark::pi) * radius * radius * radius;
+		});
 }
 
 void CapillaryLiquid::setVolume(int body, Real amount) {
 	checkVolume("setVolume: volume", amount);
-	meet();
+	meetBodies();
 	const auto& bodies = *Omega::instance().getScene()->bodies;
 	if (body < 0 || static_cast<std::size_t>(body) >= bodies.size() || !sphereOf(bodies[body]))
 		fail("CapillaryLiquid.setVolume: body " + std::to_string(body) +
@@ -113,165 +141,90 @@ void CapillaryLiquid::addWall(const std::vector<int>& bodies, Real pool, Real sh
 	checkVolume("addWall: pool", pool);
 	for (const Real each : {share_, part})
 		if (!(each >= 0.0 && each <= 1.0)) fail("CapillaryLiquid.addWall: share and part must be >= 0 and <= 1, not " + text(each));
-	meet();
+	meetBodies();
 	for (const int body : bodies) {
 		if (body < 0 || static_cast<std::size_t>(body) >= liquid.size() || !Body::byId(body) || sphereOf(Body::byId(body)))
 			fail("CapillaryLiquid.addWall: body " + std::to_string(body) +
 			     " is no wall of the scene; add its bodies to O.bodies first");
 		if (walls[body] >= 0) fail("CapillaryLiquid.addWall: body " + std::to_string(body) + " belongs to a wall already");
 	}
-	for (const int body : bodies) walls[body] = static_cast<int>(pools.size());
-	pools.push_back(pool);
-	wallShares.push_back(share_);
-	wallParts.push_back(part);
+	for (const int body : bodies) walls[body] = static_cast<int>(ledger.walls.size()) - 1;
+	std::vector<std::string> names;
+	for (std::size_t w = 0; w <= ledger.walls.size(); ++w) names.push_back(std::to_string(w));
+	ledger.change_walls(names, grains());
+	ledger.walls.back() = {names.back(), pool, share_, part};
 }
 
-int CapillaryLiquid::wallOf(Body::id_t body) const { return static_cast<std::size_t>(body) < walls.size() ? walls[body] : -1; }
-
-/// Number of a body or wall among those of which liquid can be asked.
-std::size_t CapillaryLiquid::holder(Body::id_t body, bool wall) const { return wall ? liquid.size() + wallOf(body) : body; }
-
-void CapillaryLiquid::giveBack(Body::id_t first, Body::id_t second, const Bridge& bridge) {
-	const double toFirst  = capillary::returned(bridge.volume, bridge.imbalance),
-		     toSecond = capillary::returned(bridge.volume, -bridge.imbalance);
-	const auto   give     = [this](Body::id_t body, double amount) { (Body::byId(body) ? liquid[body] : lost) += amount; };
-	give(first, toFirst);
-	if (!bridge.wall) give(second, toSecond);
-	else if (wallOf(second) >= 0) pools[wallOf(second)] += toSecond;
-}
-
-/// Bridges of the scene, after it was loaded.
-void CapillaryLiquid::findBridges() {
-	if (known) return;
-	known = true;
-	for (const auto& interaction : *Omega::instance().getScene()->interactions) {
-		const auto* phys = interaction->isReal() ? dynamic_cast<const FinnieRabinowiczPhys*>(interaction->phys.get()) : nullptr;
-		if (!phys || !(phys->bridgeVolume > 0.0)) continue;
-		Pair       pair{interaction->getId1(), interaction->getId2()};
-		const bool wall = !sphereOf(Body::byId(pair.first)) || !sphereOf(Body::byId(pair.second));
-		if (!sphereOf(Body::byId(pair.first))) std::swap(pair.first, pair.second);
-		bridges[pair] = {phys->bridgeVolume, phys->bridgeImbalance, wall};
-	}
-}
-
-/// What erased bodies had leaves with them; the other side of their bridges keeps its part.
-void CapillaryLiquid::dropErased() {
-	const auto& bodies = *Omega::instance().getScene()->bodies;
-	bool        any    = false;
-	for (std::size_t id = 0; id < liquid.size(); ++id) {
-		if (id < bodies.size() && bodies[id]) continue;
-		lost += liquid[id];
-		liquid[id] = 0.0;
-		any        = true;
-	}
-	if (!any) return;
-	for (auto each = bridges.begin(); each != bridges.end();) {
-		if (Body::byId(each->first.first) && Body::byId(each->first.second)) {
-			++each;
-			continue;
-		}
-		giveBack(each->first.first, each->first.second, each->second);
-		each = bridges.erase(each);
-	}
-}
-
-void CapillaryLiquid::grant(const std::vector<LiquidExchange::Request>& asked) {
-	demands.resize(liquid.size() + pools.size());
-	const auto shareOfSecond = [this](const LiquidExchange::Request& r) {
-		if (!std::isinf(r.secondRadius)) return rule(r.secondRadius, r.firstRadius);
-		return wallOf(r.second) >= 0 ? wallShares[wallOf(r.second)] : 0.0;
-	};
-	for (const auto& r : asked) {
-		demands.add(r.first, rule(r.firstRadius, r.secondRadius));
-		if (const double part = shareOfSecond(r); part > 0.0) demands.add(holder(r.second, std::isinf(r.secondRadius)), part);
-	}
-	const auto   owned   = [this](std::size_t at) -> double& { return at < liquid.size() ? liquid[at] : pools[at - liquid.size()]; };
-	const double largest = maxBridge > 0.0 ? maxBridge : capillary::flat<double>;
-	std::vector<double> taken(asked.size()), takenOfSecond(asked.size());
-	for (std::size_t k = 0; k < asked.size(); ++k) {
-		const auto&       r     = asked[k];
-		const bool        wall  = std::isinf(r.secondRadius);
-		const std::size_t first = r.first;
-		const double      part  = shareOfSecond(r);
-		const double      given = rule(r.firstRadius, r.secondRadius) * capillary::grant(liquid[first], demands.of(first));
-		double            other = 0.0;
-		if (part > 0.0) {
-			const std::size_t second = holder(r.second, wall);
-			other                    = part * capillary::grant(owned(second), demands.of(second));
-		}
-		const auto bridge =
-			wall ? capillary::form_wall_bridge(given, other, wallOf(r.second) >= 0 ? wallParts[wallOf(r.second)] : 0.0,
-			                                   splitting, largest)
-			     : capillary::form_bridge(given, other, r.firstRadius, r.secondRadius, splitting, largest);
-		taken[k]         = bridge.from_i;
-		takenOfSecond[k] = bridge.from_j;
-		if (!(bridge.volume > 0.0)) continue;
-		r.phys->setBridge(bridge.volume, bridge.imbalance, r.firstRadius, r.secondRadius);
-		bridges[{r.first, r.second}] = {bridge.volume, bridge.imbalance, wall};
-	}
-	// All grants are of what was owned before the first.
-	for (std::size_t k = 0; k < asked.size(); ++k) {
-		double& own = liquid[asked[k].first];
-		own         = capillary::remaining(own, taken[k]);
-		if (!(takenOfSecond[k] > 0.0)) continue;
-		double& other = owned(holder(asked[k].second, std::isinf(asked[k].secondRadius)));
-		other         = capillary::remaining(other, takenOfSecond[k]);
-	}
-	demands.clear();
+/// Bridges that vanished with a body go back to their sides.
+void CapillaryLiquid::reconcile() {
+	double    excess = 0.0;
+	const int full   = ledger.reconcile_pairs(
+		grains(),
+		[this](auto visit) {
+			for (const auto& each : *scene->interactions)
+				if (const auto* phys = bridgeOf(*each); phys && !phys->wallBody)
+					visit(each->getId1(), each->getId2(), phys->bridgeVolume, phys->bridgeImbalance);
+		},
+		excess);
+	if (full >= 0)
+		fail("CapillaryLiquid: the bridges of body " + std::to_string(full) + " hold " + text(excess) +
+		     " more than was given to them");
+	ledger.reconcile_walls(grains(), [this](int id, std::size_t wall, auto visit) {
+		for (const auto& [other, each] : Body::byId(id, scene)->intrs)
+			if (auto* phys = bridgeOf(*each); phys && phys->wallBody && wallNumber(other) == static_cast<int>(wall))
+				visit(phys->bridgeVolume, phys->bridgeImbalance);
+	});
+	vanished = false;
 }
 
 void CapillaryLiquid::action() {
-	std::vector<LiquidExchange::Request> asked;
-	std::vector<LiquidExchange::Broken>  back;
-	meet();
-	findBridges();
-	dropErased();
-	lawOf(*scene)->exchange->take(scene->iter, asked, back);
-	for (const auto& each : back) {
-		giveBack(each.first, each.second, {each.volume, each.imbalance, each.wall});
-		bridges.erase({each.first, each.second});
-	}
-	if (!asked.empty()) grant(asked);
+	std::vector<LiquidExchange::Request> requests;
+	std::vector<LiquidExchange::Broken>  broken;
+	lawOf(*scene)->exchange->take(scene->iter, requests, broken);
+	meetBodies();
+	for (auto& each : requests)
+		if (each.sides.wall) each.sides.other = wallNumber(each.sides.other);
+	for (auto& each : broken)
+		if (each.sides.wall) each.sides.other = wallNumber(each.sides.other);
+	ledger.give_back(broken, grains());
+	if (vanished) reconcile();
+	ledger.form(requests, grains(), [](const LiquidExchange::Request& r, const capillary::NewBridge<double>& bridge) {
+		r.phys->setBridge(bridge.volume, bridge.imbalance, r.radius, r.other_radius);
+	});
 }
 
 Real CapillaryLiquid::volume(int body) {
-	meet();
+	meetBodies();
 	if (body < 0 || static_cast<std::size_t>(body) >= liquid.size())
 		fail("CapillaryLiquid.volume: there is no body " + std::to_string(body));
 	return liquid[body];
 }
 
 Real CapillaryLiquid::wallPool(int wall) const {
-	if (wall < 0 || static_cast<std::size_t>(wall) >= pools.size())
+	if (wall < 0 || static_cast<std::size_t>(wall) + 1 >= ledger.walls.size())
 		fail("CapillaryLiquid.wallPool: there is no wall " + std::to_string(wall));
-	return pools[wall];
+	return ledger.walls[wall + 1].pool;
 }
 
-Real CapillaryLiquid::inGrains() {
-	meet();
-	Real sum = 0.0;
-	for (const Real each : liquid) sum += each;
-	return sum;
+std::vector<Real> CapillaryLiquid::ofWalls(double capillary::LiquidWall::* of) const {
+	std::vector<Real> all;
+	for (std::size_t w = 1; w < ledger.walls.size(); ++w) all.push_back(ledger.walls[w].*of);
+	return all;
 }
 
-Real CapillaryLiquid::inBridges() {
-	findBridges();
-	Real sum = 0.0;
-	for (const auto& each : bridges) sum += each.second.volume;
-	return sum;
+capillary::LiquidLedger::Totals CapillaryLiquid::totals() {
+	meetBodies();
+	return ledger.totals(grains());
 }
 
-Real CapillaryLiquid::onWalls() const {
-	Real sum = 0.0;
-	for (const Real each : pools) sum += each;
-	return sum;
+Real CapillaryLiquid::total() {
+	const auto all = totals();
+	return all.grains + all.bridges + all.walls + ledger.lost;
 }
 
-Real CapillaryLiquid::total() { return inGrains() + inBridges() + onWalls() + lost; }
-
-long CapillaryLiquid::bridgeCount() {
-	findBridges();
-	return static_cast<long>(bridges.size());
+long CapillaryLiquid::bridgeCount() const {
+	const auto& interactions = *Omega::instance().getScene()->interactions;
+	return std::count_if(interactions.begin(), interactions.end(), [](const auto& each) { return bridgeOf(*each) != nullptr; });
 }
 
 }  // namespace yade

@@ -1,38 +1,29 @@
-// Liquid that bodies carry, lend to bridges and get back: the books, and the exchange once a step. The rule is
-// dembark/capillary/liquid.hpp.
+// Liquid that bodies carry, lend to bridges and get back, settled once a step by dembark/capillary/liquid_ledger.hpp.
 #pragma once
 
-#include <map>
 #include <mutex>
 #include <vector>
 
 #include <core/Body.hpp>
 #include <core/GlobalEngine.hpp>
 
-#include "dembark/capillary/liquid.hpp"
+#include "dembark/capillary/liquid_ledger.hpp"
 
 namespace yade {
 
 class FinnieRabinowiczPhys;
-class Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz;
 
-/// What the contacts of one step ask for and give back; filled by the law from many threads, emptied by CapillaryLiquid. `first` is the
-/// sphere of a contact with a wall.
+/// The contacts of a step that touch without a bridge, and the bridges that broke; filled by the law from many threads, emptied by
+/// CapillaryLiquid. The grain of a contact with a wall is its sphere, the other side the wall's body.
 class LiquidExchange {
 public:
-	struct Request {
-		Body::id_t            first, second;
-		double                firstRadius, secondRadius;  // infinite: a wall
-		FinnieRabinowiczPhys* phys;                       // valid in the step of the request
+	struct Request : ::dembark::capillary::BridgeRequest {
+		FinnieRabinowiczPhys* phys;  // valid in the step of the request
 	};
-	struct Broken {
-		Body::id_t first, second;
-		double     volume, imbalance;
-		bool       wall;
-	};
-	void ask(long step, const Request&);
-	void giveBack(long step, const Broken&);
-	/// Everything of `step` in an order that does not depend on threads.
+	typedef ::dembark::capillary::BrokenBridge Broken;
+	void                                       requestBridge(long step, const Request&);
+	void                                       bridgeBroke(long step, const Broken&);
+	/// Everything of `step`.
 	void take(long step, std::vector<Request>&, std::vector<Broken>&);
 
 private:
@@ -45,17 +36,23 @@ private:
 
 class CapillaryLiquid : public GlobalEngine {
 public:
-	void action() override;
-	void postLoad(CapillaryLiquid&);
-	void setVolume(int body, Real volume);
-	void addWall(const std::vector<int>& bodies, Real pool, Real share, Real part);
-	Real volume(int body);
-	Real wallPool(int wall) const;
-	Real inGrains();
-	Real inBridges();
-	Real onWalls() const;
-	Real total();
-	long bridgeCount();
+	void              action() override;
+	void              postLoad(CapillaryLiquid&);
+	void              preSave(CapillaryLiquid&);
+	void              postSave(CapillaryLiquid&) { saved.clear(); }
+	void              setVolume(int body, Real volume);
+	void              addWall(const std::vector<int>& bodies, Real pool, Real share, Real part);
+	Real              volume(int body);
+	Real              wallPool(int wall) const;
+	Real              inGrains() { return totals().grains; }
+	Real              inBridges() { return totals().bridges; }
+	Real              onWalls() { return totals().walls; }
+	Real              total();
+	Real              getLost() const { return ledger.lost; }
+	long              bridgeCount() const;
+	std::vector<Real> getPools() const { return ofWalls(&::dembark::capillary::LiquidWall::pool); }
+	std::vector<Real> getWallShares() const { return ofWalls(&::dembark::capillary::LiquidWall::share); }
+	std::vector<Real> getWallParts() const { return ofWalls(&::dembark::capillary::LiquidWall::part); }
 	// clang-format off
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(CapillaryLiquid,GlobalEngine,"Liquid that grains and walls carry. It belongs right after :yref:`InteractionLoop`, whose :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz` has carriedLiquid=True. Touching bodies without a bridge ask both sides for a share of what they own; what is asked of a body in one step is scaled down to what it has. A bridge acts from the next step on, and gives its liquid back when it breaks. Nothing is made or lost.",
 		((Real,content,0,Attr::triggerPostLoad,"Liquid of each sphere when it is first seen, over the volume of the sphere; :yref:`setVolume<CapillaryLiquid.setVolume>` overrides it"))
@@ -65,12 +62,13 @@ public:
 		((Real,maxBridge,0,Attr::triggerPostLoad,"Largest volume [m^3] of a new bridge; 0 = no limit"))
 		((vector<Real>,liquid,,Attr::readonly,"Liquid [m^3] of each body by id, without its bridges"))
 		((vector<int>,walls,,Attr::readonly,"For each body the number of the wall whose liquid it shares, -1 = none"))
-		((vector<Real>,pools,,Attr::readonly,"Liquid [m^3] of each wall"))
-		((vector<Real>,wallShares,,Attr::readonly,"Part of its liquid that each wall gives to a bridge"))
-		((vector<Real>,wallParts,,Attr::readonly,"Part of a broken bridge that stays on each wall"))
-		((Real,lost,0,Attr::readonly,"Liquid [m^3] that left with bodies that were erased"))
+		((vector<Real>,saved,,Attr::hidden,"The ledger's numbers, while the scene is saved and loaded"))
 		, /*ctor*/
 		, /*py*/
+		.add_property("pools",&CapillaryLiquid::getPools,"Liquid [m^3] of each wall")
+		.add_property("wallShares",&CapillaryLiquid::getWallShares,"Part of its liquid that each wall gives to a bridge")
+		.add_property("wallParts",&CapillaryLiquid::getWallParts,"Part of a broken bridge that stays on each wall")
+		.add_property("lost",&CapillaryLiquid::getLost,"Liquid [m^3] that left with bodies that were erased")
 		.def("setVolume",&CapillaryLiquid::setVolume,(boost::python::arg("body"),boost::python::arg("volume")),"Give a sphere this liquid [m^3] in place of what it has.")
 		.def("addWall",&CapillaryLiquid::addWall,(boost::python::arg("bodies"),boost::python::arg("pool")=0.0,boost::python::arg("share")=0.0,boost::python::arg("part")=0.0),"Let the bodies (ids) be one wall with `pool` [m^3] of liquid that gives `share` (0...1) of it to each bridge and keeps `part` (0...1) of each that breaks (of 'taken': what it gave). A wall that was not added gives and keeps nothing.")
 		.def("volume",&CapillaryLiquid::volume,(boost::python::arg("body")),"Liquid [m^3] of a sphere, without its bridges.")
@@ -84,25 +82,23 @@ public:
 	// clang-format on
 
 private:
-	struct Bridge {
-		double volume, imbalance;
-		bool   wall;
+	/// A body is another one than before if it stands elsewhere in memory or was inserted at another time.
+	struct Seen {
+		const Body* body = nullptr;
+		long        born = -1;
+		bool        operator==(const Seen& other) const { return body == other.body && born == other.born; }
 	};
-	typedef std::pair<Body::id_t, Body::id_t> Pair;
+	void                                       meetBodies();
+	void                                       reconcile();
+	::dembark::capillary::GrainLiquid          grains() { return {liquid.data(), static_cast<int>(liquid.size())}; }
+	::dembark::capillary::LiquidLedger::Totals totals();
+	std::vector<Real>                          ofWalls(double ::dembark::capillary::LiquidWall::*) const;
+	/// The ledger's number of a body's wall: 0 for all that were not added, which give and keep nothing.
+	int wallNumber(Body::id_t body) const { return 1 + walls[body]; }
 
-	void        meet();
-	void        dropErased();
-	void        findBridges();
-	void        giveBack(Body::id_t first, Body::id_t second, const Bridge&);
-	int         wallOf(Body::id_t) const;
-	std::size_t holder(Body::id_t body, bool wall) const;
-	void        grant(const std::vector<LiquidExchange::Request>&);
-
-	::dembark::capillary::ShareRule rule;
-	::dembark::capillary::Return    splitting = ::dembark::capillary::Return::equal;
-	::dembark::capillary::Demands   demands;
-	std::map<Pair, Bridge>          bridges;  // of all contacts, for those whose bodies are erased; made anew after loading
-	bool                            known = false;
+	::dembark::capillary::LiquidLedger ledger;
+	std::vector<Seen>                  seen;              // by id
+	bool                               vanished = false;  // bodies, and maybe bridges with them
 };
 REGISTER_SERIALIZABLE(CapillaryLiquid);
 

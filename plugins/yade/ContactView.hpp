@@ -35,11 +35,12 @@ struct ContactView {
 			bodies.mass_2     = body2.isDynamic() ? state2.mass : INFINITY;
 			return;
 		}
-		const State&   sphere  = swapped() ? state2 : state1;
+		const Body&    round   = swapped() ? body2 : body1;
+		const State&   sphere  = *round.state;
 		const State&   plane   = swapped() ? state1 : state2;
 		const Vector3r outward = sign() * geom.normal;  // from the wall to the sphere
 		bodies.radius_1        = swapped() ? geom.radius2 : geom.radius1;
-		bodies.mass_1          = sphere.mass;
+		bodies.mass_1          = round.isDynamic() ? sphere.mass : INFINITY;
 		const double distance  = bodies.radius_1 - geom.penetrationDepth;
 		bodies.separation      = vec(Vector3r(distance * outward));
 		surface                = sphere.pos + sign() * shift - plane.pos - distance * outward;

@@ -1,6 +1,8 @@
 #include "ContactWorks.hpp"
 
 #include <algorithm>
+#include <exception>
+#include <mutex>
 #include <typeinfo>
 
 #include <core/Scene.hpp>
@@ -12,50 +14,50 @@ namespace yade::dembark_yade {
 
 using ::dembark::ContactPart;
 using ::dembark::cross;
+using ::dembark::dofs;
 using ::dembark::dot;
 
-namespace {
-
-::dembark::RelativeMotion motionOf(const ContactView& view, const ::dembark::ContactForce& force) {
-	return ::dembark::relative_motion(view.bodies, force.normal, force.overlap);
-}
-
-}  // namespace
-
-void ContactWorks::Sums::add(const Sums& other) {
-	for (std::size_t k = 0; k < parts.size(); ++k) parts[k] += other.parts[k];
-	onFree += other.onFree;
-	onBlocked += other.onBlocked;
-	normalStored += other.normalStored;
-	tangentialStored += other.tangentialStored;
+void ContactWorks::Stored::add(const Stored& other) {
+	normal += other.normal;
+	tangential += other.tangential;
 	half += other.half;
 }
 
 /// The sum of what `visit(index, sums)` adds, over blocks of one length in their order: it does not depend on the number of threads.
-template <class Visit>
-ContactWorks::Sums ContactWorks::overAll(int threads, Visit visit) {
+template <class Sums, class Visit>
+Sums ContactWorks::overAll(int threads, Visit visit) {
 	constexpr long    size  = 256;
 	const long        count = static_cast<long>(contacts.size()), blocks = (count + size - 1) / size;
 	std::vector<Sums> partial(blocks);
+	// No exception may leave the threads.
+	std::exception_ptr wrong;
+	std::mutex         guard;
 #ifdef YADE_OPENMP
 #pragma omp parallel for schedule(static) num_threads(threads > 0 ? std::min(threads, omp_get_max_threads()) : omp_get_max_threads())
 #else
 	(void)threads;
 #endif
-	for (long block = 0; block < blocks; ++block)
-		for (long i = block * size; i < std::min(count, (block + 1) * size); ++i) visit(i, partial[block]);
+	for (long block = 0; block < blocks; ++block) {
+		try {
+			for (long i = block * size; i < std::min(count, (block + 1) * size); ++i) visit(i, partial[block]);
+		} catch (...) {
+			const std::lock_guard<std::mutex> lock(guard);
+			wrong = std::current_exception();
+		}
+	}
+	if (wrong) std::rethrow_exception(wrong);
 	Sums total;
 	for (const Sums& each : partial) total.add(each);
 	return total;
 }
 
-ContactWorks::Sums ContactWorks::record(Scene& scene, int threads) {
+ContactWorks::Stored ContactWorks::record(Scene& scene, int threads) {
 	const auto& interactions = *scene.interactions;
 	contacts.resize(scene.interactions->size());
-	return overAll(threads, [&](long i, Sums& sums) { recordOne(contacts[i], *interactions[i], scene, sums); });
+	return overAll<Stored>(threads, [&](long i, Stored& sums) { recordOne(contacts[i], *interactions[i], scene, sums); });
 }
 
-void ContactWorks::recordOne(Contact& c, const Interaction& interaction, Scene& scene, Sums& sums) const {
+void ContactWorks::recordOne(Contact& c, const Interaction& interaction, Scene& scene, Stored& sums) const {
 	c.acting = false;
 	if (!interaction.isReal()) return;
 	c.id1             = interaction.getId1();
@@ -89,36 +91,35 @@ void ContactWorks::recordOne(Contact& c, const Interaction& interaction, Scene& 
 	f.tangential                      = shear - f.viscous_tangential;
 	c.parts                           = ::dembark::contact_parts(phys->contact, bodies, f, vec(phys->elasticDisplacement));
 
-	c.half = 0.5 * scene.dt * dot(c.parts[ContactPart::normal_elastic], f.normal) * motionOf(c.view, f).normal_velocity;
+	c.half = 0.5 * scene.dt * dot(c.parts[ContactPart::normal_elastic], f.normal) * c.motion().normal_velocity;
 	sums.half += c.half;
-	sums.normalStored += c.parts.normal_stored;
-	sums.tangentialStored += c.parts.tangential_stored;
+	sums.normal += c.parts.normal_stored;
+	sums.tangential += c.parts.tangential_stored;
 }
 
-ContactWorks::Sums ContactWorks::book(const std::vector<BodyMotion>& mean, double dt, int threads) {
-	return overAll(threads, [&](long i, Sums& sums) {
-		if (contacts[i].acting) bookOne(contacts[i], mean, dt, sums);
+::dembark::Powers ContactWorks::powers(const Bodies& mean, double dt, int threads) {
+	return overAll<::dembark::Powers>(threads, [&](long i, ::dembark::Powers& sums) {
+		if (contacts[i].acting) addPowers(contacts[i], mean, dt, sums);
 	});
 }
 
-void ContactWorks::bookOne(Contact& c, const std::vector<BodyMotion>& mean, double dt, Sums& sums) const {
-	const BodyMotion &one = mean[c.id1], &two = mean[c.id2];
-	c.view.move(one.velocity, one.spin, two.velocity, two.spin);
-	const auto motion   = motionOf(c.view, c.whole);
-	const auto velocity = motion.normal_velocity * c.whole.normal + motion.tangential_velocity;
-	for (std::size_t k = 0; k < c.parts.force.size(); ++k) sums.parts[k] += dt * dot(c.parts.force[k], velocity);
-	c.work = dt * dot(c.parts[ContactPart::normal_elastic], velocity);
-
-	// The whole force, as it acts on the bodies: what the parts above miss of it is missing in the balance.
-	const Vector3r force = vec(c.whole.force), moment = vec(cross(c.whole.normal, c.whole.force));
-	const auto     act = [&](const BodyMotion& body, const Vector3r& push, const Vector3r& turn) {
-		sums.onFree += dt * (along(push, body.velocity, body.blocked, false) + along(turn, body.spin, body.blocked, true));
-		sums.onBlocked +=
-			dt * (along(push, body.velocity, body.blocked, false, false) + along(turn, body.spin, body.blocked, true, false));
+void ContactWorks::addPowers(Contact& c, const Bodies& mean, double dt, ::dembark::Powers& sums) const {
+	const ::dembark::EnergyBody &one = mean[c.id1], &two = mean[c.id2];
+	const auto                   velocity = [](const ::dembark::EnergyBody& body) {
+		return Vector3r(body.velocity[0], body.velocity[1], body.velocity[2]);
 	};
-	act(c.view.swapped() ? two : one, force, -motion.arm_1 * moment);
-	act(c.view.swapped() ? one : two, -force,
-	    c.view.wallBody ? Vector3r(-c.view.surface.cross(force)) : Vector3r(-motion.arm_2 * moment));
+	const auto spin = [](const ::dembark::EnergyBody& body) { return Vector3r(body.velocity[3], body.velocity[4], body.velocity[5]); };
+	c.view.move(velocity(one), spin(one), velocity(two), spin(two));
+	const auto motion   = c.motion();
+	const auto relative = motion.normal_velocity * c.whole.normal + motion.tangential_velocity;
+	sums.add_contact(c.parts, relative);
+	c.work = dt * dot(c.parts[ContactPart::normal_elastic], relative);
+
+	// The whole force, as it acts on the bodies: what the parts above miss of it shows up in `other`.
+	const auto moment = cross(c.whole.normal, c.whole.force), surface = vec(c.view.surface);
+	sums.add_held(c.view.swapped() ? two : one, dofs(c.whole.force, -motion.arm_1 * moment));
+	sums.add_held(c.view.swapped() ? one : two,
+	              dofs(-c.whole.force, c.view.wallBody ? -cross(surface, c.whole.force) : -motion.arm_2 * moment));
 }
 
 double ContactWorks::unexplained(const std::vector<bool>& bodies, bool arriving) const {

@@ -2,7 +2,6 @@
 
 #include <core/Aabb.hpp>
 #include <core/Scene.hpp>
-#include <pkg/dem/ScGeom.hpp>
 
 #include "report.hpp"
 
@@ -20,17 +19,20 @@ void CylinderWall::postLoad(CylinderWall&) {
 	if (math::abs(length - 1.0) > 4e-16) axis /= length;
 }
 
-void Bo1_CylinderWall_Aabb::go(const shared_ptr<Shape>& shape, shared_ptr<Bound>& bound, const Se3r& se3, const Body*) {
+void Bo1_CylinderWall_Aabb::go(const shared_ptr<Shape>& shape, shared_ptr<Bound>& bound, const Se3r& se3, const Body*) try {
+	if (!bound) bound = shared_ptr<Bound>(new Aabb);
+	bound->min = bound->max = se3.position;
 	if (scene->isPeriodic) fail("a CylinderWall has no end and does not fit a periodic cell; use an aperiodic scene");
 	const CylinderWall& wall = *static_cast<CylinderWall*>(shape.get());
 	if (!(wall.radius > 0.0)) fail("CylinderWall.radius is not set; give it in m");
-	if (!bound) bound = shared_ptr<Bound>(new Aabb);
 	for (int i = 0; i < 3; ++i) {
 		const Real across = wall.radius * math::sqrt(math::max(Real(0), 1.0 - wall.axis[i] * wall.axis[i]));
 		const Real half   = math::abs(wall.axis[i]) > 1e-12 ? std::numeric_limits<Real>::infinity() : across;
 		bound->min[i]     = se3.position[i] - half;
 		bound->max[i]     = se3.position[i] + half;
 	}
+} catch (const std::exception& error) {
+	dembark_yade::postpone(*scene, error, true);
 }
 
 bool Ig2_CylinderWall_Sphere_ScGeom::go(const shared_ptr<Shape>& shape1, const shared_ptr<Shape>& shape2, const State& state1,
@@ -48,23 +50,8 @@ bool Ig2_CylinderWall_Sphere_ScGeom::go(const shared_ptr<Shape>& shape1, const s
 	}
 	const Real     distance = math::sqrt(squared);
 	const Vector3r normal   = distance > 0.0 ? Vector3r(-across / distance) : Vector3r(wall.axis.unitOrthogonal());
-
-	const bool isNew = !interaction->geom;
-	if (isNew) interaction->geom = shared_ptr<ScGeom>(new ScGeom());
-	ScGeom& geom          = *static_cast<ScGeom*>(interaction->geom.get());
-	geom.penetrationDepth = distance + radius - wall.radius;
-	geom.contactPoint     = centre - (radius - 0.5 * geom.penetrationDepth) * normal;
-	geom.radius1          = 1e8 * radius;
-	geom.radius2          = radius;
-	geom.precompute(state1, state2, scene, interaction, normal, isNew, shift2, false);
+	set(interaction, state1, state2, shift2, radius, distance + radius - wall.radius, normal);
 	return true;
-}
-
-bool Ig2_CylinderWall_Sphere_ScGeom::goReverse(const shared_ptr<Shape>& shape1, const shared_ptr<Shape>& shape2, const State& state1,
-                                               const State& state2, const Vector3r& shift2, const bool& force,
-                                               const shared_ptr<Interaction>& interaction) {
-	interaction->swapOrder();
-	return go(shape2, shape1, state2, state1, -shift2, force, interaction);
 }
 
 }  // namespace yade

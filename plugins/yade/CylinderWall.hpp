@@ -1,9 +1,10 @@
 // The inside of an infinite circular cylinder as a wall for YADE, exact where facets would be a polygon.
 #pragma once
 
-#include <core/Dispatching.hpp>
 #include <core/Shape.hpp>
 #include <pkg/common/Sphere.hpp>
+
+#include "WallContact.hpp"
 
 namespace yade {
 
@@ -32,12 +33,10 @@ public:
 };
 REGISTER_SERIALIZABLE(Bo1_CylinderWall_Aabb);
 
-class Ig2_CylinderWall_Sphere_ScGeom : public IGeomFunctor {
+class Ig2_CylinderWall_Sphere_ScGeom : public WallContact {
 public:
 	bool go(const shared_ptr<Shape>&, const shared_ptr<Shape>&, const State&, const State&, const Vector3r& shift2, const bool& force,
 	        const shared_ptr<Interaction>&) override;
-	bool goReverse(const shared_ptr<Shape>&, const shared_ptr<Shape>&, const State&, const State&, const Vector3r& shift2,
-	               const bool& force, const shared_ptr<Interaction>&) override;
 	FUNCTOR2D(CylinderWall, Sphere);
 	DEFINE_FUNCTOR_ORDER_2D(CylinderWall, Sphere);
 	// clang-format off

@@ -1,5 +1,5 @@
-// Energy of a run: the works of all parts of all contacts, of gravity, walls and numerical damping, beside the kinetic energy. The
-// splitting of forces and the reason why the works balance to round-off are those of dembark/contact_energy.hpp.
+// Energy of a run: the works of all parts of all contacts, of gravity, walls and numerical damping, beside the kinetic energy. Its sums,
+// and the reason why they balance to round-off, are those of dembark/energy_ledger.hpp.
 #pragma once
 
 #include <mutex>
@@ -20,7 +20,8 @@ class EnergyAccount : public GlobalEngine {
 public:
 	virtual ~EnergyAccount() = default;
 	void                action() override;
-	void                preSave(EnergyAccount&) { update(); }
+	void                preSave(EnergyAccount&);
+	void                postLoad(EnergyAccount&);
 	void                reset();
 	Real                get(const std::string& name);
 	boost::python::list keys() const;
@@ -28,9 +29,8 @@ public:
 	boost::python::dict energies();
 	// clang-format off
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(EnergyAccount,GlobalEngine,"Energies [J] of a scene whose contacts are those of :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz`: kinetic energy, what springs hold, and the works of all parts of the contacts' forces, of gravity, walls, numerical damping and other forces, which balance the kinetic energy to round-off in each step. Stands after :yref:`InteractionLoop` and all engines that add forces, and before :yref:`NewtonIntegrator`. Read like :yref:`O.energy<Omega.energy>`: account['gravity'], account.keys(), account.items().",
-		((vector<Real>,sums,,Attr::hidden,"All energies in the order of keys()"))
+		((vector<Real>,saved,,Attr::hidden,"The numbers of the ledger, when the scene is saved"))
 		((vector<Real>,known,,Attr::hidden,"Kinetic energy [J] of each body by id, -1 = no body"))
-		((Real,firstStored,0,Attr::hidden,"Energy [J] of normal springs that no work explains: it came and left with bodies"))
 		((long,step,-1,Attr::readonly,"Last step whose works are in the sums; -1 = none"))
 		, /*ctor*/
 		, /*py*/
@@ -43,33 +43,25 @@ public:
 	// clang-format on
 
 private:
-	/// A body in the step that is being booked, and what acts on it.
-	struct Mover {
-		const Body* body    = nullptr;  // to tell whether it is still the same; to own it could mean to end a Python object without
-		                                // the interpreter
-		Real        mass    = 0.0;
-		Vector3r    inertia = Vector3r::Zero();
-		Vector3r    force, torque, weight, damping, dampingTorque;
-	};
 	const NewtonIntegrator& integrator() const;
 	void                    update();
-	void                    book(const Scene&);
+	void                    tally(const Scene&);
 	void                    record(const NewtonIntegrator&, bool first);
 	bool                    recordBodies(const NewtonIntegrator&, bool first);
 	void                    recordForces(const Body&, const NewtonIntegrator&);
-	Real                    kineticEnergy(Body::id_t, const Vector3r& velocity, const Vector3r& spin) const;
-	void                    moveOn(Body::id_t, const State*);
 	void                    begin();
 
-	std::vector<Mover>                    movers;   // by id
-	std::vector<dembark_yade::BodyMotion> motions;  // by id, before the step, and then in the mean of it
-	std::vector<bool>                     changed;  // by id: came, left, or is another one than a step ago
-	dembark_yade::ContactWorks            contacts;
-	bool                                  pending  = false;  // the step `recorded` is not in the sums yet
-	long                                  recorded = -1;
-	Real                                  length   = 0.0;  // s, of that step
-	boost::weak_ptr<Scene>                home;
-	std::mutex                            guard;
+	::dembark::EnergyLedger            ledger;
+	std::vector<const Body*>           present;  // by id, to tell whether it is still the same; to own it could mean to end a Python
+	                                             // object without the interpreter
+	dembark_yade::ContactWorks::Bodies bodies;   // by id, before the step that is to be tallied, and then in the mean of it
+	std::vector<bool>                  changed;  // by id: came, left, or is another one than a step ago
+	dembark_yade::ContactWorks         contacts;
+	bool                               pending  = false;  // the step `recorded` is not in the sums yet
+	long                               recorded = -1;
+	Real                               length   = 0.0;  // s, of that step
+	boost::weak_ptr<Scene>             home;
+	std::mutex                         guard;
 };
 REGISTER_SERIALIZABLE(EnergyAccount);
 

@@ -1,15 +1,15 @@
-// Facets that share corners as one surface for YADE: a sphere has one contact where it is closest to the surface, not one with each facet
-// it overlaps, and takes the contact along when it moves from facet to facet.
+// Facets as one surface for YADE: a sphere has the contacts of dembark/surface, not one with each facet it overlaps, and takes them along
+// when it moves from facet to facet.
 #pragma once
 
 #include <vector>
 
-#include <core/Dispatching.hpp>
 #include <core/GlobalEngine.hpp>
 #include <pkg/common/Facet.hpp>
 #include <pkg/common/Sphere.hpp>
 
-#include "dembark/impact/triangles.hpp"
+#include "WallContact.hpp"
+#include "dembark/surface/surface_contacts.hpp"
 
 namespace yade {
 
@@ -19,61 +19,44 @@ public:
 	void postLoad(FacetSurface&);
 	void action() override;
 
-	/// Where a sphere is closest to one facet.
-	struct Place {
-		::dembark::impact::ClosestPoint closest{};
-		double                          distance = 0.0;
-	};
 	/// Number of a facet in this surface, -1 for a body that is none.
-	int   index(Body::id_t id) const { return id < Body::id_t(indexOf.size()) ? indexOf[id] : -1; }
-	Place place(int facet, const Vector3r& centre) const;
-	/// The facet among this one and its neighbours that is to have the contact; the one itself, or one nearer to the sphere.
-	int better(int facet, const Place&, const Vector3r& centre, Real radius) const;
-	/// Whether the engine has seen the present step, so that the places are those of now.
+	int                               index(Body::id_t id) const { return id < Body::id_t(indexOf.size()) ? indexOf[id] : -1; }
+	const ::dembark::SurfaceContacts& contacts() const { return surface; }
+	/// Whether the engine has seen the present step, so that the facets are where they are now.
 	bool upToDate(long iteration) const { return iteration == lastRun; }
 
 	// clang-format off
-	YADE_CLASS_BASE_DOC_ATTRS(FacetSurface,GlobalEngine,"Joins all :yref:`Facet` bodies that share corners to one surface: of the facets that a sphere overlaps only those have a contact on which the distance to the surface has a minimum, so that a flat patch acts as one plane, and an edge counts once. When the minimum moves to a neighbour, the interaction's geometry and physics (friction, bridge) go with it. Stands before :yref:`InteractionLoop`, which has :yref:`Ig2_FacetSurface_Sphere_ScGeom` in place of :yref:`Ig2_Facet_Sphere_ScGeom`.",
-		((Real,smoothAngle,0.05,Attr::triggerPostLoad,"Neighbours whose planes form a smaller angle [rad] are one smooth surface: a sphere in the groove between them touches only the nearer one. 0 ... pi/4."))
-		((Real,weld,1e-6,Attr::triggerPostLoad,"Corners nearer to each other than this part of the shortest edge of all facets are one corner. 0 ... 0.1."))
+	YADE_CLASS_BASE_DOC_ATTRS(FacetSurface,GlobalEngine,"Joins all :yref:`Facet` bodies that stand beside each other to one surface: of the facets that a sphere overlaps only those have a contact on which the distance to the surface has a minimum, so that a flat patch acts as one plane, and an edge counts once. When the minimum moves to a neighbour, the interaction's geometry and physics (friction, bridge) go with it. Stands before :yref:`InteractionLoop`, which has :yref:`Ig2_FacetSurface_Sphere_ScGeom` in place of :yref:`Ig2_Facet_Sphere_ScGeom`.",
+		((Real,smoothAngle,0.05,Attr::triggerPostLoad,"Sides of a groove that form a smaller angle [rad] are one smooth surface: a sphere between them touches only the nearer one. 0 ... pi/4."))
+		((Real,weld,1e-6,Attr::triggerPostLoad,"Facets nearer to each other than this part of the shortest edge of all facets stand beside each other. 0 ... 0.1."))
 		((long,handedOver,0,Attr::readonly,"Number of contacts that have been handed to another facet so far"))
 	);
 	// clang-format on
 
 private:
-	struct Neighbour {
-		int  facet;
-		int  shared;  // bit k: corner k of the facet it stands beside
-		bool smooth;
-	};
 	struct Member {
-		Body::id_t                  id;
-		const Body*                 body;
-		::dembark::impact::Triangle triangle;
-		double                      height[3];
-		Vector3r                    position;
-		Quaternionr                 orientation;
-		std::vector<Neighbour>      neighbours;
+		Body::id_t  id;
+		const Body* body;
+		Vector3r    position;
+		Quaternionr orientation;
 	};
 
 	void refresh();
-	void join();
-	void move(Member&) const;
 	void handOver(const shared_ptr<Interaction>&, int facet);
 
-	std::vector<Member> members;
-	std::vector<int>    indexOf;
-	std::size_t         bodiesSeen = 0;
-	long                lastRun    = -1;
+	::dembark::SurfaceContacts       surface;
+	std::vector<Member>              members;
+	std::vector<::dembark::Triangle> triangles;  // of the members
+	std::vector<int>                 indexOf;
+	std::size_t                      bodiesSeen = 0;
+	long                             lastRun    = -1;
 };
 REGISTER_SERIALIZABLE(FacetSurface);
 
-class Ig2_FacetSurface_Sphere_ScGeom : public IGeomFunctor {
+class Ig2_FacetSurface_Sphere_ScGeom : public WallContact {
 public:
 	bool go(const shared_ptr<Shape>&, const shared_ptr<Shape>&, const State&, const State&, const Vector3r& shift2, const bool& force,
 	        const shared_ptr<Interaction>&) override;
-	bool goReverse(const shared_ptr<Shape>&, const shared_ptr<Shape>&, const State&, const State&, const Vector3r& shift2,
-	               const bool& force, const shared_ptr<Interaction>&) override;
 	FUNCTOR2D(Facet, Sphere);
 	DEFINE_FUNCTOR_ORDER_2D(Facet, Sphere);
 	// clang-format off

@@ -1,8 +1,7 @@
 #include "FinnieRabinowicz.hpp"
 
+#include <algorithm>
 #include <atomic>
-#include <deque>
-#include <mutex>
 #include <type_traits>
 
 #include <core/Omega.hpp>
@@ -25,11 +24,15 @@ using dembark_yade::vec;
 
 namespace {
 
+const std::string ip2  = "Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.";
+const std::string law2 = "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz.";
+
 std::string pairName(const Material& a, const Material& b) { return "materials " + std::to_string(a.id) + " and " + std::to_string(b.id); }
+std::string pairName(const Body& a, const Body& b) { return "bodies " + std::to_string(a.getId()) + " and " + std::to_string(b.getId()); }
 
 /// Value of a pair parameter; one that was not given is `fallback`, or an error when that is NaN.
 double pairValue(const shared_ptr<MatchMaker>& maker, const char* name, const Material& a, const Material& b, double fallback = NaN) {
-	const std::string attribute = std::string("Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.") + name;
+	const std::string attribute = ip2 + name;
 	if (!maker) {
 		if (!std::isnan(fallback)) return fallback;
 		fail(attribute + " is not set; give it a number or a MatchMaker");
@@ -43,25 +46,10 @@ double pairValue(const shared_ptr<MatchMaker>& maker, const char* name, const Ma
 	return value;
 }
 
-/// The force law of one model and angle, built once for all contacts; stays valid until the process ends.
-const ::dembark::capillary::BridgeForce* bridgeForce(::dembark::capillary::Model model, double angle) {
-	static std::mutex                                    guard;
-	static std::deque<::dembark::capillary::BridgeForce> built;
-	const std::lock_guard<std::mutex>                    lock(guard);
-	for (const auto& force : built)
-		if (force.model() == model && force.contact_angle() == angle) return &force;
-	try {
-		built.emplace_back(model, angle);
-	} catch (const std::exception& error) {
-		fail(std::string("Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.contactAngle: ") + error.what());
-	}
-	return &built.back();
-}
-
 }  // namespace
 
 void Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys::go(const shared_ptr<Material>& material1, const shared_ptr<Material>& material2,
-                                                    const shared_ptr<Interaction>& interaction) {
+                                                    const shared_ptr<Interaction>& interaction) try {
 	if (interaction->phys) return;
 	const FrictMat& a    = *YADE_CAST<FrictMat*>(material1.get());
 	const FrictMat& b    = *YADE_CAST<FrictMat*>(material2.get());
@@ -93,35 +81,36 @@ void Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys::go(const shared_ptr<Material>& 
 	phys->wettable = phys->newBridgeVolume > 0.0 || (contactAngle && !std::isnan(surfaceTension));
 	if (phys->wettable) {
 		if (!(surfaceTension >= 0.0 && surfaceTension < INFINITY))
-			fail("Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.surfaceTension must be a finite number >= 0 N/m when bridgeVolume "
-			     "is > 0");
+			fail(ip2 + "surfaceTension must be a finite number >= 0 N/m when bridgeVolume is > 0");
 		phys->surfaceTension = surfaceTension;
 		phys->contactAngle   = pairValue(contactAngle, "contactAngle", a, b);
 		if (const char* wrong = ::dembark::capillary::ViscousLiquid{liquidViscosity, minimumGap}.error())
-			fail(std::string("Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.liquidViscosity, minimumGap: ") + wrong);
+			fail(ip2 + "liquidViscosity, minimumGap: " + wrong);
 		phys->liquidViscosity = liquidViscosity;
 		phys->minimumGap      = minimumGap;
 	}
 	interaction->phys = phys;
+} catch (const std::exception& error) {
+	dembark_yade::postpone(*scene, error);
+	interaction->phys = shared_ptr<FinnieRabinowiczPhys>(new FinnieRabinowiczPhys());  // without values: the law lets go of it
 }
 
 void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::postLoad(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz&) {
 	static std::atomic<long> revisions{0};
-	const std::string        name = "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz.";
 
 	if (normalLaw == "hertz") normal = ::dembark::NormalLaw::hertz;
 	else if (normalLaw == "hooke") normal = ::dembark::NormalLaw::hooke;
-	else fail(name + "normalLaw is '" + normalLaw + "'; it must be hertz or hooke");
+	else fail(law2 + "normalLaw is '" + normalLaw + "'; it must be hertz or hooke");
 
 	if (presliding == "linear") path = ::dembark::Presliding::linear;
 	else if (presliding == "exponential") path = ::dembark::Presliding::exponential;
-	else fail(name + "presliding is '" + presliding + "'; it must be linear or exponential");
+	else fail(law2 + "presliding is '" + presliding + "'; it must be linear or exponential");
 
 	wet = capillaryModel != "none";
 	if (wet && !::dembark::capillary::model_from_name(capillaryModel.c_str(), model)) {
 		std::string known = "none";
 		for (const std::string& each : ::dembark::capillary::model_names()) known += ", " + each;
-		fail(name + "capillaryModel is '" + capillaryModel + "'; it must be one of " + known);
+		fail(law2 + "capillaryModel is '" + capillaryModel + "'; it must be one of " + known);
 	}
 	revision = ++revisions;
 }
@@ -130,7 +119,7 @@ void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::prepare(FinnieRabinowicz
                                                                 const Body& body2) const {
 	const bool sphere1 = dynamic_cast<const Sphere*>(body1.shape.get()), sphere2 = dynamic_cast<const Sphere*>(body2.shape.get());
 	if (!sphere1 && !sphere2)
-		fail("bodies " + std::to_string(body1.getId()) + " and " + std::to_string(body2.getId()) +
+		fail(pairName(body1, body2) +
 		     " are both no spheres; the Finnie-Rabinowicz law knows a sphere with a sphere or with a wall");
 	phys.wallBody = sphere1 ? (sphere2 ? 0 : 2) : 1;
 
@@ -143,83 +132,67 @@ void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::prepare(FinnieRabinowicz
 	p.friction                = {phys.staticFriction,         phys.kineticFriction, phys.criticalSlipDistance,
 	                             phys.interfaceShearStrength, phys.healingTime,     path};
 	if (carriedLiquid) {
-		const std::string name = "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz.carriedLiquid";
-		if (!wet) fail(name + " needs a capillaryModel other than none");
-		if (!phys.wettable) fail(name + " needs surfaceTension and contactAngle of Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys");
+		if (!wet) fail(law2 + "carriedLiquid needs a capillaryModel other than none");
+		if (!phys.wettable) fail(law2 + "carriedLiquid needs " + ip2 + "surfaceTension and contactAngle");
 		if (phys.newBridgeVolume > 0.0)
-			fail(name +
-			     ": bridgeVolume of Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys must not be given, bridges take what the bodies "
-			     "carry");
+			fail(law2 + "carriedLiquid: " + ip2 + "bridgeVolume must not be given, bridges take what the bodies carry");
 	}
-	if (wet && (carriedLiquid || phys.newBridgeVolume > 0.0 || phys.bridgeVolume > 0.0))
-		p.liquid = {bridgeForce(model, phys.contactAngle),
-		            phys.surfaceTension,
-		            phys.newBridgeVolume,
-		            {phys.liquidViscosity, phys.minimumGap}};
+	if (wet && (carriedLiquid || phys.newBridgeVolume > 0.0 || phys.bridgeVolume > 0.0)) try {
+			p.liquid = {&::dembark::capillary::shared_bridge_force(model, phys.contactAngle),
+			            phys.surfaceTension,
+			            phys.newBridgeVolume,
+			            {phys.liquidViscosity, phys.minimumGap}};
+		} catch (const std::exception& error) {
+			fail(ip2 + "contactAngle: " + error.what());
+		}
 	phys.contact = p;
 	if (!p.liquid.viscous.on()) phys.viscousShearForce = Vector3r::Zero();
 
-	const double r1 = phys.wallBody == 1 ? INFINITY : geom.radius1, r2 = phys.wallBody == 2 ? INFINITY : geom.radius2;
-	const double m1 = phys.wallBody != 1 && body1.isDynamic() ? body1.state->mass : INFINITY;
-	const double m2 = phys.wallBody != 2 && body2.isDynamic() ? body2.state->mass : INFINITY;
-	if (p.liquid.viscous.on() && !(std::isinf(m1) && std::isinf(m2))) {
-		const double limit = ::dembark::capillary::viscous_time_step(p.liquid.viscous, 2.0 * ::dembark::reduced(r1, r2),
-		                                                             ::dembark::reduced(m1, m2));
-		if (scene->dt > limit)
-			fail("bodies " + std::to_string(body1.getId()) + " and " + std::to_string(body2.getId()) +
-			     ": their viscous bridge needs O.dt <= " + text(limit) + " s, not " + text(scene->dt) +
-			     " s, or a larger minimumGap");
-	}
-
-	phys.linearStiffness = 0.0;
-	if (normal == ::dembark::NormalLaw::hooke) {
-		if (!(characteristicVelocity > 0.0))
-			fail("Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz.characteristicVelocity must be > 0 m/s for "
-			     "normalLaw='hooke'");
-		phys.linearStiffness =
-			::dembark::hooke(::dembark::HookeParameters{phys.effectiveYoungsModulus, phys.restitution, characteristicVelocity},
-			                 ::dembark::reduced(r1, r2), ::dembark::reduced(m1, m2), 1.0, 0.0)
-				.force;
-	}
+	const ContactView view(phys.wallBody, geom, body1, body2, Vector3r::Zero());
+	const double      limit = p.liquid.stable_time_step(view.bodies.effective_radius(), view.bodies.effective_mass());
+	if (scene->dt > limit)
+		fail(pairName(body1, body2) + ": their viscous bridge needs O.dt <= " + text(limit) + " s, not " + text(scene->dt) +
+		     " s, or a larger minimumGap");
+	if (normal == ::dembark::NormalLaw::hooke && !(characteristicVelocity > 0.0))
+		fail(law2 + "characteristicVelocity must be > 0 m/s for normalLaw='hooke'");
 	phys.preparedBy = revision;
 }
 
-/// What the contact asks for, or gives back, after its forces are known.
-void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::trade(FinnieRabinowiczPhys& phys, const ScGeom& geom,
-                                                              const Interaction& interaction, double volumeBefore) {
+/// Tells CapillaryLiquid, after the forces are known, that the contact touches without a bridge, or that its bridge broke.
+void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::reportBridge(FinnieRabinowiczPhys& phys, const ScGeom& geom,
+                                                                     const Interaction& interaction, double volumeBefore) {
 	if (phys.bridgeVolume > 0.0) return;
-	Body::id_t first = interaction.getId1(), second = interaction.getId2();
-	double     firstRadius = geom.radius1, secondRadius = phys.wallBody == 2 ? INFINITY : geom.radius2;
-	if (phys.wallBody == 1) {
-		std::swap(first, second);
-		firstRadius  = geom.radius2;
-		secondRadius = INFINITY;
-	}
+	const bool                              swapped = phys.wallBody == 1, wall = phys.wallBody != 0;
+	const Body::id_t                        id1 = interaction.getId1(), id2 = interaction.getId2();
+	const ::dembark::capillary::BridgeSides sides{swapped ? id2 : id1, swapped ? id1 : id2, wall};
 	if (volumeBefore > 0.0) {
-		exchange->giveBack(scene->iter, {first, second, volumeBefore, phys.bridgeImbalance, phys.wallBody != 0});
+		exchange->bridgeBroke(scene->iter, {sides, volumeBefore, phys.bridgeImbalance});
 		phys.bridgeImbalance = 0.0;
 	} else if (geom.penetrationDepth > 0.0) {
-		exchange->ask(scene->iter, {first, second, firstRadius, secondRadius, &phys});
+		exchange->requestBridge(scene->iter,
+		                        {{sides, swapped ? geom.radius2 : geom.radius1, wall ? INFINITY : geom.radius2}, &phys});
 	}
 }
 
-bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* interaction) {
+bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys,
+                                                           Interaction* interaction) try {
 	const ScGeom&         geom = *static_cast<ScGeom*>(igeom.get());
 	FinnieRabinowiczPhys& phys = *static_cast<FinnieRabinowiczPhys*>(iphys.get());
-	const Body::id_t      id1 = interaction->getId1(), id2 = interaction->getId2();
-	const Body&           body1  = *Body::byId(id1, scene);
-	const Body&           body2  = *Body::byId(id2, scene);
-	const State&          state1 = *body1.state;
-	const State&          state2 = *body2.state;
+	if (dembark_yade::postponed(*scene)) return phys.effectiveYoungsModulus > 0.0;
+	const Body::id_t id1 = interaction->getId1(), id2 = interaction->getId2();
+	const Body&      body1  = *Body::byId(id1, scene);
+	const Body&      body2  = *Body::byId(id2, scene);
+	const State&     state1 = *body1.state;
+	const State&     state2 = *body2.state;
 	if (phys.preparedBy != revision) prepare(phys, geom, body1, body2);
 
 	const bool free1 = phys.wallBody != 1 && body1.isDynamic(), free2 = phys.wallBody != 2 && body2.isDynamic();
 	if (!free1 && !free2) {  // nothing that they do to each other has an effect
 		phys.normalForce = phys.shearForce = Vector3r::Zero();
-		if (carriedLiquid && phys.bridgeVolume > 0.0) {
-			const double volume = phys.bridgeVolume;
-			if (-geom.penetrationDepth > phys.ruptureDistance) phys.bridgeVolume = phys.ruptureDistance = 0.0;
-			trade(phys, geom, *interaction, volume);
+		if (const double volume = phys.bridgeVolume; carriedLiquid && volume > 0.0) {
+			bridge_step(phys.contact.liquid, geom.radius1, geom.radius2, -geom.penetrationDepth, false, phys.bridgeVolume,
+			            phys.ruptureDistance);
+			reportBridge(phys, geom, *interaction, volume);
 		}
 		return geom.penetrationDepth > 0.0 || phys.bridgeVolume > 0.0;
 	}
@@ -239,20 +212,15 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 	view.move(state1.vel, state1.angVel, state2.vel + shiftVelocity, state2.angVel);
 	const ::dembark::ContactBodies& bodies = view.bodies;
 
-	::dembark::ContactState state;
-	state.friction.displacement      = vec(phys.elasticDisplacement);
-	state.friction.slip              = phys.slip;
-	state.friction.dissipated_energy = phys.dissipatedEnergy;
-	state.bridge_volume              = phys.bridgeVolume;
-	state.rupture_distance           = phys.ruptureDistance;
-
+	::dembark::ContactState state{
+		{vec(phys.elasticDisplacement), phys.slip, phys.dissipatedEnergy}, phys.bridgeVolume, phys.ruptureDistance};
 	const double volumeBefore = phys.bridgeVolume;
 
 	const ::dembark::ContactForce out = ::dembark::contact_step(phys.contact, bodies, scene->dt, state);
 	// A comparison with what is no number is false: such a contact would vanish without a word.
 	if (!std::isfinite(out.overlap + out.force.x + out.force.y + out.force.z))
-		fail("the contact of bodies " + std::to_string(id1) + " and " + std::to_string(id2) + " has no finite force in step " +
-		             std::to_string(scene->iter) + "; look at their positions, velocities and parameters, and at the time step",
+		fail("the contact of " + pairName(body1, body2) + " has no finite force in step " + std::to_string(scene->iter) +
+		             "; look at their positions, velocities and parameters, and at the time step",
 		     1);
 
 	if (!(out.overlap > 0.0) && phys.dissipatedEnergy > 0.0) endedDissipation += phys.dissipatedEnergy;
@@ -263,38 +231,29 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 	phys.ruptureDistance     = state.rupture_distance;
 	phys.capillaryForce      = out.capillary_force;
 	phys.viscousForce        = out.viscous_normal;
-	if (carriedLiquid) trade(phys, geom, *interaction, volumeBefore);
+	if (carriedLiquid) reportBridge(phys, geom, *interaction, volumeBefore);
 	if (!out.interacting) return false;
 
 	const Vector3r force      = vec(out.force);
 	const Vector3r tangential = vec(out.tangential + out.viscous_tangential);
-	const bool     turns      = out.overlap > 0.0 || phys.contact.liquid.viscous.on();
+	const bool     viscous    = phys.contact.liquid.viscous.on();
 	phys.shearForce           = view.sign() * tangential;
 	phys.normalForce          = view.sign() * (force - tangential);
-	if (phys.contact.liquid.viscous.on()) phys.viscousShearForce = view.sign() * vec(out.viscous_tangential);
-	if (out.overlap > 0.0) {
-		const double radius =
-			phys.wallBody ? bodies.radius_1 : bodies.radius_1 * bodies.radius_2 / (bodies.radius_1 + bodies.radius_2);
-		if (normal == ::dembark::NormalLaw::hertz) {
-			const double root = std::sqrt(radius * out.overlap);
-			phys.kn           = 2.0 * phys.effectiveYoungsModulus * root;
-			phys.ks           = 8.0 * phys.effectiveShearModulus * root;
-		} else {
-			phys.kn = phys.ks = phys.linearStiffness;
-		}
-	} else {
-		phys.kn = phys.ks = 0.0;
-	}
+	if (viscous) phys.viscousShearForce = view.sign() * vec(out.viscous_tangential);
+	phys.kn = out.normal_stiffness;
+	phys.ks = out.tangential_stiffness;
 
 	const Body::id_t first = view.swapped() ? id2 : id1, second = view.swapped() ? id1 : id2;
 	scene->forces.addForce(first, force);
 	scene->forces.addForce(second, -force);
-	if (turns) scene->forces.addTorque(first, vec(out.torque_1));
-	if (phys.wallBody == 0) {
-		if (turns) scene->forces.addTorque(second, vec(out.torque_2));
-	} else {
-		scene->forces.addTorque(second, -view.surface.cross(force));
+	if (out.overlap > 0.0 || viscous) {
+		scene->forces.addTorque(first, vec(out.torque_1));
+		if (phys.wallBody == 0) scene->forces.addTorque(second, vec(out.torque_2));
 	}
+	if (phys.wallBody) scene->forces.addTorque(second, -view.surface.cross(force));
+	return true;
+} catch (const std::exception& error) {
+	dembark_yade::postpone(*scene, error);
 	return true;
 }
 

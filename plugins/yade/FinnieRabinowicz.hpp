@@ -22,9 +22,8 @@ public:
 
 	// Built from the attributes by the law and valid as long as `preparedBy` is the law's revision.
 	::dembark::ContactParameters contact;
-	long                         preparedBy      = -1;
-	int                          wallBody        = 0;  // 1 or 2: this body of the interaction is a wall; 0: two spheres
-	double                       linearStiffness = 0.0;
+	long                         preparedBy = -1;
+	int                          wallBody   = 0;  // 1 or 2: this body of the interaction is a wall; 0: two spheres
 
 	void postLoad(FinnieRabinowiczPhys&) { preparedBy = -1; }
 	/// A bridge of carried liquid forms between spheres of these radii (m; infinite = a wall).
@@ -118,7 +117,7 @@ public:
 
 private:
 	void prepare(FinnieRabinowiczPhys&, const ScGeom&, const Body&, const Body&) const;
-	void trade(FinnieRabinowiczPhys&, const ScGeom&, const Interaction&, double volumeBefore);
+	void reportBridge(FinnieRabinowiczPhys&, const ScGeom&, const Interaction&, double volumeBefore);
 
 	::dembark::NormalLaw        normal   = ::dembark::NormalLaw::hertz;
 	::dembark::Presliding       path     = ::dembark::Presliding::linear;

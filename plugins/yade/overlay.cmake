@@ -28,8 +28,10 @@ endif()
 string(REPLACE "\t\t\t\texcept: # all other exceptions\n"
 "\t\t\t\texcept RuntimeError as error:
 \t\t\t\t\tif str(error).startswith('dembark: ') and yade.runtime.opts.exitAfter:
-\t\t\t\t\t\tprint(error,file=sys.stderr,flush=True)
-\t\t\t\t\t\tsys.exit(2)
+\t\t\t\t\t\tline,code,logged=getattr(sys,'dembark_failure',('',2,False))
+\t\t\t\t\t\tif line!=str(error): code,logged=2,False
+\t\t\t\t\t\tif not logged: print(error,file=sys.stderr,flush=True)
+\t\t\t\t\t\tsys.exit(code)
 \t\t\t\t\timport traceback
 \t\t\t\t\ttraceback.print_exc()
 \t\t\t\t\tif yade.runtime.opts.exitAfter: sys.exit(1)

@@ -1,41 +1,28 @@
-// How the classes of this plugin tell a user's mistake.
+// How the classes of this plugin tell a user's mistake: in one line, as a RuntimeError of Python that leaves the session as it is.
 #pragma once
 
-#include <Python.h>
-
-#include <cstdio>
-#include <cstdlib>
 #include <stdexcept>
 #include <string>
 
-#ifdef _OPENMP
-#include <omp.h>
-#endif
+namespace yade {
 
-namespace yade::dembark_yade {
+class Scene;
 
-/// Throws std::runtime_error to Python where that can be: in a thread that holds the interpreter. From a loop that YADE runs with OpenMP
-/// no exception can leave, and YADE's simulation thread loses its text: there the line goes to stderr and the process ends with
-/// `code`, 2 for wrong input and 1 for a run that failed.
-[[noreturn]] inline void fail(const std::string& line, int code = 2) {
-#ifdef _OPENMP
-	const bool parallel = omp_get_level() > 0;
-#else
-	const bool parallel = false;
-#endif
-	if (parallel || !PyGILState_Check()) {
-		std::fprintf(stderr, "dembark: %s\n", line.c_str());
-		std::fflush(nullptr);
-		std::_Exit(code);
-	}
-	throw std::runtime_error("dembark: " + line);
-}
+namespace dembark_yade {
+
+/// Throws std::runtime_error with "dembark: " and the line. A script that runs by `yade -x` ends with this line and `code`, 2 for
+/// wrong input and 1 for a run that failed. From a loop that YADE runs with OpenMP no exception can leave: what YADE calls there
+/// must catch it and postpone() it.
+[[noreturn]] void fail(const std::string& line, int code = 2);
+
+/// In a catch block: lets the engine after the present one throw what was caught in a parallel loop; outside of one throws it on.
+void postpone(Scene& scene, const std::exception& error, bool inCollider = false);
+/// Whether that is still to come: then nothing in the loop counts any more.
+bool postponed(const Scene& scene);
 
 /// Shortest of the usual forms of a number, for such lines.
-inline std::string text(double value) {
-	char buffer[32];
-	std::snprintf(buffer, sizeof buffer, "%.6g", value);
-	return buffer;
-}
+std::string text(double value);
 
-}  // namespace yade::dembark_yade
+}  // namespace dembark_yade
+
+}  // namespace yade

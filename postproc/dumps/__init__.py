@@ -1,1 +1,1 @@
-"""Files of grains and contacts as frames of numbers: text and binary dumps of LAMMPS's format, plain or gzipped, and VTK files."""
+"""Files of grains and contacts as frames of numbers: text dumps and binary dumps, plain or gzipped, and VTK files."""

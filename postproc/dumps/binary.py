@@ -1,4 +1,4 @@
-"""LAMMPS binary dumps of grains (`dump ... custom ... file.bin`)."""
+"""Binary dumps of grains (`dump ... custom ... file.bin`)."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any
 
 import numpy as np
 
-from dembark.postproc.dumps.frames import HINT, Array, CutOffError, Dump, DumpError, Entry, RawFrame, before_tilt, numbered
-from dembark.postproc.dumps.source import Source
+from dembark.postproc.dumps.frames import HINT, Array, ColumnsError, CutOffError, Dump, DumpError, Entry, RawFrame, before_tilt, numbered
+from dembark.postproc.dumps.source import Handle, Source
 
 # Step, rows, whether the box is tilted, six words about its faces (0: periodic), its corners; the tilt; numbers a row, blocks.
 _START, _TILT, _END = struct.Struct("=qqi6i6d"), struct.Struct("=3d"), struct.Struct("=2i")
@@ -44,11 +44,11 @@ class BinaryDump(Dump):
             raise DumpError(f"{path} does not begin with 'ITEM: TIMESTEP', nor as a binary dump does")
         if columns is None:
             advice = "give columns=, the words of the deck's dump command"
-            raise DumpError(f"{path} is binary and does not name its {head.width} columns; {advice}")
+            raise ColumnsError(f"{path} is binary and does not name its {head.width} columns; {advice}")
         self._columns = tuple(columns)
         super().__init__(Path(path), skip_truncated=skip_truncated, stream=stream)
 
-    def _words(self, handle: BinaryIO, form: struct.Struct) -> tuple[float, ...] | None:
+    def _words(self, handle: Handle, form: struct.Struct) -> tuple[Any, ...] | None:
         room = bytearray(form.size)
         read = self._source.fill(handle, memoryview(room))
         if read == 0:
@@ -57,7 +57,7 @@ class BinaryDump(Dump):
             raise CutOffError
         return form.unpack(room)
 
-    def _header(self, handle: BinaryIO) -> _Header | None:
+    def _header(self, handle: Handle) -> _Header | None:
         """The header at the handle, or None at the end of the file; ValueError when it is none."""
         start = self._words(handle, _START)
         if start is None:
@@ -96,7 +96,7 @@ class BinaryDump(Dump):
                 yield Entry(place, 0, handle.tell() - place, number, step, count)
                 number, place = number + 1, handle.tell()
 
-    def _checked(self, handle: BinaryIO, number: int) -> _Header | None:
+    def _checked(self, handle: Handle, number: int) -> _Header | None:
         where = f"{self.path}, frame {number}"
         try:
             head = self._header(handle)
@@ -105,7 +105,7 @@ class BinaryDump(Dump):
                 raise
             raise DumpError(f"{where}: header cannot be read") from None
         if head is not None and head.width != len(self._columns):
-            raise DumpError(f"{where}: has {head.width} columns, but columns= names {len(self._columns)}")
+            raise ColumnsError(f"{where}: has {head.width} columns, but columns= names {len(self._columns)}")
         return head
 
     def _read(self, entry: Entry, columns: Sequence[str] | None) -> RawFrame:
@@ -118,13 +118,13 @@ class BinaryDump(Dump):
             raise DumpError(f"{self.path}, frame {entry.number}: the file was changed since it was opened")
         return frame
 
-    def _frame(self, handle: BinaryIO, number: int, columns: Sequence[str] | None = None) -> RawFrame | None:
+    def _frame(self, handle: Handle, number: int, columns: Sequence[str] | None = None) -> RawFrame | None:
         where = f"{self.path}, frame {number}"
         head = self._checked(handle, number)
         if head is None:
             return None
         values = np.empty((head.count, head.width))
-        room, filled = memoryview(values).cast("B") if values.size else memoryview(b""), 0
+        room, filled = values.data.cast("B") if values.size else memoryview(b""), 0
         for _ in range(head.blocks):
             length = self._words(handle, _BLOCK)
             if length is None:
@@ -139,8 +139,7 @@ class BinaryDump(Dump):
                 filled += read
         if filled != len(room):
             raise DumpError(f"{where}: its blocks hold fewer than {head.count} rows")
-        bad = np.argwhere(~np.isfinite(values)) if not np.isfinite(values.sum()) else []
-        if len(bad):
+        if not np.isfinite(values.sum()) and len(bad := np.argwhere(~np.isfinite(values))):
             row, column = bad[0]
             what = f"column {self._columns[column]} holds a number that is not finite, '{values[row, column]}'"
             raise DumpError(f"{where}, row {row + 1}: {what}")

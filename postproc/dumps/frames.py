@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,6 +19,17 @@ HINT = "skip_truncated=True leaves it out"
 
 class DumpError(ValueError):
     """A dump that cannot be read; the message is one line naming file and frame."""
+
+
+class ColumnsError(DumpError):
+    """The parameter `columns` is needed, or does not fit the file. Whoever has another name for it, as the command line, says so by
+    `parameter`."""
+
+    parameter = "columns="
+
+    def named(self, parameter: str) -> str:
+        """The message with another name of the parameter."""
+        return str(self).replace(self.parameter, parameter)
 
 
 class CutOffError(DumpError):
@@ -104,16 +115,21 @@ class Dump(ABC):
 
     def refresh(self) -> None:
         """Look at the file anew: it may have grown while an engine writes it."""
+        self._index = self._search()
+
+    def _search(self) -> list[Entry]:
+        """The frames to be read; sets what is said about the others."""
         found = list(self._find())
         again = {entry.step for entry in found if not entry.fault}
         faulty = [entry for entry in found if entry.fault and entry.step not in again]
         self.truncated, self.remarks = "", ()
         for entry in faulty:
             self._cut_off(f"{self._where(entry)}: {entry.fault}")
-        self._index, said = kept_entries([entry for entry in found if not entry.fault])
+        kept, said = kept_entries([entry for entry in found if not entry.fault])
         if said:
             self.remarks += (f"{self.path}: {said}",)
-            warnings.warn(self.remarks[-1], DumpWarning, stacklevel=2)
+            warnings.warn(self.remarks[-1], DumpWarning, stacklevel=3)
+        return kept
 
     def _where(self, entry: Entry) -> str:
         return f"{self.path}, frame {entry.number}"
@@ -129,7 +145,7 @@ class Dump(ABC):
     @property
     def _entries(self) -> list[Entry]:
         if self._index is None:
-            self.refresh()
+            self._index = self._search()
         return self._index
 
     @property
@@ -219,7 +235,7 @@ def before_tilt(low: Array, high: Array, tilt: Array) -> tuple[Array, Array]:
     return low - np.array(least), high - np.array(most)
 
 
-def less_edges(vectors: Array, raw: RawFrame, whole: np.ufunc) -> Array:
+def less_edges(vectors: Array, raw: RawFrame, whole: Callable[[Array], Array]) -> Array:
     """The vectors (m, 3) less whole edges of the box along its periodic axes: as many as `whole` makes of their components along them."""
     edges, result = cell(raw.low, raw.high, raw.tilt), vectors.copy()
     for axis in (2, 1, 0):

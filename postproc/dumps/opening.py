@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from dembark.postproc.dumps.binary import BinaryDump
-from dembark.postproc.dumps.frames import Dump, DumpError
+from dembark.postproc.dumps.frames import ColumnsError, Dump
 from dembark.postproc.dumps.series import SeriesDump, files_of
 from dembark.postproc.dumps.source import Source
 from dembark.postproc.dumps.text import TextDump
@@ -17,7 +17,7 @@ Trajectory = str | Path | Sequence[str | Path]
 
 
 def open_dump(path: Trajectory, skip_truncated: bool = False, *, stream: bool = False, columns: Sequence[str] | None = None) -> Dump:
-    """Open text or binary dumps of LAMMPS's format, gzipped or not, or VTK files of `dump custom/vtk`, `atom/vtk` and `local/gran/vtk`.
+    """Open text or binary dumps, gzipped or not, or VTK files of `dump custom/vtk`, `atom/vtk` and `local/gran/vtk`.
 
     `path` is a file or, where each step has its own, a pattern such as "post/dump*.dump" or "post/grains*.vtk", or a list of files.
     `columns` names the columns of a binary dump, which holds numbers only, in the order of the deck's `dump` command. `skip_truncated`
@@ -25,8 +25,8 @@ def open_dump(path: Trajectory, skip_truncated: bool = False, *, stream: bool = 
     file.
     """
     files = files_of(path)
-    if files is None:
-        return _open_one(Path(path), columns=columns, skip_truncated=skip_truncated, stream=stream)
+    if isinstance(files, Path):
+        return _open_one(files, columns=columns, skip_truncated=skip_truncated, stream=stream)
     return SeriesDump(files, partial(_open_one, columns=columns), skip_truncated=skip_truncated, stream=stream)
 
 
@@ -36,5 +36,6 @@ def _open_one(file: Path, *, columns: Sequence[str] | None, skip_truncated: bool
     if not text and not any(source.begins_with(start) for start in (b"# vtk", b"<?xml", b"<VTKFile")):
         return BinaryDump(file, columns=columns, skip_truncated=skip_truncated, stream=stream)
     if columns is not None:
-        raise DumpError(f"{file}: columns= is for binary dumps; this is a {'text dump, which names its columns' if text else 'VTK file'}")
+        kind = "text dump, which names its columns" if text else "VTK file"
+        raise ColumnsError(f"{file}: columns= is for binary dumps; this is a {kind}")
     return TextDump(file, skip_truncated=skip_truncated, stream=stream) if text else VtkFile(file)

@@ -12,11 +12,11 @@ from dembark.postproc.dumps.frames import CutOffError, Dump, DumpError, Entry, R
 from dembark.postproc.dumps.vtk import BOX
 
 
-def files_of(path: str | Path | Sequence[str | Path]) -> list[Path] | None:
-    """The files of a pattern or list, in the order of the numbers in their names; None for the path of one file."""
+def files_of(path: str | Path | Sequence[str | Path]) -> Path | list[Path]:
+    """The files of a pattern or list, in the order of the numbers in their names; the path of one file as it is."""
     if isinstance(path, str | Path):
         if Path(path).exists() or not glob.has_magic(str(path)):
-            return None
+            return Path(path)
         found = [Path(name) for name in glob.glob(str(path)) if BOX not in Path(name).name]  # noqa: PTH207 - it may be absolute
     else:
         found = [Path(name) for name in path]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import io
 import os
 import sys
 import weakref
@@ -10,11 +11,12 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
 from dembark.postproc.dumps.frames import DumpError
+
+Handle = io.FileIO | gzip.GzipFile
 
 _WINDOW = 1 << 22
 # So much text is kept behind the place of reading, to find in it the start of a frame that a restarted run wrote into a cut-off line.
@@ -37,7 +39,7 @@ class Source:
         if not start:
             raise DumpError(f"{path} does not exist or is empty")
         self.compressed = start == b"\x1f\x8b"
-        self._gzip: BinaryIO | None = None
+        self._gzip: gzip.GzipFile | None = None
         self._spare: list[bytearray] = []
 
     def begins_with(self, start: bytes) -> bool:
@@ -58,7 +60,7 @@ class Source:
         return {**self.__dict__, "_gzip": None, "_spare": []}
 
     @contextmanager
-    def at(self, place: int) -> Iterator[BinaryIO]:
+    def at(self, place: int) -> Iterator[Handle]:
         """The bytes from `place` on."""
         if not self.compressed:
             with self.path.open("rb", buffering=0) as handle:
@@ -79,10 +81,10 @@ class Source:
         except (zlib.error, gzip.BadGzipFile) as error:
             raise DumpError(f"{self.path}: its compression is damaged ({error})") from None
 
-    def fill(self, handle: BinaryIO, room: memoryview) -> int:
+    def fill(self, handle: Handle, room: memoryview) -> int:
         """Read into `room`; how many bytes came, 0 at the end. A gzipped file that was cut off just ends."""
-        if not self.compressed:
-            return handle.readinto(room)
+        if isinstance(handle, io.FileIO):
+            return handle.readinto(room) or 0
         filled = 0
         with self._damage():
             try:
@@ -92,9 +94,9 @@ class Source:
                 pass
         return filled
 
-    def reach(self, handle: BinaryIO, place: int) -> bool:
+    def reach(self, handle: Handle, place: int) -> bool:
         """Go on to `place`; whether the file is so long."""
-        if not self.compressed:
+        if isinstance(handle, io.FileIO):
             return handle.seek(place) <= os.fstat(handle.fileno()).st_size
         with self._damage():
             try:
@@ -109,7 +111,7 @@ class Window:
     `line_number` is that of the line at `begin`.
     """
 
-    def __init__(self, source: Source, handle: BinaryIO, room: bytearray, place: int = 0, line: int = 1, size: int | None = None) -> None:
+    def __init__(self, source: Source, handle: Handle, room: bytearray, place: int = 0, line: int = 1, size: int | None = None) -> None:
         """At `place`, where line `line` begins; `room` is memory to use, `size` (bytes) how much to read at most."""
         self._source, self._handle = source, handle
         self._offset, self.line_number = place, line

@@ -1,4 +1,4 @@
-"""LAMMPS text dumps: `ITEM: ATOMS` (grains) and `ITEM: ENTRIES` (contacts), as numpy arrays in double precision."""
+"""Text dumps: `ITEM: ATOMS` (grains) and `ITEM: ENTRIES` (contacts), as numpy arrays in double precision."""
 
 from __future__ import annotations
 

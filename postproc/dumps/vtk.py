@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dembark.postproc.dumps.frames import HINT, Array, CutOffError, Dump, DumpError, Entry, RawFrame, numbered
 from dembark.postproc.dumps.source import Source
@@ -47,11 +48,14 @@ def _table(data: Any, where: str) -> dict[str, Array]:
     """Columns of a dataset, named as those of a text dump."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
+    # VTK's function has no types.
+    plain: Callable[[Any], NDArray[Any]] = vtk_to_numpy
+
     def arrays(part: Any) -> dict[str, Array]:
         numeric = [part.GetArray(number) for number in range(part.GetNumberOfArrays()) if part.GetArray(number)]
-        return {array.GetName(): vtk_to_numpy(array).astype(float) for array in numeric}
+        return {array.GetName(): plain(array).astype(float) for array in numeric}
 
-    points = vtk_to_numpy(data.GetPoints().GetData()).astype(float) if data.GetNumberOfPoints() else np.empty((0, 3))
+    points = plain(data.GetPoints().GetData()).astype(float) if data.GetNumberOfPoints() else np.empty((0, 3))
     columns: dict[str, Array] = {}
     if data.GetCellData().GetArray("id1") is not None or data.GetPointData().GetNumberOfArrays() == 0:
         ends = points.reshape(-1, 6) if len(points) else np.empty((0, 6))

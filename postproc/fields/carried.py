@@ -76,16 +76,16 @@ class Contacts:
         if self.liquid is not None:
             values[:, column.BRIDGED] = self.liquid[index]
         if self.omegas is not None:
-            values[:, column.POWER], values[:, column.FRICTION] = self._power(index, forces, normal, length)
+            values[:, column.POWER], values[:, column.FRICTION] = self._power(self.omegas, index, forces, normal, length)
         if self.power is not None:
             values[:, column.POWER] = self.power[index]
         return values
 
-    def _power(self, index: Index, forces: Array, normal: Array, length: Array) -> tuple[Array, Array]:
+    def _power(self, omegas: Array, index: Index, forces: Array, normal: Array, length: Array) -> tuple[Array, Array]:
         """Power (k,) of the contact forces that the grains lose (W), and its tangential part."""
         one, two = self.pairs[index].T
         half = 0.5 * (self.radii[one] + self.radii[two] - length)
-        spin = (self.radii[one] - half)[:, None] * self.omegas[one] + (self.radii[two] - half)[:, None] * self.omegas[two]
+        spin = (self.radii[one] - half)[:, None] * omegas[one] + (self.radii[two] - half)[:, None] * omegas[two]
         relative = self.velocities[one] - self.velocities[two] + np.cross(spin, normal)
         total = -(forces * relative).sum(axis=1)
         return total, total + (forces * normal).sum(axis=1) * (relative * normal).sum(axis=1)

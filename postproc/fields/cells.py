@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
 from dembark.postproc.contacts import ContactFrame
+from dembark.postproc.dumps.frames import cell
 from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.postproc.fields.grid import Grid, check_periods
 from dembark.postproc.fields.sums import full_tensor, ratio, symmetric_parts
-from dembark.postproc.grains import GrainFrame, cell
+from dembark.postproc.grains import GrainFrame
 from dembark.postproc.spheres import volume
 
 Array = NDArray[np.float64]
@@ -141,7 +142,7 @@ def cell_totals(grains: GrainFrame, contacts: ContactFrame | None, grid: Grid, w
         """Sums (nx, ny, nz[, c]) of `values` (n[, c]) by cell; number grid.cells is outside."""
         columns = values.T if values.ndim == 2 else [values]
         sums = [np.bincount(place, weights=column, minlength=grid.cells + 1)[: grid.cells] for column in columns]
-        return np.stack(sums, axis=-1).reshape(*grid.shape, *values.shape[1:])
+        return np.stack(sums, axis=-1).reshape(*grid.shape, *values.shape[1:]).astype(float, copy=False)
 
     return CellTotals(
         grid,
@@ -198,6 +199,6 @@ def _cells(places: Array, frame: GrainFrame, grid: Grid) -> NDArray[np.int64]:
     index = np.floor((places - grid.low) / grid.spacing)
     # What lies on an upper face belongs to the last cell; folding can round a place up to it.
     index[places == grid.high] -= 1.0
-    inside = ((index >= 0) & (index < grid.shape)).all(axis=1)
+    inside = np.asarray(((index >= 0) & (index < grid.shape)).all(axis=1))
     safe = np.where(inside[:, None], index, 0.0).astype(np.int64)
     return np.where(inside, np.ravel_multi_index(tuple(safe.T), grid.shape), grid.cells)

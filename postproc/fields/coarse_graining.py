@@ -84,7 +84,7 @@ def coarse_grain(
     spreader.grains(
         Grains(grains.wrapped, grains.masses, grains.radii, grains.velocities, peculiar, touches, grains.extra.get(liquid)), sums.grains
     )
-    if contacts is not None:
+    if contacts is not None and sums.contacts is not None:
         for name in ("first", "branch", "forces"):
             _check_finite(getattr(contacts, name), name, contacts.step, workers)
         omegas = grains.omegas if grains.has("omegas") else None
@@ -115,7 +115,7 @@ def _linked(grains: GrainFrame, contacts: ContactFrame | None, threads: int) -> 
     """What `_touching` gives, compiled."""
     count = 0 if contacts is None else len(contacts.ids)
     touching, pairs, touches = np.zeros(count, bool), np.zeros((count, 2), np.int64), np.zeros(len(grains.ids))
-    if count:
+    if contacts is not None and count:
         wanted = np.ascontiguousarray(contacts.ids, np.int64)
         ids, radii, branch = np.ascontiguousarray(grains.ids, np.int64), _doubles(grains.radii), _doubles(contacts.branch)
         missing = _fields.link(ids, radii, wanted, branch, 1.0 + _TOUCHING, threads, pairs, touching, touches)

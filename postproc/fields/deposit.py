@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,11 @@ from scipy.sparse import csr_matrix
 
 from dembark import _fields
 from dembark.common.errors import DembarkError
+from dembark.postproc.dumps.frames import cell
 from dembark.postproc.fields.carried import Contacts, Grains
 from dembark.postproc.fields.grid import Grid, periodic_images
 from dembark.postproc.fields.kernels import NAMES, Kernel, ball_shares, cumulative, line_nodes, unit_gauss
-from dembark.postproc.grains import GrainFrame, cell
+from dembark.postproc.grains import GrainFrame
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -57,8 +59,7 @@ class Spreader:
         # Moments are taken about the middle of the grid, so that the second ones lose few digits.
         middle = 0.5 * (self.grid.low + self.grid.high)
         if self.backend == "native":
-            carried = {name: _plain(getattr(grains, name)) for name in grains.__dataclass_fields__}
-            self._target().grains(**carried, middle=middle, out=_rows(out))
+            self._target().grains(**_all_plain(grains), middle=middle, out=_rows(out))
             return
         for index, shift in self._images(grains.places, None):
             place = grains.places[index] + shift
@@ -68,8 +69,7 @@ class Spreader:
         """Add to `out` (nx, ny, nz, 20), made by `zeros`, what the contacts carry times the mean shares along their branches."""
         place, weight = line_nodes(self.kernel, _longest(contacts.branch))
         if self.backend == "native":
-            carried = {name: _plain(getattr(contacts, name)) for name in contacts.__dataclass_fields__}
-            self._target().contacts(**carried, place=place, weight=weight, out=_rows(out))
+            self._target().contacts(**_all_plain(contacts), place=place, weight=weight, out=_rows(out))
             return
         for index, shift in self._images(contacts.first, contacts.branch):
             self._add(contacts.first[index] + shift, contacts.branch[index], contacts.values(index), (place, weight), out)
@@ -129,10 +129,14 @@ def _rows(out: Array) -> Array:
     return out.transpose(0, 1, 3, 2)
 
 
-def _plain(values: Array | Index | None) -> Array | Index | None:
+def _all_plain(carried: Grains | Contacts) -> dict[str, Any]:
+    """What grains or contacts carry, by name, as the compiled code takes it."""
+    values = {item.name: getattr(carried, item.name) for item in fields(carried)}
+    return {name: None if one is None else _plain(one) for name, one in values.items()}
+
+
+def _plain(values: NDArray[Any]) -> NDArray[Any]:
     """`values` as the compiled code takes them: contiguous, of 8 bytes or flags."""
-    if values is None:
-        return None
     kind = values.dtype if values.dtype in (np.bool_, np.int64) else np.float64
     return np.ascontiguousarray(values, kind)
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
 from dembark.postproc.dumps.frames import cell
@@ -40,7 +41,7 @@ class Grid:
             object.__setattr__(self, name, value)
 
     @classmethod
-    def around(cls, frame: GrainFrame, spacing: ArrayLike, margin: float = 0.0) -> Grid:
+    def around(cls, frame: GrainFrame, spacing: float | Sequence[float] | Array, margin: float = 0.0) -> Grid:
         """Grid of cells of at most `spacing` (m; one number or three) around all grains of `frame`.
 
         On a periodic axis it spans the box exactly. Elsewhere it reaches `margin` (m) beyond the grains' surfaces; with a margin of
@@ -113,7 +114,7 @@ def periodic_images(low: Array, high: Array, reach: float, grid: Grid, frame: Gr
         if len(index) == 0:
             break
         least, most = low[index, axis] + shift[:, axis] - reach, high[index, axis] + shift[:, axis] + reach
-        numbers = [0]
+        numbers: Sequence[int] = [0]
         if frame.periodic[axis]:
             begin = np.ceil((grid.low[axis] - most.max()) / length[axis])
             end = np.floor((grid.high[axis] - least.min()) / length[axis])

@@ -50,7 +50,7 @@ class Rings:
         """Rings of about `spacing` (m) in a vessel of `radius` with a filling of `height`, both borders of rings; REACH widths around."""
         step, rise = radius / max(1, round(radius / spacing)), height / max(1, round(height / spacing))
         more, further = int(np.ceil(REACH * width / step)), int(np.ceil(REACH * width / rise))
-        radial, vertical = np.arange(round(radius / step) + more + 1), np.arange(-further, round(height / rise) + further + 1)
+        radial, vertical = np.arange(round(radius / step) + more + 1.0), np.arange(-further, round(height / rise) + further + 1.0)
         return cls(step * radial, rise * vertical, width, radius)
 
     @property
@@ -179,7 +179,8 @@ def coarse_grain(
     """
     lines = [(contacts.first, contacts.branch, contacts.forces),
              *((one.positions, one.points - one.positions, one.forces) for one in walls)]
-    place, tensor = _points(*(np.concatenate(parts) for parts in zip(*lines, strict=True)), rings.width)
+    first, branch, forces = (np.concatenate(parts) for parts in zip(*lines, strict=True))
+    place, tensor = _points(first, branch, forces, rings.width)
     count = len(place)
     # The streaming part is a line of no length: the momentum m v is carried with v.
     place = np.concatenate([place, grains.positions])

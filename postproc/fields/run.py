@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import reduce
+from itertools import islice
+from operator import add
 from pathlib import Path
 
 import numpy as np
@@ -12,15 +15,15 @@ from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
 from dembark.postproc.contacts import ContactFrame
-from dembark.postproc.fields.cells import CellAverage, CellTotals, cell_grid, cell_totals
-from dembark.postproc.fields.coarse_graining import coarse_grain
+from dembark.postproc.fields.cells import CellAverage, cell_grid, cell_totals
+from dembark.postproc.fields.coarse_graining import WallContacts, coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import Kernel
-from dembark.postproc.fields.sums import MASS, MOMENTUM, Fields, FieldSums
+from dembark.postproc.fields.sums import MASS, MOMENTUM, Fields
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.output.netcdf import FieldsNetcdf
 from dembark.postproc.output.vtkhdf import FieldsVtkhdf, GrainsVtkhdf
-from dembark.postproc.output.whole import Selection
+from dembark.postproc.output.whole import Labelled, Selection
 from dembark.postproc.sources import Reading, Source
 from dembark.postproc.walls import Inclusion, wall_contacts
 from dembark.postproc.walls.run import (
@@ -37,6 +40,7 @@ from dembark.postproc.walls.stress import WallStress
 from dembark.postproc.words import WallWord, counts, length, near, span
 
 Array = NDArray[np.float64]
+Frame = tuple[GrainFrame, ContactFrame | None]
 Attributes = Mapping[str, str | float | int]
 
 _PATCH = 2.0  # size of a wall's patches in mean diameters
@@ -66,6 +70,19 @@ class Words:
     grains: Path | None
     plot: Path | None
     threads: int | None
+
+
+@dataclass
+class _Sample:
+    """Frames that are averaged: `times` (s), and `totals` (5,) of all grains of each: mass, momentum along x, y, z, and sum of m |v|."""
+
+    times: list[float] = field(default_factory=list)
+    totals: list[Array] = field(default_factory=list)
+
+    def add(self, grains: GrainFrame, time: float) -> None:
+        momenta = grains.masses[:, None] * grains.velocities
+        self.times.append(time)
+        self.totals.append(np.array([grains.masses.sum(), *momenta.sum(axis=0), np.linalg.norm(momenta, axis=1).sum()]))
 
 
 @dataclass
@@ -126,33 +143,26 @@ class FieldJob:
         attributes = {**provenance, **self._method()}
         recorders = recorders_of(self.walls, self.source, self.numbers, _PATCH * self.diameter)
         stream = self.source.frames(self.numbers)
-        last: Fields | CellAverage | None = None
         with ExitStack() as stack:
-            netcdf, vtkhdf, points = (stack.enter_context(kind(path, attributes)) if path else None for kind, path in (
-                (FieldsNetcdf, self.words.out), (FieldsVtkhdf, self.words.vtkhdf), (GrainsVtkhdf, self.words.grains)))
+            netcdf = stack.enter_context(FieldsNetcdf(self.words.out, attributes)) if self.words.out else None
+            vtkhdf = stack.enter_context(FieldsVtkhdf(self.words.vtkhdf, attributes)) if self.words.vtkhdf else None
+            points = stack.enter_context(GrainsVtkhdf(self.words.grains, attributes)) if self.words.grains else None
+
+            def seen(grains: GrainFrame, contacts: ContactFrame | None, time: float) -> None:
+                for recorder in recorders:
+                    recorder.add(grains, contacts, time)
+                if points:
+                    points.add(grains, time)
+                advance()
+
             for group in self.groups:
-                sums: FieldSums | CellTotals | None = None
-                times, totals = [], []
-                for _ in group:
-                    grains, contacts = next(stream)
-                    times.append(self.source.time(grains.step))
-                    totals.append(_totals(grains))
-                    one = self._sums(grains, contacts, times[-1])
-                    sums = one if sums is None else sums + one
-                    for recorder in recorders:
-                        recorder.add(grains, contacts, times[-1])
-                    if points:
-                        points.add(grains, times[-1])
-                    advance()
-                self._check(sums, np.mean(totals, axis=0))
-                last = sums.average(self.words.least_contacts) if isinstance(sums, CellTotals) else sums.fields()
-                if isinstance(last, CellAverage):
-                    self.seen = min(self.seen, float(1.0 - last.mask.mean()))
-                chosen, middle = Selection(last, self.only) if self.only else last, 0.5 * (times[0] + times[-1])
+                sample = _Sample()
+                last = self._average(self._sampled(islice(stream, len(group)), sample, seen), sample)
+                chosen, (begin, end) = Selection(last, self.only) if self.only else last, (sample.times[0], sample.times[-1])
                 if netcdf:
-                    netcdf.add(chosen, middle, (times[0], times[-1]))
+                    netcdf.add(chosen, 0.5 * (begin + end), (begin, end))
                 if vtkhdf:
-                    vtkhdf.add(chosen, middle)
+                    vtkhdf.add(chosen, 0.5 * (begin + end))
             self.loads = [recorder.result() for recorder in recorders]
             if netcdf:
                 netcdf.add_walls(self.loads)
@@ -162,25 +172,42 @@ class FieldJob:
             figures = field_figures(last) | {name: figure for one in self.loads for name, figure in wall_figures(one).items()}
             self.written += save(self.words.plot, figures)
 
-    def _sums(self, grains: GrainFrame, contacts: ContactFrame | None, time: float) -> FieldSums | CellTotals:
-        touched = [wall_contacts(grains, one.wall, time) for one in self.walls if not isinstance(one.wall, Inclusion)]
-        if self.kernel is None:
-            return cell_totals(grains, contacts, self.grid, touched)
-        return coarse_grain(grains, contacts, self.grid, kernel=self.kernel.name, width=self.kernel.width, walls=touched,
-                            threads=self.words.threads)
+    def _sampled(self, frames: Iterable[Frame], sample: _Sample, seen: Callable[[GrainFrame, ContactFrame | None, float], None]
+                 ) -> Iterator[tuple[GrainFrame, ContactFrame | None, list[WallContacts]]]:
+        """The frames with the contacts of their walls; each is noted in `sample` and `seen` once it was used."""
+        for grains, contacts in frames:
+            time = self.source.time(grains.step)
+            yield grains, contacts, [wall_contacts(grains, one.wall, time) for one in self.walls if not isinstance(one.wall, Inclusion)]
+            sample.add(grains, time)
+            seen(grains, contacts, time)
 
-    def _check(self, sums: FieldSums | CellTotals, expected: Array) -> None:
-        """Keep mass and error of the momentum in all cells, masked or not; `expected` as from `_totals`."""
-        mass, momentum = (sums.grains[..., MASS], sums.grains[..., MOMENTUM]) if isinstance(sums, FieldSums) else (sums.mass, sums.momentum)
-        self.masses.append((float(mass.sum()) / sums.frames, float(expected[0])))
+    def _average(self, frames: Iterator[tuple[GrainFrame, ContactFrame | None, list[WallContacts]]], sample: _Sample) -> Labelled:
+        """The average of a group of frames; keeps what of its mass and momentum is in the cells, masked or not."""
+        if self.kernel is None:
+            totals = reduce(add, (cell_totals(grains, contacts, self.grid, touched) for grains, contacts, touched in frames))
+            average = totals.average(self.words.least_contacts)
+            self.seen = min(self.seen, float(1.0 - average.mask.mean()))
+            self._check(totals.mass, totals.momentum, sample)
+            return average
+        name, width, threads = self.kernel.name, self.kernel.width, self.words.threads
+        sums = reduce(add, (coarse_grain(grains, contacts, self.grid, kernel=name, width=width, walls=touched, threads=threads)
+                            for grains, contacts, touched in frames))
+        self._check(sums.grains[..., MASS], sums.grains[..., MOMENTUM], sample)
+        return sums.fields()
+
+    def _check(self, mass: Array, momentum: Array, sample: _Sample) -> None:
+        """Keep mass and error of the momentum of all cells, summed over frames."""
+        expected, frames = np.mean(sample.totals, axis=0), len(sample.totals)
+        self.masses.append((float(mass.sum()) / frames, float(expected[0])))
         if expected[4] > 0.0:
-            error = np.abs(momentum.sum(axis=(0, 1, 2)) / sums.frames - expected[1:4]).max() / expected[4]
+            error = np.abs(momentum.sum(axis=(0, 1, 2)) / frames - expected[1:4]).max() / expected[4]
             self.momentum_error = max(self.momentum_error, float(error))
 
     def _method(self) -> Attributes:
-        method = {"method": "cell averages", "least_contacts": self.words.least_contacts} if self.kernel is None else {
-            "method": "coarse graining", "kernel": self.kernel.name, "kernel_width": self.kernel.width}
-        known = {"mean_diameter": self.diameter, "frames": len(self.numbers),
+        method: dict[str, str | float | int] = {"method": "cell averages", "least_contacts": self.words.least_contacts}
+        if self.kernel is not None:
+            method = {"method": "coarse graining", "kernel": self.kernel.name, "kernel_width": self.kernel.width}
+        known: dict[str, str | float | int] = {"mean_diameter": self.diameter, "frames": len(self.numbers),
                  "walls": ", ".join(one.wall.name for one in self.walls) or "none",
                  "case": str(self.source.record.get("case", "")), "engine": str(self.source.record.get("engine", ""))}
         return {**method, **{name: value for name, value in known.items() if value != ""}}
@@ -206,12 +233,6 @@ class FieldJob:
         for one in self.loads:
             lines += wall_lines(one, self.source)
         return [*lines, *(f"written: {path}" for path in self.written)]
-
-
-def _totals(grains: GrainFrame) -> Array:
-    """Mass, momentum along x, y, z, and sum of m |v| of all grains (5,)."""
-    momenta = grains.masses[:, None] * grains.velocities
-    return np.array([grains.masses.sum(), *momenta.sum(axis=0), np.linalg.norm(momenta, axis=1).sum()])
 
 
 def _names(text: str | None, known: Mapping[str, str]) -> list[str]:
@@ -251,7 +272,7 @@ def _grid(frames: Sequence[GrainFrame], words: Words, diameter: float, margin: f
         spans = np.array([span(",".join(parts[2 * axis : 2 * axis + 2]), diameter, "--box") for axis in range(3)])
         # Only a grid over the whole period goes on at its other side.
         whole = np.abs(spans - np.column_stack([low, high])).max(axis=1) <= 1e-9 * (high - low)
-        periodic = tuple(bool(flag and all_of_it) for flag, all_of_it in zip(periodic, whole, strict=True))
+        periodic = (periodic[0] and bool(whole[0]), periodic[1] and bool(whole[1]), periodic[2] and bool(whole[2]))
         low, high = spans.T
     shape = counts(words.grid) if words.grid else tuple(np.maximum(1.0, np.ceil((high - low) / size * (1.0 - 1e-9))).tolist())
     if np.prod(np.array(shape, float)) > _MOST_CELLS:

@@ -134,7 +134,7 @@ class FieldSums:
             self.kernel,
             self.frames + other.frames,
             self.grains + other.grains,
-            None if self.contacts is None else self.contacts + other.contacts,
+            None if self.contacts is None or other.contacts is None else self.contacts + other.contacts,
             self.boundary + other.boundary,
             self.peculiar,
             self.liquid,
@@ -181,8 +181,8 @@ class FieldSums:
             stress=None if contact_stress is None else contact_stress + kinetic,
             coordination=None if contacts is None else ratio(grains[..., TOUCHES], grains[..., NUMBER]),
             fabric=None if contacts is None else ratio(full_tensor(contacts[..., FABRIC]), contacts[..., TOUCHING]),
-            dissipated_power=contacts[..., POWER] / volume if self.power else None,
-            friction_power=contacts[..., FRICTION] / volume if self.power else None,
+            dissipated_power=None if contacts is None or not self.power else contacts[..., POWER] / volume,
+            friction_power=None if contacts is None or not self.power else contacts[..., FRICTION] / volume,
             liquid_content=liquid / volume if self.liquid else None,
             grain_count=grains[..., NUMBER],
             contact_count=None if contacts is None else contacts[..., COUNT],
@@ -203,7 +203,7 @@ class FieldSums:
         spread = moment - centre[..., :, None] * centre[..., None, :]
         shear = ratio(grains[..., SHEAR].reshape(*self.grid.shape, 3, 3), mass[..., 0, 0]) - mean[..., :, None] * centre[..., None, :]
         spread, shear = spread[..., axes, :][..., axes], shear[..., axes]
-        seen = np.isfinite(spread).all(axis=(-2, -1))
+        seen = np.asarray(np.isfinite(spread).all(axis=(-2, -1)))
         # In a dense packing the spread is at least the kernel's variance. A millionth of it is what round-off leaves, or, of kernels that
         # are narrow beside the cells, the last digits of the moment that the square of the centre was taken off.
         rounding = 1e-12 * np.trace(moment[seen], axis1=-2, axis2=-1)

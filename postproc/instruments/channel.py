@@ -7,8 +7,9 @@ grain by its exact volume in the cell, Lagrangian ones are displacements of sing
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,12 +20,15 @@ from dembark.common.errors import RunError
 from dembark.postproc import ContactFrame, GrainFrame, profiles, stress
 from dembark.postproc.fields.coarse_graining import WallContacts, rows_of
 from dembark.postproc.replica import Array, Replica, once
+from dembark.postproc.resampling import profile, resampled
 from dembark.postproc.spheres import slice_volumes, volume
-from dembark.postproc.statistics import Estimate, block_mean, steady_start
+from dembark.postproc.statistics import Estimate, block_mean, steady_start, time_blocks
 
 Mask = NDArray[np.bool_]
 Bands = Mask | slice
 ALL = slice(None)
+# A mean velocity below this share of sqrt(g W) is creep: falling grains are jammed between the walls.
+LEAST_SPEED = 0.01
 
 
 def _ratio(above: Array, below: Array) -> Array:
@@ -132,6 +136,20 @@ class Channel:
         """Length in d of the exponential that fits the deficit; `start` in d."""
         return min(fitted_decay(*self.deficit(frames, bands, cells), start * self.diameter), self.width) / self.diameter
 
+    def scaled_deficit(self, length: float) -> tuple[Array, Array]:
+        """Distance from the layer at the nearer wall over `length` (d), and (v_core - v) / (v_core - v_wall) there; 1 at 0.
+
+        The layer's centres are half a diameter off the wall, and its velocity is that of the wall.
+        """
+        place, deficit = self.deficit(self.frames, cells=2)
+        return (place - place[0]) / (length * self.diameter), deficit / (1.0 - self.wall_velocity(self.frames))
+
+    def lagrangian(self) -> Array:
+        """Mean Lagrangian velocity (cells,) of the grains whose mean place is in each cell; NaN where there is none."""
+        cell = np.clip(np.searchsorted(self.edges, self.grain_place) - 1, 0, len(self.middle) - 1)
+        count, speeds = np.bincount(cell, minlength=len(self.middle)), np.bincount(cell, self.grain_speed, len(self.middle))
+        return _ratio(speeds.astype(np.float64), count.astype(np.float64))
+
     def ninety_width(self, frames: Mask, bands: Bands = ALL) -> float:
         """Distance from the wall in d at which the deficit has fallen to a tenth of its greatest value."""
         place, deficit = self.deficit(frames, bands)
@@ -149,6 +167,16 @@ class Channel:
         slopes = [np.polyfit(self.middle[one], speed[one], 1)[0] for one in (self.core & left, self.core & ~left)]
         pressure = self.pressure[frames][:, self.core].mean()
         return float(profiles.inertial_number(max(slopes, key=abs), pressure, self.diameter, self.density))
+
+    def inertial_numbers(self, frames: Mask) -> Array:
+        """Inertial number across the channel (cells - 1,), between the middles of neighbouring cells."""
+        pressure, slope = self.pressure[frames].mean(axis=0), np.diff(self.velocity(frames)) / np.diff(self.middle)
+        return np.asarray(profiles.inertial_number(slope, 0.5 * (pressure[1:] + pressure[:-1]), self.diameter, self.density))
+
+    def shear_inertial(self, frames: Mask) -> float:
+        """The largest of these further than one diameter from the walls, where cells are not split by the layers."""
+        place = 0.5 * (self.middle[1:] + self.middle[:-1])
+        return float(self.inertial_numbers(frames)[np.minimum(place, self.width - place) > self.diameter].max())
 
     def fluctuation(self, frames: Mask, bands: Bands = ALL, apart: bool = False) -> Array:
         """Standard deviation (cells,) of the vertical velocities about the cell's mean, over the scale of velocities.
@@ -186,11 +214,12 @@ def joined(given: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], track: A
     are in the channel all along."""
     width, diameter = float(given["channel_width"]), float(given["grain_diameter"])
     inner = stays & (np.abs(track[:, :, 0].mean(axis=0) - 0.5 * width) < 0.25 * width)
+    over_frames: dict[str, Any] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     return Channel(
         edges=cells_across(width, diameter), width=width, depth=float(given["channel_depth"]), diameter=diameter,
         density=float(given["grain_density"]), core_motion=-np.diff(track[:, inner, 2].mean(axis=1)) / np.diff(clock),
         grain_place=track[:, stays, 0].mean(axis=0), grain_speed=-profiles.lagrangian_velocities(track[:, stays], clock)[:, 2],
-        **{name: np.array([row[name] for row in rows]) for name in rows[0]}, **more)
+        **over_frames, **more)
 
 
 @once
@@ -211,16 +240,93 @@ def read(replica: Replica) -> Channel:
                        "filled while the plate sinks", "take more grains or less travel")
     levels, edges = np.linspace(low, high, max(4, round((high - low) / diameter)) + 1), cells_across(width, diameter)
     rows, paths = [], []
-    for (grains, contacts), keep in zip(replica.paired_frames(), used, strict=True):
-        if keep:
-            paths.append(grains.select(grains.types == 1).positions)
-            rows.append(frame_rows(grains, contacts, edges, levels, depth))
+    for grains, contacts in _chosen(replica, used):
+        paths.append(grains.select(grains.types == 1).positions)
+        rows.append(frame_rows(grains, contacts, edges, levels, depth))
     track = np.array(paths)
     stays = (track[0, :, 2] > bottom[0] + 2.0 * diameter) & (track[-1, :, 2] < top[-1] - 2.0 * diameter)
     walls = sum(times[f"{wall}_fz"] for wall in ("left", "right", "base"))
-    return joined(given, rows, track, stays, steps[used] * replica.time_step, levels=levels, speed=float(given["base_speed"]),
+    return joined(given, rows, track, stays, steps[used].astype(float) * replica.time_step, levels=levels, speed=float(given["base_speed"]),
                   force_error=block_mean((walls / weight - 1.0)[times["step"] >= start]), height=float(np.mean(top - bottom)),
                   steady_share=float(used.mean()), remark=remark)
+
+
+@once
+def read_periodic(replica: Replica) -> Channel:
+    """Measure a run whose grains fall between the walls, periodic along the flow; the scale of velocities is sqrt(g W).
+
+    The walls' friction swings by as much as its mean, so the steady part is that of the kinetic energy, which sums up what the balance of
+    forces lacks. The balance is that of friction, weight and the mean acceleration from frame to frame.
+    """
+    given, times, steps = replica.parameters, replica.times(), np.array([frame.step for frame in replica.grains()])
+    gravity, width, depth = (float(given[name]) for name in ("gravity", "channel_width", "channel_depth"))
+    window = times["step"] > 2 * steps[0] - steps[1]
+    start, remark = steady_part(times["kinetic_energy"][window], times["step"][window], steps)
+    used, edges, speed = steps >= start, cells_across(width, float(given["grain_diameter"])), float(np.sqrt(gravity * width))
+    rows, paths, levels, weight = [], [], np.zeros(2), 0.0
+    for grains, contacts in _chosen(replica, used):
+        levels, weight = np.array([grains.low[2], grains.high[2]]), float(grains.masses.sum()) * gravity
+        paths.append(grains.positions)
+        # All grains in the box, where the walls' forces are to be sorted by height.
+        rows.append(frame_rows(replace(grains, positions=grains.wrapped), contacts, edges, levels, depth, periodic=True))
+    fall, track = np.array([row["flow"].sum() / row["solid"].sum() for row in rows]), np.array(paths)
+    if fall.mean() < LEAST_SPEED * speed:
+        remark = f"the grains are jammed between the walls: they creep at {fall.mean():.2g} m/s"
+    friction, when, clock = times["left_fz"] + times["right_fz"], times["step"], steps[used] * replica.time_step
+    held = [friction[(when > low) & (when <= high)].mean() / weight for low, high in pairwise(steps[used])]
+    return joined(given, rows, track, np.full(track.shape[1], True), clock, levels=levels, speed=speed,
+                  force_error=block_mean(np.array(held) - 1.0 + np.diff(fall) / np.diff(clock) / gravity),
+                  height=float(levels[1] - levels[0]), steady_share=float(used.mean()), remark=remark)
+
+
+Measure = Callable[[Mask, Bands], float]
+
+
+def estimates(one: Channel, series: Array, more: Mapping[str, Measure], apart: bool = False) -> dict[str, Estimate]:
+    """What is measured of any channel, by name, and `more`; intervals are from time blocks of `series` (frames,), and from the bands.
+
+    `apart`: fluctuations without what all grains do together, see `Channel.fluctuation`.
+    """
+    near, bands = one.from_wall < one.diameter, one.solid.shape[2]
+    measures: dict[str, Measure] = {
+        "core_flatness": one.flatness,
+        "inertial_number": one.inertial,
+        "wall_mobilisation": one.mobilisation,
+        "core_fluctuation": lambda f, b: float(one.fluctuation(f, b, apart)[one.core].mean()),
+        "wall_fluctuation": lambda f, b: float(np.nanmean(one.fluctuation(f, b, apart)[near])),
+        "solid_fraction": lambda f, b: float(one.fraction(f, b)[one.core].mean()),
+        **more,
+    }
+
+    def estimate(get: Measure) -> Estimate:
+        return resampled(lambda f, b: get(f, ALL if places is None else b), frames, places)
+
+    frames, places = time_blocks(series), np.arange(bands) * max(4, bands // 2) // bands if bands > 1 else None
+    return {
+        **{name: estimate(get) for name, get in measures.items()},
+        "wall_normal_stress": block_mean(one.normal.mean(axis=(1, 2))),
+        "force_balance_error": one.force_error,
+    }
+
+
+def across(channels: Sequence[Channel], name: str, title: str, label: str, get: Callable[[Channel], Array], **more: Any) -> dict[str, Any]:
+    """A curve from wall to wall, the same in all `channels`: `get` gives it for each cell, or between the middles of neighbours."""
+    rows, place = [get(one) for one in channels], channels[0].middle / channels[0].diameter
+    return profile(name, title, "from the left wall x / d", label, place if len(rows[0]) == len(place) else 0.5 * (place[1:] + place[:-1]),
+                   rows, **more)
+
+
+def upward(channels: Sequence[Channel], name: str, title: str, label: str, get: Callable[[Channel], Array]) -> dict[str, Any]:
+    """A curve over the height in the window, of values (frames, bands, ...) that `get` gives; windows of replicas differ a little."""
+    first, curves = channels[0], [get(one).mean(axis=(0, 2)) for one in channels]
+    levels = (0.5 * (first.levels[1:] + first.levels[:-1]) - first.levels[0]) / first.diameter
+    rows = [np.interp(np.linspace(0, 1, len(levels)), np.linspace(0, 1, len(curve)), curve) for curve in curves]
+    return profile(name, title, "height in the window z / d", label, levels, rows, vertical=True)
+
+
+def _chosen(replica: Replica, used: Mask) -> Iterator[tuple[GrainFrame, ContactFrame]]:
+    """The frames that `used` marks."""
+    return (pair for pair, keep in zip(replica.paired_frames(), used, strict=True) if keep)
 
 
 def _outline(grains: GrainFrame, area: float) -> tuple[int, float, float, float]:

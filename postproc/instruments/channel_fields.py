@@ -7,7 +7,7 @@ one, displacements of single grains over the same time. The flow is uniform alon
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import islice
 from operator import add
@@ -25,8 +25,8 @@ from dembark.postproc.instruments.channel import read as read_channel
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.output.labelled import labelled, variable, with_interval
 from dembark.postproc.replica import Array, Replica
-from dembark.postproc.resampling import TimeBlocks, resampled, time_blocks
-from dembark.postproc.statistics import Estimate, block_mean, combined, over_replicas, student
+from dembark.postproc.resampling import resampled
+from dembark.postproc.statistics import Estimate, TimeBlocks, block_mean, combined, over_replicas, student, time_blocks
 from dembark.postproc.walls import PlaneWall, wall_contacts
 
 WIDTH = 0.5  # of the kernel, in grain diameters: the layers at the walls stay apart
@@ -42,11 +42,11 @@ _FIELDS = {
 
 @dataclass(frozen=True)
 class Flow:
-    """One replica: `sums` of each time block on the grid, and the `channel`."""
+    """One replica: `sums` of each of the time `blocks` on the grid, and the `channel`; the groups of `blocks` number its frames."""
 
     channel: Channel
     sums: list[FieldSums]
-    single: bool
+    blocks: TimeBlocks
 
     @property
     def inside(self) -> Any:
@@ -66,7 +66,7 @@ class Flow:
 
     def estimate(self, measure: Callable[[FieldSums], float]) -> Estimate:
         """`measure(sums)` of the sums of all blocks, with the interval of what varies among them."""
-        blocks = TimeBlocks(np.arange(len(self.sums)), self.single)
+        blocks = replace(self.blocks, groups=np.arange(len(self.sums)))
         return resampled(lambda keep, _: measure(reduce(add, (one for one, kept in zip(self.sums, keep, strict=True) if kept))), blocks)
 
     def scaled(self, fields: Fields) -> dict[str, Array]:
@@ -102,7 +102,7 @@ class Flow:
         if count < 4:
             return {name: [Estimate(value, np.inf) for value in values] for name, values in every.items()}
         left_out = [self.curves(reduce(add, self.sums[:number] + self.sums[number + 1 :])) for number in range(count)]
-        basis, factor = f"jackknife over {count} time blocks", student(count - 1) * (np.sqrt(count) if self.single else 1.0)
+        basis, factor = f"jackknife over {count} time blocks", student(count - 1) * self.blocks.widening
         found = {}
         for name, values in every.items():
             # As statistics.jackknife does for one number.
@@ -116,7 +116,8 @@ def _whole_height(sums: FieldSums) -> FieldSums:
     """The sums of each column of cells, as of a grid with one cell along z."""
     grid = sums.grid
     flat = Grid(grid.low, grid.high, (grid.shape[0], grid.shape[1], 1), grid.periodic)
-    grains, contacts, boundary = (values.sum(axis=2, keepdims=True) for values in (sums.grains, sums.contacts, sums.boundary))
+    grains, boundary = sums.grains.sum(axis=2, keepdims=True), sums.boundary.sum(axis=2, keepdims=True)
+    contacts = None if sums.contacts is None else sums.contacts.sum(axis=2, keepdims=True)
     return FieldSums(flat, sums.kernel, sums.frames, grains, contacts, boundary, sums.peculiar, sums.liquid, sums.power)
 
 
@@ -126,8 +127,8 @@ def read(replica: Replica) -> Flow:
     d, depth, width = channel.diameter, channel.depth, channel.width
     margin = CUTOFF * WIDTH * d
     across = round((width + 2.0 * margin) / (0.25 * d))
-    grid = Grid([-margin, 0.0, channel.levels[0]], [width + margin, depth, channel.levels[-1]], (across, 1, 2 * (len(channel.levels) - 1)),
-                (False, True, False))
+    low, high = np.array([-margin, 0.0, channel.levels[0]]), np.array([width + margin, depth, channel.levels[-1]])
+    grid = Grid(low, high, (across, 1, 2 * (len(channel.levels) - 1)), (False, True, False))
     planes = (PlaneWall("left", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), PlaneWall("right", (width, 0.0, 0.0), (-1.0, 0.0, 0.0)))
     blocks = time_blocks(channel.shear.sum(axis=(1, 2)))
     sums: dict[int, FieldSums] = {}
@@ -138,7 +139,7 @@ def read(replica: Replica) -> Flow:
         walls = [*glued, *(wall_contacts(free, plane) for plane in planes)]
         found = coarse_grain(free, among, grid, width=WIDTH * d, walls=walls, threads=1)
         sums[block] = sums[block] + found if block in sums else found
-    return Flow(channel, list(sums.values()), blocks.single)
+    return Flow(channel, list(sums.values()), blocks)
 
 
 def measured(replicas: Sequence[Replica], unsteady: str) -> Measurement:

@@ -186,7 +186,7 @@ def read(replica: Replica) -> Column:
     sectors, bridges = silo.sectors(diameter), wall_bridges(values)
     rows = [_frame_rows(grains, contacts, silo, gravity, edges, sectors, bridges) for grains, contacts in replica.paired_frames()]
     times = replica.times()
-    lift = sum(times[f"{name}_fz"] for name in (*silo.names, "base"))[times["step"] >= outlines[0][0]]
+    lift = np.sum([times[f"{name}_fz"] for name in (*silo.names, "base")], axis=0)[times["step"] >= outlines[0][0]]
     return Column(edges, height, silo, diameter, gravity, mass, force_error=block_mean(lift / (mass * gravity) - 1.0),
                   **{name: np.array([row[name] for row in rows]) for name in rows[0]})
 

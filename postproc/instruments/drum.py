@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import xarray
@@ -17,8 +18,8 @@ from numpy.typing import NDArray
 from dembark.postproc import DumpError
 from dembark.postproc.output.labelled import labelled, variable, with_interval
 from dembark.postproc.replica import Array, Replica, once
-from dembark.postproc.resampling import TimeBlocks, resampled, time_blocks
-from dembark.postproc.statistics import Estimate, over_replicas
+from dembark.postproc.resampling import resampled
+from dembark.postproc.statistics import Estimate, TimeBlocks, over_replicas, time_blocks
 
 # Edges of the histograms of places, in degrees from the lowest point of the drum, positive the way it turns.
 ANGLES = np.linspace(-180.0, 180.0, 37)
@@ -72,9 +73,31 @@ class Drum:
         """Sums of `rows` over each of `count` equal pieces of the window."""
         return np.asarray(rows.reshape(count, -1).sum(axis=1))
 
+    def power(self, rows: Array, pieces: int) -> Array:
+        """W, of the energies `rows` over each of `pieces` parts of a revolution."""
+        return self.pieces(rows, pieces * self.revolutions) / (self.period / pieces)
+
+    def per_log(self, number: Array) -> Array:
+        """A `number` of impacts per log and revolution."""
+        return np.asarray(number / (self.logs * self.revolutions))
+
+    def exceeding(self, forces: Array) -> Array:
+        """Impacts per log and revolution whose peak is above each of `forces` (N); NaN where there is none."""
+        number = np.array([np.count_nonzero(self.peak > force) for force in forces], float)
+        return self.per_log(np.where(number > 0.0, number, np.nan))
+
+    def at_angle(self, angles: Array) -> Array:
+        """How many of `angles` (degrees) lie in each bin of ANGLES, per log, revolution and 10 degrees."""
+        return self.per_log(np.histogram(angles, ANGLES)[0]) * 10.0 / float(np.diff(ANGLES)[0])
+
+    def peak_at_angle(self) -> Array:
+        """Mean peak force (N) in each bin of ANGLES; NaN where fewer than ten impacts are."""
+        chosen = [self.peak[np.digitize(self.angle, ANGLES) - 1 == k] for k in range(len(PLACES))]
+        return np.array([peaks.mean() if len(peaks) >= 10 else np.nan for peaks in chosen])
+
     def lost_in(self, impacts: NDArray[np.bool_]) -> Array:
         """J lost in the chosen impacts of each quarter."""
-        return np.bincount(self.quarter[impacts], self.loss[impacts], self.quarters)
+        return np.bincount(self.quarter[impacts], self.loss[impacts], self.quarters).astype(float, copy=False)
 
 
 @once
@@ -140,7 +163,7 @@ def estimates(drum: Drum) -> dict[str, Estimate]:
         "impulse_sum": mean(impulse, 4.0),
         "dissipated_energy": mean(lost, 4.0),
         "torque_arm": mean(torque, 4.0 / (rows * drum.weight * drum.radius)),
-        "shell_share": of_impacts(lambda shell: float(shell.mean()), drum.shell),
+        "shell_share": of_impacts(lambda shell: float(shell.mean()), drum.shell.astype(float)),
         "pivots_per_step": mean(pivots, drum.quarters / drum.steps),
         "impact_loss_share": over(lambda keep: float(hits[keep].sum() / lost[keep].sum()), loss_blocks),
         "shell_loss_share": over(lambda keep: float(shell[keep].sum() / hits[keep].sum()) if hits[keep].any() else math.nan, loss_blocks),
@@ -154,7 +177,8 @@ def fields(replicas: Sequence[Replica]) -> xarray.Dataset:
     radius, duration = drums[0].radius, drums[0].revolutions * drums[0].period
     edges = np.linspace(-radius, radius, CELLS + 1)
     patch = radius * math.radians(float(np.diff(ANGLES)[0])) * float(given["log_length"])
-    cells = np.mean([np.histogram2d(*one.place.T, bins=(edges, edges), weights=one.loss)[0] / duration for one in drums], axis=0)
+    cells = np.mean([np.histogram2d(one.place[:, 0], one.place[:, 1], bins=(edges, edges), weights=one.loss)[0] / duration
+                     for one in drums], axis=0)
     bins = (ANGLES, np.log10(_FORCES))
     peaks = np.mean([np.histogram2d(one.angle[one.shell], np.log10(np.maximum(one.peak[one.shell], 1e-300)), bins=bins)[0] / one.revolutions
                      for one in drums], axis=0)
@@ -184,4 +208,8 @@ def _along_shell(drum: Drum, patch: float) -> list[Estimate]:
     np.add.at(table, (drum.quarter[drum.shell], bins[drum.shell]), drum.loss[drum.shell])
     table /= patch * drum.period / 4.0
     blocks = time_blocks(table.sum(axis=1))
-    return [resampled(lambda keep, _, column=column: float(column[keep].mean()), blocks) for column in table.T]
+    return [resampled(partial(_mean_of, column), blocks) for column in table.T]
+
+
+def _mean_of(values: Array, keep: NDArray[np.bool_], _: NDArray[np.bool_]) -> float:
+    return float(values[keep].mean())

@@ -65,7 +65,7 @@ class Solutions:
     def __init__(self, one: Impacts, time_step: float, phase: float) -> None:
         length = float((1.4 * one.duration * (1.0 - np.log(one.restitution) / 4.0)).max())
         self.scheme = [stepped(one, time_step, (phase + more) % 1.0, length).numbers(one) for more in _PHASES]
-        self.law = (solved(one), solved(one, 500)) if one.slides else ()
+        self.law: tuple[Rebounds, ...] = (solved(one), solved(one, 500)) if one.slides else ()
         known = one.slides and not one.arm[1].any() and (one.restitution > 0.95).all()
         self.slip = partial_slip(one) if known else None
 

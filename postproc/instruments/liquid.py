@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dembark.postproc.measurement import Value
-from dembark.postproc.replica import Replica
+from dembark.postproc.replica import Array, Replica
 from dembark.postproc.statistics import Estimate, block_mean, exact, over_replicas
 
 
@@ -19,9 +19,9 @@ def liquid_values(replicas: Sequence[Replica]) -> dict[str, Value]:
     if not float(replicas[0].parameters.get("liquid_content") or 0.0) > 0.0:
         return {}
     tables, grains = [replica.times() for replica in replicas], float(replicas[0].parameters["grain_count"])
-    totals = [sum(times[f"liquid_{place}"] for place in ("grains", "bridges", "walls", "lost")) for times in tables]
+    totals = [np.sum([times[f"liquid_{place}"] for place in ("grains", "bridges", "walls", "lost")], axis=0) for times in tables]
 
-    def late(series: Sequence[np.ndarray]) -> Estimate:
+    def late(series: Sequence[Array]) -> Estimate:
         return over_replicas([block_mean(one[len(one) // 2 :]) for one in series])
 
     return {

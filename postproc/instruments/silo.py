@@ -10,11 +10,14 @@ import numpy as np
 
 from dembark.postproc.instruments import janssen
 from dembark.postproc.instruments.column import Column, Mask
+from dembark.postproc.instruments.growth import Growth
 from dembark.postproc.instruments.vessel import overlap
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.replica import Array
-from dembark.postproc.resampling import pooled, profile, resampled, time_blocks
-from dembark.postproc.statistics import Estimate, block_mean
+from dembark.postproc.resampling import pooled, profile, resampled
+from dembark.postproc.statistics import Estimate, block_mean, exact, time_blocks
+from dembark.postproc.studies import measured as of_point
+from dembark.postproc.studies import propagated
 
 Fit = Callable[[Mask, Mask], Any]
 ZERO = Estimate(0.0, 0.0)
@@ -64,6 +67,37 @@ def _scalars(one: Column) -> dict[str, Estimate]:
     }
 
 
+def fillings(points: Sequence[Mapping[str, Any]], size: str) -> Measurement:
+    """The classical experiment: the mass that the base feels of several fillings, M_app = M_sat (1 - exp(-M / M_sat)) with that of lambda.
+
+    `points` are the results of silos that differ in the mass filled in; `size` is the symbol of the length in Janssen's law.
+    """
+    points = sorted(points, key=lambda point: of_point(point, "filled_mass").value)
+    mass = np.array([of_point(point, "filled_mass").value for point in points])
+    base = Growth.of(points, "apparent_mass_ratio", mass, mass)
+    # Mass of a piece of the column as high as `size`.
+    per_size = mass[-1] / of_point(points[-1], "filling_height").value
+    predicted, top = of_point(points[-1], "janssen_length_predicted"), float(base.values.max())
+    fitted = propagated(lambda values: janssen.fitted_length(mass, values, values.max()) / per_size, base.values, base.halves,
+                        "the apparent masses")
+    starts, limits = [(top, 0.02 * top), (top, 0.3 * top)], ((0.05 * top, 50.0 * top), (0.0, 0.95 * top))
+    pair = janssen.fitted_pair(mass, base.values, starts, limits, top)
+    law = janssen.stress(mass, predicted.value * per_size)
+    gain = Estimate(janssen.gain(mass, base.values, fitted.value * per_size, pair), 0.0)
+    deepest = Estimate(float(base.values[-1]), float(base.halves[-1]), of_point(points[-1], "apparent_mass_ratio").basis)
+    values = {
+        "filling_length": Value(fitted, predicted),
+        "largest_apparent_mass": Value(deepest, exact(law[-1])),
+        "filling_two_parameter_gain": Value(gain, detail=f"with it λ is {pair[0] / per_size:.2f} {size} and the zone holds {pair[1]:.3g} "
+                                                         f"kg; {len(points)} fillings"),
+    }
+    curve = profile("apparent_mass", "Apparent mass", "filled mass (kg)", "force on the base / g (kg)", mass, [base.values],
+                    half=base.halves, reference=law, reference_label="Janssen, nothing fitted")
+    remark = ("Each point is a packing of its own, filled by rain to that height, with the wall creeping upward, so that all have the same "
+              "history.")
+    return Measurement(values, [curve], [remark])
+
+
 def measured(columns: Sequence[Column], size: str, across: str, friction: Mapping[str, float]) -> Measurement:
     """Values, profiles and remarks of all columns of a series.
 
@@ -81,8 +115,9 @@ def measured(columns: Sequence[Column], size: str, across: str, friction: Mappin
     }
     details = {"wall_mobilisation": f"lower half; the wall's static friction is {friction['wall_static']:g}",
                "two_parameter_gain": f"with it λ is {over['_pair_length'].value:.2f} {size}"}
-    values = {name: Value(one, *references.get(name, (None, None)), detail=details.get(name, ""))
-              for name, one in over.items() if not name.startswith("_") and (wet or name != "wall_adhesion")}
+    values = {name: Value(one, reference, half, detail=details.get(name, ""))
+              for name, one in over.items() for reference, half in [references.get(name, (None, None))]
+              if not name.startswith("_") and (wet or name != "wall_adhesion")}
     return Measurement(values, _profiles(columns, over, across, friction["wall_static"]), _remarks(columns, over, wet, friction))
 
 

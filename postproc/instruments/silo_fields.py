@@ -17,8 +17,8 @@ from dembark.postproc.instruments.vessel import Cylinder, overlap
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.output.labelled import labelled, variable, with_interval
 from dembark.postproc.replica import Array, Replica
-from dembark.postproc.resampling import TimeBlocks, resampled, time_blocks
-from dembark.postproc.statistics import Estimate, block_mean, combined, over_replicas
+from dembark.postproc.resampling import resampled
+from dembark.postproc.statistics import Estimate, TimeBlocks, block_mean, combined, over_replicas, time_blocks
 from dembark.postproc.studies import propagated
 from dembark.postproc.walls import CylinderWall, PlaneWall, wall_contacts
 from dembark.postproc.walls.patches import cylinder_patches

@@ -87,7 +87,7 @@ class Slab:
 
     def wall_shares(self, place: Array, sectors: int) -> Array:
         """By y, the first half of the sectors on the left wall."""
-        return self._shares(place, 1.0 * (place[:, 0] <= 0.5 * self.size), sectors)
+        return self._shares(place, (place[:, 0] <= 0.5 * self.size).astype(float), sectors)
 
     def volume_shares(self, place: Array, radii: Array, sectors: int) -> Array:
         """By y, and by the part of the sphere in the wall's half of the silo."""

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from dembark.common.errors import DembarkError
 from dembark.common.files import disk_error
 from dembark.postproc.fields.grid import Grid
-from dembark.postproc.output.whole import Labelled, SteadyFile, WholeFile
+from dembark.postproc.output.whole import Labelled, SteadyFile, WholeFile, timed
 from dembark.postproc.walls.peaks import Histogram
 from dembark.postproc.walls.stress import COMPONENTS, WallStress
 
@@ -49,7 +49,7 @@ def write_netcdf(path: str | Path, fields: Labelled | Iterable[tuple[float, Labe
     `attributes` are added to the file's own, for example kernel, width and provenance.
     """
     with FieldsNetcdf(path, attributes) as file:
-        for time, one in fields if not hasattr(fields, "arrays") else [(0.0, fields)]:
+        for time, one in timed(fields):
             file.add(one, time)
     return Path(path)
 

@@ -20,7 +20,7 @@ from dembark.common.errors import DembarkError
 from dembark.common.files import disk_error
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.grains import GrainFrame
-from dembark.postproc.output.whole import Labelled, SteadyFile, WholeFile
+from dembark.postproc.output.whole import Labelled, SteadyFile, WholeFile, timed
 from dembark.postproc.walls.stress import COMPONENTS, WallStress
 
 Array = NDArray[Any]
@@ -227,7 +227,7 @@ def _grain_arrays(frame: GrainFrame) -> dict[str, tuple[Array, str]]:
 def write_vtkhdf(path: str | Path, fields: Labelled | Iterable[tuple[float, Labelled]], attributes: Attributes | None = None) -> Path:
     """Write fields, or pairs (time in s, fields) taken one after the other, as VTKHDF ImageData; returns the path."""
     with FieldsVtkhdf(path, attributes) as file:
-        for time, one in fields if not hasattr(fields, "arrays") else [(0.0, fields)]:
+        for time, one in timed(fields):
             file.add(one, time)
     return Path(path)
 
@@ -257,7 +257,7 @@ def write_vtkhdf_wall(path: str | Path, stress: WallStress, attributes: Attribut
 def _write_wall(file: _PolyVtkhdf, stress: WallStress) -> None:
     patches = stress.patches
     owners, count = patches.owners, len(patches.cells)
-    constant = {"patch": (owners, "1"), "contact_count": (stress.contacts[owners], "1")}
+    constant: dict[str, tuple[Array, str]] = {"patch": (owners, "1"), "contact_count": (stress.contacts[owners], "1")}
     for name, values in (("mean_stress", stress.mean), ("stress_deviation", stress.deviation), ("stress_half_width", stress.half)):
         constant |= {f"{name}_{component}": (values[owners, column], "Pa") for column, component in enumerate(COMPONENTS)}
     steps = range(len(stress.times)) if stress.series is not None else range(len(stress.times) - 1, len(stress.times))

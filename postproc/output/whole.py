@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,15 +23,29 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+@runtime_checkable
 class Labelled(Protocol):
     """Fields on a grid, of coarse graining or of cell averages."""
 
-    grid: Grid
-    units: Mapping[str, str]
-    long_names: Mapping[str, str]
+    @property
+    def grid(self) -> Grid:
+        """Where they are."""
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """The unit of each field."""
+
+    @property
+    def long_names(self) -> Mapping[str, str]:
+        """What each field is."""
 
     def arrays(self) -> dict[str, Array]:
         """The fields that are there, by name: (nx, ny, nz), (nx, ny, nz, 3) or (nx, ny, nz, 3, 3)."""
+
+
+def timed(fields: Labelled | Iterable[tuple[float, Labelled]]) -> Iterable[tuple[float, Labelled]]:
+    """Pairs (time in s, fields), also of fields without a time."""
+    return [(0.0, fields)] if isinstance(fields, Labelled) else fields
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dembark.postproc.convergence import SAFETY, convergence, observed_order, refinement
+from dembark.postproc.convergence import SAFETY, SAFETY_UNSEEN_ORDER, convergence, observed_order, refinement
 
 
 @given(
@@ -21,7 +21,7 @@ from dembark.postproc.convergence import SAFETY, convergence, observed_order, re
 def test_an_error_of_one_power_is_found_exactly(order: float, factor: float, one: float, two: float, limit: float) -> None:
     h = [0.1, 0.1 * one, 0.1 * one * two]
     values = [limit + factor * size**order for size in h]
-    found = convergence(h, values)
+    found = convergence(h, values, formal_order=order)
     assert found.kind == "monotone"
     assert found.order == pytest.approx(order, rel=1e-6)
     scale = abs(values[2] - values[0])
@@ -43,7 +43,7 @@ def test_only_the_finest_three_count_in_any_order() -> None:
 def test_a_change_within_its_interval_gives_a_bound_and_no_order() -> None:
     found = convergence([1.0, 2.0, 4.0], [1.0, 1.01, 1.2], [0.05, 0.05, 0.05])
     assert (found.kind, found.order, found.extrapolated) == ("scatter", None, None)
-    assert found.uncertainty == pytest.approx(SAFETY * (0.01 + math.hypot(0.05, 0.05)))
+    assert found.uncertainty == pytest.approx(SAFETY_UNSEEN_ORDER * (0.01 + math.hypot(0.05, 0.05)))
 
 
 def test_oscillation_and_divergence_are_named() -> None:
@@ -54,9 +54,18 @@ def test_oscillation_and_divergence_are_named() -> None:
 
 def test_two_refinements_take_the_formal_order() -> None:
     found = convergence([1.0, 2.0], [1.0, 1.3], formal_order=2.0)
-    assert found.kind == "bound" and found.order is None and found.uncertainty == pytest.approx(SAFETY * 0.3 / 3.0)
-    assert found.relative(2.0) == pytest.approx(SAFETY * 0.05)
+    assert found.kind == "bound" and found.order is None and found.uncertainty == pytest.approx(SAFETY_UNSEEN_ORDER * 0.3 / 3.0) == 0.3
+    assert found.relative(2.0) == pytest.approx(SAFETY_UNSEEN_ORDER * 0.05)
     assert found.relative(0.0) is None
+
+
+@pytest.mark.parametrize(("order", "counted", "safety"), [
+    (4.0, 2.0, 3.0), (2.5, 2.0, 3.0), (2.19, 2.0, 1.25), (1.81, 2.0, 1.25), (1.5, 1.5, 3.0), (0.3, 0.5, 3.0)])
+def test_only_the_formal_order_is_trusted(order: float, counted: float, safety: float) -> None:
+    values = [1.0 + 0.1 * size**order for size in (1.0, 2.0, 4.0)]
+    found = convergence([1.0, 2.0, 4.0], values, formal_order=2.0)
+    assert found.order == pytest.approx(order) and found.extrapolated == pytest.approx(1.0)
+    assert found.uncertainty == pytest.approx(safety * (values[1] - values[0]) / (2.0**counted - 1.0))
 
 
 def test_one_refinement_is_refused() -> None:

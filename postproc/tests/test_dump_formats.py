@@ -12,6 +12,9 @@ from dembark.validation import engines
 
 COLUMNS = "id type x y z ix iy iz vx vy vz radius mass fx fy fz omegax omegay omegaz".split()
 PAIRS = {"first": (1, 2, 3), "second": (4, 5, 6), "ids": (7, 8), "forces": (10, 11, 12), "delta": 13}
+PROPERTIES = "\n".join(f"fix {name} all property/global {name} {values}" for name, values in {
+    "youngsModulus": "peratomtype 5e6 5e6", "poissonsRatio": "peratomtype 0.3 0.3",
+    "coefficientRestitution": "peratomtypepair 2 0.5 0.5 0.5 0.5", "coefficientFriction": "peratomtypepair 2 0.5 0.5 0.5 0.5"}.items())
 DECK = """
 units si
 atom_style granular
@@ -23,10 +26,7 @@ region domain prism 0 0.03 0 0.03 -0.01 0.05 0.006 0 0 units box
 create_box 2 domain
 neighbor 0.001 bin
 neigh_modify delay 0
-fix m1 all property/global youngsModulus peratomtype 5e6 5e6
-fix m2 all property/global poissonsRatio peratomtype 0.3 0.3
-fix m3 all property/global coefficientRestitution peratomtypepair 2 0.5 0.5 0.5 0.5
-fix m4 all property/global coefficientFriction peratomtypepair 2 0.5 0.5 0.5 0.5
+{properties}
 pair_style gran model hertz tangential history
 pair_coeff * *
 timestep 1e-5
@@ -70,7 +70,7 @@ def run(tmp_path_factory):
     except DembarkError as error:
         pytest.skip(str(error))
     folder = tmp_path_factory.mktemp("formats")
-    (folder / "deck.in").write_text(DECK)
+    (folder / "deck.in").write_text(DECK.format(properties=PROPERTIES))
     done = engines.call(engine.command(folder / "deck.in", {}), folder, engine.environment(), timeout=100)
     assert done.returncode == 0, done.stdout[-1000:] + done.stderr
     return folder

@@ -4,7 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
+from dembark.postproc.resampling import resampled
 from dembark.postproc.statistics import (
     Estimate,
     block_mean,
@@ -16,17 +18,15 @@ from dembark.postproc.statistics import (
     replica_mean,
     scatter,
     steady_start,
+    time_blocks,
 )
 
 
-def correlated(random, count, memory):
-    """First-order autoregressive series of unit variance with correlation `memory` from one value to the next."""
-    noise = random.standard_normal(count) * math.sqrt(1.0 - memory**2)
-    series = np.empty(count)
-    series[0] = random.standard_normal()
-    for index in range(1, count):
-        series[index] = memory * series[index - 1] + noise[index]
-    return series
+def correlated(random, count, memory, many=()):
+    """First-order autoregressive series (*many, count) of unit variance with correlation `memory` from one value to the next."""
+    noise = random.standard_normal((*many, count)) * math.sqrt(1.0 - memory**2)
+    noise[..., 0] = random.standard_normal(many)
+    return lfilter([1.0], [1.0, -memory], noise)
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
@@ -40,6 +40,36 @@ def test_block_intervals_cover_the_mean_as_often_as_they_say(memory):
     random = np.random.default_rng(4)
     hits = sum(abs(found.value) <= found.half for found in (block_mean(correlated(random, 600, memory)) for _ in range(300)))
     assert 0.89 <= hits / 300 <= 0.99
+
+
+@pytest.mark.parametrize("times", [5, 7, 10, 13, 17, 30, 100])
+@pytest.mark.parametrize("tau", [4.0, 12.0])
+def test_intervals_of_few_correlation_times_cover_the_mean(tau, times):
+    series = correlated(np.random.default_rng(11), int(tau * times), (tau - 1.0) / (tau + 1.0), (1500,))
+    means = [block_mean(one) for one in series]
+    assert np.mean([abs(one.value) <= one.half for one in means]) >= 0.93
+    # Not at the price of intervals that say nothing: two standard errors from 20 correlation times on, the spread of a sample below.
+    error = series.mean(axis=1).std()
+    assert np.median([one.half for one in means]) <= (5.5 if times < 20 else 2.4) * error
+
+
+def test_resampled_intervals_cover_as_well():
+    series = correlated(np.random.default_rng(12), 52, 0.6, (600,))
+    found = [resampled(lambda keep, _, one=one: float(one[keep].mean()), time_blocks(one)) for one in series]
+    assert np.mean([abs(one.value) <= one.half for one in found]) >= 0.93
+
+
+@pytest.mark.parametrize("times", [10, 20, 40])
+def test_correlation_time_of_a_short_series_is_hardly_biased(times):
+    series = correlated(np.random.default_rng(13), 4 * times, 0.6, (1000,))
+    assert np.median([correlation_time(one) for one in series]) == pytest.approx(4.0, rel=0.25)
+
+
+def test_a_series_within_its_correlation_time_is_a_single_sample():
+    drift = np.arange(40.0)
+    blocks = time_blocks(drift)
+    assert (blocks.single, blocks.count, blocks.widening) == (True, 4, 2.0)
+    assert block_mean(drift).half == pytest.approx(3.18245 * np.std([0.0, 10.0, 20.0, 30.0], ddof=1), rel=1e-5)
 
 
 def test_too_short_a_series_has_no_interval():

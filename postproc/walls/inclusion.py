@@ -73,7 +73,8 @@ class Inclusion:
         first = ours[rows, 0]
         branch = np.where(first[:, None], contacts.branch[rows], -contacts.branch[rows])
         forces = np.where(first[:, None], -contacts.forces[rows], contacts.forces[rows])
-        member, other = (np.where(first, *pair) for pair in (contacts.ids[rows].T, contacts.ids[rows, ::-1].T))
+        one, two = contacts.ids[rows].T
+        member, other = np.where(first, one, two), np.where(first, two, one)
         index = rows_of(frame.ids, other, contacts.step)
         own = np.searchsorted(members.ids, member)
         length = np.maximum(np.linalg.norm(branch, axis=1), 1e-300)

@@ -115,15 +115,16 @@ def mesh_patches(wall: MeshWall, by: str = "triangle") -> Patches:
     corner = wall.triangles
     area = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     cells = np.arange(3 * len(corner)).reshape(-1, 3)
+    labels: tuple[str, ...] = ()
     if by == "triangle":
-        number, labels = np.arange(len(corner)), ()
+        number = np.arange(len(corner))
     elif by == "group":
         groups = np.zeros(len(corner), np.int64) if wall.groups is None else wall.groups
         kinds, number = np.unique(groups, return_inverse=True)
         labels = tuple(wall.group_names[kind] if 0 <= kind < len(wall.group_names) else f"group {kind}" for kind in kinds)
     else:
         raise DembarkError(f"wall {wall.name}: patches by {by!r}", "", "those of a mesh are by 'triangle' or 'group'")
-    total = np.bincount(number, area)
+    total = np.bincount(number, area).astype(float, copy=False)
     centres, normals = (np.column_stack([np.bincount(number, area * column) for column in values.T]) / total[:, None]
                         for values in (corner.mean(axis=1), wall.axes[:, 0]))
     return Patches(total, centres, normals, corner.reshape(-1, 3), cells, number, of_triangle=number, labels=labels)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 Array = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ class Histogram:
     @property
     def edges(self) -> Array:
         """Borders (bins + 1,) of the bins."""
-        return self.width * np.arange(len(self.counts) + 1)
+        return self.width * np.arange(len(self.counts) + 1, dtype=np.float64)
 
     def density(self) -> Array:
         """Probability density (bins,) of the positive numbers; zeros when there are none."""
@@ -125,4 +125,4 @@ class Blocks:
         if self.count < self._LEAST:
             return np.full(shape, np.inf)
         means = np.array(self._sums[: self.count]) / self._length
-        return stats.t.ppf(0.5 + 0.5 * _CONFIDENCE, self.count - 1) * means.std(axis=0, ddof=1) / math.sqrt(self.count)
+        return special.stdtrit(self.count - 1, 0.5 + 0.5 * _CONFIDENCE) * means.std(axis=0, ddof=1) / math.sqrt(self.count)

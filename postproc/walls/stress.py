@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +66,7 @@ class WallStress:
         """Magnitude (p,) of the mean shear stress, Pa."""
         return np.hypot(self.mean[:, 1], self.mean[:, 2])
 
-    def on_grid(self, values: Array) -> Array:
+    def on_grid(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values (p, ...) of patches in the order of their coordinates, (a, b, ...); unchanged for a mesh."""
         return values.reshape(*self.patches.shape, *values.shape[1:])
 

@@ -35,6 +35,10 @@ class Wall(Protocol):
     def name(self) -> str:
         """Its name in files and messages."""
 
+    @property
+    def motion(self) -> Motion:
+        """How it moves."""
+
     def at(self, time: float) -> Wall:
         """The wall where it is at `time` (s)."""
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 if TYPE_CHECKING:
@@ -22,71 +21,63 @@ Out = Annotated[Path | None, typer.Option(help="Folder of the campaign; default:
 Dry = Annotated[bool, typer.Option("--dry-run", help="Only show the runs, what they cost and whether the file is right.")]
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands to `dembark`."""
-    app.command("campaigns")(show_campaigns)
-    app.command()(submit)
-    app.command()(resume)
-    app.command()(status)
-    app.command()(export)
+app = typer.Typer()
 
 
-def _console() -> Console:
-    from dembark.validation.cli import _console as console
-
-    return console()
-
-
+@app.command("campaigns")
 def show_campaigns() -> None:
     """List the campaigns that come with the cases."""
     from dembark.validation.campaigns.expand import points
     from dembark.validation.campaigns.spec import read, shipped
+    from dembark.validation.show import console
 
     table = Table("campaign", "cases", "points", "what", box=None, pad_edge=False)
     for name, path in shipped().items():
         spec = read(path)
         cases = ", ".join(dict.fromkeys(sweep.case.name for sweep in spec.sweeps))
         table.add_row(name, cases, str(len(points(spec))), " ".join(spec.description.split()))
-    _console().print(table)
+    console().print(table)
 
 
+@app.command()
 def submit(campaign: File, dry_run: Dry = False, executor: Executor = None, out: Out = None, cores: Cores = None,
            jobs: Jobs = None) -> None:
     """Run a campaign, here or on a cluster: all its runs, their measurements and the report. What is finished is kept."""
-    from dembark.validation.campaigns import folder, show, source
+    from dembark.validation.campaigns import estimate, expand, folder
     from dembark.validation.campaigns import submit as work
     from dembark.validation.campaigns.spec import locate
     from dembark.validation.runs.job import cancelled_by_signal
+    from dembark.validation.show import console
 
     file = locate(campaign)
     chosen = folder.choose(executor or "local", cores, jobs)
     work.prepare(chosen)
-    plan = source.of_campaign(file)
-    results = (out or folder.default(plan.spec.name)).resolve()
-    cancel = cancelled_by_signal()
+    plan = expand.plan(file=file)
+    results = (out or Path("results") / "campaigns" / plan.label).resolve()
     if not dry_run:
-        _conclude(work.submit(file, results, chosen, cancel, _say), results)
+        _conclude(work.submit(plan, file, results, chosen, cancelled_by_signal(), _say), results)
         return
-    folder.refuse_foreign(results, plan.spec.name)
+    folder.refuse_foreign(results, plan.label)
     work.check(chosen, plan)
     found = work.forecast(plan, results)
-    show.dry_run(_console(), plan, found, results, work.cores_here(chosen) if chosen.executor == "local" else None)
+    estimate.dry_run(console(), plan, found, results, work.cores_here(chosen) if chosen.executor == "local" else None)
 
 
+@app.command()
 def resume(directory: Folder, executor: Executor = None, cores: Cores = None, jobs: Jobs = None) -> None:
     """Go on with a campaign where it was ended, in the way it was submitted unless told otherwise."""
-    from dembark.validation.campaigns import folder
+    from dembark.validation.campaigns import expand, folder
     from dembark.validation.campaigns import submit as work
     from dembark.validation.runs.job import cancelled_by_signal
 
     results = directory.resolve()
-    folder.own_file(results)
+    file = folder.own_file(results)
     folder.restore(results)
     before = folder.options(results)
     same = executor in (None, before.executor)
     chosen = folder.choose(executor or before.executor, cores or before.cores, jobs or (before.jobs if same else None))
     work.prepare(chosen)
-    _conclude(work.resume(results, chosen, cancelled_by_signal(), _say), results)
+    _conclude(work.submit(expand.plan(file=file), file, results, chosen, cancelled_by_signal(), _say), results)
 
 
 def _say(line: str) -> None:
@@ -94,19 +85,21 @@ def _say(line: str) -> None:
 
 
 def _conclude(outcome: Outcome, results: Path) -> None:
-    from dembark.validation.cli import show_outcome
+    from dembark.validation.show import show_outcome
 
     show_outcome(outcome, "the campaign", f"go on with 'dembark resume {results}': what is finished is kept")
 
 
+@app.command()
 def status(directory: Folder) -> None:
     """Show how far a campaign is: each run with its simulated time, and the time left."""
-    from dembark.validation.campaigns.status import look
+    from dembark.validation import show
+    from dembark.validation.campaigns.folder import look
     from dembark.validation.runs.progress import duration, state_table
 
     results = directory.resolve()
     found = look(results)
-    console = _console()
+    console = show.console()
     console.print(state_table(found.states))
     console.print(found.headline, markup=False, soft_wrap=True)
     for state in found.states:
@@ -121,6 +114,7 @@ def status(directory: Folder) -> None:
         console.print(f"go on with 'dembark resume {directory}'", markup=False, soft_wrap=True)
 
 
+@app.command()
 def export(
     directory: Folder,
     table: Annotated[str, typer.Option(help="runs, steps, quantities, comparisons or points.")] = "quantities",
@@ -128,9 +122,10 @@ def export(
 ) -> None:
     """Write a table of a store as CSV."""
     from dembark.validation.campaigns import store
+    from dembark.validation.show import console
 
     if out is None:
         print(store.as_csv(directory, table), end="")
     else:
         store.export(directory, table, out)
-        _console().print(str(out), markup=False, soft_wrap=True)
+        console().print(str(out), markup=False, soft_wrap=True)

@@ -1,45 +1,72 @@
-"""What a campaign will cost before it starts: steps of its decks, time from measured rates, and room on the disk."""
+"""What a campaign will cost before it starts: steps of its decks, time from measured rates, and room on the disk; also as a table."""
 
 from __future__ import annotations
 
 import shutil
+import socket
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 
-from dembark.validation.campaigns.expand import Plan
-from dembark.validation.campaigns.rates import Rate, Rates
-from dembark.validation.campaigns.sizes import size_text
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from dembark.validation import engines
+from dembark.validation.campaigns import store
+from dembark.validation.campaigns.sizes import core_hours, size_text
 from dembark.validation.case import deck
-from dembark.validation.runs.plan import Series
+from dembark.validation.runs.plan import Plan, Series, finished
+from dembark.validation.runs.progress import duration
+
+
+@dataclass(frozen=True)
+class Rate:
+    """Particle-steps per second and core, and where the number is from."""
+
+    value: float
+    source: str
+
+
+class Rates:
+    """The rates to reckon with for a campaign whose store, if it has one yet, lies at `path`."""
+
+    def __init__(self, path: Path | None = None) -> None:
+        rows = store.read_runs(path, state="finished") if path is not None and path.is_file() else []
+        self._rows = [row for row in rows if row["particle_steps_per_second"] and row["ranks"] and row["threads"]]
+
+    def of(self, case: str, engine: str, cores: int = 1) -> Rate:
+        """Rate for runs of `case` in `engine` on `cores` cores.
+
+        The median of the store's runs of this case, those of this host and this number of cores before others; else the engine's facts.
+        """
+        rows = [row for row in self._rows if (row["case_name"], row["engine"]) == (case, engine)]
+        mine = [row for row in rows if row["host"] == socket.gethostname()]
+        alike = [row for row in mine or rows if row["ranks"] * row["threads"] == cores]
+        if chosen := alike or mine or rows:
+            value = median(row["particle_steps_per_second"] / (row["ranks"] * row["threads"]) for row in chosen)
+            return Rate(float(value), f"{len(chosen)} runs measured on {'this host' if mine else 'other hosts'}")
+        facts = engines.facts(engine)
+        if case in facts.rates:
+            return Rate(facts.rates[case], f"measured on {facts.measured_on}")
+        return Rate(facts.typical_rate, f"of other cases, measured on {facts.measured_on}")
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """One series: steps and simulated time (s) of a run, its particles, core-seconds, wall time (s) and bytes; None = not known."""
+    """A run of one series: steps of `time_step` (s), particle-steps, core-seconds, wall time (s) if its cores share the work perfectly,
+    and bytes; None = not known."""
 
     series: Series
     steps: int
     time_step: float
-    particles: int | None
     rate: Rate
     cores: int
+    particle_steps: float | None
+    core_seconds: float | None
+    wall_time: float | None
     size: int | None
-
-    @property
-    def particle_steps(self) -> float | None:
-        """Of one run."""
-        return None if self.particles is None else float(self.particles) * self.steps
-
-    @property
-    def core_seconds(self) -> float | None:
-        """Of one run."""
-        return None if self.particle_steps is None else self.particle_steps / self.rate.value
-
-    @property
-    def wall_time(self) -> float | None:
-        """Of one run, if its cores share the work perfectly (s)."""
-        return None if self.core_seconds is None else self.core_seconds / self.cores
 
 
 def estimates(plan: Plan, rates: Rates) -> list[Estimate]:
@@ -53,7 +80,10 @@ def estimates(plan: Plan, rates: Rates) -> list[Estimate]:
         if key not in known:
             setup = deck.prepare(run.case, run.values)
             known[key] = (setup.steps, setup.time_step)
-        found.append(Estimate(one, *known[key], run.particles, rates.of(run.case.name, run.engine.name, cores), cores, run.output_size))
+        rate = rates.of(run.case.name, run.engine.name, cores)
+        work = None if run.particles is None else float(run.particles) * known[key][0]
+        time = None if work is None else work / rate.value
+        found.append(Estimate(one, *known[key], rate, cores, work, time, None if time is None else time / cores, run.output_size))
     return found
 
 
@@ -83,9 +113,10 @@ def warnings(plan: Plan, found: Iterable[Estimate], results: Path, room: float) 
     lines = [f"{there} has {size_text(free)} free, less than the {size_text(room)} that are needed"] if free < room else []
     for one in found:
         limit = plan.resources[one.series.place].time
-        if limit is not None and one.wall_time is not None and one.wall_time > limit * (1 + plan.spec.retries):
+        attempts = 1 + plan.retries
+        if limit is not None and one.wall_time is not None and one.wall_time > limit * attempts:
             lines.append(f"{one.series.place} needs about {one.wall_time / 3600:.1f} h, more than the {limit / 3600:.1f} h of each of its "
-                         f"{1 + plan.spec.retries} attempts together")
+                         f"{attempts} attempts together")
     return lines
 
 
@@ -98,3 +129,51 @@ def rate_sources(found: Iterable[Estimate]) -> Mapping[str, list[str]]:
         if word not in sources.setdefault(one.rate.source, []):
             sources[one.rate.source].append(word)
     return sources
+
+
+def _left(one: Series, results: Path) -> int:
+    return sum(not finished(results / one.place / run.folder_name, run) for run in one.runs)
+
+
+def dry_run(console: Console, plan: Plan, found: Sequence[Estimate], results: Path, cores: int | None) -> None:
+    """The runs of a campaign with steps, cost and disk space; totals, of what is not finished in `results`; where the rates are from.
+
+    `cores` of this machine give the time that it will take; None when the runs are jobs of a cluster.
+    """
+    left = {one.series.place: _left(one.series, results) for one in found}
+    console.print(runs_table(found, left))
+    runs, to_do = sum(len(one.series.runs) for one in found), sum(left.values())
+    work = total(one.core_seconds and one.core_seconds * left[one.series.place] for one in found)
+    steps = total(one.particle_steps and one.particle_steps * left[one.series.place] for one in found)
+    room = total(one.size and one.size * left[one.series.place] for one in found)
+    done = f", {runs - to_do} finished already" if runs > to_do else ""
+    console.print(f"{plan.label}: {runs} runs{done}; to do: {steps:.2g} particle-steps, {core_hours(work)} core-hours, "
+                  f"{size_text(room)} on the disk", style="bold", soft_wrap=True)
+    unknown = [str(one.series.place) for one in found if one.core_seconds is None]
+    if unknown:
+        console.print(f"not in the sum, because their case does not say how many particles they have: {', '.join(unknown)}", soft_wrap=True)
+    if cores is not None and to_do:
+        costs = [(one.wall_time, one.cores) for one in found if one.wall_time is not None for _ in range(left[one.series.place])]
+        console.print(f"on {cores} cores about {duration(wall_clock(costs, cores))}")
+    for source, words in rate_sources(found).items():
+        console.print(f"particle-steps per second and core {source}: {', '.join(words)}", markup=False, soft_wrap=True)
+    for line in warnings(plan, found, results, room):
+        console.print(f"warning: {line}", markup=False, style="yellow", soft_wrap=True)
+    console.print(f"folder: {results}", markup=False, soft_wrap=True)
+
+
+def runs_table(found: Sequence[Estimate], left: dict[Path, int]) -> Table:
+    """One row a series."""
+    columns = ("case", "variant", "engine", "runs", "to do", "cores", "steps", "simulated", "particle-steps", "time of one", "core-hours",
+               "disk")
+    table = Table(*columns, box=None, pad_edge=False)
+    for column in table.columns[3:]:
+        column.justify = "right"
+    for one in found:
+        run, count = one.series.runs[0], len(one.series.runs)
+        cost = ["?"] * 3
+        if one.particle_steps is not None and one.wall_time is not None and one.core_seconds is not None:
+            cost = [f"{count * one.particle_steps:.2g}", duration(one.wall_time), core_hours(count * one.core_seconds)]
+        table.add_row(escape(run.case.name), escape(run.variant), run.engine.name, str(count), str(left[one.series.place]), str(one.cores),
+                      str(one.steps), f"{one.steps * one.time_step:.3g} s", *cost, "?" if one.size is None else size_text(count * one.size))
+    return table

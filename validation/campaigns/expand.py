@@ -1,4 +1,4 @@
-"""From a campaign to its runs: each point of a sweep is a variant with changes, with a folder name of its own."""
+"""From a profile or a campaign to its runs: each point of a sweep is a variant with changes, with a folder name of its own."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from typing import Any
 from dembark.common.choices import Value, pick
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
-from dembark.validation.campaigns.spec import CampaignSpec, SweepSpec
-from dembark.validation.case.parameters import checked
+from dembark.validation.campaigns.spec import CampaignSpec, SweepSpec, read
+from dembark.validation.case.model import checked
 from dembark.validation.case.resolve import merged, resolve
-from dembark.validation.runs.plan import Resources, Series, series
+from dembark.validation.runs.plan import Plan, Resources, Series, of_profile, series
 
 LONGEST_NAME = 100
 MOST_RUNS = 20000
@@ -36,24 +36,6 @@ class Point:
     values: Mapping[str, Value]
     changes: Mapping[str, Value]
     resolved: Mapping[str, Value]
-
-
-@dataclass(frozen=True)
-class Plan:
-    """All that a campaign runs: points in the order of the file, series with the longest first, resources by a series' place."""
-
-    spec: CampaignSpec
-    points: tuple[Point, ...]
-    series: tuple[Series, ...]
-    resources: Mapping[Path, Resources]
-
-    def sweeps(self) -> list[dict[str, Any]]:
-        """The sweeps for a JSON file: case, name, title, axes, and their points with folder names and values in SI units."""
-        return [{"case": sweep.case.name, "name": sweep.name or f"sweep {sweep.number}", "title": sweep.title, "axes": list(sweep.axes),
-                 "engines": list(sweep.engines), "profile": sweep.profile,
-                 "points": [{"variant": point.variant, "base": point.base, "values": dict(point.values), "changes": dict(point.changes)}
-                            for point in self.points if point.sweep is sweep]}
-                for sweep in self.spec.sweeps]
 
 
 def _word(value: Value) -> str:
@@ -84,10 +66,7 @@ def _changes(sweep: SweepSpec, base: str, row: Mapping[str, Value]) -> dict[str,
         changes["replicas"] = sweep.replicas
     for key, expression in sweep.derived.items():
         parameter = sweep.case.parameters[key]
-        try:
-            value = expression(merged(sweep.case, sweep.profile, base, changes))
-        except (ArithmeticError, ValueError, TypeError) as error:
-            raise DembarkError(f"{key} = {expression.text!r} cannot be evaluated", str(error)) from None
+        value = expression.evaluated(merged(sweep.case, sweep.profile, base, changes), key)
         if isinstance(value, bool | complex):
             raise DembarkError(f"{key} = {expression.text!r} is no number")
         # Grains are counted: what comes out is the next whole number.
@@ -148,8 +127,17 @@ def _distinct(spec: CampaignSpec, found: Sequence[Point]) -> None:
                                "with other values elsewhere (profile, fixed, replicas)", 'give one of them a name, name = "..."')
 
 
-def plan(spec: CampaignSpec, only_cases: Sequence[str] = (), only_engines: Sequence[str] = ()) -> Plan:
-    """The runs of a campaign, of all its cases and engines or only some; the engines that are needed have to be there."""
+def _sweeps(spec: CampaignSpec, found: Sequence[Point]) -> list[dict[str, Any]]:
+    """The sweeps for a JSON file: case, name, title, axes, and their points with folder names and values in SI units."""
+    return [{"case": sweep.case.name, "name": sweep.name or f"sweep {sweep.number}", "title": sweep.title, "axes": list(sweep.axes),
+             "engines": list(sweep.engines), "profile": sweep.profile,
+             "points": [{"variant": point.variant, "base": point.base, "values": dict(point.values), "changes": dict(point.changes)}
+                        for point in found if point.sweep is sweep]}
+            for sweep in spec.sweeps]
+
+
+def campaign(spec: CampaignSpec, only_cases: Sequence[str] = (), only_engines: Sequence[str] = ()) -> Plan:
+    """What a campaign runs, of all its cases and engines or only some; the engines that are needed have to be there."""
     for name in only_cases:
         pick(name, {sweep.case.name for sweep in spec.sweeps}, "case", f"in {spec.path}")
     for name in only_engines:
@@ -166,4 +154,16 @@ def plan(spec: CampaignSpec, only_cases: Sequence[str] = (), only_engines: Seque
                 continue
             found[place] = series(point.sweep.case, point.base, point.sweep.profile, engines.find(engine), point.changes, point.variant)
             resources[place] = point.sweep.resources[engine]
-    return Plan(spec, tuple(all_points), tuple(sorted(found.values(), key=lambda one: -one.cost)), resources)
+    facts = {"campaign": spec.name, "description": spec.description, "sweeps": _sweeps(spec, all_points)}
+    return Plan(spec.name, tuple(sorted(found.values(), key=lambda one: -one.cost)), facts, ("--campaign", str(spec.path)), resources,
+                spec.retries, spec.measure, not (only_cases or only_engines))
+
+
+def plan(profile: str | None = None, file: Path | None = None, cases: Sequence[str] = (), engines: Sequence[str] = ()) -> Plan:
+    """What a profile, or else the campaign in `file`, runs: all of it, or that of some cases and engines."""
+    if file is not None and profile is None:
+        return campaign(read(file), cases, engines)
+    if profile is None or file is not None:
+        raise DembarkError("neither a profile nor a campaign is given, or both", "", "give --profile or --campaign")
+    return Plan(profile, tuple(of_profile(profile, cases, engines)), {"profile": profile}, ("--profile", profile),
+                whole=not (cases or engines))

@@ -1,4 +1,4 @@
-"""The folder of a campaign: whose it is, the copy of the campaign's file that counts in it, and how it was submitted."""
+"""The folder of a campaign: whose it is, the copy of the campaign's file that counts in it, how it was submitted and how far it is."""
 
 from __future__ import annotations
 
@@ -6,20 +6,26 @@ import getpass
 import hashlib
 import os
 import socket
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json, write_json, write_whole
+from dembark.common.lock import held
 from dembark.validation import engines, provenance
-from dembark.validation.campaigns.expand import Plan
+from dembark.validation.campaigns.estimate import wall_clock
 from dembark.validation.campaigns.spec import read
 from dembark.validation.case.folders import shipped_root
+from dembark.validation.judge.tally import Tally, of_folder
+from dembark.validation.runs import table
 from dembark.validation.runs.perform import LOCK
-from dembark.validation.runs.steps import CAMPAIGN_FILE as FILE
+from dembark.validation.runs.plan import Plan
+from dembark.validation.runs.progress import headline
+from dembark.validation.runs.steps import CAMPAIGN_FILE
+from dembark.validation.runs.table import State
 
 FACTS = "campaign.json"
 LOG = "campaign.log"
@@ -39,18 +45,13 @@ def choose(executor: str, cores: int | None, jobs: int | None) -> Options:
     return Options(str(Path(executor).resolve()) if Path(executor).is_file() else executor, cores, jobs)
 
 
-def default(name: str) -> Path:
-    """Where a campaign goes unless told otherwise."""
-    return Path("results") / "campaigns" / name
-
-
 def refuse_foreign(folder: Path, name: str) -> None:
     """DembarkError when `folder` holds anything but an earlier state of the campaign `name`."""
     if not folder.exists():
         return
     if not folder.is_dir():
         raise DembarkError(f"{folder} is a file", "", "choose a folder with --out")
-    copy = folder / FILE
+    copy = folder / CAMPAIGN_FILE
     if copy.is_file():
         owner = read_name(folder)
         if owner != name:
@@ -62,14 +63,15 @@ def refuse_foreign(folder: Path, name: str) -> None:
 def read_name(folder: Path) -> str:
     """Name of the campaign whose folder it is."""
     facts = read_json(folder / FACTS)
-    return str(facts["name"]) if facts and "name" in facts else read(folder / FILE).name
+    return str(facts["name"]) if facts and "name" in facts else read(folder / CAMPAIGN_FILE).name
 
 
 def own_file(folder: Path) -> Path:
     """The campaign's file in its folder; DembarkError when it is no campaign's folder."""
-    copy = folder / FILE
+    copy = folder / CAMPAIGN_FILE
     if not copy.is_file():
-        raise DembarkError(f"{folder} is no campaign's folder", f"it has no {FILE}", "start one with 'dembark submit FILE --out FOLDER'")
+        raise DembarkError(f"{folder} is no campaign's folder", f"it has no {CAMPAIGN_FILE}",
+                           "start one with 'dembark submit FILE --out FOLDER'")
     return copy.resolve()
 
 
@@ -98,21 +100,16 @@ def restore(folder: Path) -> None:
 def enter(folder: Path, file: Path, plan: Plan, chosen: Options) -> None:
     """Write the copy of the campaign's file into `folder` and add to `campaign.json` who submits it, from where, with what."""
     text = file.read_bytes()
-    write_whole(folder / FILE, text)
+    used = {run.engine.name: run.engine.version for one in plan.series for run in one.runs}
+    write_whole(folder / CAMPAIGN_FILE, text)
     facts = read_json(folder / FACTS) or {}
     submission: dict[str, Any] = {
         "at": datetime.now(UTC).isoformat(timespec="seconds"), "file": str(file), "sha256": hashlib.sha256(text).hexdigest(),
         "options": asdict(chosen), "host": socket.gethostname(), "user": _user(), "decks": str(shipped_root()),
         "environment": {name: os.environ[name] for name in _variables() if name in os.environ},
-        **provenance.commit(), "versions": versions(plan)}
-    write_json(folder / FACTS, {"name": plan.spec.name, "description": plan.spec.description,
+        **provenance.commit(), "versions": {"dembark": provenance.package_version("dembark"), **used}}
+    write_json(folder / FACTS, {"name": plan.label, "description": plan.facts["description"],
                                 "submissions": [*facts.get("submissions", []), submission]})
-
-
-def versions(plan: Plan) -> Mapping[str, str | None]:
-    """Versions of dembark and the engines of a plan."""
-    used = {run.engine.name: run.engine.version for one in plan.series for run in one.runs}
-    return {"dembark": provenance.package_version("dembark"), **used}
 
 
 def _user() -> str:
@@ -120,3 +117,71 @@ def _user() -> str:
         return getpass.getuser()
     except (OSError, KeyError):
         return str(os.getuid())
+
+
+@dataclass(frozen=True)
+class Status:
+    """State of a campaign: its runs in the order of the plan, whether a process runs it now, and the time left (s, None = not known)."""
+
+    name: str
+    running: bool
+    states: tuple[State, ...]
+    left: float | None
+    measured: int
+    tally: Tally
+    report: Path | None
+
+    @property
+    def headline(self) -> str:
+        """One line."""
+        return f"{self.name}: {headline(self.states)}" + ("" if self.running or self.complete else "; nobody runs it now")
+
+    @property
+    def complete(self) -> bool:
+        """Whether every run is finished."""
+        return all(state.state == "finished" for state in self.states)
+
+
+def look(results: Path) -> Status:
+    """The state of the campaign in `results`, told from the folder alone; DembarkError when it is no campaign's."""
+    own_file(results)
+    found = table.read(results)
+    if not found:
+        raise DembarkError(f"the campaign in {results} has not been started", "", f"start it with 'dembark resume {results}'")
+    running = held(results / LOCK)
+    states = tuple(_as_the_files_say(results, state, running) for state in found)
+    report = results / "report.html"
+    measured = {Path(state.folder).parent for state in states if (results / state.folder).with_name("metrics.json").is_file()}
+    return Status(read_name(results), running, states, time_left(states), len(measured), of_folder(results),
+                  report if report.is_file() else None)
+
+
+def _as_the_files_say(results: Path, state: State, running: bool) -> State:
+    """A result counts before what the table says of it, and nothing runs when nobody runs the campaign."""
+    record = read_json(results / state.folder / "run.json")
+    if record is not None and record.get("inputs") == state.inputs:
+        return replace(state, state="finished")
+    gone = state.state == "finished" or (state.state in table.UNDER_WAY and not running)
+    return replace(state, state="waiting", step=0) if gone else state
+
+
+def time_left(states: Sequence[State]) -> float | None:
+    """Seconds until all runs are done if as many go on at a time as now; None when nothing runs or a run's cost is not known.
+
+    A waiting run takes its estimate, times what the finished ones took over theirs.
+    """
+    took = [(state.ended - state.began, state.estimate) for state in states
+            if state.state == "finished" and state.estimate and state.ended > state.began and not state.resumed_from]
+    factor = sum(real for real, _ in took) / sum(wall for _, wall in took) if took else 1.0
+    left = []
+    for state in states:
+        if state.state in ("finished", "failed"):
+            continue
+        seconds = state.left if state.left is not None else state.estimate * factor if state.estimate else None
+        if seconds is None:
+            return None
+        left.append((seconds, 1))
+    at_once = sum(state.state == "running" for state in states)
+    if not left:
+        return 0.0
+    return wall_clock(left, at_once) if at_once else None

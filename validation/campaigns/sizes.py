@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 
@@ -13,42 +14,25 @@ _SIZES = {"kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12, "KiB": 2.0**10, "MiB": 2.
 _PART = re.compile(r"\s*([0-9]+(?:\.[0-9]*)?|\.[0-9]+)\s*([A-Za-z]+)")
 
 
-def _total(text: str, units: Mapping[str, float]) -> float:
-    position, total = 0, 0.0
-    while position < len(text.rstrip()):
-        part = _PART.match(text, position)
-        if not part or part.group(2) not in units:
-            raise ValueError(text)
-        total, position = total + float(part.group(1)) * units[part.group(2)], part.end()
-    if total <= 0.0:
-        raise ValueError(text)
-    return total
-
-
-def _refuse_decimal_comma(text: str) -> None:
-    # A comma between two durations is another mistake.
-    if re.search(r"\d,\d", text):
-        refuse_comma(text)
-
-
 def seconds(text: str) -> float:
     """A positive duration in s, of a text such as `90 s`, `10 min`, `2 h 30 min`, `1 d`; DembarkError when it is none."""
-    _refuse_decimal_comma(text)
-    try:
-        return _total(text, _TIMES)
-    except ValueError:
-        right = 'wanted is a positive one with its unit: "90 s", "10 min", "2 h 30 min", "1 d"'
-        raise DembarkError(f"{text!r} is no duration", right) from None
+    return _total(text, _TIMES, "duration", '"90 s", "10 min", "2 h 30 min", "1 d"')
 
 
 def size(text: str) -> float:
     """A positive amount of memory in bytes, of a text such as `800 MB`, `1.5 GB`, `2 GiB`; DembarkError when it is none."""
-    _refuse_decimal_comma(text)
-    try:
-        return _total(text, _SIZES)
-    except ValueError:
-        right = 'wanted is a positive one with its unit: "800 MB", "1.5 GB", "2 GiB"'
-        raise DembarkError(f"{text!r} is no amount of memory", right) from None
+    return _total(text, _SIZES, "amount of memory", '"800 MB", "1.5 GB", "2 GiB"')
+
+
+def _total(text: str, units: Mapping[str, float], what: str, examples: str) -> float:
+    # A comma between two durations is another mistake.
+    if re.search(r"\d,\d", text):
+        refuse_comma(text)
+    parts = _PART.findall(text)
+    total = sum(float(number) * units.get(unit, math.nan) for number, unit in parts)
+    if _PART.sub("", text).strip() or not total > 0.0:
+        raise DembarkError(f"{text!r} is no {what}", f"wanted is a positive one with its unit: {examples}")
+    return total
 
 
 def size_text(count: float) -> str:

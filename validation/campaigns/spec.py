@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,6 @@ from dembark.validation.campaigns import sizes
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.folders import discover, files, find
 from dembark.validation.case.model import Case
-from dembark.validation.case.parameters import checked
 from dembark.validation.case.tables import TableReader, load_toml
 from dembark.validation.runs.plan import RETRIES, Resources
 
@@ -25,7 +24,10 @@ _PER_RUN = {"ranks": int, "threads": int, "memory": str, "time": str, "restart_i
 _MEASURING = {"memory": str, "time": str}
 _SWEEP = {"case": str, "name": str, "title": str, "profile": str, "variant": str, "variants": list, "engines": list, "grid": dict,
           "list": list, "fixed": dict, "derived": dict, "replicas": int, "resources": dict}
-_CAMPAIGN = {"name": str, "description": str, "profile": str, "engines": list, "replicas": int, "retries": int}
+# Keys of a sweep that [campaign] may give for all sweeps that do not have them.
+_SHARED = ("case", "variants", "fixed", "derived")
+_CAMPAIGN = {"name": str, "description": str, "profile": str, "engines": list, "replicas": int, "retries": int,
+             **{key: _SWEEP[key] for key in _SHARED}}
 
 
 @dataclass(frozen=True)
@@ -109,134 +111,119 @@ def _refuse_decimal_commas(path: Path) -> None:
                                    f"line {number} of {path}")
 
 
-@dataclass
-class _Defaults:
-    """What [campaign] and [resources] say for all sweeps."""
-
-    profile: str | None
-    engines: tuple[str, ...] | None
-    replicas: int | None
-    resources: dict[str, Resources] = field(default_factory=dict)
-
-
 class _Reader(TableReader):
     """Turns the tables of one campaign file into a CampaignSpec; each mistake names the table it is in."""
 
     def campaign(self, data: Mapping[str, Any]) -> CampaignSpec:
         self.table(data, "top level", {"campaign": dict, "sweeps": list, "resources": dict}, ("campaign", "sweeps"))
-        head = data["campaign"]
+        head, resources = data["campaign"], data.get("resources", {})
         self.table(head, "campaign", _CAMPAIGN, ("name",))
-        self.name("campaign", head["name"])
+        self.folder_name("campaign", head["name"])
         if not data["sweeps"]:
             raise self.fail("sweeps", "there are no sweeps", "add a table [[sweeps]]")
         if "profile" in head:
-            pick(head["profile"], {name for case in discover().values() for name in case.profiles}, "profile", self.where("campaign"))
-        self.least("campaign", head, "replicas", 1)
-        self.least("campaign", head, "retries", 0)
-        tables = data.get("resources", {})
-        defaults = _Defaults(head.get("profile"), self.engines("campaign", head, engines.names()), head.get("replicas"),
-                             self.resources("resources", tables, {name: Resources() for name in engines.names()}, measuring=True))
-        sweeps = tuple(self.sweep(number, entry, defaults) for number, entry in enumerate(data["sweeps"], start=1))
-        measure = self.measuring(tables[MEASURE]) if MEASURE in tables else None
-        return CampaignSpec(self.path, head["name"], head.get("description", "").strip(), head.get("retries", RETRIES), sweeps, measure)
+            self.pick(head["profile"], {name for case in discover().values() for name in case.profiles}, "profile", "campaign")
+        self.least("campaign", head, replicas=1, retries=0)
+        self.names("campaign", head, "engines", engines.names(), "engine")
+        measure = resources.get(MEASURE)
+        if measure is not None:
+            self.table(measure, f"resources.{MEASURE}", _MEASURING)
+        base = self.resources("resources", {key: value for key, value in resources.items() if key != MEASURE},
+                              dict.fromkeys(engines.names(), Resources()))
+        return CampaignSpec(
+            self.path, head["name"], head.get("description", "").strip(), head.get("retries", RETRIES),
+            tuple(self.sweep(f"sweeps {number}", number, entry, head, base) for number, entry in enumerate(data["sweeps"], start=1)),
+            None if measure is None else self.changed(f"resources.{MEASURE}", Resources(), measure))
 
-    def name(self, table: str, text: str) -> None:
+    def folder_name(self, table: str, text: str) -> None:
         if not _NAME.fullmatch(text):
             raise self.fail(table, f"name = {text!r} is no name of a folder", "wanted are up to 64 letters, digits, '.', '_' and '-'")
 
-    def least(self, table: str, data: Mapping[str, Any], key: str, low: int) -> None:
-        if key in data and data[key] < low:
-            raise self.fail(table, f"{key} = {data[key]} is out of range", f"allowed is >= {low}")
+    def least(self, table: str, data: Mapping[str, Any], **lows: int) -> None:
+        """DembarkError when one of the numbers in `data` is below its least value."""
+        for key, low in lows.items():
+            if data.get(key, low) < low:
+                raise self.fail(table, f"{key} = {data[key]} is out of range", f"allowed is >= {low}")
 
-    def names(self, table: str, key: str, given: list[Any], known: Iterable[str], what: str) -> tuple[str, ...]:
-        """`given` if it is a list of different ones among `known`."""
-        known = list(known)
+    def names(self, table: str, data: Mapping[str, Any], key: str, known: Iterable[str], what: str) -> tuple[str, ...]:
+        """The list `key` of different ones among `known`; empty when it is not given."""
+        if key not in data:
+            return ()
+        given, known = data[key], list(known)
         if not given:
             raise self.fail(table, f"{key} = [] is empty", f"name one or more of {', '.join(known)}, or leave it out")
         for one in given:
-            pick(one if isinstance(one, str) else str(one), known, what, self.where(table))
+            self.pick(one if isinstance(one, str) else str(one), known, what, table)
         if len(set(given)) < len(given):
             raise self.fail(table, f"{key} names {max(given, key=given.count)} twice", "name each once")
         return tuple(given)
 
-    def engines(self, table: str, data: Mapping[str, Any], known: Iterable[str]) -> tuple[str, ...] | None:
-        return self.names(table, "engines", data["engines"], known, "engine") if "engines" in data else None
+    def one_of(self, table: str, data: Mapping[str, Any], one: str, other: str, right: str) -> None:
+        if one in data and other in data:
+            raise self.fail(table, f"{one} and {other} are both given", right)
 
-    def sweep(self, number: int, entry: Any, defaults: _Defaults) -> SweepSpec:
-        table = f"sweeps {number}"
+    def sweep(self, table: str, number: int, entry: Any, head: Mapping[str, Any], base: Mapping[str, Resources]) -> SweepSpec:
         if not isinstance(entry, dict):
             raise self.fail("sweeps", f"{entry!r} is no sweep", "write each as a table [[sweeps]]")
+        shared = {key: head[key] for key in _SHARED if key in head and not (key == "variants" and "variant" in entry)}
+        entry = shared | entry
         self.table(entry, table, _SWEEP, ("case",))
-        if "name" in entry:
-            self.name(table, entry["name"])
-        pick(entry["case"], (path.parent.name for path in files()), "case", self.where(table))
-        case = find(entry["case"])
-        profile = entry.get("profile", defaults.profile)
+        self.folder_name(table, entry.get("name", "unnamed"))
+        case = find(self.pick(entry["case"], (path.parent.name for path in files()), "case", table))
+        profile = entry.get("profile", head.get("profile"))
         if profile is None:
             raise self.fail(table, "profile is missing", f"name it here or in [campaign]: {', '.join(case.profiles)}")
         pick(profile, case.profiles, "profile", f"{self.where(table)}, case {case.name}")
-        rows, axes = self.rows(table, entry, case)
-        variants = self.variants(table, entry, case)
-        if rows == [{}] and not ("variant" in entry or "variants" in entry):
+        fixed, rows = self.values(f"{table}.fixed", entry.get("fixed", {}), case), self.rows(table, entry, case)
+        for key in fixed.keys() & rows[0].keys():
+            raise self.fail(f"{table}.fixed", f"{key} is fixed and varies", "remove it from one of the two")
+        self.one_of(table, entry, "variant", "variants", "give one of them")
+        one = {"variants": [entry["variant"]]} if "variant" in entry else entry
+        variants = self.names(table, one, "variants", case.variants, "variant")
+        if rows == [{}] and not variants:
             raise self.fail(table, "nothing varies", "give grid, list or variants")
-        return SweepSpec(
-            number, case, entry.get("name", ""), entry.get("title", ""), profile, variants, self.chosen(table, entry, case, defaults),
-            (*(("variant",) if len(variants) > 1 else ()), *axes), tuple(rows), self.values(f"{table}.fixed", entry.get("fixed", {}), case),
-            self.derived(f"{table}.derived", entry, rows[0], case), self.replicas(table, entry, case, defaults),
-            self.resources(f"{table}.resources", entry.get("resources", {}), defaults.resources))
-
-    def chosen(self, table: str, entry: Mapping[str, Any], case: Case, defaults: _Defaults) -> tuple[str, ...]:
-        """Engines of a sweep: its own, else those of the campaign that the case has, else all of the case."""
-        own = self.engines(table, entry, case.engines)
-        found = own or tuple(name for name in case.engines if name in (defaults.engines or case.engines))
-        if not found:
+        variants = variants or (next(iter(case.variants)),)
+        # Its own engines, else those of the campaign that the case has, else all of the case.
+        chosen = (self.names(table, entry, "engines", case.engines, "engine")
+                  or tuple(name for name in case.engines if name in head.get("engines", case.engines)))
+        if not chosen:
             raise self.fail(table, f"case {case.name} runs in none of the campaign's engines", f"it runs in {', '.join(case.engines)}")
-        return found
+        return SweepSpec(
+            number, case, entry.get("name", ""), entry.get("title", ""), profile, variants, chosen,
+            (*(("variant",) if len(variants) > 1 else ()), *rows[0]), tuple(rows), fixed,
+            self.derived(f"{table}.derived", entry.get("derived", {}), rows[0].keys() | fixed.keys(), case),
+            self.replicas(table, entry, case, head), self.resources(f"{table}.resources", entry.get("resources", {}), base))
 
-    def replicas(self, table: str, entry: Mapping[str, Any], case: Case, defaults: _Defaults) -> int | None:
-        self.least(table, entry, "replicas", 1)
+    def replicas(self, table: str, entry: Mapping[str, Any], case: Case, head: Mapping[str, Any]) -> int | None:
+        self.least(table, entry, replicas=1)
         if "replicas" in case.parameters:
-            return entry.get("replicas", defaults.replicas)
+            return entry.get("replicas", head.get("replicas"))
         if entry.get("replicas", 1) > 1:
             raise self.fail(table, f"replicas = {entry['replicas']}, but nothing in case {case.name} is random", "leave it out")
         return None
 
-    def variants(self, table: str, entry: Mapping[str, Any], case: Case) -> tuple[str, ...]:
-        if "variant" in entry and "variants" in entry:
-            raise self.fail(table, "variant and variants are both given", "give one of them")
-        given = [entry["variant"]] if "variant" in entry else entry.get("variants", [next(iter(case.variants))])
-        return self.names(table, "variants", given, case.variants, "variant")
-
-    def rows(self, table: str, entry: Mapping[str, Any], case: Case) -> tuple[list[dict[str, Value]], tuple[str, ...]]:
-        """Changes of each point and the names of the parameters that vary."""
-        if "grid" in entry and "list" in entry:
-            raise self.fail(table, "grid and list are both given", "give one of them, or make two sweeps")
-        rows: list[dict[str, Value]] = [{}]
+    def rows(self, table: str, entry: Mapping[str, Any], case: Case) -> list[dict[str, Value]]:
+        """Changes of each point; all have the same parameters."""
+        self.one_of(table, entry, "grid", "list", "give one of them, or make two sweeps")
         if "grid" in entry:
-            rows = self.grid(table, entry["grid"], case)
-        elif "list" in entry:
-            rows = self.listed(table, entry["list"], case)
-        axes = tuple(rows[0])
-        for key in entry.get("fixed", {}):
-            if key in axes:
-                raise self.fail(f"{table}.fixed", f"{key} is fixed and varies", "remove it from one of the two")
-        return rows, axes
+            return self.grid(f"{table}.grid", entry["grid"], case)
+        return self.listed(table, entry["list"], case) if "list" in entry else [{}]
 
     def grid(self, table: str, grid: Mapping[str, Any], case: Case) -> list[dict[str, Value]]:
         rows: list[dict[str, Value]] = [{}]
         if not grid:
-            raise self.fail(f"{table}.grid", "the grid is empty", "give it a parameter with a list of values")
+            raise self.fail(table, "the grid is empty", "give it a parameter with a list of values")
         for key, given in grid.items():
-            self.known(f"{table}.grid", key, case)
+            self.known(table, key, case)
             if not isinstance(given, list):
-                raise self.fail(f"{table}.grid", f"{key} = {given!r} is no list", f"write {key} = [...], or move it to fixed")
+                raise self.fail(table, f"{key} = {given!r} is no list", f"write {key} = [...], or move it to fixed")
             if not given:
-                raise self.fail(f"{table}.grid", f"{key} = [] has no values", "give it one or more")
-            values = [self.value(f"{table}.grid", key, one, case) for one in given]
+                raise self.fail(table, f"{key} = [] has no values", "give it one or more")
+            values = [self.values(table, {key: one}, case) for one in given]
             for index, value in enumerate(values):
                 if value in values[:index]:
-                    raise self.fail(f"{table}.grid", f"{key} has the value {given[index]!r} twice", "give each once")
-            rows = [row | {key: value} for row in rows for value in values]
+                    raise self.fail(table, f"{key} has the value {given[index]!r} twice", "give each once")
+            rows = [row | value for row in rows for value in values]
         return rows
 
     def listed(self, table: str, entries: list[Any], case: Case) -> list[dict[str, Value]]:
@@ -244,33 +231,26 @@ class _Reader(TableReader):
             raise self.fail(table, "list = [] has no points", "give it one or more tables {...}")
         rows: list[dict[str, Value]] = []
         for index, entry in enumerate(entries, start=1):
+            place = f"{table}.list {index}"
             if not isinstance(entry, dict) or not entry:
-                raise self.fail(f"{table}.list {index}", f"{entry!r} is no point", "wanted is a table {parameter = value, ...}")
-            row = self.values(f"{table}.list {index}", entry, case)
+                raise self.fail(place, f"{entry!r} is no point", "wanted is a table {parameter = value, ...}")
+            row = self.values(place, entry, case)
             if rows and row.keys() != rows[0].keys():
-                right = f"all must have the first one's {', '.join(rows[0])}"
-                raise self.fail(f"{table}.list {index}", f"a point with {', '.join(row)}", right)
+                raise self.fail(place, f"a point with {', '.join(row)}", f"all must have the first one's {', '.join(rows[0])}")
             if row in rows:
-                raise self.fail(f"{table}.list {index}", f"the point is that of {table}.list {rows.index(row) + 1} again", "remove one")
+                raise self.fail(place, f"the point is that of {table}.list {rows.index(row) + 1} again", "remove one")
             rows.append({key: row[key] for key in rows[0]} if rows else row)
         return rows
 
-    def derived(self, table: str, entry: Mapping[str, Any], row: Mapping[str, Value], case: Case) -> dict[str, Expression]:
+    def derived(self, table: str, texts: Mapping[str, Any], given: Collection[str], case: Case) -> dict[str, Expression]:
         """Parameters of a sweep that are given by expressions in the others."""
-        found = {}
-        for key, text in entry.get("derived", {}).items():
+        for key, text in texts.items():
             self.known(table, key, case)
-            if key in row or key in entry.get("fixed", {}):
+            if key in given:
                 raise self.fail(table, f"{key} is derived and given", "remove it from one of the two")
             if not isinstance(text, str):
-                raise self.fail(table, f"{key} = {text!r} has the wrong type", 'wanted is an expression in a text, or move it to fixed')
-            try:
-                found[key] = Expression(text)
-            except DembarkError as error:
-                raise self.fail(table, f"{key}: {error}") from None
-            for name in sorted(found[key].names):
-                pick(name, case.parameters, "parameter", f"in {key} = {text!r}, {self.where(table)}")
-        return found
+                raise self.fail(table, f"{key} = {text!r} has the wrong type", "wanted is an expression in a text, or move it to fixed")
+        return {key: self.expression(table, text, case.parameters) for key, text in texts.items()}
 
     def known(self, table: str, key: str, case: Case) -> None:
         if key == "replicas":
@@ -278,52 +258,37 @@ class _Reader(TableReader):
         pick(key, case.parameters, "parameter", f"{self.where(table)}, case {case.name}")
 
     def values(self, table: str, entry: Mapping[str, Any], case: Case) -> dict[str, Value]:
-        for key in entry:
+        for key, given in entry.items():
             self.known(table, key, case)
-        return {key: self.value(table, key, value, case) for key, value in entry.items()}
+            if isinstance(given, bool) or not isinstance(given, int | float | str):
+                raise self.fail(table, f"{key} = {given!r} has the wrong type", "wanted is a number or a text")
+        return {key: self.value(table, case.parameters[key], given) for key, given in entry.items()}
 
-    def value(self, table: str, key: str, given: Any, case: Case) -> Value:
-        if isinstance(given, bool) or not isinstance(given, int | float | str):
-            raise self.fail(table, f"{key} = {given!r} has the wrong type", "wanted is a number or a text")
-        try:
-            return checked(case.parameters[key], given)
-        except DembarkError as error:
-            raise self.fail(table, str(error)) from None
-
-    def resources(self, table: str, data: Mapping[str, Any], base: Mapping[str, Resources],
-                  measuring: bool = False) -> dict[str, Resources]:
+    def resources(self, table: str, data: Mapping[str, Any], base: Mapping[str, Resources]) -> dict[str, Resources]:
         """Resources of each engine: keys of `data` count for all engines, its tables for one; `base` are the defaults."""
-        self.table(data, table, _PER_RUN | dict.fromkeys((*engines.names(), *((MEASURE,) if measuring else ())), dict))
+        self.table(data, table, _PER_RUN | dict.fromkeys(engines.names(), dict))
         common = {key: value for key, value in data.items() if key in _PER_RUN}
-        self.checked_resources(table, common)
+        self.changed(table, Resources(), common)
         found = {}
         for engine in engines.names():
-            own = data.get(engine, {})
+            facts, own = engines.facts(engine), data.get(engine, {})
             self.table(own, f"{table}.{engine}", _PER_RUN)
-            place = f"{table}.{engine}" if own else table
             # What is said for all engines cannot mean ranks for the one that has none.
-            shared = {key: value for key, value in common.items() if key != "ranks" or engines.facts(engine).ranks}
-            found[engine] = replace(base[engine], **self.checked_resources(f"{table}.{engine}", shared | own))
-            self.fitting(place, engine, found[engine])
+            shared = {key: value for key, value in common.items() if key != "ranks" or facts.ranks}
+            one = found[engine] = self.changed(f"{table}.{engine}", base[engine], shared | own)
+            place = f"{table}.{engine}" if own else table
+            if one.ranks > 1 and not facts.ranks:
+                raise self.fail(place, f"ranks = {one.ranks} for {engine}", f"use threads: {facts.one_process}")
+            if one.time is not None and one.restart_interval is not None and one.restart_interval >= one.time:
+                raise self.fail(place, "restart_interval is not shorter than time", "a run that is ended must have written a restart file")
         return found
 
-    def checked_resources(self, table: str, data: Mapping[str, Any]) -> dict[str, Any]:
-        """The numbers that the texts of `data` mean."""
-        for key in ("ranks", "threads"):
-            self.least(table, data, key, 1)
+    def changed(self, table: str, base: Resources, data: Mapping[str, Any]) -> Resources:
+        """`base` with the numbers that the texts of `data` mean."""
+        self.least(table, data, ranks=1, threads=1)
         read = {"memory": sizes.size, "time": sizes.seconds, "restart_interval": sizes.seconds}
         try:
-            return {key: read[key](value) if key in read else value for key, value in data.items()}
+            numbers: dict[str, Any] = {key: read[key](value) if key in read else value for key, value in data.items()}
         except DembarkError as error:
             raise self.fail(table, str(error)) from None
-
-    def fitting(self, table: str, engine: str, found: Resources) -> None:
-        facts = engines.facts(engine)
-        if found.ranks > 1 and not facts.ranks:
-            raise self.fail(table, f"ranks = {found.ranks} for {engine}", f"use threads: {facts.one_process}")
-        if found.time is not None and found.restart_interval is not None and found.restart_interval >= found.time:
-            raise self.fail(table, "restart_interval is not shorter than time", "a run that is ended must have written a restart file")
-
-    def measuring(self, data: Mapping[str, Any]) -> Resources:
-        self.table(data, f"resources.{MEASURE}", _MEASURING)
-        return replace(Resources(), **self.checked_resources(f"resources.{MEASURE}", data))
+        return replace(base, **numbers)

@@ -17,6 +17,9 @@ from typing import TYPE_CHECKING, Any
 from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json, write_whole
+from dembark.validation.judge.result import COMPARISON, METRICS, QuantityRecord
+from dembark.validation.judge.tally import Tally
+from dembark.validation.judge.tally import tally as count
 from dembark.validation.runs import schema
 from dembark.validation.runs.schema import KEYS, TABLES, clear, put
 
@@ -26,14 +29,6 @@ if TYPE_CHECKING:
 FILE = schema.FILE
 
 
-def path_of(results: Path) -> Path:
-    """Where the store of a results folder lies."""
-    return results / FILE
-
-
-# --- writing ----------------------------------------------------------------------------------------------------
-
-
 def collect(results: Path, campaign: str, places: Iterable[Path], sweeps: Iterable[Mapping[str, Any]] | None = None) -> None:
     """Put what was measured in `places` below `results` (<case>/<variant>/<engine>) into its store, and comparisons of engines there.
 
@@ -41,9 +36,9 @@ def collect(results: Path, campaign: str, places: Iterable[Path], sweeps: Iterab
     """
     places = list(places)
     for place in places:
-        with schema.writing(path_of(results)) as connection:
+        with schema.writing(results / FILE) as connection:
             _put_quantities(connection, campaign, results / place)
-    with schema.writing(path_of(results)) as connection:
+    with schema.writing(results / FILE) as connection:
         for variant in {place.parent for place in places}:
             _put_comparisons(connection, campaign, results / variant)
         if sweeps is not None:
@@ -63,7 +58,7 @@ def _value(quantity: Mapping[str, Any]) -> dict[str, Any]:
 
 def _put_quantities(connection: sqlite3.Connection, campaign: str, folder: Path) -> None:
     """Quantities of one series or study as its metrics.json has them; those of the same code that it no longer has go."""
-    content = read_json(folder / "metrics.json")
+    content = read_json(folder / METRICS)
     if content is None:
         return
     facts = content.get("provenance", {})
@@ -77,11 +72,11 @@ def _put_quantities(connection: sqlite3.Connection, campaign: str, folder: Path)
 
 
 def _put_comparisons(connection: sqlite3.Connection, campaign: str, folder: Path) -> None:
-    content = read_json(folder / "comparison.json")
+    content = read_json(folder / COMPARISON)
     if content is None:
         return
     versions = {path.parent.name: (read_json(path) or {}).get("provenance", {}).get("versions", {}).get(path.parent.name)
-                for path in sorted(folder.glob("*/metrics.json"))}
+                for path in sorted(folder.glob(f"*/{METRICS}"))}
     common = {"campaign": campaign, "case_name": folder.parts[-2], "variant": folder.parts[-1], **_measured(content),
               "engine_versions": ", ".join(f"{name} {version}" for name, version in versions.items())}
     where = {key: common[key] for key in ("campaign", "case_name", "variant", "commit_hash", "engine_versions")}
@@ -93,9 +88,6 @@ def _point_rows(campaign: str, sweeps: Iterable[Mapping[str, Any]]) -> list[dict
     return [{"campaign": campaign, "case_name": sweep["case"], "variant": point["variant"], "sweep": sweep["name"],
              "base_variant": point["base"], "axis": axis, "value": value}
             for sweep in sweeps for point in sweep["points"] for axis, value in point["values"].items()]
-
-
-# --- reading ----------------------------------------------------------------------------------------------------
 
 
 def query(path: Path | str, sql: str, values: Sequence[Any] = ()) -> list[dict[str, Any]]:
@@ -141,8 +133,22 @@ def read_quantities(path: Path | str, **where: Any) -> list[dict[str, Any]]:
 
 def trend(path: Path | str, case_name: str, variant: str, engine: str, name: str) -> list[dict[str, Any]]:
     """One quantity over commits and engine versions, the oldest measurement first."""
-    rows = read_quantities(path, case_name=case_name, variant=variant, engine=engine, name=name)
+    return _by_date(read_quantities(path, case_name=case_name, variant=variant, engine=engine, name=name))
+
+
+def _by_date(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: row["measured_at"] or "")
+
+
+def tally(path: Path | str, **where: Any) -> Tally:
+    """Verdicts of quantities and comparisons, also by kind of evidence; of several commits the measurement that came last counts.
+
+    `where`: column = value, or a list of values, of columns that both tables have.
+    """
+    last = {(row["case_name"], row["variant"], row["engine"], row.get("reference_engine"), row["name"]): row
+            for table in ("quantities", "comparisons") for row in _by_date(read(path, table, **where))}
+    return count(QuantityRecord(row["name"], row["value"], row["verdict"], tolerance=row["tolerance"], evidence=row["evidence"] or "")
+                 for row in last.values())
 
 
 def curve(path: Path | str, case_name: str, engine: str, name: str, axis: str, **fixed: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -152,9 +158,7 @@ def curve(path: Path | str, case_name: str, engine: str, name: str, axis: str, *
     """
     import numpy as np  # here, because every job on another host reads this file
 
-    last: dict[str, dict[str, Any]] = {}
-    for row in sorted(read_quantities(path, case_name=case_name, engine=engine, name=name), key=lambda one: one["measured_at"] or ""):
-        last[row["variant"]] = row
+    last = {row["variant"]: row for row in _by_date(read_quantities(path, case_name=case_name, engine=engine, name=name))}
     rows = [row for row in last.values() if row["value"] is not None and isinstance(row["parameters"].get(axis), int | float)
             and all(row["parameters"].get(key) == value for key, value in fixed.items())]
     rows.sort(key=lambda row: row["parameters"][axis])

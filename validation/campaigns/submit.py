@@ -9,15 +9,15 @@ from pathlib import Path
 
 from dembark.common.errors import DembarkError
 from dembark.common.lock import lock
-from dembark.validation.campaigns import estimate, expand, folder, source, store
+from dembark.validation.campaigns import estimate, expand, folder, store
 from dembark.validation.campaigns.folder import Options
-from dembark.validation.campaigns.rates import Rates
 from dembark.validation.campaigns.sizes import size_text
-from dembark.validation.runs import site, slurm
+from dembark.validation.runs import site
 from dembark.validation.runs.executor import Local
-from dembark.validation.runs.perform import Outcome, Place, perform
+from dembark.validation.runs.perform import LOCK, Outcome, Place, perform
 from dembark.validation.runs.plan import Plan
 from dembark.validation.runs.queue import Queue
+from dembark.validation.runs.steps import CAMPAIGN_FILE
 
 Say = Callable[[str], None]
 
@@ -33,8 +33,8 @@ def cores_here(chosen: Options) -> int:
     return chosen.cores or (os.cpu_count() or 1 if chosen.executor == "local" else 1)
 
 
-def check(chosen: Options, plan: expand.Plan) -> None:
-    """DembarkError for runs with more cores or memory than there are, here; for jobs of a cluster see `slurm.check`."""
+def check(chosen: Options, plan: Plan) -> None:
+    """DembarkError for runs with more cores or memory than there are, here; for jobs of a cluster see `site.check`."""
     if chosen.executor != "local":
         site.find(chosen.executor)
         return
@@ -60,32 +60,24 @@ def _place(chosen: Options, results: Path, plan: Plan, cancel: threading.Event, 
     return lambda table: Queue(there, results, plan, say, chosen.jobs, lambda name: table.state(name).job)
 
 
-def forecast(plan: expand.Plan, results: Path) -> list[estimate.Estimate]:
+def forecast(plan: Plan, results: Path) -> list[estimate.Estimate]:
     """What each series costs, with the rates of the campaign's own store when it has measured some."""
-    return estimate.estimates(plan, Rates(store.path_of(results)))
+    return estimate.estimates(plan, estimate.Rates(results / store.FILE))
 
 
-def submit(file: Path, results: Path, chosen: Options, cancel: threading.Event, say: Say) -> Outcome:
-    """Run the campaign `file` in the folder `results` until all its runs are finished, measured and reported.
+def submit(plan: Plan, file: Path, results: Path, chosen: Options, cancel: threading.Event, say: Say) -> Outcome:
+    """Run `plan`, that of the campaign `file`, in the folder `results` until all its runs are finished, measured and reported.
 
     `say` gets lines for people. A second submission of the same campaign waits for nothing: it is refused while the first one lives.
     DembarkError for mistakes, before anything has been started; Interrupted when `cancel` is set.
     """
-    wanted = source.of_campaign(file)
-    folder.refuse_foreign(results, wanted.spec.name)
-    check(chosen, wanted)
-    with lock(results / folder.LOCK, f"the campaign in {results} is being run by another process"):
+    folder.refuse_foreign(results, plan.label)
+    check(chosen, plan)
+    with lock(results / LOCK, f"the campaign in {results} is being run by another process"):
         if chosen.executor != "local":
-            slurm.check(site.find(chosen.executor), filter(None, [*wanted.resources.values(), wanted.spec.measure]))
-        folder.enter(results, file, wanted, chosen)
+            site.check(site.find(chosen.executor), filter(None, [*plan.resources.values(), plan.measure]))
+        folder.enter(results, file, plan, chosen)
         # Its own copy counts from here on, whatever becomes of the file.
-        source.of_campaign.cache_clear()
-        copy = results / folder.FILE
-        plan, found = source.plan(file=copy), forecast(source.of_campaign(copy), results)
-        return perform(plan, results, _place(chosen, results, plan, cancel, say), cancel, cores_here(chosen), results / folder.LOG,
-                       {str(one.series.place): one.wall_time for one in found})
-
-
-def resume(results: Path, chosen: Options, cancel: threading.Event, say: Say) -> Outcome:
-    """Go on with the campaign of the folder `results`, from its own copy of the file."""
-    return submit(folder.own_file(results), results, chosen, cancel, say)
+        plan = expand.plan(file=results / CAMPAIGN_FILE)
+        place, expected = _place(chosen, results, plan, cancel, say), {one.series.place: one.wall_time for one in forecast(plan, results)}
+        return perform(plan, results, place, cancel, cores_here(chosen), results / folder.LOG, expected)

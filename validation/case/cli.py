@@ -10,21 +10,16 @@ import typer
 
 from dembark.common.errors import DembarkError
 
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to `dembark`."""
-    app.command("cases")(show_cases)
-    app.command()(deck)
-    app.command("new-case")(new_case)
+app = typer.Typer()
 
 
+@app.command("cases")
 def show_cases(case: Annotated[str | None, typer.Argument(help="Show the keys, profiles and variants of this case.")] = None) -> None:
     """List the cases, or everything about one."""
     from dembark.validation import show
     from dembark.validation.case.folders import discover, find
-    from dembark.validation.cli import _console
 
-    console = _console()
+    console = show.console()
     if case is None:
         console.print(show.case_table(discover().values()))
         return
@@ -36,6 +31,7 @@ def show_cases(case: Annotated[str | None, typer.Argument(help="Show the keys, p
         console.print(f"source: {source}", markup=False)
 
 
+@app.command()
 def deck(
     case: Annotated[str, typer.Argument(help="Name of a case, see 'dembark cases'.")],
     engine: Annotated[str, typer.Option(help="Engine, see 'dembark doctor'.")],
@@ -71,6 +67,7 @@ def _empty(folder: Path) -> None:
         raise DembarkError(f"{folder} is not empty", "", "name a new folder")
 
 
+@app.command("new-case")
 def new_case(
     name: Annotated[str, typer.Argument(help="Name of the case: letters, digits and underscores.")],
     folder: Annotated[Path, typer.Option("--in", help="Folder of your cases; the case gets a folder of its name in it.")] = Path(),

@@ -61,12 +61,7 @@ def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
     from dembark.input_decks.common.setup import Setup
 
     path = case.folder / "setup.py"
-    known: dict[str, Value] = dict(values)
-    for name, expression in case.derived.items():
-        try:
-            known[name] = expression(known)
-        except (ArithmeticError, ValueError, TypeError) as error:
-            raise DembarkError(f"{name} = {expression.text!r} cannot be evaluated", f"[derived] of case {case.name}", str(error)) from None
+    known = case.with_derived(values)
     if not path.is_file():
         missing = [name for name in ("steps", "time_step") if not isinstance(known.get(name), int | float)]
         if missing:
@@ -104,9 +99,8 @@ def require_measure(case: Case) -> None:
         raise DembarkError(f"case {case.name} has no measure.py", str(case.folder), "add one with measure(replicas), see docs/cases.md")
 
 
-def derived(case: Case, values: Mapping[str, Value]) -> dict[str, Value]:
-    """Numbers that follow from the parameters `values`, by name, with `steps` and `time_step` (s)."""
-    setup = prepare(case, values)
+def derived(setup: Setup) -> dict[str, Value]:
+    """The numbers of `setup` by name, with `steps` and `time_step` (s), as decks of all engines can read them."""
     return {name: _plain(value) for name, value in {**setup.numbers, "steps": setup.steps, "time_step": setup.time_step}.items()}
 
 
@@ -144,8 +138,8 @@ def _files(case: Case, engine: str, values: Mapping[str, Value], setup: Setup) -
     except OSError as error:
         raise DembarkError(f"{source} cannot be read", error.strerror or str(error),
                            f"add the deck, or take {engine} from engines in case.toml") from None
-    known: dict[str, Value] = {**values, **setup.numbers, "steps": setup.steps, "time_step": setup.time_step}
-    numbers = {name: engines.DeckNumber(_plain(value), _meaning(case, name)) for name, value in known.items() if name != "replicas"}
+    known = {name: _plain(value) for name, value in values.items() if name != "replicas"} | derived(setup)
+    numbers = {name: engines.DeckNumber(value, _meaning(case, name)) for name, value in known.items()}
     numbers |= {name: engines.DeckNumber(tuple(map(_plain, row))) for name, row in setup.tables.items()}
     try:
         deck = kind.deck_text(text, numbers, [source.parent, package_root() / "common" / engine])

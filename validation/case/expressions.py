@@ -6,6 +6,9 @@ import ast
 import math
 import operator
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import partial
+from itertools import pairwise
 from typing import Any
 
 from dembark.common.errors import DembarkError
@@ -22,22 +25,15 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {"min": min, "max": max, "abs": abs,
 _CONSTANTS = {"pi": math.pi}
 
 
+Values = Mapping[str, Any]
+
+
 class _Unset(Exception):
     """A value that is needed is not set."""
 
 
-def _outside_first(node: ast.AST) -> set[str]:
-    """Names in `node` that are not within a call of `first`."""
-    if isinstance(node, ast.Name):
-        return {node.id} - _CONSTANTS.keys()
-    parts: list[ast.AST] = list(ast.iter_child_nodes(node))
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-        parts = [] if node.func.id == "first" else list(node.args)
-    return set().union(*(_outside_first(part) for part in parts))
-
-
 class Expression:
-    """A parsed condition, e.g. `kinetic_friction <= static_friction or grain_count < 100`."""
+    """A parsed condition, e.g. `kinetic_friction <= static_friction or grain_count < 100`; `names`: the parameters in it."""
 
     def __init__(self, text: str) -> None:
         """Parse `text`; DembarkError for anything but arithmetic, comparisons, and/or/not, pi, first, and the functions min, max, abs,
@@ -45,37 +41,14 @@ class Expression:
 
         `first(a, b)` is the first of its values that is set.
         """
-        self.text = text
+        self.text, self.names, self._needed = text, frozenset[str](), frozenset[str]()
         try:
-            self._body = ast.parse(text, mode="eval").body
+            body = ast.parse(text, mode="eval").body
         except SyntaxError:
             raise DembarkError(f"{text!r} is no expression") from None
-        self.names = frozenset(self._names(self._body))
-        self._needed = frozenset(_outside_first(self._body))
+        self._value = self._read(body, needed=True)
 
-    def _names(self, node: ast.AST) -> set[str]:
-        match node:
-            case ast.Name(id=name):
-                return {name} - _CONSTANTS.keys()
-            case ast.Constant(value=value) if isinstance(value, (int, float, str)):
-                return set()
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
-                parts: list[ast.AST] = [left, right]
-            case ast.UnaryOp(op=op, operand=operand) if type(op) in _UNARY:
-                parts = [operand]
-            case ast.BoolOp(values=values):
-                parts = list(values)
-            case ast.Compare(left=left, ops=ops, comparators=others) if all(type(op) in _COMPARE for op in ops):
-                parts = [left, *others]
-            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in _FUNCTIONS:
-                parts = list(args)
-            case ast.Call(func=ast.Name(id="first"), args=args, keywords=[]) if args:
-                parts = list(args)
-            case _:
-                raise DembarkError(f"{self.text!r} holds something other than arithmetic and comparisons")
-        return set().union(*(self._names(part) for part in parts))
-
-    def __call__(self, values: Mapping[str, Any]) -> Any:
+    def __call__(self, values: Values) -> Any:
         """Result for `values`; None when a parameter that it names has no value, because then there is nothing to hold.
 
         Within `first(...)` one value is enough.
@@ -83,40 +56,65 @@ class Expression:
         if any(values.get(name) is None for name in self._needed):
             return None
         try:
-            return self._value(self._body, values)
+            return self._value(values)
         except _Unset:
             return None
 
-    def _value(self, node: ast.AST, values: Mapping[str, Any]) -> Any:  # noqa: PLR0911 - one return for each kind of node
-        match node:
-            case ast.Name(id=name) if name in _CONSTANTS:
-                return _CONSTANTS[name]
-            case ast.Name(id=name):
-                if values.get(name) is None:
-                    raise _Unset
-                return values[name]
-            case ast.Constant(value=value):
-                return value
-            case ast.BinOp(left=left, op=op, right=right):
-                return _BINARY[type(op)](self._value(left, values), self._value(right, values))
-            case ast.UnaryOp(op=op, operand=operand):
-                return _UNARY[type(op)](self._value(operand, values))
-            case ast.BoolOp(op=op, values=parts):
-                test = all if isinstance(op, ast.And) else any
-                return test(self._value(part, values) for part in parts)
-            case ast.Compare(left=left, ops=ops, comparators=others):
-                sides = [self._value(side, values) for side in (left, *others)]
-                return all(_COMPARE[type(op)](a, b) for op, a, b in zip(ops, sides, sides[1:], strict=False))
-            case ast.Call(func=ast.Name(id="first"), args=args):
-                return self._first(args, values)
-            case ast.Call(func=ast.Name(id=name), args=args):
-                return _FUNCTIONS[name](*(self._value(arg, values) for arg in args))
-        raise AssertionError(f"unchecked node {node!r}")
+    def evaluated(self, values: Values, name: str = "", where: str = "") -> Any:
+        """The same; DembarkError when it cannot be evaluated, with the `name` that it gives a value to, if any, and `where`."""
+        try:
+            return self(values)
+        except (ArithmeticError, ValueError, TypeError) as error:
+            raise DembarkError(f"{f'{name} = ' if name else ''}{self.text!r} cannot be evaluated", where, str(error)) from None
 
-    def _first(self, nodes: Sequence[ast.AST], values: Mapping[str, Any]) -> Any:
-        for node in nodes:
-            try:
-                return self._value(node, values)
-            except _Unset:
-                continue
-        raise _Unset
+    def __reduce__(self) -> tuple[type[Expression], tuple[str]]:
+        # Functions do not go to other processes; the text does.
+        return Expression, (self.text,)
+
+    def _read(self, node: ast.AST, needed: bool) -> Callable[[Values], Any]:  # noqa: PLR0911 - one return for each kind of node
+        """The function that evaluates `node`; `needed`: not within a call of `first`."""
+        match node:
+            case ast.Name(id=name):
+                return self._name(name, needed)
+            case ast.Constant(value=value) if isinstance(value, (int, float, str)):
+                return lambda _: value
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
+                return self._applied(_BINARY[type(op)], [left, right], needed)
+            case ast.UnaryOp(op=op, operand=operand) if type(op) in _UNARY:
+                return self._applied(_UNARY[type(op)], [operand], needed)
+            case ast.BoolOp(op=op, values=nodes):
+                parts, test = [self._read(part, needed) for part in nodes], all if isinstance(op, ast.And) else any
+                return lambda values: test(part(values) for part in parts)
+            case ast.Compare(left=left, ops=ops, comparators=others) if all(type(op) in _COMPARE for op in ops):
+                tests = [_COMPARE[type(op)] for op in ops]
+                return self._applied(lambda *sides: all(test(*two) for test, two in zip(tests, pairwise(sides), strict=True)),
+                                     [left, *others], needed)
+            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in _FUNCTIONS:
+                return self._applied(_FUNCTIONS[name], args, needed)
+            case ast.Call(func=ast.Name(id="first"), args=args, keywords=[]) if args:
+                return partial(_first, [self._read(part, needed=False) for part in args])
+        raise DembarkError(f"{self.text!r} holds something other than arithmetic and comparisons")
+
+    def _name(self, name: str, needed: bool) -> Callable[[Values], Any]:
+        if name in _CONSTANTS:
+            return lambda _: _CONSTANTS[name]
+        self.names |= {name}
+        self._needed |= {name} if needed else set()
+
+        def value(values: Values) -> Any:
+            if values.get(name) is None:
+                raise _Unset
+            return values[name]
+
+        return value
+
+    def _applied(self, function: Callable[..., Any], nodes: Sequence[ast.AST], needed: bool) -> Callable[[Values], Any]:
+        parts = [self._read(part, needed) for part in nodes]
+        return lambda values: function(*(part(values) for part in parts))
+
+
+def _first(parts: Sequence[Callable[[Values], Any]], values: Values) -> Any:
+    for part in parts:
+        with suppress(_Unset):
+            return part(values)
+    raise _Unset

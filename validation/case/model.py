@@ -2,21 +2,78 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from dembark.common.choices import Value
+from dembark.common.errors import DembarkError
+from dembark.common.units import finite, to_si
 from dembark.validation import engines
 from dembark.validation.case.expressions import Expression
-from dembark.validation.case.parameters import Parameter
 
 STUDY_PREFIX = "study-"
 # What a deck may be asked to write, and the file that it goes to; a case asks for the first three unless it says otherwise.
 OUTPUTS = {"grains": "grains.dump", "contacts": "contacts.dump", "times": "time.csv", "impacts": "impacts.txt"}
 STANDARD_OUTPUTS = ("grains", "contacts", "times")
+# Sizes of run that every case has; one that a case does not change has its own values.
+PROFILES = ("quick", "standard", "full")
 # Kinds of evidence: what a reference is.
 EVIDENCE = ("experiment", "theory", "code", "identity")
+UNSET = "auto"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One key of a case: default (None = not set), unit of plain numbers (`1` = dimensionless), and what is allowed."""
+
+    name: str
+    type: str
+    doc: str
+    value: Value = None
+    unit: str = "1"
+    optional: bool = False
+    min: float | None = None
+    max: float | None = None
+    exclusive_min: bool = False
+    exclusive_max: bool = False
+    values: tuple[str, ...] = ()
+
+    @property
+    def range(self) -> str:
+        """What is allowed, in words: `> 0`, `0 ... 1`, `smooth | rough`; empty when everything is."""
+        if self.values:
+            return " | ".join(self.values)
+        lower = None if self.min is None else f"{'>' if self.exclusive_min else '>='} {self.min:g}"
+        upper = None if self.max is None else f"{'<' if self.exclusive_max else '<='} {self.max:g}"
+        return " and ".join(part for part in (lower, upper) if part)
+
+
+def checked(parameter: Parameter, value: Value) -> Value:
+    """`value` as the type that `parameter` declares, None when it is optional and not set; DembarkError when not allowed."""
+    if value is None or (value == UNSET and UNSET not in parameter.values):
+        if parameter.optional:
+            return None
+        raise DembarkError(f"{parameter.name} must have a value", parameter.range)
+    if parameter.type == "choice":
+        if value not in parameter.values:
+            raise DembarkError(f"{parameter.name} = {value!r} is not allowed", f"allowed are {parameter.range}")
+        return value
+    unlimited = value == "inf" == str(parameter.value)
+    number = math.inf if unlimited else to_si(value, parameter.unit, parameter.name) if isinstance(value, str) else value
+    # Only a case itself may mean "unlimited", by an infinite default; nan differs from everything.
+    if number != parameter.value or parameter.type == "int":
+        finite(number, parameter.name)
+    if parameter.type == "int" and number != int(number):
+        raise DembarkError(f"{parameter.name} = {number!r} is not a whole number", parameter.range)
+    number = int(number) if parameter.type == "int" else float(number)
+    low = parameter.min is not None and (number <= parameter.min if parameter.exclusive_min else number < parameter.min)
+    high = parameter.max is not None and (number >= parameter.max if parameter.exclusive_max else number > parameter.max)
+    if low or high:
+        unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+        raise DembarkError(f"{parameter.name} = {number:g}{unit} is out of range", f"allowed is {parameter.range}")
+    return number
 
 
 @dataclass(frozen=True)
@@ -112,9 +169,15 @@ class Case:
         """Deck of `engine` in this folder."""
         return self.folder / engines.facts(engine).deck
 
+    def with_derived(self, values: Mapping[str, Value]) -> dict[str, Value]:
+        """`values` and the numbers that follow from them by the expressions of [derived]; DembarkError for one without a value."""
+        known: dict[str, Value] = dict(values)
+        for name, expression in self.derived.items():
+            known[name] = expression.evaluated(known, name, f"[derived] of case {self.name}")
+        return known
+
     def particle_count(self, values: Mapping[str, Value]) -> int | None:
         """Number of bodies in a run with these parameters; None when the case does not say."""
-        found = self.particles(values) if self.particles else None
-        if found is None:
-            found = values.get("grain_count", values.get("log_count"))
+        known = self.with_derived(values)
+        found = self.particles(known) if self.particles else known.get("grain_count", known.get("log_count"))
         return round(found) if isinstance(found, int | float) else None

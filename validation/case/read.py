@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
-from dembark.common.choices import Value, nearest, pick
-from dembark.common.errors import DembarkError
+from dembark.common.choices import Value
 from dembark.common.units import known_unit
 from dembark.validation import engines
 from dembark.validation.case.expressions import Expression
@@ -15,15 +14,16 @@ from dembark.validation.case.folders import package_root
 from dembark.validation.case.model import (
     EVIDENCE,
     OUTPUTS,
+    PROFILES,
     STANDARD_OUTPUTS,
     Case,
     Constraint,
     Declared,
+    Parameter,
     PlannedRun,
     Study,
 )
-from dembark.validation.case.parameters import Parameter, checked
-from dembark.validation.case.tables import TableReader, load_toml
+from dembark.validation.case.tables import TableReader, Types, load_toml
 
 
 @cache
@@ -46,38 +46,44 @@ class CaseReader(TableReader):
 
     def case(self, data: Mapping[str, Any]) -> Case:
         """The whole case; `data` is the content of the file."""
-        tables = {"case": dict, "parameters": dict, "profiles": dict, "variants": dict, "runs": dict, "constraints": list, "studies": dict,
+        tables = {"case": dict, "parameters": dict, "profiles": dict, "variants": dict, "runs": dict, "constraints": dict, "studies": dict,
                   "derived": dict, "quantities": dict, "picture": dict}
         self.table(data, "top level", tables, ("case",))
         head = data["case"]
         keys = {"name": str, "title": str, "description": str, "source": list, "engines": list, "outputs": list, "particles": str,
                 "groups": list, "references": list}
-        self.table(head, "case", keys, ("name", "title", "engines"))
-        if head["name"] != self.path.parent.name:
+        self.table(head, "case", keys, ("title",))
+        if head.get("name", self.path.parent.name) != self.path.parent.name:
             raise self.fail("case", f"name = {head['name']!r}", f"the name of its folder, {self.path.parent.name!r}")
-        for engine in head["engines"]:
-            pick(engine, engines.names(), "engine", f"[case] of {self.path}")
+        decks = [name for name in engines.names() if (self.path.parent / engines.facts(name).deck).is_file()]
+        if not head.get("engines", decks):
+            raise self.fail("case", "there is no deck", f"one of {', '.join(engines.facts(name).deck for name in engines.names())}")
+        own_engines = tuple(head.get("engines", decks))
+        for engine in own_engines:
+            self.pick(engine, engines.names(), "engine", "case")
         outputs = tuple(head.get("outputs", STANDARD_OUTPUTS))
         for output in outputs:
-            pick(output, OUTPUTS, "output", f"[case] of {self.path}")
+            self.pick(output, OUTPUTS, "output", "case")
         if not outputs or len(set(outputs)) < len(outputs):
             raise self.fail("case", f"outputs = {list(outputs)}", f"one or more of {', '.join(OUTPUTS)}, each once")
-        groups = [_groups()[pick(str(name), _groups(), "group", f"[case] of {self.path}")] for name in head.get("groups", ())]
+        groups = [_groups()[self.pick(str(name), _groups(), "group", "case")] for name in head.get("groups", ())]
         entries = self.merged("parameters", data.get("parameters", {}), groups)
         parameters = {name: self.parameter(name, entry) for name, entry in entries.items()}
-        constraints = [*(one for group in groups for one in group.get("constraints", ())), *data.get("constraints", ())]
+        constraints = {text: told for table in (*groups, data) for text, told in table.get("constraints", {}).items()}
         derived = self.derived(data.get("derived", {}), parameters)
         quantities = self.merged("quantities", data.get("quantities", {}), groups)
         variants = self.changes("variants", data.get("variants", {"default": {}}), parameters)
-        profiles = self.changes("profiles", data.get("profiles", {"quick": {}}), parameters)
+        profiles = self.changes("profiles", {name: {} for name in PROFILES} | data.get("profiles", {}), parameters)
         return Case(
-            name=head["name"], title=head["title"], description=head.get("description", "").strip(), source=tuple(head.get("source", ())),
-            engines=tuple(head["engines"]), folder=self.path.parent, parameters=parameters, profiles=profiles, variants=variants,
-            runs=self.runs(data.get("runs", {}), profiles, variants, tuple(head["engines"]), parameters),
-            constraints=tuple(self.constraint(entry, parameters) for entry in constraints),
+            name=self.path.parent.name, title=head["title"], description=head.get("description", "").strip(),
+            source=tuple(head.get("source", ())), engines=own_engines, folder=self.path.parent,
+            parameters=parameters, profiles=profiles, variants=variants,
+            runs=self.runs(data.get("runs", {}), profiles, variants, own_engines, parameters),
+            constraints=tuple(self.constraint(*entry, parameters) for entry in constraints.items()),
             studies={name: self.study(name, entry, parameters, variants) for name, entry in data.get("studies", {}).items()},
-            outputs=outputs, particles=self.expression("case", head["particles"], parameters) if "particles" in head else None,
-            derived=derived, quantities={name: self.quantity(name, entry) for name, entry in quantities.items()},
+            outputs=outputs, derived=derived,
+            particles=self.expression("case", head["particles"], {**parameters, **derived}) if "particles" in head else None,
+            quantities={name: self.quantity(name, entry) for name, entry in quantities.items()},
             references=tuple(head.get("references", ())), picture=data.get("picture", {}))
 
     def merged(self, table: str, own: Mapping[str, Any], groups: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -101,11 +107,12 @@ class CaseReader(TableReader):
     def quantity(self, name: str, entry: Mapping[str, Any]) -> Declared:
         """[quantities.NAME]: what a measured quantity is and how it is judged."""
         table = f"quantities.{name}"
-        keys = {"label": str, "unit": str, "evidence": str, "tolerance": (int, float, str), "why": str, "absolute": bool, "source": str,
-                "detail": str, "agreement": (int, float), "compared": bool}
+        keys: dict[str, Types] = {
+            "label": str, "unit": str, "evidence": str, "tolerance": (int, float, str), "why": str, "absolute": bool, "source": str,
+            "detail": str, "agreement": (int, float), "compared": bool}
         self.table(entry, table, keys, ("label",))
         if "evidence" in entry:
-            pick(entry["evidence"], EVIDENCE, "kind of evidence", self.where(table))
+            self.pick(entry["evidence"], EVIDENCE, "kind of evidence", table)
         if not known_unit(entry.get("unit", "1")):
             raise self.fail(table, f"unknown unit {entry['unit']!r}", 'an SI unit, or "1"')
         tolerance = entry.get("tolerance")
@@ -118,13 +125,14 @@ class CaseReader(TableReader):
     def parameter(self, name: str, entry: Mapping[str, Any]) -> Parameter:
         """[parameters.NAME], its own value checked."""
         table, number = f"parameters.{name}", (int, float)
-        if not isinstance(entry, dict) or not name.isidentifier():
-            raise self.fail(table, "a parameter is a table with an identifier as name")
-        keys = {"value": (int, float, str), "unit": str, "type": str, "min": number, "max": number, "exclusive_min": bool,
-                "exclusive_max": bool, "doc": str, "values": list, "optional": bool, "above": number, "below": number}
+        if not name.isidentifier():
+            raise self.fail(table, f"{name!r} is no name of a parameter", "letters, digits and underscores")
+        keys: dict[str, Types] = {
+            "value": (int, float, str), "unit": str, "type": str, "min": number, "max": number, "exclusive_min": bool,
+            "exclusive_max": bool, "doc": str, "values": list, "optional": bool, "above": number, "below": number}
         self.table(entry, table, keys, ("doc",))
         entry = _full(entry)
-        pick(entry["type"], ("float", "int", "choice"), "type", f"[{table}] of {self.path}")
+        self.pick(entry["type"], ("float", "int", "choice"), "type", table)
         if "value" not in entry and not entry.get("optional"):
             raise self.fail(table, "value is missing", "a value, or optional = true")
         if (entry["type"] == "choice") != ("values" in entry):
@@ -132,15 +140,8 @@ class CaseReader(TableReader):
         if not known_unit(entry.get("unit", "1")):
             raise self.fail(table, f"unknown unit {entry['unit']!r}", 'an SI unit, or "1"')
         parameter = Parameter(name=name, **{**entry, "values": tuple(entry.get("values", ()))})
-        self.check(table, parameter, parameter.value)
+        self.value(table, parameter, parameter.value)
         return parameter
-
-    def check(self, table: str, parameter: Parameter, value: Value) -> Value:
-        """`value` in the parameter's unit and type; DembarkError that names `table` when it is not allowed."""
-        try:
-            return checked(parameter, value)
-        except DembarkError as error:
-            raise self.fail(table, str(error)) from None
 
     def changes(self, kind: str, tables: Mapping[str, Any], parameters: Mapping[str, Parameter]) -> dict[str, dict[str, Value]]:
         """All tables [KIND.NAME], profiles or variants: changed parameters by name."""
@@ -150,25 +151,26 @@ class CaseReader(TableReader):
         """One table of changed parameters."""
         if not isinstance(entry, dict):
             raise self.fail(table, "overrides are a table of key = value")
-        for key in entry:
-            if key not in parameters:
-                raise self.fail(table, f"unknown parameter {key!r}", nearest(key, parameters))
-        return {key: self.check(table, parameters[key], value) for key, value in entry.items()}
+        return {self.pick(key, parameters, "parameter", table): self.value(table, parameters[key], value) for key, value in entry.items()}
 
     def runs(self, data: Mapping[str, Any], profiles: Mapping[str, Any], variants: Mapping[str, Any],
              engines: tuple[str, ...], parameters: Mapping[str, Parameter]) -> dict[str, tuple[PlannedRun, ...]]:
         """[runs]: what each profile runs."""
         result = {}
         for profile, entries in data.items():
-            pick(profile, profiles, "profile", f"[runs] of {self.path}")
+            self.pick(profile, profiles, "profile", "runs")
             planned = []
-            for entry in entries:
-                self.table(entry, "runs", {"variant": str, "engines": list, "replicas": dict}, ("variant",))
+            for one in entries:
+                entry = {"variant": one} if isinstance(one, str) else one
+                self.table(entry, "runs", {"variant": str, "variants": list, "engines": list, "replicas": dict})
+                named = entry.get("variants", [entry["variant"]] if "variant" in entry else [])
+                if not named or ("variant" in entry and "variants" in entry):
+                    raise self.fail("runs", f"{entry!r} in {profile}", "give variant or variants")
                 chosen = tuple(entry.get("engines", engines))
-                pick(entry["variant"], variants, "variant", f"[runs] of {self.path}")
                 for engine in chosen:
-                    pick(engine, engines, "engine", f"[runs] of {self.path}")
-                planned.append(PlannedRun(entry["variant"], chosen, self.replicas(entry, chosen, parameters)))
+                    self.pick(engine, engines, "engine", "runs")
+                counts = self.replicas(entry, chosen, parameters)
+                planned += [PlannedRun(self.pick(str(name), variants, "variant", "runs"), chosen, counts) for name in named]
             pairs = [(run.variant, engine) for run in planned for engine in run.engines]
             if len(set(pairs)) < len(pairs):
                 raise self.fail("runs", f"{profile} names a variant twice for the same engine")
@@ -179,38 +181,25 @@ class CaseReader(TableReader):
         """`replicas` of an entry of [runs]: how many, by engine."""
         counts = entry.get("replicas", {})
         for engine, count in counts.items():
-            pick(engine, engines, "engine", f"replicas in [runs] of {self.path}")
+            self.pick(engine, engines, "engine of replicas", "runs")
             if "replicas" not in parameters:
                 raise self.fail("runs", "replicas are given, but nothing in this case is random", "leave them out")
-            self.check("runs", parameters["replicas"], count)
+            self.value("runs", parameters["replicas"], count)
         return dict(counts)
 
     def study(self, name: str, entry: Any, parameters: Mapping[str, Parameter], variants: Mapping[str, Any]) -> Study:
         """[studies.NAME]: variants along a parameter."""
         table = f"studies.{name}"
-        if not isinstance(entry, dict):
-            raise self.fail(table, "a study is a table with title, along and variants")
         self.table(entry, table, {"title": str, "description": str, "along": str, "variants": list}, ("title", "along", "variants"))
-        pick(entry["along"], parameters, "parameter", f"[{table}] of {self.path}")
+        self.pick(entry["along"], parameters, "parameter", table)
         for variant in entry["variants"]:
-            pick(variant, variants, "variant", f"[{table}] of {self.path}")
+            self.pick(variant, variants, "variant", table)
         if len(set(entry["variants"])) < max(3, len(entry["variants"])):
             raise self.fail(table, "a study needs at least three variants, each once")
         return Study(name, entry["title"], entry.get("description", "").strip(), entry["along"], tuple(entry["variants"]))
 
-    def constraint(self, entry: Any, parameters: Mapping[str, Parameter]) -> Constraint:
-        """An entry of [[constraints]]."""
-        if not isinstance(entry, dict):
-            raise self.fail("constraints", "a constraint is a table with expression and message")
-        self.table(entry, "constraints", {"expression": str, "message": str}, ("expression", "message"))
-        return Constraint(self.expression("constraints", entry["expression"], parameters), entry["message"])
-
-    def expression(self, table: str, text: str, parameters: Mapping[str, Parameter | Expression]) -> Expression:
-        """`text` as an expression that uses nothing but `parameters`."""
-        try:
-            expression = Expression(text)
-        except DembarkError as error:
-            raise self.fail(table, str(error)) from None
-        for name in sorted(expression.names - parameters.keys()):
-            raise self.fail(table, f"unknown parameter {name!r}", nearest(name, parameters))
-        return expression
+    def constraint(self, text: str, message: Any, parameters: Mapping[str, Parameter]) -> Constraint:
+        """An entry of [constraints]: the condition, and the sentence for whoever breaks it."""
+        if not isinstance(message, str):
+            raise self.fail("constraints", f"{message!r} is no sentence", 'write "condition" = "what is wrong when it does not hold"')
+        return Constraint(self.expression("constraints", text, parameters), message)

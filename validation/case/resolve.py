@@ -7,8 +7,7 @@ from collections.abc import Iterable, Mapping
 
 from dembark.common.choices import Value, nearest, pick
 from dembark.common.errors import DembarkError
-from dembark.validation.case.model import Case
-from dembark.validation.case.parameters import checked
+from dembark.validation.case.model import Case, checked
 
 UNLIMITED = 1e300
 
@@ -53,10 +52,7 @@ def resolve(case: Case, profile: str | None = None, variant: str | None = None,
     values = merged(case, profile, variant, changes)
     where = f"in case {case.name}"
     for constraint in case.constraints:
-        try:
-            holds = constraint.expression(values)
-        except (ArithmeticError, ValueError, TypeError) as error:
-            raise DembarkError(f"{constraint.expression.text!r} cannot be evaluated", where, str(error)) from None
+        holds = constraint.expression.evaluated(values, where=where)
         if holds is not None and not holds:
             given = ", ".join(f"{name} = {values[name]}" for name in sorted(constraint.expression.names) if values[name] is not None)
             raise DembarkError(constraint.message, f"{given} {where}", f"wanted is {constraint.expression.text}")

@@ -7,8 +7,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from dembark.common.choices import nearest
+from dembark.common.choices import Value, nearest, pick
 from dembark.common.errors import DembarkError
+from dembark.validation.case.expressions import Expression
+from dembark.validation.case.model import Parameter, checked
 
 Types = type | tuple[type, ...]
 _WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", list: "a list [...]", dict: "a table {...}"}
@@ -42,8 +44,31 @@ class TableReader:
         """The error to raise for a mistake in `table`."""
         return DembarkError(what, self.where(table), right)
 
+    def pick(self, name: str, known: Iterable[str], what: str, table: str) -> str:
+        """`name` if it is among `known`, else DembarkError naming near matches."""
+        return pick(name, known, what, self.where(table))
+
+    def value(self, table: str, parameter: Parameter, given: Value) -> Value:
+        """`given` in the parameter's unit and type; DembarkError that names `table` when it is not allowed."""
+        try:
+            return checked(parameter, given)
+        except DembarkError as error:
+            raise self.fail(table, str(error)) from None
+
+    def expression(self, table: str, text: str, known: Iterable[str]) -> Expression:
+        """`text` as an expression in the parameters that are `known`."""
+        try:
+            expression = Expression(text)
+        except DembarkError as error:
+            raise self.fail(table, str(error)) from None
+        for name in sorted(expression.names):
+            self.pick(name, known, "parameter", table)
+        return expression
+
     def table(self, data: Mapping[str, Any], name: str, keys: Mapping[str, Types], required: Iterable[str] = ()) -> None:
-        """Raise DembarkError unless the table `name` has only `keys`, of these types, and all that are `required`."""
+        """DembarkError unless `data`, the table `name`, is one that has only `keys`, of these types, and all that are `required`."""
+        if not isinstance(data, Mapping):
+            raise self.fail(name, f"{data!r} is no table", "write it as { key = value, ... }")
         for key, value in data.items():
             if key not in keys:
                 raise self.fail(name, f"unknown key {key!r}", nearest(key, keys))

@@ -1,7 +1,8 @@
 """The engines: one module each, found by name.
 
 To add an engine:
-1. write `validation/engines/<name>.py` with a class that derives from Engine (base.py) and says its facts, program and command;
+1. write `validation/engines/<name>.py` with a class that derives from Engine (base.py) and says its program and command, and what is known
+   of it into facts.toml;
 2. add the class to ENGINES below, where it shall stand in lists and tables;
 3. add its deck, with the file name from its facts, to the cases that it shall run, and its name to `engines` in their case.toml.
 """

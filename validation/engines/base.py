@@ -9,11 +9,12 @@ import shlex
 import shutil
 import subprocess
 import tempfile
+import tomllib
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from dembark.common.checkout import checkout
 from dembark.common.choices import Value
@@ -37,20 +38,25 @@ class EngineFacts:
 
     name: str
     title: str
-    program: str
-    deck: str
-    version_words: tuple[str, ...]
-    version_pattern: str
-    restart_suffix: str
-    colour: str
-    marker: str
-    relative_cost: float
-    restart_rate: float
-    typical_rate: float
-    measured_on: str
+    program: str = ""
+    deck: str = ""
+    version_words: tuple[str, ...] = ()
+    version_pattern: str = ""
+    restart_suffix: str = ""
+    colour: str = "#000000"
+    marker: str = "o"
+    relative_cost: float = 1.0
+    restart_rate: float = 1e5
+    typical_rate: float = 1e5
+    measured_on: str = ""
     rates: Mapping[str, float] = field(default_factory=dict)
-    # Environment variables that say which program is meant.
+    # Environment variables that say which program is meant, its name, where it is built below `build` and by what command, and whether one
+    # that is found on PATH will do.
     variables: tuple[str, ...] = ()
+    executable: str = ""
+    built: str = ""
+    target: str = ""
+    on_path: bool = False
     # What makes the ids in its impact files count from 1.
     impact_id_offset: int = 0
     # What stands in the source of a deck that writes states to resume from.
@@ -65,6 +71,13 @@ class EngineFacts:
     ranks: bool = False
     threads: bool = False
     interactive: bool = False
+
+    @classmethod
+    def read(cls, name: str) -> Self:
+        """The facts of the engine called `name` in facts.toml."""
+        known = tomllib.loads(Path(__file__).with_name("facts.toml").read_text(encoding="utf-8"))[name]
+        given: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in known.items()}
+        return cls(name, **given)
 
     def check_ranks(self, ranks: int) -> None:
         """DembarkError when a run shall have several MPI processes and the engine has none."""
@@ -94,11 +107,6 @@ class Engine(ABC):
     version: str
     identity: str
 
-    @classmethod
-    @abstractmethod
-    def locate(cls) -> Path:
-        """The program; DembarkError telling what to do if there is none."""
-
     @abstractmethod
     def command(self, deck: Path, values: Mapping[str, Value], ranks: int = 1, threads: int = 1) -> list[str]:
         """Words that run `deck` with `values` (None = leave the deck's default) in the current folder."""
@@ -107,6 +115,25 @@ class Engine(ABC):
     @abstractmethod
     def deck_text(cls, source: str, numbers: Mapping[str, DeckNumber], folders: Sequence[Path]) -> str:
         """The deck that runs, from its `source` in a case folder: with all numbers, and what it includes from `folders` in its place."""
+
+    @classmethod
+    def locate(cls) -> Path:
+        """The program, or the folder above its `bin`, that the environment names, else the program that was built here, else, if one from
+        elsewhere will do, that on PATH; DembarkError telling what to do if there is none."""
+        facts, tree = cls.facts, checkout()
+        for variable in filter(os.environ.get, facts.variables):
+            named = Path(os.environ[variable])
+            path = named / "bin" / facts.executable if named.is_dir() else named
+            if not _is_program(path):
+                raise DembarkError(f"{variable}={path} is no program", "", f"set {variable} to the engine's executable, or unset it")
+            return path
+        here = tree / "build" / facts.built if tree else None
+        if here and _is_program(here):
+            return here
+        if facts.on_path and (elsewhere := shutil.which(facts.executable)):
+            return Path(elsewhere)
+        raise DembarkError(f"{facts.program} not found", f"{here or 'it'} is not there" + (", nor is it on PATH" if facts.on_path else ""),
+                           f"build it with '{facts.target}' or set {facts.variables[0]} to its executable")
 
     @classmethod
     def find(cls) -> Self:
@@ -154,22 +181,8 @@ def texts(values: Mapping[str, Value]) -> dict[str, str]:
     return {key: repr(value) if isinstance(value, float) else str(value) for key, value in values.items() if value is not None}
 
 
-def built(path: str) -> Path | None:
-    """`path` below the folder `build` of the source tree; None in an installed copy."""
-    tree = checkout()
-    return tree / "build" / path if tree else None
-
-
-def is_program(path: Path) -> bool:
-    """Whether `path` can be executed."""
+def _is_program(path: Path) -> bool:
     return path.is_file() and os.access(path, os.X_OK)
-
-
-def named_program(path: Path, variable: str) -> Path:
-    """`path`, which `variable` of the environment leads to; DembarkError when it is no program."""
-    if not is_program(path):
-        raise DembarkError(f"{variable}={path} is no program", "", f"set {variable} to the engine's executable, or unset it")
-    return path
 
 
 def end_with_parent(signal: str) -> list[str]:

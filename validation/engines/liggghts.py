@@ -2,86 +2,28 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import jinja2
 
 from dembark.common.choices import Value
-from dembark.common.errors import DembarkError
-from dembark.validation.engines.base import (
-    DECK_NOTE,
-    DeckNumber,
-    Engine,
-    EngineFacts,
-    built,
-    end_with_parent,
-    is_program,
-    mpi_launcher,
-    named_program,
-    texts,
-)
-
-_PROGRAM = "liggghts-dembark"
+from dembark.validation.engines.base import DECK_NOTE, DeckNumber, Engine, EngineFacts, end_with_parent, mpi_launcher, texts
 
 
 class Liggghts(Engine):
     """LIGGGHTS's input script with `-var key value`; MPI ranks, no threads."""
 
-    facts = EngineFacts(
-        name="liggghts",
-        title="LIGGGHTS",
-        program="LIGGGHTS with dembark's styles",
-        deck="liggghts.in",
-        variables=("DEMBARK_LIGGGHTS",),
-        version_words=("-in", "/dev/null", "-log", "none"),
-        version_pattern=r"\(Version (?:LIGGGHTS-PUBLIC )?([^\s,)]+)",
-        by_hand="liggghts-dembark -in liggghts.in",
-        restart_suffix="restart",
-        restart_words=("restart_every", '"run.in"'),
-        # A restart file of its own, when it is told to stop.
-        leftovers=("restart_forced_liggghts_*.data",),
-        stop_message="SIGINT/SIGTERM caught",
-        # Okabe & Ito's palette, which colour-blind readers can tell apart.
-        colour="#0072B2",
-        marker="o",
-        ranks=True,
-        relative_cost=1,
-        restart_rate=1e6,
-        # About the mean of the cases with grains.
-        typical_rate=2e6,
-        # From `make validate` (profile quick, one run a core), except plane_silo, gravity_channel and single_contact, which are of single
-        # small runs beside other work. Small runs of logs are mostly the engine's start; each step of many logs costs more than in
-        # proportion.
-        measured_on="Intel Xeon (2 virtual cores), 2026-11-21, LIGGGHTS-PUBLIC 3.8.0",
-        rates={"silo": 3.3e6, "plug_flow": 2.4e6, "plane_silo": 1.4e6, "gravity_channel": 1.1e6, "debarking_drum": 7.4e5,
-               "log_pile": 7.5e5, "log_cradle": 2.7e5, "log_pair": 3.0e4, "single_contact": 9.0e4},
-    )
-
-    @classmethod
-    def locate(cls) -> Path:
-        """DEMBARK_LIGGGHTS, else the one that was built here, else the one on PATH."""
-        named = os.environ.get("DEMBARK_LIGGGHTS")
-        if named:
-            return named_program(Path(named), "DEMBARK_LIGGGHTS")
-        here = built(f"bin/{_PROGRAM}")
-        if here and is_program(here):
-            return here
-        on_path = shutil.which(_PROGRAM)
-        if on_path:
-            return Path(on_path)
-        raise DembarkError(f"{_PROGRAM} not found", f"neither {here or 'in a build folder'} nor on PATH",
-                           "build it with 'make liggghts' or set DEMBARK_LIGGGHTS to the executable")
+    facts = EngineFacts.read("liggghts")
 
     @classmethod
     def deck_text(cls, source: str, numbers: Mapping[str, DeckNumber], folders: Sequence[Path]) -> str:
         """See Engine. The source is a Jinja template with << >> around expressions, for ${ } and { } have a meaning in decks."""
         environment = jinja2.Environment(loader=jinja2.FileSystemLoader([str(folder) for folder in folders]),
                                          undefined=jinja2.StrictUndefined,
-                                         variable_start_string="<<", variable_end_string=">>", trim_blocks=True, lstrip_blocks=True,
+                                         variable_start_string="<<", variable_end_string=">>",
+                                         comment_start_string="{*", comment_end_string="*}", trim_blocks=True, lstrip_blocks=True,
                                          keep_trailing_newline=True, autoescape=False)
         # Tables are for the template; a variable holds one number.
         given = texts({name: number.value for name, number in numbers.items() if not isinstance(number.value, tuple)})

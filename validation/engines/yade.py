@@ -2,59 +2,18 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
-from dembark.validation.engines.base import DECK_NOTE, DeckNumber, Engine, EngineFacts, built, is_program, named_program, texts
+from dembark.validation.engines.base import DECK_NOTE, DeckNumber, Engine, EngineFacts, texts
 
 
 class Yade(Engine):
     """YADE's Python script with words `key=value`; one process, threads."""
 
-    facts = EngineFacts(
-        name="yade",
-        title="YADE",
-        program="YADE with dembark's laws",
-        deck="yade.py",
-        variables=("DEMBARK_YADE",),
-        version_words=("--version",),
-        version_pattern=r"[Yy]ade version:?\s*(\S+)",
-        by_hand="dembark yade -n -x yade.py",
-        restart_suffix="yade.gz",
-        restart_words=("dembark.run(",),
-        impact_id_offset=1,
-        # Okabe & Ito's palette, which colour-blind readers can tell apart.
-        colour="#D55E00",
-        marker="s",
-        threads=True,
-        interactive=True,
-        relative_cost=10,
-        restart_rate=1e5,
-        # About the mean of the cases with grains.
-        typical_rate=3e5,
-        # From `make validate` (profile quick, one run a core), except plane_silo, gravity_channel and single_contact, which are of single
-        # small runs beside other work. Small runs of logs are mostly the engine's start; each step of many logs costs more than in
-        # proportion.
-        measured_on="Intel Xeon (2 virtual cores), 2026-11-21, YADE 2025.2.0",
-        rates={"silo": 4.1e5, "plug_flow": 4.3e5, "plane_silo": 1.9e5, "gravity_channel": 1.6e5, "debarking_drum": 4.2e5,
-               "log_pile": 4.2e5, "log_cradle": 1.1e5, "log_pair": 9.0e3, "single_contact": 1.2e4},
-    )
-
-    @classmethod
-    def locate(cls) -> Path:
-        """DEMBARK_YADE (folder or executable), else the overlay that was built here."""
-        named = os.environ.get("DEMBARK_YADE")
-        if named:
-            place = Path(named)
-            return named_program(place / "bin/yade" if place.is_dir() else place, "DEMBARK_YADE")
-        overlay = built("yade-overlay")
-        if overlay and is_program(overlay / "bin/yade"):
-            return overlay / "bin/yade"
-        raise DembarkError("YADE with dembark's laws not found", f"no {overlay or 'build/yade-overlay'}",
-                           "build it with 'make yade-plugin' or set DEMBARK_YADE to its folder or executable")
+    facts = EngineFacts.read("yade")
 
     @property
     def prefix(self) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
@@ -13,10 +14,11 @@ from dembark.common.choices import pick
 from dembark.common.errors import DembarkError, RunError
 from dembark.postproc import DumpError
 from dembark.postproc.measurement import Measurement, Value
+from dembark.postproc.statistics import Estimate
 from dembark.validation.case import deck
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.model import Case, Declared, Study
-from dembark.validation.judge.quantity import Quantity
+from dembark.validation.judge.result import QuantityRecord
 
 if TYPE_CHECKING:
     from dembark.postproc.replica import Replica
@@ -63,11 +65,11 @@ def _call(case: Case, name: str, call: Callable[[Callable[..., Any]], Any]) -> M
     return found
 
 
-def quantities(case: Case, found: Measurement) -> list[Quantity]:
-    """The measured quantities as declared, in the order of the declaration; DembarkError for one that is not declared."""
+def quantities(case: Case, found: Measurement) -> tuple[QuantityRecord, ...]:
+    """The measured quantities as declared, with verdicts, in the order of the declaration; DembarkError for one that is not declared."""
     order = list(case.quantities)
     matched = [(*declared(case, name), name, value) for name, value in found.values.items()]
-    return [_joined(one, part, name, value) for one, part, name, value in sorted(matched, key=lambda entry: order.index(entry[0].name))]
+    return tuple(_judged(*entry) for entry in sorted(matched, key=lambda entry: order.index(entry[0].name)))
 
 
 def declared(case: Case, name: str) -> tuple[Declared, str]:
@@ -81,14 +83,14 @@ def declared(case: Case, name: str) -> tuple[Declared, str]:
     raise DembarkError(f"quantity {name} is measured but not declared", f"{case.folder / 'case.toml'}", f"add a table [quantities.{name}]")
 
 
-def _joined(one: Declared, part: str, name: str, value: Value) -> Quantity:
+def _judged(one: Declared, part: str, name: str, value: Value) -> QuantityRecord:
     if one.tolerance == "bound" and value.bound is None and value.reference is not None and not value.reason:
         raise DembarkError(f"quantity {name} is declared with tolerance = \"bound\"", "", "give bound=... in its Value")
     if value.bound is not None and one.tolerance != "bound":
         raise DembarkError(f"quantity {name} has a bound", "its tolerance is not the word \"bound\"", "take the bound away or declare it")
     tolerance = None if value.reference is None else value.bound if one.tolerance == "bound" else one.tolerance
-    return Quantity(
-        name=name, label=one.label.replace("*", part), unit=one.unit, estimate=value.estimate, reference=value.reference,
+    return judged(
+        name, one.label.replace("*", part), one.unit, value.estimate, reference=value.reference,
         tolerance=None if tolerance is None else float(tolerance), absolute=one.absolute, deviation_half=value.half, source=one.source,
         detail=value.detail or one.detail or one.why, reason=value.reason, verdict=value.verdict, compared=one.compared and value.compared,
         agreement=None if one.agreement is None else one.agreement * value.scale, evidence=one.evidence)
@@ -106,12 +108,58 @@ def _citations() -> dict[str, dict[str, str]]:
     return tomllib.loads(Path(__file__).with_name("references.toml").read_text(encoding="utf-8"))
 
 
-def references(case: Case) -> list[dict[str, str]]:
+def references(case: Case) -> tuple[dict[str, str], ...]:
     """The publications that the case names."""
     known = _citations()
-    return [known[pick(name, known, "reference", f"[case] of {case.folder / 'case.toml'}")] for name in case.references]
+    return tuple(known[pick(name, known, "reference", f"[case] of {case.folder / 'case.toml'}")] for name in case.references)
 
 
 def statements(case: Case) -> list[str]:
     """What the publications of the case are cited for, a sentence each."""
     return [f"{one['short']}: {one['statement']}" for one in references(case) if one["statement"]]
+
+
+def judged(name: str, label: str, unit: str, estimate: Estimate, *, reference: Estimate | None = None, tolerance: float | None = None,
+           absolute: bool = False, deviation_half: float | None = None, verdict: str = "", reason: str = "", detail: str = "",
+           source: str = "", compared: bool = True, agreement: float | None = None, evidence: str = "") -> QuantityRecord:
+    """A quantity with its verdict, as results hold it (see QuantityRecord); numbers that are not finite become None.
+
+    The deviation from the reference is relative unless `absolute`; `deviation_half` is the half-width of its own interval, where value
+    and reference of one run are correlated. `tolerance` None means: nothing to pass or fail. `verdict` is one that was reached by another
+    rule, told in `detail`; `reason` tells why there is none.
+    """
+    deviation, joint = None, estimate.half
+    if reference is not None:
+        scale = 1.0 if absolute else reference.value
+        deviation = (estimate.value - reference.value) / scale if scale else math.nan
+        joint = math.hypot(estimate.half, reference.half) / abs(scale) if scale else math.nan
+    if not verdict:
+        verdict = "info"
+        if not reason and tolerance is not None and deviation is not None:
+            verdict, reason = judge(deviation, joint if deviation_half is None else deviation_half, tolerance)
+    return QuantityRecord(
+        name=name, label=label, value=_finite(estimate.value), unit=unit, interval=_interval(estimate), basis=estimate.basis,
+        reference=_finite(reference.value if reference else None), reference_interval=_interval(reference) if reference else None,
+        deviation=_finite(deviation), deviation_kind="absolute" if absolute else "relative", tolerance=_finite(tolerance), verdict=verdict,
+        reason=reason, detail=detail, source=source, evidence=evidence, compared=compared, deviation_half_width=_finite(deviation_half),
+        agreement=agreement)
+
+
+def judge(deviation: float, half: float, tolerance: float) -> tuple[str, str]:
+    """pass or fail of a deviation with interval half-width `half`; info when the interval is wider than the tolerance, for then
+    neither verdict would mean anything."""
+    if not math.isfinite(deviation):
+        return "fail", "no finite number"
+    if not half <= tolerance:
+        wide = f"±{half:.2g}" if math.isfinite(half) else "unknown"
+        return "info", f"its interval ({wide}) is wider than what is allowed"
+    return ("pass", "") if abs(deviation) <= tolerance else ("fail", "")
+
+
+def _finite(value: float | None) -> float | None:
+    return float(value) if value is not None and math.isfinite(value) else None
+
+
+def _interval(estimate: Estimate) -> tuple[float, float] | None:
+    low, high = estimate.interval
+    return (float(low), float(high)) if math.isfinite(low) and math.isfinite(high) else None

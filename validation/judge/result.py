@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
 from dembark.common.errors import RunError
 from dembark.common.files import read_json, write_json
+from dembark.validation.case.model import EVIDENCE
 
-EVIDENCE = ("experiment", "theory", "code", "identity")
 VERDICTS = ("pass", "fail", "info")
 METRICS, COMPARISON = "metrics.json", "comparison.json"
 
@@ -142,14 +141,14 @@ def as_json(value: QuantityRecord | Result | Comparison) -> dict[str, Any]:
     return content
 
 
-_OPTIONAL = ("deviation_half_width", "agreement", "title", "description", "measured", "inputs", "replicas_missing")
+_OPTIONAL = ("deviation_half_width", "agreement", "title", "description")
 
 
 def _default(one: dataclasses.Field[Any]) -> Any:
     return one.default_factory() if one.default_factory is not dataclasses.MISSING else one.default
 
 
-def write(path: Path, value: Result | Comparison) -> Result | Comparison:
+def write(path: Path, value: Kind) -> Kind:
     """Write `metrics.json` or `comparison.json`, whole or not at all; returns `value`."""
     write_json(path, as_json(value))
     return value
@@ -161,11 +160,6 @@ def read(path: Path) -> Result:
     A file of another version of dembark is read as far as it goes; a remark tells which keys it lacks, or has more.
     """
     return _read(path, Result)
-
-
-def read_comparison(path: Path) -> Comparison:
-    """The Comparison in a `comparison.json`, see `read`."""
-    return _read(path, Comparison)
 
 
 def _read(path: Path, kind: type[Kind]) -> Kind:
@@ -185,16 +179,14 @@ def from_json(content: Mapping[str, Any], kind: type[Kind], where: str = "") -> 
     return found
 
 
-@cache
-def _keys(kind: type) -> tuple[dict[str, dataclasses.Field[Any]], tuple[str, ...]]:
-    known = {one.name: one for one in fields(kind)}
-    needed = [name for name, one in known.items() if one.default is one.default_factory is dataclasses.MISSING]
-    return known, tuple(needed)
+# Fields of each kind by name, and whether all results have them.
+_KEYS: dict[type, dict[str, bool]] = {kind: {one.name: one.default is one.default_factory is dataclasses.MISSING for one in fields(kind)}
+         for kind in (QuantityRecord, ComparedRecord, Result, Comparison)}
 
 
 def _value(content: Mapping[str, Any], kind: type[Kind], where: str, notes: dict[str, None]) -> Kind:
-    known, needed = _keys(kind)
-    missing = [key for key in needed if key not in content]
+    known = _KEYS[kind]
+    missing = [key for key, needed in known.items() if needed and key not in content]
     if missing:
         raise RunError(f"{where} has no {', '.join(missing)}", "it is no result of this version of dembark", "measure it again")
     notes |= {f"unknown {key!r} left out": None for key in content if key not in known}
@@ -221,7 +213,7 @@ def results(folder: Path) -> tuple[list[Result], list[Comparison], list[str]]:
             if path.name == METRICS:
                 found.append(read(path))
             else:
-                compared.append(read_comparison(path))
+                compared.append(_read(path, Comparison))
         except RunError as error:
             problems.append(str(error))
     return found, compared, problems

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dembark.common.files import read_json
-from dembark.validation.judge.result import EVIDENCE, QuantityRecord, from_json, results
+from dembark.validation.case.model import EVIDENCE
+from dembark.validation.judge.result import QuantityRecord, from_json, results
 
 VERIFICATION = "verification.json"
 # What each kind of evidence means, for people; "" is that of cases that do not say.
@@ -26,14 +27,9 @@ class Counts:
     information: int = 0
 
     @property
-    def decided(self) -> int:
-        """Checks with a verdict."""
-        return self.passed + self.failed
-
-    @property
     def checks(self) -> int:
-        """Checks, decided or open."""
-        return self.decided + self.open
+        """Checks, with a verdict or open."""
+        return self.passed + self.failed + self.open
 
     @property
     def sentence(self) -> str:
@@ -77,16 +73,7 @@ def _numbers(counts: Counter[str]) -> tuple[int, int, int, int]:
 def of_folder(folder: Path) -> Tally:
     """The tally of everything judged in a results folder: quantities, comparisons of engines, and the verification of the instruments."""
     found, compared, unread = results(folder)
-    verified = (read_json(folder / VERIFICATION) or {}).get("quantities", [])
+    verified = [one for item in (read_json(folder / VERIFICATION) or {}).get("items", []) for one in item["quantities"]]
     counted = tally([*(one for each in found for one in each.quantities), *(one for each in compared for one in each.quantities),
                      *(from_json(one, QuantityRecord, VERIFICATION) for one in verified)])
     return replace(counted, unread=tuple(unread))
-
-
-def open_reasons(quantities: Iterable[QuantityRecord]) -> dict[str, list[QuantityRecord]]:
-    """The checks that stayed open, by reason."""
-    found: dict[str, list[QuantityRecord]] = {}
-    for one in quantities:
-        if one.standing == "open":
-            found.setdefault(one.reason or "there is no number to judge", []).append(one)
-    return found

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dembark.common.errors import RunError
 from dembark.common.files import write_whole
 from dembark.postproc import DumpError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PICTURE, ANIMATION = "picture.png", "animation.gif"
 
@@ -41,3 +45,15 @@ def draw(folder: Path, wanted: Mapping[str, Any] | None) -> list[str]:
         return [f"No picture: {error}."]
     write_whole(folder / PICTURE, image)
     return []
+
+
+def saved(figure: Figure, kind: str = "png", dots: float = 180.0) -> bytes:
+    """A figure as the content of a file of that `kind`, the same for the same data; images have so many `dots` an inch."""
+    import matplotlib
+
+    from dembark.postproc.style import STYLE
+
+    buffer = io.BytesIO()
+    with matplotlib.rc_context(STYLE):
+        figure.savefig(buffer, format=kind, dpi=dots, metadata={"Date": None} if kind == "svg" else None)
+    return buffer.getvalue()

@@ -2,40 +2,28 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dembark.postproc import ContactFrame, ContactsDump, GrainFrame, GrainsDump, render
 from dembark.postproc.fields.coarse_graining import WallContacts, rows_of
 from dembark.postproc.spheres import volume
-from dembark.postproc.style import STYLE
 from dembark.postproc.walls import CylinderWall, PlaneWall, wall_contacts
+from dembark.validation.pictures import saved
 
 HEIGHT = 3.3  # inches
-_DOTS = 180
 
 
-def picture(folder: Path, colour_by: str, scale: float, cut: bool, radius: float = 0.0) -> bytes:
+def picture(folder: Path, colour_by: str, scale: float, cut: bool = False, radius: float = 0.0) -> bytes:
     """The last frame of the run in `folder` as a PNG, see `scene`; RunError when the renderer fails."""
-    return png(render.picture(scene(folder, colour_by, scale, cut, radius), height=HEIGHT))
+    return saved(render.picture(scene(folder, colour_by, scale, cut, radius), height=HEIGHT))
 
 
-def png(figure: Figure) -> bytes:
-    """A figure as PNG."""
-    buffer = io.BytesIO()
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(buffer, format="png", dpi=_DOTS)
-    return buffer.getvalue()
-
-
-def scene(folder: Path, colour_by: str, scale: float, cut: bool, radius: float = 0.0) -> render.Scene:
+def scene(folder: Path, colour_by: str, scale: float, cut: bool = False, radius: float = 0.0) -> render.Scene:
     """The last frame of the run in `folder`.
 
     `colour_by` is "velocity" (downward, over `scale` in m/s), "force" (sum of the normal contact forces on a grain over the mean

@@ -21,7 +21,8 @@ from dembark.common.files import read_json
 from dembark.postproc import GrainFrame, GrainsDump
 from dembark.postproc.dumptext import TextDump
 from dembark.postproc.style import STYLE
-from dembark.validation.pictures.packings import HEIGHT, png
+from dembark.validation.pictures import saved
+from dembark.validation.pictures.packings import HEIGHT
 
 _MAP = "cividis"
 _PIXELS = 300
@@ -110,7 +111,7 @@ def picture(section: Section) -> bytes:
         bar = figure.colorbar(ScalarMappable(Normalize(0.0, top), _MAP), ax=axes, shrink=0.75, aspect=22, pad=0.02, extend="max")
         bar.set_label(section.label)
         bar.outline.set_linewidth(0.4)
-    return png(figure)
+    return saved(figure)
 
 
 def draw(axes: Axes, section: Section, top: float) -> None:

@@ -16,8 +16,8 @@ from dembark.common.errors import RunError
 from dembark.common.files import disk_error, write_whole
 from dembark.validation.judge.result import Result
 from dembark.validation.report import front, numbers, scatter, sections
+from dembark.validation.report.figures import colour, engine_name
 from dembark.validation.report.gather import Gathered, gather
-from dembark.validation.report.look import colour, engine_name
 
 _HERE = Path(__file__).parent
 _SIGNS = {"passed": "✓ pass", "failed": "✗ FAIL", "open": "○ open", "information": ""}
@@ -64,14 +64,13 @@ def write(gathered: Gathered, chapters: Any) -> Path:
 
 
 # Chapters that only some reports have.
-_EMPTY: Mapping[str, Any] = {"sections": (), "sweeps": (), "errors": (), "against": None, "verification": ()}
+_EMPTY: Mapping[str, Any] = {"sections": (), "sweeps": (), "errors": (), "verification": ()}
 
 
 def _environment() -> Environment:
     found = Environment(loader=FileSystemLoader(_HERE), autoescape=select_autoescape(["html", "j2"]), undefined=StrictUndefined,
-                        trim_blocks=True,
-                        lstrip_blocks=True)
-    found.filters |= {"plain": numbers.plain, "compact": numbers.compact, "subscripts": _subscripts, "percent": numbers.percent,
+                        trim_blocks=True, lstrip_blocks=True)
+    found.filters |= {"plain": numbers.plain, "compact": numbers.compact, "subscripts": _subscripts,
                       "duration": numbers.duration, "engine": engine_name}
     found.globals |= {"signs": _SIGNS, "estimate": numbers.with_interval, "unit": numbers.with_unit, "deviation": numbers.deviation,
                       "allowed": numbers.allowed, "colour": colour}

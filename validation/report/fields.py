@@ -1,16 +1,27 @@
-"""Figures of the fields that the measurement left in `fields.nc`: which ones a page has, and what was read for them."""
+"""Figures of the fields that the measurement left in `fields.nc`: which ones a page has, what was read for them, and the panels that they
+share: maps of the engines side by side on one scale, and profiles with intervals."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from dembark.validation.report.figures import colour, engine_name, look
+
+Array = NDArray[np.float64]
 
 FILE = "fields.nc"
+SEQUENTIAL, DIVERGING = "cividis", "RdBu_r"
+_EDGE = "#9aa1a9"
 # Module that draws the fields of a kind, beside this one.
 _DRAWN_BY = {"silo": "fields_silo", "channel": "fields_channel", "drum": "fields_drum"}
 
@@ -47,3 +58,53 @@ def figures(datasets: Mapping[str, Any]) -> list[FieldFigure]:
         return []
     module = importlib.import_module(f"dembark.validation.report.{_DRAWN_BY[kinds.pop()]}")
     return list(module.draw(datasets))
+
+
+def limits(values: Sequence[Array], centre: float | None = None) -> tuple[float, float]:
+    """Ends of a colour scale that leave 1 % of all finite values out at either side; even about `centre` if given."""
+    everything = np.concatenate([one[np.isfinite(one)] for one in values])
+    if not len(everything):
+        return 0.0, 1.0
+    low, high = (float(edge) for edge in np.percentile(everything, [1.0, 99.0]))
+    if centre is not None:
+        half = max(high - centre, centre - low) or 1.0
+        return centre - half, centre + half
+    return (low, high) if high > low else (low - 0.5, high + 0.5)
+
+
+def image(
+    axes: Any, values: Array, extent: tuple[float, float, float, float], scale: tuple[float, float], paint: str, *, smooth: bool = True
+) -> None:
+    """A map (rows along y, from below) of cell values; `smooth`: of a field that varies less than from cell to cell."""
+    axes.imshow(np.ma.masked_invalid(values), extent=extent, origin="lower", cmap=paint, norm=Normalize(*scale),
+                interpolation="bilinear" if smooth else "nearest", aspect="auto", interpolation_stage="data")
+    axes.grid(False)
+    for spine in axes.spines.values():
+        spine.set(visible=True, edgecolor=_EDGE, linewidth=0.6)
+
+
+def bar(figure: Figure, axes: Any, scale: tuple[float, float], paint: str, label: str, **place: Any) -> None:
+    """A colour scale beside or below `axes`."""
+    one = figure.colorbar(ScalarMappable(Normalize(*scale), paint), ax=axes, extend="both", **place)
+    one.set_label(label, fontsize=7)
+    one.ax.tick_params(labelsize=6.5, width=0.5, length=2.0)
+    one.outline.set_linewidth(0.4)
+
+
+def curve(axes: Any, engine: str, place: Array, value: Array, half: Array | None = None, *, upward: bool = False,
+          marked: bool = True) -> Any:
+    """A profile of an engine with the band of its interval; `upward`: the place is drawn upwards."""
+    paint, style = colour(engine), {"marker": look(engine).marker, "markersize": 2.6} if marked else {}
+    if half is not None:
+        band = np.where(np.isfinite(half), half, 0.0)
+        (axes.fill_betweenx if upward else axes.fill_between)(place, value - band, value + band, color=paint, alpha=0.18, linewidth=0)
+    pair = (value, place) if upward else (place, value)
+    (line,) = axes.plot(*pair, color=paint, label=engine_name(engine), **style)
+    return line
+
+
+def long_table(header: Sequence[str], columns: Mapping[str, Sequence[Array]]) -> tuple[list[str], list[list[Any]]]:
+    """Header and rows of the engines' columns of equal length, one below the other; what is not finite is an empty cell."""
+    rows = [[engine, *(float(cell) if np.isfinite(cell) else None for cell in cells)]
+            for engine, of_engine in columns.items() for cells in zip(*(np.ravel(column) for column in of_engine), strict=True)]
+    return ["engine", *header], rows

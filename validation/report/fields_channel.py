@@ -10,9 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from dembark.postproc.style import STYLE
-from dembark.validation.report.fields import FieldFigure
-from dembark.validation.report.fields_panels import DIVERGING, SEQUENTIAL, bar, curve, image, limits, long_table
-from dembark.validation.report.look import colour, engine_name
+from dembark.validation.report.fields import DIVERGING, SEQUENTIAL, FieldFigure, bar, curve, image, limits, long_table
+from dembark.validation.report.figures import colour, engine_name
 
 # Name in the dataset, label, colour map, and whether the scale is even about zero.
 _MAPS = (

@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from dembark.postproc.style import STYLE
-from dembark.validation.report.fields import FieldFigure
-from dembark.validation.report.fields_panels import SEQUENTIAL, bar, curve, image, limits, long_table
-from dembark.validation.report.look import engine_name
+from dembark.validation.report.fields import SEQUENTIAL, FieldFigure, bar, curve, image, limits, long_table
+from dembark.validation.report.figures import engine_name
 
 _SHELL = "#4a4f57"
 

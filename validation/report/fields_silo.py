@@ -11,9 +11,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from dembark.postproc.style import STYLE
-from dembark.validation.report.fields import FieldFigure
-from dembark.validation.report.fields_panels import DIVERGING, SEQUENTIAL, bar, curve, image, limits, long_table
-from dembark.validation.report.look import engine_name
+from dembark.validation.report.fields import DIVERGING, SEQUENTIAL, FieldFigure, bar, curve, image, limits, long_table
+from dembark.validation.report.figures import engine_name
 
 Array = NDArray[np.float64]
 
@@ -44,8 +43,7 @@ def _panels(one: Any) -> dict[str, Array]:
 
 
 _LABELS = {"stress_zz_kPa": "σ$_{zz}$ (kPa)", "stress_rr_kPa": "σ$_{rr}$ (kPa)", "stress_zr_kPa": "σ$_{rz}$ (kPa)",
-           "k": "K = σ$_{rr}$/σ$_{zz}$",
-           "solid_fraction": "solid fraction"}
+           "k": "K = σ$_{rr}$/σ$_{zz}$", "solid_fraction": "solid fraction"}
 
 
 def _maps(datasets: Mapping[str, Any]) -> FieldFigure:
@@ -95,16 +93,14 @@ def _profiles(datasets: Mapping[str, Any]) -> FieldFigure:
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 2.75))
         grid = figure.add_gridspec(1, 1 + len(bands), width_ratios=[1.25, *[1.0] * len(bands)], left=0.065, right=0.985, bottom=0.26,
-                                   top=0.88,
-                                   wspace=0.32)
+                                   top=0.88, wspace=0.32)
         left = figure.add_subplot(grid[0])
         for engine, one in shown.items():
             d = one.attrs["grain_diameter"]
             curve(left, engine, one.height.values / d, 1e-3 * one.stress_zz_section.values, 1e-3 * one.stress_zz_section_half.values,
                   upward=True, marked=False)
             left.plot(1e-3 * one.janssen.values, one.height.values / d, color=left.lines[-1].get_color(), linestyle=(0, (4, 2)),
-                      linewidth=1.0,
-                      label=f"Janssen ({engine_name(engine)})")
+                      linewidth=1.0, label=f"Janssen ({engine_name(engine)})")
         left.set(xlabel="σ$_{zz}$ (kPa)", ylabel="height z / d", title="σ$_{zz}$ of the section", xlim=(0.0, None), ylim=(0.0, None))
         right = [figure.add_subplot(grid[1 + number]) for number in range(len(bands))]
         for number, axes in enumerate(right):
@@ -112,8 +108,7 @@ def _profiles(datasets: Mapping[str, Any]) -> FieldFigure:
                 curve(axes, engine, one.radius.values / one.attrs["vessel_radius"], one.k_profile.values[number],
                       one.k_profile_half.values[number])
                 axes.plot([1.0], [_wall_ratio(one, bands[number])], "*", markersize=7, color=axes.lines[-1].get_color(),
-                          markeredgecolor="white",
-                          markeredgewidth=0.4, clip_on=False, zorder=5)
+                          markeredgecolor="white", markeredgewidth=0.4, clip_on=False, zorder=5)
             low, high = bands[number] / first.attrs["grain_diameter"]
             axes.set(xlabel="r / R", title=f"z = {low:.0f} … {high:.0f} d", xlim=(0.0, 1.0))
         top = max(axes.get_ylim()[1] for axes in right)

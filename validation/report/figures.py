@@ -1,9 +1,8 @@
-"""Figures of the report as SVG, and tables as CSV."""
+"""How engines look in figures; figures of the report as SVG, and tables as CSV."""
 
 from __future__ import annotations
 
 import csv
-import io
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,13 +15,36 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from dembark.postproc.style import STYLE
-from dembark.validation.report.look import MARKS, PALETTE, colour, engine_name
+from dembark.validation import engines
+from dembark.validation.engines import EngineFacts
+from dembark.validation.pictures import saved
 from dembark.validation.verification.item import Item, Panel
 
 WIDE = 7.2  # inches
-_INK = "#4a4f57"
-_DOTS = 220
-_DASHES = ((0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
+INK = "#4a4f57"
+_DOTS = 220.0
+DASHES = ((0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
+# Okabe & Ito's palette.
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+MARKS = ("o", "s", "D", "^", "v", "P")
+
+
+def look(engine: str) -> EngineFacts:
+    """Title, colour and marker of `engine` in all figures, among its facts; one that is not known gets a spare colour."""
+    if engine in engines.names():
+        return engines.facts(engine)
+    spare = 2 + sum(engine.encode()) % (len(PALETTE) - 2)
+    return EngineFacts(engine, engine, colour=PALETTE[spare], marker=MARKS[spare])
+
+
+def engine_name(engine: str) -> str:
+    """As its makers write it."""
+    return look(engine).title
+
+
+def colour(engine: str) -> str:
+    """Colour of an engine."""
+    return look(engine).colour
 
 
 def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
@@ -35,18 +57,12 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) 
 
 def svg(figure: Figure) -> bytes:
     """The figure as SVG text, the same for the same data."""
-    buffer = io.BytesIO()
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    return buffer.getvalue()
+    return saved(figure, "svg", 100.0)
 
 
 def png(figure: Figure) -> bytes:
     """The figure as PNG for the PDF, where the many paths of an SVG take seconds to lay out."""
-    buffer = io.BytesIO()
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(buffer, format="png", dpi=_DOTS)
-    return buffer.getvalue()
+    return saved(figure, "png", _DOTS)
 
 
 def symbols(text: str) -> str:
@@ -93,7 +109,7 @@ def _panel(axes: Any, entries: Sequence[tuple[str, Mapping[str, Any]]], handles:
             same = all(_same(other, one) for _, other in entries)
             if not same or not number:
                 shown = "reference" if same else f"reference ({engine_name(engine)})"
-                handles.setdefault(shown, line(_numbers(one["reference"]), color=_INK if same else paint, linestyle=_DASHES[number % 3],
+                handles.setdefault(shown, line(_numbers(one["reference"]), color=INK if same else paint, linestyle=DASHES[number % 3],
                                               linewidth=0.9, zorder=3))
         if one.get("low") is not None:
             fill = axes.fill_betweenx if upward else axes.fill_between
@@ -159,11 +175,10 @@ def _draw(axes: Any, panel: Panel) -> None:
     number = 0
     for curve in panel.curves:
         if curve.theory:
-            axes.plot(curve.place, curve.value, color=_INK, linewidth=0.9, linestyle=_DASHES[0], label=curve.label)
+            axes.plot(curve.place, curve.value, color=INK, linewidth=0.9, linestyle=DASHES[0], label=curve.label)
         else:
             axes.plot(curve.place, curve.value, color=PALETTE[number % len(PALETTE)], marker=MARKS[number % len(MARKS)], markersize=3.2,
-                      linewidth=1.1,
-                      label=curve.label)
+                      linewidth=1.1, label=curve.label)
             number += 1
     axes.set(yscale="log", xlabel=panel.along, ylabel=panel.across)
     axes.set_title(panel.title, fontsize=7.5)

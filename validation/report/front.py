@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from dembark.validation.judge.result import QuantityRecord
 from dembark.validation.judge.tally import MEANING, Tally, tally
 from dembark.validation.report import figures, scatter
 from dembark.validation.report.gather import Row
@@ -17,9 +19,9 @@ FAILED, OPEN, MISSING = 8, 14, 6
 # What a failure says most about comes first.
 _WEIGHT = ("experiment", "theory", "identity", "", "code")
 
-CSV_HEADER = ("case", "variant", "engine", "quantity", "label", "unit", "value", "low", "high", "reference", "reference_low",
-              "reference_high",
-              "deviation", "deviation_kind", "tolerance", "verdict", "evidence", "reason", "detail", "source")
+# Of a quantity in all tables, see `cells`.
+COLUMNS = ("quantity", "label", "unit", "value", "low", "high", "reference", "reference_low", "reference_high", "deviation",
+           "deviation_kind", "tolerance", "verdict", "evidence", "reason", "detail", "source")
 
 
 @dataclass(frozen=True)
@@ -67,19 +69,17 @@ def context(rows: Sequence[Row], missing: Sequence[str]) -> Mapping[str, Any]:
             "most": {"failed": FAILED, "open": OPEN, "missing": MISSING}}
 
 
-def csv_rows(rows: Iterable[Row]) -> Iterable[Sequence[Any]]:
-    """All quantities as rows of a table, see CSV_HEADER."""
-    for row in rows:
-        one = row.record
-        yield (row.case, row.anchor.removeprefix(f"{row.case}-"), row.who, one.name, one.label, one.unit, one.value,
-               *(one.interval or (None, None)), one.reference, *(one.reference_interval or (None, None)), one.deviation,
-               one.deviation_kind, one.tolerance, one.verdict, one.evidence,
-               one.reason, one.detail, one.source)
+def cells(one: QuantityRecord) -> list[Any]:
+    """A quantity as part of the row of a table, see COLUMNS."""
+    return [one.name, one.label, one.unit, one.value, *(one.interval or (None, None)), one.reference,
+            *(one.reference_interval or (None, None)), one.deviation, one.deviation_kind, one.tolerance, one.verdict, one.evidence,
+            one.reason, one.detail, one.source]
 
 
-def write_tables(folder: Any, rows: Sequence[Row], found: Sequence[scatter.Point]) -> None:
+def write_tables(folder: Path, rows: Sequence[Row], found: Sequence[scatter.Point]) -> None:
     """quantities.csv and scatter.csv."""
-    figures.write_csv(folder / "quantities.csv", CSV_HEADER, csv_rows(rows))
+    figures.write_csv(folder / "quantities.csv", ("case", "variant", "engine", *COLUMNS),
+                      ([row.case, row.anchor.removeprefix(f"{row.case}-"), row.who, *cells(row.record)] for row in rows))
     figures.write_csv(folder / "scatter.csv", ("case", "quantity", "engine", "evidence", "measured", "reference", "relative_half_width",
                                                "reference_relative_half_width"),
                       ((*one.line, one.engine, one.evidence, one.value, one.reference, one.half, one.reference_half) for one in found))

@@ -13,7 +13,7 @@ from dembark.validation import verification
 from dembark.validation.case.folders import discover
 from dembark.validation.case.model import STUDY_PREFIX, Case
 from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result, results
-from dembark.validation.report.look import engine_name
+from dembark.validation.report.figures import engine_name
 from dembark.validation.verification.item import Item
 
 # What comparisons of variants leave out: they are due to differ, or say how long and often a run is repeated.
@@ -112,12 +112,9 @@ def gather(folder: Path) -> Gathered:
         return pages.setdefault((case, variant), Page(case, variant, folder / case / variant))
 
     summary = read_json(folder / "runs.json") or {}
-    silent: dict[tuple[str, str], dict[str, bool]] = {}
-    for case, variant, engine, line in _expected(folder, cases, summary):
-        one = page(case, variant)
-        one.missing += [line] if line else []
-        of_variant = silent.setdefault((case, variant), {})
-        of_variant[engine] = of_variant.get(engine, True) and not line
+    expected = list(_expected(folder, cases, summary))
+    for case, variant, _, line in expected:
+        page(case, variant).missing += [line] if line else []
     measured, compared, unread = results(folder)
     for found in measured:
         one = page(found.case, found.variant)
@@ -125,9 +122,10 @@ def gather(folder: Path) -> Gathered:
         one.title, one.description = found.title, found.description
     for both in compared:
         page(both.case, both.variant).comparison = both
-    for key, engines in silent.items():
-        pages[key].missing += [f"{engine_name(engine)}: it could not be measured" for engine in sorted(engines)
-                               if engines[engine] and engine not in pages[key].results]
+    failed = {run[:3] for run in expected if run[3]}
+    for case, variant, engine in sorted({run[:3] for run in expected} - failed):
+        if engine not in pages[case, variant].results:
+            pages[case, variant].missing.append(f"{engine_name(engine)}: it could not be measured")
     ordered = sorted(pages.values(), key=lambda one: (one.case != "silo", one.case, one.is_study, "wet" in one.variant, one.variant))
     return Gathered(folder, ordered, verification.read(folder), cases, unread, summary)
 

@@ -80,13 +80,6 @@ def compact(value: float | str | None) -> str:
     return text.replace("-", "−")
 
 
-def percent(value: float | None) -> str:
-    """A relative change with sign; `–` for none."""
-    if value is None or not math.isfinite(value):
-        return "–"
-    return f"{100.0 * value:+.1f} %".replace("-", "−") if abs(value) <= _PERCENT else f"× {plain(1.0 + value, 2)}"
-
-
 def duration(seconds: float | None) -> str:
     """Seconds as s, min or h."""
     if seconds is None:

@@ -14,12 +14,10 @@ from matplotlib.ticker import NullFormatter
 
 from dembark.postproc.statistics import Scatter, scatter
 from dembark.postproc.style import STYLE
-from dembark.validation.report.figures import WIDE, symbols
+from dembark.validation.report.figures import INK, WIDE, look, symbols
 from dembark.validation.report.gather import Row
-from dembark.validation.report.look import look
 
 KINDS = ("experiment", "theory")
-_INK = "#4a4f57"
 # Lines that fit on the first pages; the others are in the table beside the report.
 LINES = 24
 
@@ -92,14 +90,14 @@ def figure(found: Sequence[Point], tolerance: float = 0.10) -> Figure | None:
         right = result.add_axes((0.76, 0.42 / tall, 0.23, 1.0 - (0.25 + 0.42) / tall))
         values = [value for one in drawn for value in (one.value, one.reference)]
         ends = 10.0 ** np.array([math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)) + 1e-9)])
-        left.fill_between(ends, ends * (1 - tolerance), ends * (1 + tolerance), color=_INK, alpha=0.12, linewidth=0)
-        left.plot(ends, ends, color=_INK, linewidth=0.6)
+        left.fill_between(ends, ends * (1 - tolerance), ends * (1 + tolerance), color=INK, alpha=0.12, linewidth=0)
+        left.plot(ends, ends, color=INK, linewidth=0.6)
         left.set(xscale="log", yscale="log", xlim=ends, ylim=ends, xlabel="reference", ylabel="measured",
                  title="Measured against reference")
         for axis in (left.xaxis, left.yaxis):
             axis.set_minor_formatter(NullFormatter())
-        right.axvspan(1 - tolerance, 1 + tolerance, color=_INK, alpha=0.12, linewidth=0)
-        right.axvline(1.0, color=_INK, linewidth=0.6)
+        right.axvspan(1 - tolerance, 1 + tolerance, color=INK, alpha=0.12, linewidth=0)
+        right.axvline(1.0, color=INK, linewidth=0.6)
         for place, engine in enumerate(engines):
             _engine(left, right, engine, place, [one for one in drawn if one.engine == engine], number, len(engines),
                     statistics([one for one in found if one.engine == engine]))
@@ -127,8 +125,7 @@ def _engine(left: Any, right: Any, engine: str, place: int, found: Sequence[Poin
     label = title if known is None else f"{title}: δ = {known.bias:.3f}, σ = {known.model:.3f}, {known.count} points"
     right.errorbar([one.ratio for one in found], [number[one.line] + shift for one in found],
                    xerr=[one.ratio * math.hypot(one.half, one.reference_half) for one in found], fmt=mark, color=paint, markersize=2.8,
-                   elinewidth=0.6,
-                   markeredgecolor="white", markeredgewidth=0.3, label=label)
+                   elinewidth=0.6, markeredgecolor="white", markeredgewidth=0.3, label=label)
     if known is not None:
         right.axvline(known.bias, color=paint, linewidth=0.8)
         right.axvspan(known.bias - 2 * known.model, known.bias + 2 * known.model, color=paint, alpha=0.07, linewidth=0)

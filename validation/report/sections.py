@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from dembark.validation import pictures
 from dembark.validation.judge.tally import Counts, tally
 from dembark.validation.report import fields, figures, front
+from dembark.validation.report.figures import engine_name
 from dembark.validation.report.gather import Gathered, Page, Row, beside
-from dembark.validation.report.look import engine_name
 
 # Of a case in the PDF: variants with figures (of the first all main ones, of the others one), panels of a figure, and rows of one quantity
 # before only the worst is shown.

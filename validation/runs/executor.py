@@ -17,12 +17,13 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessP
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Protocol
 
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.validation.runs.plan import RETRIES, Resources, Run
-from dembark.validation.runs.simulate import Tell, simulate
+from dembark.validation.runs.simulate import Progress, simulate
 from dembark.validation.runs.steps import Step
 from dembark.validation.runs.table import Table
 
@@ -38,10 +39,10 @@ class Backend(Protocol):
     def fits(self, used: Resources, busy: Sequence[Resources]) -> bool:
         """Whether a run may start beside those that are under way (if `here`, also beside the steps)."""
 
-    def start(self, run: Run, out: Path, used: Resources, tell: Tell) -> Future[object]:
+    def start(self, run: Run, out: Path, used: Resources, progress: Progress) -> Future[object]:
         """Begin with a run; the future raises Killed when it was ended from outside, another DembarkError when it failed.
 
-        `tell` hears of the run's progress, and with `state` that it is queued or running.
+        `progress` is called with what has changed of the run, `state` among it when that is queued or running.
         """
 
     def start_step(self, step: Step) -> Future[object] | None:
@@ -65,10 +66,10 @@ class Local:
         memory = sum(one.memory or 0.0 for one in (used, *busy))
         return not busy or (used.cores + sum(one.cores for one in busy) <= self._cores and (self._memory is None or memory <= self._memory))
 
-    def start(self, run: Run, out: Path, used: Resources, tell: Tell) -> Future[object]:
+    def start(self, run: Run, out: Path, used: Resources, progress: Progress) -> Future[object]:
         """See Backend; the run begins when a thread is free."""
-        tell(state="running", host=socket.gethostname())
-        return self._pool.submit(simulate, run, out, self._cancel, used, tell)
+        progress(state="running", host=socket.gethostname())
+        return self._pool.submit(simulate, run, out, self._cancel, used, progress)
 
     def start_step(self, step: Step) -> Future[object] | None:
         """See Backend; all steps are left to processes of this machine."""
@@ -80,11 +81,16 @@ class Local:
 
 
 def _prepare_worker() -> None:
-    """In a process that works on steps: it ends with the one that started it, which alone hears of interruptions."""
+    """In a process that works on steps: it ends with the one that started it, which alone gets the signals of interruptions."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:
-        threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: BaseProcess) -> None:
+    parent.join()
+    os._exit(1)
 
 
 class Workers:
@@ -190,7 +196,7 @@ class Executor:
             busy = [work.used for work in self._under_way.values() if work.here == self._backend.here]
             if self._backend.fits(task.used, busy):
                 self._tasks.remove(task)
-                future = self._backend.start(task.run, task.out, task.used, partial(self._tell, task.name))
+                future = self._backend.start(task.run, task.out, task.used, partial(self._progress, task.name))
                 self._under_way[future] = _Work(task, task.used, self._backend.here)
 
     def _room(self) -> bool:
@@ -211,7 +217,7 @@ class Executor:
         elsewhere = self._backend.start_step(step)
         self._under_way[elsewhere or self._workers.start(step)] = _Work(step, Resources(), elsewhere is None)
 
-    def _tell(self, name: str, state: str = "", **facts: object) -> None:
+    def _progress(self, name: str, state: str = "", **facts: object) -> None:
         if state and state != self._table.state(name).state:
             self._table.transition(name, state, **facts)
         elif facts:

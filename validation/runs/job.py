@@ -1,5 +1,5 @@
 """One run, or one measurement, as the job of a scheduler: `python -m dembark.validation.runs.job ...` on the node does exactly what the
-executor does on its own machine, and tells of it in a small file beside the results."""
+executor does on its own machine, and reports its progress in a small file beside the results."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from typing import Any
 from dembark.common.errors import DembarkError, Interrupted, Killed
 from dembark.common.files import read_json, write_json
 from dembark.common.lock import Busy
-from dembark.validation.campaigns import source
+from dembark.validation.campaigns import expand
 from dembark.validation.runs.plan import Resources, Run, Series
 from dembark.validation.runs.simulate import simulate
 from dembark.validation.runs.steps import measure_series
@@ -40,7 +40,7 @@ def cancelled_by_signal() -> threading.Event:
 
 
 class Report:
-    """What a job tells whoever has submitted it: a JSON file, written whole, about once a second at most."""
+    """The progress of a job for whoever has submitted it: a JSON file, written whole, about once a second at most."""
 
     def __init__(self, path: Path) -> None:
         self._path, self._written = path, 0.0
@@ -62,10 +62,10 @@ def read_report(path: Path) -> dict[str, Any]:
     return read_json(path) or {}
 
 
-def _simulate(run: Run, out: Path, used: Resources, cancel: threading.Event, tell: Report) -> None:
+def _simulate(run: Run, out: Path, used: Resources, cancel: threading.Event, progress: Report) -> None:
     while True:
         try:
-            simulate(run, out, cancel, used, tell)
+            simulate(run, out, cancel, used, progress)
             return
         except Busy:
             # A job that the scheduler has forgotten still works on it.
@@ -75,7 +75,7 @@ def _simulate(run: Run, out: Path, used: Resources, cancel: threading.Event, tel
 
 def _series(options: argparse.Namespace) -> Series:
     case, _, engine = Path(options.place).parts
-    planned = source.plan(options.profile, options.campaign, (case,), (engine,))
+    planned = expand.plan(options.profile, options.campaign, (case,), (engine,))
     (one,) = [one for one in planned.series if one.place == Path(options.place)]
     if options.inputs and options.inputs not in {run.inputs for run in one.runs}:
         raise DembarkError("the inputs have changed since the job was submitted", f"{options.place}", "submit again")
@@ -89,7 +89,7 @@ def _arguments(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--results", type=Path, required=True, help="results/<profile>, or the campaign's folder")
     parser.add_argument("--place", required=True, help="<case>/<variant>/<engine>")
     parser.add_argument("--inputs", help="hash of the inputs of a run; without it the series is measured")
-    parser.add_argument("--report", type=Path, required=True, help="file to tell in how it goes")
+    parser.add_argument("--report", type=Path, required=True, help="file for the progress")
     parser.add_argument("--ranks", type=int, default=1)
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--restart-interval", type=float, help="wall time between restart files (s)")
@@ -99,22 +99,22 @@ def _arguments(words: Sequence[str] | None) -> argparse.Namespace:
 def main(words: Sequence[str] | None = None) -> int:
     """Do one job; returns the exit code."""
     options = _arguments(words)
-    cancel, tell = cancelled_by_signal(), Report(options.report)
-    tell(state="running", host=socket.gethostname(), pid=os.getpid())
+    cancel, progress = cancelled_by_signal(), Report(options.report)
+    progress(state="running", host=socket.gethostname(), pid=os.getpid())
     try:
         one = _series(options)
         out = options.results.resolve() / one.place
         if options.inputs:
             (run,) = [run for run in one.runs if run.inputs == options.inputs]
-            _simulate(run, out, Resources(options.ranks, options.threads, restart_interval=options.restart_interval), cancel, tell)
+            _simulate(run, out, Resources(options.ranks, options.threads, restart_interval=options.restart_interval), cancel, progress)
         else:
             measure_series(out, one.runs)
     except DembarkError as error:
         # Another attempt may follow what was ended from outside; it is not the run that failed.
-        tell(state="stopped" if isinstance(error, Killed | Interrupted) else "failed", message=str(error))
+        progress(state="stopped" if isinstance(error, Killed | Interrupted) else "failed", message=str(error))
         print(f"dembark: {error}", file=sys.stderr)
         return error.exit_code
-    tell(state="finished")
+    progress(state="finished")
     return 0
 
 

@@ -6,19 +6,21 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json, write_json
 from dembark.common.lock import lock
-from dembark.validation.campaigns import source, store
+from dembark.validation.campaigns import expand, store
+from dembark.validation.judge.result import METRICS, Result
 from dembark.validation.judge.tally import Tally, of_folder
 from dembark.validation.runs.executor import Backend, Executor, Local, Task
 from dembark.validation.runs.plan import Plan, Resources, Series, studies
 from dembark.validation.runs.progress import Monitor
-from dembark.validation.runs.steps import Step, measure_series, steps
+from dembark.validation.runs.steps import Step, draw, measure_series, steps
 from dembark.validation.runs.table import State, Table, summary
 
 LOCK = ".lock"
@@ -45,14 +47,14 @@ class Outcome:
 def validate(profile: str, cancel: threading.Event, cores: int | None = None, results_root: Path = Path("results"),
              cases: Sequence[str] = (), engines: Sequence[str] = ()) -> Outcome:
     """Run everything that the cases list for `profile` and build the report in results_root/<profile>, see `perform`."""
-    planned, results = source.plan(profile, None, cases, engines), results_root.resolve() / profile
+    planned, results = expand.plan(profile, None, cases, engines), results_root.resolve() / profile
     count = cores or os.cpu_count() or 1
     with lock(results / LOCK, f"another validation works in {results}"):
         return perform(planned, results, lambda _: Local(count, None, cancel), cancel, count)
 
 
 def perform(plan: Plan, results: Path, place: Place, cancel: threading.Event, cores: int = 1, log: Path | None = None,
-            estimates: Mapping[str, float | None] | None = None) -> Outcome:
+            estimates: Mapping[Path, float | None] | None = None) -> Outcome:
     """Make all runs of `plan` in the folder `results`, measure them and build the report; events also go to the file `log`.
 
     Runs that finished earlier with the same inputs are kept. A run that fails stops nothing else: the report is built from what
@@ -63,9 +65,9 @@ def perform(plan: Plan, results: Path, place: Place, cancel: threading.Event, co
     tasks = [Task(run, results / one.place, plan.of(one)) for one in plan.series for run in one.runs]
     todo, table, problems = steps(plan, results), Table(results, plan.label), list[str]()
     table.enter(folders, results, {step.name: step.kind for step in todo}, plan.whole)
-    for one in plan.series if estimates else ():
-        for run in one.runs:
-            table.note(run.name, estimate=estimates.get(str(one.place)))
+    if estimates:
+        for task in tasks:
+            table.note(task.name, estimate=estimates.get(task.out.relative_to(results)))
 
     def write_summary() -> None:
         write_json(results / "runs.json", {**plan.facts, "runs": summary(table.states(), folders)})
@@ -102,10 +104,10 @@ def perform(plan: Plan, results: Path, place: Place, cancel: threading.Event, co
 
 
 def perform_series(one: Series, out: Path, cancel: threading.Event, used: Resources, jobs: int | None = None,
-                   force: bool = False) -> dict[str, Any]:
+                   force: bool = False) -> Result:
     """Run the replicas of a series that are not finished yet in the folder `out`, `jobs` at a time (default: as many as fit the cores).
 
-    Returns the content of `out/metrics.json`. A replica that fails does not stop the others; the first failure is raised when all have
+    Returns what is in `out/metrics.json`. A replica that fails does not stop the others; the first failure is raised when all have
     ended. DembarkError when `out` holds something else, unless `force` lets results of other inputs be replaced.
     """
     if not force:
@@ -117,17 +119,34 @@ def perform_series(one: Series, out: Path, cancel: threading.Event, used: Resour
     cores = jobs * used.cores if jobs else max(used.cores, os.cpu_count() or 1)
     table = Table()
     table.enter({run.folder_name: run for run in one.runs}, out, {})
-    # Why a run failed is told once, at the end.
-    with Monitor(table.states, reasons=False) as monitor:
-        table.listener = monitor.event
-        executor = Executor(table, Local(cores, None, cancel), cancel, retries=0)
-        executor.execute([Task(run, out, used) for run in one.runs], ())
-    if executor.errors:
-        _, *others = dict.fromkeys(str(error) for error in executor.errors.values())
-        for message in others:
-            print(f"dembark: {message}", file=sys.stderr)
-        raise next(iter(executor.errors.values()))
-    return measure_series(out, one.runs)
+    drawn: list[Future[list[str]]] = []
+    with ThreadPoolExecutor(2) as beside:
+        beside.submit(_load)
+        # Why a run failed is told once, at the end.
+        with Monitor(table.states, reasons=False) as monitor:
+
+            def event(state: State) -> None:
+                monitor.event(state)
+                # The pictures are of the first replica: they need not wait for the others.
+                if state.name == one.runs[0].name and state.state == "finished":
+                    drawn.append(beside.submit(draw, out))
+
+            table.listener = event
+            executor = Executor(table, Local(cores, None, cancel), cancel, retries=0)
+            executor.execute([Task(run, out, used) for run in one.runs], ())
+        if executor.errors:
+            first, *others = executor.errors.values()
+            for message in dict.fromkeys(map(str, others)):
+                if message != str(first):
+                    print(f"dembark: {message}", file=sys.stderr)
+            raise first
+        return measure_series(out, one.runs, drawn[0] if drawn else None)
+
+
+def _load() -> None:
+    """Import what measures and draws: meanwhile the engines run."""
+    for name in ("metrics", "pictures.packings", "pictures.sections"):
+        import_module(f"dembark.validation.{name}")
 
 
 def refuse_foreign(one: Series, out: Path) -> None:
@@ -143,4 +162,4 @@ def refuse_foreign(one: Series, out: Path) -> None:
 
 
 def _ours(out: Path) -> bool:
-    return all(path.name in ("failed", "superseded", "metrics.json") or path.name.startswith(".replica-") for path in out.iterdir())
+    return all(path.name in ("failed", "superseded", METRICS) or path.name.startswith(".replica-") for path in out.iterdir())

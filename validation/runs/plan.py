@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +58,7 @@ class Run:
         frames = self.values.get("frames")
         return self.particles * frames * _BYTES_PER_GRAIN_AND_FRAME if self.particles and isinstance(frames, int) else None
 
-    @property
+    @cached_property
     def inputs(self) -> str:
         """Hash of what decides the outcome: parameters, deck and engine, but not where, on how many cores or beside how many replicas."""
         parameters = {key: value for key, value in self.values.items() if key != "replicas"}
@@ -86,8 +87,8 @@ class Series:
 
 @dataclass(frozen=True)
 class Resources:
-    """What a run may use: MPI ranks (LIGGGHTS) and threads; memory (bytes), time of an attempt (s) and about how long it computes between
-    states to resume from (s, 0: none), where None leaves the choice to the system."""
+    """What a run may use: MPI ranks and threads; memory (bytes), time of an attempt (s) and about how long it computes between restart
+    files (s, 0: none), where None leaves the choice to the system."""
 
     ranks: int = 1
     threads: int = 1
@@ -167,7 +168,7 @@ def series(case: Case, variant: str, profile: str | None, engine: Engine, change
     return Series(tuple(Run(case, name or variant, profile or "default", engine, k, for_replica(values, k)) for k in numbers))
 
 
-def campaign(profile: str, only_cases: Sequence[str] = (), only_engines: Sequence[str] = ()) -> list[Series]:
+def of_profile(profile: str, only_cases: Sequence[str] = (), only_engines: Sequence[str] = ()) -> list[Series]:
     """All series that the cases list for `profile`, longest first; only the engines that are needed have to be there."""
     cases = discover()
     for name in only_cases:

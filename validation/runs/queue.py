@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import re
 import shlex
 import sys
@@ -13,13 +12,12 @@ from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import write_whole
 from dembark.validation.runs.job import read_report
 from dembark.validation.runs.plan import Plan, Resources, Run, finished
-from dembark.validation.runs.simulate import Tell, quiet
+from dembark.validation.runs.simulate import Progress, no_progress
 from dembark.validation.runs.site import Row, Site, word
 from dembark.validation.runs.steps import Step
 
@@ -43,7 +41,7 @@ class _Job:
     words: list[str]
     report: Path
     done: Callable[[], bool]
-    tell: Tell
+    progress: Progress
     number: str = ""
     gone: float | None = None
     future: Future[object] = field(default_factory=Future)
@@ -80,12 +78,12 @@ class Queue:
         """See Backend; the scheduler looks after cores and memory, only the number of jobs is limited here."""
         return len(busy) < self._limit
 
-    def start(self, run: Run, out: Path, used: Resources, tell: Tell) -> Future[object]:
+    def start(self, run: Run, out: Path, used: Resources, progress: Progress) -> Future[object]:
         """See Backend; the run is submitted as a job."""
         interval = [] if used.restart_interval is None else ["--restart-interval", str(used.restart_interval)]
         words = ["--inputs", run.inputs, "--ranks", str(used.ranks), "--threads", str(used.threads), *interval]
         report = out / f".{run.folder_name}.job.json"
-        job = _Job(run.name, self._name(run.inputs), used, words, report, lambda: finished(out / run.folder_name, run), tell)
+        job = _Job(run.name, self._name(run.inputs), used, words, report, lambda: finished(out / run.folder_name, run), progress)
         return self._add(job, out)
 
     def start_step(self, step: Step) -> Future[object] | None:
@@ -94,14 +92,14 @@ class Queue:
             return None
         out = self._results / step.place
         job = _Job(step.name, self._name(hashlib.sha256(step.name.encode()).hexdigest()), self._plan.measure, [], out / ".measure.job.json",
-                   lambda: False, quiet)
+                   lambda: False, no_progress)
         return self._add(job, out)
 
     def _add(self, job: _Job, out: Path) -> Future[object]:
         out.mkdir(parents=True, exist_ok=True)
         place = ["--place", str(out.relative_to(self._results)), "--results", str(self._results), "--report", str(job.report)]
         job.words = [*self._plan.words, *place, *job.words]
-        job.tell(state="queued")
+        job.progress(state="queued")
         self._jobs.append(job)
         return job.future
 
@@ -175,7 +173,7 @@ class Queue:
     def _submit(self, job: _Job, earlier: Row | None) -> None:
         if earlier is not None and self._site.lives(earlier):
             job.number = earlier.job
-            job.tell(job=job.number)
+            job.progress(job=job.number)
             return
         job.report.unlink(missing_ok=True)
         script, log = self._results / ".jobs" / f"{job.name}.sh", self._results / ".jobs" / f"{job.name}.log"
@@ -183,11 +181,11 @@ class Queue:
         write_whole(script, f"#!/bin/bash\n{self._site.preamble}\nexec {call}\n".encode())
         script.chmod(0o755)
         done = self._site.ask("submit", name=job.name, title=shlex.quote(job.title.replace(" ", "_")), log=log, script=script,
-                              **asked(self._site, job.used))
+                              **self._site.asked(job.used))
         number = None if done.returncode else self._site.number(done.stdout)
         if number is not None:
             job.number = number
-            job.tell(job=number)
+            job.progress(job=number)
         elif not self._site.transient(done.stderr + done.stdout):
             job.future.set_exception(RunError(f"{job.title} failed", "its job was refused", word(done)))
 
@@ -195,9 +193,9 @@ class Queue:
         told = read_report(job.report)
         facts = {key: told[key] for key in ("step", "steps", "time_step", "attempt", "resumed_from", "host") if key in told}
         if told.get("state") == "running":
-            job.tell(state="running")
+            job.progress(state="running")
         if facts and told.get("state") == "running":
-            job.tell(**facts)
+            job.progress(**facts)
         if row is not None and self._site.lives(row):
             if self._site.hopeless(row):
                 self._once(f"job {row.job} ({job.title}) will not start: {row.reason}; cancel it, or change what keeps it")
@@ -205,7 +203,7 @@ class Queue:
             return
         # The files tell how it ended; those of a node may be seen late.
         if job.done() or told.get("state") == "finished":
-            job.tell(**facts)
+            job.progress(**facts)
             job.future.set_result(None)
         elif told.get("state") == "failed":
             job.future.set_exception(RunError(told["message"]))
@@ -217,10 +215,3 @@ class Queue:
             how = f"as {row.state}" if row else "and is forgotten by the scheduler"
             log = self._results / ".jobs" / f"{job.name}.log"
             job.future.set_exception(Killed(f"{job.title} failed", f"its job {job.number} ended {how}", f"see {log}"))
-
-
-def asked(site: Site, used: Resources) -> dict[str, Any]:
-    """What a job asks for, with the site's values where the plan has none."""
-    return {"ranks": used.ranks, "threads": used.threads, "cores": used.cores,
-            "memory_mb": math.ceil((used.memory or site.jobs["memory"]) / 1e6), "minutes": math.ceil((used.time or site.jobs["time"]) / 60),
-            "seconds": math.ceil(used.time or site.jobs["time"])}

@@ -6,15 +6,20 @@ state in it, on whatever host. A run that fails by its own fault begins anew.
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
+import signal
 import subprocess
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from select import select
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from dembark.common.choices import Value
@@ -23,21 +28,75 @@ from dembark.common.files import DISK_FULL, disk_error, move_into_place, sweep, 
 from dembark.common.lock import lock
 from dembark.validation import provenance
 from dembark.validation.case import deck
+from dembark.validation.engines import end_with_parent
 from dembark.validation.runs import outcome, restarts
 from dembark.validation.runs.plan import Resources, Run, finished
-from dembark.validation.runs.process import chunks, running
 from dembark.validation.runs.progress import OutputParser
 
 _RESUMED = re.compile(r"dembark: resumed at step (\d+) (exact|approximate)ly")
-# Called with what changed: step, steps, time_step, attempt, resumed_from.
-Tell = Callable[..., None]
+# The callback of a run: it gets what has changed, of step, steps, time_step, attempt and resumed_from.
+Progress = Callable[..., None]
+_GRACE = 5.0
 
 
-def quiet(**facts: object) -> None:
-    """A `Tell` for callers that need no progress."""
+@contextmanager
+def running(command: Sequence[str], folder: Path, environment: Mapping[str, str]) -> Iterator[subprocess.Popen[bytes]]:
+    """The process of `command` in `folder`, with both its outputs in one pipe; at the end of the block it and its children are gone."""
+    # It must not go on alone when this process is killed, and its lines must come when it writes them.
+    words = [*end_with_parent("TERM"), *(["stdbuf", "-oL"] if shutil.which("stdbuf") else []), *command]
+    process = subprocess.Popen(words, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                               stderr=subprocess.STDOUT, start_new_session=True)
+    try:
+        yield process
+    finally:
+        _end_group(process)
 
 
-def simulate(run: Run, out: Path, cancel: threading.Event, used: Resources | None = None, tell: Tell = quiet) -> bool:
+def chunks(process: subprocess.Popen[bytes], pause: float = 0.3) -> Iterator[bytes]:
+    """What `process` writes, as it comes, until it ends; b"" whenever it was silent for `pause` (s)."""
+    assert process.stdout
+    while True:
+        if select([process.stdout], [], [], pause)[0]:
+            chunk = os.read(process.stdout.fileno(), 1 << 16)
+            if not chunk:
+                return
+            yield chunk
+        # A grandchild may hold the pipe open although the engine itself has ended.
+        elif process.poll() is not None:
+            return
+        else:
+            yield b""
+
+
+def _end_group(process: subprocess.Popen[bytes]) -> None:
+    """End the process and all that it started (its process group): politely first, after some seconds for good."""
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        try:
+            os.killpg(process.pid, number)
+        except ProcessLookupError:
+            break
+        deadline = time.monotonic() + _GRACE
+        while time.monotonic() < deadline and _group_lives(process):
+            time.sleep(0.05)
+    process.wait()
+    if process.stdout:
+        process.stdout.close()
+
+
+def _group_lives(process: subprocess.Popen[bytes]) -> bool:
+    process.poll()
+    try:
+        os.killpg(process.pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def no_progress(**facts: object) -> None:
+    """The callback of callers that need no progress."""
+
+
+def simulate(run: Run, out: Path, cancel: threading.Event, used: Resources | None = None, progress: Progress = no_progress) -> bool:
     """Run `run` into `out/replica-<k>`; False when its finished result stands there already.
 
     Until the run is finished and checked, an earlier result in that folder stays as it is. When it fails, RunError says why
@@ -49,7 +108,7 @@ def simulate(run: Run, out: Path, cancel: threading.Event, used: Resources | Non
         sweep(target)
         if finished(target, run):
             return False
-        _run_into(run, target, tell, _Ended(cancel, lost), used or Resources())
+        _run_into(run, target, progress, _Ended(cancel, lost), used or Resources())
     return True
 
 
@@ -64,7 +123,7 @@ class _Ended:
         return self.cancel.is_set() or self.lost.is_set()
 
 
-def _run_into(run: Run, target: Path, tell: Tell, ended: _Ended, used: Resources) -> None:
+def _run_into(run: Run, target: Path, progress: Progress, ended: _Ended, used: Resources) -> None:
     work = restarts.work_folder(run, target)
     computed = kept = False
     try:
@@ -73,9 +132,8 @@ def _run_into(run: Run, target: Path, tell: Tell, ended: _Ended, used: Resources
                 shutil.rmtree(other)
         outcome.check_room(run, target.parent)
         step, computed = restarts.begin(run, work), True
-        if step is None:
-            deck.write(run.case, run.engine.name, run.values, work)
-        record = _execute(run, work, step, tell, ended, used)
+        setup = deck.write(run.case, run.engine.name, run.values, work) if step is None else deck.prepare(run.case, run.values)
+        record = _execute(run, work, step, progress, ended, used) | {"derived": deck.derived(setup)}
         restarts.clear(run, work)
         deck.archive(run.case, work)
         write_json(work / "run.json", record)
@@ -90,14 +148,11 @@ def _run_into(run: Run, target: Path, tell: Tell, ended: _Ended, used: Resources
             raise Killed(f"{run.name} was given up", "another process has taken its lock, because this one was held up") from None
         kept, going_on = _going_on(run, work)
         raise Interrupted(f"{run.name} was interrupted", going_on) from None
-    except Killed as error:
-        kept, going_on = _going_on(run, work)
-        raise Killed(f"{run.name} failed", str(error), going_on, _keep_log(work, target)) from None
     except RunError as error:
-        # A run is at fault for what it did, but not for a disk without room.
-        faulty = computed and not str(error).startswith(DISK_FULL)
+        # A run is at fault for what it did, but not when it was killed, or for a disk without room.
+        faulty = computed and not isinstance(error, Killed) and not str(error).startswith(DISK_FULL)
         kept, going_on = (False, "") if faulty else _going_on(run, work)
-        raise RunError(f"{run.name} failed", str(error), going_on, _keep_log(work, target)) from None
+        raise type(error)(f"{run.name} failed", str(error), going_on, _keep_log(work, target)) from None
     finally:
         if not kept:
             shutil.rmtree(work, ignore_errors=True)
@@ -129,7 +184,7 @@ def _forget_failure(target: Path) -> None:
         kept.rmdir()
 
 
-def _execute(run: Run, work: Path, step: int | None, tell: Tell, ended: _Ended, used: Resources) -> dict[str, Any]:
+def _execute(run: Run, work: Path, step: int | None, progress: Progress, ended: _Ended, used: Resources) -> dict[str, Any]:
     """One attempt in `work`, from `step` on (None: from the start); the record of the finished run."""
     words: dict[str, Value] = {}
     every = 0
@@ -142,15 +197,18 @@ def _execute(run: Run, work: Path, step: int | None, tell: Tell, ended: _Ended, 
     began, clock = datetime.now(UTC), time.monotonic()
     restarts.remember(work, replace(before, attempts=before.attempts + 1, ended=False))
     parser = OutputParser()
-    tell(attempt=before.attempts + 1, resumed_from=step or 0)
+    progress(attempt=before.attempts + 1, resumed_from=step or 0)
 
     def update() -> None:
-        tell(step=parser.step, steps=parser.steps, time_step=parser.time_step)
+        progress(step=parser.step, steps=parser.steps, time_step=parser.time_step)
 
     try:
-        with running(command, work, run.engine.environment(used.threads)) as process:
-            _listen(process, work, parser, update, ended)
-            code = process.wait()
+        # Open MPI makes its session folder without regard to others that do so at the same time.
+        with TemporaryDirectory(prefix="dembark-", ignore_cleanup_errors=True) as own:
+            environment = run.engine.environment(used.threads) | {"TMPDIR": own}
+            with running(command, work, environment) as process:
+                _listen(process, work, parser, update, ended)
+                code = process.wait()
     finally:
         wall = time.monotonic() - clock
         done = _with_log(work, replace(before, attempts=before.attempts + 1, wall_time=before.wall_time + wall, ended=False))
@@ -161,7 +219,7 @@ def _execute(run: Run, work: Path, step: int | None, tell: Tell, ended: _Ended, 
     speed = run.particles * (parser.steps - (step or 0)) / wall if run.particles else None
     return {
         "case": run.case.name, "variant": run.variant, "profile": run.profile, "engine": run.engine.name, "replica": run.replica,
-        "parameters": dict(run.values), "derived": deck.derived(run.case, run.values), "seed": run.values.get("seed"),
+        "parameters": dict(run.values), "seed": run.values.get("seed"),
         "steps": parser.steps, "time_step": parser.time_step, "impact_id_offset": run.engine.facts.impact_id_offset, "frames": frames,
         "inputs": run.inputs, "deck": deck.sources(run.case, run.engine.name), "command": command,
         "attempts": done.attempts, "resumed_at": list(done.resumed_at), "resume": done.resume, "restart_every": every,

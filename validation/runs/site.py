@@ -1,12 +1,17 @@
-"""How a site's scheduler is spoken to: a TOML file with its commands, how their answers are read, and text for the shell of each job."""
+"""How a site's scheduler is spoken to: a TOML file with its commands, how their answers are read, and text for the shell of each job; and
+what it would refuse, told before anything is submitted."""
 
 from __future__ import annotations
 
 import getpass
+import math
 import os
 import re
 import shlex
+import shutil
 import subprocess
+import tempfile
+import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +21,9 @@ from dembark.common.choices import nearest
 from dembark.common.errors import DembarkError
 from dembark.validation.campaigns import sizes
 from dembark.validation.case.tables import TableReader, load_toml
+from dembark.validation.runs.plan import Resources
 
+_TRIES, _PAUSE = 4, 10.0
 SHIPPED = Path(__file__).with_name("sites")
 _JOBS = {"at_a_time": int, "memory": str, "time": str, "options": str, "poll": str, "latency": str}
 _COMMANDS = {"submit": str, "status": str, "cancel": str, "test": str}
@@ -58,7 +65,7 @@ class Site:
             raise DembarkError(f"the preamble of {self.path} fails", last[0], "mend it, or try it in a shell")
         return dict(entry.split("=", 1) for entry in done.stdout.split("\0") if "=" in entry)
 
-    def ask(self, command: str, jobs: Iterable[str] = (), **words: object) -> subprocess.CompletedProcess[str]:
+    def ask(self, command: str, jobs: Iterable[str] = (), /, **words: object) -> subprocess.CompletedProcess[str]:
         """Call one of the commands with these words in it; DembarkError when there is no such program."""
         several = {"options": shlex.split(self.jobs["options"]), "jobs": list(jobs)}
         told = {"user": getpass.getuser(), **words}
@@ -79,6 +86,12 @@ class Site:
         found = (re.search(self.answers["line"], line) for line in done.stdout.splitlines())
         rows = [Row(**{key: value.strip() for key, value in match.groupdict().items() if value is not None}) for match in found if match]
         return [row for row in rows if row.name.startswith(cut) or not row.name]
+
+    def asked(self, used: Resources) -> dict[str, int]:
+        """What a job asks for, with the site's values where the plan has none."""
+        time = used.time or self.jobs["time"]
+        return {"ranks": used.ranks, "threads": used.threads, "cores": used.cores, "minutes": math.ceil(time / 60),
+                "memory_mb": math.ceil((used.memory or self.jobs["memory"]) / 1e6), "seconds": math.ceil(time)}
 
     def waits(self, row: Row) -> bool:
         """Whether a job has not begun."""
@@ -156,3 +169,57 @@ def _check(reader: TableReader, jobs: Mapping[str, Any], commands: Mapping[str, 
                 raise reader.fail("answers", f"{key} has no group (?P<{group}>...)", "")
         except re.error as error:
             raise reader.fail("answers", f"{key} is no regular expression", str(error)) from None
+
+
+def check(site: Site, used: Iterable[Resources]) -> None:
+    """Ask the scheduler of `site` whether it answers and, if there is a way to ask, whether it would take jobs with these resources.
+
+    DembarkError tells in one line what it refuses.
+    """
+    absent = [name for name in dict.fromkeys(text.split()[0] for text in site.commands.values()) if not shutil.which(name)]
+    if absent:
+        raise DembarkError(f"{', '.join(absent)} not found", "on PATH", "start this on a machine that jobs are submitted from")
+    if site.rows() is None:
+        raise DembarkError("the scheduler does not answer", word(site.ask("status")), f"the question is in {site.path}")
+    if "test" in site.commands:
+        distinct = {tuple(site.asked(one).items()) for one in (*used, Resources())}
+        for resources in sorted(distinct):
+            _check_request(site, dict(resources))
+
+
+def _check_request(site: Site, resources: dict[str, int]) -> None:
+    with tempfile.TemporaryDirectory(prefix="dembark-") as folder:
+        script = Path(folder, "job.sh")
+        script.write_text("#!/bin/sh\n", encoding="utf-8")
+        for _ in range(_TRIES):
+            done = site.ask("test", name="dembark", title="dembark", log="/dev/null", script=script, **resources)
+            if not done.returncode or "configuration is not available" not in done.stderr:
+                break
+            # It says so also for a while after its own restart, until the nodes have told it what they are.
+            time.sleep(_PAUSE)
+    words = " ".join(f"{key}={value}" for key, value in resources.items())
+    place = f"asked with {words} {site.jobs['options']}, see the campaign's resources and {site.path}"
+    if done.returncode:
+        raise DembarkError("Slurm would refuse a job", word(done), place)
+    # Most sites let jobs wait for ever that ask for more time than their partition gives.
+    named = re.search(r"(?:--partition[= ]|-p ?)(\S+)", site.jobs["options"])
+    limit = time_limit(named.group(1) if named else "")
+    if limit and resources["minutes"] > limit:
+        raise DembarkError("Slurm would never start a job",
+                           f"{resources['minutes']} min exceed the partition's limit of {limit:g} min", place)
+
+
+def time_limit(partition: str) -> float | None:
+    """Longest job of `partition` (empty: the default one), in min; None when it is unlimited or unknown."""
+    try:
+        done = subprocess.run(["sinfo", "--noheader", "--format=%P|%l"], capture_output=True, text=True, errors="replace",
+                              stdin=subprocess.DEVNULL, timeout=60, check=False)
+    except (FileNotFoundError, subprocess.TimeoutExpired):
+        return None
+    for line in done.stdout.splitlines():
+        name, _, limit = line.strip().partition("|")
+        parts = re.fullmatch(r"(?:(\d+)-)?(?:(\d+):)?(\d+):(\d+)", limit)
+        if parts and (name.rstrip("*") == partition if partition else name.endswith("*")):
+            days, hours, minutes, seconds = (int(part or 0) for part in parts.groups())
+            return days * 1440 + hours * 60 + minutes + seconds / 60
+    return None

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
-from datetime import UTC, datetime
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from dembark import common, postproc, validation
 from dembark.common.errors import DembarkError, RunError
-from dembark.common.files import retire, write_json
+from dembark.common.files import retire
 from dembark.validation import analysis, pictures, provenance
+from dembark.validation.judge.result import COMPARISON, METRICS, Result, write
 from dembark.validation.runs.plan import Plan, PlannedStudy, Run, finished, studies, variants
 
 # A campaign's folder holds a copy of its file.
@@ -51,12 +52,11 @@ class Step:
 @cache
 def _code(reporting: bool) -> str:
     total = hashlib.sha256()
-    for package in (common, validation, postproc):
-        folder = Path(package.__file__).parent
+    for folder in (Path(place) for package in (common, validation, postproc) for place in package.__path__):
         for path in sorted(folder.rglob("*.*")):
             parts = set(path.relative_to(folder).parts)
             wanted = parts & _REPORTING and not parts & {"tests"} if reporting else not parts & (_REPORTING | _ELSEWHERE)
-            if path.suffix in (".py", ".j2", ".css") and wanted:
+            if path.suffix in (".py", ".toml", ".j2", ".css") and wanted:
                 total.update(path.read_bytes())
     return total.hexdigest()
 
@@ -66,18 +66,18 @@ def steps(plan: Plan, results: Path) -> list[Step]:
     found = []
     for one in plan.series:
         folder, own = results / one.place, one.runs[0].case.folder / "measure.py"
-        found.append(Step(name("measure", one.place), "measure", one.place, tuple(run.name for run in one.runs), folder / "metrics.json",
+        found.append(Step(name("measure", one.place), "measure", one.place, tuple(run.name for run in one.runs), folder / METRICS,
                           (own, *(folder / run.folder_name / "run.json" for run in one.runs)), measure_series, (folder, one.runs),
                           "".join(run.inputs for run in one.runs)))
     for planned in studies(plan.series):
-        parts = tuple(results / one.place / "metrics.json" for one in planned.series)
+        parts = tuple(results / one.place / METRICS for one in planned.series)
         found.append(Step(name("study", planned.place), "study", planned.place, tuple(name("measure", one.place) for one in planned.series),
-                          results / planned.place / "metrics.json", parts, measure_study, (results, planned)))
+                          results / planned.place / METRICS, parts, measure_study, (results, planned)))
     for place, group in variants(plan.series).items():
         if len(group) > 1:
             kinds = tuple(name("study" if isinstance(one, PlannedStudy) else "measure", one.place) for one in group)
-            sources = tuple(results / one.place / "metrics.json" for one in group)
-            found.append(Step(name("compare", place), "compare", place, kinds, results / place / "comparison.json", sources,
+            sources = tuple(results / one.place / METRICS for one in group)
+            found.append(Step(name("compare", place), "compare", place, kinds, results / place / COMPARISON, sources,
                               compare_engines, (results / place, sources)))
     sources = (results / "runs.json", results / CAMPAIGN_FILE, *(step.target for step in found))
     found.append(Step("report", "report", Path(), tuple(step.name for step in found), results / "report.html", sources, build_report,
@@ -86,95 +86,91 @@ def steps(plan: Plan, results: Path) -> list[Step]:
 
 
 def name(kind: str, place: Path) -> str:
-    """Name of a step: `measure silo dry yade`."""
+    """Name of a step: its kind, case, variant and engine."""
     return " ".join((kind, *place.parts))
 
 
-def _now() -> dict[str, Any]:
-    """When, and by which version of the code, something is measured; the runs themselves may be older."""
-    return {**provenance.commit(), "at": datetime.now(UTC).isoformat(timespec="seconds")}
-
-
 @contextmanager
-def _told(what: str) -> Iterator[None]:
-    """Whatever goes wrong in an analysis or a report is a failure to be told in one line."""
+def _told(what: str, why: Callable[[Exception], Iterable[str]] = lambda error: [f"{type(error).__name__}: {error}"]) -> Iterator[None]:
+    """Whatever goes wrong in an analysis or a report is a failure to be told in one line: `what`, and `why`."""
     try:
         yield
     except DembarkError:
         raise
     except Exception as error:
-        raise RunError(what, f"{type(error).__name__}: {error}") from error
+        raise RunError(what, *why(error)) from error
 
 
-def measure_series(folder: Path, runs: Iterable[Run]) -> dict[str, Any]:
-    """Write `folder/metrics.json` from the finished ones of `runs` and return it; results of other inputs are put aside first.
+def draw(folder: Path) -> list[str]:
+    """Draw the pictures of the replicas in `folder`; remarks where one cannot be drawn."""
+    from dembark.validation.metrics import picture
 
-    Raises RunError when none is finished or the measurement fails; then there is no metrics.json, rather than an old one.
+    return pictures.draw(folder, picture(folder))
+
+
+def measure_series(folder: Path, runs: Iterable[Run], drawn: Future[list[str]] | None = None) -> Result:
+    """Measure the finished ones of `runs` and write `folder/metrics.json`; results of other inputs are put aside first.
+
+    `drawn`: what `draw` returns, where the pictures are being drawn already. Raises RunError when none is finished or the measurement
+    fails; then there is no metrics.json, rather than an old one.
     """
-    from dembark.validation.metrics import measure
-
     wanted = {run.folder_name: run for run in runs}
     for path in folder.glob("replica-*"):
         if path.name not in wanted or not finished(path, wanted[path.name]):
             retire(path)
     done = [run for name, run in wanted.items() if (folder / name).is_dir()]
-    target = folder / "metrics.json"
+    target = folder / METRICS
     if not done:
         retire(target)
         raise RunError(f"nothing to measure in {folder}", "none of its runs is finished")
     target.unlink(missing_ok=True)
-    try:
-        with analysis.warnings_kept() as remarks:
-            content = measure(folder)
-    except DembarkError:
-        raise
-    except Exception as error:  # as in _told, with what is too small in the runs
-        raise RunError(f"{folder} could not be measured", *analysis.reasons(folder, error, done[0].case)) from error
-    content["remarks"] = [*content.get("remarks", ()), *remarks, *pictures.draw(folder, content.get("picture"))]
-    if "replicas" in content["parameters"]:
-        content["parameters"]["replicas"] = len(wanted)  # those of an earlier request for fewer or more are kept, and know its number
-    content["measured"] = _now()
-    content["inputs"] = [run.inputs for run in done]
-    content["replicas_missing"] = sorted(run.replica for run in wanted.values() if run not in done)
-    write_json(target, content)
-    return content
+    with _told(f"{folder} could not be measured", lambda error: analysis.reasons(folder, error, done[0].case)):
+        from dembark.validation.metrics import measure
+
+        # A process of its own draws, which measuring need not wait for.
+        with ThreadPoolExecutor(1) as beside:
+            drawn = drawn or beside.submit(draw, folder)
+            found = measure(folder, len(wanted))
+        return write(target, replace(found, remarks=(*found.remarks, *drawn.result())))
 
 
 def measure_study(results: Path, planned: PlannedStudy) -> None:
     """Write `metrics.json` of a study from those of its variants; RunError when one of them is missing or the study fails."""
-    from dembark.validation.metrics import study
-
-    target = results / planned.place / "metrics.json"
+    target = results / planned.place / METRICS
     target.parent.mkdir(parents=True, exist_ok=True)
     target.unlink(missing_ok=True)
     with _told(f"{results / planned.place} could not be measured"):
-        write_json(target, study(planned.study, [results / one.place for one in planned.series]) | {"measured": _now()})
+        from dembark.validation.metrics import study
+
+        write(target, study(planned.study, [results / one.place for one in planned.series]))
 
 
 def compare_engines(folder: Path, metrics: Sequence[Path]) -> None:
     """Write `folder/comparison.json` (folder = results/<profile>/<case>/<variant>) when all of `metrics` are there; an old one goes aside
     otherwise. RunError when the comparison fails."""
-    from dembark.validation.compare import compare
-
-    target = folder / "comparison.json"
+    target = folder / COMPARISON
     if not all(path.is_file() for path in metrics):
         retire(target)
         return
     target.unlink(missing_ok=True)
     with _told(f"{folder} could not be compared"):
-        write_json(target, compare(folder) | {"measured": _now()})
+        from dembark.validation.judge.compare import compare
+
+        write(target, replace(compare(folder), measured=provenance.measured()))
 
 
 def build_report(results: Path) -> None:
     """Write report.html and report.pdf into `results` (results/<profile> or a campaign's folder); RunError when that fails."""
+    build: Callable[[Path], Path]
     if (results / CAMPAIGN_FILE).is_file():
-        from dembark.validation.campaigns import report
+        from dembark.validation.campaigns.report import build
     else:
-        from dembark.validation import report, verification
+        from dembark.validation import verification
+        from dembark.validation.report import build
 
         # The report of a profile includes the verification of the instruments.
         verification.write(results)
     # Better none than one of other results.
     (results / "report.html").unlink(missing_ok=True)
     with _told(f"the report of {results} could not be built"):
-        report.build(results)
+        build(results)

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -68,21 +69,18 @@ class State:
         return (time.time() - self.began) * (self.steps - self.step) / done
 
 
-_COLUMNS = {"state": "state", "message": "message", "attempt": "attempts", "began": "began", "ended": "ended", "host": "host", "job": "job"}
-_OF_RUN = {"resumed_from": "resumed_from_step", "step": "step", "steps": "steps", "time_step": "time_step", "estimate": "estimated_time",
-           "inputs": "run_id", "folder": "folder"}
-_OF_STEP = {"inputs": "inputs", "name": "name", "kind": "kind"}
+@cache
+def _columns(table: str) -> dict[str, str]:
+    """Columns of `table`, runs or steps, by the fields of State that they hold."""
+    renamed = {"attempt": "attempts", "resumed_from": "resumed_from_step", "estimate": "estimated_time"}
+    renamed |= {"inputs": "run_id"} if table == "runs" else {}
+    named = {one.name: renamed.get(one.name, one.name) for one in fields(State)}
+    return {key: column for key, column in named.items() if column in schema.TABLES[table]}
 
 
-def _columns(state: State) -> dict[str, str]:
-    return _COLUMNS | (_OF_RUN if state.kind == "run" else _OF_STEP)
-
-
-def _state(name: str, kind: str, row: Mapping[str, Any]) -> State:
-    defaults = {field.name: field.default for field in fields(State)}
-    columns = _columns(State(name, kind=kind))
-    found = {key: defaults[key] if row[column] is None else row[column] for key, column in columns.items() if key not in ("name", "kind")}
-    return State(name, kind=kind, **found)
+def _state(name: str, table: str, row: Mapping[str, Any]) -> State:
+    found = {key: row[column] for key, column in _columns(table).items() if row[column] is not None}
+    return State(**found | {"name": name})
 
 
 class Table:
@@ -108,10 +106,10 @@ class Table:
         with self._guard:
             before = self._load()
             for folder, run in runs.items():
-                known = before.pop((run.inputs, folder), None)
-                self._states[run.name] = replace(known, name=run.name) if known else State(run.name, inputs=run.inputs, folder=folder)
+                known = before.pop((run.inputs, folder), State("", inputs=run.inputs, folder=folder))
+                self._states[run.name] = replace(known, name=run.name)
             for name, kind in steps.items():
-                self._states[name] = before.pop(("", name), None) or State(name, kind=kind)
+                self._states[name] = before.pop(("", name), State(name, kind=kind))
             planned = dict(self._states)
             gone = [state for key, state in before.items() if key[0] and (whole or key[1] in runs) and state.state != "superseded"]
             if self._results:
@@ -195,9 +193,9 @@ class Table:
             return {}
         with schema.writing(self._results / schema.FILE) as connection:
             # A folder may hold runs of other inputs that are superseded: their names are made unique.
-            found = {(row["run_id"], row["folder"]): _state(f"{row['folder']} {row['run_id']}", "run", row)
+            found = {(row["run_id"], row["folder"]): _state(f"{row['folder']} {row['run_id']}", "runs", row)
                      for row in connection.execute("SELECT * FROM runs")}
-            return found | {("", row["name"]): _state(row["name"], row["kind"], row) for row in connection.execute("SELECT * FROM steps")}
+            return found | {("", row["name"]): _state(row["name"], "steps", row) for row in connection.execute("SELECT * FROM steps")}
 
     def _save(self) -> None:
         self._saved = time.monotonic()
@@ -207,10 +205,11 @@ class Table:
         try:
             with schema.writing(self._results / schema.FILE) as connection:
                 for state in states:
-                    row = {column: getattr(state, key) for key, column in _columns(state).items()}
-                    if state.kind == "run" and state.state == "finished":
+                    table = "runs" if state.kind == "run" else "steps"
+                    row = {column: getattr(state, key) for key, column in _columns(table).items()}
+                    if table == "runs" and state.state == "finished":
                         row |= record_row(self._results / state.folder)
-                    schema.change(connection, "runs" if state.kind == "run" else "steps", row)
+                    schema.change(connection, table, row)
             self._changed.clear()
             self.problem = ""
         except RunError as error:
@@ -241,7 +240,7 @@ def read(results: Path) -> list[State]:
     if not path.is_file():
         return []
     sql = "SELECT * FROM runs WHERE state != 'superseded' ORDER BY rowid"
-    return [_state(" ".join(str(row[key]) for key in ("case_name", "variant", "engine", "replica")), "run", row)
+    return [_state(" ".join(str(row[key]) for key in ("case_name", "variant", "engine", "replica")), "runs", row)
             for row in schema.rows(path, sql)]
 
 

@@ -97,7 +97,6 @@ doc = "number of packings"
 steps = "100"
 time_step = "1e-5"
 
-[profiles.quick]
 [profiles.standard]
 replicas = 3
 grain_count = 20
@@ -110,9 +109,8 @@ contact_angle = 0.1
 quick = [{variant = "dry"}, {variant = "wet", engines = ["liggghts"]}]
 standard = [{variant = "dry"}]
 
-[[constraints]]
-expression = "kinetic_friction <= static_friction"
-message = "the kinetic friction exceeds the static one"
+[constraints]
+"kinetic_friction <= static_friction" = "the kinetic friction exceeds the static one"
 """
 
 

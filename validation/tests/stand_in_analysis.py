@@ -8,25 +8,35 @@ import sys
 import types
 
 
-def measure(folder):
+def measure(folder, wanted):
+    from dembark.validation.judge.result import QuantityRecord, Result
+
     replicas = sorted(folder.glob("replica-*/run.json"))
     if (folder / "unmeasurable").exists():
         raise ValueError("cannot be measured")
     first = json.loads(replicas[0].read_text())
-    quantity = {"name": "replicas", "value": len(replicas), "unit": "1", "interval": [0.5, 1.5], "reference": 1.0, "deviation": 0.0,
-                "tolerance": 0.1, "verdict": "fail" if first["variant"] == "wet" else "pass"}
-    return {**{key: first[key] for key in ("case", "variant", "engine", "profile", "parameters")}, "quantities": [quantity]}
+    quantity = QuantityRecord("replicas", len(replicas), "fail" if first["variant"] == "wet" else "pass", interval=(0.5, 1.5),
+                              reference=1.0, deviation=0.0, tolerance=0.1)
+    parameters = first["parameters"] | {"replicas": wanted}
+    return Result(*(first[key] for key in ("case", "variant", "engine")), (quantity,), first["profile"], parameters=parameters)
+
+
+def picture(folder):
+    return None
 
 
 def study(planned, folders):
-    points = [json.loads((folder / "metrics.json").read_text()) for folder in folders]
-    numbers = [point["parameters"][planned.along] for point in points]
-    return {"case": points[0]["case"], "variant": planned.folder_name, "engine": points[0]["engine"], "quantities": [], "numbers": numbers}
+    from dembark.validation.judge.result import Result, read
+
+    points = [read(folder / "metrics.json") for folder in folders]
+    numbers = [point.parameters[planned.along] for point in points]
+    return Result(points[0].case, planned.folder_name, points[0].engine, (), parameters={"numbers": numbers})
 
 
 def compare(folder):
-    return {"case": folder.parent.name, "variant": folder.name,
-            "engines": sorted(path.parent.name for path in folder.glob("*/metrics.json")), "quantities": []}
+    from dembark.validation.judge.result import Comparison
+
+    return Comparison(folder.parent.name, folder.name, tuple(sorted(path.parent.name for path in folder.glob("*/metrics.json"))), ())
 
 
 def build(folder):
@@ -39,7 +49,7 @@ def write(folder):
     pass
 
 
-for name, function in (("verification", write), ("metrics", measure), ("metrics", study), ("compare", compare), ("report", build),
-                       ("campaigns.report", build)):
+for name, function in (("verification", write), ("metrics", measure), ("metrics", picture), ("metrics", study), ("judge.compare", compare),
+                       ("report", build), ("campaigns.report", build)):
     module = sys.modules.setdefault(f"dembark.validation.{name}", types.ModuleType(f"dembark.validation.{name}"))
     setattr(module, function.__name__, function)

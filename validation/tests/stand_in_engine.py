@@ -34,6 +34,8 @@ with pathlib.Path("pid").open("w", encoding="utf-8") as file:
     file.write(str(os.getpid()))
 with pathlib.Path("values").open("w", encoding="utf-8") as file:
     file.write("\n".join(f"{key}={value}" for key, value in sorted(values.items())))
+with pathlib.Path("tmpdir").open("w", encoding="utf-8") as file:
+    file.write(os.environ.get("TMPDIR", ""))
 every, begin = int(values.get("restart_every", 0)), 0
 suffix = "restart" if "-in" in words else "yade.gz"
 if values.get("resume") == "yes":

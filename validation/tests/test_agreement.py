@@ -5,12 +5,13 @@ import math
 import pytest
 
 from dembark.postproc.statistics import exact
-from dembark.validation.compare import pair
-from dembark.validation.judge.quantity import Quantity
+from dembark.validation.judge.compare import pair
+from dembark.validation.judge.measuring import judged
+from dembark.validation.judge.result import as_json
 
 
 def entry(value, agreement, half=0.0):
-    return Quantity("speed", "speed", "m/s", exact(value, half), agreement=agreement).as_json()
+    return judged("speed", "speed", "m/s", exact(value, half), agreement=agreement)
 
 
 @pytest.mark.parametrize(
@@ -26,12 +27,12 @@ def entry(value, agreement, half=0.0):
 )
 def test_deterministic_numbers_agree_within_their_bound(one, other, verdict):
     found = pair(entry(one, 1e-9), entry(other, 1e-9), "liggghts", "yade")
-    assert found["verdict"] == verdict
+    assert found.verdict == verdict
     if verdict == "pass":
-        assert found["deviation_kind"] == "absolute" and found["tolerance"] == 1e-9
+        assert found.deviation_kind == "absolute" and found.tolerance == 1e-9
 
 
 def test_numbers_without_a_bound_are_compared_by_their_intervals():
-    assert "agreement" not in entry(1.0, None)
-    assert pair(entry(1.0, None, 0.06), entry(1.05, None, 0.06), "liggghts", "yade")["verdict"] == "pass"
-    assert pair(entry(1.0, None), entry(1.05, None), "liggghts", "yade")["verdict"] == "fail"
+    assert "agreement" not in as_json(entry(1.0, None))
+    assert pair(entry(1.0, None, 0.06), entry(1.05, None, 0.06), "liggghts", "yade").verdict == "pass"
+    assert pair(entry(1.0, None), entry(1.05, None), "liggghts", "yade").verdict == "fail"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from pathlib import Path
 
 import pytest
@@ -31,6 +32,35 @@ def test_case_is_read(decks: Path) -> None:
     assert case.parameters["grain_diameter"].value == 0.005
     assert case.parameters["grain_diameter"].range == "> 0"
     assert [(run.variant, run.engines) for run in case.runs["quick"]] == [("dry", ("liggghts", "yade")), ("wet", ("liggghts",))]
+
+
+def test_what_the_folder_says_need_not_be_written(decks: Path) -> None:
+    path = edited(decks, 'name = "box"\n', "")
+    (decks / "box" / "yade.py").unlink()
+    case = load(edited(decks, 'engines = ["liggghts", "yade"]\n', ""))
+    assert (case.name, case.engines) == ("box", ("liggghts",))
+    assert resolve(case, "full") == resolve(case, "quick") == resolve(case)
+    (decks / "box" / "liggghts.in").unlink()
+    folders.load.cache_clear()
+    with pytest.raises(DembarkError, match=r"there is no deck, \[case\] of .*, one of liggghts.in, yade.py"):
+        load(path)
+
+
+def test_runs_are_named_or_tables(decks: Path) -> None:
+    case = load(edited(decks, '[{variant = "dry"}]', '[{variants = ["wet", "dry"], replicas = {yade = 2}}]'))
+    assert [(run.variant, run.engines, run.replicas) for run in case.runs["standard"]] == [
+        (name, ("liggghts", "yade"), {"yade": 2}) for name in ("wet", "dry")]
+    case = load(edited(decks, '[{variant = "dry"}, ', '["dry", '))
+    assert [(run.variant, run.engines) for run in case.runs["quick"]] == [("dry", ("liggghts", "yade")), ("wet", ("liggghts",))]
+
+
+def test_bodies_are_counted_with_derived_numbers(decks: Path) -> None:
+    case = load(edited(decks, 'steps = "100"', 'steps = "100"\ntwice = "2 * grain_count"'))
+    case = load(edited(decks, '[case]', '[case]\nparticles = "twice"'))
+    assert case.particle_count(resolve(case)) == 20
+    case = load(edited(decks, 'twice = ', 'half = "1 / 0"\ntwice = '))
+    with pytest.raises(DembarkError, match=r"half = '1 / 0' cannot be evaluated, \[derived\] of case box"):
+        case.particle_count(resolve(case))
 
 
 def test_order_of_overrides(decks: Path) -> None:
@@ -123,6 +153,12 @@ variants = ["dry", "wet", "large"]
     ('quick = [{variant = "dry"}', 'quick = [{variant = "dry", replicas = {yad = 1}}', ["replicas", "did you mean yade"]),
     ('quick = [{variant = "dry"}', 'quick = [{variant = "dry", replicas = {yade = 0}}', ["replicas", "out of range"]),
     ('quick = [{variant = "dry"}', 'quick = [{variant = "dry", replicas = 2}', ["replicas", "wrong type"]),
+    ('quick = [{variant = "dry"}', 'quick = ["dri"', ["dri", "did you mean dry"]),
+    ('quick = [{variant = "dry"}', 'quick = [{variants = ["dri"]}', ["dri", "did you mean dry"]),
+    ('quick = [{variant = "dry"}', 'quick = [{variants = []}', ["in quick", "give variant or variants"]),
+    ('quick = [{variant = "dry"}', 'quick = [{variant = "dry", variants = ["wet"]}', ["in quick", "give variant or variants"]),
+    ('"the kinetic friction exceeds the static one"', "3", ["3 is no sentence", "[constraints]"]),
+    ("[runs]", '[studies]\nsize = "dry"\n[runs]', ["'dry' is no table", "studies.size"]),
     ('name = "box"', 'name = "bax"', ["bax", "box"]),
     ('engines = ["liggghts", "yade"]', 'engines = ["ligghts"]', ["did you mean liggghts"]),
     ("kinetic_friction <= static", "kinetic_frictio <= static", ["kinetic_frictio"]),
@@ -197,6 +233,11 @@ def test_expressions_agree_with_python(a: float, b: float) -> None:
     assert Expression("a <= b or -a > 2*b")(values) == (a <= b or -a > 2 * b)
     assert Expression("min(a, b) + abs(a) < max(a, b)/2 and not a == b")(values) == (min(a, b) + abs(a) < max(a, b) / 2 and a != b)
     assert Expression("0 < a < b")(values) == (0 < a < b)
+
+
+def test_expressions_go_to_other_processes() -> None:
+    again = pickle.loads(pickle.dumps(Expression("first(a, b) > 1 and c > 0")))
+    assert again.names == {"a", "b", "c"} and again({"b": 2, "c": 1}) is True and again({"b": 2}) is None
 
 
 @pytest.mark.parametrize("text", ["a.b", "a[0]", "lambda: 1", "open('x')", "a := 1", "[1]", "a if b else 1", "f'{a}'", "a if", "min(*a)"])

@@ -155,7 +155,7 @@ def final_energy(folder: Path) -> float:
 @pytest.mark.parametrize(("engine", "gravity"), [("liggghts", 9.81), ("liggghts", -2.0), ("yade", 2.0)])
 def test_both_engines_get_the_parameters_and_fall_as_they_say(tmp_path: Path, engine: str, gravity: float) -> None:
     told: dict[str, object] = {}
-    simulate(plan(engine, gravity=gravity), tmp_path / "out", threading.Event(), tell=lambda **facts: told.update(facts))
+    simulate(plan(engine, gravity=gravity), tmp_path / "out", threading.Event(), progress=lambda **facts: told.update(facts))
     folder = tmp_path / "out/replica-1"
     record = read_json(folder / "run.json")
     assert (record["steps"], record["time_step"], record["frames"]) == (1000, 1e-5, 2)

@@ -8,20 +8,14 @@ import pytest
 
 from dembark.common.errors import RunError
 from dembark.postproc.statistics import Estimate, over_replicas
-from dembark.validation.compare import pair
-from dembark.validation.judge.quantity import Quantity, judge
+from dembark.validation.judge.compare import pair
+from dembark.validation.judge.measuring import judge, judged
+from dembark.validation.judge.result import QuantityRecord, as_json
 from dembark.validation.metrics import measure
 
 
 def entry(value, half, basis="5 replicas"):
-    return {
-        "basis": basis,
-        "name": "q",
-        "label": "q",
-        "unit": "1",
-        "value": value,
-        "interval": None if half is None else [value - half, value + half],
-    }
+    return QuantityRecord("q", value, "info", label="q", interval=None if half is None else (value - half, value + half), basis=basis)
 
 
 @pytest.mark.parametrize(
@@ -36,7 +30,7 @@ def entry(value, half, basis="5 replicas"):
     ],
 )
 def test_verdict_of_a_pair(one, other, verdict):
-    assert pair(entry(*one), entry(*other), "liggghts", "yade")["verdict"] == verdict
+    assert pair(entry(*one), entry(*other), "liggghts", "yade").verdict == verdict
 
 
 @pytest.mark.parametrize("other", [1.0, 1.05, 1.5])
@@ -44,8 +38,8 @@ def test_verdict_of_a_pair(one, other, verdict):
 def test_intervals_within_fewer_than_three_packings_leave_a_comparison_open(other, packings):
     single = f"within {packings}: jackknife over 8 sectors or bands"
     found = pair(entry(1.0, 0.01, single), entry(other, 0.01), "liggghts", "yade")
-    assert found["verdict"] == "info"
-    assert f"within {packings.split()[0]} packing" in found["reason"]
+    assert found.verdict == "info"
+    assert f"within {packings.split()[0]} packing" in found.reason
 
 
 def test_one_of_many_comparisons_may_lie_beyond_its_interval():
@@ -55,11 +49,11 @@ def test_one_of_many_comparisons_may_lie_beyond_its_interval():
     verdicts = []
     for page in samples:
         estimates = [[over_replicas([Estimate(value, 0.0) for value in engine]) for engine in quantity] for quantity in page]
-        verdicts.append({pair(*(entry(one.value, one.half, one.basis) for one in two), "liggghts", "yade", 20)["verdict"]
+        verdicts.append({pair(*(entry(one.value, one.half, one.basis) for one in two), "liggghts", "yade", 20).verdict
                          for two in estimates})
     assert sum("fail" in page for page in verdicts) <= 12
     assert sum("info" in page for page in verdicts) > 100
-    assert pair(entry(1.0, 0.01), entry(1.05, 0.01), "liggghts", "yade", 20)["verdict"] == "fail"
+    assert pair(entry(1.0, 0.01), entry(1.05, 0.01), "liggghts", "yade", 20).verdict == "fail"
 
 
 @pytest.mark.parametrize(
@@ -78,15 +72,15 @@ def test_verdict_needs_an_interval_narrower_than_the_tolerance(deviation, half, 
 
 
 def test_nan_fails():
-    broken = Quantity("q", "q", "1", Estimate(float("nan"), 0.1), reference=Estimate(1.0, 0.0), tolerance=0.1)
-    assert broken.judged()[0] == "fail"
-    assert broken.as_json()["value"] is None
+    broken = judged("q", "q", "1", Estimate(float("nan"), 0.1), reference=Estimate(1.0, 0.0), tolerance=0.1)
+    assert broken.verdict == "fail"
+    assert as_json(broken)["value"] is None
 
 
 def test_a_bound_that_is_not_finite_is_none_in_the_file() -> None:
     """A column too small for an interval allows anything; JSON has no number for that."""
-    entry = Quantity("field_balance", "balance", "1", Estimate(0.1, math.inf), reference=Estimate(0.0, 0.0), tolerance=math.inf,
-                     absolute=True).as_json()
+    entry = as_json(judged("field_balance", "balance", "1", Estimate(0.1, math.inf), reference=Estimate(0.0, 0.0), tolerance=math.inf,
+                           absolute=True))
     assert entry["tolerance"] is None and entry["interval"] is None
     json.dumps(entry, allow_nan=False)
 

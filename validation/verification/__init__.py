@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-
-import numpy as np
+from typing import Any
 
 from dembark.common.files import read_json, write_json
-from dembark.validation.judge.result import QuantityRecord, as_json, from_json
+from dembark.validation.judge.result import QuantityRecord, from_json
 from dembark.validation.judge.tally import VERIFICATION as FILE
 from dembark.validation.verification import fields_balance, fields_exact, fields_rings
 from dembark.validation.verification.item import Curve, Item, Panel
@@ -36,24 +35,14 @@ def items() -> list[Item]:
 
 def write(results: Path, found: list[Item] | None = None) -> None:
     """Compute all items, unless they are `found` already, and write them to `verification.json` in a results folder."""
-    chosen = items() if found is None else found
-    quantities = [as_json(one) for item in chosen for one in item.quantities]
-    described = [{**{key: getattr(item, key) for key in ("name", "title", "text", "caption")},
-                  "quantities": [one.name for one in item.quantities],
-                  "panels": [asdict(panel) | {"curves": [_plain(curve) for curve in panel.curves]} for panel in item.panels]}
-                 for item in chosen]
-    write_json(results / FILE, {"quantities": quantities, "items": described})
-
-
-def _plain(curve: Curve) -> dict[str, object]:
-    return {"label": curve.label, "place": np.asarray(curve.place, float).tolist(), "value": np.asarray(curve.value, float).tolist(),
-            "theory": curve.theory}
+    write_json(results / FILE, {"items": [asdict(item) for item in (items() if found is None else found)]})
 
 
 def read(results: Path) -> list[Item]:
     """The items in the `verification.json` of a results folder; none when there is no such file."""
-    content = read_json(results / FILE) or {}
-    records = {one["name"]: from_json(one, QuantityRecord, FILE) for one in content.get("quantities", [])}
-    return [Item(one["name"], one["title"], one["text"], [records[name] for name in one["quantities"]],
-                 [Panel(**panel | {"curves": [Curve(**curve) for curve in panel["curves"]]}) for panel in one["panels"]], one["caption"])
-            for one in content.get("items", [])]
+    return [_item(one) for one in (read_json(results / FILE) or {}).get("items", [])]
+
+
+def _item(content: dict[str, Any]) -> Item:
+    panels = [Panel(**panel | {"curves": [Curve(**curve) for curve in panel["curves"]]}) for panel in content["panels"]]
+    return Item(**content | {"quantities": [from_json(one, QuantityRecord, FILE) for one in content["quantities"]], "panels": panels})

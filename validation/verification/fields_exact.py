@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from dembark.postproc import ContactFrame, GrainFrame
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import NAMES, Kernel
@@ -43,12 +44,13 @@ def conservation() -> Item:
     )
 
 
-def _totals(frame: object, network: scenes.Network, kernel: str, width: float, due: tuple[Array, ...],
+def _totals(frame: GrainFrame, network: scenes.Network, kernel: str, width: float, due: tuple[Array, ...],
             scales: tuple[float, ...]) -> list[float]:
     margin = Kernel(kernel, width).reach
     count = int(np.ceil((1.0 + 2.0 * margin) / 0.15))
-    grid = Grid([-margin] * 3, [0.15 * count - margin] * 3, (count,) * 3)
-    fields = coarse_grain(frame, network.links, grid, kernel=kernel, width=width).fields()  # type: ignore[arg-type]
+    grid = Grid(np.full(3, -margin), np.full(3, 0.15 * count - margin), (count,) * 3)
+    fields = coarse_grain(frame, network.links, grid, kernel=kernel, width=width).fields()
+    assert fields.contact_stress is not None
     sums = (values.sum(axis=(0, 1, 2)) * grid.cell_volume for values in (fields.density, fields.momentum, fields.contact_stress))
     return [float(np.abs(found - known).max() / scale) for found, known, scale in zip(sums, due, scales, strict=True)]
 
@@ -56,7 +58,7 @@ def _totals(frame: object, network: scenes.Network, kernel: str, width: float, d
 def threads() -> Item:
     """The same system on different numbers of threads."""
     network = scenes.heap()
-    grid = Grid([-0.4] * 3, [1.4] * 3, (18,) * 3)
+    grid = Grid(np.full(3, -0.4), np.full(3, 1.4), (18,) * 3)
 
     def summed(count: int) -> FieldSums:
         return coarse_grain(network.frame, network.links, grid, width=0.12, walls=[network.base], threads=count)
@@ -71,8 +73,7 @@ def threads() -> Item:
         "The compiled coarse graining on 1, 2, 3 and 7 threads, bit by bit, and beside the plain implementation in numpy, which shares no "
         "compiled code with it.",
         [exact("thread_differences", "sums that differ in any bit on 2, 3 or 7 threads from those on 1", different,
-               "same order of additions",
-               tolerance=0.0),
+               "same order of additions", tolerance=0.0),
          exact("backend_difference", "compiled against plain, largest difference over the largest sum", gap, "two implementations")],
     )
 
@@ -112,9 +113,9 @@ def lattice() -> Item:
     )
 
 
-def _periodic(frame: object, links: object, kernel: str, width: float, cells: int = 10) -> Array:
-    grid = Grid(frame.low, frame.high, (cells,) * 3, (True,) * 3)  # type: ignore[attr-defined]
-    stress = coarse_grain(frame, links, grid, kernel=kernel, width=width).fields().contact_stress  # type: ignore[arg-type]
+def _periodic(frame: GrainFrame, links: ContactFrame, kernel: str, width: float, cells: int = 10) -> Array:
+    grid = Grid(frame.low, frame.high, (cells,) * 3, (True,) * 3)
+    stress = coarse_grain(frame, links, grid, kernel=kernel, width=width).fields().contact_stress
     assert stress is not None
     return stress
 
@@ -125,7 +126,7 @@ def shear() -> Item:
     place, radii = network.frame.positions, network.frame.radii
     gradient = np.array([[0.1, 1.0, -0.4], [0.3, -0.2, 0.6], [0.0, 0.5, 0.1]])
     spin = np.array([0.3, -0.7, 0.2])
-    grid = Grid([0.0] * 3, [1.0] * 3, (8,) * 3)
+    grid = Grid(np.zeros(3), np.ones(3), (8,) * 3)
     sheared = coarse_grain(scenes.grains(place, radii, place @ gradient.T, low=np.zeros(3), high=np.ones(3)), None, grid, width=0.15)
     turning = coarse_grain(scenes.grains(place, radii, np.cross(spin, place), low=np.zeros(3), high=np.ones(3)), None, grid,
                            width=0.15).fields()

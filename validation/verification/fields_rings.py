@@ -37,8 +37,7 @@ def rings() -> Item:
         [exact("ring_mass", "mass in the rings over that of the grains, − 1", fields.mass.sum() / network.frame.masses.sum() - 1.0,
                "closed form"),
          exact("ring_balance", "balance of vertical momentum, the worst ring, over max ρ g", float(unbalanced), "momentum balance",
-               tolerance=1e-3,
-               detail="Gauss's rule along the lines, and the table of the kernel; the limit is that of the cases")],
+               tolerance=1e-3, detail="Gauss's rule along the lines, and the table of the kernel; the limit is that of the cases")],
         [Panel("Rings against cubes", "spacing of the cubes / width", "largest difference / largest stress", [
             Curve("σ$_{zz}$, σ$_{rr}$, σ$_{rz}$", spacings / _WIDTH, errors),
             Curve("cut of the cubes' Gaussian", spacings / _WIDTH, np.full(len(spacings), cut), theory=True)])],
@@ -58,7 +57,7 @@ def _centred(network: Network) -> Network:
 def _against_cubes(network: Network, cells: Rings, fields: Fields, spacing: float) -> float:
     half, low = 1.2, -0.6
     across, up = int(np.ceil(2.0 * half / spacing)), int(np.ceil(2.2 / spacing))
-    grid = Grid([-half, -half, low], [half, half, low + up * spacing], (across, across, up))
+    grid = Grid(np.array([-half, -half, low]), np.array([half, half, low + up * spacing]), (across, across, up))
     stress = coarse_grain(network.frame, network.links, grid, width=_WIDTH, walls=[network.base]).fields().contact_stress
     assert stress is not None
     place = grid.points()[..., :2]

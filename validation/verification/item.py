@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark.postproc.statistics import Estimate
-from dembark.validation.judge.quantity import Quantity
+from dembark.validation.judge.measuring import judged
 from dembark.validation.judge.result import QuantityRecord
 
 Array = NDArray[np.float64]
@@ -28,6 +28,10 @@ class Curve:
     place: Sequence[float] | Array
     value: Sequence[float] | Array
     theory: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("place", "value"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), float).tolist())
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,5 @@ def order(name: str, label: str, steps: Array, errors: Array, due: float, source
 
 def _judged(name: str, label: str, unit: str, value: float, due: float, tolerance: float, source: str, detail: str,
             evidence: str) -> QuantityRecord:
-    return Quantity(name, label, unit, Estimate(value, 0.0), reference=Estimate(due, 0.0), absolute=True, tolerance=tolerance,
-                    source=source,
-                    detail=detail, compared=False, evidence=evidence).record()
+    return judged(name, label, unit, Estimate(value, 0.0), reference=Estimate(due, 0.0), absolute=True, tolerance=tolerance, source=source,
+                  detail=detail, compared=False, evidence=evidence)

@@ -20,5 +20,4 @@ O.engines = [
     PyRunner(command="if O.iter: dump.write()", iterPeriod=p.stride),
     NewtonIntegrator(damping=0, gravity=weight),
 ]
-dembark.announce(p.steps)
 dembark.run(p.steps)

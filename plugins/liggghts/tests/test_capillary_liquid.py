@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig.liggghts_driver import properties, read_dump, run_deck
-from rig.packing import packing
+from rig.liggghts_driver import head, properties, read_dump, run_deck
+from rig.packing import packing, start_state
 from rig.scenarios import Material
 
 LIQUID = Material(static_friction=0.5, kinetic_friction=0.4, bridge_volume=1.0)
@@ -17,13 +17,7 @@ SIDE = 0.03
 GRAINS = "\n".join(f"create_atoms 1 single {0.003 + 0.006 * i} {0.003 + 0.006 * j} {0.004 + 0.006 * k} units box"
                    for i in range(5) for j in range(5) for k in range(5))
 CREATE = f"region domain block 0 {SIDE} 0 {SIDE} -0.005 0.05 units box\ncreate_box 2 domain\n{GRAINS}"
-STATE = """\
-variable size atom 0.0045*(1+0.25*sin(37*id))
-variable push_x atom 0.5*sin(91*id)
-variable push_y atom 0.5*sin(53*id)
-variable push_z atom 0.5*sin(17*id)-0.3
-set group all density 2500 diameter v_size density 2500
-set group all vx v_push_x vy v_push_y vz v_push_z"""
+STATE = start_state("0.0045*(1+0.25*sin(37*id))", 0.5)
 THERMO = "thermo_style custom step atoms " + " ".join(f"f_liquid[{k}]" for k in range(1, 9))
 OUTPUT = {name: k for k, name in enumerate(("step", "atoms", "grains", "bridges", "walls", "lost", "count", "added", "held", "error"))}
 
@@ -48,12 +42,7 @@ def shaken(run: str, *, ranks: int = 1, liquid: str = "content 0.01 return radiu
     planes = "\n".join(f"fix {name} all wall/gran {MODELS} primitive type 2 {axis}plane {at} {words}"
                        for name, axis, at in (("left", "x", 0.0), ("right", "x", SIDE), ("front", "y", 0.0), ("back", "y", SIDE)))
     return f"""\
-units si
-atom_style granular
-atom_modify map array
-boundary f f f
-newton {newton}
-communicate single vel yes
+{head(newton)}
 processors {grid}
 {create}
 neighbor 0.002 bin
@@ -147,9 +136,10 @@ def test_resumed_run_is_the_same_to_the_bit(tmp_path, ranks):
     assert resumed[-1].tolist() == rows[-1].tolist()
 
 
-def test_restart_on_other_ranks_conserves(tmp_path):
-    before = run_shaken(tmp_path, shaken("run 1000\nwrite_restart bed.restart"))
-    after = run_shaken(tmp_path, shaken("run 500", ranks=2, create="read_restart bed.restart", state=""), ranks=2)
+@pytest.mark.parametrize(("ranks", "others"), [(1, 2), (2, 1)])
+def test_restart_on_other_ranks_conserves(tmp_path, ranks, others):
+    before = run_shaken(tmp_path, shaken("run 1000\nwrite_restart bed.restart", ranks=ranks), ranks=ranks)
+    after = run_shaken(tmp_path, shaken("run 500", ranks=others, create="read_restart bed.restart", state=""), ranks=others)
     np.testing.assert_allclose(after[0, 2:9], before[-1, 2:9], rtol=1e-13, atol=1e-25)
     np.testing.assert_allclose(column(after, "held"), column(before, "held")[0], rtol=1e-14)
     assert column(after, "count")[-1] > 0
@@ -165,7 +155,8 @@ def test_grains_that_leave_take_their_liquid_with_them(tmp_path, ranks):
     np.testing.assert_allclose(held + lost, held[0], rtol=1e-14)
 
 
-def test_deleted_grains_and_walls(tmp_path):
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_deleted_grains_and_walls(tmp_path, ranks):
     """A group is deleted in mid-heap, and a wet wall goes; what was in their bridges falls back to those that stay."""
     commands = """\
 run 1000
@@ -176,7 +167,7 @@ unfix left
 variable seen equal f_liquid[5]
 print "bridges while a wall is gone: ${seen}"
 run 250"""
-    rows = run_shaken(tmp_path, shaken(commands))
+    rows = run_shaken(tmp_path, shaken(commands, ranks=ranks), ranks=ranks)
     held, lost = column(rows, "held"), column(rows, "lost")
     np.testing.assert_allclose(held + lost, held[0], rtol=1e-13)
     assert column(rows, "atoms")[-1] == 65

@@ -77,6 +77,19 @@ fix more all insert/pack seed 49979687 distributiontemplate kinds vel constant 0
     np.testing.assert_allclose(account.kinetic, account.full, rtol=1e-14)
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_deleted_grains(tmp_path, ranks):
+    """Their kinetic energy is imposed; what their springs held is no error of the step."""
+    text = bed("run 1200\ngroup some id 1:20\ndelete_atoms group some compress no\nrun 600", ranks=ranks)
+    account = account_bed(tmp_path, text, ranks=ranks)
+    account.assert_balanced()
+    before, after = np.flatnonzero(account.step == 1200)
+    assert account.atoms[after] == account.atoms[before] - 20
+    assert account.normal_stored[after] < account.normal_stored[before]
+    assert account.imposed[after] == pytest.approx(account.full[after] - account.full[before], rel=1e-12)
+    assert account.step_error[after] == pytest.approx(account.step_error[before], abs=1e-13 * account.turnover)
+
+
 def test_driven_and_frozen_grains_are_walls(tmp_path):
     groups = "group stuck id 1 5 9\ngroup pushed id 17 33\ngroup free subtract all stuck pushed\nvelocity stuck set 0 0 0\n"
     drive = "fix free free nve/sphere\nfix hold stuck freeze\nfix push pushed move wiggle 0.0005 0 0.0005 0.02"

@@ -35,6 +35,38 @@ def test_a_contact_that_ends_forgets(tmp_path):
     assert load_at_second_touch(run(case, tmp_path / "stock", tangential="history")) > 0.1
 
 
+def jumping(folder, material, after: str, engines_loop: bool):
+    """Two grains touch and slide; in step 20 alone they are far apart, and later, by `after` (m), as before or at a gap."""
+    k = "(t/0.000127-20)"
+    slide = Path(displacement=("0.00001*(1-exp(-t/0.0003))", "0", f"-0.00002+{after}/(1+exp(-20*({k}+0.5)))+0.0015*exp(-25*{k}*{k})"),
+                 velocity=("0.00001*exp(-t/0.0003)/0.0003", "0", "0"))
+    case = Scenario(name="jump", material=replace(material, restitution=1.0), time_step=1.27e-4, steps=45, stride=1,
+                    grains=(Grain(position=(0.0, 0.0, 5e-3), path=slide), Grain(position=(0.0, 0.0, -5e-3), path=STILL)))
+    text = deck(case).replace("neighbor 0.001 bin", "neighbor 0.004 bin")  # no new list that would end the contact
+    if engines_loop:  # a rolling model, here without resistance, stands in the way of ours
+        models = next(line for line in text.splitlines() if line.startswith("pair_style"))
+        rolling = "fix p_roll all property/global coefficientRollingFriction peratomtypepair 2 0 0 0 0\n"
+        text = text.replace(models, rolling + models.replace(" presliding", " rolling_friction cdt presliding"))
+    done = run_deck(folder, text)
+    assert done.code == 0, done.error
+    return motion(case, folder)
+
+
+@pytest.mark.parametrize("engines_loop", [False, True])
+def test_a_contact_forgets_though_the_grains_jump_out_of_reach(tmp_path, engines_loop):
+    """In one step beyond the distance up to which the engine tells the models about a pair, and in the next one back."""
+    found = jumping(tmp_path, DRY, "0", engines_loop)
+    apart = np.flatnonzero(found.normal_force == 0.0)
+    assert len(apart) == 1 and np.linalg.norm(found.tangential_force[apart[0] - 1]) > 0.1 * found.normal_force[apart[0] - 1]
+    assert np.linalg.norm(found.tangential_force[apart[0] + 1]) < 0.01 * found.normal_force[apart[0] + 1]
+
+
+@pytest.mark.parametrize("engines_loop", [False, True])
+def test_a_bridge_ruptures_though_the_grains_jump_out_of_reach(tmp_path, engines_loop):
+    pull = np.linalg.norm(jumping(tmp_path, WET, "0.00012", engines_loop).force, axis=-1)
+    assert (pull[:18] > 0.0).all() and (pull[20:] == 0.0).all()
+
+
 # Down, along the floor in touch, up again with a bridge, and on over the floor with a gap.
 CARRIED = Scenario(
     name="carried", material=WET, wall=True, time_step=1e-5, steps=3900,
@@ -145,3 +177,50 @@ def test_bridge_longer_than_the_neighbour_lists(tmp_path):
     assert run_deck(tmp_path / "kept", text).code == 0
     line = stopped_by(text.replace("run 600", 'run 600 pre no every 5 "set group all diameter 0.002"'), tmp_path)
     assert "cohesion capillary" in line and "use neigh_modify contact_distance_factor 1." in line
+
+
+SIZES = """
+atom_style granular
+atom_modify map array
+boundary f f f
+newton off
+communicate single vel yes
+units si
+region box block 0 0.03 0 0.03 -0.001 0.03 units box
+create_box 2 box
+neighbor 0.0003 bin
+neigh_modify delay 0 {lists}
+lattice sc 0.00101
+region layer block 0.0006 0.0294 0.0006 0.0294 0.0006 0.0026 units box
+create_atoms 1 region layer
+create_atoms 2 single 0.0075 0.015 0.0085 units box
+create_atoms 2 single 0.0176 0.015 0.0085 units box
+set type 1 diameter 0.001 density 2500
+set type 2 diameter 0.01 density 2500
+fix m1 all property/global youngsModulus peratomtype 5.e6 5.e6
+fix m2 all property/global poissonsRatio peratomtype 0.3 0.3
+fix m3 all property/global coefficientRestitution peratomtypepair 2 0.5 0.5 0.5 0.5
+fix m4 all property/global staticFriction peratomtypepair 2 0.5 0.5 0.5 0.5
+fix m5 all property/global kineticFriction peratomtypepair 2 0.5 0.5 0.5 0.5
+fix m6 all property/global criticalSlipDistance peratomtypepair 2 1e-5 1e-5 1e-5 1e-5
+fix m7 all property/global surfaceTension scalar 0.072
+fix m8 all property/global contactAngle peratomtype 0 0
+fix m9 all property/global bridgeVolume peratomtypepair 2 1.25e-13 1.25e-13 1.25e-13 1.25e-10
+pair_style gran model hertz tangential finnie_rabinowicz {cohesion}
+pair_coeff * *
+timestep 1e-6
+fix motion all nve/sphere
+fix floor all wall/gran model hertz tangential finnie_rabinowicz {cohesion} primitive type 1 zplane 0.0
+run 0
+"""
+
+
+def test_neighbour_lists_of_many_sizes_are_no_longer_than_the_bridges_need(tmp_path):
+    """Radii of 1 : 10, each with bridges of a volume that suits it: V/R^3 = 1e-3, which reach 0.1 of the radius at the wall."""
+    def neighbours(name, lists, cohesion):
+        done = run_deck(tmp_path / name, SIZES.format(lists=lists, cohesion=cohesion))
+        assert done.code == 0, done.error
+        return int(next(line for line in done.output.splitlines() if line.startswith("Total # of neighbors")).split("=")[1])
+
+    least, most = (neighbours(factor, f"contact_distance_factor {factor}", "") for factor in ("1.09", "1.12"))
+    assert least <= neighbours("bridges", "", "cohesion capillary") <= most

@@ -41,7 +41,7 @@ def test_copies_once(tmp_path):
     assert {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in source.rglob("*") if path.is_file()} == before
     for name in ("tangential_model_finnie_rabinowicz.h", "cohesion_model_capillary.h", "fix_lcp_impact.cpp", "fix_resume_exact.cpp",
                  "resume_state.h",
-                 "fix_energy_account.cpp", "energy_books.h"):
+                 "fix_energy_account.cpp", "energy_tally.h"):
         assert (source / name).read_bytes() == (ROOT / "plugins/liggghts" / name).read_bytes()
     assert (source / "dembark/capillary/bridge.hpp").exists() and not (source / "dembark/tests").exists()
     lines = (source / "style_contact_model_user.whitelist").read_text().splitlines()
@@ -64,6 +64,13 @@ def test_whitelist_is_what_liggghts_dembark_compiles(tmp_path):
     expected = set(re.findall(r"^GRAN_MODEL.*$", text, re.MULTILINE))
     assert len(expected) == 18
     assert set((source / "style_contact_model_user.whitelist").read_text().splitlines()) == expected
+
+
+def test_private_members_of_the_engine_are_reached_in_one_file():
+    """By explicit instantiation with a pointer to a member."""
+    files = [*(ROOT / "plugins/liggghts").glob("*.h"), *(ROOT / "plugins/liggghts").glob("*.[ch]pp")]
+    reaching = [path.name for path in files if re.search(r"^template (struct|class) \w+<.*&", path.read_text(), re.MULTILINE)]
+    assert reaching == ["engine_access.cpp"]
 
 
 def test_wrong_folders(tmp_path):

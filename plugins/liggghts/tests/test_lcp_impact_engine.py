@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import subprocess
 
 import numpy as np
 import pytest
@@ -79,6 +80,17 @@ def test_logs_that_were_moved_get_new_forces(tmp_path):
     found = run(tmp_path, case)
     assert found.vector("active") == 0
     assert np.abs(found.last[:, 10:13]).max() == 0.0
+
+
+@pytest.mark.parametrize(("change", "mass", "gravity"), [("", 50.0, 9.81), ("unfix weight", 50.0, 0.0), ("set atom 1 mass 80", 80.0, 9.81)])
+def test_forces_of_a_second_run_are_those_of_the_present_masses_and_forces(tmp_path, change, mass, gravity):
+    """At rest on a floor: N of equation (2) for the set-up's half kick, with what is true now and not what was true a step before."""
+    s, step = 1e7, 5e-3
+    overlap = 50.0 * 9.81 * 2.0 / s
+    case = Case([Log((0.0, 0.1 - overlap))], f"stiffness {s!r} wall plane floor y 0 lo stiffness {s!r}", step,
+                f"run 20\n{change}\nrun 0", gravity=9.81, every=20)
+    response = 0.5 * step**2
+    assert run(tmp_path, case).vector("peak") == pytest.approx((overlap + response * gravity) / (2.0 / s + response / mass), rel=1e-9)
 
 
 def test_another_time_step_goes_on(tmp_path):
@@ -214,6 +226,44 @@ def test_local_array_and_vector(tmp_path):
         assert found.last[:, 10:13] == pytest.approx(force + weight, abs=1e-6 * np.abs(force).max())
 
 
+def test_the_local_array_is_that_of_the_step_for_whoever_reads_it(tmp_path):
+    """compute reduce in every step, with no dump in between: the sum over the one contact is the largest force of the step."""
+    case = Case([Log((0.0, 0.0), (1.0, 0.0)), Log((0.2, 0.0))], "stiffness 1e7", 1e-4, "run 40", every=40,
+                extra=["compute load all reduce sum f_hits[7]", "fix series all ave/time 1 1 1 c_load f_hits[4] file load.txt"])
+    for ranks in (1, 2):
+        run(tmp_path / str(ranks), case, ranks=ranks)
+        load, peak = np.loadtxt(tmp_path / str(ranks) / "load.txt")[:, 1:].T
+        assert len(set(peak)) > 20
+        assert load == pytest.approx(peak, rel=1e-5)
+
+
+PERTURBED = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdlib.h>
+double exp(double x) {
+  static double (*real)(double), factor = 1.0;
+  if (!real) {
+    const char* rank = getenv("OMPI_COMM_WORLD_RANK");
+    if (rank && atoi(rank) > 0) factor = 1.0 + 1e-6;
+    *(void**)&real = dlsym(RTLD_NEXT, "exp");
+  }
+  return factor * real(x);
+}
+"""
+
+
+def test_ranks_that_compute_differently_agree(tmp_path, monkeypatch):
+    """Another mathematical library on the second rank, as in a cluster of unlike machines: the motion is that of one rank, to the bit."""
+    (tmp_path / "perturbed.c").write_text(PERTURBED)
+    subprocess.run(["cc", "-shared", "-fPIC", "-fno-builtin", "perturbed.c", "-o", "perturbed.so", "-ldl"], cwd=tmp_path, check=True)
+    # The sums of the engine's own output differ with the number of ranks; the frames do not.
+    alone = run(tmp_path / "1", pile(steps=4000))
+    assert alone.vector("impacts") > 10
+    monkeypatch.setenv("LD_PRELOAD", str(tmp_path / "perturbed.so"))
+    assert_same(run(tmp_path / "2", pile(steps=4000), ranks=2).last, alone.last, 0.0)
+
+
 def test_beside_pair_forces(tmp_path):
     """A pair style for other atoms: excluded from each other's neighbour lists, the logs feel nothing of it."""
     pair = """fix m1 all property/global youngsModulus peratomtype 5e6
@@ -277,7 +327,7 @@ def test_restart_files_that_do_not_fit(tmp_path):
     assert done.code != 0 and "wall 1 is ground in the restart file and floor in the command" in done.error
     (tmp_path / "impacts.txt").write_text("# short\n")
     done = start(tmp_path, pile(steps=200), head="read_restart here.restart")
-    assert done.code != 0 and "impacts.txt has 8 bytes, the restart file goes on after" in done.output
+    assert done.code != 0 and "impacts.txt has 8 bytes, the saved run goes on after" in done.output
 
 
 def test_other_atom_styles_are_refused(tmp_path):

@@ -1,12 +1,13 @@
 """A mesh is one surface: a grain that is dragged over its triangles, sticks, slips, and holds a bridge as on one plane."""
 
 import math
-import random
 
 import numpy as np
 import pytest
 from rig import liggghts_driver, walls
+from rig.impact_decks import Case, Log, run
 from rig.liggghts_driver import read_dump
+from rig.meshes import bent, box_corner, patch
 from rig.motion import deviation
 from rig.scenarios import Grain, Material, Path, Scenario
 
@@ -15,39 +16,6 @@ from dembark.physics import capillary_force, effective_youngs_modulus
 WET = Material(bridge_volume=2e-10)
 RADIUS = 5e-3
 LARGE = [((-0.04, -0.04, 0.0), (0.04, -0.04, 0.0), (0.04, 0.04, 0.0)), ((-0.04, -0.04, 0.0), (0.04, 0.04, 0.0), (-0.04, 0.04, 0.0))]
-
-
-def patch() -> list:
-    """A flat floor of irregular triangles, corners of up to eight of them, some upside down."""
-    chance = random.Random(3)
-    nodes = [[(0.0031 * (i + chance.uniform(-0.3, 0.3)), 0.0031 * (j + chance.uniform(-0.3, 0.3)), 0.0) for j in range(-3, 4)]
-             for i in range(-3, 4)]
-    found = []
-    for i in range(6):
-        for j in range(6):
-            a, b, c, d = nodes[i][j], nodes[i + 1][j], nodes[i + 1][j + 1], nodes[i][j + 1]
-            two = ((a, b, c), (a, c, d)) if (i + j) % 2 else ((a, b, d), (c, b, d))
-            found += [three[::-1] if (i + 2 * j) % 3 == 0 else three for three in two]
-    return found
-
-
-def bent(angle: float) -> list:
-    """Two strips of triangles that meet at x = 0; the second rises by `angle` (rad)."""
-    c, s = math.cos(angle), math.sin(angle)
-    found = []
-    for j in range(-2, 2):
-        y, z = 0.004 * j + 0.001, 0.004 * (j + 1) + 0.001
-        left = [(-0.02, y, 0), (0, y, 0), (0, z, 0), (-0.02, z, 0)]
-        right = [(0, y, 0), (0.02 * c, y, 0.02 * s), (0.02 * c, z, 0.02 * s), (0, z, 0)]
-        found += [part for four in (left, right) for part in ([four[0], four[1], four[2]], [four[0], four[2], four[3]])]
-    return found
-
-
-def box_corner() -> list:
-    """Three square walls that meet at (-0.02, -0.02, 0)."""
-    o, a, b, c = (-0.02, -0.02, 0), (0.02, 0, 0), (0, 0.02, 0), (0, 0, 0.02)
-    add = lambda p, *more: tuple(sum(k) for k in zip(p, *more, strict=True))
-    return [three for u, v in ((a, b), (b, c), (c, a)) for three in ((o, add(o, u), add(o, u, v)), (o, add(o, u, v), add(o, v)))]
 
 
 def drag(name: str, start, displacement, velocity, steps: int, spin=(1.0, 2.0, 3.0)) -> Scenario:
@@ -71,7 +39,7 @@ CASES = {  # case and mesh
     "along, two": (ALONG, LARGE), "along, many": (ALONG, patch()),
     "bend 0": (OVER, bent(0.0)), "bend -2": (OVER, bent(-2 * DEGREE)), "bend 2": (OVER, bent(2 * DEGREE)),
     "bend -30": (OVER, bent(-30 * DEGREE)),
-    "corner": (INTO, box_corner()),
+    "corner": (INTO, box_corner((-0.02, -0.02, 0.0))),
 }
 
 
@@ -152,3 +120,18 @@ def test_a_corner_of_three_walls_is_three_contacts(found):
         repulsion = stiffness * math.sqrt(RADIUS) * overlap**1.5
         # Along x and y there is friction of the slow way down besides.
         assert motion.force[0, 0, axis] == pytest.approx(repulsion - pull, rel=0.02)
+
+
+def test_a_floor_that_leaves_a_periodic_box_keeps_its_speed(tmp_path):
+    """The engine takes triangles that leave to the other end, which is no motion: a log goes along with the floor, at rest on it."""
+    strips = [-0.9 + 0.2 * k for k in range(9)]
+    floor = [three for a in strips for b in [a + 0.2]
+             for three in (((a, 0, -0.4), (b, 0, -0.4), (b, 0, 0.4)), ((a, 0, -0.4), (b, 0, 0.4), (a, 0, 0.4)))]
+    (tmp_path / "floor.stl").write_text(walls.stl(floor))
+    static = 50.0 * 9.81 * (1e-7 + 1.0 / 4e7)
+    case = Case([Log((-0.5, 0.1 - static), (0.5, 0.0))], "stiffness 1e7 wall mesh floor stl stiffness 4e7 friction 0.5", 2e-5, "run 20000",
+                gravity=9.81, box=(-1.0, 1.0, -1.0, 1.0, -0.5, 0.5), boundary="p f f",
+                before="fix stl all mesh/surface file floor.stl type 1\nfix move all move/mesh mesh stl linear 0.5 0.0 0.0")
+    found = run(tmp_path, case)
+    assert found.velocity()[0] == pytest.approx([0.5, 0.0, 0.0], abs=1e-6)
+    assert found.last[0, 1:3] == pytest.approx([-0.3, 0.1 - static], abs=1e-6)

@@ -93,3 +93,49 @@ def test_other_models_than_those_of_the_state_are_refused_or_approximate(tmp_pat
     shutil.copytree(tmp_path, tmp_path / "other")
     done = run_deck(tmp_path / "other", other.replace("neighbor 0.002 bin", "neighbor 0.0025 bin"))
     assert done.code == 0 and "dembark: resumed at step 200 approximately: the atoms or their candidates" in done.output
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_run_that_begins_anew_deletes_no_state(tmp_path, ranks):
+    """States of an earlier run in the folder: the run ends with one line before anything is written over."""
+    deck = bed(False, STATES.format(every=500) + "run 1200", ranks=ranks)
+    assert run_deck(tmp_path, deck, ranks=ranks).code == 0
+    before = {path.name: path.read_bytes() for path in tmp_path.glob("bed.*")}
+    assert len(before) == 4
+    done = run_deck(tmp_path, deck, ranks=ranks)
+    assert done.code != 0
+    assert "bed.1000.restart; go on from it by resume_state, move it away" in done.error
+    assert {path.name: path.read_bytes() for path in tmp_path.glob("bed.*")} == before
+
+
+def test_state_that_is_not_whole_does_not_stand_in_the_way(tmp_path):
+    (tmp_path / "bed.90000.restart").write_bytes(b"broken")
+    assert run_deck(tmp_path, bed(False, STATES.format(every=500) + "run 1200", ranks=1)).code == 0
+    assert sorted(path.name for path in tmp_path.glob("bed.*.restart")) == ["bed.1000.restart", "bed.500.restart"]
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_stock_command_reads_a_state_exactly_under_its_name_only(tmp_path, ranks):
+    states = STATES.format(every=500)
+    assert run_deck(tmp_path, bed(False, f"{states}run 700", ranks=ranks), ranks=ranks).code == 0
+    (tmp_path / "other.restart").write_bytes((tmp_path / "bed.500.restart").read_bytes())
+    for name, told in (("bed.500", "at step 500 exactly"), ("other", "approximately: file bed.500.restart does not hold")):
+        if name == "other":
+            (tmp_path / "bed.500.restart").unlink()
+        deck = bed(False, f"{states}run 600 upto", ranks=ranks, resume=True).replace("resume_state bed", f"read_restart {name}.restart")
+        done = run_deck(tmp_path, deck, ranks=ranks)
+        assert done.code == 0, done.error
+        assert told in done.output
+
+
+def test_data_of_a_state_do_not_count_against_the_limit_of_a_fix(tmp_path):
+    """The engine stores at most 2 GB of one fix: what grows with the grains stands behind its end of the file."""
+    sizes = []
+    for every, text in ((500, "resume/exact 500 bed"), (0, "")):
+        folder = tmp_path / str(every)
+        fix = f"fix state all {text}\n" if text else ""
+        done = run_deck(folder, bed(False, f"{fix}run 600\nwrite_restart whole.restart", ranks=1))
+        assert done.code == 0, done.error
+        sizes.append((folder / "whole.restart").stat().st_size)
+    assert 0 < sizes[0] - sizes[1] < 200
+    assert (tmp_path / "500" / "bed.500.restart").stat().st_size > sizes[0] + 8 * 6 * 64

@@ -19,7 +19,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <deque>
 #include <memory>
+#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -122,5 +124,16 @@ class BridgeForce {
     }
   }
 };
+
+/// The law of one model and contact angle (rad), built once for all that ask for it; it stays until the program ends. Safe from many
+/// threads.
+inline const BridgeForce& shared_bridge_force(Model model, double contact_angle) {
+  static std::mutex guard;
+  static std::deque<BridgeForce> built;
+  const std::lock_guard<std::mutex> lock(guard);
+  for (const BridgeForce& force : built)
+    if (force.model() == model && force.contact_angle() == contact_angle) return force;
+  return built.emplace_back(model, contact_angle);
+}
 
 }  // namespace dembark::capillary

@@ -28,18 +28,14 @@ class BridgeTable {
   /// Solves Young and Laplace's equation for contact angle `theta` (rad, 0...pi/2); std::runtime_error should it not converge.
   explicit BridgeTable(double theta) : rows_(octaves), patches_(octaves * cells) {
     const YoungLaplace bridges(theta);
-    std::array<Column, 4> columns;
+    std::array<detail::Column<cells>, 4> columns;
     ShapeCoordinates touching = bridges.small_touching(detail::volume_at(0, 0.0)), before = touching;
     int solved = 0;
     for (int octave = 0; octave < octaves; ++octave) {
       if (octave > 0) columns[0] = columns[3];
       for (int node = octave > 0 ? 1 : 0; node < 4; ++node) {
         const double v = detail::volume_at(octave, node / 3.0);
-        ShapeCoordinates guess = touching;
-        if (solved > 1) {
-          guess.phase += touching.phase - before.phase;
-          guess.log_slenderness += touching.log_slenderness - before.log_slenderness;
-        }
+        ShapeCoordinates guess = solved > 1 ? between(before, touching, 2.0) : touching;
         detail::require(bridges.solve(v, 0.0, guess), theta, v);
         before = touching;
         touching = guess;
@@ -82,11 +78,6 @@ class BridgeTable {
   };
   using Patch = std::array<Cubic, 4>;  // [power of zeta][power of mu]
 
-  struct Column {
-    double inverse_rupture = 0.0, fall = 0.0;
-    std::array<Cubic, cells> spline{};
-  };
-
   std::vector<Row> rows_;
   std::vector<Patch> patches_;
 
@@ -95,38 +86,16 @@ class BridgeTable {
     return (detail::cubic(p[0], y) + detail::cubic(p[1], y) * x) + (detail::cubic(p[2], y) * x2 + detail::cubic(p[3], y) * x3);
   }
 
-  static Column column(const YoungLaplace& bridges, double theta, double v, const ShapeCoordinates& touching) {
+  static detail::Column<cells> column(const YoungLaplace& bridges, double theta, double v, const ShapeCoordinates& touching) {
     ShapeCoordinates edge = touching;
     std::vector<ShapeCoordinates> path{touching};
-    detail::require(bridges.rupture(v, edge, &path), theta, v);
-    const BridgeShape last = bridges.shape(edge);
-    Column c;
-    c.inverse_rupture = 1.0 / last.gap;
-    c.fall = 1.0 / std::sqrt(v);
-    std::array<double, cells + 1> h;
-    h[0] = last.force * detail::square(1.0 + c.fall * last.gap);
-    // Starts between points of the path keep Newton's method on the stable branch up to the fold.
-    std::size_t right = 1;
-    double left_gap = 0.0, right_gap = bridges.shape(path[1]).gap;
-    for (int i = cells; i > 0; --i) {
-      const double zeta2 = detail::square(static_cast<double>(i) / cells);
-      const double gap = (1.0 - zeta2) / (c.inverse_rupture + c.fall * zeta2);
-      while (gap > right_gap && right + 1 < path.size()) {
-        left_gap = right_gap;
-        right_gap = bridges.shape(path[++right]).gap;
-      }
-      const double part = (gap - left_gap) / (right_gap - left_gap);
-      const ShapeCoordinates &near = path[right - 1], &far = path[right];
-      ShapeCoordinates x{near.phase + part * (far.phase - near.phase),
-                         near.log_slenderness + part * (far.log_slenderness - near.log_slenderness)};
-      detail::require(bridges.solve(v, gap, x), theta, v);
-      h[i] = bridges.shape(x).force * detail::square(1.0 + c.fall * gap);
-    }
-    c.spline = detail::spline(h);
+    std::array<ShapeCoordinates, cells + 1> at;
+    detail::Column<cells> c;
+    detail::require(bridges.rupture(v, edge, &path) && detail::solve_column(bridges, v, path, at, c), theta, v);
     return c;
   }
 
-  void fill(int octave, const std::array<Column, 4>& c) {
+  void fill(int octave, const std::array<detail::Column<cells>, 4>& c) {
     Row& row = rows_[octave];
     row.inverse_rupture = detail::through(c[0].inverse_rupture, c[1].inverse_rupture, c[2].inverse_rupture, c[3].inverse_rupture);
     row.fall = detail::through(c[0].fall, c[1].fall, c[2].fall, c[3].fall);
@@ -134,8 +103,7 @@ class BridgeTable {
       for (int power = 0; power < 4; ++power)
         patches_[octave * cells + cell][power] =
             detail::through(c[0].spline[cell][power], c[1].spline[cell][power], c[2].spline[cell][power], c[3].spline[cell][power]);
-    const Patch& last = patches_[octave * cells + cells - 1];
-    for (int power = 0; power < 4; ++power) row.touching[power] = last[0][power] + last[1][power] + last[2][power] + last[3][power];
+    row.touching = detail::through(c[0].touching(), c[1].touching(), c[2].touching(), c[3].touching());
   }
 };
 

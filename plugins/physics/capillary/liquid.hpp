@@ -10,12 +10,11 @@
 // All shares that one step asks of a holder are summed, D. Each is granted L / max(1, D) times its share: no more is taken than is there,
 // and the order of the contacts does not matter. A bridge may be limited to a largest volume; the rest stays where it was.
 // A bridge is split again when it breaks: into halves, by the radii, or into what each side gave. The part that would go to i is fixed
-// when the bridge forms, so each side can keep its own books. SI units; nothing here knows an engine.
+// when the bridge forms, so each side can tally its own (liquid_ledger.hpp). SI units; nothing here knows an engine.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <limits>
 #include <string>
 #include <vector>
@@ -42,6 +41,11 @@ struct ShareRule {
   Kind kind = Kind::cap;
   double factor = 1.0;  // c above: 0...2 of the cap, 0...1 as a fraction
 
+  /// Whether there is a kind of that name, which then holds.
+  bool set_kind(const std::string& name) {
+    kind = name == "cap" ? Kind::cap : Kind::fraction;
+    return name == "cap" || name == "fraction";
+  }
   /// Nullptr, or what is wrong.
   const char* error() const {
     if (kind == Kind::cap) return factor > 0.0 && factor <= 2.0 ? nullptr : "the factor of the facing cap must lie in (0, 2]";
@@ -59,6 +63,14 @@ enum class Return { equal, radius, taken };
 
 /// The names that users write, in the order of `Return`.
 inline std::vector<std::string> return_names() { return {"equal", "radius", "taken"}; }
+
+/// Whether there is a rule of that name, which then is `rule`.
+inline bool return_from_name(const std::string& name, Return& rule) {
+  const std::vector<std::string> names = return_names();
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found != names.end()) rule = static_cast<Return>(found - names.begin());
+  return found != names.end();
+}
 
 /// Volume (m^3) that a holder of `liquid` gives per unit share when the shares asked of it in one step add up to `demand`.
 template <class Real>
@@ -107,27 +119,5 @@ inline NewBridge<Real> form_wall_bridge(Real given_i, Real given_wall, Real wall
   if (rule != Return::taken) bridge.imbalance = bridge.volume * (Real(1) - Real(2) * wall_part);
   return bridge;
 }
-
-/// The sums of what one step asks of holders 0...n-1. Cleared in a time that goes with the number of those that were asked.
-class Demands {
- public:
-  void resize(std::size_t holders) {
-    clear();
-    if (sums_.size() < holders) sums_.resize(holders, 0.0);
-  }
-  void add(std::size_t holder, double share) {
-    if (sums_[holder] == 0.0) asked_.push_back(holder);
-    sums_[holder] += share;
-  }
-  double of(std::size_t holder) const { return sums_[holder]; }
-  void clear() {
-    for (const std::size_t holder : asked_) sums_[holder] = 0.0;
-    asked_.clear();
-  }
-
- private:
-  std::vector<double> sums_;
-  std::vector<std::size_t> asked_;
-};
 
 }  // namespace dembark::capillary

@@ -70,10 +70,7 @@ class PairTable {
     Surface inverse_rupture, touching;
     Cubic fall;
   };
-  struct Column {
-    double inverse_rupture = 0.0, fall = 0.0;
-    std::array<Cubic, cells> spline{};
-  };
+  using Column = detail::Column<cells>;
   struct Slice {
     int index;
     double y;
@@ -104,21 +101,12 @@ class PairTable {
     return detail::cubic(in_x, x);
   }
 
-  static double gap_at(const Column& c, int i) {
-    const double zeta2 = detail::square(static_cast<double>(i) / cells);
-    return (1.0 - zeta2) / (c.inverse_rupture + c.fall * zeta2);
-  }
-
   static std::vector<Column> equal_layer(const BridgeTable& equal) {
     std::vector<Column> columns(3 * octaves + 1);
     for (int n = 0; n <= 3 * octaves; ++n) {
       const double v = node_volume(n);
-      Column& c = columns[n];
-      c.inverse_rupture = 1.0 / equal.rupture(v);
-      c.fall = 1.0 / std::sqrt(v);
-      std::array<double, cells + 1> h;
-      for (int i = 0; i <= cells; ++i) h[i] = equal.force(gap_at(c, i), v) * detail::square(1.0 + c.fall * gap_at(c, i));
-      c.spline = detail::spline(h);
+      Column& c = columns[n] = {v, equal.rupture(v)};
+      c.fit([&](int i) { return equal.force(c.gap(i), v); });
     }
     return columns;
   }
@@ -140,8 +128,7 @@ class PairTable {
       const double v = node_volume(n);
       Bridges next = here;
       if (n > 1)
-        for (int i = 0; i <= cells; ++i)
-          for (int k = 0; k < 3; ++k) next[i][k] += here[i][k] - before[i][k];
+        for (int i = 0; i <= cells; ++i) next[i] = between(before[i], here[i], 2.0);
       // Volume by volume the bridges of one zeta form a smooth row; only its beginning has to be looked for along the branch.
       if (n < 2 || !extend(bridges, v, next, columns[n])) {
         next = here;
@@ -156,10 +143,10 @@ class PairTable {
   /// Solves a column from guesses of all its bridges.
   static bool extend(const PairYoungLaplace& bridges, double v, Bridges& at, Column& c) {
     if (!bridges.fold(v, at[0])) return false;
-    prepare(bridges, v, at[0], c);
+    c = {v, bridges.shape(at[0]).gap};
     for (int i = 1; i <= cells; ++i)
-      if (!bridges.solve(v, gap_at(c, i), at[i])) return false;
-    finish(bridges, at, c);
+      if (!bridges.solve(v, c.gap(i), at[i])) return false;
+    c.fit([&](int i) { return bridges.shape(at[i]).force; });
     return true;
   }
 
@@ -168,33 +155,7 @@ class PairTable {
     if (!bridges.solve(v, 0.0, at[cells])) return false;
     std::vector<PairCoordinates> path{at[cells]};
     at[0] = at[cells];
-    if (!bridges.rupture(v, at[0], &path)) return false;
-    prepare(bridges, v, at[0], c);
-    std::size_t right = 1;
-    double left_gap = 0.0, right_gap = bridges.shape(path[1]).gap;
-    for (int i = cells - 1; i > 0; --i) {
-      const double gap = gap_at(c, i);
-      while (gap > right_gap && right + 1 < path.size()) {
-        left_gap = right_gap;
-        right_gap = bridges.shape(path[++right]).gap;
-      }
-      const double part = (gap - left_gap) / (right_gap - left_gap);
-      for (int k = 0; k < 3; ++k) at[i][k] = path[right - 1][k] + part * (path[right][k] - path[right - 1][k]);
-      if (!bridges.solve(v, gap, at[i])) return false;
-    }
-    finish(bridges, at, c);
-    return true;
-  }
-
-  static void prepare(const PairYoungLaplace& bridges, double v, const PairCoordinates& last, Column& c) {
-    c.inverse_rupture = 1.0 / bridges.shape(last).gap;
-    c.fall = 1.0 / std::sqrt(v);
-  }
-
-  static void finish(const PairYoungLaplace& bridges, const Bridges& at, Column& c) {
-    std::array<double, cells + 1> h;
-    for (int i = 0; i <= cells; ++i) h[i] = bridges.shape(at[i]).force * detail::square(1.0 + c.fall * gap_at(c, i));
-    c.spline = detail::spline(h);
+    return bridges.rupture(v, at[0], &path) && detail::solve_column(bridges, v, path, at, c);
   }
 
   void fill(int slice, const std::array<std::vector<Column>, 4>& layers) {
@@ -216,10 +177,7 @@ class PairTable {
       Row& row = rows_[index];
       row.inverse_rupture = bicubic([](const Column& c) { return c.inverse_rupture; });
       row.fall = bicubic([](const Column& c) { return c.fall; })[0];
-      row.touching = bicubic([](const Column& c) {
-        const Cubic& last = c.spline[cells - 1];
-        return last[0] + last[1] + last[2] + last[3];
-      });
+      row.touching = bicubic([](const Column& c) { return c.touching(); });
       for (int cell = 0; cell < cells; ++cell)
         for (int power = 0; power < 4; ++power) {
           const Surface s = bicubic([&](const Column& c) { return c.spline[cell][power]; });

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstring>
 #include <stdexcept>
+#include <vector>
 
 namespace dembark::capillary::detail {
 
@@ -95,5 +96,56 @@ inline void require(bool converged, double theta, double v) {
 }
 
 inline double square(double x) { return x * x; }
+
+/// The bridges of one volume, from rupture (zeta = 0) to touching (zeta = 1): H of bridge_table.hpp as a spline of `cells` cells in zeta.
+template <int cells>
+struct Column {
+  double inverse_rupture = 0.0, fall = 0.0;
+  std::array<Cubic, cells> spline{};
+
+  Column() = default;
+  Column(double v, double rupture) : inverse_rupture(1.0 / rupture), fall(1.0 / std::sqrt(v)) {}
+
+  /// Gap at zeta = i / cells.
+  double gap(int i) const {
+    const double zeta2 = square(static_cast<double>(i) / cells);
+    return (1.0 - zeta2) / (inverse_rupture + fall * zeta2);
+  }
+
+  /// Takes F / (gamma R) at these gaps, force(i).
+  template <class Force>
+  void fit(Force force) {
+    std::array<double, cells + 1> h;
+    for (int i = 0; i <= cells; ++i) h[i] = force(i) * square(1.0 + fall * gap(i));
+    spline = detail::spline(h);
+  }
+
+  double touching() const {
+    const Cubic& last = spline[cells - 1];
+    return last[0] + last[1] + last[2] + last[3];
+  }
+};
+
+/// Solves for a column and its bridges, the one at rupture first, from a path of bridges from touching to rupture: starts between its
+/// points keep Newton's method on the stable branch up to the fold.
+template <int cells, class Solver, class Bridge>
+bool solve_column(const Solver& solver, double v, const std::vector<Bridge>& path, std::array<Bridge, cells + 1>& at, Column<cells>& c) {
+  c = {v, solver.shape(path.back()).gap};
+  at[0] = path.back();
+  at[cells] = path.front();
+  std::size_t right = 1;
+  double left_gap = 0.0, right_gap = solver.shape(path[1]).gap;
+  for (int i = cells - 1; i > 0; --i) {
+    const double gap = c.gap(i);
+    while (gap > right_gap && right + 1 < path.size()) {
+      left_gap = right_gap;
+      right_gap = solver.shape(path[++right]).gap;
+    }
+    at[i] = between(path[right - 1], path[right], (gap - left_gap) / (right_gap - left_gap));
+    if (!solver.solve(v, gap, at[i])) return false;
+  }
+  c.fit([&](int i) { return solver.shape(at[i]).force; });
+  return true;
+}
 
 }  // namespace dembark::capillary::detail

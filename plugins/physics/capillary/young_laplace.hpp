@@ -34,8 +34,26 @@ struct BridgeShape {
 struct ShapeCoordinates {
   double phase = 0.0, log_slenderness = 0.0;
 };
+/// From `a` a part of the way to `b`, or on beyond it.
+inline ShapeCoordinates between(const ShapeCoordinates& a, const ShapeCoordinates& b, double part) {
+  return {a.phase + part * (b.phase - a.phase), a.log_slenderness + part * (b.log_slenderness - a.log_slenderness)};
+}
 
 namespace detail {
+
+/// One step of a damped Newton method: the first of x' = moved_by(1), moved_by(1/2), ... whose residual is smaller. False: there is none.
+template <class Coordinates, class Residual, class Move, class Evaluate>
+bool damped_step(Coordinates& x, Residual& f, Move moved_by, Evaluate residual) {
+  for (double part = 1.0; part > 1e-3; part *= 0.5) {
+    const Coordinates y = moved_by(part);
+    const Residual next = residual(y);
+    if (!(next.valid && next.norm() < f.norm())) continue;
+    x = y;
+    f = next;
+    return true;
+  }
+  return false;
+}
 
 constexpr double pi = 3.14159265358979323846;
 
@@ -142,17 +160,8 @@ class YoungLaplace {
       const double determinant = a * d - b * c;
       const double dk = -(d * f.volume - b * f.height) / determinant, dl = -(a * f.height - c * f.volume) / determinant;
       if (!std::isfinite(dk) || !std::isfinite(dl)) return false;
-      double damping = 1.0;
-      ShapeCoordinates y;
-      Residual next;
-      for (; damping > 1e-3; damping *= 0.5) {
-        y = {x.phase + damping * dk, x.log_slenderness + damping * dl};
-        next = residual(y, volume, gap);
-        if (next.valid && next.norm() < f.norm()) break;
-      }
-      if (!(damping > 1e-3)) break;
-      x = y;
-      f = next;
+      const auto moved_by = [&](double part) { return ShapeCoordinates{x.phase + part * dk, x.log_slenderness + part * dl}; };
+      if (!detail::damped_step(x, f, moved_by, [&](const ShapeCoordinates& y) { return residual(y, volume, gap); })) break;
     }
     return f.valid && f.norm() < round_off;
   }

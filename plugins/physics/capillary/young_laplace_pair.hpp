@@ -19,7 +19,13 @@
 namespace dembark::capillary {
 
 /// ln(b1 / (1 + e)), p L, ln(L).
-using PairCoordinates = std::array<double, 3>;
+struct PairCoordinates : std::array<double, 3> {};
+/// From `a` a part of the way to `b`, or on beyond it.
+inline PairCoordinates between(const PairCoordinates& a, const PairCoordinates& b, double part) {
+  PairCoordinates c;
+  for (int k = 0; k < 3; ++k) c[k] = a[k] + part * (b[k] - a[k]);
+  return c;
+}
 
 /// A meridian from body 1 to the height of body 2, in units of R and gamma.
 struct PairShape {
@@ -98,17 +104,12 @@ class PairYoungLaplace {
       if (!j.valid) return false;
       const PairCoordinates uv = cross(j.row[1], j.row[2]), vw = cross(j.row[2], j.row[0]), wu = cross(j.row[0], j.row[1]);
       const double determinant = dot(j.row[0], uv);
-      double damping = 1.0;
-      PairCoordinates y{};
-      Residual next;
-      for (; damping > 1e-3; damping *= 0.5) {
-        for (int i = 0; i < 3; ++i) y[i] = x[i] - damping * (f.value[0] * uv[i] + f.value[1] * vw[i] + f.value[2] * wu[i]) / determinant;
-        next = residual(y, volume, gap);
-        if (next.valid && next.norm() < f.norm()) break;
-      }
-      if (!(damping > 1e-3)) break;
-      x = y;
-      f = next;
+      const auto moved_by = [&](double part) {
+        PairCoordinates y{};
+        for (int i = 0; i < 3; ++i) y[i] = x[i] - part * (f.value[0] * uv[i] + f.value[1] * vw[i] + f.value[2] * wu[i]) / determinant;
+        return y;
+      };
+      if (!detail::damped_step(x, f, moved_by, [&](const PairCoordinates& y) { return residual(y, volume, gap); })) break;
     }
     return f.valid && f.norm() < round_off;
   }

@@ -2,8 +2,7 @@
 //
 //   A = diag(1 / (s + c/tau)) + h tau^2 G^T M'^-1 G,
 //
-// s the stiffness of both springs in series, M' the response masses, G the normals. Its pattern is kept while the list of rows
-// stays as it is.
+// s the stiffness of both springs in series, M' the response masses, G the normals.
 #pragma once
 
 #include <Eigen/SparseCore>
@@ -11,7 +10,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -49,42 +47,38 @@ class Assembly {
     const std::size_t pairs = settings.materials.size() * settings.materials.size();
     if (springs_.size() != pairs || dt_ != settings.dt) springs_.assign(pairs, Springs());
     dt_ = settings.dt;
-    bool same_pattern = rows_.size() == sorted.size() && bodies_ == bodies.size();
     rows_.resize(sorted.size());
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-      Row& r = rows_[i];
-      const int a = r.a, b = r.b;
-      fill(bodies, contacts[std::size_t(sorted[i].contact)], settings, r);
-      same_pattern = same_pattern && a == r.a && b == r.b;
-    }
-    if (same_pattern) return;
-    bodies_ = bodies.size();
-    stale_ = true;
+    for (std::size_t i = 0; i < rows_.size(); ++i) fill(bodies, contacts[std::size_t(sorted[i].contact)], settings, rows_[i]);
   }
 
-  /// Forgets the rows and the pattern.
-  void clear() {
-    rows_.clear();
-    bodies_ = std::numeric_limits<std::size_t>::max();
-  }
+  void clear() { rows_.clear(); }
 
-  /// Values of A. bodies: with 1/m' as `inverse` (1/kg); scale: h tau^2 (s^2).
+  /// Makes A. bodies: with 1/m' as `inverse` (1/kg); scale: h tau^2 (s^2). Rows meet in the bodies that they share, and each body keeps
+  /// the last row so far, which leads to those before it.
   template <class Sums>
   void assemble(const std::vector<Sums>& bodies, double scale) {
-    if (stale_) build_pattern(bodies_);
-    double* value = matrix_.valuePtr();
-    const int *outer = matrix_.outerIndexPtr(), *inner = matrix_.innerIndexPtr();
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-      const Row& r = rows_[i];
-      for (int p = outer[i]; p < outer[i + 1]; ++p) {
-        const int code = shared_[p];
-        if (code < 0) value[p] = r.compliance + scale * (bodies[r.a].inverse + (r.b >= 0 ? bodies[r.b].inverse : 0.0));
-        else {
-          const double entry = scale * bodies[code >> 1].inverse * dot(r.normal, rows_[inner[p]].normal);
-          value[p] = code & 1 ? -entry : entry;
+    const auto inverse = [&](int body) { return body >= 0 ? bodies[std::size_t(body)].inverse : 0.0; };
+    entries_.clear();
+    last_.assign(bodies.size(), -1);
+    before_.resize(2 * rows_.size());
+    for (int i = 0; i < int(rows_.size()); ++i) {
+      const Row& r = rows_[std::size_t(i)];
+      entries_.emplace_back(i, i, r.compliance + scale * (inverse(r.a) + inverse(r.b)));
+      for (int side = 0; side < (r.b >= 0 ? 2 : 1); ++side) {
+        const int body = side ? r.b : r.a;
+        int& last = last_[std::size_t(body)];
+        for (int other = last; other >= 0; other = before_[std::size_t(other)]) {  // two slots a row, for its two sides
+          const double entry = scale * inverse(body) * dot(r.normal, rows_[std::size_t(other / 2)].normal);
+          const double value = other % 2 == side ? entry : -entry;
+          entries_.emplace_back(i, other / 2, value);
+          entries_.emplace_back(other / 2, i, value);
         }
+        before_[2 * std::size_t(i) + std::size_t(side)] = last;
+        last = 2 * i + side;
       }
     }
+    matrix_.resize(Eigen::Index(rows_.size()), Eigen::Index(rows_.size()));
+    matrix_.setFromTriplets(entries_.begin(), entries_.end());
   }
 
  private:
@@ -151,58 +145,11 @@ class Assembly {
       r.radius = wall || a.radius == 0.0 ? a.radius : a.radius * other / (a.radius + other);
   }
 
-  void build_pattern(std::size_t bodies) {
-    stale_ = false;
-    const int n = int(rows_.size());
-    start_.assign(bodies + 1, 0);
-    for (const Row& r : rows_) {
-      ++start_[r.a + 1];
-      if (r.b >= 0) ++start_[r.b + 1];
-    }
-    for (std::size_t b = 0; b < bodies; ++b) start_[b + 1] += start_[b];
-    list_.resize(std::size_t(start_[bodies]));
-    fill_.assign(start_.begin(), start_.end() - 1);
-    for (int i = 0; i < n; ++i) {
-      list_[fill_[rows_[i].a]++] = i;
-      if (rows_[i].b >= 0) list_[fill_[rows_[i].b]++] = i;
-    }
-    matrix_.resize(n, n);
-    inner_.clear();
-    shared_.clear();
-    int* outer = matrix_.outerIndexPtr();
-    for (int i = 0; i < n; ++i) {
-      outer[i] = int(inner_.size());
-      const Row& r = rows_[i];
-      int p = start_[r.a], q = r.b >= 0 ? start_[r.b] : 0;
-      const int p_end = start_[r.a + 1], q_end = r.b >= 0 ? start_[r.b + 1] : 0;
-      while (p < p_end || q < q_end) {
-        const bool from_a = p < p_end && (q >= q_end || list_[p] <= list_[q]);
-        const int j = from_a ? list_[p] : list_[q];
-        if (j == i) {  // in the lists of both bodies
-          inner_.push_back(i);
-          shared_.push_back(-1);
-          if (p < p_end && list_[p] == i) ++p;
-          if (q < q_end && list_[q] == i) ++q;
-          continue;
-        }
-        const int body = from_a ? r.a : r.b;
-        const bool opposite = from_a != (rows_[j].a == body);
-        inner_.push_back(j);
-        shared_.push_back(2 * body + opposite);
-        from_a ? ++p : ++q;
-      }
-    }
-    outer[n] = int(inner_.size());
-    matrix_.resizeNonZeros(Eigen::Index(inner_.size()));
-    std::copy(inner_.begin(), inner_.end(), matrix_.innerIndexPtr());
-  }
-
   std::vector<Row> rows_;
   std::vector<Springs> springs_;  ///< of each pair of materials, made where needed
   double dt_ = 0.0;
-  std::vector<int> start_, fill_, list_, inner_, shared_;
-  std::size_t bodies_ = std::numeric_limits<std::size_t>::max();
-  bool stale_ = true;  ///< the pattern is made when it is needed
+  std::vector<Eigen::Triplet<double>> entries_;
+  std::vector<int> last_, before_;
   Eigen::SparseMatrix<double> matrix_;
 };
 

@@ -10,8 +10,13 @@
 // law; what is left in the spring is xi' = (c xi / tau - T) / K.
 #pragma once
 
+#include <cstddef>
+#include <vector>
+
 #include "../finnie_rabinowicz.hpp"
 #include "assembly.hpp"
+#include "history.hpp"
+#include "motion.hpp"
 #include "types.hpp"
 
 namespace dembark {
@@ -44,6 +49,68 @@ inline Vec3<double> friction_sweep(const Row& row, double normal_force, double r
   state.displacement = (force + (row.viscous / row.stiffness) * start) * -give;
   return force;
 }
+
+/// k, N/m, of the friction spring.
+inline double tangential_stiffness(const Row& row) { return row.law->tangential_stiffness_ratio * row.stiffness; }
+
+/// The friction forces of all contacts of a step.
+class FrictionForces {
+ public:
+  std::vector<Vec3<double>> force;           ///< N, on a
+  std::vector<FrictionState<double>> state;  ///< after the step
+
+  static bool acts(const Row& row) { return row.law->friction.static_friction > 0.0; }
+
+  /// Begins with the springs as the last step left them, turned with the bodies. False if there is no friction.
+  bool begin(const std::vector<Row>& rows, const HistoryKeeper& history, double dt, double kick, Motion& motion) {
+    dt_ = dt;
+    kick_ = kick;
+    bool any = false;
+    motion.clear_tangential();
+    start_.assign(rows.size(), Vec3<double>());
+    state.resize(rows.size());
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      if (!acts(rows[i])) continue;
+      any = true;
+      const ContactHistory& before = history.before(i);
+      if (!before.active) continue;
+      const Vec3<double> turned = rotate_to_plane(before.friction.displacement, rows[i].normal, motion.twist(rows[i], dt));
+      start_[i] = -tangential_stiffness(rows[i]) * turned;
+      motion.add_tangential(rows[i], start_[i]);
+    }
+    force = start_;
+    return any;
+  }
+
+  /// All of them once, from the velocities with those of the last sweep. False if nothing changed.
+  bool sweep(const std::vector<Row>& rows, const HistoryKeeper& history, const std::vector<char>& active, const Eigen::VectorXd& normal,
+             Motion& motion) {
+    trial_.assign(rows.size(), Vec3<double>());
+    bool changed = false;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const Row& r = rows[i];
+      state[i] = {};
+      if (active[i] && acts(r)) {
+        state[i].slip = history.before(i).friction.slip;
+        Vec3<double> velocity = motion.surface_velocity(r);
+        velocity -= dot(velocity, r.normal) * r.normal;
+        trial_[i] =
+            friction_sweep(r, normal[Eigen::Index(i)], motion.tangential_response(r), velocity, force[i], start_[i], dt_, kick_, state[i]);
+      }
+      changed = changed || trial_[i].x != force[i].x || trial_[i].y != force[i].y || trial_[i].z != force[i].z;
+    }
+    if (!changed) return false;
+    force.swap(trial_);
+    motion.clear_tangential();
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      if (active[i]) motion.add_tangential(rows[i], force[i]);
+    return true;
+  }
+
+ private:
+  double dt_ = 0.0, kick_ = 1.0;
+  std::vector<Vec3<double>> start_, trial_;
+};
 
 }  // namespace impact
 }  // namespace dembark

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "../surface/point_grid.hpp"
 #include "types.hpp"
 
 namespace dembark {
@@ -34,89 +35,13 @@ inline double default_reach(const std::vector<Body>& bodies, double dt, double w
   return std::max(reach_factor * closing, 0.01 * radius);
 }
 
-/// Bodies sorted into the cells of a dense grid whose edge is at least `cell` (m); a body lies in the cell of its centre.
-class BodyGrid {
- public:
-  void build(const std::vector<Body>& bodies, double cell) {
-    const std::size_t n = bodies.size();
-    Vec3<double> high{};
-    for (std::size_t i = 0; i < n; ++i) {
-      const Vec3<double>& p = bodies[i].position;
-      if (!(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z)))
-        throw std::invalid_argument("body " + std::to_string(bodies[i].id) + ": position is not a finite number");
-      if (i == 0) low_ = high = p;
-      low_ = {std::min(low_.x, p.x), std::min(low_.y, p.y), std::min(low_.z, p.z)};
-      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-    }
-    // A few bodies far away must not blow up the grid: the cells grow until there are not many more of them than bodies.
-    for (cell = cell > 0.0 ? cell : 1.0;; cell *= 1.5) {
-      const double nx = std::floor((high.x - low_.x) / cell) + 1, ny = std::floor((high.y - low_.y) / cell) + 1;
-      const double nz = std::floor((high.z - low_.z) / cell) + 1;
-      if (nx * ny * nz > 8.0 * double(n) + 64.0) continue;
-      count_[0] = int(nx), count_[1] = int(ny), count_[2] = int(nz);
-      break;
-    }
-    inverse_ = 1.0 / cell;
-    start_.assign(std::size_t(count_[0]) * count_[1] * count_[2] + 1, 0);
-    cell_of_.resize(n);
-    member_.resize(n);
-    for (std::size_t i = 0; i < n; ++i) {
-      const Vec3<double>& p = bodies[i].position;
-      cell_of_[i] = index(at(p.x, low_.x, 0), at(p.y, low_.y, 1), at(p.z, low_.z, 2));
-      ++start_[cell_of_[i] + 1];
-    }
-    for (std::size_t c = 1; c < start_.size(); ++c) start_[c] += start_[c - 1];
-    fill_.assign(start_.begin(), start_.end() - 1);
-    for (std::size_t i = 0; i < n; ++i) member_[fill_[cell_of_[i]]++] = int(i);
-  }
-
-  /// Calls visit(i, j) once for each two bodies in the same cell or in cells that touch.
-  template <class Visit>
-  void pairs(Visit visit) const {
-    for (int z = 0; z < count_[2]; ++z)
-      for (int y = 0; y < count_[1]; ++y)
-        for (int x = 0; x < count_[0]; ++x) {
-          const std::size_t cell = index(x, y, z);
-          const int from = start_[cell], to = start_[cell + 1];
-          if (from == to) continue;
-          for (int k = from; k < to; ++k)
-            for (int l = k + 1; l < to; ++l) visit(member_[k], member_[l]);
-          // The half of the cells around that come later; those of a row lie side by side.
-          const auto row = [&](int begin, int yy, int zz) {
-            if (yy < 0 || yy >= count_[1] || zz >= count_[2]) return;
-            const int first = start_[index(std::max(begin, 0), yy, zz)], last = start_[index(std::min(x + 1, count_[0] - 1), yy, zz) + 1];
-            for (int k = from; k < to; ++k)
-              for (int l = first; l < last; ++l) visit(member_[k], member_[l]);
-          };
-          if (x + 1 < count_[0]) row(x + 1, y, z);
-          row(x - 1, y + 1, z);
-          for (int yy = y - 1; yy <= y + 1; ++yy) row(x - 1, yy, z + 1);
-        }
-  }
-
-  /// Calls visit(body index) for all bodies whose centre may lie in the box.
-  template <class Visit>
-  void in_box(const Vec3<double>& from, const Vec3<double>& to, Visit visit) const {
-    if (member_.empty()) return;
-    const int x0 = at(from.x, low_.x, 0), x1 = at(to.x, low_.x, 0), y0 = at(from.y, low_.y, 1), y1 = at(to.y, low_.y, 1);
-    const int z0 = at(from.z, low_.z, 2), z1 = at(to.z, low_.z, 2);
-    for (int z = z0; z <= z1; ++z)
-      for (int y = y0; y <= y1; ++y)
-        for (int k = start_[index(x0, y, z)]; k < start_[index(x1, y, z) + 1]; ++k) visit(member_[k]);
-  }
-
- private:
-  std::size_t index(int x, int y, int z) const { return (std::size_t(z) * count_[1] + y) * count_[0] + x; }
-  int at(double p, double low, int axis) const {
-    const double c = std::floor((p - low) * inverse_);
-    return c < 0.0 ? 0 : c >= count_[axis] ? count_[axis] - 1 : int(c);
-  }
-  Vec3<double> low_{};
-  double inverse_ = 1.0;
-  int count_[3] = {1, 1, 1};
-  std::vector<int> start_, fill_, member_;
-  std::vector<std::size_t> cell_of_;
-};
+/// The centres of the bodies in cells of an edge of `cell` (m).
+inline void build_grid(const std::vector<Body>& bodies, double cell, PointGrid& grid) {
+  for (const Body& b : bodies)
+    if (!std::isfinite(b.position.x + b.position.y + b.position.z))
+      throw std::invalid_argument("body " + std::to_string(b.id) + ": position is not a finite number");
+  grid.build(bodies.size(), [&](std::size_t i) { return bodies[i].position; }, cell);
+}
 
 /// Finds pairs and remembers a wider list of them, which holds while no body has moved by half of the margin. What it finds does not
 /// depend on the age of that list.
@@ -162,7 +87,7 @@ class PairFinder {
     margin_ = lasting ? margin + reach : 0.0;
     reach_ = lasting ? 2.0 * reach : reach;
     const double range = 2.0 * largest + reach_ + margin_;
-    grid_.build(bodies, range);
+    build_grid(bodies, range, grid_);
     found_.clear();
     start_.assign(bodies.size() + 1, 0);
     grid_.pairs([&](int i, int j) {
@@ -190,18 +115,12 @@ class PairFinder {
     if (!std::is_sorted(pairs_.begin(), pairs_.end(), before)) std::sort(pairs_.begin(), pairs_.end(), before);
     reference_ = bodies;
   }
-  BodyGrid grid_;
+  PointGrid grid_;
   std::vector<Body> reference_;
   std::vector<std::pair<int, int>> pairs_, found_;
   std::vector<int> start_;
   double reach_ = 0.0, margin_ = 0.0;
 };
-
-/// All pairs with gap <= reach, for a single call; PairFinder is faster step after step.
-inline void find_pairs(const std::vector<Body>& bodies, double reach, std::vector<Contact>& contacts) {
-  PairFinder finder;
-  finder.find(bodies, reach, contacts);
-}
 
 namespace detail {
 inline void wall_contact(const Wall& wall, int body, const Body& b, std::int64_t key, double gap, const Vec3<double>& normal,
@@ -220,17 +139,20 @@ inline void wall_contact(const Wall& wall, int body, const Body& b, std::int64_t
 }
 }  // namespace detail
 
-/// A plane; the free space is on the side of the normal.
+/// A plane; the free space is on the side of the normal, or on both: then a body is on the side of its centre, and one whose centre lies on
+/// the plane on that of the normal.
 struct Plane : Wall {
   Vec3<double> point{};                ///< m, any of the plane
   Vec3<double> normal{0.0, 1.0, 0.0};  ///< unit
   Vec3<double> velocity{};             ///< m/s, of the surface; moving `point` along is the caller's
+  bool two_sided = false;
 };
 
 inline void plane_contacts(const std::vector<Body>& bodies, const Plane& plane, double reach, std::vector<Contact>& contacts) {
   for (std::size_t i = 0; i < bodies.size(); ++i) {
-    const double gap = dot(bodies[i].position - plane.point, plane.normal) - bodies[i].radius;
-    if (gap <= reach) detail::wall_contact(plane, int(i), bodies[i], plane.id, gap, plane.normal, plane.velocity, contacts);
+    const double height = dot(bodies[i].position - plane.point, plane.normal);
+    const double side = plane.two_sided && height < 0.0 ? -1.0 : 1.0, gap = side * height - bodies[i].radius;
+    if (gap <= reach) detail::wall_contact(plane, int(i), bodies[i], plane.id, gap, side * plane.normal, plane.velocity, contacts);
   }
 }
 

@@ -9,16 +9,19 @@
 #include <limits>
 #include <vector>
 
+#include "../lcp/residual.hpp"
 #include "motion.hpp"
 
 namespace dembark {
 namespace impact {
 
-/// w = q + A z with A = diag(compliance) + scale G^T M'^-1 G; see system.hpp.
+/// w = q + A z with A = diag(compliance) + scale G^T M'^-1 G; see system.hpp. The rows of lcp/relaxation.hpp.
 /// Width: components that are kept of each vector, 2 or 4 (the last one zero).
 template <int Width>
 class Lines {
  public:
+  static constexpr double worth_steps = 500.0;  ///< the matrix and its order have to be made as well
+
   using Vector = Eigen::Matrix<double, Width, 1>;
   using Component = double Vec3<double>::*;
 
@@ -49,8 +52,8 @@ class Lines {
     shift_.resize(bodies.size() + 1);  // walls are the last, which never moves
   }
 
-  /// Begins a solve with the forces z. share: of what is added up in a row, that is rounding.
-  void start(const Eigen::VectorXd& q, double share, const Eigen::VectorXd& z) {
+  /// Begins a solve with the forces z. fraction: of what is added up in a row, that is rounding.
+  void start(const Eigen::VectorXd& q, double fraction, const Eigen::VectorXd& z) {
     if (!built_) build(q, z);
     double largest = 0.0;
     for (Line& l : lines_) {
@@ -58,7 +61,7 @@ class Lines {
       const double push = std::max(-l.q, 0.0);
       largest = std::max(largest, push * push * l.inverse);
     }
-    floor_ = std::numeric_limits<double>::epsilon() / share * std::sqrt(largest);
+    floor_ = std::numeric_limits<double>::epsilon() / fraction * std::sqrt(largest);
     for (std::size_t i = 0; i < near_; ++i) start(i, z[lines_[i].row]);
     gather();
   }
@@ -69,19 +72,21 @@ class Lines {
   }
 
   /// So many lines, the first, may carry a force and are swept over.
-  std::size_t near() const { return near_; }
-  std::size_t bodies() const { return shift_.size(); }
-  const Line& line(std::size_t i) const { return lines_[i]; }
-  double force(std::size_t i) const { return visits_[i].z; }
-  void set_force(std::size_t i, double z) { visits_[i].z = z; }
+  Eigen::Index near() const { return Eigen::Index(near_); }
+  double unit(Eigen::Index i) const { return lines_[std::size_t(i)].root; }
+  double force(Eigen::Index i) const { return visits_[std::size_t(i)].z; }
+  void set_force(Eigen::Index i, double z) { visits_[std::size_t(i)].z = z; }
   /// What the forces minimise (J), 1/2 z A z + q z; after gather().
   double energy() const {
     double sum = 0.0;
-    for (std::size_t i = 0; i < near_; ++i) sum += visits_[i].z * (lines_[i].q + opening(i));
+    for (Eigen::Index i = 0; i < near(); ++i) sum += force(i) * (lines_[std::size_t(i)].q + gap(i));
     return 0.5 * sum;
   }
   /// D (m) under the forces as gather() or the sweeps left the bodies.
-  double opening(std::size_t i) const { return lines_[i].q + lines_[i].compliance * visits_[i].z + gap(lines_[i]); }
+  double gap(Eigen::Index i) const {
+    const Line& l = lines_[std::size_t(i)];
+    return l.q + l.compliance * force(i) + parted(l);
+  }
 
   /// Positions of the bodies after the step under the forces alone.
   void gather() {
@@ -116,7 +121,7 @@ class Lines {
   bool widen() {
     const std::size_t before = near_;
     for (std::size_t i = near_; i < lines_.size(); ++i) {
-      if (!(lines_[i].q + gap(lines_[i]) < 0.0)) continue;
+      if (!(lines_[i].q + parted(lines_[i]) < 0.0)) continue;
       std::swap(lines_[i], lines_[near_]);
       place(near_);
       start(near_++, 0.0);
@@ -124,27 +129,58 @@ class Lines {
     return near_ > before;
   }
 
-  /// w, and whether all conditions hold to rounding; those of the rows that no sweep visits do. After gather() and widen().
-  bool judge(double share, Eigen::VectorXd& w, double& certificate) {
-    double largest = 0.0, low = 0.0, product = 0.0, worst = 0.0;
-    for (std::size_t i = 0; i < near_; ++i) {
-      const Line& l = lines_[i];
-      const double z = visits_[i].z, whole = gap(l), own = (l.of_a + l.of_b) * z, give = l.compliance * z;
-      const double s = std::fabs(l.q) + own + give + std::fabs(whole - own);
-      const double opening = l.q + give + whole, below = std::max(-opening, 0.0);
-      const double beyond = std::max((z > 0.0 ? std::fabs(opening) : below) - share * s, 0.0);
-      largest = std::max(largest, s * s * l.inverse);
-      worst = std::max(worst, beyond * beyond * l.inverse);
-      low = std::max(low, below * below * l.inverse);
-      product += z * opening;
-      w[l.row] = z > 0.0 ? 0.0 : std::max(opening, 0.0);
+  /// The residual of the rows that are swept over; the others hold it. After gather() and widen().
+  void measure(lcp::Residual& r) const {
+    r.resize(near());
+    for (Eigen::Index i = 0; i < near(); ++i) {
+      const Line& l = lines_[std::size_t(i)];
+      const double z = force(i), whole = parted(l), own = (l.of_a + l.of_b) * z, give = l.compliance * z;
+      r.z[i] = z;
+      r.w[i] = l.q + give + whole;
+      r.s[i] = std::fabs(l.q) + own + give + std::fabs(whole - own);
+      r.unit[i] = l.root;
     }
-    constexpr double everywhere = std::numeric_limits<double>::epsilon();
-    if (!std::isfinite(product) || worst > everywhere * everywhere * largest) return false;
-    for (std::size_t i = near_; i < lines_.size(); ++i) w[lines_[i].row] = lines_[i].q + gap(lines_[i]);
-    certificate = largest > 0.0 ? std::max(std::sqrt(low / largest), std::fabs(product) / largest) : 0.0;
-    return true;
   }
+  /// D (m) of all rows, zero where they carry a force; after measure().
+  void store_gaps(const lcp::Residual& r, Eigen::VectorXd& w) const {
+    for (Eigen::Index i = 0; i < near(); ++i) w[lines_[std::size_t(i)].row] = r.z[i] > 0.0 ? 0.0 : std::max(r.w[i], 0.0);
+    for (std::size_t i = near_; i < lines_.size(); ++i) w[lines_[i].row] = lines_[i].q + parted(lines_[i]);
+  }
+
+  /// What the forces of a face add up to; forces scaled by the root of the diagonal, shifts of the bodies by that of their response.
+  class Face {
+   public:
+    struct Link {
+      Vector on_a, on_b;
+      Vector *a, *b;
+    };
+    struct Sums {
+      const Link* links;
+      double pulled(Eigen::Index k) const {
+        return (links[k].on_a.cwiseProduct(*links[k].a) - links[k].on_b.cwiseProduct(*links[k].b)).sum();
+      }
+      void push(Eigen::Index k, double force) const {
+        *links[k].a += force * links[k].on_a;
+        *links[k].b -= force * links[k].on_b;
+      }
+    };
+
+    void load(const Lines& lines, const std::vector<Eigen::Index>& face) {
+      links_.resize(face.size());
+      push_.resize(lines.shift_.size());
+      for (std::size_t k = 0; k < face.size(); ++k) {
+        const Line& l = lines.lines_[std::size_t(face[k])];
+        links_[k] = {(l.root * std::sqrt(l.of_a)) * l.normal, (l.root * std::sqrt(l.of_b)) * l.normal, &push_[std::size_t(l.a)],
+                     &push_[std::size_t(l.b)]};
+      }
+    }
+    void clear() { std::fill(push_.begin(), push_.end(), Vector::Zero()); }
+    Sums sums() const { return {links_.data()}; }
+
+   private:
+    std::vector<Link, Eigen::aligned_allocator<Link>> links_;
+    std::vector<Vector, Eigen::aligned_allocator<Vector>> push_;
+  };
 
  private:
   static constexpr std::size_t parts = 8;
@@ -203,7 +239,8 @@ class Lines {
     v.base = std::fabs(v.q) + floor_ * l.root;
   }
 
-  double gap(const Line& l) const { return l.normal.dot(shift_[std::size_t(l.a)] - shift_[std::size_t(l.b)]); }
+  /// By how far (m) the shifts of the bodies open a row.
+  double parted(const Line& l) const { return l.normal.dot(shift_[std::size_t(l.a)] - shift_[std::size_t(l.b)]); }
 
   const std::vector<Row>* rows_ = nullptr;
   const std::vector<BodyResponse>* bodies_ = nullptr;

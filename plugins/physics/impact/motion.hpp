@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "../kinematics.hpp"
 #include "assembly.hpp"
 #include "types.hpp"
 
@@ -163,8 +164,7 @@ class Motion {
 
   /// Turn of the contact about its normal in the step (rad): the friction spring turns with the bodies.
   double twist(const Row& r, double dt) const {
-    const Vec3<double>& a = (*bodies_)[r.a].spin;
-    return dt * (r.b >= 0 ? 0.5 * dot(a + (*bodies_)[r.b].spin, r.normal) : dot(a, r.normal));
+    return contact_twist(r.normal, (*bodies_)[r.a].spin, r.b >= 0 ? (*bodies_)[r.b].spin : Vec3<double>{}, dt);
   }
 
  private:

@@ -37,13 +37,14 @@
 #include <utility>
 #include <vector>
 
+#include "archive.hpp"
 #include "assembly.hpp"
 #include "candidates.hpp"
 #include "friction.hpp"
 #include "geometry.hpp"
+#include "history.hpp"
 #include "motion.hpp"
 #include "normal_forces.hpp"
-#include "records.hpp"
 #include "screening.hpp"
 #include "types.hpp"
 
@@ -107,36 +108,34 @@ class System {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const Row& r = rows[i];
       const Eigen::Index k = Eigen::Index(i);
-      results_[i] = {r.a, r.b, r.key_a, r.key_b, r.gap, normal_[k], opening_[k], tangential_[i], r.normal, r.place};
+      results_[i] = {r.a, r.b, r.key_a, r.key_b, r.gap, normal_[k], gap_[k], friction_.force[i], r.normal, r.place};
     }
     return results_;
   }
   /// Impacts that ended since the last call.
-  std::vector<Impact> take_finished() { return records_.take_finished(); }
+  std::vector<Impact> take_finished() { return std::exchange(history_.finished, {}); }
 
   /// Everything needed to go on bit for bit, as numbers that survive as doubles.
   std::vector<double> state() const {
-    std::vector<double> out{1.0, stepped_ ? 1.0 : 0.0, time_, weight_};
-    records_.save(out);
-    return out;
+    Archive out;
+    const_cast<System*>(this)->archive(out);  // writing changes nothing
+    return out.numbers();
   }
   /// Throws std::invalid_argument if `state` is none.
   void restore(const std::vector<double>& state) {
-    if (state.size() < 4 || state[0] != 1.0) throw std::invalid_argument("impact state: not written by this version of dembark");
-    stepped_ = state[1] != 0.0;
-    time_ = state[2];
-    weight_ = state[3];
-    std::size_t at = 4;
-    records_.load(state, at);
-    if (at != state.size())
-      throw std::invalid_argument("impact state: " + std::to_string(state.size()) + " numbers, but " + std::to_string(at) +
-                                  " belong to it");
+    Archive in(state);
+    archive(in);
+    in.end();
     assembly_.clear();
-    report_ = StepReport();
-    put_totals();
+    report_ = history_.last().report;
   }
 
  private:
+  void archive(Archive& a) {
+    a.version(2.0);
+    a(time_), a(weight_), a(history_);
+  }
+
   void begin(const std::vector<Body>& bodies, double kick, const std::vector<Vec3<double>>& force,
              const std::vector<Vec3<double>>& torque) {
     if (!(kick > 0.0 && kick <= 1.0)) throw std::invalid_argument("kick must be > 0 and <= 1, not " + std::to_string(kick));
@@ -153,11 +152,11 @@ class System {
   template <class Widen>
   const StepReport& run(const std::vector<Body>& bodies, const std::vector<Contact>& contacts, double time,
                         std::vector<Vec3<double>>& force, std::vector<Vec3<double>>& torque, Widen widen) {
-    const bool again = stepped_ && time == time_;
+    const bool again = history_.last().begun && time == time_;
     const StepReport last = report_;
-    records_.begin(again);
+    history_.begin(again);
+    report_ = history_.base().report;
     try {
-      report_ = StepReport();
       do {
         motion_.clear_tangential();
         motion_.accelerate();
@@ -165,15 +164,13 @@ class System {
         do solve_contacts(bodies, contacts);
         while (screening_.missed(contacts, motion_));
       } while (widen());
-      report_.contacts = int(contacts.size());
     } catch (...) {
-      records_.cancel();
       assembly_.clear();
       report_ = last;
       throw;
     }
+    report_.contacts = int(contacts.size());
     weight_ = again ? weight_ : kick_;
-    stepped_ = true;
     time_ = time;
     finish(bodies, force, torque);
     return report_;
@@ -181,19 +178,20 @@ class System {
 
   /// Forces of the contacts that are near, and the motion of the bodies with them.
   void solve_contacts(const std::vector<Body>& bodies, const std::vector<Contact>& contacts) {
-    candidates_.take(contacts, screening_, [&](const Key& key) { return records_.recall(key); });
+    candidates_.take(contacts, screening_, [&](const Key& key) { return history_.recall(key); });
     assembly_.update(bodies, contacts, candidates_.sorted(), settings_);
-    records_.take(candidates_.sorted(), assembly_.rows());
+    const std::vector<Row>& rows = assembly_.rows();
+    history_.take(candidates_.sorted(), rows);
     damp_bodies(bodies);
-    if (!stepped_) deform_overlaps();
-    set_rows();
-    bool friction = has_friction();
+    begin_rows();
+    bool friction = friction_.begin(rows, history_, settings_.dt, kick_, motion_);
+    solver_.prepare(assembly_, motion_, h_ * settings_.dt * settings_.dt, settings_.lcp);
     for (int sweep = 0;; ++sweep) {
       const bool last = !friction || sweep == settings_.friction_sweeps;
       solve(last);
       motion_.move();
       if (last) return;
-      friction = sweep_friction();
+      friction = friction_.sweep(rows, history_, active_, normal_, motion_);
       if (!friction && !solver_.approaches()) return;  // nothing has changed since the last solve, which was exact
     }
   }
@@ -203,56 +201,30 @@ class System {
     const auto damp = [&](int b) { motion_.damp(b, settings_.materials[bodies[b].material].damping, response); };
     const std::vector<Row>& rows = assembly_.rows();
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      if (!records_.before(i).active) continue;
+      if (!history_.before(i).active) continue;
       damp(rows[i].a);
       if (rows[i].b >= 0) damp(rows[i].b);
     }
-    for (const std::int64_t id : records_.lost_bodies)
+    for (const std::int64_t id : history_.lost_bodies)
       for (std::size_t b = 0; b < bodies.size(); ++b)
         if (bodies[b].id == id) damp(int(b));
   }
 
-  /// Bodies that overlap from the beginning have been deformed before: else contact damping would take the overlap for a sudden blow.
-  void deform_overlaps() {
+  void begin_rows() {
     const std::vector<Row>& rows = assembly_.rows();
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      const double overlap = -rows[i].gap;
-      if (!(overlap > 0.0)) continue;
-      records_.remember(i).deformation = overlap;
-      records_.remember(i).elastic = 0.5 * rows[i].stiffness * overlap * overlap;
-    }
-  }
-
-  void set_rows() {
-    const std::vector<Row>& rows = assembly_.rows();
-    motion_.clear_tangential();
     const std::size_t n = rows.size();
     active_.resize(n);
-    start_.resize(n);
-    tangential_.resize(n);
-    offset_.resize(Eigen::Index(n));
-    q_.resize(Eigen::Index(n));
-    normal_.resize(Eigen::Index(n));
-    opening_.resize(Eigen::Index(n));
+    for (Eigen::VectorXd* v : {&offset_, &q_, &normal_, &gap_}) v->resize(Eigen::Index(n));
     for (std::size_t i = 0; i < n; ++i) {
       const Row& r = rows[i];
-      const Memory& before = records_.before(i);
+      const ContactHistory& before = history_.before(i);
       offset_[Eigen::Index(i)] =
           r.gap + (2.0 * settings_.theta - 1.0) * settings_.dt * motion_.gap_rate(r) + r.viscous * r.compliance * before.deformation;
       active_[i] = before.active;
       // Where to begin: the contact force as if the spring were at rest.
       normal_[Eigen::Index(i)] = before.active ? r.stiffness * before.deformation : 0.0;
-      start_[i] = {};
-      if (before.active && r.law->friction.static_friction > 0.0) {
-        start_[i] = -tangential_stiffness(r) * rotate_to_plane(before.friction.displacement, r.normal, motion_.twist(r, settings_.dt));
-        motion_.add_tangential(r, start_[i]);
-      }
-      tangential_[i] = start_[i];
     }
-    solver_.prepare(assembly_, motion_, h_ * settings_.dt * settings_.dt, settings_.lcp);
   }
-
-  static double tangential_stiffness(const Row& r) { return r.law->tangential_stiffness_ratio * r.stiffness; }
 
   /// The normal forces, with the friction forces as they are.
   void solve(bool last) {
@@ -263,142 +235,92 @@ class System {
     motion_.accelerate();
     for (std::size_t i = 0; i < rows.size(); ++i)
       q_[Eigen::Index(i)] = offset_[Eigen::Index(i)] + scale * motion_.gap_acceleration(rows[i]);
-    solver_.solve(assembly_, motion_, q_, last, active_, normal_, opening_, report_);
+    solver_.solve(assembly_, motion_, q_, last, active_, normal_, gap_, report_);
     for (std::size_t i = 0; i < rows.size(); ++i)
       if (active_[i]) motion_.add_normal(rows[i], normal_[Eigen::Index(i)]);
   }
 
-  bool has_friction() const {
-    for (const Row& r : assembly_.rows())
-      if (r.law->friction.static_friction > 0.0) return true;
-    return false;
-  }
-
-  /// All friction forces once, from the velocities with those of the last sweep. False if nothing changed.
-  bool sweep_friction() {
-    const std::vector<Row>& rows = assembly_.rows();
-    trial_.resize(rows.size());
-    friction_.resize(rows.size());
-    bool changed = false;
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      const Row& r = rows[i];
-      FrictionState<double>& state = friction_[i];
-      Vec3<double> force{};
-      state = {};
-      if (active_[i] && r.law->friction.static_friction > 0.0) {
-        state.slip = records_.before(i).friction.slip;
-        Vec3<double> velocity = motion_.surface_velocity(r);
-        velocity -= dot(velocity, r.normal) * r.normal;
-        force = friction_sweep(r, normal_[Eigen::Index(i)], motion_.tangential_response(r), velocity, tangential_[i], start_[i],
-                               settings_.dt, kick_, state);
-      }
-      const Vec3<double>& last = tangential_[i];
-      changed = changed || force.x != last.x || force.y != last.y || force.z != last.z;
-      trial_[i] = force;
-    }
-    if (!changed) return false;
-    tangential_.swap(trial_);
-    motion_.clear_tangential();
-    for (std::size_t i = 0; i < rows.size(); ++i)
-      if (active_[i]) motion_.add_tangential(rows[i], tangential_[i]);
-    return true;
-  }
-
-  /// Forces out; energies, impacts and memories on.
+  /// Forces out; energies, impacts and histories on.
   void finish(const std::vector<Body>& bodies, std::vector<Vec3<double>>& force, std::vector<Vec3<double>>& torque) {
     const std::vector<Row>& rows = assembly_.rows();
     const double length = weight_ * settings_.dt;       // s, the stretch of time this step stands for
     const double middle = 1.0 - 0.5 * weight_ / kick_;  // where its mean velocity lies between v (0) and v' (1)
-    Totals& totals = records_.totals;
-    records_.settle();
+    history_.settle(report_);
     motion_.go_back(middle);
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      const Memory& before = records_.before(i);
-      Memory& now = records_.now[i];
-      if (!active_[i] && before.idle()) {
-        if (!now.idle()) now = Memory();
-        continue;
-      }
-      const Row& r = rows[i];
-      const double n = normal_[Eigen::Index(i)];
-      now = before;
-      now.friction = {};
-      if (active_[i] && r.law->friction.static_friction > 0.0) now.friction = friction_[i];
-      now.active = active_[i];
-      now.normal = r.normal;
-      now.deformation = (n + r.viscous * before.deformation) * r.compliance;
-      // Below the last digit of the gap, what is left of it acts on nothing any more.
-      if (!now.active && now.deformation < std::numeric_limits<double>::epsilon() * std::abs(r.gap)) now.deformation = 0.0;
-      now.elastic = 0.5 * r.stiffness * now.deformation * now.deformation +
-                    0.5 * tangential_stiffness(r) * dot(now.friction.displacement, now.friction.displacement);
-      report_.elastic_energy += now.elastic;
-
-      // What the bodies (and the wall) put into the contact and its springs do not hold is lost.
-      const Vec3<double> on_a = n * r.normal + tangential_[i];
-      const double lost = -length * dot(on_a, motion_.surface_velocity(r)) - (now.elastic - before.elastic);
-      totals.dissipated += lost;
-      if (now.active && !before.active) {
-        totals.impacts_begun += 1.0;
-        now.time = time_;
-        now.duration = now.impulse = now.peak_force = now.dissipated = 0.0;
-        now.relative_speed = -motion_.gap_rate(r);
-        now.place = r.place;
-      }
-      now.dissipated += lost;
-      if (now.active) {
-        ++report_.active;
-        now.duration += length;
-        now.impulse += n * length;
-        now.peak_force = std::max(now.peak_force, n);
-        report_.peak_force = std::max(report_.peak_force, n);
-        totals.impulse += n * length;
-        continue;
-      }
-      if (before.active) records_.finish(r.key_a, r.key_b, now);
-      if (now.idle()) now = Memory();
-    }
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      if (active_[i] || !history_.before(i).idle()) finish_contact(i, length);
     for (const int b : motion_.damped) {
       const Vec3<double> change = motion_.change[b].velocity;
       // lambda on theta v' + (1 - theta) v_{n-1/2}
       const Vec3<double> on = -motion_.response[b].damping * (bodies[b].velocity + (g_ / kick_) * change);
       force[b] += on;
-      totals.dissipated -= length * dot(on, bodies[b].velocity + middle * change);
+      report_.dissipated_energy -= length * dot(on, bodies[b].velocity + middle * change);
     }
     for (std::size_t b = 0; b < bodies.size(); ++b) {
       force[b] += motion_.normal[b].force + motion_.tangential[b].force;
       torque[b] += motion_.tangential[b].torque;
     }
-    totals.pivots += report_.pivots;
-    totals.peak_force = std::max(totals.peak_force, report_.peak_force);
-    totals.certificate = std::max(totals.certificate, report_.certificate);
-    put_totals();
+    report_.pivots_total += report_.pivots;
+    report_.peak_force_so_far = std::max(report_.peak_force_so_far, report_.peak_force);
+    report_.worst_certificate = std::max(report_.worst_certificate, report_.certificate);
+    history_.commit(report_);
   }
 
-  void put_totals() {
-    const Totals& t = records_.totals;
-    report_.impacts_begun = std::int64_t(t.impacts_begun);
-    report_.pivots_total = std::int64_t(t.pivots);
-    report_.impulse_sum = t.impulse;
-    report_.peak_force_so_far = t.peak_force;
-    report_.dissipated_energy = t.dissipated;
-    report_.worst_certificate = t.certificate;
+  /// What contact i leaves to the next step, and its part of the report.
+  void finish_contact(std::size_t i, double length) {
+    const Row& r = assembly_.rows()[i];
+    const double n = normal_[Eigen::Index(i)];
+    const ContactHistory& before = history_.before(i);
+    ContactHistory now = before;
+    now.active = active_[i];
+    now.friction = now.active && FrictionForces::acts(r) ? friction_.state[i] : FrictionState<double>();
+    now.normal = r.normal;
+    now.deformation = (n + r.viscous * before.deformation) * r.compliance;
+    // Below the last digit of the gap, what is left of it acts on nothing any more.
+    if (!now.active && now.deformation < std::numeric_limits<double>::epsilon() * std::abs(r.gap)) now.deformation = 0.0;
+    now.elastic = 0.5 * r.stiffness * now.deformation * now.deformation +
+                  0.5 * tangential_stiffness(r) * dot(now.friction.displacement, now.friction.displacement);
+    report_.elastic_energy += now.elastic;
+
+    // What the bodies (and the wall) put into the contact and its springs do not hold is lost.
+    const Vec3<double> on_a = n * r.normal + friction_.force[i];
+    const double lost = -length * dot(on_a, motion_.surface_velocity(r)) - (now.elastic - before.elastic);
+    report_.dissipated_energy += lost;
+    Impact& impact = now.impact;
+    if (now.active && !before.active) {
+      ++report_.impacts_begun;
+      impact = Impact();
+      impact.time = time_;
+      impact.relative_speed = -motion_.gap_rate(r);
+      impact.point = r.place;
+    }
+    impact.dissipated += lost;
+    if (now.active) {
+      ++report_.active;
+      impact.duration += length;
+      impact.impulse += n * length;
+      impact.peak_force = std::max(impact.peak_force, n);
+      report_.peak_force = std::max(report_.peak_force, n);
+      report_.impulse_sum += n * length;
+    } else if (before.active) {
+      history_.finish({r.key_a, r.key_b}, now);
+    }
+    if (!now.idle()) history_.add({r.key_a, r.key_b}, now);
   }
 
   Settings settings_;
   Screening screening_;
   Candidates candidates_;
   Assembly assembly_;
-  Records records_;
+  HistoryKeeper history_;
   Motion motion_;
+  FrictionForces friction_;
   NormalForces solver_;
   StepReport report_;
   std::vector<Contact> found_;  ///< by the search of the step
   double time_ = 0.0, kick_ = 1.0, weight_ = 1.0, h_ = 1.0, g_ = 1.0;
-  bool stepped_ = false;
   std::vector<char> active_;
-  std::vector<Vec3<double>> start_, tangential_, trial_;
-  Eigen::VectorXd offset_, q_, normal_, opening_;
-  std::vector<FrictionState<double>> friction_;
+  Eigen::VectorXd offset_, q_, normal_, gap_;  ///< gap_: D, of the deformed bodies
   mutable std::vector<ContactResult> results_;
 };
 

@@ -7,11 +7,15 @@
 // Units SI. Normals point from b (or the wall) to a: the direction of the force on a.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "../energy_lcp.hpp"
@@ -52,6 +56,8 @@ struct Wall {
 inline std::int64_t wall_key(std::int64_t number, std::int64_t feature = 0) { return -1 - (number * (std::int64_t(1) << 32) + feature); }
 /// The number of the wall that a key belongs to.
 inline std::int64_t wall_number(std::int64_t key) { return (-1 - key) / (std::int64_t(1) << 32); }
+/// What users see of a key: the id of a body, or -1, -2, ... for the first, second, ... wall.
+inline std::int64_t shown_id(std::int64_t key) { return key < 0 ? -1 - wall_number(key) : key; }
 
 /// A candidate: a pair that touches or may touch within the step. Geometry is that of step n.
 struct Contact {
@@ -81,7 +87,7 @@ struct Material {
 struct PairLaw {
   FinnieRabinowicz friction = frictionless();
   double tangential_stiffness_ratio = 2.0 / 7.0;  ///< tangential stiffness over the normal stiffness of the contact, > 0
-  double contact_damping = 0.0;  ///< c, N s/m, >= 0, on the deformation of the contact: Galilean invariant; the ratio's share along it
+  double contact_damping = 0.0;  ///< c, N s/m, >= 0, on the deformation of the contact: Galilean invariant; times the ratio along it
   double contact_area = 0.0;     ///< m^2, for the shear strength of the interface; 0 = pi R* N / s, the circle of R*, N and s
 
   static FinnieRabinowicz frictionless() {
@@ -98,35 +104,73 @@ struct Settings {
   LcpOptions lcp{};
   std::vector<Material> materials = std::vector<Material>(1);
   std::vector<PairLaw> pairs = std::vector<PairLaw>(1);  ///< n x n, row by row, symmetric, n = number of materials
+
+  /// Appends a material with the same law against all others and itself; a wall is a material of its own.
+  void add(const Material& material, const PairLaw& law) {
+    const std::size_t n = materials.size();
+    std::vector<PairLaw> wider((n + 1) * (n + 1), law);
+    for (std::size_t i = 0; i < n; ++i) std::copy_n(pairs.begin() + std::ptrdiff_t(i * n), n, wider.begin() + std::ptrdiff_t(i * (n + 1)));
+    pairs.swap(wider);
+    materials.push_back(material);
+  }
 };
 
 /// Of the last step, and totals since the system began (marked).
 struct StepReport {
   int contacts = 0;                ///< candidates
   int active = 0;                  ///< contacts with N > 0
-  int pivots = 0;                  ///< of all solves of the step; of relaxed ones the contacts that changed sides
-  int block_steps = 0;             ///< likewise
   std::int64_t impacts_begun = 0;  ///< total
-  std::int64_t pivots_total = 0;   ///< total
-  double impulse_sum = 0.0;        ///< total, N s: sum of N tau over contacts and steps
   double peak_force = 0.0;         ///< N, largest N of the step
-  double peak_force_so_far = 0.0;  ///< N, total
+  double impulse_sum = 0.0;        ///< total, N s: sum of N tau over contacts and steps
   double dissipated_energy = 0.0;  ///< total, J: friction, both dampings and the loss of the scheme
   double elastic_energy = 0.0;     ///< J, in the springs now, normal and tangential
+  int pivots = 0;                  ///< of all solves of the step; of relaxed ones the contacts that changed sides
+  int block_steps = 0;             ///< likewise
+  std::int64_t pivots_total = 0;   ///< total
   double certificate = 0.0;        ///< worst entry of the solver's certificate in the step, scaled
   double worst_certificate = 0.0;  ///< total
+  double peak_force_so_far = 0.0;  ///< N, total
+
+  static constexpr std::size_t size = 13;
+  /// Calls visit(value) for each, in the order above: that of every output.
+  template <class Visit>
+  void each(Visit&& visit) {
+    visit(contacts), visit(active), visit(impacts_begun), visit(peak_force), visit(impulse_sum), visit(dissipated_energy);
+    visit(elastic_energy), visit(pivots), visit(block_steps), visit(pivots_total), visit(certificate), visit(worst_certificate);
+    visit(peak_force_so_far);
+  }
+
+  std::array<double, size> values() const {
+    std::array<double, size> out{};
+    std::size_t k = 0;
+    StepReport(*this).each([&](auto value) { out[k++] = double(value); });
+    return out;
+  }
+
+  /// At the beginning of a step: the totals.
+  StepReport totals() const {
+    StepReport t;
+    t.impacts_begun = impacts_begun, t.impulse_sum = impulse_sum, t.dissipated_energy = dissipated_energy, t.pivots_total = pivots_total;
+    t.worst_certificate = worst_certificate, t.peak_force_so_far = peak_force_so_far;
+    return t;
+  }
 };
 
 /// One contact of the last step, for output.
 struct ContactResult {
-  int a = 0, b = -1;  ///< as in Contact, key_a < key_b for pairs
-  std::int64_t key_a = 0, key_b = -1;
-  double gap = 0.0;           ///< m, at step n, of the undeformed bodies
-  double normal_force = 0.0;  ///< N, on a along the normal
-  double opening = 0.0;       ///< D, m
-  Vec3<double> tangential{};  ///< N, on a
+  int a = -1, b = -1;                  ///< as in Contact; not known of a restored step
+  std::int64_t key_a = 0, key_b = -1;  ///< key_a < key_b for pairs
+  double gap = 0.0;                    ///< m, at step n, of the undeformed bodies
+  double normal_force = 0.0;           ///< N, on a along the normal
+  double deformed_gap = 0.0;           ///< D, m, between the deformed boundaries
+  Vec3<double> tangential{};           ///< N, on a
   Vec3<double> normal{};
-  Vec3<double> place{};  ///< m
+  Vec3<double> point{};  ///< m
+
+  template <class Visit>
+  void each(Visit&& visit) {
+    visit(key_a), visit(key_b), visit(gap), visit(normal_force), visit(deformed_gap), visit(tangential), visit(normal), visit(point);
+  }
 };
 
 /// One impact: a contact from the first step with N > 0 to the last.
@@ -137,9 +181,32 @@ struct Impact {
   double peak_force = 0.0;      ///< N
   double impulse = 0.0;         ///< N s, sum of N tau
   double relative_speed = 0.0;  ///< m/s, approach along the normal at the beginning, positive = closing
-  Vec3<double> place{};         ///< m, of the contact at the beginning
   double dissipated = 0.0;      ///< J, in this contact
+  Vec3<double> point{};         ///< m, of contact at the beginning
+
+  template <class Visit>
+  void each(Visit&& visit) {
+    visit(a), visit(b), visit(time), visit(duration), visit(peak_force), visit(impulse), visit(relative_speed), visit(dissipated);
+    visit(point);
+  }
 };
+
+/// Whether two laws are the same in every parameter.
+inline bool operator==(const PairLaw& p, const PairLaw& q) {
+  const auto all = [](const PairLaw& l) {
+    const FinnieRabinowicz& f = l.friction;
+    return std::tie(f.static_friction, f.kinetic_friction, f.critical_slip_distance, f.interface_shear_strength, f.healing_time,
+                    f.presliding, l.tangential_stiffness_ratio, l.contact_damping, l.contact_area);
+  };
+  return all(p) == all(q);
+}
+
+inline bool operator==(const Settings& a, const Settings& b) {
+  const auto same = [](const Material& p, const Material& q) { return p.stiffness == q.stiffness && p.damping == q.damping; };
+  return a.dt == b.dt && a.theta == b.theta && a.friction_sweeps == b.friction_sweeps && a.lcp.method == b.lcp.method &&
+         a.lcp.tolerance == b.lcp.tolerance && a.pairs == b.pairs &&
+         std::equal(a.materials.begin(), a.materials.end(), b.materials.begin(), b.materials.end(), same);
+}
 
 /// The one clear line about what is wrong with the settings, or an empty string.
 inline std::string settings_error(const Settings& s) {
@@ -168,10 +235,7 @@ inline std::string settings_error(const Settings& s) {
       if (!(p.contact_damping >= 0.0) || std::isinf(p.contact_damping))
         return which + "contact damping must be >= 0 N s/m and finite, not " + std::to_string(p.contact_damping);
       if (!(p.contact_area >= 0.0)) return which + "contact area must be >= 0 m^2, not " + std::to_string(p.contact_area);
-      if (p.contact_damping != q.contact_damping || p.tangential_stiffness_ratio != q.tangential_stiffness_ratio ||
-          p.contact_area != q.contact_area || p.friction.static_friction != q.friction.static_friction ||
-          p.friction.kinetic_friction != q.friction.kinetic_friction)
-        return which + "the pair laws must be the same in both orders";
+      if (!(p == q)) return which + "the pair laws must be the same in both orders";
     }
   return {};
 }

@@ -9,165 +9,123 @@
 // O(k n) with k active indices instead of the O(n^2) of a tableau, and only orthogonal steps follow each other.
 #pragma once
 
-#include <utility>
+#include <Eigen/Jacobi>
 
-#include "blocks.hpp"
+#include "factors.hpp"
 
 namespace dembark::lcp {
 
 class ActiveFactor {
  public:
   Index size() const { return Index(order_.size()); }
-  double value(Index i) const { return value_[std::size_t(i)]; }        ///< w_i outside, z_i inside
-  double diagonal(Index i) const { return diagonal_[std::size_t(i)]; }  ///< transformed diagonal, > 0
+  double value(Index i) const { return value_[i]; }        ///< w_i outside, z_i inside
+  double diagonal(Index i) const { return diagonal_[i]; }  ///< transformed diagonal, > 0
 
   /// The empty active set: value = q, diagonal = M_ii.
   template <class Matrix>
   void clear(const Matrix& m, const double* q) {
-    n_ = m.n;
-    value_.assign(q, q + n_);
-    sign_.assign(std::size_t(n_), -1.0);
-    diagonal_.resize(std::size_t(n_));
-    for (Index i = 0; i < n_; ++i) diagonal_[std::size_t(i)] = m.diagonal(i);
+    const Index n = m.n;
+    value_ = Eigen::Map<const Row>(q, n);
+    sign_.setConstant(n, -1.0);
+    diagonal_.resize(n);
+    for (Index i = 0; i < n; ++i) diagonal_[i] = m.diagonal(i);
+    rows_.resize(n, n);
+    lower_.resize(n, n);
+    y_.resize(n);
     order_.clear();
-    y_.clear();
-    used_ = 0;
-    removed_ = false;
+    rotated_ = false;
   }
 
   /// Whether indices have left since the factor was made: then its last digits are those of the rotations.
-  bool rotated() const { return removed_; }
+  bool rotated() const { return rotated_; }
 
+  /// Throws NotDefinite.
   template <class Matrix>
   void insert(const Matrix& m, Index p) {
     const Index k = size();
-    reserve(k + 1);
-    double* fresh = rows_[std::size_t(k)].data();
-    double* l = lower_[std::size_t(k)].data();
-    m.copy_column(p, fresh);
-    for (const Index a : order_) fresh[a] = 0.0;
-    double square = m.diagonal(p);
-    for (Index r = 0; r < k; ++r) {
-      l[r] = rows_[std::size_t(r)][std::size_t(p)];
-      square -= l[r] * l[r];
-    }
-    if (!(square > definite_share(n_) * m.diagonal(p))) throw NotDefinite{p, square, m.diagonal(p)};
-    fresh[p] = 1.0;
-    for (Index r = 0; r < k; ++r) rows_[std::size_t(r)][std::size_t(p)] = 0.0;
-    subtract_rows(l, k, fresh);
-    const double pivot = std::sqrt(square), y = -value_[std::size_t(p)] / pivot, inverse = 1.0 / pivot;
-    l[k] = pivot;
-    sign_[std::size_t(p)] = 1.0;
-    value_[std::size_t(p)] = diagonal_[std::size_t(p)] = 0.0;
-    double *value = value_.data(), *diagonal = diagonal_.data();
-    const double* sign = sign_.data();
-    for (Index i = 0; i < n_; ++i) {
-      const double v = fresh[i] * inverse;
-      fresh[i] = v;
-      value[i] += y * v;
-      diagonal[i] += sign[i] * v * v;
-    }
+    auto row = rows_.row(k);
+    row.setZero();
+    m.add_column(p, 1.0, row.data());
+    for (const Index a : order_) row[a] = 0.0;
+    const Eigen::RowVectorXd l = rows_.col(p).head(k).transpose();
+    const double square = m.diagonal(p) - l.squaredNorm();
+    if (!(square > definite_fraction(m.n) * m.diagonal(p))) throw NotDefinite{p, square, m.diagonal(p)};
+    row[p] = 1.0;
+    rows_.col(p).head(k).setZero();
+    subtract_rows(l, row);
+    const double pivot = std::sqrt(square);
+    lower_.row(k).head(k) = l;
+    lower_(k, k) = pivot;
+    y_[k] = -value_[p] / pivot;
+    row *= 1.0 / pivot;
     order_.push_back(p);
-    y_.push_back(y);
-    used_ = k + 1;
+    change_side(p, 1.0);
+    value_ += y_[k] * row.array();
+    diagonal_ += sign_ * row.array().square();
   }
 
   void remove(Index p) {
-    const Index k = size();
-    Index j = 0;
-    while (order_[std::size_t(j)] != p) ++j;
+    const Index k = size() - 1, j = std::find(order_.begin(), order_.end(), p) - order_.begin();
     // Outside of the set the column of p is L^{-1} M_Ap, which is p's own row of L.
-    for (Index r = 0; r < k; ++r) rows_[std::size_t(r)][std::size_t(p)] = r <= j ? lower_[std::size_t(j)][std::size_t(r)] : 0.0;
-    for (Index r = j; r + 1 < k; ++r) std::swap(lower_[std::size_t(r)], lower_[std::size_t(r + 1)]);
-    for (Index r = j; r + 1 < k; ++r) {
-      const double* l = lower_[std::size_t(r)].data();
-      const double length = std::hypot(l[r], l[r + 1]), c = l[r] / length, s = l[r + 1] / length;
-      for (Index below = r; below + 1 < k; ++below) {
-        double* t = lower_[std::size_t(below)].data();
-        const double a = t[r], b = t[r + 1];
-        t[r] = c * a + s * b;
-        t[r + 1] = c * b - s * a;
-      }
-      double *upper = rows_[std::size_t(r)].data(), *under = rows_[std::size_t(r + 1)].data();
-      for (Index i = 0; i < n_; ++i) {
-        const double a = upper[i], b = under[i];
-        upper[i] = c * a + s * b;
-        under[i] = c * b - s * a;
-      }
-      const double a = y_[std::size_t(r)], b = y_[std::size_t(r + 1)];
-      y_[std::size_t(r)] = c * a + s * b;
-      y_[std::size_t(r + 1)] = c * b - s * a;
-    }
-    sign_[std::size_t(p)] = -1.0;
-    value_[std::size_t(p)] = diagonal_[std::size_t(p)] = 0.0;
-    const double* last = rows_[std::size_t(k - 1)].data();
-    const double y = y_.back();
-    for (Index i = 0; i < n_; ++i) {
-      const double v = last[i];
-      value_[std::size_t(i)] -= y * v;
-      diagonal_[std::size_t(i)] -= sign_[std::size_t(i)] * v * v;
+    rows_.col(p).head(k + 1).setZero();
+    rows_.col(p).head(j + 1) = lower_.row(j).head(j + 1).transpose();
+    for (Index c = 0; c <= k; ++c) std::rotate(&lower_(j, c), &lower_(j, c) + 1, &lower_(0, c) + k + 1);
+    for (Index r = j; r < k; ++r) {
+      const double length = std::hypot(lower_(r, r), lower_(r, r + 1));
+      const Eigen::JacobiRotation<double> turn(lower_(r, r) / length, lower_(r, r + 1) / length);
+      lower_.middleRows(r, k - r).applyOnTheRight(r, r + 1, turn.transpose());
+      rows_.applyOnTheLeft(r, r + 1, turn);
+      y_.applyOnTheLeft(r, r + 1, turn);
     }
     order_.erase(order_.begin() + j);
-    y_.pop_back();
-    used_ = k - 1;
-    removed_ = true;
+    rotated_ = true;
+    change_side(p, -1.0);
+    value_ -= y_[k] * rows_.row(k).array();
+    diagonal_ -= sign_ * rows_.row(k).array().square();
   }
 
-  /// z_A += M_AA^{-1} right (right given by full-length array, entries of A used): a step of iterative refinement.
-  void add_solution(const double* right, double* z) {
+  /// z_A += M_AA^{-1} right_A; arrays of full length: a step of iterative refinement.
+  void add_solution(const Eigen::ArrayXd& right, Eigen::ArrayXd& z) const {
     for (Index r = 0; r < size(); ++r) {
-      const double* row = rows_[std::size_t(r)].data();
       double sum = 0.0;
-      for (const Index a : order_) sum += row[a] * right[a];
-      for (const Index a : order_) z[a] += row[a] * sum;
+      for (const Index a : order_) sum += rows_(r, a) * right[a];
+      for (const Index a : order_) z[a] += rows_(r, a) * sum;
     }
   }
 
   /// Replace the values by ones that were computed afresh.
   void set_values(const Unknowns& u) {
-    for (Index i = 0; i < n_; ++i) value_[std::size_t(i)] = u.active[std::size_t(i)] ? u.z[std::size_t(i)] : u.w[std::size_t(i)];
+    for (Index i = 0; i < value_.size(); ++i) value_[i] = u.active[std::size_t(i)] ? u.z[i] : u.w[i];
     for (Index r = 0; r < size(); ++r) {  // y = L^T z_A
-      double sum = 0.0;
-      for (Index below = r; below < size(); ++below) {
-        const Index a = order_[std::size_t(below)];
-        sum += lower_[std::size_t(below)][std::size_t(r)] * u.z[std::size_t(a)];
-      }
-      y_[std::size_t(r)] = sum;
+      y_[r] = 0.0;
+      for (Index below = r; below < size(); ++below) y_[r] += lower_(below, r) * u.z[order_[std::size_t(below)]];
     }
   }
 
  private:
-  void reserve(Index k) {
-    if (Index(rows_.size()) < k) rows_.resize(std::size_t(k)), lower_.resize(std::size_t(k));
-    rows_[std::size_t(k - 1)].resize(std::size_t(n_));
-    for (Index r = 0; r < k; ++r)
-      if (Index(lower_[std::size_t(r)].size()) < n_ + 1) lower_[std::size_t(r)].resize(std::size_t(n_) + 1);
-  }
+  using Row = Eigen::Array<double, 1, Eigen::Dynamic>;
 
-  /// fresh -= sum_r l_r rows_r, four rows at a time: the memory of the rows is what this costs.
-  void subtract_rows(const double* l, Index k, double* __restrict__ fresh) const {
-    Index r = 0;
-    for (; r + 4 <= k; r += 4) {
-      const double a = l[r], b = l[r + 1], c = l[r + 2], d = l[r + 3];
-      if (a == 0.0 && b == 0.0 && c == 0.0 && d == 0.0) continue;
-      const double *ra = rows_[std::size_t(r)].data(), *rb = rows_[std::size_t(r + 1)].data();
-      const double *rc = rows_[std::size_t(r + 2)].data(), *rd = rows_[std::size_t(r + 3)].data();
-      for (Index i = 0; i < n_; ++i) fresh[i] -= (a * ra[i] + b * rb[i]) + (c * rc[i] + d * rd[i]);
-    }
-    for (; r < k; ++r) {
-      const double a = l[r];
-      if (a == 0.0) continue;
-      const double* row = rows_[std::size_t(r)].data();
-      for (Index i = 0; i < n_; ++i) fresh[i] -= a * row[i];
+  /// row -= l rows, a few rows at a time: their memory is what this costs, and those that l has no part of are passed over.
+  template <class Target>
+  void subtract_rows(const Eigen::RowVectorXd& l, Target& row) const {
+    constexpr Index most = 4;
+    for (Index r = 0; r < l.size(); r += most) {
+      const Index count = std::min(most, l.size() - r);
+      if (!l.segment(r, count).isZero(0.0)) row.noalias() -= l.segment(r, count) * rows_.middleRows(r, count);
     }
   }
 
-  Index n_ = 0, used_ = 0;
-  bool removed_ = false;
+  void change_side(Index p, double sign) {
+    sign_[p] = sign;
+    value_[p] = diagonal_[p] = 0.0;
+  }
+
+  bool rotated_ = false;
   std::vector<Index> order_;  ///< active indices in the order of the rows
-  std::vector<double> value_, diagonal_, sign_, y_;
-  std::vector<std::vector<double>> rows_;   ///< V and U, one row of length n per active index
-  std::vector<std::vector<double>> lower_;  ///< L
+  Row value_, diagonal_, sign_;
+  Eigen::VectorXd y_;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows_;  ///< V and U, one row per active index
+  Eigen::MatrixXd lower_;                                                        ///< L
 };
 
 }  // namespace dembark::lcp

@@ -1,166 +1,121 @@
-// Cholesky factors of the active block, made anew for every active set: what the block method solves with.
+// Cholesky factors of the active block, made anew for every active set: Eigen's.
 #pragma once
 
-#include "cholesky.hpp"
+#include <Eigen/Cholesky>
+#include <Eigen/SparseCholesky>
+
+#include "matrices.hpp"
 
 namespace dembark::lcp {
 
-/// M_AA = L L^T, dense.
-class DenseFactor {
- public:
-  void compute(const DenseBlock& m, const std::vector<char>& active) {
-    index_.clear();
-    for (Index i = 0; i < m.n; ++i)
-      if (active[std::size_t(i)]) index_.push_back(i);
-    const Index k = Index(index_.size());
-    if (work_.cols() < k) work_.resize(m.n + 8 - m.n % 8 + 8, m.n);  // no stride of a power of two
-    for (Index c = 0; c < k; ++c) {
-      const double* column = m.column(index_[std::size_t(c)]);
-      double* out = work_.data() + c * work_.rows();
-      for (Index r = c; r < k; ++r) out[r] = column[index_[std::size_t(r)]];
-    }
-    const Index failed = cholesky(work_.data(), work_.rows(), k);
-    const double least = definite_share(m.n);
-    for (Index c = 0; c < (failed < 0 ? k : failed); ++c) {
-      const double diagonal = m.diagonal(index_[std::size_t(c)]), pivot = work_(c, c) * work_(c, c);
-      if (!(pivot > least * diagonal)) throw NotDefinite{index_[std::size_t(c)], pivot, diagonal};
-    }
-    if (failed >= 0) {
-      const double diagonal = m.diagonal(index_[std::size_t(failed)]);
-      throw NotDefinite{index_[std::size_t(failed)], diagonal - work_.row(failed).head(failed).squaredNorm(), diagonal};
-    }
-  }
+/// A Cholesky pivot that is not above this fraction of M_ii has lost all its digits: M is singular to working accuracy.
+inline double definite_fraction(Index n) { return 8.0 * std::numeric_limits<double>::epsilon() * std::sqrt(double(n)); }
 
-  /// z_A += M_AA^{-1} right_A; arrays of full length.
-  void add_solution(const double* right, double* z) {
-    const Index k = Index(index_.size());
-    x_.resize(k);
-    for (Index c = 0; c < k; ++c) x_[c] = right[index_[std::size_t(c)]];
-    const auto l = work_.topLeftCorner(k, k);
-    l.triangularView<Eigen::Lower>().solveInPlace(x_);
-    l.triangularView<Eigen::Lower>().transpose().solveInPlace(x_);
-    for (Index c = 0; c < k; ++c) z[index_[std::size_t(c)]] += x_[c];
-  }
-
- private:
-  Eigen::MatrixXd work_;
-  Eigen::VectorXd x_;
-  std::vector<Index> index_;
+/// Thrown with the local index of the row whose pivot failed; the solver turns it into a message with the row's own number.
+struct NotDefinite {
+  Index row;
+  double pivot, diagonal;
 };
 
-/// M_AA = L D L^T, sparse, in the order of the block (made fill reducing once for the whole pattern): rows and columns outside of the
-/// active set are passed over, so no pattern of the active block is ever built or ordered. Up-looking, with the elimination tree
-/// of the active block (T. A. Davis, Direct Methods for Sparse Linear Systems, SIAM 2006, chapter 4).
-class SparseFactor {
+/// The indices of an active set, and the way between it and all unknowns.
+class ActiveIndices {
  public:
-  /// shift: of the matrix less this share of its diagonal.
-  void compute(const SparseBlock& m, const std::vector<char>& active, double shift = 0.0) {
-    n_ = int(m.n);
-    least_pivot_ = 1.0;
-    resize(m.n);
-    active_ = active.data();
-    symbolic(m);
-    const double least = definite_share(m.n);
-    for (int k = 0; k < n_; ++k) {
-      if (!active_[k]) continue;
-      int top = n_;
-      flag_[std::size_t(k)] = k;
-      double d = 0.0;
-      for (int p = m.start[k]; p < m.start[k + 1]; ++p) {
-        int i = m.row[p];
-        if (i > k) break;
-        if (!active_[i]) continue;
-        y_[std::size_t(i)] = m.value[p];
-        int length = 0;
-        for (; flag_[std::size_t(i)] != k; i = parent_[std::size_t(i)]) {
-          pattern_[std::size_t(length++)] = i;
-          flag_[std::size_t(i)] = k;
-        }
-        while (length > 0) pattern_[std::size_t(--top)] = pattern_[std::size_t(--length)];
-      }
-      d = (1.0 - shift) * y_[std::size_t(k)];
-      y_[std::size_t(k)] = 0.0;
-      for (; top < n_; ++top) {
-        const int i = pattern_[std::size_t(top)];
-        const double yi = y_[std::size_t(i)];
-        y_[std::size_t(i)] = 0.0;
-        const int begin = begin_[std::size_t(i)], end = begin + filled_[std::size_t(i)];
-        for (int p = begin; p < end; ++p) y_[std::size_t(row_[std::size_t(p)])] -= l_[std::size_t(p)] * yi;
-        const double l = yi * inverse_[std::size_t(i)];
-        d -= l * yi;
-        row_[std::size_t(end)] = k;
-        l_[std::size_t(end)] = l;
-        ++filled_[std::size_t(i)];
-      }
-      if (!(d > least * m.diagonal(k))) throw NotDefinite{k, d, m.diagonal(k)};
-      least_pivot_ = std::min(least_pivot_, d / m.diagonal(k));
-      inverse_[std::size_t(k)] = 1.0 / d;
-    }
+  std::vector<Index> index;
+
+  Index size() const { return Index(index.size()); }
+  Index operator[](Index k) const { return index[std::size_t(k)]; }
+
+  void take(const std::vector<char>& active) {
+    index.clear();
+    for (std::size_t i = 0; i < active.size(); ++i)
+      if (active[i]) index.push_back(Index(i));
   }
 
-  /// Of the last factor, in units of the diagonal.
-  double least_pivot() const { return least_pivot_; }
-
-  void add_solution(const double* right, double* z) {
-    for (int i = 0; i < n_; ++i) y_[std::size_t(i)] = active_[i] ? right[i] : 0.0;
-    for (int i = 0; i < n_; ++i) {
-      const double x = y_[std::size_t(i)];
-      if (x == 0.0) continue;
-      for (int p = begin_[std::size_t(i)], end = p + filled_[std::size_t(i)]; p < end; ++p)
-        y_[std::size_t(row_[std::size_t(p)])] -= l_[std::size_t(p)] * x;
-    }
-    for (int i = n_ - 1; i >= 0; --i) {
-      if (!active_[i]) continue;
-      double x = y_[std::size_t(i)] * inverse_[std::size_t(i)];
-      for (int p = begin_[std::size_t(i)], end = p + filled_[std::size_t(i)]; p < end; ++p)
-        x -= l_[std::size_t(p)] * y_[std::size_t(row_[std::size_t(p)])];
-      y_[std::size_t(i)] = x;
-      z[i] += x;
-    }
-    std::fill(y_.begin(), y_.end(), 0.0);
+  /// z_A += solve(right_A); arrays of full length.
+  template <class Solve>
+  void add_solution(const Eigen::ArrayXd& right, Eigen::ArrayXd& z, Solve solve) {
+    x_.resize(size());
+    for (Index k = 0; k < size(); ++k) x_[k] = right[(*this)[k]];
+    solve(x_);
+    for (Index k = 0; k < size(); ++k) z[(*this)[k]] += x_[k];
   }
 
  private:
-  void resize(Index n) {
-    const std::size_t size = std::size_t(n);
-    parent_.resize(size), flag_.assign(size, -1), filled_.assign(size, 0), pattern_.resize(size), begin_.resize(size + 1);
-    inverse_.assign(size, 0.0), y_.assign(size, 0.0);
+  Eigen::VectorXd x_;
+};
+
+/// Dense, L L^T. By the function below Eigen::LLT, which tells where it failed and makes no norm.
+class DenseFactor {
+ public:
+  /// Throws NotDefinite.
+  void compute(const DenseBlock& m, const std::vector<char>& active) {
+    active_.take(active);
+    const Index n = active_.size();
+    lower_.resize(n, n);
+    for (Index k = 0; k < n; ++k) {
+      const auto column = m.column(active_[k]);
+      for (Index r = k; r < n; ++r) lower_(r, k) = column[active_[r]];
+    }
+    const Index failed = Eigen::internal::llt_inplace<double, Eigen::Lower>::blocked(lower_);
+    const double least = definite_fraction(m.n);
+    for (Index k = 0; k < (failed < 0 ? n : failed); ++k) check(m, k, lower_(k, k) * lower_(k, k), least);
+    if (failed >= 0) check(m, failed, m.diagonal(active_[failed]) - lower_.row(failed).head(failed).squaredNorm(), least);
   }
 
-  /// Elimination tree and lengths of the columns of L.
-  void symbolic(const SparseBlock& m) {
-    for (int k = 0; k < n_; ++k) {
-      parent_[std::size_t(k)] = -1;
-      if (!active_[k]) continue;
-      flag_[std::size_t(k)] = k;
-      for (int p = m.start[k]; p < m.start[k + 1]; ++p) {
-        int i = m.row[p];
-        if (i >= k) break;
-        if (!active_[i]) continue;
-        for (; flag_[std::size_t(i)] != k; i = parent_[std::size_t(i)]) {
-          if (parent_[std::size_t(i)] < 0) parent_[std::size_t(i)] = k;
-          ++filled_[std::size_t(i)];
-          flag_[std::size_t(i)] = k;
-        }
-      }
-    }
-    int total = 0;
-    for (int k = 0; k < n_; ++k) {
-      begin_[std::size_t(k)] = total;
-      total += filled_[std::size_t(k)];
-      filled_[std::size_t(k)] = 0;
-      flag_[std::size_t(k)] = -1;
-    }
-    begin_[std::size_t(n_)] = total;
-    row_.resize(std::size_t(total));
-    l_.resize(std::size_t(total));
+  void add_solution(const Eigen::ArrayXd& right, Eigen::ArrayXd& z) {
+    active_.add_solution(right, z, [this](Eigen::VectorXd& x) {
+      lower_.triangularView<Eigen::Lower>().solveInPlace(x);
+      lower_.triangularView<Eigen::Lower>().transpose().solveInPlace(x);
+    });
   }
 
-  int n_ = 0;
-  double least_pivot_ = 1.0;
-  const char* active_ = nullptr;
-  std::vector<int> parent_, flag_, filled_, pattern_, begin_, row_;
-  std::vector<double> inverse_, y_, l_;
+ private:
+  void check(const DenseBlock& m, Index k, double pivot, double least) const {
+    const double diagonal = m.diagonal(active_[k]);
+    if (!(pivot > least * diagonal)) throw NotDefinite{active_[k], pivot, diagonal};
+  }
+
+  ActiveIndices active_;
+  Eigen::MatrixXd lower_;
+};
+
+/// Sparse, L D L^T, in the order of the block, which is made fill-reducing once for the whole pattern.
+class SparseFactor {
+ public:
+  /// Throws NotDefinite.
+  void compute(const SparseBlock& m, const std::vector<char>& active) {
+    active_.take(active);
+    const Index n = active_.size();
+    if (n == 0) return;
+    place_.assign(active.size(), -1);
+    for (Index k = 0; k < n; ++k) place_[std::size_t(active_[k])] = int(k);
+    upper_.resize(n, n);
+    upper_.reserve(m.start[m.n] - m.start[0]);
+    for (Index k = 0; k < n; ++k) {
+      const Index j = active_[k];
+      upper_.startVec(k);
+      for (int p = m.start[j]; p < m.start[j + 1] && m.row[p] <= j; ++p)
+        if (const int i = place_[std::size_t(m.row[p])]; i >= 0) upper_.insertBack(i, k) = m.value[p];
+    }
+    upper_.finalize();
+    factor_.compute(upper_);
+    const double least = definite_fraction(m.n);
+    const auto pivots = factor_.vectorD();
+    for (Index k = 0; k < n; ++k) {
+      const Index i = active_[k];
+      if (!(pivots[k] > least * m.diagonal(i))) throw NotDefinite{i, pivots[k], m.diagonal(i)};
+    }
+  }
+
+  void add_solution(const Eigen::ArrayXd& right, Eigen::ArrayXd& z) {
+    if (active_.size() > 0) active_.add_solution(right, z, [this](Eigen::VectorXd& x) { x = factor_.solve(x); });
+  }
+
+ private:
+  ActiveIndices active_;
+  std::vector<int> place_;
+  Eigen::SparseMatrix<double> upper_;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Upper, Eigen::NaturalOrdering<int>> factor_;
 };
 
 }  // namespace dembark::lcp

@@ -4,7 +4,7 @@
 #include <Eigen/OrderingMethods>
 #include <numeric>
 
-#include "blocks.hpp"
+#include "matrices.hpp"
 
 namespace dembark::lcp {
 

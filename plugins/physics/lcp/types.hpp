@@ -11,9 +11,9 @@
 
 namespace dembark {
 
-/// automatic: `energy` on small islands, guarded `block` on large ones.
+/// automatic: `energy` on small islands; sweeps, conjugate gradients and `block` on large ones.
 /// energy: one principal pivot at a time, the one that releases the most energy.
-/// block: all violated indices at once (Judice & Pires), guarded.
+/// block: all violated indices at once (Judice & Pires).
 /// murty: the violated index that comes first, one at a time; always ends, slow.
 /// pgs: projected Gauss-Seidel, for comparison; never exact.
 enum class LcpMethod { automatic, energy, block, murty, pgs };
@@ -55,7 +55,7 @@ struct LcpResult {
   int pivots = 0;              ///< single exchanges (pgs: sweeps)
   int block_steps = 0;         ///< steps that exchanged all violated indices at once
   int islands = 0;             ///< connected parts of the graph of M
-  bool guarded = false;        ///< some rule stalled or came back to a set that it had left, and a safer one took over
+  bool used_fallback = false;  ///< some rule stalled or came back to a set that it had left, and a safer one took over
   LcpCertificate certificate;  ///< of w before its active entries were set to 0
   LcpStatus status = LcpStatus::solved;
 };

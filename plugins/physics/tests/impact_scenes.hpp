@@ -11,8 +11,23 @@ namespace impact_scenes {
 
 using dembark::Vec3;
 using dembark::impact::Body;
+using dembark::impact::PairLaw;
+using dembark::impact::Settings;
 
 constexpr double g = 9.81;
+
+inline Settings two_materials(double dt, double theta, double mu, double contact_damping = 0.0) {
+  Settings s;
+  s.dt = dt;
+  s.theta = theta;
+  s.materials = {{1e7, 0.0}, {5e7, 0.0}};
+  s.pairs.assign(4, PairLaw());
+  for (PairLaw& p : s.pairs) {
+    p.friction.static_friction = p.friction.kinetic_friction = mu;
+    p.contact_damping = contact_damping;
+  }
+  return s;
+}
 
 /// Logs of unequal size in a drum, thrown about; two materials and one of the drum.
 inline std::vector<Body> crowd(int n, unsigned seed = 7) {
@@ -33,6 +48,32 @@ inline std::vector<Body> crowd(int n, unsigned seed = 7) {
     for (const Body& o : bodies) free = free && norm(o.position - b.position) > o.radius + b.radius + 0.002;
     if (free) bodies.push_back(b);
   }
+  return bodies;
+}
+
+/// All pairs with gap <= reach (m).
+inline void find_pairs(const std::vector<Body>& bodies, double reach, std::vector<dembark::impact::Contact>& contacts) {
+  dembark::impact::PairFinder().find(bodies, reach, contacts);
+}
+
+/// A lattice of triangles whose neighbours overlap or miss each other by `gap`, at random.
+inline std::vector<Body> lattice(int columns, int rows, double gap, bool tilted, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  std::vector<Body> bodies;
+  for (int i = 0; i < columns; ++i)
+    for (int j = 0; j < rows; ++j) {
+      Body b;
+      b.id = std::int64_t(bodies.size());
+      b.radius = 0.05;
+      b.mass = 20.0 + 10.0 * unit(random);
+      b.inertia = dembark::impact::cylinder_inertia(b.mass, b.radius);
+      const double x = 0.1 * (i + 0.5 * (j % 2)) + gap * unit(random), y = 0.0866 * j + gap * unit(random);
+      b.position = {tilted ? 0.8 * x : x, y, tilted ? 0.6 * x : 0.0};
+      b.velocity = {0.5 * unit(random), 0.5 * unit(random), tilted ? 0.5 * unit(random) : 0.0};
+      b.force = {0.0, -b.mass * g, 0.0};
+      bodies.push_back(b);
+    }
   return bodies;
 }
 

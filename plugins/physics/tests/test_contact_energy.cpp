@@ -63,17 +63,22 @@ Account impact(const ContactParameters& p, double dt) {
     mean.velocity_2 = 0.5 * (before.velocity_2 + b.velocity_2);
     mean.angular_velocity_1 = 0.5 * (before.angular_velocity_1 + b.angular_velocity_1);
     mean.angular_velocity_2 = 0.5 * (before.angular_velocity_2 + b.angular_velocity_2);
-    const ContactEnergies e = contact_energies(p, mean, f, state.friction.displacement);
-    out.total += e.power() * dt;
-    out.normal += e.normal_elastic * dt;
-    out.viscous += (e.normal_viscous + e.tangential_viscous) * dt;
-    out.tangential += e.tangential_elastic * dt;
-    out.capillary += e.capillary * dt;
-    out.liquid += e.liquid_viscous * dt;
+    const RelativeMotion motion = relative_motion(mean, f.normal, f.overlap);
+    const Vec3<double> velocity = motion.normal_velocity * f.normal + motion.tangential_velocity;
+    const auto work = [&](ContactPart part) { return dot(parts[part], velocity) * dt; };
+    const double normal = work(ContactPart::normal_elastic), tangential = work(ContactPart::tangential_elastic);
+    const double viscous = work(ContactPart::normal_viscous) + work(ContactPart::tangential_viscous);
+    const double capillary = work(ContactPart::capillary), liquid = work(ContactPart::liquid_viscous);
+    out.total += normal + viscous + tangential + capillary + liquid;
+    out.normal += normal;
+    out.viscous += viscous;
+    out.tangential += tangential;
+    out.capillary += capillary;
+    out.liquid += liquid;
     out.friction = std::max(out.friction, state.friction.dissipated_energy);
     out.worst = std::max(out.worst, std::abs(kinetic(b) - start - out.total));
     // Half of this step's work is of the way after its positions.
-    out.half_way = std::max(out.half_way, std::abs(-(out.normal - 0.5 * e.normal_elastic * dt) - e.normal_stored));
+    out.half_way = std::max(out.half_way, std::abs(-(out.normal - 0.5 * normal) - parts.normal_stored));
     b.separation += dt * (b.velocity_1 - b.velocity_2);
   }
   out.kinetic_change = kinetic(b) - start;

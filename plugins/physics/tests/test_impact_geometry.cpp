@@ -4,7 +4,7 @@
 #include <vector>
 #include "catch.hpp"
 
-#include "dembark/impact/scene.hpp"
+#include "dembark/impact/system.hpp"
 #include "dembark/impact/triangles.hpp"
 
 using namespace dembark;
@@ -32,6 +32,14 @@ std::vector<Triangle> square() {
   t[0].node[0] = p, t[0].node[1] = q, t[0].node[2] = r, t[0].id = 0;
   t[1].node[0] = p, t[1].node[1] = r, t[1].node[2] = s, t[1].id = 1;
   return t;
+}
+
+std::vector<Contact> on_mesh(const std::vector<Body>& bodies, const std::vector<Triangle>& triangles, double reach) {
+  SurfaceContacts surface;
+  surface.update(triangles);
+  std::vector<Contact> contacts;
+  TriangleFinder().find(bodies, Wall(), surface, reach, contacts);
+  return contacts;
 }
 
 Body ball(double x, double y, double z, double radius = 0.1) {
@@ -69,6 +77,49 @@ TEST_CASE("pairs are those of the double loop, sorted, also when bodies have mov
   }
 }
 
+TEST_CASE("one body far away adds no work to the search") {
+  const auto visits = [](double far) {
+    std::vector<Body> bodies = cloud(1000, 6.0, false, 3);
+    bodies[0].position.x += far;
+    PointGrid grid;
+    build_grid(bodies, 0.3, grid);
+    int count = 0;
+    grid.pairs([&](int, int) { ++count; });
+    return count;
+  };
+  CHECK(visits(1e4) <= visits(0.0) + 50);
+  CHECK(visits(1e300) <= visits(0.0) + 50);
+}
+
+TEST_CASE("bodies may all go") {
+  PairFinder finder;
+  std::vector<Contact> contacts;
+  finder.find(cloud(50, 100.0, false, 2), 0.1, contacts);
+  contacts.clear();
+  finder.find({}, 0.1, contacts);
+  CHECK(contacts.empty());
+}
+
+TEST_CASE("a body without a place is named") {
+  std::vector<Body> bodies = cloud(3, 1.0, false, 2);
+  bodies[1].position.y = NAN;
+  std::vector<Contact> contacts;
+  PairFinder finder;
+  CHECK_THROWS_WITH(finder.find(bodies, 0.1, contacts), "body " + std::to_string(bodies[1].id) + ": position is not a finite number");
+}
+
+TEST_CASE("a plane with two sides presses to the side of the centre, also one on the plane itself") {
+  Plane plane;
+  plane.point = {0, 1, 0};
+  plane.two_sided = true;
+  std::vector<Contact> c;
+  plane_contacts({ball(0, 1.05, 0), ball(0, 0.95, 0), ball(0, 1.0, 0), ball(0, 0.5, 0)}, plane, 0.0, c);
+  REQUIRE(c.size() == 3);
+  for (int i = 0; i < 2; ++i) CHECK_THAT(c[std::size_t(i)].gap, WithinAbs(-0.05, 1e-15));
+  CHECK((c[0].normal.y == 1.0 && c[1].normal.y == -1.0 && c[2].normal.y == 1.0));
+  CHECK(c[2].gap == -0.1);
+}
+
 TEST_CASE("planes and the inside of a drum") {
   std::vector<Contact> c;
   Plane plane;
@@ -91,18 +142,15 @@ TEST_CASE("planes and the inside of a drum") {
 
 TEST_CASE("two triangles are one square: one contact on the shared diagonal and beside it") {
   for (const double x : {0.2, 0.5, 0.7, 0.500001, 0.46}) {
-    std::vector<Contact> c;
-    triangle_contacts({ball(x, 0.5, 0.09)}, Wall(), square(), 0.01, c);
+    const std::vector<Contact> c = on_mesh({ball(x, 0.5, 0.09)}, square(), 0.01);
     REQUIRE(c.size() == 1);
     CHECK_THAT(c[0].gap, WithinAbs(-0.01, 1e-12));
     CHECK_THAT(c[0].normal.z, WithinAbs(1.0, 1e-12));
   }
-  std::vector<Contact> c;
-  triangle_contacts({ball(-0.05, -0.05, 0.0)}, Wall(), square(), 0.05, c);  // the corner of both
+  std::vector<Contact> c = on_mesh({ball(-0.05, -0.05, 0.0)}, square(), 0.05);  // the corner of both
   REQUIRE(c.size() == 1);
   CHECK_THAT(c[0].gap, WithinAbs(std::sqrt(0.005) - 0.1, 1e-12));
-  c.clear();
-  triangle_contacts({ball(-0.05, 0.4, -0.02)}, Wall(), square(), 0.05, c);  // an outer edge
+  c = on_mesh({ball(-0.05, 0.4, -0.02)}, square(), 0.05);  // an outer edge
   REQUIRE(c.size() == 1);
   CHECK_THAT(c[0].normal.x, WithinAbs(-0.05 / std::hypot(0.05, 0.02), 1e-12));
 }
@@ -112,14 +160,12 @@ TEST_CASE("a concave corner gives two contacts, a convex one its edge") {
   Triangle wall;
   wall.node[0] = {0, 0, 0}, wall.node[1] = {0, 1, 0}, wall.node[2] = {0, 0.5, 1}, wall.id = 2;
   t.push_back(wall);
-  std::vector<Contact> c;
-  triangle_contacts({ball(0.09, 0.5, 0.08)}, Wall(), t, 0.0, c);
+  std::vector<Contact> c = on_mesh({ball(0.09, 0.5, 0.08)}, t, 0.0);
   REQUIRE(c.size() == 2);
   CHECK_THAT(c[0].normal.x + c[1].normal.x, WithinAbs(1.0, 1e-12));
   CHECK_THAT(c[0].normal.z + c[1].normal.z, WithinAbs(1.0, 1e-12));
   t[2].node[2] = {0, 0.5, -1};
-  c.clear();
-  triangle_contacts({ball(-0.06, 0.5, 0.06)}, Wall(), t, 0.0, c);
+  c = on_mesh({ball(-0.06, 0.5, 0.06)}, t, 0.0);
   REQUIRE(c.size() == 1);
   CHECK_THAT(c[0].normal.z, WithinAbs(std::sqrt(0.5), 1e-12));
 }
@@ -127,8 +173,7 @@ TEST_CASE("a concave corner gives two contacts, a convex one its edge") {
 TEST_CASE("a moving mesh gives its velocity at the contact") {
   std::vector<Triangle> t = square();
   t[0].velocity[1] = {0, 0, 2};  // node (1, 0): the lower triangle tilts
-  std::vector<Contact> c;
-  triangle_contacts({ball(0.75, 0.25, 0.1)}, Wall(), t, 0.01, c);
+  const std::vector<Contact> c = on_mesh({ball(0.75, 0.25, 0.1)}, t, 0.01);
   REQUIRE(c.size() == 1);
   CHECK_THAT(c[0].point_velocity.z, WithinAbs(1.0, 1e-12));
 }
@@ -142,12 +187,10 @@ TEST_CASE("a contact keeps its friction when the body moves on to the next trian
   bodies[0].mass = 10;
   bodies[0].inertia = INFINITY;
   bodies[0].velocity = {1.0, 0, 0};
-  Wall wall;
   double last = 0.0;
   for (int i = 0; i < 800; ++i) {
-    std::vector<Contact> c;
+    const std::vector<Contact> c = on_mesh(bodies, square(), 0.01);
     std::vector<Vec3<double>> force(1), torque(1);
-    triangle_contacts(bodies, wall, square(), 0.01, c);
     REQUIRE(c.size() == 1);
     system.step(bodies, c, i, 1.0, force, torque);
     if (i) REQUIRE(force[0].x <= last + 1e-9);

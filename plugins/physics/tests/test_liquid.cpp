@@ -1,14 +1,15 @@
-// The rule of carried liquid: shares, simultaneous requests, return; conservation over random sequences of contacts.
+// Carried liquid: shares, simultaneous requests, return; the ledger over random sequences of contacts, and when grains, walls or bridges
+// go.
 #include "catch.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <random>
+#include <string>
 #include <vector>
 
-#include "dembark/capillary/liquid.hpp"
+#include "dembark/capillary/liquid_ledger.hpp"
 
 using namespace dembark::capillary;
 using Catch::Matchers::WithinAbs;
@@ -17,48 +18,66 @@ using Catch::Matchers::WithinRel;
 namespace {
 
 struct Bridge {
-  std::size_t i, j;
+  BridgeSides sides;
   NewBridge<double> liquid;
 };
 
-/// Holders with radii, whose contacts ask, form and break in steps.
+/// Grains with radii and the walls of a ledger, whose contacts ask, form and break in steps.
 struct Assembly {
   std::vector<double> radius, liquid;
   std::vector<Bridge> bridges;
-  ShareRule share;
-  Return rule = Return::equal;
-  double largest = flat<double>;
-  Demands demands;
+  std::vector<BrokenBridge> broken;
+  LiquidLedger ledger;
 
-  void touch(const std::vector<std::pair<std::size_t, std::size_t>>& contacts) {
-    demands.resize(liquid.size());
-    for (const auto& [i, j] : contacts) {
-      demands.add(i, share(radius[i], radius[j]));
-      demands.add(j, share(radius[j], radius[i]));
-    }
-    const std::vector<double> before = liquid;
-    for (const auto& [i, j] : contacts) {
-      const double given_i = share(radius[i], radius[j]) * grant(before[i], demands.of(i));
-      const double given_j = share(radius[j], radius[i]) * grant(before[j], demands.of(j));
-      const NewBridge<double> bridge = form_bridge(given_i, given_j, radius[i], radius[j], rule, largest);
-      liquid[i] = remaining(liquid[i], bridge.from_i);
-      liquid[j] = remaining(liquid[j], bridge.from_j);
-      bridges.push_back({i, j, bridge});
-    }
+  GrainLiquid grains() { return {liquid.data(), int(liquid.size())}; }
+  void begin(const std::vector<LiquidWall>& walls = {}) {
+    ledger.resize(liquid.size());
+    std::vector<std::string> names;
+    for (const LiquidWall& wall : walls) names.push_back(wall.name);
+    ledger.change_walls(names, grains());
+    ledger.walls = walls;
+  }
+  void touch(const std::vector<BridgeSides>& contacts) {
+    std::vector<BridgeRequest> requests;
+    for (const BridgeSides& c : contacts) requests.push_back({c, radius[c.grain], c.wall ? flat<double> : radius[c.other]});
+    ledger.give_back(broken, grains());
+    ledger.form(requests, grains(), [this](const BridgeRequest& r, const NewBridge<double>& b) { bridges.push_back({r.sides, b}); });
   }
   void rupture(std::size_t k) {
-    const Bridge b = bridges[k];
-    liquid[b.i] += returned(b.liquid.volume, b.liquid.imbalance);
-    liquid[b.j] += returned(b.liquid.volume, -b.liquid.imbalance);
+    broken.push_back({bridges[k].sides, bridges[k].liquid.volume, bridges[k].liquid.imbalance});
     bridges.erase(bridges.begin() + std::ptrdiff_t(k));
   }
-  double total() const {
-    long double sum = 0;
-    for (const double v : liquid) sum += v;
-    for (const Bridge& b : bridges) sum += b.liquid.volume;
-    return double(sum);
+  void reconcile() {
+    double excess = 0.0;
+    REQUIRE(ledger.reconcile_pairs(
+                grains(),
+                [this](auto visit) {
+                  for (const Bridge& b : bridges)
+                    if (!b.sides.wall) visit(b.sides.grain, b.sides.other, b.liquid.volume, b.liquid.imbalance);
+                },
+                excess) < 0);
+    ledger.reconcile_walls(grains(), [this](int i, std::size_t wall, auto visit) {
+      for (Bridge& b : bridges)
+        if (b.sides.wall && b.sides.grain == i && b.sides.other == int(wall)) visit(b.liquid.volume, b.liquid.imbalance);
+    });
+  }
+  double total() {
+    const auto all = ledger.totals(grains());
+    return all.grains + all.bridges + all.walls + ledger.lost;
   }
 };
+
+/// Three wet grains in a row on a wet wall, each with a bridge to its neighbours and to the wall.
+Assembly row_on_wall(Return split) {
+  Assembly row;
+  row.radius = {1e-3, 2e-3, 1e-3};
+  row.liquid = {1e-10, 2e-10, 3e-10};
+  row.ledger.split = split;
+  row.begin({{"floor", 4e-10, 0.1, 0.3}});
+  row.touch({{0, 1, false}, {2, 1, false}, {0, 0, true}, {1, 0, true}, {2, 0, true}});
+  REQUIRE(row.bridges.size() == 5);
+  return row;
+}
 
 }  // namespace
 
@@ -96,15 +115,18 @@ TEST_CASE("rules outside their range are named", "[liquid]") {
 TEST_CASE("n requests at once never take more than there is", "[liquid]") {
   const int n = GENERATE(1, 2, 3, 20, 1000);
   const double liquid = 3e-11, share = 0.3;
-  Demands demands;
-  demands.resize(1);
-  for (int k = 0; k < n; ++k) demands.add(0, share);
-  double left = liquid;
-  for (int k = 0; k < n; ++k) left = remaining(left, share * grant(liquid, demands.of(0)));
-  CHECK(left >= 0.0);
-  CHECK_THAT(left, WithinAbs(liquid * std::max(0.0, 1.0 - n * share), 1e-15 * n * liquid));
-  demands.clear();
-  CHECK(demands.of(0) == 0.0);
+  Assembly star;
+  star.ledger.share = {ShareRule::Kind::fraction, share};
+  star.radius.assign(std::size_t(n) + 1, 1e-3);
+  star.liquid.assign(std::size_t(n) + 1, 0.0);
+  star.liquid[0] = liquid;
+  star.begin();
+  std::vector<BridgeSides> contacts;
+  for (int k = 1; k <= n; ++k) contacts.push_back({0, k, false});
+  star.touch(contacts);
+  CHECK(star.liquid[0] >= 0.0);
+  CHECK_THAT(star.liquid[0], WithinAbs(liquid * std::max(0.0, 1.0 - n * share), 1e-15 * n * liquid));
+  for (const Bridge& b : star.bridges) CHECK(b.liquid.volume == star.bridges[0].liquid.volume);
 }
 
 TEST_CASE("a dry pair forms an empty bridge, a dry side gives nothing", "[liquid]") {
@@ -147,33 +169,159 @@ TEST_CASE("random contacts and ruptures conserve the liquid in any order", "[liq
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> u(0.0, 1.0);
   Assembly one;
-  one.rule = rule;
-  one.share = share;
-  one.largest = 1e-12;
+  one.ledger.split = rule;
+  one.ledger.share = share;
+  one.ledger.largest_bridge = 1e-12;
   const std::size_t n = 40;
   for (std::size_t i = 0; i < n; ++i) {
     one.radius.push_back(std::pow(10.0, -4.0 + 2.0 * u(random)));
     one.liquid.push_back(i % 5 ? std::pow(10.0, -13.0 + 3.0 * u(random)) : 0.0);
   }
+  one.begin({{"wet", 1e-12, 0.2, 0.5}, {"dry"}});
   const double total = one.total();
-  std::vector<std::pair<std::size_t, std::size_t>> contacts;
+  std::vector<BridgeSides> contacts;
   for (int step = 0; step < 300; ++step) {
     contacts.clear();
     for (int k = 0; k < 30; ++k) {
-      const std::size_t i = std::size_t(u(random) * n), j = std::size_t(u(random) * n);
-      if (i != j) contacts.emplace_back(i, j);
+      const int i = int(u(random) * n), j = int(u(random) * n);
+      if (i != j) contacts.push_back({i, k % 5 ? j : j % 2, k % 5 == 0});
     }
     Assembly other = one;
     one.touch(contacts);
     std::shuffle(contacts.begin(), contacts.end(), random);
-    for (auto& [i, j] : contacts)
-      if (u(random) < 0.5) std::swap(i, j);
+    std::shuffle(other.broken.begin(), other.broken.end(), random);
     other.touch(contacts);
-    for (std::size_t i = 0; i < n; ++i) REQUIRE_THAT(other.liquid[i], WithinAbs(one.liquid[i], 1e-13 * total));
+    REQUIRE(other.liquid == one.liquid);
     REQUIRE(*std::min_element(one.liquid.begin(), one.liquid.end()) >= 0.0);
     while (one.bridges.size() > 50) one.rupture(std::size_t(u(random) * double(one.bridges.size())));
     REQUIRE_THAT(one.total(), WithinRel(total, 1e-15 * (step + 10)));
   }
   while (!one.bridges.empty()) one.rupture(0);
+  one.touch({});
   CHECK_THAT(one.total(), WithinRel(total, 1e-13));
+  CHECK_THAT(one.ledger.totals(one.grains()).bridges, WithinAbs(0.0, 1e-14 * total));
+}
+
+TEST_CASE("swapped sides of a contact get the same bridge", "[liquid]") {
+  Assembly one, other;
+  one.radius = other.radius = {1e-3, 2e-3};
+  one.liquid = other.liquid = {3e-10, 1e-10};
+  one.begin();
+  other.begin();
+  one.touch({{0, 1, false}});
+  other.touch({{1, 0, false}});
+  CHECK(one.liquid == other.liquid);
+  CHECK(one.bridges[0].liquid.volume == other.bridges[0].liquid.volume);
+}
+
+TEST_CASE("bridges that vanish with a grain go back to those who stay", "[liquid]") {
+  const auto split = GENERATE(Return::equal, Return::radius, Return::taken);
+  Assembly row = row_on_wall(split);
+  const double total = row.total();
+  const std::vector<double> before = row.liquid;
+  const double pool = row.ledger.walls[0].pool;
+  // In the order in which they formed: pairs 0-1 and 2-1, then the wall with 0, 1 and 2.
+  const NewBridge<double> first = row.bridges[0].liquid, second = row.bridges[1].liquid, floor = row.bridges[3].liquid;
+  const double taken_along = before[1] + returned(first.volume, -first.imbalance) + returned(second.volume, -second.imbalance) +
+                             returned(floor.volume, floor.imbalance);
+  row.ledger.remove(1, row.grains());
+  row.bridges = {row.bridges[2], row.bridges[4]};
+  row.reconcile();
+  row.touch({});
+  CHECK_THAT(row.ledger.lost, WithinRel(taken_along, 1e-14));
+  CHECK_THAT(row.liquid[0], WithinRel(before[0] + returned(first.volume, first.imbalance), 1e-14));
+  CHECK_THAT(row.liquid[2], WithinRel(before[2] + returned(second.volume, second.imbalance), 1e-14));
+  CHECK_THAT(row.ledger.walls[0].pool, WithinRel(pool + returned(floor.volume, -floor.imbalance), 1e-14));
+  CHECK_THAT(row.total(), WithinRel(total, 1e-14));
+}
+
+TEST_CASE("a bridge that an engine doubled or dropped at a wall is split as it was to be", "[liquid]") {
+  const auto split = GENERATE(Return::equal, Return::radius, Return::taken);
+  Assembly row = row_on_wall(split), dropped = row;
+  const double total = row.total(), own = row.liquid[0], pool = row.ledger.walls[0].pool;
+  const NewBridge<double> bridge = row.bridges[2].liquid;
+  dropped.bridges.erase(dropped.bridges.begin() + 2);
+  dropped.reconcile();
+  dropped.touch({});
+  row.bridges.push_back(row.bridges[2]);
+  row.reconcile();
+  CHECK_THAT(row.bridges[2].liquid.volume, WithinRel(0.5 * bridge.volume, 1e-14));
+  row.rupture(5);
+  row.rupture(2);
+  row.touch({});
+  for (Assembly* one : {&row, &dropped}) {
+    CHECK_THAT(one->liquid[0], WithinRel(own + returned(bridge.volume, bridge.imbalance), 1e-14));
+    CHECK_THAT(one->ledger.walls[0].pool, WithinRel(pool + returned(bridge.volume, -bridge.imbalance), 1e-14));
+    CHECK_THAT(one->total(), WithinRel(total, 1e-14));
+  }
+}
+
+TEST_CASE("a wall that goes leaves its bridges to the grains and takes its own liquid along", "[liquid]") {
+  Assembly row = row_on_wall(Return::taken);
+  const double total = row.total(), pool = row.ledger.walls[0].pool;
+  const double in_bridges = row.ledger.totals(row.grains()).bridges;
+  row.ledger.change_walls({"lid", "floor"}, row.grains());
+  CHECK(row.total() == total);
+  CHECK(row.ledger.walls[1].pool == pool);
+  row.ledger.change_walls({"lid"}, row.grains());
+  CHECK(row.ledger.lost == pool);
+  CHECK_THAT(row.total(), WithinRel(total, 1e-14));
+  CHECK(row.ledger.totals(row.grains()).bridges < in_bridges);
+}
+
+TEST_CASE("new grains are counted as added, missing liquid is told", "[liquid]") {
+  Assembly some;
+  some.radius = {1e-3, 1e-3, 1e-3};
+  some.liquid = {1e-10, GrainLiquid::unset, 0.0};
+  some.begin();
+  const auto full = [](int) { return 4e-10; };
+  REQUIRE(some.ledger.admit(some.grains(), full) < 0);
+  CHECK(some.ledger.audit(some.grains(), true) == 0.0);
+  CHECK(some.ledger.expected == 5e-10);
+  CHECK(some.ledger.added == 0.0);
+  some.radius.push_back(1e-3);
+  some.liquid.push_back(GrainLiquid::unset);
+  some.ledger.resize(4);
+  REQUIRE(some.ledger.admit(some.grains(), full) < 0);
+  CHECK(some.ledger.audit(some.grains(), true) == 0.0);
+  CHECK(some.ledger.added == 4e-10);
+  some.liquid[0] = 0.0;
+  CHECK_THAT(some.ledger.audit(some.grains(), true), WithinRel(1.0 / 9.0, 1e-12));
+  some.liquid[0] = -1e-12;
+  CHECK(some.ledger.admit(some.grains(), full) == 0);
+  some.liquid.erase(some.liquid.begin());
+  const double lost = some.ledger.lost;
+  CHECK(some.ledger.audit(some.grains(), true) == 0.0);
+  CHECK(some.ledger.lost == lost);
+}
+
+TEST_CASE("two processes reckon a pair across their border alike", "[liquid]") {
+  // Each has one grain and a copy of the other's; they exchange what their grains grant.
+  std::vector<double> radius{1e-3, 2e-3}, liquid{3e-10, 1e-10};
+  std::vector<NewBridge<double>> bridges;
+  std::vector<std::vector<double>> left;
+  for (const int me : {0, 1}) {
+    LiquidLedger ledger;
+    std::vector<double> mine{liquid[me]};
+    const GrainLiquid grains{mine.data(), 1};
+    ledger.resize(2);
+    ledger.copy_to_others = [&](std::vector<double>& grants) { grants[1] = liquid[1 - me]; };  // one request: all is granted
+    std::vector<BridgeRequest> requests{{{0, 1, false}, radius[me], radius[1 - me]}};
+    ledger.form(requests, grains, [&](const BridgeRequest&, const NewBridge<double>& b) { bridges.push_back(b); });
+    left.push_back(mine);
+  }
+  CHECK(bridges[0].volume == bridges[1].volume);
+  CHECK(bridges[0].imbalance == -bridges[1].imbalance);
+  CHECK_THAT(left[0][0] + left[1][0] + bridges[0].volume, WithinRel(4e-10, 1e-15));
+}
+
+TEST_CASE("what a restart file holds brings everything back", "[liquid]") {
+  Assembly row = row_on_wall(Return::taken), again;
+  row.ledger.remove(2, row.grains());
+  const std::vector<double> saved = row.ledger.saved(true);
+  again.liquid = row.liquid;
+  again.ledger.restore(saved.data(), saved.size());
+  again.ledger.resize(again.liquid.size());
+  CHECK(again.total() == row.total());
+  CHECK(again.ledger.saved(true) == saved);
 }

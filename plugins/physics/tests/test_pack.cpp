@@ -61,37 +61,43 @@ void compare() {
     const Pack<N> radius = draw.uniform(1e-3, 2e-3), mass = draw.uniform(1e-5, 1e-4), overlap = draw.uniform(1e-6, 1e-4), dt = 1e-5;
     Vec3<Pack<N>> normal = draw.vector(1.0);
     normal *= 1.0 / sqrt(dot(normal, normal));
-    const Vec3<Pack<N>> relative = draw.vector(0.1), spin = draw.vector(0.1);
+    const Vec3<Pack<N>> relative = draw.vector(0.1), spin_1 = draw.vector(100.0), spin_2 = draw.vector(100.0);
+    const Pack<N> arm_1 = draw.uniform(1e-3, 2e-3), arm_2 = draw.uniform(1e-3, 2e-3);
     const Pack<N> twist = draw.among({0.0, 1e-9, 1e-5, 0.1, -1.0});
     Vec3<Pack<N>> displacement = draw.vector(1e-6);
     displacement -= draw.among({0.0, 0.9, 0.9999, 1.0, 1.0}) * dot(displacement, normal) * normal;
     FrictionState<Pack<N>> state{displacement, draw.among({0.0, 0.0, 1e-6}), draw.uniform(0.0, 1.0)};
     const FrictionState<Pack<N>> before = state;
 
-    const ContactMotion<Pack<N>> motion = contact_motion(normal, relative, spin);
-    const NormalResponse<Pack<N>> response = hertz(p, radius, mass, overlap, motion.normal);
-    state.displacement = rotate_to_plane(state.displacement, normal, twist) + motion.tangential * dt;
+    const SurfaceMotion<Pack<N>> motion = surface_motion(normal, relative, arm_1, spin_1, arm_2, spin_2);
+    const Pack<N> turn = contact_twist(normal, spin_1, spin_2, dt);
+    const NormalResponse<Pack<N>> response =
+        adjusted(hertz(p, radius, mass, overlap, motion.normal_velocity), round % 2 == 0, round % 3 != 0);
+    state.displacement = rotate_to_plane(state.displacement, normal, twist) + motion.tangential_velocity * dt;
     const unsigned sticks = bits(plainly_sticks(p, response.force, response.tangential_stiffness, response.contact_area, state));
     const FrictionState<Pack<N>> moved = state;
     const Vec3<Pack<N>> force =
-        sticking_force(response.tangential_stiffness, response.tangential_damping, motion.tangential, dt, p.kept_slip, state);
+        sticking_force(response.tangential_stiffness, response.tangential_damping, motion.tangential_velocity, dt, p.kept_slip, state);
 
     for (int k = 0; k < N; ++k) {
-      const ContactMotion<double> one_motion = contact_motion(lane(normal, k), lane(relative, k), lane(spin, k));
-      CHECK(one_motion.normal == motion.normal[k]);
-      CHECK(same(one_motion.tangential, lane(motion.tangential, k)));
+      const Vec3<double> one_normal = lane(normal, k), one_spin = lane(spin_1, k), other_spin = lane(spin_2, k);
+      const SurfaceMotion<double> one_motion = surface_motion(one_normal, lane(relative, k), arm_1[k], one_spin, arm_2[k], other_spin);
+      CHECK(one_motion.normal_velocity == motion.normal_velocity[k]);
+      CHECK(same(one_motion.tangential_velocity, lane(motion.tangential_velocity, k)));
+      CHECK(contact_twist(one_normal, one_spin, other_spin, dt[k]) == turn[k]);
       HertzParameters elasticity;
       elasticity.effective_youngs_modulus = p.effective_youngs_modulus[k];
       elasticity.effective_shear_modulus = p.effective_shear_modulus[k];
       elasticity.damping = p.damping[k];
-      const NormalResponse<double> one = hertz(elasticity, radius[k], mass[k], overlap[k], one_motion.normal);
+      const NormalResponse<double> one =
+          adjusted(hertz(elasticity, radius[k], mass[k], overlap[k], one_motion.normal_velocity), round % 2 == 0, round % 3 != 0);
       CHECK(one.force == response.force[k]);
       CHECK(one.tangential_stiffness == response.tangential_stiffness[k]);
       CHECK(one.tangential_damping == response.tangential_damping[k]);
       CHECK(one.contact_area == response.contact_area[k]);
       FrictionState<double> single{rotate_to_plane(lane(before.displacement, k), lane(normal, k), twist[k]), before.slip[k],
                                    before.dissipated_energy[k]};
-      CHECK(same(single.displacement + one_motion.tangential * dt[k], lane(moved.displacement, k)));
+      CHECK(same(single.displacement + one_motion.tangential_velocity * dt[k], lane(moved.displacement, k)));
       if (!(sticks >> k & 1)) {
         ++moving;
         continue;
@@ -104,7 +110,7 @@ void compare() {
       law.interface_shear_strength = p.interface_shear_strength[k];
       law.healing_time = p.kept_slip[k] > 0.0 ? -dt[k] / std::log(p.kept_slip[k]) : 0.0;
       const Vec3<double> whole = friction_step(law, one.force, one.tangential_stiffness, one.tangential_damping, one.contact_area,
-                                               one_motion.tangential, dt[k], single);
+                                               one_motion.tangential_velocity, dt[k], single);
       CHECK(same(whole, lane(force, k)));
       CHECK(same(single.displacement, lane(state.displacement, k)));
       CHECK(single.dissipated_energy == state.dissipated_energy[k]);

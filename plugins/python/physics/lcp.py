@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -45,7 +46,7 @@ class LcpResult:
     pivots: int  # single exchanges w_i <-> z_i; sweeps of pgs
     block_steps: int  # steps that exchanged all violated indices at once
     islands: int  # connected parts of the graph of M, solved apart
-    guarded: bool  # a rule stalled or came back to a set that it had left, and a safer one took over
+    used_fallback: bool  # a rule stalled or came back to a set that it had left, and a safer one took over
     certificate: LcpCertificate
     status: str  # 'solved' or 'iteration_limit'
 
@@ -53,6 +54,12 @@ class LcpResult:
     def active(self) -> NDArray[np.bool_]:
         """(n,) flags, z_i > 0: the `start` for a problem that is nearly the same."""
         return self.z > 0.0
+
+    @property
+    def guarded(self) -> bool:
+        """The former name of `used_fallback`."""
+        warnings.warn("LcpResult.guarded is now LcpResult.used_fallback", DeprecationWarning, stacklevel=2)
+        return self.used_fallback
 
 
 class LcpSolver:
@@ -98,10 +105,10 @@ def solve_lcp(M: Matrix, q: ArrayLike, *, method: str = "auto", start: ArrayLike
 
     M : (n, n), dense or any scipy.sparse matrix; both triangles. Any units: they go with q (M z) and z.
     q : (n,)
-    method : 'auto'    energy for small islands, block for large ones
+    method : 'auto'    energy for small islands; sweeps and conjugate gradients for large ones, then block where those take too long
              'energy'  the energy criterion (G. N. Kolesnikov, Resources and Technology 10 (2013)): exchange w_i <-> z_i where -q_i^2 / M_ii
                        of the transformed system is most negative, the exchange that releases the most energy; ties: the lower index
-             'block'   all violated indices at once (Judice & Pires, Computers & Operations Research 21 (1994) 587), guarded
+             'block'   all violated indices at once (Judice & Pires, Computers & Operations Research 21 (1994) 587)
              'murty'   least index (Murty, Opsearch 11 (1974) 138): slow, ends for certain
              'pgs'     projected Gauss-Seidel, for comparison
     start : (n,) flags or the z of a like problem: the set {z_i > 0} to begin with. It changes the number of steps, not the answer.
@@ -182,5 +189,6 @@ def _limit(max_iterations: int | None) -> int:
 
 
 def _result(values: tuple[Any, ...]) -> LcpResult:
-    z, w, pivots, block_steps, islands, guarded, certificate, solved = values
-    return LcpResult(z, w, pivots, block_steps, islands, guarded, LcpCertificate(*certificate), "solved" if solved else "iteration_limit")
+    z, w, pivots, block_steps, islands, used_fallback, certificate, solved = values
+    status = "solved" if solved else "iteration_limit"
+    return LcpResult(z, w, pivots, block_steps, islands, used_fallback, LcpCertificate(*certificate), status)

@@ -93,16 +93,22 @@ def models(m: Material, tangential: str = "finnie_rabinowicz", wall: str = "") -
     return f"model {m.normal_law} tangential {tangential}{' cohesion capillary' if wet else ''} {wall}{settings}"
 
 
+def head(newton: str = "off", boundary: str = "f f f") -> str:
+    """The first lines of a deck."""
+    return f"""\
+units si
+atom_style granular
+atom_modify map array
+boundary {boundary}
+newton {newton}
+communicate single vel yes"""
+
+
 def deck(case: Scenario, *, tangential: str = "finnie_rabinowicz", newton: str = "off", material_lines: str | None = None,
          finish: str = "", start: str = "") -> str:
     m = case.material
     prefix = f"""\
-units si
-atom_style granular
-atom_modify map array
-boundary f f f
-newton {newton}
-communicate single vel yes
+{head(newton)}
 region domain block -0.05 0.05 -0.05 0.05 -0.05 0.05 units box
 create_box 2 domain
 neighbor 0.001 bin

@@ -1,15 +1,12 @@
-"""Runs inside YADE: `yade -n -x energy_scenes.py out.json scene...`. Each scene is a function that returns plain data."""
+"""Runs inside YADE: `PYTHONPATH=. yade -n -x energy_scenes.py out.json scene...`. Each scene is a function that returns plain data."""
 
-import json
 import math
 import os
 import random
-import sys
 
-from yade import dembark, utils
-
-sys.path.insert(0, os.path.dirname(os.path.realpath(sys.argv[0] if sys.argv[0].endswith(".py") else __file__)))
 from columns import dilute_column
+from scene_results import write_results
+from yade import dembark, utils
 
 PAIR = dict(restitution=0.6, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5)
 WET = dict(bridgeVolume=2e-11, surfaceTension=0.072, contactAngle=0.35, liquidViscosity=5e-3, minimumGap=1e-5)
@@ -159,12 +156,16 @@ def drum():
     return account.energies()
 
 
+def flying(count, spacing, speed):
+    """Grains on a cube of `count` by `count` by `count` places, `speed` at most along each axis."""
+    chance = random.Random(5)
+    return [grain([spacing * n + 0.003 for n in (i, j, k)], R, [chance.uniform(-speed, speed) for _ in range(3)])
+            for i in range(count) for j in range(count) for k in range(count)]
+
+
 def periodic():
     """Grains that fly about in a periodic cell."""
-    chance = random.Random(5)
-    grains = [grain([0.006 * n + 0.003 for n in (i, j, k)], R, [chance.uniform(-0.5, 0.5) for _ in range(3)])
-              for i in range(4) for j in range(4) for k in range(4)]
-    account = scene_with(grains, WET, dict(capillaryModel="willett"), step=1e-5)
+    account = scene_with(flying(4, 0.006, 0.5), WET, dict(capillaryModel="willett"), step=1e-5)
     O.periodic, O.cell.hSize = True, Matrix3(0.024, 0, 0, 0, 0.024, 0, 0, 0, 0.024)
     O.run(2000, True)
     return account.energies()
@@ -172,12 +173,9 @@ def periodic():
 
 def carried():
     """Bridges of carried liquid form and break between the forces and the account."""
-    chance = random.Random(5)
-    grains = [grain([0.0052 * n + 0.003 for n in (i, j, k)], R, [chance.uniform(-1, 1) for _ in range(3)])
-              for i in range(3) for j in range(3) for k in range(3)]
     words = {key: value for key, value in WET.items() if key != "bridgeVolume"}
     liquid = CapillaryLiquid(content=0.01)
-    account = scene_with(grains, words, dict(capillaryModel="willett", carriedLiquid=True), step=1e-5, before=[liquid])
+    account = scene_with(flying(3, 0.0052, 1.0), words, dict(capillaryModel="willett", carriedLiquid=True), step=1e-5, before=[liquid])
     counts = []
     for _ in range(20):
         O.run(50, True)
@@ -302,7 +300,7 @@ def table():
 
 
 def messages():
-    """What the account says to scenes whose energies it cannot book; `nothing` for none."""
+    """What the account says to scenes whose energies it cannot tally; `nothing` for none."""
     found = {}
 
     def heard(name, change, **options):
@@ -357,8 +355,4 @@ def other_law():
     O.run(3, True)
 
 
-out, *names = sys.argv[1:]
-results = {name: globals()[name]() for name in names}
-with open(out, "w", encoding="utf-8") as file:
-    json.dump(results, file)
-print("scenes: finished", flush=True)
+write_results(globals())

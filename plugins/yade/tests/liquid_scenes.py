@@ -1,11 +1,10 @@
-"""Runs inside YADE: `yade -n -x liquid_scenes.py out.json scene...`. Each scene is a function that returns plain data."""
+"""Runs inside YADE: `PYTHONPATH=. yade -n -x liquid_scenes.py out.json scene...`. Each scene is a function that returns plain data."""
 
-import json
 import math
 import os
 import random
-import sys
 
+from scene_results import write_results
 from yade import dembark, utils
 
 PAIR = dict(restitution=0.6, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5, surfaceTension=0.072, contactAngle=0.35)
@@ -49,7 +48,7 @@ def held(position, radius=R):
     return make
 
 
-def books(engine, count):
+def tallies(engine, count):
     return {"grains": [engine.volume(i) for i in range(count)], "bridges": engine.inBridges(), "walls": engine.onWalls(),
             "lost": engine.lost,
             "count": engine.bridgeCount(), "total": engine.total(),
@@ -78,7 +77,7 @@ def sequence():
         rows = []
         for places in ({0: 0, 1: 0.0062, 2: -0.0062}, {1: 0.0049, 2: -0.0049}, {}, {1: 0.0065}, {2: -0.008}):
             put(places)
-            rows.append(books(engine, 3) | {"pull": O.forces.f(1)[0]})
+            rows.append(tallies(engine, 3) | {"pull": O.forces.f(1)[0]})
         found[name] = rows
     return found
 
@@ -89,7 +88,7 @@ def many_at_once():
     engine = scene_with([held((0, 0, 0)), *around], share="fraction", shareFactor=1.0)
     engine.setVolume(0, 6e-11)
     O.step()
-    return books(engine, 7)
+    return tallies(engine, 7)
 
 
 def wall():
@@ -109,9 +108,9 @@ def wall():
     engine = scene_with([lambda: utils.wall(-R, 0), held((-0.00001, 0, 0))])
     engine.setVolume(1, 1e-10)
     O.step()
-    on = books(engine, 2)
+    on = tallies(engine, 2)
     put({1: 0.005})
-    return {"orders": found, "plain": [on, books(engine, 2)]}
+    return {"orders": found, "plain": [on, tallies(engine, 2)]}
 
 
 def erased():
@@ -120,10 +119,64 @@ def erased():
     for k in range(3):
         engine.setVolume(k, 1e-10)
     O.step()
-    before = books(engine, 3)
+    before = tallies(engine, 3)
     O.bodies.erase(1)
     O.step()
-    return [before, books(engine, 3)]
+    return [before, tallies(engine, 3)]
+
+
+def reused_id():
+    """A grain is erased, with the bridge that holds it, and another one is put in its place before the next step."""
+    engine = scene_with([held((0, 0, 0)), held((TOUCH, 0, 0)), held((-TOUCH, 0, 0))], content=0.01)
+    O.step()
+    before = tallies(engine, 3)
+    O.bodies.erase(1)
+    body = held((0.03, 0, 0), 0.002)()
+    body.mat = O.materials[0]
+    O.bodies.insertAtId(body, 1)
+    O.step()
+    after = tallies(engine, 3)
+    put({1: -0.0093})  # it touches the third grain
+    O.bodies.erase(1)
+    body = held((0.03, 0, 0), 0.002)()
+    body.mat = O.materials[0]
+    O.bodies.insertAtId(body, 1)
+    engine.setVolume(1, 5e-11)
+    O.step()
+    return [before, after, tallies(engine, 3)]
+
+
+def rolling_over_facets():
+    """A grain that a wet floor of two triangles lends a bridge is drawn over their common edge and up."""
+    corners = ((-1, -1, -R), (0, -1, -R), (0, 1, -R), (1, -1, -R))
+    floor = [lambda three=three: utils.facet([corners[k] for k in three]) for three in ((0, 1, 2), (1, 3, 2))]
+    scene_with([*floor, held((-0.0004, 0, -0.00001))])
+    surface = FacetSurface()
+    O.engines = [O.engines[0], InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Facet_Aabb()], verletDist=0.001), surface, InteractionLoop(
+        [Ig2_Sphere_Sphere_ScGeom(), Ig2_FacetSurface_Sphere_ScGeom(surface=surface)], O.engines[2].physDispatcher.functors,
+        O.engines[2].lawDispatcher.functors), *O.engines[3:]]
+    engine = O.engines[4]
+    engine.addWall([0, 1], pool=2e-10, share=0.25, part=0.4)
+    rows = []
+    for x, z in ((-0.0004, -0.00001), (-0.0002, 0), (0.0003, 0), (0.0006, 0), (0.0006, 0.004)):
+        O.bodies[2].state.pos, O.bodies[2].state.vel = Vector3(x, 0, z), Vector3(0, 0, 0)
+        O.step()
+        rows.append({"grain": engine.volume(2), "pool": engine.wallPool(0)} | tallies(engine, 0))
+    return {"rows": rows, "handed": surface.handedOver}
+
+
+def erased_facet():
+    """The wall under a bridge is erased; then the grain of another bridge to a wall."""
+    engine = scene_with([lambda: utils.wall(-R, 0), lambda: utils.wall(R + 0.01, 0), held((-0.00001, 0, 0)), held((0.01001, 0, 0))])
+    engine.addWall([0], pool=2e-10, share=0.25, part=0.4)
+    engine.addWall([1], pool=2e-10, share=0.25, part=0.4)
+    for _ in range(2):
+        O.step()
+    before = tallies(engine, 4) | {"pools": list(engine.pools)}
+    O.bodies.erase(0)
+    O.bodies.erase(3)
+    O.step()
+    return [before, tallies(engine, 4) | {"pools": list(engine.pools)}]
 
 
 def both_fixed():
@@ -134,12 +187,12 @@ def both_fixed():
     rows = []
     for x in (0.00505, 0.0051, 0.008):
         put({1: x})
-        rows.append(books(engine, 2))
+        rows.append(tallies(engine, 2))
     return rows
 
 
 def cloud():
-    """Wet grains of two sizes that fall into a corner of walls and bounce about: the books at begin, on the way, and at the end."""
+    """Wet grains of two sizes that fall into a corner of walls and bounce about: the liquid at begin, on the way, and at the end."""
     chance = random.Random(3)
     bodies = [lambda a=a: utils.wall(0, a) for a in range(3)]
     for k in range(4):
@@ -162,7 +215,7 @@ def conserved(step=1e-5, blocks=15, length=100):
     rows = []
     for _ in range(blocks):
         O.run(length, True)
-        rows.append(books(engine, 0))
+        rows.append(tallies(engine, 0))
     solid = sum(4 / 3 * math.pi * b.shape.radius**3 for b in O.bodies if isinstance(b.shape, Sphere))
     return {"begin": engine.content * solid + 1e-9, "rows": rows}
 
@@ -200,7 +253,7 @@ def history():
     writer = dembark.HistoryWriter({"side": 2}, gravity=(0, 0, 0), progress=False, liquid=engine)
     O.step()
     writer.write()
-    return {"text": open("time.csv", encoding="utf-8").read(), "books": books(engine, 2)}
+    return {"text": open("time.csv", encoding="utf-8").read(), "tallies": tallies(engine, 2)}
 
 
 def messages():
@@ -243,8 +296,4 @@ def fixed_volumes_too():
     O.run(1, True)
 
 
-out, *names = sys.argv[1:]
-results = {name: globals()[name]() for name in names}
-with open(out, "w", encoding="utf-8") as file:
-    json.dump(results, file)
-print("scenes: finished", flush=True)
+write_results(globals())

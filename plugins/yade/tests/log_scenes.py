@@ -1,23 +1,22 @@
-"""Runs inside YADE: `yade -n -x log_scenes.py out.json scene...`. Each scene is a function that returns plain data."""
+"""Runs inside YADE: `PYTHONPATH=. yade -n -x log_scenes.py out.json scene...`. Each scene is a function that returns plain data."""
 
 import builtins
-import json
 import math
 import os
-import sys
 
+from scene_results import write_results
 from yade import dembark, utils
 
 GRAVITY = 9.81
 
 
 def setting(bodies, dt, gravity=0.0, **impact):
-    """A new scene of `bodies` with LogImpact; returns the engine."""
+    """A new scene of `bodies` with LcpImpact; returns the engine."""
     O.reset()
     # Bodies take the last material.
     O.materials.append([FrictMat(young=1e9, poisson=0.3, density=700, label=label) for label in ("other", "log")])
     O.bodies.append([body() for body in bodies])
-    engine = LogImpact(**impact)
+    engine = LcpImpact(**impact)
     O.dt = dt
     O.engines = [ForceResetter(), engine, NewtonIntegrator(damping=0, gravity=(0, -gravity, 0))]
     return engine
@@ -243,7 +242,7 @@ def save_load():
         found[ending]["half step"] = outputs(O.engines[1])
         for file in (f"logs.{ending}", f"again.{ending}", name):
             os.remove(file)
-    # Saved between LogImpact and NewtonIntegrator: the whole step is done again after loading.
+    # Saved between LcpImpact and NewtonIntegrator: the whole step is done again after loading.
     engine = heap(velocityAtStart=True)
     builtins.save = lambda: O.save("middle.bin")
     O.engines = [*O.engines[:2], PyRunner(command="save()", iterPeriod=9000, firstIterRun=9000), O.engines[2]]
@@ -290,8 +289,4 @@ def first_impacts():
     return {"rows": rows, "radii": radii, "masses": masses, "places": places, "outputs": outputs(engine)}
 
 
-out, *names = sys.argv[1:]
-results = {name: globals()[name]() for name in names}
-with open(out, "w", encoding="utf-8") as file:
-    json.dump(results, file)
-print("scenes: finished", flush=True)
+write_results(globals())

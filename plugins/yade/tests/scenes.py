@@ -1,15 +1,13 @@
-"""Runs inside YADE: `yade -n -x scenes.py out.json scene...`. Each scene is a function that returns plain data."""
+"""Runs inside YADE: `PYTHONPATH=. yade -n -x scenes.py out.json scene...`. Each scene is a function that returns plain data."""
 
 import builtins
-import json
 import math
 import os
 import sys
 
-from yade import dembark, utils
-
-sys.path.insert(0, os.path.dirname(os.path.realpath(sys.argv[0] if sys.argv[0].endswith(".py") else __file__)))
 from columns import dilute_column
+from scene_results import refusal, write_results
+from yade import dembark, utils
 
 PAIR = dict(restitution=0.6, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5)
 WET = dict(bridgeVolume=2e-10, surfaceTension=0.072, contactAngle=0.35)
@@ -256,17 +254,16 @@ def dumps():
 
 def messages():
     """What wrong words of the law and its functors say."""
-    said = []
-    for wrong in (lambda: Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(normalLaw="herz"),
-                  lambda: Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding="bent"),
-                  lambda: Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(capillaryModel="wet"),
-                  lambda: CylinderWall(radius=-1.0), lambda: CylinderWall(radius=1, axis=(0, 0, 0))):
-        try:
-            wrong()
-            said.append("accepted")
-        except RuntimeError as error:
-            said.append(str(error))
-    return said
+    return [refusal(wrong) for wrong in (
+        lambda: Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(normalLaw="herz"),
+        lambda: Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding="bent"),
+        lambda: Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(capillaryModel="wet"),
+        lambda: CylinderWall(radius=-1.0), lambda: CylinderWall(radius=1, axis=(0, 0, 0)))]
+
+
+def said_at_contact():
+    """What is said when the first two bodies come into contact; `nothing` for nothing."""
+    return refusal(lambda: utils.createInteraction(0, 1), "nothing")
 
 
 def bad_values():
@@ -283,21 +280,11 @@ def bad_values():
         words = {key: value for key, value in {**ok, **wrong}.items() if value is not None}
         scene_with([moving((0, 0, 0), 0.0025), moving((0, 0, 0.00499), 0.0025)], capillaryModel="exact")
         O.engines[2].physDispatcher.functors = [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**words)]
-        try:
-            utils.createInteraction(0, 1)
-            said = "nothing"
-        except RuntimeError as error:
-            said = str(error)
-        found[f"{name} {wrong[name]}"] = said
+        found[f"{name} {wrong[name]}"] = said_at_contact()
     for name, value in (("young", -1.0), ("young", math.inf), ("young", math.nan), ("poisson", 0.7), ("poisson", math.nan)):
         scene_with([moving((0, 0, 0), 0.0025), moving((0, 0, 0.00499), 0.0025)])
         setattr(O.materials[0], name, value)
-        try:
-            utils.createInteraction(0, 1)
-            said = "nothing"
-        except RuntimeError as error:
-            said = str(error)
-        found[f"{name} {value}"] = said
+        found[f"{name} {value}"] = said_at_contact()
     return found
 
 
@@ -310,7 +297,12 @@ def hostile():
 
     def no_number():
         scene_with([moving((0, 0, 0), 0.0025), moving((0, 0, 0.00499), 0.0025, (math.nan, 0, 0))])
-        O.run(10, True)
+        try:
+            for _ in range(10):
+                O.step()
+        except RuntimeError as error:
+            print(error, file=sys.stderr)
+            os._exit(sys.dembark_failure[1])
 
     def erased():
         law = scene_with([moving((0, 0, 0.00495 * k), 0.0025) for k in range(3)], WET, capillaryModel="exact")
@@ -354,8 +346,4 @@ def hostile():
     return found
 
 
-out, *names = sys.argv[1:]
-results = {name: globals()[name]() for name in names}
-with open(out, "w", encoding="utf-8") as file:
-    json.dump(results, file)
-print("scenes: finished", flush=True)
+write_results(globals())

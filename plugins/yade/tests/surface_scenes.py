@@ -4,40 +4,18 @@ import builtins
 import json
 import math
 import os
-import random
 import sys
+from pathlib import Path
 
 from yade import utils
+
+sys.path.insert(0, str(Path(sys.argv[0] if sys.argv[0].endswith(".py") else __file__).resolve().parents[2] / "tests"))
+
+from rig.meshes import bent, box_corner, patch
 
 RADIUS, DENSITY, STEP = 0.005, 2500.0, 1e-5
 PAIR = dict(restitution=0.8, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5,
             bridgeVolume=2e-10, surfaceTension=0.072, contactAngle=0.35)
-
-
-def patch(scale=1.0):
-    """A flat floor of irregular triangles, corners of up to eight of them, some upside down."""
-    chance = random.Random(3)
-    near = lambda i, j: (0.0031 * (i + chance.uniform(-0.3, 0.3)) * scale, 0.0031 * (j + chance.uniform(-0.3, 0.3)) * scale, 0.0)
-    nodes = [[near(i, j) for j in range(-3, 4)] for i in range(-3, 4)]
-    found = []
-    for i in range(6):
-        for j in range(6):
-            a, b, c, d = nodes[i][j], nodes[i + 1][j], nodes[i + 1][j + 1], nodes[i][j + 1]
-            two = ((a, b, c), (a, c, d)) if (i + j) % 2 else ((a, b, d), (c, b, d))
-            found += [three[::-1] if (i + 2 * j) % 3 == 0 else three for three in two]
-    return found
-
-
-def bent(angle):
-    """Two strips of triangles that meet at x = 0; the second rises by `angle` (rad)."""
-    c, s = math.cos(angle), math.sin(angle)
-    found = []
-    for j in range(-2, 2):
-        y, z = 0.004 * j + 0.001, 0.004 * (j + 1) + 0.001
-        left = [(-0.02, y, 0), (0, y, 0), (0, z, 0), (-0.02, z, 0)]
-        right = [(0, y, 0), (0.02 * c, y, 0.02 * s), (0.02 * c, z, 0.02 * s), (0, z, 0)]
-        found += [part for four in (left, right) for part in ([four[0], four[1], four[2]], [four[0], four[2], four[3]])]
-    return found
 
 
 def scene(walls, joined=True, cell=0.0, **surface):
@@ -126,11 +104,8 @@ def bends():
 def corner():
     """A sphere pressed into the corner of three square walls, of planes and of facets."""
     path = lambda t: ((RADIUS - 2e-5, RADIUS - 3e-5, RADIUS - 1e-5 - 0.001 * t), (0, 0, -0.001))
-    add = lambda a, b: tuple(x + y for x, y in zip(a, b, strict=True))
-    square = lambda a, b: [[(0, 0, 0), a, add(a, b)], [(0, 0, 0), add(a, b), b]]
-    x, y, z = (0.02, 0, 0), (0, 0.02, 0), (0, 0, 0.02)
     return {"planes": drag([utils.wall(0, k) for k in range(3)], path, 20),
-            "facets": drag(facets(square(x, y) + square(y, z) + square(z, x)), path, 20)}
+            "facets": drag(facets(box_corner()), path, 20)}
 
 
 def moving():

@@ -1,25 +1,18 @@
 """Liquid that bodies carry in YADE: what bridges take and give back, nothing made or lost, saved exactly."""
 
-import json
 import math
 from pathlib import Path
 
 import pytest
 
 HERE = Path(__file__).parent
-SCENES = "sequence many_at_once wall erased both_fixed conserved save_load history messages".split()
-
-
-def run(yade, *names, threads=1):
-    out = yade.folder / f"liquid-{threads}.json"
-    done = yade(HERE / "liquid_scenes.py", str(out), *names, threads=threads)
-    assert "scenes: finished" in done.stdout, (done.stdout + done.stderr)[-3000:]
-    return json.loads(out.read_text())
+SCENES = ("sequence many_at_once wall erased reused_id rolling_over_facets erased_facet both_fixed conserved save_load history "
+          "messages").split()
 
 
 @pytest.fixture(scope="module")
 def found(yade):
-    return run(yade, *SCENES)
+    return yade.scenes(*SCENES, script="liquid_scenes.py")
 
 
 def cap(own, other):
@@ -85,6 +78,38 @@ def test_erased_body_takes_its_own_and_no_more(found):
     assert after["total"] == pytest.approx(3e-10, rel=1e-14)
 
 
+def test_body_at_the_id_of_an_erased_one_is_a_new_one(found):
+    """It gets its own content, or what it is given; what was of the former is gone with it but for its partner's half."""
+    before, after, again = found["reused_id"]
+    bridge, volume = before["volumes"]["0-1"], 0.01 * 4.0 / 3.0 * math.pi * 0.002**3
+    assert after["lost"] == pytest.approx(before["grains"][1] + 0.5 * bridge, rel=1e-13)
+    assert after["grains"] == pytest.approx([before["grains"][0] + 0.5 * bridge, volume, before["grains"][2]], rel=1e-13, abs=1e-25)
+    assert after["total"] == pytest.approx(before["total"] + volume, rel=1e-14)
+    assert again["grains"][1] == 5e-11
+    assert again["total"] == pytest.approx(after["total"] + 5e-11, rel=1e-14)
+    assert after["count"] == again["count"] == 1
+
+
+def test_bridge_that_goes_from_facet_to_facet_is_counted_once(found):
+    case = found["rolling_over_facets"]
+    touch, *_, left = case["rows"]
+    assert case["handed"] == 1
+    assert [row["count"] for row in case["rows"]] == [1, 1, 1, 1, 0]
+    for row in case["rows"]:
+        assert row["total"] == pytest.approx(2e-10, rel=1e-14)
+        assert row["bridges"] == pytest.approx(5e-11 if row["count"] else 0.0, rel=1e-14, abs=1e-25)
+    assert (touch["grain"], touch["pool"]) == pytest.approx((0.0, 1.5e-10), rel=1e-14, abs=1e-25)
+    assert (left["grain"], left["pool"]) == pytest.approx((3e-11, 1.7e-10), rel=1e-13)
+
+
+def test_bridge_to_a_wall_is_split_when_one_of_them_is_erased(found):
+    before, after = found["erased_facet"]
+    assert before["bridges"] == pytest.approx(1e-10, rel=1e-14) and before["count"] == 2
+    assert after["grains"][2] == pytest.approx(3e-11, rel=1e-13) and after["lost"] == pytest.approx(3e-11, rel=1e-13)
+    assert after["pools"] == pytest.approx([1.7e-10, 1.7e-10], rel=1e-13, abs=1e-25)
+    assert after["total"] == pytest.approx(4e-10, rel=1e-14) and after["bridges"] == pytest.approx(0.0, abs=1e-25)
+
+
 def test_bridge_between_fixed_bodies_keeps_its_liquid(found):
     first, second, gone = found["both_fixed"]
     assert first["count"] == second["count"] == 1 and gone["count"] == 0
@@ -93,7 +118,8 @@ def test_bridge_between_fixed_bodies_keeps_its_liquid(found):
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_nothing_is_made_or_lost(yade, found, threads):
-    case = found["conserved"] if threads == 1 else run(yade, "conserved_briefly", threads=2)["conserved_briefly"]
+    one = found["conserved"] if threads == 1 else None
+    case = one or yade.scenes("conserved_briefly", script="liquid_scenes.py", threads=2)["conserved_briefly"]
     counts = [row["count"] for row in case["rows"]]
     assert max(counts) > 20 and min(counts) < max(counts)
     for row in case["rows"]:
@@ -113,10 +139,10 @@ def test_saved_liquid_is_the_same_to_the_bit(found, ending):
 def test_history_has_the_liquid(found):
     header, row = found["history"]["text"].split()
     values = dict(zip(header.split(","), row.split(","), strict=True))
-    books = found["history"]["books"]
+    liquid = found["history"]["tallies"]
     assert header.endswith(",liquid_grains,liquid_bridges,liquid_walls,liquid_lost,bridge_count")
-    assert float(values["liquid_grains"]) == sum(books["grains"]) > 0.0
-    assert float(values["liquid_bridges"]) == books["bridges"] > 0.0
+    assert float(values["liquid_grains"]) == sum(liquid["grains"]) > 0.0
+    assert float(values["liquid_bridges"]) == liquid["bridges"] > 0.0
     assert (float(values["liquid_walls"]), float(values["liquid_lost"]), int(values["bridge_count"])) == (0.0, 0.0, 1)
 
 

@@ -182,7 +182,7 @@ def test_cylinder_in_a_periodic_cell_is_one_line(yade):
         wall.shape = CylinderWall(radius=0.02)
         O.bodies.append([wall, sphere((0, 0, 0), 0.001)])
         O.periodic = True
-        O.engines = [InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_CylinderWall_Aabb()])]
+        O.engines = [InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_CylinderWall_Aabb()]), NewtonIntegrator()]
         O.run(1, True)
         print("went on")
         """)

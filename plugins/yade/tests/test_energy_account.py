@@ -1,7 +1,6 @@
 """EnergyAccount in YADE: every part of the energy against formulas and known values, and the balance of whole runs."""
 
 import itertools
-import json
 import math
 from pathlib import Path
 
@@ -21,16 +20,9 @@ SCENES = ("impacts elastic dry wet damped box_gate drum periodic carried two_ste
           "set_in_a_step reset table messages").split()
 
 
-def run(yade, *names, threads=1):
-    out = yade.folder / f"energy-{threads}.json"
-    done = yade(HERE / "energy_scenes.py", str(out), *names, threads=threads)
-    assert "scenes: finished" in done.stdout, (done.stdout + done.stderr)[-3000:]
-    return json.loads(out.read_text())
-
-
 @pytest.fixture(scope="module")
 def found(yade):
-    return run(yade, *SCENES)
+    return yade.scenes(*SCENES, script="energy_scenes.py")
 
 
 def mass(radius):
@@ -180,7 +172,7 @@ def test_periodic_cell_and_carried_liquid(found):
 
 
 def test_two_threads_find_the_same_energies(yade, found):
-    one, two = found["briefly"], run(yade, "briefly", threads=2)["briefly"]
+    one, two = found["briefly"], yade.scenes("briefly", script="energy_scenes.py", threads=2)["briefly"]
     assert_balanced(two)
     for name in KEYS:
         if name not in ("balance", "other"):
@@ -266,7 +258,7 @@ SAID = {"no integrator": ("no NewtonIntegrator", "exactly one"), "two integrator
 
 
 @pytest.mark.parametrize("name", SAID)
-def test_scene_that_cannot_be_booked_is_refused(found, name):
+def test_scene_that_cannot_be_tallied_is_refused(found, name):
     said = found["messages"][name]
     assert said.startswith("dembark: EnergyAccount") and "\n" not in said
     assert all(part in said for part in SAID[name]), said

@@ -1,4 +1,4 @@
-"""The report of a campaign: studies along its parameters, numerical uncertainty, tables, and what changed against another one."""
+"""The report of a campaign: studies along its parameters, numerical uncertainty, and tables."""
 
 from dembark.validation.campaigns.report.build import build
 

@@ -1,4 +1,4 @@
-"""The report of a campaign's folder, alone or against another campaign: its chapters in the report that profiles have too."""
+"""The report of a campaign's folder: its chapters in the report that profiles have too."""
 
 from __future__ import annotations
 
@@ -7,42 +7,35 @@ from typing import Any
 
 from dembark.common.errors import RunError
 from dembark.common.files import write_whole
-from dembark.validation.campaigns.report import against as other
 from dembark.validation.campaigns.report import figures, tables
 from dembark.validation.campaigns.report.sweeps import Point, Sweep, numerical_errors, sweeps
-from dembark.validation.judge.result import Comparison, Result
+from dembark.validation.judge.result import Comparison
 from dembark.validation.judge.tally import tally
 from dembark.validation.report.build import write
-from dembark.validation.report.figures import write_csv
+from dembark.validation.report.figures import engine_name
 from dembark.validation.report.gather import Gathered, gather
-from dembark.validation.report.look import engine_name
 from dembark.validation.report.sections import embed
 
 # A page that shows everything shows nothing: the rest is in the tables.
 _PANELS = 9
 
 
-def build(folder: Path, against: Path | None = None) -> Path:
+def build(folder: Path) -> Path:
     """Write `report.html`, `report.pdf` and `figures/` into a campaign's `folder` and return the path of the HTML file.
 
-    `against`: folder of another campaign, whose quantities are set beside these. RunError when there is nothing measured or a file
-    cannot be written; the HTML comes last, so that it never stands there with an older PDF.
+    RunError when there is nothing measured or a file cannot be written; the HTML comes last, so that it never stands there with an older
+    PDF.
     """
     gathered = gather(folder)
-    if not _results(gathered):
+    if not any(page.results for page in gathered.pages):
         raise RunError(f"nothing to report in {folder}", "the campaign has no measured run yet", "see 'dembark status'")
-    return write(gathered, lambda drawn: _chapters(gathered, against, drawn))
+    return write(gathered, lambda drawn: _chapters(gathered, drawn))
 
 
-def _results(gathered: Gathered) -> list[Result]:
-    return [one for page in gathered.pages for one in page.results.values()]
-
-
-def _chapters(gathered: Gathered, against: Path | None, drawn: Path) -> dict[str, Any]:
-    name = gathered.summary.get("campaign") or gathered.folder.name
+def _chapters(gathered: Gathered, drawn: Path) -> dict[str, Any]:
     found = sweeps(gathered.summary.get("sweeps", ()), gathered.pages, gathered.cases)
-    return {"title": f"Campaign {name}", "sweeps": [_sweep(one, gathered, drawn) for one in found], "errors": numerical_errors(found),
-            "against": None if against is None else _comparison(gathered, name, against, drawn)}
+    return {"title": f"Campaign {gathered.summary.get('campaign') or gathered.folder.name}",
+            "sweeps": [_sweep(one, gathered, drawn) for one in found], "errors": numerical_errors(found)}
 
 
 def _sweep(sweep: Sweep, gathered: Gathered, drawn: Path) -> dict[str, Any]:
@@ -68,20 +61,3 @@ def _verdicts(sweep: Sweep, point: Point, comparison: Comparison | None) -> dict
     groups |= {"engines beside each other": comparison.quantities} if comparison else {}
     return {"values": {axis: point.values[axis] for axis in sweep.axes}, "counts": {who: tally(found) for who, found in groups.items()},
             "failed": [f"{who}: {one.title}" for who, found in groups.items() for one in found if one.standing == "failed"]}
-
-
-def _comparison(gathered: Gathered, name: str, against: Path, drawn: Path) -> dict[str, Any]:
-    before, after = _results(gather(against)), _results(gathered)
-    if not before:
-        raise RunError(f"nothing to compare with in {against}", "it has no measured run", "name the folder of another campaign")
-    rows = other.differences(before, after)
-    write_csv(drawn / "against.csv",
-              ("case", "variant", "engine", "quantity", "before", "after", "relative_change", "change_over_joint_half_width", "state"),
-              ([row.case, row.variant, row.engine, row.name, *(one and one.value for one in (row.before, row.after)), row.change,
-                row.significance,
-                row.state] for row in rows))
-    shown = embed(figures.against_figure(rows), drawn, "against",
-                  "Change of each quantity over its joint half-width; grey: within the interval.",
-                  ["against.csv"])
-    return {"name": against.name, "own_name": name, "rows": [row for row in rows if row.state == "changed"], "figure": shown,
-            "counts": {state: sum(row.state == state for row in rows) for state in other.STATES}, "facts": other.facts(before, after)}

@@ -1,4 +1,4 @@
-"""Figures of a campaign: quantities along the swept parameters, maps over two of them, and two campaigns against each other."""
+"""Figures of a campaign: quantities along the swept parameters, and maps over two of them."""
 
 from __future__ import annotations
 
@@ -11,22 +11,18 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from dembark.postproc.style import STYLE
-from dembark.validation.campaigns.report.against import Difference
 from dembark.validation.campaigns.report.sweeps import Sweep, words
 from dembark.validation.judge.result import QuantityRecord
-from dembark.validation.report.figures import symbols
-from dembark.validation.report.look import colour, engine_name
+from dembark.validation.report.figures import INK, MARKS, WIDE, colour, engine_name, symbols
 
-_INK = "#4a4f57"
 _DASHES = ["-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (8, 3))]
-_MARKS = ["o", "s", "D", "^", "v", "P", "X"]
 COLUMNS = 3
 
 
 def _panels(count: int, height: float = 1.95) -> tuple[Figure, list[Any]]:
     rows = max(1, math.ceil(count / COLUMNS))
     tall = height * rows + 0.5
-    figure = Figure(figsize=(7.2, tall))
+    figure = Figure(figsize=(WIDE, tall))
     figure.subplots_adjust(left=0.075, right=0.985, bottom=0.85 / tall, top=1.0 - 0.3 / tall, wspace=0.42, hspace=0.55)
     return figure, [figure.add_subplot(rows, COLUMNS, number + 1) for number in range(count)]
 
@@ -51,13 +47,13 @@ def _study_panel(axes: Any, sweep: Sweep, along: str, quantity: QuantityRecord, 
         for number, (others, line) in enumerate(sweep.lines(along, engine, quantity.name)):
             place = np.array([at for at, _ in line])
             value = np.array([one.value for _, one in line], float)
-            style = {"color": colour(engine), "linestyle": _DASHES[number % len(_DASHES)], "marker": _MARKS[number % len(_MARKS)]}
+            style = {"color": colour(engine), "linestyle": _DASHES[number % len(_DASHES)], "marker": MARKS[number % len(MARKS)]}
             handle = axes.errorbar(place, value, yerr=_bars(line), markersize=3.2, elinewidth=0.7, linewidth=1.1, **style)
             label = engine_name(engine) + (f", {words(others)}" if others else "")
             handles.setdefault(label, handle)
             known = [(at, one.reference) for at, one in line if one.reference is not None]
             if known:
-                (reference,) = axes.plot(*zip(*known, strict=True), color=_INK, linewidth=0.8, linestyle=_DASHES[1], alpha=0.8, zorder=1)
+                (reference,) = axes.plot(*zip(*known, strict=True), color=INK, linewidth=0.8, linestyle=_DASHES[1], alpha=0.8, zorder=1)
                 handles.setdefault("reference", reference)
     axes.set(xlabel=sweep.label(along), ylabel=_unit(quantity))
     axes.set_title(_title(quantity), fontsize=7.0)
@@ -126,20 +122,3 @@ def map_figure(sweep: Sweep, engine: str, quantities: Sequence[QuantityRecord]) 
 
 def _short(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def against_figure(rows: Sequence[Difference]) -> Figure:
-    """Two campaigns: the change of each quantity over its joint 95 % half-width; beyond the grey band it changed."""
-    known = [row for row in rows if row.significance is not None]
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 2.4), layout="constrained")
-        axes = figure.subplots()
-        axes.axhspan(-1.0, 1.0, color=_INK, alpha=0.12, linewidth=0)
-        for engine in sorted({row.engine for row in known}):
-            points = [(number, row.significance) for number, row in enumerate(known) if row.engine == engine]
-            axes.plot(*zip(*points, strict=True), ".", color=colour(engine), label=engine_name(engine), markersize=4)
-        axes.set(xlabel="quantity, in the order of the table", ylabel="change / joint half-width")
-        if known:
-            axes.legend(loc="best", fontsize=7)
-            axes.set_yscale("symlog", linthresh=2.0)
-    return figure

@@ -9,12 +9,10 @@ from typing import Any
 
 from dembark.validation.campaigns.report.sweeps import Sweep
 from dembark.validation.judge.result import QuantityRecord
-from dembark.validation.report.figures import write_csv
-from dembark.validation.report.look import engine_name
+from dembark.validation.report.figures import engine_name, write_csv
+from dembark.validation.report.front import COLUMNS, cells
 from dembark.validation.report.numbers import deviation, with_interval, with_unit
 
-COLUMNS = ("case", "variant", "engine", "quantity", "unit", "value", "low", "high", "reference", "reference_low", "reference_high",
-           "deviation", "tolerance", "verdict", "evidence")
 _SPECIAL = {"&": r"\&", "%": r"\%", "#": r"\#", "_": r"\_", "$": r"\$", "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}",
             "^": r"\textasciicircum{}", "\\": r"\textbackslash{}", "−": "$-$", "±": r"$\pm$", "·": r"$\cdot$", "–": "--", "λ": r"$\lambda$",
             "σ": r"$\sigma$", "ρ": r"$\rho$", "μ": r"$\mu$", "θ": r"$\theta$", "τ": r"$\tau$", "ω": r"$\omega$", "π": r"$\pi$",
@@ -24,18 +22,11 @@ _SPECIAL = {"&": r"\&", "%": r"\%", "#": r"\#", "_": r"\_", "$": r"\$", "{": r"\
 _POWERS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 
-def rows(sweep: Sweep) -> list[list[Any]]:
-    """One row for each quantity of each point and engine: case, variant, engine, the swept values, and the quantity as in COLUMNS."""
-    none = (None, None)
-    return [[sweep.case, point.variant, engine, *(point.values[axis] for axis in sweep.axes), one.name, one.unit, one.value,
-             *(one.interval or none),
-             one.reference, *(one.reference_interval or none), one.deviation, one.tolerance, one.verdict, one.evidence]
-            for point in sweep.points for engine, result in sorted(point.results.items()) for one in result.quantities]
-
-
 def write_table_csv(path: Path, sweep: Sweep) -> None:
-    """All quantities of a sweep, a column for each swept parameter."""
-    write_csv(path, [*COLUMNS[:3], *sweep.axes, *COLUMNS[3:]], rows(sweep))
+    """All quantities of a sweep: a row for each of each point and engine, a column for each swept parameter."""
+    write_csv(path, ["case", "variant", "engine", *sweep.axes, *COLUMNS],
+              ([sweep.case, point.variant, engine, *(point.values[axis] for axis in sweep.axes), *cells(one)]
+               for point in sweep.points for engine, result in sorted(point.results.items()) for one in result.quantities))
 
 
 def latex(sweep: Sweep, quantities: Sequence[QuantityRecord]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import subprocess
 import sys
 from pathlib import Path
 
@@ -15,3 +16,17 @@ _SPEC.loader.exec_module(_MODULE)
 decks, stand_in, environment, wait_for, lives = (getattr(_MODULE, name)
                                                  for name in ("decks", "stand_in", "environment", "wait_for", "lives"))
 engine_pid = _MODULE.engine_pid
+
+
+def start(folder: Path, environment: dict[str, str], *words: str) -> subprocess.Popen[str]:
+    """The command `dembark` in `folder`."""
+    return subprocess.Popen([sys.executable, "-m", "dembark.validation.cli", *words], cwd=folder, env=environment,
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def dembark(folder: Path, environment: dict[str, str], *words: str) -> tuple[int, str, str]:
+    """The same, to its end: exit code, output and errors."""
+    process = start(folder, environment, *words)
+    out, error = process.communicate(timeout=300)
+    assert "Traceback" not in error, error
+    return process.returncode, out, error

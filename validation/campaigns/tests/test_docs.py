@@ -24,7 +24,7 @@ def results(tmp_path: Path) -> Path:
     """A campaign's folder with a store of two quantities of two points."""
     folder = tmp_path / "results/campaigns/silo-small"
     folder.mkdir(parents=True)
-    with schema.writing(store.path_of(folder)) as connection:
+    with schema.writing(folder / store.FILE) as connection:
         for friction, value in ((0.2, 0.8), (0.4, 0.6)):
             common = {"campaign": "silo-small", "case_name": "silo", "variant": f"dry_wall_friction={friction}", "engine": "liggghts",
                       "commit_hash": "c", "engine_version": "3.8.0", "measured_at": "2026", "value": value, "low": value - 0.1,
@@ -39,7 +39,7 @@ def results(tmp_path: Path) -> Path:
 def test_sql(results: Path) -> None:
     statements = [text for block in blocks("sql") for text in re.sub(r"--.*", "", block).split(";") if text.strip()]
     found = [store.query(results, text) for text in statements]
-    assert [len(rows) for rows in found] == [2, 2, 2, 2]
+    assert [len(rows) for rows in found] == [2, 2, 2, 2, 2]
     assert [(row["wall_friction"], row["value"]) for row in found[0]] == [(0.2, 0.8), (0.4, 0.6)]
 
 

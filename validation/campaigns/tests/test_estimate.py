@@ -10,8 +10,7 @@ from harness import decks, stand_in  # noqa: F401
 
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
-from dembark.validation.campaigns.estimate import estimates
-from dembark.validation.campaigns.rates import Rates
+from dembark.validation.campaigns.estimate import Rates, estimates
 from dembark.validation.case.folders import discover, find
 from dembark.validation.case.resolve import resolve
 from dembark.validation.runs.plan import Resources, series

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dembark.common.errors import DembarkError
-from dembark.validation.campaigns import source
-from dembark.validation.campaigns.expand import LONGEST_NAME, plan, points, variant_name
+from dembark.validation.campaigns import expand
+from dembark.validation.campaigns.expand import LONGEST_NAME, campaign, points, variant_name
 from dembark.validation.campaigns.spec import read
-from dembark.validation.runs.plan import campaign
+from dembark.validation.runs.plan import of_profile
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
@@ -58,7 +58,7 @@ grid = { grain_diameter = ["4 mm", 0.0125], strength = ["2 MPa"] }
 
 
 def test_a_point_that_a_profile_runs_has_the_same_inputs(tmp_path: Path) -> None:
-    ordinary = {run.inputs: run for one in campaign("standard") for run in one.runs}
+    ordinary = {run.inputs: run for one in of_profile("standard") for run in one.runs}
     spec = spec_of(tmp_path, """
 [[sweeps]]
 case = "box"
@@ -66,7 +66,7 @@ profile = "standard"
 replicas = 3
 grid = { grain_count = [10, 20] }
 """)
-    mine = {run.inputs: run for one in plan(spec).series for run in one.runs}
+    mine = {run.inputs: run for one in campaign(spec).series for run in one.runs}
     shared = ordinary.keys() & mine.keys()
     assert len(mine) == 2 * len(ordinary) and shared == ordinary.keys()
     assert {mine[key].variant for key in shared} == {"dry_grain_count=20"}
@@ -83,11 +83,11 @@ grid = { grain_count = [10, 20] }
 case = "box"
 grid = { grain_diameter = [0.005, 0.004] }
 """)
-    whole = plan(spec)
+    whole = campaign(spec)
     assert sorted(str(one.place) for one in whole.series) == [
         "box/dry_grain_count=10/liggghts", "box/dry_grain_count=10/yade", "box/dry_grain_count=20/liggghts",
         "box/dry_grain_diameter=0.004/liggghts", "box/dry_grain_diameter=0.004/yade"]
-    assert [[point["variant"] for point in sweep["points"]] for sweep in whole.sweeps()] == [
+    assert [[point["variant"] for point in sweep["points"]] for sweep in whole.facts["sweeps"]] == [
         ["dry_grain_count=10", "dry_grain_count=20"], ["dry_grain_count=10", "dry_grain_diameter=0.004"]]
     inputs = [run.inputs for one in whole.series for run in one.runs]
     assert len(set(inputs)) == len(inputs)
@@ -134,17 +134,17 @@ def test_mistakes_in_derived_parameters(derived: str, expected: str, tmp_path: P
 
 def test_only_what_is_chosen(tmp_path: Path) -> None:
     spec = spec_of(tmp_path, '[[sweeps]]\ncase = "box"\ngrid = { grain_count = [10, 20] }\n[resources.yade]\nthreads = 2\n')
-    whole, chosen = source.plan(file=spec.path), source.plan(file=spec.path, engines=["yade"])
-    assert {one.place.name for one in chosen.series} == {"yade"} and len(source.plan(file=spec.path, cases=["box"]).series) == 4
+    whole, chosen = expand.plan(file=spec.path), expand.plan(file=spec.path, engines=["yade"])
+    assert {one.place.name for one in chosen.series} == {"yade"} and len(expand.plan(file=spec.path, cases=["box"]).series) == 4
     assert {one.place.name: whole.of(one).threads for one in whole.series} == {"liggghts": 1, "yade": 2}
     assert [one.place.name for one in whole.series] == ["yade", "yade", "liggghts", "liggghts"]  # the longest first
     assert whole.facts["sweeps"][0]["axes"] == ["grain_count"] and whole.label == "boxes" and whole.whole and not chosen.whole
     with pytest.raises(DembarkError, match="did you mean box"):
-        source.plan(file=spec.path, cases=["bxo"])
+        expand.plan(file=spec.path, cases=["bxo"])
 
 
 def test_a_plan_is_that_of_a_profile_or_a_campaign() -> None:
     with pytest.raises(DembarkError, match="--profile or --campaign"):
-        source.plan()
-    planned = source.plan("quick")
+        expand.plan()
+    planned = expand.plan("quick")
     assert planned.facts == {"profile": "quick"} and planned.label == "quick" and planned.words == ("--profile", "quick")

@@ -14,9 +14,9 @@ from slurm_cluster import Cluster
 
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.validation import engines
-from dembark.validation.campaigns import source
+from dembark.validation.campaigns import expand
 from dembark.validation.engines.liggghts import Liggghts
-from dembark.validation.runs import queue, site, slurm
+from dembark.validation.runs import queue, site
 from dembark.validation.runs.plan import Plan, Resources
 from dembark.validation.runs.queue import Queue
 
@@ -76,9 +76,9 @@ def test_a_launcher_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     words = engine.command(Path("d"), {}, 3)
     assert words[:4] == ["srun", "--mpi=pmix", "-n", "3"] and "/bin/lmp" in words and known() == {"SLURM_CONF", "SLURM_JOB_ID"}
     assert "srun" not in engine.command(Path("d"), {}, 1)
-    assert queue.asked(SLURM, Resources(3, 1, 5e8, 590.0)) == {
+    assert SLURM.asked(Resources(3, 1, 5e8, 590.0)) == {
         "ranks": 3, "threads": 1, "cores": 3, "memory_mb": 500, "minutes": 10, "seconds": 590}
-    assert queue.asked(SLURM, Resources(threads=4)) == {
+    assert SLURM.asked(Resources(threads=4)) == {
         "ranks": 1, "threads": 4, "cores": 4, "memory_mb": 2000, "minutes": 30, "seconds": 1800}
 
 
@@ -89,7 +89,7 @@ def test_names_of_jobs_tell_campaigns_apart(tmp_path: Path) -> None:
 
 
 def test_what_slurm_would_take_passes(on_cluster: Cluster) -> None:
-    slurm.check(SLURM, [Resources(1, 1, 5e8, 300), Resources(4, 1, 4e9, 3600), Resources(1, 4)])
+    site.check(SLURM, [Resources(1, 1, 5e8, 300), Resources(4, 1, 4e9, 3600), Resources(1, 4)])
 
 
 @pytest.mark.parametrize(("options", "used", "words"), [
@@ -101,16 +101,16 @@ def test_what_slurm_would_take_passes(on_cluster: Cluster) -> None:
 ])
 def test_what_slurm_would_refuse_is_told_before_the_start(on_cluster: Cluster, tmp_path: Path, options: str, used: Resources,
                                                           words: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(slurm, "_PAUSE", 0.05)
+    monkeypatch.setattr(site, "_PAUSE", 0.05)
     with pytest.raises(DembarkError, match=words) as caught:
-        slurm.check(written(tmp_path, f'{QUICK}options = "--nodes=1 {options}"\n'), [used])
+        site.check(written(tmp_path, f'{QUICK}options = "--nodes=1 {options}"\n'), [used])
     assert "\n" not in str(caught.value)
 
 
 def test_without_slurm_the_missing_commands_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(DembarkError, match="sbatch, squeue, scancel not found"):
-        slurm.check(SLURM, [])
+        site.check(SLURM, [])
 
 
 # --- the queue, with job scripts that stand in for the job ------------------------------------------------------------
@@ -146,7 +146,7 @@ class Campaign:
 @pytest.fixture
 def campaign(tmp_path: Path, decks: Path, stand_in: Path, on_cluster: Cluster,
              monkeypatch: pytest.MonkeyPatch) -> Iterator[Campaign]:
-    one = Campaign(tmp_path, source.plan("quick"), monkeypatch)
+    one = Campaign(tmp_path, expand.plan("quick"), monkeypatch)
     yield one
     for each in one.queues:
         each._end.set()
@@ -240,7 +240,7 @@ def test_another_scheduler_is_served_by_its_commands(tmp_path: Path, decks: Path
         (tmp_path / name).write_text(f"#!/bin/bash\n{text}\n")
         (tmp_path / name).chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
-    campaign = Campaign(tmp_path, source.plan("quick"), monkeypatch)
+    campaign = Campaign(tmp_path, expand.plan("quick"), monkeypatch)
     campaign.site = written(tmp_path, """
 [jobs]
 poll = "0.2 s"
@@ -256,7 +256,7 @@ line = '^(?P<job>\\\\S+) \\\\S+ (?P<state>\\\\S+)'
 waiting = ["Q", "H"]
 running = ["R", "E"]
 """.replace("\\\\", "\\"))
-    slurm.check(campaign.site, [Resources()])
+    site.check(campaign.site, [Resources()])
     campaign.script(f"echo x >> $out/started; sleep 4; {FINISH}")
     campaign.start()
     number = str(wait_for(lambda: campaign.told.get("job"), 60))

@@ -78,6 +78,19 @@ def test_a_right_file_is_read_as_it_is_meant(write) -> None:
     assert first.resources["yade"].threads == 1 and second.resources["yade"].threads == 4 and second.resources["yade"].memory == 5e8
 
 
+def test_what_the_campaign_says_of_its_sweeps_counts_where_they_do_not(write) -> None:
+    shared = ('case = "box"\nvariants = ["dry", "wet"]\nfixed = { grain_count = 3 }\n'
+              'derived = { kinetic_friction = "0.5 * static_friction" }\n')
+    own = 'variants = ["wet"]\nfixed = { grain_count = 4 }\n'
+    path = write(f"{HEAD}{shared}[[sweeps]]\ngrid = {{ static_friction = [0.4, 0.6] }}\n"
+                 f"[[sweeps]]\n{own}grid = {{ static_friction = [0.45] }}\n"
+                 '[[sweeps]]\nvariant = "dry"\ngrid = { static_friction = [0.5] }\n')
+    first, second, third = read(path).sweeps
+    assert first.case.name == "box" and (first.variants, second.variants, third.variants) == (("dry", "wet"), ("wet",), ("dry",))
+    assert [one.fixed["grain_count"] for one in (first, second, third)] == [3, 4, 3]
+    assert [one.resolved["kinetic_friction"] for one in points(read(path)) if one.sweep.number == 1] == [0.2, 0.3, 0.2, 0.3]
+
+
 HEAD = '[campaign]\nname = "boxes"\nprofile = "quick"\n'
 SWEEP = HEAD + '[[sweeps]]\ncase = "box"\n'
 GRID = SWEEP + "grid = { grain_count = [10, 20] }\n"
@@ -107,7 +120,9 @@ MISTAKES = {
     "unknown engine": (HEAD + 'engines = ["yaed"]\n[[sweeps]]\ncase = "box"\n', "did you mean yade?"),
     "unknown engine of a sweep": (GRID + 'engines = ["lammps"]\n', "unknown engine 'lammps', [sweeps 1] of"),
     "unknown profile": (GRID.replace('"quick"', '"quikc"'), "did you mean quick?"),
-    "unknown profile of a sweep": (GRID + 'profile = "full"\n', "unknown profile 'full', [sweeps 1]"),
+    "unknown profile of a sweep": (GRID + 'profile = "huge"\n', "unknown profile 'huge', [sweeps 1]"),
+    "unknown variant of all sweeps": (GRID.replace("[[sweeps]]", 'variants = ["wett"]\n[[sweeps]]'), "did you mean wet?"),
+    "fixed for all sweeps and varied": (GRID.replace("[[sweeps]]", "fixed = { grain_count = 3 }\n[[sweeps]]"), "is fixed and varies"),
     "no profile": (GRID.replace('profile = "quick"\n', ""), "profile is missing, [sweeps 1]"),
     "unknown parameter": (SWEEP + "grid = { grain_cuont = [10] }\n", "did you mean grain_count or"),
     "unknown parameter in fixed": (GRID + "fixed = { grain_diamter = 1 }\n", "[sweeps 1.fixed] of"),

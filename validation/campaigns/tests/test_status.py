@@ -10,8 +10,10 @@ import pytest
 
 from dembark.common.lock import lock
 from dembark.validation.campaigns import folder
-from dembark.validation.campaigns.status import look
+from dembark.validation.campaigns.folder import look
 from dembark.validation.runs import schema
+from dembark.validation.runs.perform import LOCK
+from dembark.validation.runs.steps import CAMPAIGN_FILE
 
 CAMPAIGN = '[campaign]\nname = "boxes"\nprofile = "quick"\n'
 
@@ -19,7 +21,7 @@ CAMPAIGN = '[campaign]\nname = "boxes"\nprofile = "quick"\n'
 @pytest.fixture
 def results(tmp_path: Path) -> Path:
     """A campaign of four runs of two series, each estimated to take 100 s; the first one is finished and took 200 s."""
-    (tmp_path / folder.FILE).write_text(CAMPAIGN)
+    (tmp_path / CAMPAIGN_FILE).write_text(CAMPAIGN)
     (tmp_path / folder.FACTS).write_text(json.dumps({"name": "boxes"}))
     rows = [{"run_id": f"{n}{k}", "campaign": "boxes", "case_name": "box", "variant": f"n={n}", "engine": "yade", "replica": k,
              "folder": f"box/n={n}/yade/replica-{k}", "state": "waiting", "estimated_time": 100.0} for n in (1, 2) for k in (1, 2)]
@@ -35,7 +37,7 @@ def results(tmp_path: Path) -> Path:
 
 
 def test_time_left_is_what_the_finished_ones_took_over_their_estimate(results: Path) -> None:
-    with lock(results / folder.LOCK, "held"):
+    with lock(results / LOCK, "held"):
         found = look(results)
     assert found.running and [state.state for state in found.states] == ["finished", "running", "waiting", "waiting"]
     # Half of its own steps in 50 s: 40 s more; then two runs of twice their estimate, one at a time.

@@ -14,8 +14,8 @@ from harness import decks, stand_in  # noqa: F401
 from dembark.common.errors import DembarkError, RunError
 from dembark.validation import engines
 from dembark.validation.campaigns import store
-from dembark.validation.campaigns.rates import Rates
-from dembark.validation.runs.plan import Series, campaign
+from dembark.validation.campaigns.estimate import Rates
+from dembark.validation.runs.plan import Series, of_profile
 from dembark.validation.runs.schema import KEYS, TABLES, VERSION
 from dembark.validation.runs.table import Table
 
@@ -25,9 +25,8 @@ pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 def quantity(name: str, value: float | None, interval: list[float] | None = None) -> dict[str, Any]:
     return {"name": name, "label": name.upper(), "unit": "1", "value": value, "interval": interval, "reference": 2.0,
             "reference_interval": None, "deviation": None, "deviation_kind": "relative", "tolerance": 0.1, "verdict": "pass", "reason": "",
-            "detail": "",
-            "source": "",
-            "basis": "replicas", "compared": True, "agreement": None, "deviation_half_width": None}
+            "detail": "", "source": "", "evidence": "theory", "basis": "replicas",
+            "compared": True, "agreement": None, "deviation_half_width": None}
 
 
 def put(results: Path, one: Series, quantities: list[dict[str, Any]], commit: str = "c1", at: str = "2026-01-01T00:00:00+00:00",
@@ -56,7 +55,7 @@ def collect(results: Path, label: str, planned: list[Series], messages: dict[str
 
 
 def test_every_run_and_quantity_is_there_once_however_often_they_are_collected(tmp_path: Path) -> None:
-    planned = campaign("quick")
+    planned = of_profile("quick")
     for index, one in enumerate(planned):
         put(tmp_path, one, [quantity("k", 1.0 + index, [0.5, 1.5]), quantity("none", None)])
     (tmp_path / "box/dry/comparison.json").write_text(json.dumps(
@@ -82,7 +81,7 @@ def test_every_run_and_quantity_is_there_once_however_often_they_are_collected(t
 
 
 def test_runs_that_are_not_finished_are_told_from_those_that_are(tmp_path: Path) -> None:
-    planned = campaign("quick")
+    planned = of_profile("quick")
     put(tmp_path, planned[0], [quantity("k", 1.0)])
     failed = planned[1].runs[0]
     collect(tmp_path, "boxes", planned, {failed.name: "it blew up"}, True)
@@ -95,7 +94,7 @@ def test_runs_that_are_not_finished_are_told_from_those_that_are(tmp_path: Path)
 
 
 def test_rows_of_several_commits_stay_and_the_same_commit_replaces_its_own(tmp_path: Path) -> None:
-    (one,) = [one for one in campaign("quick") if str(one.place) == "box/wet/liggghts"]
+    (one,) = [one for one in of_profile("quick") if str(one.place) == "box/wet/liggghts"]
     for index, commit in enumerate(("c1", "c2", "c2")):
         others = [quantity("renamed", 1.0)] if index == 1 else []
         put(tmp_path, one, [quantity("k", 1.0 + index), *others], commit, f"2026-01-0{index + 1}")
@@ -108,15 +107,15 @@ def test_rows_of_several_commits_stay_and_the_same_commit_replaces_its_own(tmp_p
 def test_runs_of_other_inputs_are_superseded_not_lost(tmp_path: Path, decks: Path) -> None:
     from dembark.validation.case import folders
 
-    before = campaign("quick")
-    collect(tmp_path, "boxes", campaign("standard"), {}, True)  # never finished: not to be kept
+    before = of_profile("quick")
+    collect(tmp_path, "boxes", of_profile("standard"), {}, True)  # never finished: not to be kept
     for one in before:
         put(tmp_path, one, [quantity("k", 1.0)])
     collect(tmp_path, "boxes", before, {}, True)
     path = decks / "box/case.toml"
     path.write_text(path.read_text().replace("value = 0.35", "value = 0.36").replace(', {variant = "wet", engines = ["liggghts"]}', ""))
     folders.load.cache_clear()
-    after = campaign("quick")
+    after = of_profile("quick")
     for one in after:
         put(tmp_path, one, [quantity("k", 2.0)])
     collect(tmp_path, "boxes", after, {}, True)
@@ -126,7 +125,7 @@ def test_runs_of_other_inputs_are_superseded_not_lost(tmp_path: Path, decks: Pat
 
 
 def test_a_series_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
-    one = campaign("quick")[0]
+    one = of_profile("quick")[0]
     put(tmp_path, one, [quantity("k", 1.0), quantity("l", 1.0)])
     collect(tmp_path, "boxes", [one])
     put(tmp_path, one, [quantity("k", 5.0), {**quantity("l", 5.0), "name": None}])
@@ -138,9 +137,9 @@ def test_a_series_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
 def test_a_curve_is_that_of_the_last_measurement(tmp_path: Path, decks: Path) -> None:
     (tmp_path / "c.toml").write_text('[campaign]\nname = "c"\nprofile = "quick"\n[[sweeps]]\ncase = "box"\nengines = ["yade"]\n'
                                      'grid = { grain_count = [30, 10, 20] }\n')
-    from dembark.validation.campaigns import source
+    from dembark.validation.campaigns import expand
 
-    planned = list(source.plan(file=tmp_path / "c.toml").series)
+    planned = list(expand.plan(file=tmp_path / "c.toml").series)
     for commit in ("a", "b"):
         for one in planned:
             count = one.runs[0].values["grain_count"]
@@ -153,8 +152,40 @@ def test_a_curve_is_that_of_the_last_measurement(tmp_path: Path, decks: Path) ->
     assert store.curve(tmp_path, "box", "liggghts", "k", "grain_count")[0].size == 0
 
 
+def test_verdicts_are_counted_by_kind_of_evidence_and_once_however_many_commits_measured_them(tmp_path: Path) -> None:
+    planned = of_profile("quick")
+    for commit, verdict in (("a", "pass"), ("b", "fail")):
+        for one in planned:
+            judged = [quantity("k", 1.0), quantity("m", 1.0) | {"verdict": verdict, "evidence": "identity"},
+                      quantity("n", 1.0) | {"verdict": "info", "tolerance": None, "evidence": ""}]
+            put(tmp_path, one, judged, commit, commit)
+        collect(tmp_path, "boxes", planned)
+    (tmp_path / "box/dry/comparison.json").write_text(json.dumps(
+        {"quantities": [{**quantity("k", 1.0), "engine": "yade", "reference_engine": "liggghts", "evidence": "code"}]}))
+    collect(tmp_path, "boxes", planned)
+    found = store.tally(tmp_path)
+    assert {kind: (one.passed, one.failed) for kind, one in found.by_evidence.items()} == {"theory": (3, 0), "code": (1, 0),
+                                                                                         "identity": (0, 3)}
+    assert found.information == 3 and store.tally(tmp_path, variant="wet").checks == 2
+    assert [row["evidence"] for row in store.read(tmp_path, "comparisons")] == ["code"]
+
+
+def test_a_store_of_the_version_before_gets_the_kind_of_evidence(tmp_path: Path) -> None:
+    one = of_profile("quick")[0]
+    put(tmp_path, one, [quantity("k", 1.0)])
+    collect(tmp_path, "boxes", [one])
+    with sqlite3.connect(tmp_path / store.FILE) as connection:
+        for table in ("quantities", "comparisons"):
+            connection.execute(f"ALTER TABLE {table} DROP COLUMN evidence")
+        connection.execute(f"PRAGMA user_version = {VERSION - 1}")
+    (tmp_path / one.place / "metrics.json").unlink()
+    collect(tmp_path, "boxes", [one])
+    assert [(row["value"], row["evidence"]) for row in store.read_quantities(tmp_path)] == [(1.0, None)]
+    assert store.tally(tmp_path).by_evidence[""].passed == 1
+
+
 def test_tables_go_to_csv(tmp_path: Path) -> None:
-    one = campaign("quick")[0]
+    one = of_profile("quick")[0]
     put(tmp_path, one, [quantity("k", 0.1 + 0.2)])
     collect(tmp_path, "boxes", [one])
     store.export(tmp_path, "quantities", tmp_path / "q.csv")
@@ -188,7 +219,7 @@ def test_keys_are_columns() -> None:
 
 
 def test_rates_are_those_of_the_store_before_those_of_the_table(tmp_path: Path) -> None:
-    planned = campaign("standard")
+    planned = of_profile("standard")
     none = Rates(tmp_path / store.FILE)
     facts = engines.facts("yade")
     assert none.of("silo", "yade").value == facts.rates["silo"] and none.of("box", "yade").value == facts.typical_rate

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import re
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
+from harness import decks, dembark, engine_pid, environment, lives, stand_in, start, wait_for  # noqa: F401
 
 from dembark.common.files import read_json
 from dembark.common.lock import lock
 from dembark.validation.campaigns import store
 from dembark.validation.campaigns.estimate import wall_clock
-from dembark.validation.campaigns.status import look
+from dembark.validation.campaigns.folder import look
 from dembark.validation.cli import main
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
@@ -48,18 +46,6 @@ memory = "10 MB"
 time = "1 min"
 restart_interval = "0.0001 s"
 """
-
-
-def start(folder: Path, environment: dict[str, str], *words: str) -> subprocess.Popen[str]:
-    return subprocess.Popen([sys.executable, "-m", "dembark.validation.cli", *words], cwd=folder, env=environment,
-                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-
-def dembark(folder: Path, environment: dict[str, str], *words: str) -> tuple[int, str, str]:
-    process = start(folder, environment, *words)
-    out, error = process.communicate(timeout=300)
-    assert "Traceback" not in error, error
-    return process.returncode, out, error
 
 
 def logs(results: Path) -> str:

@@ -174,16 +174,17 @@ def stub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def test_a_new_engine_is_found_everywhere(stub: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    from dembark.validation.campaigns import rates
+    from dembark.validation.campaigns import estimate
     from dembark.validation.case import deck
-    from dembark.validation.report.look import Look, look
+    from dembark.validation.report.figures import look
     from dembark.validation.runs.plan import series
 
     assert main(["cases"]) == 0 and "stub" in capsys.readouterr().out
     told = {finding.what: finding.found for finding in doctor.examine()}
     assert told["the stub"] == f"4.2 ({Stub.program})"
-    assert look("stub") == Look("The Stub", "#000000", "x")
-    assert rates.Rates().of("box", "stub").value == 1e3
+    assert (look("stub").title, look("stub").colour, look("stub").marker) == ("The Stub", "#000000", "x")
+    assert look("gone").title == "gone" and look("gone").colour not in {facts.colour for facts in map(engines.facts, engines.names())}
+    assert estimate.Rates().of("box", "stub").value == 1e3
     monkeypatch.chdir(stub)
     for words, expected in ((["--engine", "stbu"], "did you mean stub?"),
                             (["--engine", "stub", "--ranks", "2"], "with The Stub, use --threads")):

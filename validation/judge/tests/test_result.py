@@ -8,11 +8,11 @@ import pytest
 from dembark.common.errors import RunError
 from dembark.postproc.statistics import Estimate
 from dembark.validation.judge import result
-from dembark.validation.judge.quantity import Quantity
+from dembark.validation.judge.measuring import judged
 from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result
 
-RECORD = Quantity("mass", "mass", "kg", Estimate(1.02, 0.01, "3 replicas"), reference=Estimate(1.0, 0.0), tolerance=0.05,
-                  evidence="identity").record()
+RECORD = judged("mass", "mass", "kg", Estimate(1.02, 0.01, "3 replicas"), reference=Estimate(1.0, 0.0), tolerance=0.05,
+                evidence="identity")
 RESULT = Result("silo", "dry", "yade", (RECORD,), "quick", parameters={"gravity": 9.81}, profiles=({"name": "stress", "place": [0.0]},),
                 remarks=("note",), provenance={"commit": "a"}, inputs=("f00",))
 
@@ -29,7 +29,8 @@ def test_a_comparison_comes_back_as_it_was_written(tmp_path: Path) -> None:
     both = Comparison("silo", "dry", ("liggghts", "yade"),
                       (ComparedRecord("mass", 1.0, "pass", engine="yade", reference_engine="liggghts"),))
     result.write(tmp_path / "comparison.json", both)
-    assert result.read_comparison(tmp_path / "comparison.json") == both and both.quantities[0].evidence == "code"
+    content = json.loads((tmp_path / "comparison.json").read_text())
+    assert result.from_json(content, Comparison) == both and both.quantities[0].evidence == "code"
 
 
 def test_keys_of_another_version_are_told_in_one_remark() -> None:
@@ -65,5 +66,5 @@ def test_unreadable_results_of_a_folder_are_named(tmp_path: Path) -> None:
 
 
 def test_a_relative_deviation_from_zero_is_no_pass() -> None:
-    record = Quantity("drift", "drift", "1", Estimate(0.0, 0.0), reference=Estimate(0.0, 0.0), tolerance=0.1).record()
+    record = judged("drift", "drift", "1", Estimate(0.0, 0.0), reference=Estimate(0.0, 0.0), tolerance=0.1)
     assert record.verdict == "fail" and record.deviation is None

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from dembark.validation.judge import result
 from dembark.validation.judge.result import QuantityRecord, Result
-from dembark.validation.judge.tally import of_folder, open_reasons, tally
+from dembark.validation.judge.tally import of_folder, tally
 
 QUANTITIES = (
     QuantityRecord("a", 1.0, "pass", tolerance=0.1, evidence="identity"),
@@ -26,16 +26,12 @@ def test_each_quantity_is_counted_once() -> None:
     assert tally(()).sentence == "no checks"
 
 
-def test_open_checks_by_reason() -> None:
-    assert {reason: [one.name for one in found] for reason, found in open_reasons(QUANTITIES).items()} == {"too short": ["c"]}
-
-
 def test_a_folder_with_what_cannot_be_read(tmp_path: Path) -> None:
     for name in ("yade", "liggghts"):
         (tmp_path / "silo/dry" / name).mkdir(parents=True)
     result.write(tmp_path / "silo/dry/yade/metrics.json", Result("silo", "dry", "yade", QUANTITIES))
     (tmp_path / "silo/dry/liggghts/metrics.json").write_text("[]")
-    (tmp_path / "verification.json").write_text(json.dumps({"quantities": [result.as_json(QUANTITIES[1])]}))
+    (tmp_path / "verification.json").write_text(json.dumps({"items": [{"quantities": [result.as_json(QUANTITIES[1])]}]}))
     found = of_folder(tmp_path)
     assert (found.passed, found.failed) == (1, 3) and len(found.unread) == 1
     assert found.sentences[-1].startswith("not counted: ")

@@ -10,7 +10,7 @@ from PIL import Image
 from dembark.common.errors import RunError
 from dembark.postproc import render
 from dembark.postproc.fields.coarse_graining import WallContacts
-from dembark.validation.pictures import packings
+from dembark.validation.pictures import packings, saved
 from dembark.validation.verification import scenes
 
 
@@ -36,5 +36,5 @@ def test_picture_is_drawn_without_a_display(monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     random = np.random.default_rng(1)
     scene = render.Scene(random.uniform(0, 1, (50, 3)), np.full(50, 0.1), random.uniform(0, 1, 50), "v")
-    image = np.asarray(Image.open(io.BytesIO(packings.png(render.picture(scene)))).convert("L"))
+    image = np.asarray(Image.open(io.BytesIO(saved(render.picture(scene)))).convert("L"))
     assert image.min() < 100 and image.max() > 250

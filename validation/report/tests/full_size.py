@@ -14,7 +14,7 @@ from dembark.validation import pictures, verification
 from dembark.validation.judge import result
 from dembark.validation.judge.compare import compare
 from dembark.validation.judge.result import QuantityRecord, Result
-from dembark.validation.pictures.packings import png
+from dembark.validation.pictures import saved
 from dembark.validation.verification.item import Item, exact
 
 CASES = ("silo", "plane_silo", "plug_flow", "gravity_channel", "column_collapse", "debarking_drum", "log_pile", "log_pair", "log_cradle",
@@ -51,7 +51,7 @@ def write(folder: Path, cases: tuple[str, ...] = CASES, variants: int = 3, quant
     """A results folder with all runs finished; returns it."""
     figure = Figure(figsize=(3.0, 3.0))
     figure.subplots().plot([0.0, 1.0])
-    picture = png(figure)
+    picture = saved(figure)
     runs = []
     for case in cases:
         for variant in [f"variant_{number}" for number in range(variants)]:

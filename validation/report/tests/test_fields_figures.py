@@ -5,10 +5,10 @@ import csv
 import numpy as np
 import pytest
 import xarray
+from measuring import measure
 from synthetic import plug_flow, silo
 
 from dembark.validation import report
-from dembark.validation.metrics import measure
 from dembark.validation.report import fields, figures, sections
 from dembark.validation.report.gather import gather
 

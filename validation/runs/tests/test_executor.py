@@ -16,8 +16,8 @@ from harness import decks, stand_in  # noqa: F401
 
 from dembark.common.errors import Interrupted, Killed, RunError
 from dembark.validation.runs.executor import Executor, Local, Task
-from dembark.validation.runs.plan import Resources, Run, campaign
-from dembark.validation.runs.simulate import Tell
+from dembark.validation.runs.plan import Resources, Run, of_profile
+from dembark.validation.runs.simulate import Progress
 from dembark.validation.runs.steps import Step
 from dembark.validation.runs.table import Table
 
@@ -38,8 +38,8 @@ class Scripted:
         self.busy.append(len(busy))
         return len(busy) < self.at_once
 
-    def start(self, run: Run, out: Path, used: Resources, tell: Tell) -> Future[object]:
-        tell(state="running")
+    def start(self, run: Run, out: Path, used: Resources, progress: Progress) -> Future[object]:
+        progress(state="running")
         self.started.append(run.name)
         future: Future[object] = Future()
         error = self.script[run.name].pop(0) if self.script.get(run.name) else None
@@ -54,7 +54,7 @@ class Scripted:
 
 
 def tasks(folder: Path) -> list[Task]:
-    return [Task(run, folder / one.place, Resources()) for one in campaign("quick") for run in one.runs]
+    return [Task(run, folder / one.place, Resources()) for one in of_profile("quick") for run in one.runs]
 
 
 def write(path: Path, text: str) -> None:

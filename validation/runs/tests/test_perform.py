@@ -3,32 +3,18 @@
 from __future__ import annotations
 
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
+from harness import decks, dembark, engine_pid, environment, lives, stand_in, start, wait_for  # noqa: F401
 
 from dembark.common.files import read_json
 from dembark.validation.case import folders
-from dembark.validation.runs.plan import campaign, studies, variants
+from dembark.validation.runs.plan import of_profile, studies, variants
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
-
-
-def start(tmp_path: Path, environment: dict[str, str], *words: str) -> subprocess.Popen[str]:
-    return subprocess.Popen([sys.executable, "-m", "dembark.validation.cli", *words], cwd=tmp_path, env=environment,
-                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-
-def dembark(tmp_path: Path, environment: dict[str, str], *words: str) -> tuple[int, str, str]:
-    process = start(tmp_path, environment, *words)
-    out, error = process.communicate(timeout=300)
-    assert "Traceback" not in error
-    return process.returncode, out, error
 
 
 def set_default(decks: Path, variant: str, line: str) -> None:
@@ -76,18 +62,18 @@ def test_studies_are_planned_for_engines_that_run_all_their_variants(decks: Path
     path = decks / "box" / "case.toml"
     path.write_text(path.read_text().replace("[runs]\n", STUDY).replace(
         '{variant = "wet", engines = ["liggghts"]}', '{variant = "large"}, {variant = "huge", engines = ["yade"]}'))
-    planned = campaign("quick")
+    planned = of_profile("quick")
     assert [str(one.place) for one in studies(planned)] == ["box/study-size/yade"]
     assert len(variants(planned)[Path("box/large")]) == 2 and len(variants(planned)[Path("box/study-size")]) == 1
     path.write_text(path.read_text().replace(', engines = ["yade"]', ""))
     folders.load.cache_clear()
-    assert len(variants(campaign("quick"))[Path("box/study-size")]) == 2
+    assert len(variants(of_profile("quick"))[Path("box/study-size")]) == 2
 
 
 def test_a_line_of_runs_may_give_an_engine_its_own_number_of_replicas(decks: Path) -> None:
     path = decks / "box" / "case.toml"
     path.write_text(path.read_text().replace('standard = [{variant = "dry"}]', 'standard = [{variant = "dry", replicas = {yade = 1}}]'))
-    assert {one.runs[0].engine.name: len(one.runs) for one in campaign("standard")} == {"liggghts": 3, "yade": 1}
+    assert {one.runs[0].engine.name: len(one.runs) for one in of_profile("standard")} == {"liggghts": 3, "yade": 1}
 
 
 def test_a_study_is_made_of_its_variants_and_again_when_one_of_them_changes(tmp_path: Path, environment: dict[str, str],
@@ -100,12 +86,12 @@ def test_a_study_is_made_of_its_variants_and_again_when_one_of_them_changes(tmp_
     code, _, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
     results = tmp_path / "results" / "quick"
     assert code == 0, error
-    assert read_json(results / "box/study-size/liggghts/metrics.json")["numbers"] == [10, 30, 40]
+    assert read_json(results / "box/study-size/liggghts/metrics.json")["parameters"]["numbers"] == [10, 30, 40]
     assert "box/study-size/liggghts/metrics.json" in (results / "report.html").read_text()
 
     path.write_text(path.read_text().replace("grain_count = 40", "grain_count = 50"))
     code, _, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
-    assert code == 0 and read_json(results / "box/study-size/liggghts/metrics.json")["numbers"] == [10, 30, 50]
+    assert code == 0 and read_json(results / "box/study-size/liggghts/metrics.json")["parameters"]["numbers"] == [10, 30, 50]
 
 
 def test_a_failed_run_is_missing_in_the_report_and_nothing_stale_takes_its_place(

@@ -17,10 +17,13 @@ from harness import decks, engine_pid, environment, lives, stand_in, wait_for  #
 from dembark.common.errors import DembarkError, Interrupted, RunError
 from dembark.common.files import read_json
 from dembark.validation import engines
-from dembark.validation.case import folders
+from dembark.validation.case import deck, folders
 from dembark.validation.case.folders import find
+from dembark.validation.judge.result import read
 from dembark.validation.runs import outcome, simulate
+from dembark.validation.runs import plan as plans
 from dembark.validation.runs.plan import Run, series
+from dembark.validation.runs.steps import measure_series
 
 FindPid = Callable[[Path], int]
 Lives = Callable[[int], bool]
@@ -54,6 +57,12 @@ def test_a_run_leaves_its_files_and_its_record(tmp_path: Path, engine: str) -> N
     assert "DISPLAY" not in engines.find(engine).environment() and engines.find(engine).environment()["OMP_NUM_THREADS"] == "1"
     passed = dict(line.split("=") for line in (folder / "values").read_text().splitlines())
     assert passed["strength"] == "1e+300" and passed["seed"] == "7" and "kinetic_friction" not in passed
+
+
+def test_each_run_has_a_folder_of_its_own_for_temporary_files_which_goes_with_it(tmp_path: Path) -> None:
+    """Two MPI programs that start at the same time must not make one session folder: one of them would fail."""
+    own = [Path((run(tmp_path / name)[0] / "tmpdir").read_text()) for name in "ab"]
+    assert own[0] != own[1] and all(path.is_absolute() and path.name.startswith("dembark-") and not path.exists() for path in own)
 
 
 def test_a_result_holds_the_deck_that_made_it(tmp_path: Path, decks: Path, stand_in: Path) -> None:
@@ -206,3 +215,28 @@ def test_the_engines_own_word_is_found() -> None:
     assert outcome.reason(["ERROR: Unknown pair style (force.cpp:1)", "Last command: x"]).startswith("ERROR: Unknown pair")
     assert outcome.reason(["dembark: steps 3", "only this"]) == "only this"
     assert outcome.reason([]) == "it said nothing"
+
+
+def test_a_result_is_written_once_with_all_that_is_known_of_it(tmp_path: Path) -> None:
+    folders.load.cache_clear()
+    runs = series(find("box"), "dry", "quick", engines.find("liggghts"), {"replicas": 3}).runs
+    for one in (runs[0], runs[2]):
+        simulate.simulate(one, tmp_path, threading.Event())
+    found = measure_series(tmp_path, runs)
+    assert read(tmp_path / "metrics.json") == found
+    assert found.inputs == (runs[0].inputs, runs[2].inputs) and found.replicas_missing == (2,) and found.parameters["replicas"] == 3
+    assert found.provenance["seeds"] == [7, 9] and "at" in found.measured
+
+
+def test_the_inputs_of_a_run_are_worked_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr(plans, "sources", lambda case, engine: asked.append(engine) or {})
+    one = plan()
+    assert one.inputs == one.inputs and asked == ["liggghts"]
+
+
+def test_the_numbers_of_a_run_are_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made, prepare = list[str](), deck.prepare
+    monkeypatch.setattr(deck, "prepare", lambda case, values: made.append(case.name) or prepare(case, values))
+    folder, _ = run(tmp_path)
+    assert made == ["box"] and read_json(folder / "run.json")["derived"] == {"steps": 100, "time_step": 1e-5}

@@ -11,14 +11,14 @@ from harness import decks, stand_in  # noqa: F401
 
 from dembark.common.errors import DembarkError
 from dembark.validation.runs import schema
-from dembark.validation.runs.plan import Run, campaign
+from dembark.validation.runs.plan import Run, of_profile
 from dembark.validation.runs.table import ALLOWED, State, Table, read
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
 
 def planned() -> dict[str, Run]:
-    return {str(one.place / run.folder_name): run for one in campaign("quick") for run in one.runs}
+    return {str(one.place / run.folder_name): run for one in of_profile("quick") for run in one.runs}
 
 
 def entered(results: Path, whole: bool = True, **steps: str) -> Table:

@@ -224,12 +224,14 @@ def test_degenerate(method):
         check(M, w - M @ z, result)
 
 
-def test_rules_that_stall_are_guarded():
+def test_rules_that_stall_fall_back():
     """Block steps that go round in a circle begin elsewhere, and say so."""
     M = np.array(CYCLE_M)  # noqa: N806
     q = np.array(CYCLE_Q)
     result = solve_lcp(M, q, method="block", start=CYCLE_START)
-    assert result.guarded
+    assert result.used_fallback
+    with pytest.warns(DeprecationWarning, match=r"LcpResult\.guarded is now LcpResult\.used_fallback"):
+        assert result.guarded
     assert result.block_steps > 0
     check(M, q, result)
     np.testing.assert_allclose(result.z, enumerated(M, q), atol=1e-10)

@@ -47,7 +47,7 @@ def test_published_examples(M, q, z, w, pivots, method):  # noqa: N803
     result = solve_lcp(M, q, method=method)
     np.testing.assert_allclose(result.z, z, atol=5e-7)
     np.testing.assert_allclose(result.w, w, atol=5e-7)
-    assert (result.pivots, result.block_steps, result.guarded) == (pivots, 0, False)
+    assert (result.pivots, result.block_steps, result.used_fallback) == (pivots, 0, False)
 
 
 @pytest.mark.parametrize("method", [*EXACT, "pgs"])

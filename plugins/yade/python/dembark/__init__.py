@@ -4,10 +4,11 @@ The files have the schema of the LIGGGHTS decks. Standard library only; SI units
 """
 
 from yade.dembark.frames import FrameWriter
-from yade.dembark.logs import LogWriter, drum, log, log_loop, logs
-from yade.dembark.report import announce, fail, finish
+from yade.dembark.logs import LogWriter, drum, log, log_loop, log_wall, logs
+from yade.dembark.report import fail, finish
 from yade.dembark.scene import (
     Recorder,
+    begin,
     box,
     contact_loop,
     engine_loop,
@@ -18,12 +19,14 @@ from yade.dembark.scene import (
     parameters,
     periodic,
     plane,
+    planes,
+    slab_loop,
 )
 from yade.dembark.states import options, run, table
 from yade.dembark.writers import DumpWriter, EnergyWriter, HistoryWriter, energies
 
 __all__ = [
-    "DumpWriter", "EnergyWriter", "FrameWriter", "HistoryWriter", "LogWriter", "Recorder", "announce", "box", "contact_loop", "drum",
-    "energies", "engine_loop", "fail", "finish", "grains", "log", "log_loop", "logs", "materials", "options", "packing", "pairs",
-    "parameters", "periodic", "plane", "run", "table",
+    "DumpWriter", "EnergyWriter", "FrameWriter", "HistoryWriter", "LogWriter", "Recorder", "begin", "box", "contact_loop", "drum",
+    "energies", "engine_loop", "fail", "finish", "grains", "log", "log_loop", "log_wall", "logs", "materials", "options", "packing",
+    "pairs", "parameters", "periodic", "plane", "planes", "run", "slab_loop", "table",
 ]

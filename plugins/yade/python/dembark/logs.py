@@ -1,8 +1,8 @@
-"""Logs in cross-section, for LogImpact: bodies, the drum around them, engines, and what a case of logs is measured by."""
+"""Logs in cross-section, for LcpImpact: bodies, the drum around them, engines, and what a case of logs is measured by."""
 
 import math
 
-from yade import CylinderWall, ForceResetter, NewtonIntegrator, Omega, PyRunner, utils
+from yade import CylinderWall, ForceResetter, LogWall, NewtonIntegrator, Omega, PyRunner, utils
 from yade.dembark.frames import FrameWriter
 from yade.dembark.report import fail
 from yade.dembark.scene import packing
@@ -18,7 +18,7 @@ def _plane(axis, what):
 
 
 def log(position, radius, mass, velocity=(0.0, 0.0, 0.0), spin=0.0, axis="z", material=-1, color=None):
-    """A log in cross-section, for LogImpact: a sphere that moves in the plane across `axis` and turns about it.
+    """A log in cross-section, for LcpImpact: a sphere that moves in the plane across `axis` and turns about it.
 
     position (m), radius (m, > 0), mass (kg, > 0, of the whole log), velocity (m/s), spin (rad/s, about `axis`); material: id, label
     or Material. Its inertia is that of a solid cylinder, m r^2 / 2. Returns a body for O.bodies.append.
@@ -37,7 +37,7 @@ def log(position, radius, mass, velocity=(0.0, 0.0, 0.0), spin=0.0, axis="z", ma
 
 
 def drum(centre, radius, axis="z", omega=0.0, material=-1):
-    """The inside of a drum as a wall of LogImpact, or of the contact laws: a CylinderWall that turns with omega (rad/s) about `axis`.
+    """The inside of a drum as a wall of LcpImpact, or of the contact laws: a CylinderWall that turns with omega (rad/s) about `axis`.
 
     centre (m): any point of the axis; radius (m, > 0). Returns a body for O.bodies.append.
     """
@@ -47,6 +47,11 @@ def drum(centre, radius, axis="z", omega=0.0, material=-1):
     body.shape = CylinderWall(radius=radius, axis=direction)
     body.state.angVel = omega * direction
     return body
+
+
+def log_wall(place, axis, sense, material, **more):
+    """A plane wall of LogImpact through `place` (m), across `axis` (0 ... 2), that bounds the side `sense`; `more`: its attributes."""
+    return LogWall(bodies=[O.bodies.append(utils.wall(place, axis=axis, sense=sense, material=material))], **more)
 
 
 def logs(materials, axis="z", path="packing.data"):
@@ -61,7 +66,7 @@ def logs(materials, axis="z", path="packing.data"):
 
 
 def log_loop(impacts, record, stride=1, gravity=(0.0, 0.0, 0.0)):
-    """All engines of a scene of logs around the LogImpact `impacts`; the command `record` runs every `stride` steps, from step 0 on."""
+    """All engines of a scene of logs around the LcpImpact `impacts`; the command `record` runs every `stride` steps, from step 0 on."""
     return [
         ForceResetter(),
         impacts,
@@ -74,7 +79,7 @@ def log_loop(impacts, record, stride=1, gravity=(0.0, 0.0, 0.0)):
 class LogWriter(FrameWriter):
     """Writes what a case of logs is measured by: frames of grains.dump and contacts.dump, and a line of time.csv with each.
 
-    engine : the LogImpact that the scene has or will have. The logs must be the first bodies: their number is the body's id + 1.
+    engine : the LcpImpact that the scene has or will have. The logs must be the first bodies: their number is the body's id + 1.
     bounds, gravity : see FrameWriter
     """
 
@@ -89,11 +94,11 @@ class LogWriter(FrameWriter):
         self._begin("contacts.dump")
 
     def write(self):
-        """Append the present state; to be called between LogImpact and NewtonIntegrator."""
+        """Append the present state; to be called between LcpImpact and NewtonIntegrator."""
         # A scene that was loaded has engines of its own.
         engine = next(one for one in O.engines if isinstance(one, self.kind))
         self.frame()
-        touching = [(a + 1, b + 1 if b >= 0 else b, *normal, gap, force, *friction, *place)
-                    for a, b, normal, gap, force, friction, place in engine.contacts() if force > 0.0]
+        touching = [(a + 1, b + 1 if b >= 0 else b, *normal, gap, force, *friction, *point)
+                    for a, b, normal, gap, force, friction, point in engine.contacts() if force > 0.0]
         self._frame("contacts.dump", "ENTRIES", touching, " ".join(f"f_impacts[{i}]" for i in range(1, 14)))
         self.row(*(getattr(engine, name) for name in self.NUMBERS.values()))

@@ -1,8 +1,11 @@
 """Scenes of decks: bodies of packing.data, materials, walls, and the engines around the Finnie-Rabinowicz law."""
 
 from yade import (
+    Bo1_Box_Aabb,
+    Bo1_Sphere_Aabb,
     ForceResetter,
     FrictMat,
+    Ig2_Box_Sphere_ScGeom,
     Ig2_Sphere_Sphere_ScGeom,
     InsertionSortCollider,
     InteractionLoop,
@@ -85,6 +88,24 @@ def periodic(axes, room):
     O.cell.setBox(*(high - low + (0.0 if axis in axes else room) for axis, (low, high) in enumerate(box())))
 
 
+def begin(p, gravity=(0, 0, 0), along=(), mask=1, held=None):
+    """Begin the scene of a deck: time step, periods along the axes `along` (0 ... 2), materials, and the grains of the packing.
+
+    `gravity` (m/s^2) is that of the first step, see `grains`; `held`: mask of the grains that do not move. Returns the materials (ids) of
+    grains and walls, and the ids of the grains by type.
+    """
+    O.dt = p.time_step
+    if along:
+        periodic(along, room=8 * p.grain_diameter)
+    both = materials(p)
+    return both, grains(both[0], gravity, mask, None if held is None else (both[1], held))
+
+
+def planes(p, materials, mask=1, **walls):
+    """Ids of plane walls by name, each given as (axis, position, side), see `plane`."""
+    return {name: plane(*place, materials[1], p.grain_diameter, mask) for name, place in walls.items()}
+
+
 def plane(axis, position, side, material, diameter, mask=1):
     """A plane wall across `axis` (0 ... 2) at `position` (m) in periodic scenes, grains of mean `diameter` (m) on its `side` (+-1); its id.
 
@@ -142,6 +163,12 @@ def engine_loop(p, loop, bounds, verlet, gravity, liquid=None, account=None, per
         *([account] if account is not None else []),
         NewtonIntegrator(damping=0, gravity=gravity),
     ]
+
+
+def slab_loop(p, materials, gravity, verlet=0.1, static=None, kinetic=None, **more):
+    """All engines of a periodic scene between `planes`; `verlet`: Verlet distance over the mean diameter, `more` as in `engine_loop`."""
+    loop = contact_loop(p, materials, [Ig2_Box_Sphere_ScGeom()], static, kinetic)
+    return engine_loop(p, loop, [Bo1_Sphere_Aabb(), Bo1_Box_Aabb()], verlet * p.grain_diameter, gravity, periodic=True, **more)
 
 
 class Recorder:

@@ -11,7 +11,7 @@ import zlib
 from functools import cache
 
 from yade import Omega
-from yade.dembark.report import fail, finish
+from yade.dembark.report import announce, fail, finish
 
 O = Omega()
 _KEPT_STATES = 2
@@ -133,7 +133,7 @@ def _cut(path, step):
 
 def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.csv", "grains.dump", "contacts.dump"), base="state",
         saving=None, loaded=None):
-    """Run the scene until step `steps` is written, and say that it is finished.
+    """Run the scene until step `steps` is written; say how many steps there are, and that it is finished.
 
     `restart_every` and `resume` are what the words behind the script say unless they are given. Every `restart_every` steps (0: never)
     the scene is saved as `base`.<step>.yade.gz. With `resume` the newest of these that is whole takes the scene's place, and what
@@ -141,6 +141,7 @@ def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.c
     complete. A scene goes on from the saved copy of itself, so that a run that was killed and resumed is the same to the bit as one
     that was not, on one thread. `saving()` is called before the scene is saved, `loaded()` after it was resumed.
     """
+    announce(steps)
     given = options()
     restart_every = given[0] if restart_every is None else restart_every
     resume = given[1] if resume is None else resume
@@ -154,8 +155,13 @@ def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.c
         print(f"dembark: resumed at step {O.iter} exactly", flush=True)
         if loaded:
             loaded()
-    else:
-        _forget(_states(base))
+    elif restart_every:
+        # They could be mixed up later with those of this run.
+        found = _states(base)
+        whole = [path for _, path in found if _is_whole(path)]
+        if whole:
+            fail(f"there is a state of an earlier run, {whole[0]}; go on from it by resume=yes, move it away, or use another folder")
+        _forget(found)
     # The last row and frame are written in the step that starts from their state.
     end = steps + 1
     while O.iter < end:

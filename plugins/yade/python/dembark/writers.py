@@ -112,8 +112,9 @@ class HistoryWriter:
         where = []
         if self._liquid:
             # A scene that was loaded has engines of its own.
-            books = next(one for one in O.engines if isinstance(one, CapillaryLiquid))
-            where = [*(f"{getattr(books, name)():.17g}" for name in self.LIQUID.values()), f"{books.lost:.17g}", str(books.bridgeCount())]
+            carried = next(one for one in O.engines if isinstance(one, CapillaryLiquid))
+            volumes = [*(getattr(carried, name)() for name in self.LIQUID.values()), carried.lost]
+            where = [*(f"{volume:.17g}" for volume in volumes), str(carried.bridgeCount())]
         self._file.write(",".join([str(O.iter), f"{O.time:.9g}", f"{energy:.9g}", *forces, *where]) + "\n")
         self._file.flush()
         if self.progress:

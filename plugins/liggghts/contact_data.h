@@ -1,0 +1,94 @@
+// A contact of LIGGGHTS in the terms of dembark/contact.hpp, and what both contact models need beside it.
+#ifndef DEMBARK_CONTACT_DATA_H
+#define DEMBARK_CONTACT_DATA_H
+
+#include <cmath>
+#include <cstdio>
+
+#include "atom.h"
+#include "contact_interface.h"
+#include "error.h"
+#include "neigh_list.h"
+#include "pair_gran.h"
+
+#include "dembark/contact.hpp"
+
+namespace dembark_liggghts {
+
+typedef dembark::Vec3<double> Vec3;
+
+inline Vec3 vector(const double* v) { return {v[0], v[1], v[2]}; }
+
+/// The two bodies but for their masses, which the models do not ask for.
+inline dembark::ContactBodies bodies(const LIGGGHTS::ContactModels::SurfacesCloseData& d, double* const* omega) {
+  dembark::ContactBodies b;
+  b.velocity_1 = vector(d.v_i);
+  b.velocity_2 = vector(d.v_j);
+  b.angular_velocity_1 = vector(omega[d.i]);
+  b.radius_1 = d.radi;
+  if (d.is_wall) return b;
+  b.angular_velocity_2 = vector(omega[d.j]);
+  b.radius_2 = d.radj;
+  return b;
+}
+
+/// Adds an assembled force to what acts on the two bodies.
+inline void add_force(const dembark::ContactForce& f, const LIGGGHTS::ContactModels::SurfacesCloseData& d,
+                      LIGGGHTS::ContactModels::ForceData& on_i, LIGGGHTS::ContactModels::ForceData& on_j) {
+  const auto add = [](double* to, double scale, const Vec3& v) {
+    to[0] += scale * v.x;
+    to[1] += scale * v.y;
+    to[2] += scale * v.z;
+  };
+  const double scale = d.is_wall ? d.area_ratio : 1.0;
+  add(on_i.delta_F, scale, f.force);
+  add(on_i.delta_torque, scale, f.torque_1);
+  if (d.is_wall) return;
+  add(on_j.delta_F, -1.0, f.force);
+  add(on_j.delta_torque, 1.0, f.torque_2);
+}
+
+/// The friction of a contact among the numbers that the engine stores.
+inline dembark::FrictionState<double> load_friction(const double* h) { return {{h[0], h[1], h[2]}, h[3], h[4]}; }
+inline void store_friction(double* h, const dembark::FrictionState<double>& s) {
+  h[0] = s.displacement.x;
+  h[1] = s.displacement.y;
+  h[2] = s.displacement.z;
+  h[3] = s.slip;
+  h[4] = s.dissipated_energy;
+}
+
+/// Calls `end(i, j, history)` for all pairs with one of `flags` that are farther apart than the contact distance factor allows. Of a
+/// pair that jumps so far in one step the engine's loop tells the models nothing, and its contact would go on when it touches again.
+template <class End>
+void end_parted_pairs(LAMMPS_NS::PairGran& pair, const LAMMPS_NS::Atom& atom, double distance_factor, int flags, End end) {
+  const LAMMPS_NS::NeighList* const list = pair.list;
+  if (!list || !list->listgranhistory) return;
+  for (int n = 0; n < list->inum; ++n) {
+    const int i = list->ilist[n];
+    int* const flag = list->listgranhistory->firstneigh[i];
+    for (int k = 0; k < list->numneigh[i]; ++k) {
+      if (!(flag[k] & flags)) continue;
+      const int j = list->firstneigh[i][k] & NEIGHMASK;
+      const Vec3 apart = vector(atom.x[i]) - vector(atom.x[j]);
+      const double reach = distance_factor * (atom.radius[i] + atom.radius[j]);
+      if (dot(apart, apart) < reach * reach) continue;
+      end(i, j, list->listgranhistory->firstdouble[i] + pair.dnum() * k);
+      flag[k] &= ~flags;
+    }
+  }
+}
+
+/// The run ends when two centres lie on each other: there is no normal, and the engine's own models would give no number. `j` < 0: a wall.
+DEMBARK_COLD inline void refuse_coincidence(LAMMPS_NS::Error* error, const int* tag, int i, int j) {
+  char line[160];
+  if (j < 0)
+    snprintf(line, sizeof line, "the centre of atom %d lies on a wall: it has no normal; take a smaller time step or another start",
+             tag[i]);
+  else snprintf(line, sizeof line, "atoms %d and %d have the same centre: their contact has no normal; place them apart", tag[i], tag[j]);
+  error->one(FLERR, line);
+}
+
+}  // namespace dembark_liggghts
+
+#endif

@@ -1,0 +1,43 @@
+// Private and protected members of the engine that liggghts-dembark uses, all of them, each with the reason why there is no other way.
+//
+// An explicit instantiation may name a private member (C++17 [temp.spec]/6): stock LIGGGHTS is used as it is installed.
+#ifndef DEMBARK_ENGINE_ACCESS_H
+#define DEMBARK_ENGINE_ACCESS_H
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "fix_contact_history.h"
+#include "granular_pair_style.h"
+#include "granular_wall.h"
+#include "input.h"
+#include "modify.h"
+#include "settings.h"
+
+namespace dembark_liggghts {
+
+/// Keywords of the contact models. A model can register those with on/off or a number only, not one with named values.
+std::map<std::string, Setting*>& keywords(Settings& settings);
+
+typedef LAMMPS_NS::Fix* (*FixCreator)(LAMMPS_NS::LAMMPS*, int, char**);
+typedef void (*CommandCreator)(LAMMPS_NS::LAMMPS*, int, char**);
+/// Fix styles and commands by name, filled when the engine is built: there is no way to add one later.
+std::map<std::string, FixCreator>& fix_styles(LAMMPS_NS::Modify& modify);
+std::map<std::string, CommandCreator>& commands(LAMMPS_NS::Input& input);
+
+template <class Host>
+using GranularCreators = std::map<std::pair<std::string, int>, Host* (*)(LAMMPS_NS::LAMMPS*, typename Host::ParentType*, std::int64_t)>;
+/// Loops of the combinations of contact models. addStyle() adds one, but what is there, the slow one for all other combinations, can
+/// neither be asked for nor be replaced.
+GranularCreators<LIGGGHTS::PairStyles::IGranularPairStyle>& pair_loops();
+GranularCreators<LIGGGHTS::Walls::IGranularWall>& wall_loops();
+
+/// Number of contacts of each atom and their partners: a state that is put back has to set them.
+int* partner_counts(LAMMPS_NS::FixContactHistory& history);
+int** partners(LAMMPS_NS::FixContactHistory& history);
+
+}  // namespace dembark_liggghts
+
+#endif

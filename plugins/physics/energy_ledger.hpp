@@ -1,0 +1,214 @@
+// The energies of a run: the works of all parts of all contacts (contact_energy.hpp), of gravity, walls, numerical damping and other
+// forces, which balance the kinetic energy to round-off.
+//
+// A kick of duration h changes a velocity by h a. The work of each part f of the force F = m a in it is that on the mean velocity,
+//
+//   W = h P + s (h^2 / 2) Q,   P = f . v,   Q = f . a,                                                                              (1)
+//
+// where v is the velocity at the beginning (s = 1), the mean one (s = 0) or that at the end of the kick (s = -1). Leapfrog makes one kick a
+// step, h = dt. Velocity Verlet makes two of dt/2, and P and Q with the velocity between them serve for both.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "contact_energy.hpp"
+
+namespace dembark {
+
+/// Of a body along x, y, z and about them: velocities and spins, forces and torques, masses and moments of inertia.
+typedef std::array<double, 6> Dofs;
+
+inline Dofs dofs(const Vec3<double>& along, const Vec3<double>& about) { return {along.x, along.y, along.z, about.x, about.y, about.z}; }
+
+DEMBARK_HOT double dot(const Dofs& a, const Dofs& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5];
+}
+
+/// How a body moves.
+struct BodyMotion {
+  Dofs mass{}, velocity{};
+  unsigned blocked = 0;  ///< bit k: forces do not change degree of freedom k; there the body is a wall to the others
+  static constexpr unsigned all_blocked = 63;
+
+  bool is_free(std::size_t k) const { return !(blocked >> k & 1u); }
+  DEMBARK_HOT Dofs free_part(Dofs of, bool free = true) const {
+    if (blocked == (free ? 0 : all_blocked)) return of;
+    for (std::size_t k = 0; k < of.size(); ++k)
+      if (is_free(k) != free) of[k] = 0.0;
+    return of;
+  }
+  /// J, of the degrees of freedom that forces change.
+  DEMBARK_HOT double kinetic(const Dofs& at) const {
+    const Dofs v = free_part(at);
+    return 0.5 * dot({mass[0] * v[0], mass[1] * v[1], mass[2] * v[2], mass[3] * v[3], mass[4] * v[4], mass[5] * v[5]}, v);
+  }
+};
+
+/// A body and what acts on it in a moment.
+struct EnergyBody : BodyMotion {
+  Dofs force{};              ///< all of it
+  Dofs weight{}, damping{};  ///< what gravity and numerical damping have in that
+  Dofs acceleration{};
+
+  /// After mass and degrees of freedom.
+  DEMBARK_HOT void set_forces(const Dofs& all, const Dofs& of_gravity, const Dofs& of_damping = {}) {
+    force = all;
+    weight = of_gravity;
+    damping = of_damping;
+    acceleration = accelerated(*this, all);
+  }
+  DEMBARK_HOT static Dofs accelerated(const BodyMotion& body, const Dofs& by) {
+    Dofs a = body.free_part(by);
+    for (std::size_t k = 0; k < a.size(); ++k)
+      if (body.is_free(k)) a[k] /= body.mass[k];
+    return a;
+  }
+  /// Velocity after a kick of duration h.
+  DEMBARK_HOT Dofs kicked(double h) const {
+    Dofs v = velocity;
+    for (std::size_t k = 0; k < v.size(); ++k) v[k] += h * acceleration[k];
+    return v;
+  }
+};
+
+/// P (W) and Q (W/s) of (1), of the parts of contacts' forces in the order of ContactPart, and of what else has a work.
+struct Powers {
+  static constexpr std::size_t walls = contact_part_count, gravity = walls + 1, damping = walls + 2, all = walls + 3, count = walls + 4;
+  typedef std::array<double, count> Each;
+  Each power{}, rate{};
+
+  void add(const Powers& other) {
+    for (std::size_t k = 0; k < count; ++k) {
+      power[k] += other.power[k];
+      rate[k] += other.rate[k];
+    }
+  }
+  /// Gravity, numerical damping, and all forces together.
+  DEMBARK_HOT void add_body(const EnergyBody& body) {
+    if (body.blocked == EnergyBody::all_blocked) return;
+    const Dofs v = body.free_part(body.velocity);
+    add(gravity, body.weight, v, body.acceleration);
+    add(damping, body.damping, v, body.acceleration);
+    add(all, body.force, v, body.acceleration);
+  }
+  /// The last of these alone.
+  DEMBARK_HOT void add_forces(const BodyMotion& body, const Dofs& force) {
+    if (body.blocked == EnergyBody::all_blocked) return;
+    add(all, force, body.free_part(body.velocity), EnergyBody::accelerated(body, force));
+  }
+  /// For engines that add up the parts of contacts' forces body by body: `load(part)` is what acts on this one. A body that is held
+  /// gives the others what it takes.
+  template <class Load>
+  DEMBARK_HOT void add_loads(const EnergyBody& body, Load load) {
+    const Dofs held = body.free_part(body.velocity, false);
+    for (std::size_t part = 0; part < contact_part_count; ++part) {
+      const Dofs on_body = load(part);
+      add(part, on_body, body.velocity, body.acceleration);
+      if (body.blocked) power[walls] -= dot(on_body, held);
+    }
+  }
+  /// For engines that know the mean motions when they look at a contact: velocity of body 1 against body 2 there.
+  DEMBARK_HOT void add_contact(const ContactParts& parts, const Vec3<double>& velocity) {
+    for (std::size_t part = 0; part < contact_part_count; ++part) power[part] += dot(parts.force[part], velocity);
+  }
+  /// The whole force of a contact on one of its bodies, as far as that is held.
+  DEMBARK_HOT void add_held(const BodyMotion& body, const Dofs& load) {
+    if (body.blocked) power[walls] -= dot(load, body.free_part(body.velocity, false));
+  }
+
+ private:
+  DEMBARK_HOT void add(std::size_t of, const Dofs& force, const Dofs& velocity, const Dofs& acceleration) {
+    power[of] += dot(force, velocity);
+    rate[of] += dot(force, acceleration);
+  }
+};
+
+constexpr std::array<const char*, 18> energy_names{"kinetic",
+                                                   "first_kinetic",
+                                                   "gravity",
+                                                   "normal_elastic",
+                                                   "normal_viscous",
+                                                   "tangential_elastic",
+                                                   "tangential_viscous",
+                                                   "capillary",
+                                                   "liquid_viscous",
+                                                   "walls",
+                                                   "numerical_damping",
+                                                   "other",
+                                                   "imposed",
+                                                   "balance",
+                                                   "normal_stored",
+                                                   "tangential_stored",
+                                                   "step_error",
+                                                   "scale"};
+typedef std::array<double, energy_names.size()> Energies;  ///< J, in the order of their names
+
+/// The sums of a run, plain numbers: those of several processes add up, and a restart file holds them as they are.
+struct EnergyLedger {
+  double kinetic = 0.0, first_kinetic = 0.0;
+  double imposed = 0.0;  ///< kinetic energy that no force made
+  double normal_stored = 0.0, tangential_stored = 0.0;
+  double first_stored = 0.0;  ///< of the normal springs at the beginning, and what came and went with bodies
+  double spring_ahead = 0.0;  ///< work of the normal springs from the velocities of `work` to the positions of `normal_stored`
+  Powers::Each work{};
+  Powers now;
+
+  /// Adds the works of a kick, `now` being of velocities at its beginning (side 1), in its mean (0) or at its end (-1).
+  void kick(double duration, int side) {
+    const double square = side * 0.5 * duration * duration, before = work[0];
+    for (std::size_t k = 0; k < Powers::count; ++k) work[k] += duration * now.power[k] + square * now.rate[k];
+    spring_ahead -= work[0] - before;
+  }
+  /// What the springs hold at the present positions; `ahead`: work of the normal springs up to these that is not in `work` yet.
+  void set_stored(double normal, double tangential, double ahead = 0.0) {
+    normal_stored = normal;
+    tangential_stored = tangential;
+    spring_ahead = ahead;
+  }
+  /// A body after a kick, with the velocity `after`: its kinetic energy (J). What is not as the forces made it was set by somebody.
+  /// The body's own velocity becomes the mean one of the kick.
+  DEMBARK_HOT double arrive(EnergyBody& body, double duration, const Dofs& after) {
+    constexpr double round_off = 1e-13;
+    const Dofs expected = body.kicked(duration);
+    Dofs by_forces = after;
+    bool set = false;
+    for (std::size_t k = 0; k < after.size(); ++k) {
+      const double momentum = body.mass[k] * std::abs(body.velocity[k]) + duration * (std::abs(body.force[k]) + std::abs(body.weight[k]));
+      if (body.mass[k] * std::abs(after[k] - expected[k]) <= round_off * momentum || !body.is_free(k)) continue;
+      by_forces[k] = expected[k];
+      set = true;
+    }
+    const double energy = body.kinetic(after);
+    if (set) imposed += energy - body.kinetic(by_forces);
+    kinetic += energy;
+    for (std::size_t k = 0; k < after.size(); ++k) body.velocity[k] = 0.5 * (body.velocity[k] + by_forces[k]);
+    return energy;
+  }
+
+  Energies energies() const {
+    double contacts = work[Powers::walls], sizes = std::abs(contacts);
+    for (std::size_t part = 0; part < contact_part_count; ++part) {
+      contacts += work[part];
+      sizes += std::abs(work[part]);
+    }
+    const double gravity = work[Powers::gravity], damping = work[Powers::damping], all = work[Powers::all];
+    const double other = all - gravity - damping - contacts;
+    const double scale = first_kinetic + sizes + std::abs(gravity) + std::abs(damping) + std::abs(other) + std::abs(imposed);
+    Energies e{kinetic, first_kinetic, gravity};
+    for (std::size_t k = 0; k <= Powers::walls; ++k) e[3 + k] = work[k];
+    const double rest[] = {damping,
+                           other,
+                           imposed,
+                           kinetic - first_kinetic - all - imposed,
+                           normal_stored,
+                           tangential_stored,
+                           work[0] + spring_ahead + normal_stored - first_stored,
+                           scale};
+    for (std::size_t k = 0; k < std::size(rest); ++k) e[4 + Powers::walls + k] = rest[k];
+    return e;
+  }
+};
+
+}  // namespace dembark

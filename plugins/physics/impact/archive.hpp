@@ -1,0 +1,80 @@
+// State as numbers that survive as doubles, bit for bit: one description of a type, `each`, serves to write it and to read it back.
+#pragma once
+
+#include <cstddef>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "../vec3.hpp"
+
+namespace dembark {
+namespace impact {
+
+class Archive {
+ public:
+  Archive() = default;  ///< writes
+  /// Reads what another one has written.
+  explicit Archive(std::vector<double> numbers) : reading_(true), numbers_(std::move(numbers)) {}
+
+  const std::vector<double>& numbers() const { return numbers_; }
+  bool reading() const { return reading_; }
+
+  /// Writes or reads; throws std::invalid_argument with one line if the numbers are not those of `value`.
+  template <class T>
+  void operator()(T& value) {
+    if constexpr (std::is_arithmetic_v<T>) {
+      if (!reading_) return numbers_.push_back(double(value));
+      if (at_ == numbers_.size()) wrong("are too few for what it says it holds");
+      value = T(numbers_[at_++]);
+    } else {
+      value.each(*this);
+    }
+  }
+  void operator()(Vec3<double>& v) { (*this)(v.x), (*this)(v.y), (*this)(v.z); }
+  template <class A, class B>
+  void operator()(std::pair<A, B>& p) {
+    (*this)(p.first), (*this)(p.second);
+  }
+  template <class T>
+  void operator()(std::vector<T>& list) {
+    resize(list);
+    for (T& value : list) (*this)(value);
+  }
+  void operator()(std::string& text) {
+    resize(text);
+    for (char& c : text) (*this)(c);
+  }
+
+  /// The version of what follows; another one is refused.
+  void version(double number) {
+    double found = number;
+    (*this)(found);
+    if (found != number) throw std::invalid_argument("impact state: not written by this version of dembark");
+  }
+  /// All has been read.
+  void end() const {
+    if (reading_ && at_ != numbers_.size()) wrong("do not all belong to it");
+  }
+
+ private:
+  [[noreturn]] void wrong(const char* what) const {
+    throw std::invalid_argument("impact state: " + std::to_string(numbers_.size()) + " numbers " + what);
+  }
+  template <class List>
+  void resize(List& list) {
+    double size = double(list.size());
+    (*this)(size);
+    if (reading_ && !(size >= 0.0 && size <= double(numbers_.size()))) wrong("are too few for what it says it holds");
+    list.resize(std::size_t(size));
+  }
+
+  bool reading_ = false;
+  std::vector<double> numbers_;
+  std::size_t at_ = 0;
+};
+
+}  // namespace impact
+}  // namespace dembark

@@ -1,0 +1,192 @@
+// The history of contacts from step to step: the deformation, the friction spring, whether they were active, and the impact under way.
+// That before the last step is kept beside that after it, so that a step can be done again: engines ask for the forces of one moment
+// twice where one run ends and the next begins.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "archive.hpp"
+#include "assembly.hpp"
+#include "types.hpp"
+
+namespace dembark {
+namespace impact {
+
+struct ContactHistory {
+  bool active = false;
+  double deformation = 0.0;  ///< m, of both springs
+  double elastic = 0.0;      ///< J, in them and in the friction spring
+  FrictionState<double> friction{};
+  Vec3<double> normal{};
+  Impact impact{};  ///< under way
+
+  /// As a new one.
+  bool idle() const { return !active && elastic == 0.0; }
+
+  template <class Visit>
+  void each(Visit&& visit) {
+    visit(active), visit(deformation), visit(elastic), visit(friction.displacement), visit(friction.slip), visit(normal), visit(impact);
+  }
+};
+
+/// All that a step leaves to the next.
+struct Histories {
+  std::vector<Key> keys;  ///< ascending, of the contacts that are not idle
+  std::vector<ContactHistory> contacts;
+  StepReport report;   ///< its totals
+  bool begun = false;  ///< a step has been done
+
+  void add(const Key& key, const ContactHistory& history) {
+    keys.push_back(key);
+    contacts.push_back(history);
+  }
+  void clear() {
+    keys.clear();
+    contacts.clear();
+  }
+  template <class Visit>
+  void each(Visit&& visit) {
+    visit(keys), visit(contacts), visit(report), visit(begun);
+  }
+};
+
+class HistoryKeeper {
+ public:
+  /// Impacts that have ended, for output.
+  std::vector<Impact> finished;
+  /// Bodies (ids) of contacts that were active and are not among the candidates any more.
+  std::vector<std::int64_t> lost_bodies;
+
+  /// Begins a step. `again`: the last step once more, from the same state. Nothing has happened until commit().
+  void begin(bool again) {
+    again_ = again;
+    cursor_ = 0;
+    next_.clear();
+  }
+  /// What the step begins from.
+  const Histories& base() const { return again_ ? before_ : after_; }
+  const Histories& last() const { return after_; }
+  /// Of row i, before the step.
+  const ContactHistory& before(std::size_t i) const { return *from_[i]; }
+
+  /// Where in base() the history of a contact is, or -1; fast while keys ascend from call to call.
+  int recall(const Key& key) {
+    const std::vector<Key>& keys = base().keys;
+    const std::size_t n = keys.size();
+    if (cursor_ > 0 && !(keys[cursor_ - 1] < key)) cursor_ = 0;
+    for (int step = 0; cursor_ < n && keys[cursor_] < key; ++cursor_)
+      if (++step > 8) {
+        cursor_ = std::size_t(std::lower_bound(keys.begin() + std::ptrdiff_t(cursor_), keys.end(), key) - keys.begin());
+        break;
+      }
+    return cursor_ < n && keys[cursor_] == key ? int(cursor_) : -1;
+  }
+
+  /// The rows of the step, with what `recall` said about each; may be called again with more of them.
+  void take(const std::vector<Sorted>& sorted, const std::vector<Row>& rows) {
+    const std::vector<ContactHistory>& contacts = base().contacts;
+    lost_bodies.clear();
+    from_.assign(rows.size(), &blank_);
+    left_.assign(contacts.size(), 1);
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      if (sorted[i].memory >= 0) hand_on(std::size_t(sorted[i].memory), i);
+    orphans_.clear();
+    for (std::size_t o = 0; o < left_.size(); ++o)
+      if (left_[o]) orphans_.push_back(o);
+    if (!base().begun) deform_overlaps(rows);
+    if (orphans_.empty()) return;
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      if (rows[i].b < 0 && from_[i] == &blank_) inherit(i, rows[i]);
+    for (const std::size_t o : orphans_) {
+      const Key& key = base().keys[o];
+      if (!left_[o] || !contacts[o].active) continue;
+      lost_bodies.push_back(key.first);
+      if (key.second >= 0) lost_bodies.push_back(key.second);
+    }
+  }
+
+  /// The impact of a contact is over. What its springs still hold then (contact damping lets go before they are straight, friction) is
+  /// lost as they relax, and is part of its loss.
+  void finish(const Key& key, const ContactHistory& history) {
+    if (again_) return;  // reported the first time
+    finished.push_back(history.impact);
+    finished.back().a = key.first;
+    finished.back().b = key.second;
+    finished.back().dissipated += history.elastic;
+  }
+
+  void add(const Key& key, const ContactHistory& history) { next_.add(key, history); }
+
+  /// What is held by contacts that no row has taken on is lost.
+  void settle(StepReport& report) {
+    for (const std::size_t o : orphans_) {
+      if (!left_[o]) continue;
+      const ContactHistory& history = base().contacts[o];
+      report.dissipated_energy += history.elastic;
+      if (history.active) finish(base().keys[o], history);
+    }
+  }
+
+  /// The histories that were added are those after the step.
+  void commit(const StepReport& report) {
+    next_.report = report.totals();
+    next_.begun = true;
+    if (!again_) std::swap(before_, after_);
+    std::swap(after_, next_);
+  }
+
+  template <class Visit>
+  void each(Visit&& visit) {
+    visit(before_), visit(after_), visit(finished);
+  }
+
+ private:
+  void hand_on(std::size_t history, std::size_t row) {
+    from_[row] = &base().contacts[history];
+    left_[history] = 0;
+  }
+
+  /// Bodies that overlap from the beginning have been deformed before: else contact damping would take the overlap for a sudden blow.
+  void deform_overlaps(const std::vector<Row>& rows) {
+    overlaps_.assign(rows.size(), ContactHistory());
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const double overlap = -rows[i].gap;
+      if (!(overlap > 0.0)) continue;
+      overlaps_[i].deformation = overlap;
+      overlaps_[i].elastic = 0.5 * rows[i].stiffness * overlap * overlap;
+      from_[i] = &overlaps_[i];
+    }
+  }
+
+  /// A body that rolls from one feature of a wall to the next keeps its contact: the new one takes on the history of the one that has
+  /// gone and points nearly the same way.
+  void inherit(std::size_t i, const Row& row) {
+    int best = -1;
+    double closest = 0.9;
+    for (const std::size_t o : orphans_) {
+      const Key& key = base().keys[o];
+      if (!left_[o] || key.first != row.key_a || key.second >= 0 || wall_number(key.second) != wall_number(row.key_b)) continue;
+      const double along = dot(base().contacts[o].normal, row.normal);
+      if (along > closest) {
+        closest = along;
+        best = int(o);
+      }
+    }
+    if (best >= 0) hand_on(std::size_t(best), i);
+  }
+
+  bool again_ = false;
+  Histories before_, after_, next_;
+  std::vector<const ContactHistory*> from_;  ///< of each row
+  std::vector<ContactHistory> overlaps_;     ///< see deform_overlaps()
+  std::size_t cursor_ = 0;                   ///< see recall()
+  std::vector<char> left_;                   ///< of base(): no row has taken it on
+  std::vector<std::size_t> orphans_;
+  const ContactHistory blank_{};
+};
+
+}  // namespace impact
+}  // namespace dembark

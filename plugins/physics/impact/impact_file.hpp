@@ -1,0 +1,76 @@
+// The file of impacts: one line for each impact that has ended, written at once.
+#pragma once
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "types.hpp"
+
+namespace dembark {
+namespace impact {
+
+/// Appends impacts and knows how many bytes are right, so that a run that is taken up again neither repeats what was written after its
+/// state was saved nor loses what was written before. Throws std::runtime_error with one line.
+class ImpactFile {
+ public:
+  const std::string& path() const { return path_; }
+  long long bytes() const { return bytes_; }
+
+  /// A new file. about: what the numbers of the walls stand for, or nothing.
+  void begin(std::string path, const std::string& about) {
+    path_ = std::move(path);
+    bytes_ = 0;
+    put("w", (about.empty() ? "" : "# impacts that have ended, SI units; id_b < 0 is a wall: " + about + "\n") +
+                 "# id_a id_b time duration peak_force impulse relative_speed dissipated x y z\n");
+  }
+
+  /// Goes on with the file behind its first `bytes`; the rest is cut off.
+  void resume(std::string path, long long bytes) {
+    path_ = std::move(path);
+    bytes_ = bytes;
+    std::error_code wrong;
+    const auto size = std::filesystem::file_size(path_, wrong);
+    if (wrong) fail("is not there; the saved run goes on with it");
+    if (size < static_cast<std::uintmax_t>(bytes))
+      fail("has " + std::to_string(size) + " bytes, the saved run goes on after " + std::to_string(bytes) +
+           "; bring the file back or give another name");
+    std::filesystem::resize_file(path_, static_cast<std::uintmax_t>(bytes), wrong);
+    if (wrong) fail("cannot be cut: " + wrong.message());
+  }
+
+  void append(const std::vector<Impact>& impacts) {
+    if (path_.empty() || impacts.empty()) return;
+    std::string lines;
+    char line[320];
+    for (const Impact& i : impacts) {
+      const int length = std::snprintf(line, sizeof line, "%lld %lld %.12g %.12g %.12g %.12g %.12g %.12g %.12g %.12g %.12g\n",
+                                       static_cast<long long>(shown_id(i.a)), static_cast<long long>(shown_id(i.b)), i.time, i.duration,
+                                       i.peak_force, i.impulse, i.relative_speed, i.dissipated, i.point.x, i.point.y, i.point.z);
+      lines.append(line, std::size_t(length));
+    }
+    put("a", lines);
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const { throw std::runtime_error("file " + path_ + " " + what); }
+
+  void put(const char* mode, const std::string& lines) {
+    std::FILE* file = std::fopen(path_.c_str(), mode);
+    const bool written = file && std::fwrite(lines.data(), 1, lines.size(), file) == lines.size();
+    if (!file || std::fclose(file) != 0 || !written) fail(std::string("cannot be written: ") + std::strerror(errno));
+    bytes_ += static_cast<long long>(lines.size());
+  }
+
+  std::string path_;  ///< empty: none
+  long long bytes_ = 0;
+};
+
+}  // namespace impact
+}  // namespace dembark
