@@ -77,7 +77,7 @@ def _remarks(case: Case, found: Measurement) -> tuple[str, ...]:
 
 def _write_fields(folder: Path, fields: xarray.Dataset) -> None:
     # Labelled arrays take a second to import, which commands that measure nothing need not wait for.
-    from dembark.postproc.output import labelled
+    from dembark.postproc import labelled
 
     labelled.write(folder / "fields.nc", fields)
 

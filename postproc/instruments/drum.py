@@ -10,16 +10,19 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray
 from numpy.typing import NDArray
 
 from dembark.postproc import DumpError
-from dembark.postproc.output.labelled import labelled, variable, with_interval
+from dembark.postproc.labelled import labelled, variable, with_interval
 from dembark.postproc.replica import Array, Replica, once
 from dembark.postproc.resampling import resampled
 from dembark.postproc.statistics import Estimate, TimeBlocks, over_replicas, time_blocks
+
+if TYPE_CHECKING:
+    import xarray
 
 # Edges of the histograms of places, in degrees from the lowest point of the drum, positive the way it turns.
 ANGLES = np.linspace(-180.0, 180.0, 37)

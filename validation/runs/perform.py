@@ -145,8 +145,9 @@ def perform_series(one: Series, out: Path, cancel: threading.Event, used: Resour
 
 def _load() -> None:
     """Import what measures and draws: meanwhile the engines run."""
-    for name in ("metrics", "pictures.packings", "pictures.sections"):
-        import_module(f"dembark.validation.{name}")
+    for name in ("dembark.validation.metrics", "dembark.validation.pictures.packings", "dembark.validation.pictures.sections",
+                 "dembark.postproc.output", "scipy.optimize", "scipy.interpolate"):
+        import_module(name)
 
 
 def refuse_foreign(one: Series, out: Path) -> None:

@@ -1,17 +1,20 @@
-"""Fields of a series as one labelled file: variables with units and names by the CF conventions."""
+"""Fields of a series as one labelled file: variables with units and names by the CF conventions.
+
+Labelled arrays and files take a while to import: that is done when they are made, which runs that are not over yet need not wait for.
+"""
 
 from __future__ import annotations
 
 import operator
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray
 from numpy.typing import NDArray
 
-from dembark.postproc.output.whole import WholeFile
+if TYPE_CHECKING:
+    import xarray
 
 Variable = tuple[tuple[str, ...], NDArray[Any], dict[str, str]]
 
@@ -31,11 +34,15 @@ def with_interval(key: str, dimensions: Sequence[str], estimates: Sequence[Any],
 
 def labelled(variables: Mapping[str, Any], coordinates: Mapping[str, Any], **attributes: str | float) -> xarray.Dataset:
     """A dataset by the CF conventions."""
+    import xarray
+
     return xarray.Dataset(dict(variables), dict(coordinates), {"Conventions": "CF-1.11", **attributes})
 
 
 def write(path: Path, dataset: xarray.Dataset) -> Path:
     """Write `dataset` as NetCDF to `path`, whole or not at all; returns the path."""
+    from dembark.postproc.output.whole import WholeFile
+
     with WholeFile(path) as part:
         dataset.to_netcdf(part, engine="h5netcdf")
     return path
