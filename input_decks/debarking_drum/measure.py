@@ -7,17 +7,14 @@ lost; and the mean force of the shell is the weight.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from dembark.postproc.instruments.drum import PLACES, Drum, estimates, fields, read
 from dembark.postproc.instruments.growth import Growth, ordered
-from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.replica import Array, Replica
-from dembark.postproc.resampling import pooled, profile
-from dembark.postproc.statistics import Estimate
+from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, pooled, profile
 
 FORCES = np.logspace(1.0, 6.0, 51)  # edges of the histogram of peak forces, N
 CURVES = {"impacts_per_log": ("Impacts per log and revolution", "1"), "peak_force_mean": ("Mean peak force", "kN"),
@@ -25,7 +22,7 @@ CURVES = {"impacts_per_log": ("Impacts per log and revolution", "1"), "peak_forc
           "torque_arm": ("Moment over weight × radius", "1")}
 
 
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values, profiles, remarks and fields of all loads."""
     drums, given = [read(replica) for replica in replicas], replicas[0].parameters
     found, zero, limit, first = [estimates(drum) for drum in drums], Estimate(0.0, 0.0), given["impact_speed"], drums[0]
@@ -52,12 +49,12 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
     return Measurement(values, _profiles(drums, limit), remarks, fields(replicas))
 
 
-def _profiles(drums: Sequence[Drum], limit: float) -> list[dict[str, Any]]:
+def _profiles(drums: Sequence[Drum], limit: float) -> list[Curve]:
     hit = np.nonzero(sum(np.histogram(drum.peak, FORCES)[0] for drum in drums))[0]
     forces = FORCES[max(0, hit[0] - 1) : hit[-1] + 3] if len(hit) else FORCES
     turned = (np.arange(20 * drums[0].revolutions) + 0.5) / 20.0
 
-    def curve(name: str, title: str, along: str, across: str, place: Array, get: Callable[[Drum], Array], **more: Any) -> dict[str, Any]:
+    def curve(name: str, title: str, along: str, across: str, place: Array, get: Callable[[Drum], Array], **more: Any) -> Curve:
         return profile(name, title, along, across, place, [get(drum) for drum in drums], **more)
 
     note, around, number = f"approach ≥ {limit:g} m/s", "angle past the lowest point (°)", "per log, turn and 10°"
@@ -76,7 +73,7 @@ def _profiles(drums: Sequence[Drum], limit: float) -> list[dict[str, Any]]:
     ]
 
 
-def study(_name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
+def study(_name: str, points: Points, along: str) -> Measurement:
     """The studies `filling` and `speed`: curves of impacts, peak forces and power, and the power of `along` that each grows with."""
     points, place = ordered(points, along)
     label = {"filling": "filling", "drum_speed": "speed of the drum (rad/s)"}.get(along, along.replace("_", " "))

@@ -6,18 +6,14 @@ velocity the mean over the middle half; the thickness of the shear zones is the 
 latter, in cells of one diameter. The studies ask how these grow with the width.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from dembark.postproc.instruments import channel
 from dembark.postproc.instruments.channel import Channel, Mask
 from dembark.postproc.instruments.growth import Growth, ordered
-from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.replica import Array, Replica
-from dembark.postproc.resampling import pooled, profile
-from dembark.postproc.statistics import Estimate, exact
+from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, pooled, profile
 
 # Quantities without a verdict where no steady flow was found.
 FLOW = ("greatest_velocity", "slip_velocity", "velocity_ratio", "shear_zone_thickness", "core_flatness")
@@ -53,7 +49,7 @@ def _estimates(one: Channel) -> dict[str, Estimate]:
     }, apart=True)
 
 
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values, profiles and remarks of all replicas of a series."""
     channels = [channel.read_periodic(replica) for replica in replicas]
     estimates = [_estimates(one) for one in channels]
@@ -67,7 +63,7 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
     return Measurement(values, _profiles(channels), [unsteady[0].upper() + unsteady[1:] + "." if unsteady else remark])
 
 
-def _profiles(channels: Sequence[Channel]) -> list[dict[str, Any]]:
+def _profiles(channels: Sequence[Channel]) -> list[Curve]:
     scaled = [one.scaled_deficit(thickness(one, one.frames)) for one in channels]
     # The cells' own places only: between them a straight line is far from an exponential.
     reach = np.mean([where for where, _ in scaled], axis=0)
@@ -83,7 +79,7 @@ def _profiles(channels: Sequence[Channel]) -> list[dict[str, Any]]:
     ]
 
 
-def study(_name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
+def study(_name: str, points: Points, along: str) -> Measurement:
     """Exponents of velocities and thickness in the width, and the scaled profiles of all widths."""
     points, widths = ordered(points, along)
     given, cells = points[0]["parameters"], widths / float(points[0]["parameters"]["grain_diameter"])

@@ -1,33 +1,26 @@
 """Log cradle: the velocities after an impact through a row of logs against the exact motion of the row."""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from dembark.physics.exact.chains import Chain, ChainMotion
-from dembark.postproc.instruments.logs import LogRun, energy_curves, number, over_time, read, solver_values
-from dembark.postproc.measurement import Measurement
-from dembark.postproc.replica import Replica
+from dembark.postproc.instruments.logs import LogRun, energy_curves, over_time, read, solver_values
+from dembark.postproc.measurement import Curve, Measurement, Numbers, Replicas, number
 
 # Curves are drawn of so many logs at most.
 SHOWN = 5
 
 
-def row(p: Mapping[str, Any]) -> Chain:
+def row(p: Numbers) -> Chain:
     """The logs of a run with parameters `p`, the first of which moves; a contact is two boundaries in series."""
     n = int(p["log_count"])
     return Chain(np.full(n, p["mass"]), np.full(n - 1, 0.5 * p["stiffness"]), np.full(n - 1, p["gap"]), p["velocity"] * np.eye(n)[0])
 
 
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values and curves of the run (there is one)."""
-    return measured(read(replicas[0]))
-
-
-def measured(run: LogRun) -> Measurement:
-    """The same from a run that was read."""
+    run = read(replicas[0])
     p, chain, duration = run.parameters, row(run.parameters), float(run.times[-1])
     motion, speed, turn = chain.motion(run.times), p["velocity"], chain.highest_frequency * run.time_step
     due, peak = motion.velocities[-1], chain.peak_force(duration)
@@ -53,7 +46,7 @@ def measured(run: LogRun) -> Measurement:
          "the same time; a row of separate pairs would hand on the whole speed.")])
 
 
-def _curves(run: LogRun, chain: Chain, motion: ChainMotion) -> list[dict[str, Any]]:
+def _curves(run: LogRun, chain: Chain, motion: ChainMotion) -> list[Curve]:
     n, along, forces, due = len(run.masses), run.velocities[:, :, 0], run.neighbour_forces() / 1e3, motion.forces / 1e3
     return [
         *(over_time(f"velocity_{log + 1}", f"Velocity of log {log + 1}", "v (m/s)", run.times, along[:, log], motion.velocities[:, log])

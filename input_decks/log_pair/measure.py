@@ -6,20 +6,17 @@ the scheme's own recursion over all phases); twice that is allowed.
 """
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from dembark.physics.exact.pairs import Pair, PairMotion
 from dembark.postproc.instruments.growth import Growth, ordered
-from dembark.postproc.instruments.logs import LogRun, energy_curves, number, over_time, read, solver_values
-from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.replica import Array, Replica
+from dembark.postproc.instruments.logs import LogRun, energy_curves, over_time, read, solver_values
+from dembark.postproc.measurement import Array, Curve, Measurement, Numbers, Points, Replicas, Value, number
 
 
-def pair(p: Mapping[str, Any]) -> Pair:
+def pair(p: Numbers) -> Pair:
     """The bodies of a run with parameters `p`; a wall has no mass, radius or velocity of its own, and is met head on."""
     wall = p["target"] == "wall"
     mass, radius, speed, offset = (math.inf, 0.0, 0.0, 0.0) if wall else (p["mass_2"], p["radius_2"], p["velocity_2"], p["offset"])
@@ -28,13 +25,9 @@ def pair(p: Mapping[str, Any]) -> Pair:
                 p["contact_damping"])
 
 
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values and curves of the run (there is one)."""
-    return measured(read(replicas[0]))
-
-
-def measured(run: LogRun) -> Measurement:
-    """The same from a run that was read."""
+    run = read(replicas[0])
     p, bodies = run.parameters, pair(run.parameters)
     motion, turn = bodies.motion(run.times, p["lead_time"]), bodies.omega * run.time_step
     loss, square, duration = 0.5 * math.pi * (2.0 * p["theta"] - 1.0) * turn, turn**2, motion.end - motion.begin
@@ -92,7 +85,7 @@ def _velocities(run: LogRun, bodies: Pair, motion: PairMotion, error: float) -> 
     return values
 
 
-def _curves(run: LogRun, bodies: Pair, motion: PairMotion) -> list[dict[str, Any]]:
+def _curves(run: LogRun, bodies: Pair, motion: PairMotion) -> list[Curve]:
     along, due = run.velocities[:, :, :2] @ motion.normal, motion.velocities @ motion.normal
     force = np.linalg.norm(run.forces[:, 0], axis=1)
     return [
@@ -103,7 +96,7 @@ def _curves(run: LogRun, bodies: Pair, motion: PairMotion) -> list[dict[str, Any
     ]
 
 
-def study(_name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
+def study(_name: str, points: Points, along: str) -> Measurement:
     """Orders of convergence: exponents of the errors over the time step, fitted to all points."""
     points, steps = ordered(points, along)
     theta = points[0]["parameters"]["theta"]
@@ -117,6 +110,6 @@ def study(_name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measur
                        [f"θ = {theta:g}. Each impact begins at the end of a step, so that the errors differ by the step alone."])
 
 
-def _error(point: Mapping[str, Any], name: str) -> float:
+def _error(point: Numbers, name: str) -> float:
     one = next(quantity for quantity in point["quantities"] if quantity["name"] == name)
     return abs(one["value"] / one["reference"] - 1.0) if one["reference"] else abs(one["value"])

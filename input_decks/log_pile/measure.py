@@ -1,29 +1,20 @@
 """Log pile: forces of a stack at rest, its contacts, and the state after the first impacts, in which engines are due to be the same."""
 
 import math
-from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from dembark.postproc.instruments.logs import Loads, LogRun, beginning, impact_values, loads, number, over_time, read, solver_values
-from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.replica import Array, Replica
-from dembark.postproc.resampling import profile
-from dembark.postproc.statistics import block_mean, exact
+from dembark.postproc.instruments.logs import Loads, LogRun, beginning, impact_values, loads, over_time, read, solver_values
+from dembark.postproc.measurement import Array, Curve, Measurement, Replicas, Value, block_mean, exact, number, profile
 
 WALLS = (-1, -2, -3)  # ground, left and right stake
 REST = 0.1  # the share of the run, at its end, in which the stack is at rest
 FIRST = 10  # impacts from the beginning in which two engines have to be the same
 
 
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values and curves of the run (there is one)."""
-    return measured(read(replicas[0]))
-
-
-def measured(run: LogRun) -> Measurement:
-    """The same from a run that was read."""
+    run = read(replicas[0])
     stack, rest = loads(run, WALLS), slice(int((1.0 - REST) * len(run.times)), None)
     height = run.positions[:, :, 1] @ run.masses * run.parameters["gravity"]
     values = {**_at_rest(run, stack, rest), **_energy(run, height), **solver_values(run), **_beginning(run), **impact_values(run)}
@@ -90,7 +81,7 @@ def _beginning(run: LogRun) -> dict[str, Value]:
         "first_sideways": number(sideways, scale=max(abs(sideways), speed), detail=told)}
 
 
-def _curves(run: LogRun, stack: Loads) -> list[dict[str, Any]]:
+def _curves(run: LogRun, stack: Loads) -> list[Curve]:
     times, p, weight, last = run.times, run.parameters, run.masses.sum() * run.parameters["gravity"], slice(-100, None)
     lift, energy = stack.walls[:, :, 1].sum(axis=1) / weight, weight * p["radius"]
     peaks = np.log10(np.maximum(run.impacts[:, 4], 1e-300)) if len(run.impacts) else np.zeros(1)

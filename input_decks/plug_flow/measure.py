@@ -4,17 +4,13 @@ Only the steady part is used; it is detected in the wall friction (MSER-5 and a 
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from dembark.postproc.instruments import channel, channel_fields
 from dembark.postproc.instruments.channel import Channel
 from dembark.postproc.instruments.liquid import liquid_values
-from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.replica import Replica
-from dembark.postproc.resampling import pooled
-from dembark.postproc.statistics import CONFIDENCE, Estimate, block_mean
+from dembark.postproc.measurement import CONFIDENCE, Curve, Estimate, Measurement, Replicas, Value, block_mean, pooled
 
 # A wall zone whose velocity deficit is below this cannot be told from the core's own scatter.
 LEAST_DEFICIT = 0.02
@@ -27,7 +23,7 @@ REMARKS = (
 )
 
 
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values, profiles, remarks and fields of all replicas of a series."""
     channels = [channel.read(replica) for replica in replicas]
     estimates = [_estimates(one) for one in channels]
@@ -65,7 +61,7 @@ def _estimates(one: Channel) -> dict[str, Estimate]:
     }
 
 
-def _profiles(channels: Sequence[Channel]) -> list[dict[str, Any]]:
+def _profiles(channels: Sequence[Channel]) -> list[Curve]:
     plate = {"reference": np.ones(len(channels[0].middle)), "reference_label": "the plate, v₀"}
     return [
         channel.across(channels, "velocity", "Velocity, Eulerian", "v / v₀", lambda c: c.velocity(c.frames) / c.speed, **plate),

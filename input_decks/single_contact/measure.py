@@ -6,25 +6,21 @@ theories of another contact (rigid bodies that slide throughout; partial slip af
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from dembark.physics.exact.impacts import Impacts
 from dembark.postproc.instruments.impact_tests import head_on, mirrored, oblique, restitutions
 from dembark.postproc.instruments.impacts import Flight, Solutions, read
-from dembark.postproc.instruments.logs import number
-from dembark.postproc.measurement import Measurement
-from dembark.postproc.replica import Array, Replica
+from dembark.postproc.measurement import Array, Measurement, Numbers, Replicas, number
 
 
-def sweep(p: Mapping[str, Any]) -> Array:
+def sweep(p: Numbers) -> Array:
     """What is swept, for the spheres of material A, then for those of B."""
     return np.tile(p["sweep_from"] + (p["sweep_to"] - p["sweep_from"]) * np.arange(p["points"]) / max(p["points"] - 1, 1), 2)
 
 
-def impacts(p: Mapping[str, Any]) -> Impacts:
+def impacts(p: Numbers) -> Impacts:
     """The impacts of a run with parameters `p`, from these alone, so that the set-up of the decks is checked, too."""
     full, value, kind = np.ones(2 * p["points"]), sweep(p), p["sweep"]
     angle = np.radians(value) if kind in ("direction", "slide", "spin") else 0.0 * full
@@ -45,13 +41,13 @@ def impacts(p: Mapping[str, Any]) -> Impacts:
                    moving * slide, moving * normal, moving * spin)
 
 
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values and curves of the run (there is one)."""
     p = replicas[0].parameters
     return measured(p, read(replicas[0], impacts(p), p["lead_steps"] * p["time_step"]))
 
 
-def measured(p: Mapping[str, Any], flight: Flight) -> Measurement:
+def measured(p: Numbers, flight: Flight) -> Measurement:
     """The same from a run with parameters `p` that was read."""
     one = impacts(p)
     known, after = Solutions(one, p["time_step"], p["lead_steps"]), flight.after.numbers(one)

@@ -10,8 +10,7 @@ import numpy as np
 
 from dembark.physics.exact.impacts import Impacts, Rebounds, sliding_throughout
 from dembark.postproc.instruments.impacts import Flight, Solutions, materials
-from dembark.postproc.instruments.logs import number
-from dembark.postproc.measurement import Value
+from dembark.postproc.measurement import Value, number
 from dembark.postproc.replica import Array
 from dembark.postproc.resampling import profile
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from dembark.postproc import DumpError
 from dembark.postproc.dumptext import TextDump
-from dembark.postproc.measurement import Value
-from dembark.postproc.replica import Array, Replica
+from dembark.postproc.measurement import Value, number
+from dembark.postproc.replica import Array, Replica, once
 from dembark.postproc.resampling import profile
-from dembark.postproc.statistics import CONFIDENCE, Estimate, exact, student
+from dembark.postproc.statistics import CONFIDENCE, Estimate, student
 
 # Points of a curve, twice as many at most.
 POINTS = 100
@@ -93,6 +93,7 @@ def read_touches(path: Path) -> list[TouchFrame]:
     return frames
 
 
+@once
 def read(replica: Replica) -> LogRun:
     """The whole run as arrays; DumpError when files do not fit together."""
     frames, history = list(replica.grains()), replica.times()
@@ -106,11 +107,6 @@ def read(replica: Replica) -> LogRun:
                                          for name in ("positions", "velocities", "omegas", "forces"))
     return LogRun(replica.parameters, replica.time_step, steps * replica.time_step, places, velocities, spins, forces, first.masses,
                   first.radii, history, replica.impacts(), touches)
-
-
-def number(value: float, reference: float | None = None, **more: Any) -> Value:
-    """`value` and `reference` without an interval; `more` as in Value."""
-    return Value(exact(value), None if reference is None else exact(reference), **more)
 
 
 def solver_values(run: LogRun) -> dict[str, Value]:

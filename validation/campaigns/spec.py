@@ -119,6 +119,7 @@ class _Reader(TableReader):
         head, resources = data["campaign"], data.get("resources", {})
         self.table(head, "campaign", _CAMPAIGN, ("name",))
         self.folder_name("campaign", head["name"])
+        head = self.named(head["name"]) | head
         if not data["sweeps"]:
             raise self.fail("sweeps", "there are no sweeps", "add a table [[sweeps]]")
         if "profile" in head:
@@ -134,6 +135,13 @@ class _Reader(TableReader):
             self.path, head["name"], head.get("description", "").strip(), head.get("retries", RETRIES),
             tuple(self.sweep(f"sweeps {number}", number, entry, head, base) for number, entry in enumerate(data["sweeps"], start=1)),
             None if measure is None else self.changed(f"resources.{MEASURE}", Resources(), measure))
+
+    def named(self, name: str) -> dict[str, str]:
+        """Case and profile that the name of a campaign such as silo-standard gives to all sweeps that name none."""
+        case, _, profile = name.rpartition("-")
+        if case not in {path.parent.name for path in files()}:
+            return {}
+        return {"case": case} | ({"profile": profile} if profile in find(case).profiles else {})
 
     def folder_name(self, table: str, text: str) -> None:
         if not _NAME.fullmatch(text):
