@@ -20,8 +20,10 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _VALUE = re.compile(rf"\s*(?P<number>{_NUMBER}(?:\s*/\s*{_NUMBER})?)\s*\*?\s*(?P<unit>[^\W\d].*|[%°].*|)\s*")
 _IN_UNIT = re.compile(r"(?:[^\W\d]+\d?|[%°]|(?:\^|\*\*)\s*\(?[-+]?\d+(?:\.\d+)?\)?|[*/·()]|\s+)*")
 # Products and powers of these are known without the library, which takes a while to load.
-_SYMBOL = r"(?:m|s|kg|N|Pa|J|W|rad|K|d|R)(?:\^[1-9])?"
+_SYMBOL = r"(?:m|s|kg|N|Pa|J|W|rad|K)(?:\^[1-9])?"
 _PLAIN = re.compile(rf"1|{_SYMBOL}(?:[*/ ]{_SYMBOL})*")
+# What a quantity may be measured in, a grain's diameter or a vessel's radius, is a day and the gas constant to the library.
+_SCALES = ("d", "R")
 _POWER = re.compile(r"([^\W\d]+)(\d)")
 _EXAMPLES = {"m": "4 mm", "m^2": "4 mm^2", "m^3": "0.08 mm^3", "s": "2 ms", "m/s": "2 cm/s", "m/s^2": "9.81 m/s^2", "kg": "2 g",
              "kg/m^3": "2.5 g/cm^3", "Pa": "5 MPa", "Pa*s": "1 mPa*s", "N": "2 mN", "N/m": "72 mN/m", "rad": "20 deg", "rad/s": "14 rpm",
@@ -41,14 +43,22 @@ def _angle_power(quantity: pint.Quantity[float]) -> float:
 
 
 def known_unit(unit: str) -> bool:
-    """Whether `unit` is `1` or a unit that can be converted to."""
-    if _PLAIN.fullmatch(unit):
+    """Whether `unit` is `1`, a scale (d, R) or a unit that can be converted to."""
+    if unit in _SCALES or _PLAIN.fullmatch(unit):
         return True
     try:
         _registry().Unit(unit)
     except Exception:  # noqa: BLE001 (the parser of unit texts raises many kinds, none of which means anything else here)
         return False
     return True
+
+
+def si_unit(unit: str) -> bool:
+    """Whether `unit` is `1` or one of SI without a factor, so that engines may read its numbers: `Pa*s`, not `mm`, nor `d`, which is a
+    day."""
+    if _PLAIN.fullmatch(unit):
+        return True
+    return known_unit(unit) and math.isclose(_registry().Quantity(1.0, unit).to_base_units().magnitude, 1.0)
 
 
 def example(unit: str) -> str:

@@ -4,12 +4,10 @@ import math
 
 import numpy as np
 
-from dembark.physics.exact.chains import Chain, ChainMotion
-from dembark.postproc.instruments.logs import LogRun, energy_curves, over_time, read, solver_values
-from dembark.postproc.measurement import Curve, Measurement, Numbers, Replicas, number
-
-# Curves are drawn of so many logs at most.
-SHOWN = 5
+from dembark.physics.exact.chains import Chain
+from dembark.postproc.instruments.log_exact import row_curves
+from dembark.postproc.instruments.logs import read, solver_values
+from dembark.postproc.measurement import Measurement, Numbers, Replicas, number
 
 
 def row(p: Numbers) -> Chain:
@@ -41,17 +39,6 @@ def measure(replicas: Replicas) -> Measurement:
         **solver_values(run),
     }
     shares = ", ".join(f"{value:.4f}" for value in due / speed)
-    return Measurement(values, _curves(run, chain, motion), [
+    return Measurement(values, row_curves(run, chain, motion), [
         (f"Exact velocities after, over that of the first log: {shares} ({motion.events} contacts close or open on the way). All act at "
          "the same time; a row of separate pairs would hand on the whole speed.")])
-
-
-def _curves(run: LogRun, chain: Chain, motion: ChainMotion) -> list[Curve]:
-    n, along, forces, due = len(run.masses), run.velocities[:, :, 0], run.neighbour_forces() / 1e3, motion.forces / 1e3
-    return [
-        *(over_time(f"velocity_{log + 1}", f"Velocity of log {log + 1}", "v (m/s)", run.times, along[:, log], motion.velocities[:, log])
-          for log in np.unique(np.linspace(0, n - 1, min(n, SHOWN)).round().astype(int))),
-        *(over_time(f"force_{one + 1}", f"Force of logs {one + 1} and {one + 2}", "N (kN)", run.times, forces[:, one], due[:, one])
-          for one in sorted({0, n - 2})),
-        *energy_curves(run, 0.5 * (motion.forces**2 / chain.stiffness).sum(axis=1)),
-    ]

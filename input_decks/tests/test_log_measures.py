@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.tests.measuring import defaults, judged, logs, module, names
-from dembark.postproc.instruments.logs import LogRun, TouchFrame, beginning, impact_values, loads
+from dembark.postproc.instruments.log_stack import beginning, impact_values, loads
+from dembark.postproc.instruments.logs import LogRun, TouchFrame
 
 log_pair, log_cradle = (module(name) for name in ("log_pair", "log_cradle"))
 

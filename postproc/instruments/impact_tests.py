@@ -10,9 +10,7 @@ import numpy as np
 
 from dembark.physics.exact.impacts import Impacts, Rebounds, sliding_throughout
 from dembark.postproc.instruments.impacts import Flight, Solutions, materials
-from dembark.postproc.measurement import Value, number
-from dembark.postproc.replica import Array
-from dembark.postproc.resampling import profile
+from dembark.postproc.measurement import Array, Value, number, profile
 
 Found = tuple[dict[str, Value], list[dict[str, Any]]]
 

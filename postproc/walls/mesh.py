@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from dembark.postproc.dumptext import DumpError
 
@@ -115,8 +116,6 @@ class TriangleTree:
     """Finds the nearest point of t triangles (t, 3, 3): a binary tree of boxes, searched for many points at once; exact."""
 
     def __init__(self, triangles: Array) -> None:
-        from scipy.spatial import cKDTree  # slow to import, and only meshes need it
-
         self._triangles = triangles
         self._centroids = cKDTree(triangles.mean(axis=1))
         low, high, centre = triangles.min(axis=1), triangles.max(axis=1), triangles.mean(axis=1)

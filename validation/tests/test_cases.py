@@ -142,6 +142,9 @@ variants = ["dry", "wet", "large"]
 @pytest.mark.parametrize(("old", "new", "words"), [
     ('type = "int"', 'type = "integer"', ["integer", "int"]),
     ('unit = "m"', 'unit = "metrez"', ["metrez", "parameters.grain_diameter"]),
+    ('unit = "m"', 'unit = "mm"', ["'mm' is no SI unit without a factor", "parameters.grain_diameter"]),
+    ('unit = "m"', 'unit = "d"', ["'d' is no SI unit", "parameters.grain_diameter"]),
+    ('unit = "m"', 'unit = "R"', ["'R' is no SI unit", "parameters.grain_diameter"]),
     ("value = 0.005", "value = -0.005", ["out of range", "parameters.grain_diameter"]),
     ("value = 0.005\n", "", ["value is missing"]),
     ('doc = "diameter"', "", ["doc is missing"]),

@@ -242,3 +242,11 @@ def test_texts_that_are_no_duration(text: str) -> None:
 def test_sizes_are_written_as_they_are(count: float) -> None:
     number, unit = sizes.size_text(count).split()
     assert float(number) * {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9}[unit] == pytest.approx(count, rel=0.006, abs=0.5)
+
+
+def test_a_name_gives_case_and_profile(write) -> None:
+    named = write('[campaign]\nname = "box-quick"\n\n[[sweeps]]\nvariant = "wet"\ngrid = { grain_count = [10, 20] }\n')
+    (sweep,) = read(named).sweeps
+    assert (sweep.case.name, sweep.profile) == ("box", "quick")
+    other = write('[campaign]\nname = "box-quick"\nprofile = "standard"\n\n[[sweeps]]\ngrid = { grain_count = [10, 20] }\n')
+    assert read(other).sweeps[0].profile == "standard"
