@@ -138,7 +138,7 @@ class CaseReader(TableReader):
         if (entry["type"] == "choice") != ("values" in entry):
             raise self.fail(table, "type and values do not fit", 'values = [...] together with type = "choice"')
         if not si_unit(entry.get("unit", "1")):
-            raise self.fail(table, f"{entry['unit']!r} is no SI unit without a factor", 'm, kg/m^3, Pa*s, ..., or "1"; values may have others')
+            raise self.fail(table, f"{entry['unit']!r} is no SI unit without a factor", 'such as kg/m^3, or "1"; values may have others')
         parameter = Parameter(name=name, **{**entry, "values": tuple(entry.get("values", ()))})
         self.value(table, parameter, parameter.value)
         return parameter
