@@ -117,7 +117,7 @@ def run(
     for line in show.open_lines(result):
         console.print(line, markup=False, soft_wrap=True)
     counted = tally(result.quantities)
-    console.print(counted.sentence, style="bold red" if counted.failed else "bold", soft_wrap=True)
+    show.print_tally(console, counted)
     console.print(str(folder / METRICS), markup=False, soft_wrap=True)
     _strictly(counted.failed, strict)
 

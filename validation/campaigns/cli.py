@@ -107,7 +107,7 @@ def status(directory: Folder) -> None:
             console.print(f"failed: {state.name}: {state.message}", markup=False, style="red", soft_wrap=True)
     if found.running and found.left:
         console.print(f"about {duration(found.left)} left")
-    console.print(f"{found.measured} series measured; {found.tally.sentence}")
+    show.print_tally(console, found.tally, f"{found.measured} series measured; ")
     if found.report:
         console.print(str(found.report), markup=False, soft_wrap=True)
     if not found.running and not found.complete:

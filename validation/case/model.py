@@ -99,13 +99,17 @@ class PlannedRun:
 
 @dataclass(frozen=True)
 class Study:
-    """Variants that differ in one parameter, `along`, and are looked at together, in this order."""
+    """Variants that differ in one parameter, `along`, and are looked at together, in this order.
+
+    `formal_order`: that of the scheme in `along`, which the grid convergence index of campaigns along it takes.
+    """
 
     name: str
     title: str
     description: str
     along: str
     variants: tuple[str, ...]
+    formal_order: Expression = Expression("1")
 
     @property
     def folder_name(self) -> str:
@@ -168,6 +172,10 @@ class Case:
     def deck(self, engine: str) -> Path:
         """Deck of `engine` in this folder."""
         return self.folder / engines.facts(engine).deck
+
+    def formal_order(self, along: str) -> Expression:
+        """Formal order of the scheme in the parameter `along`, as the first study along it says; 1 where there is none."""
+        return next((study.formal_order for study in self.studies.values() if study.along == along), Study.formal_order)
 
     def with_derived(self, values: Mapping[str, Value]) -> dict[str, Value]:
         """`values` and the numbers that follow from them by the expressions of [derived]; DembarkError for one without a value."""

@@ -88,6 +88,10 @@ def _judged(one: Declared, part: str, name: str, value: Value) -> QuantityRecord
         raise DembarkError(f"quantity {name} is declared with tolerance = \"bound\"", "", "give bound=... in its Value")
     if value.bound is not None and one.tolerance != "bound":
         raise DembarkError(f"quantity {name} has a bound", "its tolerance is not the word \"bound\"", "take the bound away or declare it")
+    if value.bound is not None and value.estimate.half != 0.0:
+        # The noise of a run must not decide what it is allowed.
+        raise DembarkError(f"quantity {name} has a bound and an interval", "a bound is for runs in which nothing is random",
+                           "declare its tolerance as a number, with the reason")
     tolerance = None if value.reference is None else value.bound if one.tolerance == "bound" else one.tolerance
     return judged(
         name, one.label.replace("*", part), one.unit, value.estimate, reference=value.reference,
@@ -146,14 +150,19 @@ def judged(name: str, label: str, unit: str, estimate: Estimate, *, reference: E
 
 
 def judge(deviation: float, half: float, tolerance: float) -> tuple[str, str]:
-    """pass or fail of a deviation with interval half-width `half`; info when the interval is wider than the tolerance, for then
-    neither verdict would mean anything."""
+    """Verdict and reason of a deviation with interval half-width `half`.
+
+    pass: all of the interval is within the tolerance. fail: the deviation is beyond it. info, which is open: the interval reaches beyond
+    the tolerance, or is wider than it, so that neither verdict would mean anything.
+    """
     if not math.isfinite(deviation):
         return "fail", "no finite number"
     if not half <= tolerance:
         wide = f"±{half:.2g}" if math.isfinite(half) else "unknown"
         return "info", f"its interval ({wide}) is wider than what is allowed"
-    return ("pass", "") if abs(deviation) <= tolerance else ("fail", "")
+    if abs(deviation) > tolerance:
+        return "fail", ""
+    return ("pass", "") if abs(deviation) + half <= tolerance else ("info", f"its interval (±{half:.2g}) reaches beyond what is allowed")
 
 
 def _finite(value: float | None) -> float | None:

@@ -21,7 +21,8 @@ def entry(value, half, basis="5 replicas"):
 @pytest.mark.parametrize(
     ("one", "other", "verdict"),
     [
-        ((1.0, 0.04), (1.05, 0.04), "pass"),
+        ((1.0, 0.04), (1.04, 0.04), "pass"),
+        ((1.0, 0.04), (1.05, 0.04), "info"),
         ((1.0, 0.01), (1.05, 0.01), "fail"),
         ((1.0, 0.2), (1.15, 0.2), "info"),
         ((1.0, 0.05), (1.3, 0.05), "fail"),
@@ -60,14 +61,16 @@ def test_one_of_many_comparisons_may_lie_beyond_its_interval():
     ("deviation", "half", "verdict"),
     [
         (0.05, 0.02, "pass"),
-        (-0.1, 0.1, "pass"),
+        (-0.1, 0.0, "pass"),
+        (0.08, 0.03, "info"),
+        (-0.1, 0.1, "info"),
         (0.11, 0.02, "fail"),
         (0.0, 0.2, "info"),
         (0.5, float("inf"), "info"),
         (0.0, float("nan"), "info"),
     ],
 )
-def test_verdict_needs_an_interval_narrower_than_the_tolerance(deviation, half, verdict):
+def test_a_pass_needs_the_whole_interval_within_the_tolerance(deviation, half, verdict):
     assert judge(deviation, half, 0.1)[0] == verdict
 
 
