@@ -124,7 +124,7 @@ def run(
 
 def _interval(text: str | None) -> float | None:
     """Wall time (s) between states of a run, 0 for none; None when it is not said."""
-    from dembark.validation.campaigns.sizes import seconds
+    from dembark.common.units import seconds
 
     if text is None:
         return None

@@ -93,9 +93,10 @@ def _conclude(outcome: Outcome, results: Path) -> None:
 @app.command()
 def status(directory: Folder) -> None:
     """Show how far a campaign is: each run with its simulated time, and the time left."""
+    from dembark.common.units import duration
     from dembark.validation import show
     from dembark.validation.campaigns.folder import look
-    from dembark.validation.runs.progress import duration, state_table
+    from dembark.validation.runs.progress import state_table
 
     results = directory.resolve()
     found = look(results)

@@ -13,12 +13,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from dembark.common.units import core_hours, duration, size_text
 from dembark.validation import engines
 from dembark.validation.campaigns import store
-from dembark.validation.campaigns.sizes import core_hours, size_text
 from dembark.validation.case import deck
 from dembark.validation.runs.plan import Plan, Series, finished
-from dembark.validation.runs.progress import duration
 
 
 @dataclass(frozen=True)

@@ -140,12 +140,12 @@ def _sweeps(spec: CampaignSpec, found: Sequence[Point]) -> list[dict[str, Any]]:
 
 def _formal_orders(point: Point) -> dict[str, float]:
     """Formal order of the scheme at a point, by the parameters of the method that vary; DembarkError when it is no positive number."""
-    found = {}
+    found, where = {}, f"point {point.variant}"
     for axis in (axis for axis in point.sweep.axes if axis in REFINEMENT):
-        expression, where = point.sweep.formal_order or point.sweep.case.formal_order(axis), f"point {point.variant}"
+        expression = point.sweep.formal_order or point.sweep.case.formal_order(axis)
         order = expression.evaluated(point.resolved, "formal_order", where)
         if not isinstance(order, int | float) or not 0.0 < order < math.inf:
-            raise DembarkError(f"formal_order = {expression.text!r} is {order}", where, "a positive number, or an expression that gives one")
+            raise DembarkError(f"formal_order = {expression.text!r} is {order}", where, "give a positive number, or an expression for one")
         found[axis] = float(order)
     return found
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from dembark.common import units
 from dembark.common.choices import Value, nearest, pick
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
-from dembark.validation.campaigns import sizes
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.folders import discover, files, find
 from dembark.validation.case.model import Case
@@ -290,7 +290,7 @@ class _Reader(TableReader):
     def changed(self, table: str, base: Resources, data: Mapping[str, Any]) -> Resources:
         """`base` with the numbers that the texts of `data` mean."""
         self.least(table, data, ranks=1, threads=1)
-        read = {"memory": sizes.size, "time": sizes.seconds, "restart_interval": sizes.seconds}
+        read = {"memory": units.size, "time": units.seconds, "restart_interval": units.seconds}
         try:
             numbers: dict[str, Any] = {key: read[key](value) if key in read else value for key, value in data.items()}
         except DembarkError as error:

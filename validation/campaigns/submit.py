@@ -9,9 +9,9 @@ from pathlib import Path
 
 from dembark.common.errors import DembarkError
 from dembark.common.lock import lock
+from dembark.common.units import size_text
 from dembark.validation.campaigns import estimate, expand, folder, store
 from dembark.validation.campaigns.folder import Options
-from dembark.validation.campaigns.sizes import size_text
 from dembark.validation.runs import site
 from dembark.validation.runs.executor import Local
 from dembark.validation.runs.perform import LOCK, Outcome, Place, perform

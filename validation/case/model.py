@@ -22,6 +22,8 @@ PROFILES = ("quick", "standard", "full")
 # Kinds of evidence: what a reference is.
 EVIDENCE = ("experiment", "theory", "code", "identity")
 UNSET = "auto"
+# The formal order of a scheme of which nothing else is said.
+FIRST_ORDER = Expression("1")
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ class Study:
     description: str
     along: str
     variants: tuple[str, ...]
-    formal_order: Expression = Expression("1")
+    formal_order: Expression = FIRST_ORDER
 
     @property
     def folder_name(self) -> str:
@@ -175,7 +177,7 @@ class Case:
 
     def formal_order(self, along: str) -> Expression:
         """Formal order of the scheme in the parameter `along`, as the first study along it says; 1 where there is none."""
-        return next((study.formal_order for study in self.studies.values() if study.along == along), Study.formal_order)
+        return next((study.formal_order for study in self.studies.values() if study.along == along), FIRST_ORDER)
 
     def with_derived(self, values: Mapping[str, Value]) -> dict[str, Value]:
         """`values` and the numbers that follow from them by the expressions of [derived]; DembarkError for one without a value."""

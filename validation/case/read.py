@@ -13,6 +13,7 @@ from dembark.validation.case.expressions import Expression
 from dembark.validation.case.folders import package_root
 from dembark.validation.case.model import (
     EVIDENCE,
+    FIRST_ORDER,
     OUTPUTS,
     PROFILES,
     STANDARD_OUTPUTS,
@@ -198,7 +199,7 @@ class CaseReader(TableReader):
         if len(set(entry["variants"])) < max(3, len(entry["variants"])):
             raise self.fail(table, "a study needs at least three variants, each once")
         return Study(name, entry["title"], entry.get("description", "").strip(), entry["along"], tuple(entry["variants"]),
-                     self.order(table, entry, parameters) or Study.formal_order)
+                     self.order(table, entry, parameters) or FIRST_ORDER)
 
     def constraint(self, text: str, message: Any, parameters: Mapping[str, Parameter]) -> Constraint:
         """An entry of [constraints]: the condition, and the sentence for whoever breaks it."""

@@ -14,6 +14,7 @@ from markupsafe import Markup, escape
 
 from dembark.common.errors import RunError
 from dembark.common.files import disk_error, write_whole
+from dembark.common.units import duration
 from dembark.validation.judge.result import Result
 from dembark.validation.report import front, numbers, scatter, sections
 from dembark.validation.report.figures import colour, engine_name
@@ -71,7 +72,7 @@ def _environment() -> Environment:
     found = Environment(loader=FileSystemLoader(_HERE), autoescape=select_autoescape(["html", "j2"]), undefined=StrictUndefined,
                         trim_blocks=True, lstrip_blocks=True)
     found.filters |= {"plain": numbers.plain, "compact": numbers.compact, "subscripts": _subscripts,
-                      "duration": numbers.duration, "engine": engine_name}
+                      "duration": duration, "engine": engine_name}
     found.globals |= {"signs": _SIGNS, "estimate": numbers.with_interval, "unit": numbers.with_unit, "deviation": numbers.deviation,
                       "allowed": numbers.allowed, "colour": colour}
     return found

@@ -4,14 +4,16 @@ import math
 
 import pytest
 
+from dembark.postproc.measurement import Value
 from dembark.postproc.statistics import exact
+from dembark.validation.case.model import Declared
 from dembark.validation.judge.compare import pair
 from dembark.validation.judge.measuring import judged
 from dembark.validation.judge.result import as_json
 
 
 def entry(value, agreement, half=0.0):
-    return judged("speed", "speed", "m/s", exact(value, half), agreement=agreement)
+    return judged(Declared("speed", "speed", "m/s", agreement=agreement), Value(exact(value, half)))
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from dembark.common.errors import RunError
+from dembark.postproc.measurement import Value
 from dembark.postproc.statistics import Estimate, over_replicas
+from dembark.validation.case.model import Declared
 from dembark.validation.judge.compare import pair
 from dembark.validation.judge.measuring import judge, judged
 from dembark.validation.judge.result import QuantityRecord, as_json
@@ -75,15 +77,15 @@ def test_a_pass_needs_the_whole_interval_within_the_tolerance(deviation, half, v
 
 
 def test_nan_fails():
-    broken = judged("q", "q", "1", Estimate(float("nan"), 0.1), reference=Estimate(1.0, 0.0), tolerance=0.1)
+    broken = judged(Declared("q", "q", tolerance=0.1), Value(Estimate(float("nan"), 0.1), Estimate(1.0, 0.0)))
     assert broken.verdict == "fail"
     assert as_json(broken)["value"] is None
 
 
 def test_a_bound_that_is_not_finite_is_none_in_the_file() -> None:
     """A column too small for an interval allows anything; JSON has no number for that."""
-    entry = as_json(judged("field_balance", "balance", "1", Estimate(0.1, math.inf), reference=Estimate(0.0, 0.0), tolerance=math.inf,
-                           absolute=True))
+    entry = as_json(judged(Declared("field_balance", "balance", tolerance=math.inf, absolute=True),
+                           Value(Estimate(0.1, math.inf), Estimate(0.0, 0.0))))
     assert entry["tolerance"] is None and entry["interval"] is None
     json.dumps(entry, allow_nan=False)
 

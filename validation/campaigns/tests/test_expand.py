@@ -119,7 +119,7 @@ def test_the_formal_order_is_that_of_the_scheme(tmp_path: Path, monkeypatch: pyt
     text = ORDERS.replace("log_pair", "log_pile").replace("steps_40", "smooth_logs")
     assert {point["formal_orders"]["time_step"] for point in campaign(spec_of(tmp_path, text)).facts["sweeps"][0]["points"]} == {1.0}
     for order in ("0", '"theta - 2"'):
-        with pytest.raises(DembarkError, match="formal_order = .* is .*, point .*, a positive number"):
+        with pytest.raises(DembarkError, match=r"formal_order = .* is .*, point .*, give a positive number"):
             campaign(spec_of(tmp_path, f"{ORDERS}formal_order = {order}\n"))
     with pytest.raises(DembarkError, match="unknown parameter 'thet'"):
         spec_of(tmp_path, ORDERS + 'formal_order = "2 * thet"\n')
