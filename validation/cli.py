@@ -164,10 +164,9 @@ def make_report(
     from dembark.validation.runs.steps import build_report
 
     folder = directory.resolve() if directory else results.resolve() / profile
-    if directory and not any(folder.glob("*/*/*/metrics.json")):
-        raise DembarkError(f"no results in {folder}", "", "give the folder of a campaign that has measured something")
     if not any(folder.glob("*/*/*/metrics.json")):
-        raise DembarkError(f"no results in {folder}", "", f"run 'dembark validate --profile {profile}' first, or give --results")
+        raise DembarkError(f"no results in {folder}", "", "give the folder of a campaign that has measured something" if directory else
+                           f"run 'dembark validate --profile {profile}' first, or give --results")
     build_report(folder)
     show.console().print(f"{folder / 'report.html'}\n{folder / 'report.pdf'}", markup=False, soft_wrap=True)
 

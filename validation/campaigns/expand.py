@@ -107,15 +107,10 @@ def points(spec: CampaignSpec) -> list[Point]:
             folder = folders.setdefault((sweep.case.name, *point.resolved.values()), point.variant)
             found.append(replace(point, variant=folder))
     _distinct(spec, found)
-    runs = sum(len(point.sweep.engines) * _replicas(point) for point in found)
+    runs = sum(len(point.sweep.engines) * int(point.resolved.get("replicas") or 1) for point in found)
     if runs > MOST_RUNS:
         raise DembarkError(f"{spec.path} has {runs} runs", "", f"a campaign may have {MOST_RUNS}: make several")
     return found
-
-
-def _replicas(point: Point) -> int:
-    count = point.resolved.get("replicas")
-    return count if isinstance(count, int) else 1
 
 
 def _distinct(spec: CampaignSpec, found: Sequence[Point]) -> None:

@@ -92,19 +92,20 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
     """
     name = name or one.name
     tolerance, deviation, half = _tolerance(one, value, name), None, value.estimate.half
-    verdict, reason = value.verdict, value.reason
-    if value.reference is not None:
-        scale = 1.0 if one.absolute else value.reference.value
-        deviation = (value.estimate.value - value.reference.value) / scale if scale else math.nan
-        half = math.hypot(half, value.reference.half) / abs(scale) if scale else math.nan
+    verdict, reason, reference = value.verdict, value.reason, value.reference
+    if reference is not None:
+        scale = 1.0 if one.absolute else reference.value
+        deviation = (value.estimate.value - reference.value) / scale if scale else math.nan
+        half = math.hypot(half, reference.half) / abs(scale) if scale else math.nan
     if not verdict:
         verdict = "info"
         if not reason and tolerance is not None and deviation is not None:
             verdict, reason = judge(deviation, half if value.half is None else value.half, tolerance)
     return QuantityRecord(
         name=name, label=one.label.replace("*", part), value=_finite(value.estimate.value), unit=one.unit,
-        interval=_interval(value.estimate), basis=value.estimate.basis, reference=_finite(value.reference.value if value.reference else None),
-        reference_interval=_interval(value.reference) if value.reference else None, deviation=_finite(deviation),
+        interval=_interval(value.estimate), basis=value.estimate.basis,
+        reference=_finite(reference.value if reference else None), reference_interval=_interval(reference) if reference else None,
+        deviation=_finite(deviation),
         deviation_kind="absolute" if one.absolute else "relative", tolerance=_finite(tolerance), verdict=verdict, reason=reason,
         detail=value.detail or one.detail or one.why, source=one.source, evidence=one.evidence, compared=one.compared and value.compared,
         deviation_half_width=_finite(value.half), agreement=None if one.agreement is None else one.agreement * value.scale)
@@ -124,10 +125,12 @@ def _tolerance(one: Declared, value: Value, name: str) -> float | None:
     return None if value.reference is None else value.bound
 
 
-def picture(case: Case, known: Mapping[str, Any]) -> dict[str, Any] | None:
-    """How the report shows a run: the table [picture] with its expressions evaluated for the numbers `known`; None without one."""
+def picture(case: Case, record: Mapping[str, Any]) -> dict[str, Any] | None:
+    """How the report shows the run with this `record`: the table [picture] with its expressions evaluated for the run's parameters and
+    derived numbers; None without one."""
     if not case.picture:
         return None
+    known = {**record["parameters"], **record["derived"]}
     return {key: Expression(value)(known) if key in _NUMBERS and isinstance(value, str) else value for key, value in case.picture.items()}
 
 

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import logging
-import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from dembark.common.errors import RunError
 from dembark.common.files import disk_error, write_whole
 from dembark.common.units import duration
 from dembark.validation.judge.result import Result
 from dembark.validation.report import front, numbers, scatter, sections
-from dembark.validation.report.figures import colour, engine_name
+from dembark.validation.report.figures import colour, engine_name, subscripts
 from dembark.validation.report.gather import Gathered, gather
 
 _HERE = Path(__file__).parent
@@ -71,16 +70,11 @@ _EMPTY: Mapping[str, Any] = {"sections": (), "sweeps": (), "errors": (), "verifi
 def _environment() -> Environment:
     found = Environment(loader=FileSystemLoader(_HERE), autoescape=select_autoescape(["html", "j2"]), undefined=StrictUndefined,
                         trim_blocks=True, lstrip_blocks=True)
-    found.filters |= {"plain": numbers.plain, "compact": numbers.compact, "subscripts": _subscripts,
+    found.filters |= {"plain": numbers.plain, "compact": numbers.compact, "subscripts": subscripts,
                       "duration": duration, "engine": engine_name}
     found.globals |= {"signs": _SIGNS, "estimate": numbers.with_interval, "unit": numbers.with_unit, "deviation": numbers.deviation,
                       "allowed": numbers.allowed, "colour": colour}
     return found
-
-
-def _subscripts(text: str) -> Markup:
-    """Symbols like σ_zz with real subscripts."""
-    return Markup(re.sub(r"\b([σρμKv])_([a-z]+)", r"\1<sub>\2</sub>", str(escape(text))))
 
 
 def write_pdf(html: str, path: Path) -> None:

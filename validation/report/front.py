@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dembark.validation.case.model import EVIDENCE
 from dembark.validation.judge.result import QuantityRecord
-from dembark.validation.judge.tally import MEANING, Tally, tally
+from dembark.validation.judge.tally import MEANING, Counts, Tally, tally
 from dembark.validation.report import figures, scatter
 from dembark.validation.report.gather import Row
 
@@ -54,9 +55,10 @@ def _names(group: Sequence[Row]) -> str:
 
 def evidence(counted: Tally) -> list[dict[str, Any]]:
     """Rows of the table of verdicts: each kind of evidence with its counts, and all together."""
-    kinds = [{"kind": kind or "not stated", "meaning": MEANING[kind] if kind else "the case does not say", "counts": counts}
-             for kind, counts in counted.by_evidence.items()]
-    return [*kinds, {"kind": "all", "meaning": "", "counts": counted}]
+    # That nothing is compared with experiments is worth a row, too.
+    kinds = {kind: Counts() for kind in EVIDENCE} | dict(counted.by_evidence)
+    return [*({"kind": kind or "not stated", "meaning": MEANING[kind] if kind else "the case does not say", "counts": counts}
+              for kind, counts in kinds.items()), {"kind": "all", "meaning": "", "counts": counted}]
 
 
 def context(rows: Sequence[Row], missing: Sequence[str]) -> Mapping[str, Any]:

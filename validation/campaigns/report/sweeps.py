@@ -130,15 +130,10 @@ class NumericalError:
 
 def numerical_errors(sweeps: Iterable[Sweep]) -> list[NumericalError]:
     """What the sweeps along the time step or the stiffness say, for every quantity that is checked or compared."""
-    result = []
-    for sweep in sweeps:
-        for parameter in (axis for axis in sweep.axes if axis in REFINEMENT and len(sweep.levels(axis)) > 1):
-            for one in sweep.quantities():
-                for engine in sweep.engines:
-                    for others, line in sweep.lines(parameter, engine, one.name):
-                        if len(line) > 1:
-                            result.append(_judged(sweep, engine, parameter, others, line))
-    return result
+    return [_judged(sweep, engine, parameter, others, line)
+            for sweep in sweeps for parameter in sweep.axes if parameter in REFINEMENT and len(sweep.levels(parameter)) > 1
+            for one in sweep.quantities() for engine in sweep.engines
+            for others, line in sweep.lines(parameter, engine, one.name) if len(line) > 1]
 
 
 def _judged(sweep: Sweep, engine: str, parameter: str, others: Mapping[str, Any],

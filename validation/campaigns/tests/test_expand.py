@@ -160,7 +160,7 @@ def test_only_what_is_chosen(tmp_path: Path) -> None:
     spec = spec_of(tmp_path, '[[sweeps]]\ncase = "box"\ngrid = { grain_count = [10, 20] }\n[resources.yade]\nthreads = 2\n')
     whole, chosen = expand.plan(file=spec.path), expand.plan(file=spec.path, engines=["yade"])
     assert {one.place.name for one in chosen.series} == {"yade"} and len(expand.plan(file=spec.path, cases=["box"]).series) == 4
-    assert {one.place.name: whole.of(one).threads for one in whole.series} == {"liggghts": 1, "yade": 2}
+    assert {one.place.name: whole.resources[one.place].threads for one in whole.series} == {"liggghts": 1, "yade": 2}
     assert [one.place.name for one in whole.series] == ["yade", "yade", "liggghts", "liggghts"]  # the longest first
     assert whole.facts["sweeps"][0]["axes"] == ["grain_count"] and whole.label == "boxes" and whole.whole and not chosen.whole
     with pytest.raises(DembarkError, match="did you mean box"):

@@ -12,15 +12,16 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
+from dembark.postproc import pictures
 from dembark.postproc.measurement import Value
+from dembark.postproc.pictures import saved
 from dembark.postproc.statistics import Estimate
-from dembark.validation import pictures, verification
+from dembark.validation import verification
 from dembark.validation.case.folders import discover
 from dembark.validation.case.model import Case, Declared
 from dembark.validation.judge import measuring, result
 from dembark.validation.judge.compare import compare
 from dembark.validation.judge.result import QuantityRecord, Result
-from dembark.validation.pictures import saved
 from dembark.validation.report.fields import FILE
 from dembark.validation.verification.item import Item
 
