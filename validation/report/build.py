@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -53,8 +53,9 @@ def write(gathered: Gathered, chapters: Any) -> Path:
         figure = scatter.figure(first["points"])
         ratio = figure and sections.embed(figure, drawn, "scatter", "", ["scatter.csv"])
         measured = [one for page in gathered.pages if not page.is_study for _, one in sorted(page.results.items())]
+        cited = {one["short"]: one for page in gathered.pages for found in page.results.values() for one in found.references}
         context = {**_EMPTY, **own, **first, "style": Markup((_HERE / "style.css").read_text(encoding="utf-8")),
-                   "scatter": ratio, "measured": measured, "references": _references(gathered), "machine": machine(measured),
+                   "scatter": ratio, "measured": measured, "references": list(cited.values()), "machine": machine(measured),
                    "description": gathered.summary.get("description", "")}
         template = _environment().get_template("report.html.j2")
         write_pdf(template.render(context, full=False), folder / "report.pdf")
@@ -90,10 +91,6 @@ def write_pdf(html: str, path: Path) -> None:
         print(f"dembark: no {path.name}, for Pango is missing ({reason}); report.html holds the same", file=sys.stderr)
         return
     write_whole(path, HTML(string=html, base_url=str(_HERE)).write_pdf())
-
-
-def _references(gathered: Gathered) -> Sequence[Mapping[str, Any]]:
-    return list({one["short"]: one for page in gathered.pages for found in page.results.values() for one in found.references}.values())
 
 
 def machine(measured: Iterable[Result]) -> list[tuple[str, str]]:

@@ -15,7 +15,7 @@ from dembark.validation.report import figures, scatter
 from dembark.validation.report.gather import Row
 
 # Lines of each list that the first pages of the PDF hold; what is left out is counted, and in the HTML.
-FAILED, OPEN, MISSING = 8, 14, 6
+MOST = {"failed": 8, "open": 14, "missing": 6}
 
 # What a failure says most about comes first.
 _WEIGHT = ("experiment", "theory", "identity", "", "code")
@@ -67,8 +67,7 @@ def context(rows: Sequence[Row], missing: Sequence[str]) -> Mapping[str, Any]:
     found = scatter.points(rows)
     failed = sorted((row for row in rows if row.record.standing == "failed"), key=lambda row: _WEIGHT.index(row.record.evidence))
     return {"tally": counted, "evidence": evidence(counted), "failed": failed,
-            "open": open_lines(rows), "missing": missing, "points": found, "scatter_lines": len(scatter.lines(found)),
-            "most": {"failed": FAILED, "open": OPEN, "missing": MISSING}}
+            "open": open_lines(rows), "missing": missing, "points": found, "scatter_lines": len(scatter.lines(found)), "most": MOST}
 
 
 def cells(one: QuantityRecord) -> list[Any]:
