@@ -13,6 +13,7 @@ from dembark.validation.case.expressions import Expression
 from dembark.validation.case.folders import package_root
 from dembark.validation.case.model import (
     EVIDENCE,
+    FIRST_ORDER,
     OUTPUTS,
     PROFILES,
     STANDARD_OUTPUTS,
@@ -23,7 +24,7 @@ from dembark.validation.case.model import (
     PlannedRun,
     Study,
 )
-from dembark.validation.case.tables import TableReader, Types, load_toml
+from dembark.validation.case.tables import ORDER, TableReader, Types, load_toml
 
 
 @cache
@@ -193,13 +194,15 @@ class CaseReader(TableReader):
     def study(self, name: str, entry: Any, parameters: Mapping[str, Parameter], variants: Mapping[str, Any]) -> Study:
         """[studies.NAME]: variants along a parameter."""
         table = f"studies.{name}"
-        self.table(entry, table, {"title": str, "description": str, "along": str, "variants": list}, ("title", "along", "variants"))
+        keys: dict[str, Types] = {"title": str, "description": str, "along": str, "variants": list, "formal_order": ORDER}
+        self.table(entry, table, keys, ("title", "along", "variants"))
         self.pick(entry["along"], parameters, "parameter", table)
         for variant in entry["variants"]:
             self.pick(variant, variants, "variant", table)
         if len(set(entry["variants"])) < max(3, len(entry["variants"])):
             raise self.fail(table, "a study needs at least three variants, each once")
-        return Study(name, entry["title"], entry.get("description", "").strip(), entry["along"], tuple(entry["variants"]))
+        return Study(name, entry["title"], entry.get("description", "").strip(), entry["along"], tuple(entry["variants"]),
+                     self.order(table, entry, parameters) or FIRST_ORDER)
 
     def constraint(self, text: str, message: Any, parameters: Mapping[str, Parameter]) -> Constraint:
         """An entry of [constraints]: the condition, and the sentence for whoever breaks it."""

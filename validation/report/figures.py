@@ -11,18 +11,20 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
+from dembark.postproc.pictures import saved
 from dembark.postproc.style import STYLE
 from dembark.validation import engines
 from dembark.validation.engines import EngineFacts
-from dembark.validation.pictures import saved
 from dembark.validation.verification.item import Item, Panel
 
 WIDE = 7.2  # inches
 INK = "#4a4f57"
 _DOTS = 220.0
+_SUBSCRIPT = re.compile(r"\b([σρμδλτuvKM])_([a-z]+)")
 DASHES = ((0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
 # Okabe & Ito's palette.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -67,7 +69,12 @@ def png(figure: Figure) -> bytes:
 
 def symbols(text: str) -> str:
     """Symbols like σ_zz with real subscripts, in figures."""
-    return re.sub(r"([σρμKv])_([a-z]+)", r"$\\mathrm{\1_{\2}}$", text)
+    return _SUBSCRIPT.sub(r"$\\mathrm{\1_{\2}}$", text)
+
+
+def subscripts(text: str) -> Markup:
+    """The same in HTML, and no break between a number and its per cent."""
+    return Markup(_SUBSCRIPT.sub(r"\1<sub>\2</sub>", str(escape(text))).replace(" %", "\N{NO-BREAK SPACE}%"))
 
 
 Curves = Mapping[str, Sequence[Mapping[str, Any]]]

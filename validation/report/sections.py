@@ -11,7 +11,7 @@ from typing import Any
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from dembark.validation import pictures
+from dembark.postproc import pictures
 from dembark.validation.judge.tally import Counts, tally
 from dembark.validation.report import fields, figures, front
 from dembark.validation.report.figures import engine_name
@@ -75,7 +75,7 @@ def embed(figure: Figure, folder: Path, name: str, caption: str, files: Sequence
     """The figure inside the document, in the PDF if `main`, and as a file `name`.svg beside its data."""
     data = figures.svg(figure)
     (folder / f"{name}.svg").write_bytes(data)
-    return Shown(_image(data, "svg+xml", name), caption, [f"figures/{file}" for file in files],
+    return Shown(_image(data, "svg+xml", name), caption[:1].upper() + caption[1:], [f"figures/{file}" for file in files],
                  _image(figures.png(figure), "png", name) if main else "")
 
 
@@ -185,7 +185,7 @@ def _profiles(page: Page, folder: Path) -> list[Shown]:
         chosen = names[start : start + PANELS]
         stem = f"{page.anchor}-profiles" + (f"-{start // PANELS + 1}" if start else "")
         found.append(embed(figures.profile_figure(curves, chosen), folder, stem,
-                           f"{page.name}: engines over the reference; bands over replicas where there are any.",
+                           f"{page.name}: engines over the reference; bands: 95 % intervals over replicas, where there are several.",
                            [f"{page.anchor}-{name}.csv" for name in chosen], main=not start))
     return found
 

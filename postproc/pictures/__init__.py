@@ -28,7 +28,7 @@ def draw(folder: Path, wanted: Mapping[str, Any] | None) -> list[str]:
     if not wanted:
         return []
     # Renderers take a second to import, which measurements without pictures need not wait for.
-    from dembark.validation.pictures import packings, sections
+    from dembark.postproc.pictures import packings, sections
 
     replica = next(iter(sorted(folder.glob("replica-*/grains.dump"))), None)
     if replica is None:

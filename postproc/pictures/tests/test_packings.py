@@ -10,7 +10,7 @@ from PIL import Image
 from dembark.common.errors import RunError
 from dembark.postproc import render
 from dembark.postproc.fields.coarse_graining import WallContacts
-from dembark.validation.pictures import packings, saved
+from dembark.postproc.pictures import packings, saved
 from dembark.validation.verification import scenes
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from dembark.validation.pictures import sections as cross_section
+from dembark.postproc.pictures import sections as cross_section
 
 HEAD = "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF {}\n{}\nITEM: BOX BOUNDS ff ff ff\n-1 1\n-1 1\n-1 1\nITEM: {} "
 GRAINS = "id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass\n"

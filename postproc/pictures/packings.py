@@ -11,9 +11,9 @@ from scipy.spatial import cKDTree
 
 from dembark.postproc import ContactFrame, ContactsDump, GrainFrame, GrainsDump, render
 from dembark.postproc.fields.coarse_graining import WallContacts, rows_of
+from dembark.postproc.pictures import saved
 from dembark.postproc.spheres import volume
 from dembark.postproc.walls import CylinderWall, PlaneWall, wall_contacts
-from dembark.validation.pictures import saved
 
 HEIGHT = 3.3  # inches
 

@@ -10,8 +10,8 @@ from dumps import grains_text
 from matplotlib.figure import Figure
 from PIL import Image
 
-from dembark.validation import pictures
-from dembark.validation.pictures import sections as cross_section
+from dembark.postproc import pictures
+from dembark.postproc.pictures import sections as cross_section
 
 
 @pytest.fixture

@@ -20,9 +20,9 @@ from PIL import Image, ImageDraw
 from dembark.common.files import read_json
 from dembark.postproc import GrainFrame, GrainsDump
 from dembark.postproc.dumptext import TextDump
+from dembark.postproc.pictures import saved
+from dembark.postproc.pictures.packings import HEIGHT
 from dembark.postproc.style import STYLE
-from dembark.validation.pictures import saved
-from dembark.validation.pictures.packings import HEIGHT
 
 _MAP = "cividis"
 _PIXELS = 300
