@@ -27,7 +27,6 @@ app = typer.Typer(name="dembark", help=_ABOUT,
 
 _SET = 'Change a key; repeat for more. A unit may follow: --set "grain_diameter=4 mm".'
 _OUT = "Folder for the results; default: results/<profile>/<case>/<variant>/<engine>; needed with --set."
-
 _INTERVAL = "Wall time between the states that an interrupted run goes on from: '10 min', or none; default: 10 min."
 
 Profile = Annotated[str, typer.Option(help="Size of the runs: quick, standard, full, ...")]

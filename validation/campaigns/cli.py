@@ -20,7 +20,6 @@ Jobs = Annotated[int | None, typer.Option(min=1, help="Jobs of a cluster at a ti
 Out = Annotated[Path | None, typer.Option(help="Folder of the campaign; default: results/campaigns/<name>.")]
 Dry = Annotated[bool, typer.Option("--dry-run", help="Only show the runs, what they cost and whether the file is right.")]
 
-
 app = typer.Typer()
 
 

@@ -114,14 +114,12 @@ def warnings(plan: Plan, found: Iterable[Estimate], results: Path, room: float) 
     return lines
 
 
-def rate_sources(found: Iterable[Estimate]) -> Mapping[str, list[str]]:
-    """Engines and cases by the source of their rate."""
-    sources: dict[str, list[str]] = {}
+def rate_sources(found: Iterable[Estimate]) -> Mapping[str, Iterable[str]]:
+    """Engines and cases by the source of their rate, each once."""
+    sources: dict[str, dict[str, None]] = {}
     for one in found:
         run = one.series.runs[0]
-        word = f"{run.case.name} in {run.engine.name} {one.rate.value:.2g}"
-        if word not in sources.setdefault(one.rate.source, []):
-            sources[one.rate.source].append(word)
+        sources.setdefault(one.rate.source, {})[f"{run.case.name} in {run.engine.name} {one.rate.value:.2g}"] = None
     return sources
 
 

@@ -94,7 +94,7 @@ def profile_figure(profiles: Curves, names: Sequence[str], columns: int = 2) -> 
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, tall))
         # Fixed margins: long titles must not make the panels narrow.
-        figure.subplots_adjust(left=0.075, right=0.99, bottom=0.66 / tall, top=1.0 - 0.32 / tall, wspace=0.2, hspace=0.62)
+        figure.subplots_adjust(left=0.09, right=0.99, bottom=0.66 / tall, top=1.0 - 0.32 / tall, wspace=0.25, hspace=0.62)
         handles: dict[str, Any] = {}
         for number, name in enumerate(names):
             axes = figure.add_subplot(rows, columns, number + 1)

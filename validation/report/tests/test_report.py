@@ -188,6 +188,13 @@ def test_deviations_are_no_percentages_near_a_reference_of_zero(changes, text):
     assert numbers.deviation(row(3, **changes).record) == text
 
 
+def test_variants_come_as_the_case_lists_them(tmp_path):
+    for variant in ("theta_half", "damped", "a_point=2", "equal", "study-first_order"):
+        (tmp_path / "log_pair" / variant / "yade").mkdir(parents=True)
+        result.write(tmp_path / "log_pair" / variant / "yade/metrics.json", result.Result("log_pair", variant, "yade", ()))
+    assert [page.variant for page in gather(tmp_path).pages] == ["equal", "theta_half", "damped", "a_point=2", "study-first_order"]
+
+
 def test_profiles_with_a_reference_come_first():
     profiles = {"yade": [{"name": "a"}, {"name": "b", "reference": [1.0]}, {"name": "c"}]}
     assert figures.profile_names(profiles) == ["b", "a", "c"]
