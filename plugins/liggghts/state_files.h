@@ -6,35 +6,28 @@
 #define DEMBARK_STATE_FILES_H
 
 #include <string>
-#include <vector>
 
 namespace dembark_liggghts {
 
-/// Steps of the states `base`.<step>.restart that are whole, the newest first.
-std::vector<long long> whole_states(const std::string& base);
+struct State {
+  long long step = -1;  ///< -1: there is none
+  int grid[3] = {0, 0, 0};
+};
 
 std::string state_name(const std::string& base, long long step);
 
-/// The grid of processors of the run that wrote a state; false when the state has no mark.
-bool processor_grid(const std::string& state, int (&grid)[3]);
+/// The newest state that is whole.
+State newest_state(const std::string& base);
 
-/// Make the finished file `part` to the state of `step`, mark it, and delete all but the last two. What went wrong, or nothing.
-std::string keep_state(const std::string& part, const std::string& base, long long step, const int (&grid)[3]);
+/// Delete all states, whole or not, but the newest `kept`.
+void delete_states(const std::string& base, std::size_t kept);
 
-/// Delete the states that are not whole.
-void delete_broken_states(const std::string& base);
+/// Make the finished file `part` to a state, mark it, and delete all but the last two. Throws std::runtime_error with one line.
+void keep_state(const std::string& part, const std::string& base, const State& state);
 
-/// The state that this process reads, for the fixes that are made afterwards; `state_that_was_read` is the one of `step` at `base` when
-/// none was named.
-void name_state_that_is_read(const std::string& path);
-std::string state_that_was_read(const std::string& base, long long step);
-
-/// The line about a file that ends too early.
-std::string not_whole(const std::string& path);
-
-/// Cut `path` after the last frame (of a dump) or row (of a table that begins with the step) at or before `step`. What went wrong, or
-/// nothing. A file that does not exist is left alone.
-std::string cut_output(const std::string& path, long long step);
+/// Cut `path` after the last frame (of a dump) or row (of a table that begins with the step) at or before `step`. A file that does not
+/// exist is left alone. Throws std::runtime_error with one line.
+void cut_output(const std::string& path, long long step);
 
 /// Flush what `path` holds to the disk.
 void sync_file(const std::string& path);
