@@ -54,7 +54,7 @@ for file in "$here"/plugins/liggghts/fix_energy_account*; do
   copy "$file" "$src/$(basename "$file")"
 done
 # States to resume from.
-for file in "$here"/plugins/liggghts/{fix_resume_exact,state_files}.{h,cpp}; do
+for file in "$here"/plugins/liggghts/{fix_resume_exact*,state_files.h}; do
   copy "$file" "$src/$(basename "$file")"
 done
 # The fix for impacts of logs solves its equations with Eigen, a library of headers; without it LIGGGHTS would not compile any more.

@@ -16,51 +16,35 @@
 
 namespace dembark_liggghts {
 
-class EnergyTally {
- public:
-  typedef dembark::Vec3<double> Vec3;
-  typedef LIGGGHTS::ContactModels::SurfacesCloseData Contact;
-  struct Load {
-    Vec3 force, torque;
-  };
-  typedef std::array<Load, dembark::contact_part_count> Loads;
-
+struct EnergyTally {
+  std::vector<std::array<dembark::Dofs, dembark::contact_part_count>> loads;  ///< on each grain
   std::array<double, dembark::contact_part_count> wall_power{};  ///< W, of each part on the grains, were they moved as the wall is
   double normal_stored = 0.0, tangential_stored = 0.0;           ///< J
 
   /// Begins anew for the forces of a moment, with this many owned grains.
   void clear(int grains) {
-    loads_.assign(std::size_t(grains), {});
-    wall_power.fill(0.0);
+    loads.assign(std::size_t(grains), {});
+    wall_power = {};
     normal_stored = tangential_stored = 0.0;
   }
 
-  std::size_t size() const { return loads_.size(); }
-  const Loads& of(int i) const { return loads_[std::size_t(i)]; }
-
   /// The parts of a contact's force, and what its springs hold; `motion` has the lever arms. Of a pair that two ranks
   /// compute each tallies half of the latter. Forces that move no grain are not tallied.
-  DEMBARK_COLD void add(const Contact& d, const Vec3& normal, const dembark::ContactParts& parts, const dembark::RelativeMotion& motion) {
+  DEMBARK_COLD void add(const LIGGGHTS::ContactModels::SurfacesCloseData& d, const dembark::Vec3<double>& normal,
+                        const dembark::ContactParts& parts, const dembark::RelativeMotion& motion) {
     if (!d.computeflag) return;
-    const bool owned = !d.is_wall && std::size_t(d.j) < loads_.size();
+    const dembark::ContactLevers levers(normal, motion);
+    const bool owned = !d.is_wall && std::size_t(d.j) < loads.size();
     const double scale = d.is_wall ? d.area_ratio : 1.0, stored = d.is_wall || owned ? scale : 0.5;
     for (std::size_t p = 0; p < dembark::contact_part_count; ++p) {
-      const Vec3 &force = parts.force[p], moment = cross(normal, force);
-      Load& on_i = loads_[std::size_t(d.i)][p];
-      on_i.force += scale * force;
-      on_i.torque -= (scale * motion.arm_1) * moment;
-      if (d.is_wall) wall_power[p] += scale * dot(force, {d.v_j[0], d.v_j[1], d.v_j[2]});
-      if (!owned) continue;
-      Load& on_j = loads_[std::size_t(d.j)][p];
-      on_j.force -= force;
-      on_j.torque -= motion.arm_2 * moment;
+      const dembark::Vec3<double> force = scale * parts.force[p];
+      dembark::add(loads[std::size_t(d.i)][p], levers.on_one(force));
+      if (owned) dembark::add(loads[std::size_t(d.j)][p], levers.on_two(force));
+      if (d.is_wall) wall_power[p] += dot(force, {d.v_j[0], d.v_j[1], d.v_j[2]});
     }
     normal_stored += stored * parts.normal_stored;
     tangential_stored += stored * parts.tangential_stored;
   }
-
- private:
-  std::vector<Loads> loads_;
 };
 
 constexpr const char* energy_tally_name = "energy tally";

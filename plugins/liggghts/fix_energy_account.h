@@ -50,7 +50,7 @@ class FixEnergyAccount : public Fix {
   double kinetic() const;
   void note_changes();
   void measure_powers();
-  void take_setup(dembark::EnergyLedger &ledger, bool &begun) const;
+  dembark::EnergyLedger with_setup() const;
   void impose(double change, double of, double &sum) const;
 
   dembark_liggghts::EnergyTally tally_;

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cstring>
 #include <type_traits>
+#include <typeinfo>
 
 #include <core/InteractionLoop.hpp>
 #include <core/Omega.hpp>
 #include <core/Scene.hpp>
 #include <pkg/dem/NewtonIntegrator.hpp>
 
+#include "ContactView.hpp"
+#include "FinnieRabinowicz.hpp"
 #include "report.hpp"
 
 namespace yade {
@@ -179,14 +182,80 @@ bool EnergyAccount::recordBodies(const NewtonIntegrator& newton, bool first) {
 	return any;
 }
 
+/// Takes up an interaction after its law has run.
+void EnergyAccount::recordContact(Contact& c, const Interaction& interaction) const {
+	c.acting = false;
+	if (!interaction.isReal()) return;
+	const Body::id_t id1 = interaction.getId1(), id2 = interaction.getId2();
+	const IPhys&     data = *interaction.phys;
+	if (typeid(data) != typeid(FinnieRabinowiczPhys))
+		fail("EnergyAccount: bodies " + std::to_string(id1) + " and " + std::to_string(id2) + " interact by " +
+		     data.getClassName() +
+		     ", whose energies it does not know; all contacts must be of "
+		     "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz");
+	const auto& phys  = static_cast<const FinnieRabinowiczPhys&>(data);
+	const Body &body1 = *Body::byId(id1, scene), &body2 = *Body::byId(id2, scene);
+	// Without a law that has seen it, or between two held bodies, a contact has no force.
+	if (phys.preparedBy < 0 || !((phys.wallBody != 1 && body1.isDynamic()) || (phys.wallBody != 2 && body2.isDynamic()))) return;
+
+	Vector3r shift = Vector3r::Zero();
+	if (scene->isPeriodic) shift = scene->cell->intrShiftPos(interaction.cellDist);
+	dembark_yade::ContactView view(phys.wallBody, *static_cast<const ScGeom*>(interaction.geom.get()), body1, body2, shift);
+	view.move(body1.state->vel, body1.state->angVel, body2.state->vel, body2.state->angVel);
+	const auto                      on1      = [&](const Vector3r& force) { return vec(Vector3r(view.sign() * force)); };
+	const ::dembark::Vec3<Real>     along    = on1(phys.normalForce);
+	const ::dembark::ContactBodies& bodies   = view.bodies;
+	const Real                      distance = norm(bodies.separation);
+	::dembark::ContactForce         force;
+	force.overlap            = bodies.radius_1 + (phys.wallBody ? 0.0 : bodies.radius_2) - distance;
+	force.normal             = distance > 0.0 ? bodies.separation * (1.0 / distance) : ::dembark::Vec3<Real>{0.0, 0.0, 1.0};
+	force.capillary_force    = phys.capillaryForce;
+	force.viscous_normal     = phys.viscousForce;
+	force.viscous_tangential = on1(phys.viscousShearForce);
+	force.normal_force       = dot(along, force.normal) + force.capillary_force - force.viscous_normal;
+	force.tangential         = on1(phys.shearForce) - force.viscous_tangential;
+
+	const auto motion = ::dembark::relative_motion(bodies, force.normal, force.overlap);
+	c.acting          = true;
+	c.one             = view.swapped() ? id2 : id1;
+	c.two             = view.swapped() ? id1 : id2;
+	c.parts           = ::dembark::contact_parts(phys.contact, bodies, force, vec(phys.elasticDisplacement));
+	c.levers          = {force.normal, motion};
+	if (phys.wallBody) c.levers.two = vec(view.surface);
+	c.half = 0.5 * scene->dt * dot(c.parts[::dembark::ContactPart::normal_elastic], force.normal) * motion.normal_velocity;
+}
+
 /// Takes up the state before the step: the forces are known, the velocities are still those of half a step ago.
 void EnergyAccount::record(const NewtonIntegrator& newton, bool first) {
 	scene->forces.sync();
 	const bool any = recordBodies(newton, first);
-	if (any) ledger.first_stored += contacts.unexplained(changed, false);
-	const auto stored = contacts.record(*scene, ompThreads);
-	if (any) ledger.first_stored += contacts.unexplained(changed, true);
-	ledger.set_stored(stored.normal, stored.tangential, stored.half);
+	// What the springs of bodies hold that go or come is no work of theirs.
+	if (any)
+		for (const Contact& c : contacts)
+			if (changes(c)) ledger.first_stored += c.work - c.half - c.parts.normal_stored;
+
+	auto& interactions = *scene->interactions;
+	contacts.resize(interactions.size());
+#ifdef YADE_OPENMP
+#pragma omp parallel for schedule(static) num_threads(ompThreads > 0 ? std::min(ompThreads, omp_get_max_threads()) : omp_get_max_threads())
+#endif
+	for (std::size_t i = 0; i < contacts.size(); ++i) {
+		try {
+			recordContact(contacts[i], *interactions[i]);
+		} catch (const std::exception& error) {
+			dembark_yade::postpone(*scene, error);
+		}
+	}
+
+	Real normal = 0.0, tangential = 0.0, ahead = 0.0;
+	for (const Contact& c : contacts) {
+		if (!c.acting) continue;
+		normal += c.parts.normal_stored;
+		tangential += c.parts.tangential_stored;
+		ahead += c.half;
+		if (any && changes(c)) ledger.first_stored += c.parts.normal_stored + c.half;
+	}
+	ledger.set_stored(normal, tangential, ahead);
 }
 
 /// The recorded step is over: its works, by the mean velocities. Those of a body that was erased since are what the forces make.
@@ -201,40 +270,30 @@ void EnergyAccount::tally(const Scene& after) {
 		known[k] = ledger.arrive(body, length, now == present[k] ? dofs(now->state->vel, now->state->angVel) : body.kicked(length));
 		ledger.now.add_body(body);
 	}
-	ledger.now.add(contacts.powers(bodies, length, ompThreads));
+	for (Contact& c : contacts)
+		if (c.acting) c.work = length * ledger.now.add_contact(c.parts, c.levers, bodies[c.one], bodies[c.two]);
 	ledger.kick(length, 0);
 	pending = false;
 	step    = recorded;
 }
 
 Real EnergyAccount::get(const std::string& name) {
-	update();
-	const auto found = std::find(energy_names.begin(), energy_names.end(), name);
-	if (found == energy_names.end()) {
+	if (std::find(energy_names.begin(), energy_names.end(), name) == energy_names.end()) {
 		std::string all;
 		for (const char* each : energy_names) all += (all.empty() ? "" : ", ") + std::string(each);
 		PyErr_SetString(PyExc_KeyError, ("dembark: EnergyAccount has no energy '" + name + "'; it has " + all).c_str());
 		boost::python::throw_error_already_set();
 	}
-	const std::lock_guard<std::mutex> lock(guard);
-	return ledger.energies()[found - energy_names.begin()];
+	return boost::python::extract<Real>(energies()[name]);
 }
 
-boost::python::list EnergyAccount::keys() const {
-	boost::python::list all;
-	for (const char* name : energy_names) all.append(name);
-	return all;
-}
-
-boost::python::list EnergyAccount::items() {
+boost::python::dict EnergyAccount::energies() {
 	update();
 	const std::lock_guard<std::mutex> lock(guard);
-	const ::dembark::Energies         energies = ledger.energies();
-	boost::python::list               all;
-	for (std::size_t k = 0; k < energies.size(); ++k) all.append(boost::python::make_tuple(energy_names[k], energies[k]));
+	const ::dembark::Energies         values = ledger.energies();
+	boost::python::dict               all;
+	for (std::size_t k = 0; k < values.size(); ++k) all[energy_names[k]] = values[k];
 	return all;
 }
-
-boost::python::dict EnergyAccount::energies() { return boost::python::dict(items()); }
 
 }  // namespace yade

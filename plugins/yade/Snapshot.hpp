@@ -9,11 +9,9 @@ namespace yade {
 class DembarkSnapshot : public Serializable {
 public:
 	virtual ~DembarkSnapshot() = default;
-	std::string           grainRows() const;
-	std::string           contactRows() const;
-	std::vector<Vector3r> wallForces() const;
-	Real                  kineticEnergy() const;
-	long                  grainCount() const;
+	std::string grainRows() const;
+	std::string contactRows() const;
+	Real        kineticEnergy() const;
 	// clang-format off
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(DembarkSnapshot,Serializable,"Rows for dump files, and sums, of the present scene. To be used between :yref:`InteractionLoop` and :yref:`NewtonIntegrator`: positions and forces are then of one time, and velocities, which YADE keeps half a step earlier, are moved on by v + dt/2 a to the same.",
 		((vector<int>,types,,,"For each body its type in the dump, 1 = moving grain, 0 = not in the dump"))
@@ -27,13 +25,12 @@ public:
 		, /*py*/
 		.def("grainRows",&DembarkSnapshot::grainRows,"Lines 'id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass' and three forces for each wall.")
 		.def("contactRows",&DembarkSnapshot::contactRows,"Lines 'x1 y1 z1 x2 y2 z2 id1 id2 periodic fx fy fz' of all contacts and bridges between bodies of the dump.")
-		.def("wallForces",&DembarkSnapshot::wallForces,"Force [N] of each wall on the grains.")
 		.def("kineticEnergy",&DembarkSnapshot::kineticEnergy,"Translational kinetic energy [J] of the grains (type 1).")
-		.def("grainCount",&DembarkSnapshot::grainCount,"Number of rows of grainRows().")
 	);
 	// clang-format on
 private:
 	Vector3i image(const Vector3r& position) const;
+	Vector3r wrapped(const Vector3r& position) const { return position - image(position).cast<Real>().cwiseProduct(high - low); }
 };
 REGISTER_SERIALIZABLE(DembarkSnapshot);
 
