@@ -112,18 +112,13 @@ void FixEnergyAccount::check_motion() {
                                 .c_str());
 }
 
-void *FixEnergyAccount::extract(const char *name, int &) {
-  return std::strcmp(name, dembark_liggghts::energy_tally_name) == 0 ? &tally_ : nullptr;
-}
-
 /// Driven grains are to the others what walls are.
 inline dembark::BodyMotion FixEnergyAccount::motion(int i) const {
   // Moment of inertia as in fix nve/sphere.
   const double mass = atom->rmass[i], inertia = (domain->dimension == 2 ? 0.5 : 0.4) * mass * atom->radius[i] * atom->radius[i];
   dembark::BodyMotion grain;
-  grain.mass = {mass, mass, mass, inertia, inertia, inertia};
+  if ((atom->mask[i] & moving_) && !(atom->mask[i] & frozen_)) grain.mass = {mass, mass, mass, inertia, inertia, inertia};
   grain.velocity = dofs(atom->v[i], atom->omega[i]);
-  grain.blocked = (atom->mask[i] & moving_) && !(atom->mask[i] & frozen_) ? 0 : EnergyBody::all_blocked;
   return grain;
 }
 
@@ -146,7 +141,7 @@ double FixEnergyAccount::kinetic() const {
 
 /// Powers of all forces as they are, with the velocities as they are.
 void FixEnergyAccount::measure_powers() {
-  if (tally_.loads.size() != std::size_t(atom->nlocal))
+  if (tally.loads.size() != std::size_t(atom->nlocal))
     error->one(FLERR, "Fix energy/account: atoms came or went between the forces and the end of a step");
   now_.now = Powers();
   accelerations_.resize(gravities_.size());
@@ -154,11 +149,11 @@ void FixEnergyAccount::measure_powers() {
   for (int i = 0; i < atom->nlocal; ++i) {
     const EnergyBody grain = body(i);
     now_.now.add_body(grain);
-    now_.now.add_loads(grain, tally_.loads[std::size_t(i)]);
+    now_.now.add_loads(grain, tally.loads[std::size_t(i)]);
   }
   for (std::size_t part = 0; part < dembark::contact_part_count; ++part) {
-    now_.now.power[part] -= tally_.wall_power[part];
-    now_.now.power[Powers::walls] += tally_.wall_power[part];
+    now_.now.power[part] -= tally.wall_power[part];
+    now_.now.power[Powers::walls] += tally.wall_power[part];
   }
 }
 
@@ -174,7 +169,7 @@ void FixEnergyAccount::impose(double change, double of, double &sum) const {
 EnergyLedger FixEnergyAccount::with_setup() const {
   EnergyLedger ledger = now_;
   ledger.kinetic = kinetic();
-  ledger.set_stored(tally_.normal_stored, tally_.tangential_stored);
+  ledger.set_stored(tally.normal_stored, tally.tangential_stored);
   if (begun_) {
     impose(ledger.kinetic - now_.kinetic, ledger.kinetic + now_.kinetic, ledger.imposed);
     impose(ledger.normal_stored - now_.normal_stored, ledger.normal_stored + now_.normal_stored, ledger.first_stored);
@@ -186,7 +181,7 @@ EnergyLedger FixEnergyAccount::with_setup() const {
 }
 
 void FixEnergyAccount::setup_pre_force(int) {
-  tally_.clear(atom->nlocal);
+  tally.clear(atom->nlocal);
   fresh_ = true;
 }
 
@@ -224,7 +219,7 @@ void FixEnergyAccount::pre_force(int) {
     const double kinetic_now = kinetic();
     impose(kinetic_now - kinetic_before_, kinetic_now + kinetic_before_, now_.imposed);
   }
-  tally_.clear(atom->nlocal);
+  tally.clear(atom->nlocal);
 }
 
 /// The grains have got their velocities: init() has seen to the order.
@@ -236,7 +231,7 @@ void FixEnergyAccount::final_integrate() {
 
 void FixEnergyAccount::end_of_step() {
   note_changes();
-  now_.set_stored(tally_.normal_stored, tally_.tangential_stored);
+  now_.set_stored(tally.normal_stored, tally.tangential_stored);
   shown_ = now_;
 }
 
@@ -279,4 +274,4 @@ void FixEnergyAccount::restart(char *buffer) {
   shown_ = now_;
 }
 
-double FixEnergyAccount::memory_usage() { return double(tally_.loads.size() * sizeof tally_.loads[0]); }
+double FixEnergyAccount::memory_usage() { return double(tally.loads.size() * sizeof tally.loads[0]); }

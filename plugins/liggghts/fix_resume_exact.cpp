@@ -123,7 +123,7 @@ void visit(Stream stream, Atom *atom, Force *force, Modify *modify) {
       if (any) {
         stream.integer(flag);
         stream.numbers(history, width);
-      } else {
+      } else if (stream.loading) {
         flag = 0;
         std::fill_n(history, width, 0.0);
       }

@@ -20,21 +20,23 @@ namespace dembark {
 
 /// How a body moves.
 struct BodyMotion {
-  Dofs mass{}, velocity{};
-  unsigned blocked = 0;  ///< bit k: forces do not change degree of freedom k; there the body is a wall to the others
-  static constexpr unsigned all_blocked = 63;
+  Dofs mass{};  ///< 0 where forces do not change the velocity; there the body is a wall to the others
+  Dofs velocity{};
 
-  bool is_free(std::size_t k) const { return !(blocked >> k & 1u); }
-  DEMBARK_HOT Dofs free_part(Dofs of, bool free = true) const {
-    if (blocked == (free ? 0 : all_blocked)) return of;
+  DEMBARK_HOT bool is_free(std::size_t k) const { return mass[k] > 0.0; }
+  /// Of one of these, what belongs to the degrees of freedom that forces change, or to the others.
+  DEMBARK_HOT Dofs part(Dofs of, bool free) const {
     for (std::size_t k = 0; k < of.size(); ++k)
       if (is_free(k) != free) of[k] = 0.0;
     return of;
   }
+  DEMBARK_HOT Dofs accelerated(Dofs by) const {
+    for (std::size_t k = 0; k < by.size(); ++k) by[k] = is_free(k) ? by[k] / mass[k] : 0.0;
+    return by;
+  }
   /// J, of the degrees of freedom that forces change.
   DEMBARK_HOT double kinetic() const { return kinetic(velocity); }
-  DEMBARK_HOT double kinetic(const Dofs& at) const {
-    const Dofs v = free_part(at);
+  DEMBARK_HOT double kinetic(const Dofs& v) const {
     return 0.5 * dot({mass[0] * v[0], mass[1] * v[1], mass[2] * v[2], mass[3] * v[3], mass[4] * v[4], mass[5] * v[5]}, v);
   }
 };
@@ -45,18 +47,12 @@ struct EnergyBody : BodyMotion {
   Dofs weight{}, damping{};  ///< what gravity and numerical damping have in that
   Dofs acceleration{};
 
-  /// After mass and degrees of freedom.
+  /// After the masses.
   DEMBARK_HOT void set_forces(const Dofs& all, const Dofs& of_gravity, const Dofs& of_damping = {}) {
     force = all;
     weight = of_gravity;
     damping = of_damping;
-    acceleration = accelerated(*this, all);
-  }
-  DEMBARK_HOT static Dofs accelerated(const BodyMotion& body, const Dofs& by) {
-    Dofs a = body.free_part(by);
-    for (std::size_t k = 0; k < a.size(); ++k)
-      if (body.is_free(k)) a[k] /= body.mass[k];
-    return a;
+    acceleration = accelerated(all);
   }
   /// Velocity after a kick of duration h.
   DEMBARK_HOT Dofs kicked(double h) const {
@@ -72,30 +68,23 @@ struct Powers {
   typedef std::array<double, count> Each;
   Each power{}, rate{};
 
-  void add(const Powers& other) {
-    for (std::size_t k = 0; k < count; ++k) {
-      power[k] += other.power[k];
-      rate[k] += other.rate[k];
-    }
-  }
   /// Gravity, numerical damping, and all forces together.
   DEMBARK_HOT void add_body(const EnergyBody& body) {
-    if (body.blocked == EnergyBody::all_blocked) return;
-    const Dofs v = body.free_part(body.velocity);
+    const Dofs v = body.part(body.velocity, true);
     add(gravity, body.weight, v, body.acceleration);
     add(damping, body.damping, v, body.acceleration);
     add(all, body.force, v, body.acceleration);
   }
   /// The last of these alone.
   DEMBARK_HOT void add_forces(const BodyMotion& body, const Dofs& force) {
-    if (body.blocked == EnergyBody::all_blocked) return;
-    add(all, force, body.free_part(body.velocity), EnergyBody::accelerated(body, force));
+    add(all, force, body.part(body.velocity, true), body.accelerated(force));
   }
   /// For engines that add up the parts of contacts' forces body by body.
   DEMBARK_HOT void add_loads(const EnergyBody& body, const std::array<Dofs, contact_part_count>& loads) {
+    const Dofs held = body.part(body.velocity, false);
     for (std::size_t part = 0; part < contact_part_count; ++part) {
       add(part, loads[part], body.velocity, body.acceleration);
-      add_held(body, loads[part]);
+      power[walls] -= dot(loads[part], held);
     }
   }
   /// For engines that know the mean motions of the bodies when they look at a contact. Returns the power (W) of the normal spring.
@@ -111,9 +100,7 @@ struct Powers {
     return dot(parts[ContactPart::normal_elastic], velocity);
   }
   /// What acts on a body as far as that is held: it gives the others what it takes.
-  DEMBARK_HOT void add_held(const BodyMotion& body, const Dofs& load) {
-    if (body.blocked) power[walls] -= dot(load, body.free_part(body.velocity, false));
-  }
+  DEMBARK_HOT void add_held(const BodyMotion& body, const Dofs& load) { power[walls] -= dot(load, body.part(body.velocity, false)); }
 
  private:
   DEMBARK_HOT void add(std::size_t of, const Dofs& force, const Dofs& velocity, const Dofs& acceleration) {
@@ -159,7 +146,7 @@ struct EnergyLedger {
     bool set = false;
     for (std::size_t k = 0; k < after.size(); ++k) {
       const double momentum = body.mass[k] * std::abs(body.velocity[k]) + duration * (std::abs(body.force[k]) + std::abs(body.weight[k]));
-      if (body.mass[k] * std::abs(after[k] - expected[k]) <= round_off * momentum || !body.is_free(k)) continue;
+      if (body.mass[k] * std::abs(after[k] - expected[k]) <= round_off * momentum) continue;
       by_forces[k] = expected[k];
       set = true;
     }

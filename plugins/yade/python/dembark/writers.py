@@ -42,7 +42,7 @@ class _Snapshot:
 
     def forces(self):
         """Force (N) of each wall, with its glued grains, on the grains."""
-        return [-sum((O.forces.f(body) for body in (*ids, *self.glued.get(name, ()))), Vector3.Zero) for name, ids in self.walls.items()]
+        return [sum((-O.forces.f(body) for body in (*ids, *self.glued.get(name, ()))), Vector3.Zero) for name, ids in self.walls.items()]
 
 
 class DumpWriter:
