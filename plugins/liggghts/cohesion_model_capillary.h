@@ -29,7 +29,7 @@ COHESION_MODEL(COHESION_CAPILLARY,capillary,20)
 #include "dembark/contact_energy.hpp"
 #include "bridge_reach.h"
 #include "contact_data.h"
-#include "energy_tally.h"
+#include "fix_energy_account.h"
 #include "fix_capillary_liquid.h"
 #include "model_properties.h"
 #include "settings_choice.h"

@@ -24,7 +24,7 @@
 #include "dembark/contact.hpp"
 #include "bridge_reach.h"
 #include "contact_data.h"
-#include "energy_tally.h"
+#include "fix_energy_account.h"
 #include "model_properties.h"
 #include "pair_packs.h"
 

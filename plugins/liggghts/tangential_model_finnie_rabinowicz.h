@@ -22,7 +22,7 @@ TANGENTIAL_MODEL(TANGENTIAL_FINNIE_RABINOWICZ,finnie_rabinowicz,20)
 #include "dembark/contact.hpp"
 #include "dembark/contact_energy.hpp"
 #include "contact_data.h"
-#include "energy_tally.h"
+#include "fix_energy_account.h"
 #include "model_properties.h"
 #include "settings_choice.h"
 

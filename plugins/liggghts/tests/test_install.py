@@ -40,8 +40,8 @@ def test_copies_once(tmp_path):
     assert install(source).returncode == 0
     assert {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in source.rglob("*") if path.is_file()} == before
     for name in ("tangential_model_finnie_rabinowicz.h", "cohesion_model_capillary.h", "fix_lcp_impact.cpp", "fix_resume_exact.cpp",
-                 "resume_state.h",
-                 "fix_energy_account.cpp", "energy_tally.h"):
+                 "state_files.h",
+                 "fix_energy_account.cpp", "fix_energy_account.h"):
         assert (source / name).read_bytes() == (ROOT / "plugins/liggghts" / name).read_bytes()
     assert (source / "dembark/capillary/bridge.hpp").exists() and not (source / "dembark/tests").exists()
     lines = (source / "style_contact_model_user.whitelist").read_text().splitlines()
