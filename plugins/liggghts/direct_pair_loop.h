@@ -48,7 +48,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   dembark::capillary::Model model_ = dembark::capillary::Model::exact;
   PairPacks* const packs_ = choose_pair_packs();
   const std::unique_ptr<PairBlock> block_ = std::make_unique<PairBlock>();
-  std::vector<PairLaw> laws_;  // of this step
+  std::vector<PairLaw<double>> laws_;  // of this step
 
   bool plain_step(LAMMPS_NS::PairGran* pair, int eflag, int vflag, int addflag) const {
     const LAMMPS_NS::Atom* atom = lmp_->atom;
@@ -112,7 +112,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
       const std::string word = words[k], value = words[k + 1];
       if (word == "limitForce") limit_force_ = value == "on";
       else if (word == "tangential_damping") tangential_damping_ = value == "on";
-      else if (word == "presliding") presliding_ = value == "linear" ? dembark::Presliding::linear : dembark::Presliding::exponential;
+      else if (word == "presliding") dembark::option_from_name(dembark::presliding_names(), value, presliding_);
       else if (word == "capillary_model") dembark::capillary::model_from_name(words[k + 1], model_);
       else if (value != "off") plain_settings_ = false;
     }

@@ -5,7 +5,9 @@
 #define DEMBARK_PAIR_PACKS_H
 
 #include <cmath>
+#include <string>
 #include <type_traits>
+#include <vector>
 
 #include "atom.h"
 #include "contact_model_constants.h"
@@ -29,10 +31,11 @@ struct Vec3;
 namespace dembark_liggghts {
 
 /// What the laws take of a pair of types; eight numbers, read as two rows of four.
+template <class Real>
 struct PairLaw {
-  double effective_youngs_modulus, effective_shear_modulus, damping;
-  double static_friction, kinetic_friction, interface_shear_strength, kept_slip;
-  double unused;
+  Real effective_youngs_modulus, effective_shear_modulus, damping;
+  Real static_friction, kinetic_friction, interface_shear_strength, kept_slip;
+  Real unused;
 };
 
 /// The pairs in work: those that touch, and those with a contact or a bridge stored, to hold or to end it.
@@ -57,10 +60,10 @@ struct PairStep {
   LAMMPS_NS::Atom& atom;
   LAMMPS_NS::PairGran& pair;
   ScalarLaws& scalar;
-  const PairLaw* laws;  // one a pair of types, row by row
-  int types;            // in a row; with 2, only the pair 1-1 is there
-  int owned;            // grains from here on get no forces
-  int offset;           // of friction in a history
+  const PairLaw<double>* laws;  // one a pair of types, row by row
+  int types;                    // in a row; with 2, only the pair 1-1 is there
+  int owned;                    // grains from here on get no forces
+  int offset;                   // of friction in a history
   double dt;
   bool wet, limit_force, tangential_damping;
   bool pack_friction;  // false leaves all friction to the scalar law

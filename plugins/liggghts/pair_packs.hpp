@@ -11,15 +11,10 @@
 namespace dembark_liggghts {
 
 template <class P>
-struct LawPack {
-  P effective_youngs_modulus, effective_shear_modulus, damping, static_friction, kinetic_friction, interface_shear_strength, kept_slip;
-};
-
-template <class P>
-DEMBARK_HOT LawPack<P> laws_of_kinds(const PairLaw* laws, const int* kind) {
+DEMBARK_HOT PairLaw<P> laws_of_kinds(const PairLaw<double>* laws, const int* kind) {
   const Quad<P> a = rows<P, 4>([=](int k) { return &laws[kind[k]].effective_youngs_modulus; });
   const Quad<P> b = rows<P, 4>([=](int k) { return &laws[kind[k]].kinetic_friction; });
-  return {a.x, a.y, a.z, a.w, b.x, b.y, b.z};
+  return {a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w};
 }
 
 constexpr int touching_flags = LIGGGHTS::ContactModels::CONTACT_NORMAL_MODEL | LIGGGHTS::ContactModels::CONTACT_TANGENTIAL_MODEL;
@@ -141,7 +136,7 @@ DEMBARK_HOT void scatter(const PairStep& s, const int* grain, const int* partner
 template <class P>
 inline void compute(const PairStep& s, PairBlock& b, int found) {
   constexpr int N = P::size;
-  LawPack<P> law = laws_of_kinds<P>(s.laws, b.kind);
+  PairLaw<P> law = laws_of_kinds<P>(s.laws, b.kind);
   for (int first = 0; first < found; first += N) {
     const int *i = b.grain + first, *j = b.partner + first, count = found - first < N ? found - first : N;
     const unsigned there = (1u << count) - 1;
@@ -165,7 +160,7 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
     const dembark::SurfaceMotion<P> motion =
         dembark::surface_motion<P>(normal, rows3<P>(s.v, i) - rows3<P>(s.v, j), radius_i - half, omega_i, radius_j - half, omega_j);
     dembark::NormalResponse<P> response =
-        adjusted(dembark::hertz<LawPack<P>, P>(law, radius_i * radius_j / radius_sum, reduced_mass, overlap, motion.normal_velocity),
+        adjusted(dembark::hertz<PairLaw<P>, P>(law, radius_i * radius_j / radius_sum, reduced_mass, overlap, motion.normal_velocity),
                  s.limit_force, s.tangential_damping);
 
     const auto history = [=, &b, &s](int k) { return b.history[first + k] + s.offset; };
