@@ -32,7 +32,6 @@ COHESION_MODEL(COHESION_CAPILLARY,capillary,20)
 #include "fix_energy_account.h"
 #include "fix_capillary_liquid.h"
 #include "model_properties.h"
-#include "settings_choice.h"
 
 namespace LIGGGHTS {
 namespace ContactModels {
