@@ -26,8 +26,9 @@
 #include <string>
 #include <vector>
 
+#include "bridge_table.hpp"
 #include "closed_forms.hpp"
-#include "exact_bridge.hpp"
+
 
 namespace dembark::capillary {
 
