@@ -194,8 +194,8 @@ class LayerSolver {
 
   [[noreturn]] void fail() const {
     char line[128];
-    std::snprintf(line, sizeof line, "the liquid bridge of contact angle %g rad and volume %g R^3 did not converge", bridges_.contact_angle(),
-                  volume_);
+    std::snprintf(line, sizeof line, "the liquid bridge of contact angle %g rad and volume %g R^3 did not converge",
+                  bridges_.contact_angle(), volume_);
     throw std::runtime_error(line);
   }
 };

@@ -85,10 +85,10 @@ struct Cap {
 /// there, half-filling angle beta + contact angle, and sin(beta) = r_c the size. Coordinates: 0, k, ln(a).
 class EqualSpheres {
  public:
-  static constexpr int first_free = 1;           ///< of the coordinates
-  static constexpr double difference = 1e-6;     ///< of coordinates, for derivatives
-  static constexpr bool central = true;          ///< on both sides
-  static constexpr bool ends_with_fold = false;  ///< stable up to the largest gap
+  static constexpr int first_free = 1;                    ///< of the coordinates
+  static constexpr double difference = 1e-6;              ///< of coordinates, for derivatives
+  static constexpr bool central = true;                   ///< on both sides
+  static constexpr bool ends_with_fold = false;           ///< stable up to the largest gap
   explicit EqualSpheres(double theta) : theta_(theta) {}  ///< contact angle in rad
   double contact_angle() const { return theta_; }
 

@@ -31,11 +31,8 @@ struct Assembly {
 
   GrainLiquid grains() { return {liquid.data(), int(liquid.size())}; }
   void begin(const std::vector<LiquidWall>& walls = {}) {
-    ledger.resize(liquid.size());
-    std::vector<std::string> names;
-    for (const LiquidWall& wall : walls) names.push_back(wall.name);
-    ledger.change_walls(names, grains());
     ledger.walls = walls;
+    ledger.resize(liquid.size());
   }
   void touch(const std::vector<BridgeSides>& contacts) {
     std::vector<BridgeRequest> requests;
@@ -318,10 +315,10 @@ TEST_CASE("two processes reckon a pair across their border alike", "[liquid]") {
 TEST_CASE("what a restart file holds brings everything back", "[liquid]") {
   Assembly row = row_on_wall(Return::taken), again;
   row.ledger.remove(2, row.grains());
-  const std::vector<double> saved = row.ledger.saved(true);
+  const std::string saved = row.ledger.saved(true);
   again.liquid = row.liquid;
-  again.ledger.restore(saved.data(), saved.size());
-  again.ledger.resize(again.liquid.size());
+  again.ledger.restore(saved);
   CHECK(again.total() == row.total());
   CHECK(again.ledger.saved(true) == saved);
+  CHECK_THROWS_WITH(again.ledger.restore("liquid-1 0 0 0"), Catch::Contains("another version"));
 }
