@@ -165,21 +165,19 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     tally_ = dembark_liggghts::find_energy_tally(modify);
     find_owner(read);
     liquids_ = dembark_liggghts::read_liquids(read, static_cast<dembark::capillary::Model>(model_), viscous_, carried_);
-    const std::vector<dembark_liggghts::RadiusRange> radii = dembark_liggghts::radius_ranges(*atom, *modify, world, read.types());
-    dembark_liggghts::RadiusRange all;
-    for (const dembark_liggghts::RadiusRange& range : radii) all = {std::min(all.least, range.least), std::max(all.largest, range.largest)};
-    const double cube = all.largest * all.largest * all.largest;
+    const double largest = registry.max_radius() < 1e10 ? registry.max_radius() : 0.0, cube = largest * largest * largest;
     for (int i = 1; i <= read.types(); ++i)
       for (int j = 1; j <= read.types(); ++j)
         if (cube > 0.0 && liquids_(i, j).bridge_volume > largest_ratio * cube)
           read.fail("bridgeVolume (m^3) of types " + std::to_string(i) + "-" + std::to_string(j) + " is " +
                     std::to_string(liquids_(i, j).bridge_volume / cube) +
                     " cubes of the largest radius; a bridge between grains has at most a few, give its volume in m^3");
-    if (carried_ && !all.empty()) owner_->look_for_liquid(all.least, all.largest);
+    if (carried_ && largest > 0.0) owner_->look_for_liquid(registry.min_radius(), largest);
     const auto volume = [this](const dembark::Liquid& liquid, double radius, double other) {
       return carried_ ? owner_->likely_bridge(radius, other) : liquid.bridge_volume;
     };
-    neighbor->register_contact_dist_factor(dembark_liggghts::bridge_distance_factor(liquids_, radii, wall_, volume));
+    neighbor->register_contact_dist_factor(dembark_liggghts::bridge_distance_factor(
+        liquids_, dembark_liggghts::radius_ranges(*atom, *modify, world, read.types()), wall_, volume));
   }
 
   inline void surfacesIntersect(SurfacesIntersectData& d, ForceData& i_forces, ForceData& j_forces) {

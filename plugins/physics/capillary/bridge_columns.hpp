@@ -141,9 +141,9 @@ class LayerSolver {
         for (int i = 0; i <= cells; ++i) guess[i] = between(before[i], at_[i], 2.0);
       before = at_;
       at_ = guess;
-      // Volume by volume the bridges of one zeta form a smooth row; only its beginning has to be looked for along the branch. Equal spheres
-      // lose stability in two ways, so that the first of their branch has to be looked for each time.
-      if (Family::ends_with_fold && node > 1 && extend(columns[node])) continue;
+      // Volume by volume the bridges of one zeta form a smooth row; only its beginning has to be looked for along the branch, and where
+      // equal spheres lose their stability in another way than before.
+      if (node > 1 && extend(columns[node])) continue;
       at_[cells] = guess[cells];
       if (!search(columns[node])) fail();
       guess = at_;
@@ -160,10 +160,10 @@ class LayerSolver {
 
   /// Solves a column from guesses of all its bridges.
   bool extend(Column<cells>& c) {
-    if (!bridges_.fold(volume_, at_[0])) return false;
+    if (!bridges_.end(volume_, at_[0])) return false;
     c = {volume_, bridges_.shape(at_[0]).gap};
     for (int i = 1; i <= cells; ++i)
-      if (!bridges_.solve(volume_, c.gap(i), at_[i])) return false;
+      if (!(bridges_.solve(volume_, c.gap(i), at_[i]) && bridges_.steadiness(at_[i]) > 0.0)) return false;
     c.fit([this](int i) { return bridges_.shape(at_[i]).force; });
     return true;
   }

@@ -63,7 +63,7 @@ class BridgeSolver : public Family {
       }
       const bool passed = next.margin() <= 0.0;
       if (!passed) x = y;
-      else if (!bisect(volume, x, d, step, next.margin(), sense)) return false;
+      else if (!bisect(volume, x, d, step, sense)) return false;
       path.push_back(x);
       if (passed) return true;
       d = next;
@@ -72,8 +72,8 @@ class BridgeSolver : public Family {
     return false;
   }
 
-  /// The bridge of the largest gap of a volume, from one near it.
-  bool fold(double volume, BridgeCoordinates& x) const {
+  /// The last stable bridge of a volume, from one near it.
+  bool end(double volume, BridgeCoordinates& x) const {
     if (!onto_branch(volume, x)) return false;
     Tangent d = tangent(x, volume, 1.0);
     double step = 0.01;
@@ -85,11 +85,11 @@ class BridgeSolver : public Family {
         step *= 0.5;
         continue;
       }
-      const double change = d.stretch - next.stretch;
+      const double change = d.margin() - next.margin();
       x = y;
       d = next;
       if (std::fabs(step) < 1e-7) return true;
-      step = std::clamp(step * next.stretch / change, -0.1, 0.1);
+      step = std::clamp(step * next.margin() / change, -0.1, 0.1);
       if (!std::isfinite(step)) return false;
     }
     return false;
@@ -148,7 +148,7 @@ class BridgeSolver : public Family {
     const Conditions f = conditions(b, volume, b.gap);
     if (!f.valid) return {};
     const Jacobian j = jacobian(x, f, volume, b.gap);
-    Tangent d{j.valid, cross(j.row[0], j.row[1]), 0.0, Family::steadiness(x, b)};
+    Tangent d{j.valid, cross(j.row[0], j.row[1]), 0.0, Family::steadiness(x)};
     const double length = std::sqrt(dot(d.to, d.to));
     if (!(length > 0.0)) return {};
     for (double& c : d.to) c *= sense / length;
@@ -156,22 +156,17 @@ class BridgeSolver : public Family {
     return d;
   }
 
-  // The bridge is stable at x and not (`at_high` < 0) a step ahead of it; the last stable one goes to x.
-  bool bisect(double volume, BridgeCoordinates& x, const Tangent& d, double step, double at_high, double sense) const {
+  // The bridge is stable at x and not a step ahead of it; the last stable one goes to x.
+  bool bisect(double volume, BridgeCoordinates& x, const Tangent& d, double step, double sense) const {
     const BridgeCoordinates from = x;
-    double low = 0.0, high = step, at_low = d.margin();
-    for (int iteration = 0; iteration < 60 && high - low > 1e-9; ++iteration) {
-      double middle = 0.5 * (low + high);
-      // Regula falsi alone may keep one end for ever; every third step halves.
-      if (iteration % 3 != 2) middle = low + (high - low) * at_low / (at_low - at_high);
+    double low = 0.0, high = step;
+    while (high - low > 1e-12) {
+      const double middle = 0.5 * (low + high);
       x = moved(from, d, middle);
       if (!onto_branch(volume, x)) return false;
       const Tangent here = tangent(x, volume, sense);
       if (!here.valid) return false;
-      const double margin = here.margin();
-      if (margin > 0.0) low = middle, at_low = margin;
-      else high = middle, at_high = margin;
-      if (margin == 0.0) break;
+      (here.margin() > 0.0 ? low : high) = middle;
     }
     return true;
   }

@@ -201,7 +201,7 @@ class ExactBridge {
       std::vector<detail::Layer<cells>> layers{equal_layer()};
       for (int layer = 1; layer <= 3 * slices; ++layer) {
         const double y = layer / (3.0 * slices);
-        layers.push_back(solve<cells>(PairYoungLaplace(theta_, y * y), UnequalSpheres::from_equal(start, equal.shape(start))));
+        layers.push_back(solve<cells>(PairYoungLaplace(theta_, y * y), equal.among_unequal(start)));
       }
       unequal_ = std::make_unique<const BridgeTable<slices, cells>>(layers);
     });

@@ -17,6 +17,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <tuple>
 #include <vector>
 
 namespace dembark::capillary {
@@ -43,6 +44,9 @@ inline Real cap_share(Real radius, Real other) {
   return Real(0.5) * sine * sine / (Real(1) + cosine);  // 1 - cosine without cancellation
 }
 
+/// The names that users write, in the order of ShareRule::Kind.
+inline std::vector<std::string> share_names() { return {"cap", "fraction"}; }
+
 /// What a new bridge asks of one side.
 struct ShareRule {
   enum class Kind { cap, fraction };
@@ -50,7 +54,7 @@ struct ShareRule {
   double factor = 1.0;  // c above: 0...2 of the cap, 0...1 as a fraction
 
   /// Whether there is a kind of that name, which then holds.
-  bool set_kind(const std::string& name) { return choose({"cap", "fraction"}, name, kind); }
+  bool set_kind(const std::string& name) { return choose(share_names(), name, kind); }
   /// Nullptr, or what is wrong.
   const char* error() const {
     if (kind == Kind::cap) return factor > 0.0 && factor <= 2.0 ? nullptr : "the factor of the facing cap must lie in (0, 2]";
@@ -116,6 +120,30 @@ inline NewBridge<Real> form_wall_bridge(Real given_i, Real given_wall, Real wall
   if (rule != Return::taken) bridge.imbalance = bridge.volume * (Real(1) - Real(2) * wall_part);
   return bridge;
 }
+
+/// The two sides of a contact: a grain, and another grain or a wall by its number.
+struct BridgeSides {
+  int grain = 0, other = 0;
+  bool wall = false;
+
+  bool operator<(const BridgeSides& b) const { return std::tie(wall, grain, other) < std::tie(b.wall, b.grain, b.other); }
+};
+
+/// A touching contact without a bridge. Engines derive from it what they need to find the contact again.
+struct BridgeRequest {
+  BridgeSides sides;
+  double radius = 0.0, other_radius = 0.0;  // m; of a wall `flat`
+
+  bool operator<(const BridgeRequest& r) const { return sides < r.sides; }
+};
+
+/// A bridge that broke. `imbalance`: as in NewBridge.
+struct BrokenBridge {
+  BridgeSides sides;
+  double volume = 0.0, imbalance = 0.0;
+
+  bool operator<(const BrokenBridge& b) const { return std::tie(sides, volume, imbalance) < std::tie(b.sides, b.volume, b.imbalance); }
+};
 
 /// Liquid (m^3) that a grain of `radius` gathers from others, of radius `other`, that keep `liquid` each: with it bridges between them give
 /// back to each side what they took from it. Return::taken moves no liquid.

@@ -21,37 +21,12 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "liquid.hpp"
 
 namespace dembark::capillary {
-
-/// The two sides of a contact: a grain, and another grain or a wall by its number.
-struct BridgeSides {
-  int grain = 0, other = 0;
-  bool wall = false;
-
-  bool operator<(const BridgeSides& b) const { return std::tie(wall, grain, other) < std::tie(b.wall, b.grain, b.other); }
-};
-
-/// A touching contact without a bridge. Engines derive from it what they need to find the contact again.
-struct BridgeRequest {
-  BridgeSides sides;
-  double radius = 0.0, other_radius = 0.0;  // m; of a wall `flat`
-
-  bool operator<(const BridgeRequest& r) const { return sides < r.sides; }
-};
-
-/// A bridge that broke. `imbalance`: as in NewBridge.
-struct BrokenBridge {
-  BridgeSides sides;
-  double volume = 0.0, imbalance = 0.0;
-
-  bool operator<(const BrokenBridge& b) const { return std::tie(sides, volume, imbalance) < std::tie(b.sides, b.volume, b.imbalance); }
-};
 
 struct LiquidWall {
   std::string name;
@@ -110,18 +85,17 @@ class LiquidLedger {
 
   /// The walls that there are now; new ones are dry. Bridges to walls that are gone belong to their grains, as they will not break.
   void change_walls(const std::vector<std::string>& names, GrainLiquid grains) {
-    std::vector<LiquidWall> before = std::move(walls);
-    walls.clear();
+    std::vector<LiquidWall> now;
     for (const std::string& name : names) {
-      const auto known = std::find_if(before.begin(), before.end(), [&](const LiquidWall& wall) { return wall.name == name; });
-      walls.push_back(known == before.end() ? LiquidWall{name} : std::move(*known));
-      if (known != before.end()) before.erase(known);
+      LiquidWall* const known = wall(name);
+      now.push_back(known ? std::exchange(*known, {}) : LiquidWall{name});
     }
-    for (const LiquidWall& gone : before) {
+    for (const LiquidWall& gone : walls) {
       lost += gone.pool;
       expected -= gone.pool;
       for (int i = 0; i < std::min(grains.owned, int(gone.own.size())); ++i) grains.volume[i] += gone.of_grain[i] + gone.own[i];
     }
+    walls = std::move(now);
     resize(of_pairs_.size());
   }
 
@@ -192,8 +166,6 @@ class LiquidLedger {
     std::sort(requests.begin(), requests.end());
     grant(requests, grains);
     for (const Request& r : requests) withdraw(r, grains, store);
-    for (const int i : asked_) demands_[i] = 0.0;
-    asked_.clear();
     requests.clear();
     std::vector<long double> none;
     if (std::any_of(wall_grants_.begin(), wall_grants_.end(), [](double grant) { return grant != 0.0; })) settle_walls(none);
@@ -344,24 +316,20 @@ class LiquidLedger {
     }
   }
 
-  void demand(int grain, double share_of_it) {
-    if (demands_[grain] == 0.0) asked_.push_back(grain);
-    demands_[grain] += share_of_it;
-  }
-
   /// Fills in what each grain and wall grants per unit share.
   template <class Request>
   void grant(const std::vector<Request>& requests, GrainLiquid grains) {
     // All processes have to know whether any pair asks, and what is asked of each wall.
     std::vector<long double> common(1 + walls.size(), 0.0L);
+    if (!requests.empty()) demands_.assign(demands_.size(), 0.0);
     for (const Request& r : requests) {
-      demand(r.sides.grain, share(r.radius, r.other_radius));
+      demands_[r.sides.grain] += share(r.radius, r.other_radius);
       if (r.sides.wall) {
         common[1 + r.sides.other] += walls[r.sides.other].share;
         continue;
       }
       common[0] = 1.0L;
-      if (r.sides.other < grains.owned) demand(r.sides.other, share(r.other_radius, r.radius));
+      if (r.sides.other < grains.owned) demands_[r.sides.other] += share(r.other_radius, r.radius);
     }
     settle_walls(common);
     wall_grants_.clear();
@@ -369,8 +337,9 @@ class LiquidLedger {
       wall_grants_.push_back(walls[w].share * capillary::grant(walls[w].pool, double(common[1 + w])));
     // -1: nothing was asked of this grain where it is owned.
     const bool copies = common[0] != 0.0L && copy_to_others;
-    if (copies) std::fill(grants_.begin(), grants_.end(), -1.0);
-    for (const int i : asked_) grants_[i] = capillary::grant(grains.volume[i], demands_[i]);
+    if (copies) grants_.assign(grants_.size(), -1.0);
+    for (int i = 0; i < grains.owned && !requests.empty(); ++i)
+      if (demands_[i] > 0.0) grants_[i] = capillary::grant(grains.volume[i], demands_[i]);
     if (copies) copy_to_others(grants_);
   }
 
@@ -404,7 +373,6 @@ class LiquidLedger {
 
   std::vector<double> of_pairs_;  // for each grain, its part of its bridges to grains
   std::vector<double> demands_, grants_, wall_grants_;
-  std::vector<int> asked_;
   long long counted_ = -1;  // grains when liquid was last counted; -1: never
 };
 

@@ -79,77 +79,6 @@ struct Cap {
 
 }  // namespace detail
 
-/// Bridges between equal spheres, symmetric about their neck. With t from the neck and r0 its radius,
-///   r^2 = r0^2 + 4 (1 - p r0) sin^2(p t/2) / p^2,   C = r0 - p r0^2/2,
-/// so that two numbers fix a whole bridge: the phase k = p t_c at the contact line and the slenderness a = r0/t_c. They give the slope
-/// there, half-filling angle beta + contact angle, and sin(beta) = r_c the size. Coordinates: 0, k, ln(a).
-class EqualSpheres {
- public:
-  static constexpr int first_free = 1;                    ///< of the coordinates
-  static constexpr double difference = 1e-6;              ///< of coordinates, for derivatives
-  static constexpr bool central = true;                   ///< on both sides
-  static constexpr bool ends_with_fold = false;           ///< stable up to the largest gap
-  explicit EqualSpheres(double theta) : theta_(theta) {}  ///< contact angle in rad
-  double contact_angle() const { return theta_; }
-
-  BridgeShape shape(const BridgeCoordinates& x) const {
-    static const detail::EvenGauss<20> rule;
-    const double k = x[1], a = std::exp(x[2]);
-    const double spread = 1.0 - k * a;
-    // r sin(phi) = C + k r^2/2, with the large terms of a thin ring of liquid (|k| a >> 1) cancelled by hand.
-    const auto moment = [&](double arc2) { return a + 0.5 * k * spread * arc2; };
-    double height = 0.0, revolved = 0.0, area = 0.0;
-    for (std::size_t i = 0; i < rule.node.size(); ++i) {
-      const double t = rule.node[i], arc = t * detail::sinc(0.5 * k * t), arc2 = arc * arc;
-      const double r2 = a * a + spread * arc2;
-      if (!(r2 > 0.0)) return {};
-      const double r = std::sqrt(r2), rise = moment(arc2) / r;
-      height += rule.weight[i] * rise;
-      revolved += rule.weight[i] * rise * r2;
-      area += rule.weight[i] * r;
-    }
-    const double end = detail::sinc(0.5 * k), r2 = a * a + spread * end * end;
-    if (!(r2 > 0.0)) return {};
-    const double beta = std::atan2(moment(end * end), spread * detail::sinc(k)) - theta_;
-    if (!(beta > 0.0 && beta < detail::pi)) return {};
-    const double rim = std::sin(beta), scale = rim / std::sqrt(r2);  // t_c
-    const detail::Cap cap(rim, beta);
-    BridgeShape b;
-    b.caps = 2.0 * cap.height;
-    b.gap = 2.0 * scale * height - b.caps;
-    b.volume = 2.0 * (detail::pi * scale * scale * scale * revolved - cap.volume);
-    b.force = 2.0 * detail::pi * scale * (a - 0.5 * k * a * a);
-    b.energy = 4.0 * detail::pi * scale * scale * area - std::cos(theta_) * 2.0 * cap.area;
-    b.half_filling_angle = beta;
-    b.pressure = k / scale;
-    b.neck_radius = scale * a;
-    b.valid = height > 0.0 && b.volume > 0.0;
-    return b;
-  }
-
-  /// How far the bridge is from swaying. The meridian shifted along itself keeps volume and gap to first order; with slope phi and
-  /// sin(b) = r at its end it also keeps the contact angles where d(phi - b)/dt = 0. There a branch of asymmetric bridges leaves the
-  /// symmetric one, which is not stable beyond. Between planes (b = 0) this is an inflection at the contact line (Vogel, Discrete Contin.
-  /// Dyn. Syst. Suppl. 2005, 862). This is -d(phi - b)/dt without the factor 1 - p r0 of all derivatives along the meridian, which is 0 for
-  /// a cylinder.
-  double steadiness(const BridgeCoordinates& x, const BridgeShape& b) const {
-    const double k = x[1], end = detail::sinc(0.5 * k);
-    return std::cos(b.half_filling_angle) * (std::exp(x[2]) - 0.5 * k * end * end) + std::sin(b.half_filling_angle) * detail::sinc(k);
-  }
-
-  /// Start of the touching bridge of a small volume: the ring between osculating paraboloids.
-  BridgeCoordinates small_touching(double volume) const {
-    const double beta = std::pow(2.0 * volume / detail::pi, 0.25);
-    const double span = 0.5 * detail::pi - theta_ - beta;
-    const double arc = 0.5 * beta * beta / detail::sinc(span);
-    const double neck = beta - 0.5 * span * arc;
-    return {0.0, arc / neck - span, std::log(neck / arc)};
-  }
-
- private:
-  double theta_;
-};
-
 /// Bridges between spheres of the curvatures 1 + e (body 1, the smaller) and 1 - e, with the asymmetry e = (R2 - R1) / (R1 + R2), 0 =
 /// equal, 1 = a plane. With t from the contact line on body 1 (radius r1, slope phi1),
 ///   r^2 - r1^2 = 2 r1 cos(phi1) t sinc(p t) + (1 - p r1 sin(phi1)) t^2 sinc^2(p t/2) = D(t),     r sin(phi) = r1 sin(phi1) + p D/2.
@@ -160,17 +89,15 @@ class UnequalSpheres {
   static constexpr int first_free = 0;
   static constexpr double difference = 1e-7;
   static constexpr bool central = false;
-  static constexpr bool ends_with_fold = true;
   UnequalSpheres(double theta, double asymmetry) : theta_(theta), near_(1.0 + asymmetry), far_(1.0 - asymmetry) {}
   double contact_angle() const { return theta_; }
 
-  /// Coordinates of a bridge between equal spheres, the start into those of unequal ones.
-  static BridgeCoordinates from_equal(const BridgeCoordinates& x, const BridgeShape& b) {
-    return {std::log(b.half_filling_angle), 2.0 * x[1], std::log(2.0 * x[1] / b.pressure)};
-  }
+  BridgeShape shape(const BridgeCoordinates& x) const { return shape<16>(x); }
 
+  /// From integrals of 2 `half` points.
+  template <int half>
   BridgeShape shape(const BridgeCoordinates& x) const {
-    static const detail::EvenGauss<16> rule;
+    static const detail::EvenGauss<half> rule;
     const double b1 = near_ * std::exp(x[0]), length = std::exp(x[2]), k = x[1], p = k / length;
     if (!(b1 < detail::pi)) return {};
     const double r1 = std::sin(b1) / near_, rise1 = r1 * std::sin(b1 + theta_), run1 = -r1 * std::cos(b1 + theta_);
@@ -205,10 +132,63 @@ class UnequalSpheres {
   }
 
   /// No other branch crosses theirs: they are stable up to the largest gap.
-  double steadiness(const BridgeCoordinates&, const BridgeShape&) const { return HUGE_VAL; }
+  double steadiness(const BridgeCoordinates&) const { return HUGE_VAL; }
 
  private:
   double theta_, near_, far_;
+};
+
+/// Bridges between equal spheres, symmetric about their neck. With t from the neck and r0 its radius,
+///   r^2 = r0^2 + 4 (1 - p r0) sin^2(p t/2) / p^2,   C = r0 - p r0^2/2,
+/// so that two numbers fix a whole bridge: the phase k = p t_c at the contact line and the slenderness a = r0/t_c. They give the slope
+/// there, half-filling angle beta + contact angle, and sin(beta) = r_c the size. Coordinates: 0, k, ln(a).
+class EqualSpheres {
+ public:
+  static constexpr int first_free = 1;                            ///< of the coordinates
+  static constexpr double difference = 1e-6;                      ///< of coordinates, for derivatives
+  static constexpr bool central = true;                           ///< on both sides
+  explicit EqualSpheres(double theta) : meridian_(theta, 0.0) {}  ///< contact angle in rad
+  double contact_angle() const { return meridian_.contact_angle(); }
+
+  /// The coordinates of the same bridge in UnequalSpheres; the first is no number where there is none.
+  BridgeCoordinates among_unequal(const BridgeCoordinates& x) const {
+    const double k = x[1], a = std::exp(x[2]), end = detail::sinc(0.5 * k);
+    const double spread = 1.0 - k * a, r2 = a * a + spread * end * end;
+    // r sin(phi) = C + k r^2/2, with the large terms of a thin ring of liquid (|k| a >> 1) cancelled by hand.
+    const double beta = std::atan2(a + 0.5 * k * spread * end * end, spread * detail::sinc(k)) - contact_angle();
+    return {std::log(beta), 2.0 * k, std::log(2.0 * std::sin(beta) / std::sqrt(r2))};
+  }
+
+  BridgeShape shape(const BridgeCoordinates& x) const {
+    const BridgeCoordinates y = among_unequal(x);
+    if (!std::isfinite(y[0] + y[2])) return {};
+    BridgeShape b = meridian_.shape<20>(y);
+    b.miss = 0.0;
+    b.neck_radius = 0.5 * std::exp(y[2] + x[2]);
+    return b;
+  }
+
+  /// How far the bridge is from swaying. The meridian shifted along itself keeps volume and gap to first order; with slope phi and
+  /// sin(b) = r at its end it also keeps the contact angles where d(phi - b)/dt = 0. There a branch of asymmetric bridges leaves the
+  /// symmetric one, which is not stable beyond. Between planes (b = 0) this is an inflection at the contact line (Vogel, Discrete Contin.
+  /// Dyn. Syst. Suppl. 2005, 862). This is -d(phi - b)/dt without the factor 1 - p r0 of all derivatives along the meridian, which is 0 for
+  /// a cylinder.
+  double steadiness(const BridgeCoordinates& x) const {
+    const double k = x[1], end = detail::sinc(0.5 * k), beta = std::exp(among_unequal(x)[0]);
+    return std::cos(beta) * (std::exp(x[2]) - 0.5 * k * end * end) + std::sin(beta) * detail::sinc(k);
+  }
+
+  /// Start of the touching bridge of a small volume: the ring between osculating paraboloids.
+  BridgeCoordinates small_touching(double volume) const {
+    const double beta = std::pow(2.0 * volume / detail::pi, 0.25);
+    const double span = 0.5 * detail::pi - contact_angle() - beta;
+    const double arc = 0.5 * beta * beta / detail::sinc(span);
+    const double neck = beta - 0.5 * span * arc;
+    return {0.0, arc / neck - span, std::log(neck / arc)};
+  }
+
+ private:
+  UnequalSpheres meridian_;
 };
 
 }  // namespace dembark::capillary

@@ -247,7 +247,7 @@ TEST_CASE("a bridge between unequal spheres balances", "[capillary]") {
       const PairYoungLaplace bridges(theta, asymmetry);
       const double v = 1e-3, h = 1e-6;
       const BridgeCoordinates start = touching(YoungLaplace(theta), v);
-      BridgeCoordinates x = bridges.from_equal(start, EqualSpheres(theta).shape(start));
+      BridgeCoordinates x = EqualSpheres(theta).among_unequal(start);
       double energy[3];
       for (int i = 0; i < 3; ++i) {
         REQUIRE(bridges.solve(v, 0.03 + (i - 1) * h, x));
@@ -271,8 +271,8 @@ TEST_CASE("a symmetric bridge is stable until asymmetric ones branch off", "[cap
       std::vector<BridgeCoordinates> path;
       REQUIRE(equal.rupture(v, end, path));
       CAPTURE(theta, v);
-      const double at_touching = determinant(any, any.from_equal(start, equal.shape(start)));
-      CHECK(std::fabs(determinant(any, any.from_equal(end, equal.shape(end)))) < 1e-6 * std::fabs(at_touching));
+      const double at_touching = determinant(any, equal.among_unequal(start));
+      CHECK(std::fabs(determinant(any, equal.among_unequal(end))) < 1e-6 * std::fabs(at_touching));
     }
 }
 
