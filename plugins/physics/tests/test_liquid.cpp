@@ -152,6 +152,34 @@ TEST_CASE("both sides of a pair reckon the same bridge", "[liquid]") {
   }
 }
 
+TEST_CASE("grains that have gathered their liquid get back what bridges take", "[liquid]") {
+  const auto split = GENERATE(Return::equal, Return::radius);
+  const auto share = GENERATE(ShareRule{}, ShareRule{ShareRule::Kind::fraction, 0.3});
+  for (const double other : {1e-3, 2e-3, 2e-2}) {
+    const double radius = 1e-3, liquid = 1e-10, mine = gathered(share, split, radius, other, liquid);
+    const NewBridge<double> bridge = form_bridge(share(radius, other) * mine, share(other, radius) * liquid, radius, other, split);
+    CHECK_THAT(returned(bridge.volume, bridge.imbalance), WithinRel(bridge.from_i, 1e-13));
+  }
+}
+
+TEST_CASE("bridges are foreseen by the sizes of the grains", "[liquid]") {
+  const double small = 1e-3, large = 1e-2, content = 0.01;
+  WettestGrains wettest{large};
+  for (const double radius : {small, large}) wettest.add(radius, content * std::pow(radius, 3));
+  const auto likely = [&](double radius, double other) { return wettest.likely_bridge(ShareRule{}, Return::equal, radius, other); };
+  // Grains of one size: twice what a wall asks of them.
+  CHECK_THAT(likely(large, large), WithinRel(content * std::pow(large, 3), 1e-14));
+  CHECK(likely(large, flat<double>) == likely(large, large));
+  // Small ones gather films as thick as those of the large ones, but no more.
+  CHECK(likely(small, small) >= content * std::pow(small, 3));
+  CHECK_THAT(likely(small, small), WithinRel(content * large * small * small, 1e-14));
+  CHECK(likely(small, large) < 0.1 * likely(large, large));
+  CHECK(likely(small, large) == likely(large, small));
+  // One small grain that was made wet counts as it is.
+  wettest.add(small, content * std::pow(large, 3));
+  CHECK(likely(small, small) == likely(large, large));
+}
+
 TEST_CASE("a wall keeps its part", "[liquid]") {
   const NewBridge<double> bridge = form_wall_bridge(3.0, 1.0, 0.25, Return::equal);
   CHECK(returned(bridge.volume, bridge.imbalance) == 3.0);
