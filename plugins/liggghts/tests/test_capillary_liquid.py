@@ -64,9 +64,7 @@ thermo_modify lost ignore norm no format float %.17g
 thermo 250
 dump grains all custom 500 grains.dump id x y z vx vy vz f_capillaryLiquid
 dump_modify grains sort id format "%d{' %.17g' * 7}"
-{
-  run
-}
+{run}
 """
 
 
@@ -103,7 +101,7 @@ def test_liquid_is_conserved(by_ranks, ranks):
     np.testing.assert_allclose(column(rows, "grains") + column(rows, "bridges") + column(rows, "walls"), total, rtol=1e-15)
     assert np.abs(column(rows, "error")).max() <= 1e-14 * total[0]
     assert (column(rows, "lost") == 0.0).all() and (column(rows, "atoms") == 125).all()
-#Bridges form and break, and the wall takes part.
+    # Bridges form and break, and the wall takes part.
     assert column(rows, "count")[-1] > 50 and column(rows, "bridges")[-1] > 0.1 * total[0]
     assert len(set(column(rows, "walls"))) > 4
     assert all((frame[:, 7] >= 0.0).all() for frame in frames)
