@@ -1,7 +1,8 @@
 // What a user may write for LcpImpact: numbers, dicts by material, walls; read into rows of numbers, which are saved with the scene.
-#include "LcpImpactParts.hpp"
+#include "LcpImpact.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 
@@ -13,36 +14,42 @@
 namespace yade {
 
 using dembark_yade::fail;
-using lcp_impact::Table;
 namespace impact = ::dembark::impact;
-
-namespace lcp_impact {
-
-const Real* Table::find(const std::vector<Real>& rows, int a, int b) const {
-	for (std::size_t i = 0; i < rows.size(); i += keys + width) {
-		const Real x = rows[i], y = rows[i + keys - 1];
-		if (x < 0.0 || (x == a && (keys == 1 || y == b)) || (keys == 2 && x == b && y == a)) return &rows[i + keys];
-	}
-	return nullptr;
-}
-
-void setFriction(impact::PairLaw& pair, const Real* numbers) {
-	::dembark::FinnieRabinowicz& f = pair.friction;
-	f.static_friction              = numbers[0];
-	f.kinetic_friction             = numbers[1];
-	f.critical_slip_distance       = numbers[2];
-	f.interface_shear_strength     = numbers[3];
-	f.healing_time                 = numbers[4];
-	pair.contact_area              = numbers[5];
-}
-
-}  // namespace lcp_impact
 
 namespace lcp_input {
 
 namespace py = boost::python;
 
+/// A table by materials, or by pairs of them, in an attribute of YADE: rows of ids (-1 = all) and numbers.
+struct Table {
+	std::size_t keys, width;
+
+	/// The numbers of a material, or of a pair in either order; nullptr: none.
+	const Real* find(const std::vector<Real>& rows, int a, int b = -1) const {
+		for (std::size_t i = 0; i < rows.size(); i += keys + width) {
+			const Real x = rows[i], y = rows[i + keys - 1];
+			if (x < 0.0 || (x == a && (keys == 1 || y == b)) || (keys == 2 && x == b && y == a)) return &rows[i + keys];
+		}
+		return nullptr;
+	}
+};
+constexpr Table byMaterial{1, 1}, byPair{2, 6};
+
+/// The words of a friction law, and the numbers they stand for.
 const char* const frictionWords[] = {"static", "kinetic", "slip", "strength", "healing", "area"};
+using FrictionNumbers             = std::array<double*, 6>;
+FrictionNumbers numbersOf(impact::PairLaw& law) {
+	::dembark::FinnieRabinowicz& f = law.friction;
+	return {&f.static_friction,          &f.kinetic_friction, &f.critical_slip_distance,
+	        &f.interface_shear_strength, &f.healing_time,     &law.contact_area};
+}
+constexpr Real withoutFriction[] = {0.0, 0.0, 0.0, ::dembark::unlimited_strength, 0.0, 0.0};
+
+impact::PairLaw frictionLaw(const Real* numbers) {
+	impact::PairLaw law;
+	for (double* to : numbersOf(law)) *to = *numbers++;
+	return law;
+}
 
 /// Python's own text of a value, for messages.
 std::string shown(const py::object& value) { return py::extract<std::string>(py::str(value)); }
@@ -126,7 +133,7 @@ Parse atLeast(bool positive, const char* must) {
 
 /// One friction law: a coefficient, or a dict of words.
 std::vector<Real> friction(const py::object& value, const std::string& what) {
-	std::vector<Real> numbers(lcp_impact::withoutFriction, lcp_impact::withoutFriction + lcp_impact::byPair.width);
+	std::vector<Real> numbers(withoutFriction, withoutFriction + byPair.width);
 	if (isDict(value)) {
 		const py::dict words = py::extract<py::dict>(value);
 		const py::list keys  = words.keys();
@@ -142,8 +149,7 @@ std::vector<Real> friction(const py::object& value, const std::string& what) {
 	} else {
 		numbers[0] = numbers[1] = number(value, what);
 	}
-	impact::PairLaw pair;
-	lcp_impact::setFriction(pair, numbers.data());
+	const impact::PairLaw pair = frictionLaw(numbers.data());
 	if (const char* wrong = pair.friction.error()) fail(what + ": " + wrong);
 	if (!(pair.contact_area >= 0.0))
 		fail(what + ": area is " + dembark_yade::text(pair.contact_area) +
@@ -155,7 +161,7 @@ py::object oneNumber(const Real* numbers) { return py::object(*numbers); }
 
 py::object frictionToPython(const Real* numbers) {
 	py::dict words;
-	for (std::size_t i = 0; i < lcp_impact::byPair.width; ++i) words[frictionWords[i]] = numbers[i];
+	for (std::size_t i = 0; i < byPair.width; ++i) words[frictionWords[i]] = numbers[i];
 	return words;
 }
 
@@ -172,8 +178,8 @@ void take(Object& object, py::dict& kw, std::initializer_list<std::pair<const ch
 
 }  // namespace lcp_input
 
-using lcp_impact::byMaterial;
-using lcp_impact::byPair;
+using lcp_input::byMaterial;
+using lcp_input::byPair;
 
 void LogWall::postLoad(LogWall&) {
 	const std::string where = "LogWall" + (name.empty() ? "" : " '" + name + "'");
@@ -201,6 +207,66 @@ boost::python::object LogWall::getFriction() const {
 void LogWall::setFriction(const boost::python::object& value) {
 	frictionRows.clear();
 	if (!value.is_none()) frictionRows = lcp_input::friction(value, "LogWall.friction");
+}
+
+void LcpImpact::postLoad(LcpImpact&) {
+	const auto must = [](bool right, const char* name, double value, const char* what) {
+		if (!right || !std::isfinite(value))
+			fail(std::string("LcpImpact.") + name + " is " + dembark_yade::text(value) + "; it must be " + what);
+	};
+	must(contactDamping >= 0.0, "contactDamping", contactDamping, ">= 0 N s/m");
+	must(theta >= 0.5 && theta <= 1.0, "theta", theta, "in 0.5...1");
+	must(tangentialRatio > 0.0, "tangentialRatio", tangentialRatio, "> 0");
+	must(tolerance > 0.0, "tolerance", tolerance, "> 0");
+	must(sweeps >= 1, "sweeps", sweeps, ">= 1");
+	try {
+		::dembark::lcp_method(method);
+	} catch (const std::invalid_argument&) {
+		fail("LcpImpact.method is '" + method + "'; it must be auto, energy, block, murty or pgs");
+	}
+}
+
+/// The parameters of the model for the materials of the present step.
+impact::Settings LcpImpact::settings() const {
+	const auto name = [](int id) {
+		return id < 0 ? std::string("a material that is not in O.materials") : "material " + std::to_string(id);
+	};
+	const auto one = [&](const std::vector<Real>& rows, int id, const char* what) {
+		const Real* found = byMaterial.find(rows, id);
+		if (!found) fail(std::string("LcpImpact.") + what + " has no value for " + name(id) + "; add it to the dict");
+		return *found;
+	};
+	const auto law = [&](const Real* friction) {
+		impact::PairLaw pair            = lcp_input::frictionLaw(friction);
+		pair.tangential_stiffness_ratio = tangentialRatio;
+		pair.contact_damping            = contactDamping;
+		return pair;
+	};
+	const auto between = [&](int a, int b) {
+		const Real* found = frictionRows.empty() ? lcp_input::withoutFriction : byPair.find(frictionRows, a, b);
+		if (!found) fail("LcpImpact.friction has no value for " + name(a) + " and " + name(b) + "; add the pair to the dict");
+		return found;
+	};
+	impact::Settings result;
+	result.dt              = scene->dt;
+	result.theta           = theta;
+	result.friction_sweeps = sweeps;
+	result.lcp.tolerance   = tolerance;
+	result.lcp.method      = ::dembark::lcp_method(method);
+	result.materials.clear();
+	result.pairs.clear();
+	for (const int a : materials) {
+		result.materials.push_back(
+			{one(stiffnessRows, a, "stiffness"), dampingRows.empty() ? 0.0 : one(dampingRows, a, "damping")});
+		for (const int b : materials) result.pairs.push_back(law(between(a, b)));
+	}
+	for (std::size_t w = 0; w < wallList.size(); ++w) {
+		const LogWall& wall = *wallList[w];
+		if (wall.frictionRows.empty() && !frictionRows.empty() && frictionRows[0] >= 0.0)
+			fail(wallName(w) + " has no friction, and LcpImpact.friction is by pairs of materials; give the wall its own");
+		result.add({wall.stiffness, 0.0}, law(wall.frictionRows.empty() ? between(-1, -1) : wall.frictionRows.data()));
+	}
+	return result;
 }
 
 void LcpImpact::pyHandleCustomCtorArgs(boost::python::tuple&, boost::python::dict& kw) {

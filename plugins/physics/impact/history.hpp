@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <tuple>
 #include <vector>
 
-#include "archive.hpp"
 #include "assembly.hpp"
 #include "types.hpp"
 
@@ -26,10 +26,7 @@ struct ContactHistory {
   /// As a new one.
   bool idle() const { return !active && elastic == 0.0; }
 
-  template <class Visit>
-  void each(Visit&& visit) {
-    visit(active), visit(deformation), visit(elastic), visit(friction.displacement), visit(friction.slip), visit(normal), visit(impact);
-  }
+  auto fields() { return std::tie(active, deformation, elastic, friction.displacement, friction.slip, normal, impact); }
 };
 
 /// All that a step leaves to the next.
@@ -47,10 +44,7 @@ struct Histories {
     keys.clear();
     contacts.clear();
   }
-  template <class Visit>
-  void each(Visit&& visit) {
-    visit(keys), visit(contacts), visit(report), visit(begun);
-  }
+  auto fields() { return std::tie(keys, contacts, report, begun); }
 };
 
 class HistoryKeeper {
@@ -86,13 +80,13 @@ class HistoryKeeper {
   }
 
   /// The rows of the step, with what `recall` said about each; may be called again with more of them.
-  void take(const std::vector<Sorted>& sorted, const std::vector<Row>& rows) {
+  void take(const std::vector<Row>& rows) {
     const std::vector<ContactHistory>& contacts = base().contacts;
     lost_bodies.clear();
     from_.assign(rows.size(), &blank_);
     left_.assign(contacts.size(), 1);
     for (std::size_t i = 0; i < rows.size(); ++i)
-      if (sorted[i].memory >= 0) hand_on(std::size_t(sorted[i].memory), i);
+      if (rows[i].history >= 0) hand_on(std::size_t(rows[i].history), i);
     orphans_.clear();
     for (std::size_t o = 0; o < left_.size(); ++o)
       if (left_[o]) orphans_.push_back(o);
@@ -112,10 +106,10 @@ class HistoryKeeper {
   /// lost as they relax, and is part of its loss.
   void finish(const Key& key, const ContactHistory& history) {
     if (again_) return;  // reported the first time
-    finished.push_back(history.impact);
-    finished.back().a = key.first;
-    finished.back().b = key.second;
-    finished.back().dissipated += history.elastic;
+    Impact& impact = finished.emplace_back(history.impact);
+    impact.a = key.first;
+    impact.b = key.second;
+    impact.dissipated += history.elastic;
   }
 
   void add(const Key& key, const ContactHistory& history) { next_.add(key, history); }
@@ -138,10 +132,7 @@ class HistoryKeeper {
     std::swap(after_, next_);
   }
 
-  template <class Visit>
-  void each(Visit&& visit) {
-    visit(before_), visit(after_), visit(finished);
-  }
+  auto fields() { return std::tie(before_, after_, finished); }
 
  private:
   void hand_on(std::size_t history, std::size_t row) {

@@ -4,10 +4,10 @@
 
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
+#include <tuple>
 #include <vector>
 
-#include "periodic.hpp"
+#include "pairs.hpp"
 #include "types.hpp"
 
 namespace dembark {
@@ -47,17 +47,7 @@ class LastForces {
     return true;
   }
 
-  template <class Visit>
-  void each(Visit&& visit) {
-    visit(force), visit(torque);
-    std::uint64_t size = bodies_.size();
-    visit(size);
-    bodies_.resize(std::size_t(size));
-    for (Body& b : bodies_) {
-      visit(b.id), visit(b.mass), visit(b.inertia), visit(b.radius), visit(b.material);
-      visit(b.position), visit(b.velocity), visit(b.spin), visit(b.force), visit(b.torque);
-    }
-  }
+  auto fields() { return std::tie(force, torque, bodies_); }
 
  private:
   static bool same(const Vec3<double>& a, const Vec3<double>& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }

@@ -97,8 +97,7 @@ class Motion {
   }
 
   /// Rate of the gap (m/s) with the velocities v.
-  template <class Pair>
-  double gap_rate(const Pair& r) const {
+  double gap_rate(const Contact& r) const {
     return dot(r.normal, (*bodies_)[r.a].velocity - (r.b >= 0 ? (*bodies_)[r.b].velocity : r.point_velocity));
   }
   /// Takes the forces but the normal ones over, for gap_acceleration.
@@ -106,8 +105,7 @@ class Motion {
     for (std::size_t b = 0; b < response.size(); ++b) acceleration_[b] = response[b].inverse * (response[b].free + tangential[b].force);
   }
   /// Acceleration of the gap (m/s^2) by all forces but the normal ones.
-  template <class Pair>
-  double gap_acceleration(const Pair& r) const {
+  double gap_acceleration(const Contact& r) const {
     return dot(r.normal, r.b >= 0 ? acceleration_[r.a] - acceleration_[r.b] : acceleration_[r.a]);
   }
   /// What a body adds to the change of its gaps (m): rate (s) times v, and scale (s^2) times the acceleration by all forces; after move().
@@ -115,8 +113,7 @@ class Motion {
     return rate * (*bodies_)[b].velocity + (scale / interval_) * change[b].velocity;
   }
   /// As gap_acceleration, by all forces; after move().
-  template <class Pair>
-  double whole_gap_acceleration(const Pair& r) const {
+  double whole_gap_acceleration(const Contact& r) const {
     const Vec3<double> gain = r.b >= 0 ? change[r.a].velocity - change[r.b].velocity : change[r.a].velocity;
     return dot(r.normal, gain) / interval_;
   }

@@ -37,14 +37,12 @@
 #include <utility>
 #include <vector>
 
-#include "archive.hpp"
 #include "assembly.hpp"
-#include "candidates.hpp"
 #include "friction.hpp"
-#include "geometry.hpp"
 #include "history.hpp"
 #include "motion.hpp"
 #include "normal_forces.hpp"
+#include "pairs.hpp"
 #include "screening.hpp"
 #include "types.hpp"
 
@@ -108,7 +106,7 @@ class System {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const Row& r = rows[i];
       const Eigen::Index k = Eigen::Index(i);
-      results_[i] = {r.a, r.b, r.key_a, r.key_b, r.gap, normal_[k], gap_[k], friction_.force[i], r.normal, r.place};
+      results_[i] = {r.a, r.b, r.key_a, r.key_b, r.normal, r.gap, normal_[k], friction_.force[i], r.point, gap_[k]};
     }
     return results_;
   }
@@ -116,26 +114,16 @@ class System {
   std::vector<Impact> take_finished() { return std::exchange(history_.finished, {}); }
 
   /// Everything needed to go on bit for bit, as numbers that survive as doubles.
-  std::vector<double> state() const {
-    Archive out;
-    const_cast<System*>(this)->archive(out);  // writing changes nothing
-    return out.numbers();
-  }
+  std::vector<double> state() const { return to_numbers(*this); }
   /// Throws std::invalid_argument if `state` is none.
   void restore(const std::vector<double>& state) {
-    Archive in(state);
-    archive(in);
-    in.end();
+    from_numbers(state, *this);
     assembly_.clear();
     report_ = history_.last().report;
   }
+  auto fields() { return std::tie(format_, time_, weight_, history_); }
 
  private:
-  void archive(Archive& a) {
-    a.version(2.0);
-    a(time_), a(weight_), a(history_);
-  }
-
   void begin(const std::vector<Body>& bodies, double kick, const std::vector<Vec3<double>>& force,
              const std::vector<Vec3<double>>& torque) {
     if (!(kick > 0.0 && kick <= 1.0)) throw std::invalid_argument("kick must be > 0 and <= 1, not " + std::to_string(kick));
@@ -178,10 +166,9 @@ class System {
 
   /// Forces of the contacts that are near, and the motion of the bodies with them.
   void solve_contacts(const std::vector<Body>& bodies, const std::vector<Contact>& contacts) {
-    candidates_.take(contacts, screening_, [&](const Key& key) { return history_.recall(key); });
-    assembly_.update(bodies, contacts, candidates_.sorted(), settings_);
+    assembly_.take(bodies, contacts, screening_, [&](const Key& key) { return history_.recall(key); }, settings_);
     const std::vector<Row>& rows = assembly_.rows();
-    history_.take(candidates_.sorted(), rows);
+    history_.take(rows);
     damp_bodies(bodies);
     begin_rows();
     bool friction = friction_.begin(rows, history_, settings_.dt, kick_, motion_);
@@ -292,7 +279,7 @@ class System {
       impact = Impact();
       impact.time = time_;
       impact.relative_speed = -motion_.gap_rate(r);
-      impact.point = r.place;
+      impact.point = r.point;
     }
     impact.dissipated += lost;
     if (now.active) {
@@ -308,9 +295,9 @@ class System {
     if (!now.idle()) history_.add({r.key_a, r.key_b}, now);
   }
 
+  FormatVersion format_{3.0};
   Settings settings_;
   Screening screening_;
-  Candidates candidates_;
   Assembly assembly_;
   HistoryKeeper history_;
   Motion motion_;

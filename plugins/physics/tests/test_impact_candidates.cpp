@@ -23,7 +23,7 @@ std::unique_ptr<Scene> crowd_in_a_drum(double dt, double theta, double mu) {
   drum.material = 1;
   drum.stiffness = 5e7;
   drum.omega = 3.0;
-  scene->drums.push_back(drum);
+  scene->around.drums.push_back(drum);
   return scene;
 }
 

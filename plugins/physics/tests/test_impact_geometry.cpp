@@ -5,7 +5,7 @@
 #include "catch.hpp"
 
 #include "dembark/impact/system.hpp"
-#include "dembark/impact/triangles.hpp"
+#include "dembark/impact/walls.hpp"
 
 using namespace dembark;
 using namespace dembark::impact;
@@ -35,10 +35,10 @@ std::vector<Triangle> square() {
 }
 
 std::vector<Contact> on_mesh(const std::vector<Body>& bodies, const std::vector<Triangle>& triangles, double reach) {
-  SurfaceContacts surface;
-  surface.update(triangles);
+  Mesh mesh;
+  mesh.update(triangles);
   std::vector<Contact> contacts;
-  TriangleFinder().find(bodies, Wall(), surface, reach, contacts);
+  TriangleFinder().find(bodies, mesh, reach, contacts);
   return contacts;
 }
 

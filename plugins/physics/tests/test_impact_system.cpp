@@ -68,7 +68,7 @@ TEST_CASE("a stack at rest: every contact carries the weight above it") {
     Scene scene(s, logs);
     Plane floor;
     floor.stiffness = 3e7;
-    scene.planes.push_back(floor);
+    scene.around.planes.push_back(floor);
     scene.run(60000);
     double above = 0.0;
     REQUIRE(scene.system().contacts().size() == std::size_t(n));
@@ -92,7 +92,7 @@ TEST_CASE("curved bodies in a box: with theta = 1 energy never grows, with weigh
         p.material = 2;
         p.normal = {double(k == 0) - double(k == 1), double(k == 2) - double(k == 3), 0};
         p.point = -p.normal;
-        scene.planes.push_back(p);
+        scene.around.planes.push_back(p);
       }
       double last = INFINITY, first = 0.0;
       for (int i = 0; i < 2000; ++i) {
@@ -120,7 +120,7 @@ TEST_CASE("results do not depend on the order of bodies, to the last bit") {
   std::shuffle(shuffled.begin(), shuffled.end(), std::mt19937(3));
   Scene one(three_materials(1e-4, 1.0, 0.4, 100.0, 50.0), bodies), two(three_materials(1e-4, 1.0, 0.4, 100.0, 50.0), shuffled);
   for (Scene* s : {&one, &two}) {
-    s->drums.push_back(shell(2.0));
+    s->around.drums.push_back(shell(2.0));
     s->run(4000);
   }
   REQUIRE(one.system().report().impacts_begun > 20);
@@ -190,8 +190,8 @@ TEST_CASE("saved and restored, it goes on bit for bit") {
   const Settings s = three_materials(1e-4, 0.7, 0.4, 100.0, 50.0);
   const std::vector<Body> bodies = crowd(80);
   Scene one(s, bodies), two(s, bodies);
-  one.drums.push_back(shell(3.0));
-  two.drums.push_back(shell(3.0));
+  one.around.drums.push_back(shell(3.0));
+  two.around.drums.push_back(shell(3.0));
   one.run(6000);
   REQUIRE(one.system().report().active > 5);
   two.restore(one.state());
@@ -214,7 +214,7 @@ TEST_CASE("saved and restored, it goes on bit for bit") {
 TEST_CASE("a step done again, with the velocity of the full step and half a kick, gives the same forces and counts once") {
   for (const double theta : {1.0, 0.6}) {
     Scene scene(three_materials(1e-4, theta, 0.4, 100.0, 50.0), crowd(80));
-    scene.drums.push_back(shell(3.0));
+    scene.around.drums.push_back(shell(3.0));
     scene.run(6000);
     const StepReport first = scene.system().report();
     const std::vector<ContactResult> before = scene.system().contacts();
@@ -244,7 +244,7 @@ TEST_CASE("a step done again, with the velocity of the full step and half a kick
 
 TEST_CASE("records: duration, impulse and peak are those of the forces") {
   Scene scene(three_materials(1e-4, 1.0, 0.3), crowd(80));
-  scene.drums.push_back(shell(3.0));
+  scene.around.drums.push_back(shell(3.0));
   struct Sum {
     double impulse = 0.0, peak = 0.0;
     int steps = 0;

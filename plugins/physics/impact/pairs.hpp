@@ -1,7 +1,7 @@
-// Candidates for contact: pairs of discs or spheres, planes, the inside of a drum; triangles in triangles.hpp.
+// Candidates for contact between bodies: pairs of discs or spheres, across periodic boundaries too.
 //
-// Every function appends to `contacts` what lies within `reach` (m): gap <= reach. A candidate that stays open costs little; a pair
-// that is missed acts one step later, with the overlap it has by then. Unbounded space: no periodic images.
+// All searches append to `contacts` what lies within `reach` (m): gap <= reach. A candidate that stays open costs little; a pair that is
+// missed acts one step later, with the overlap it has by then.
 #pragma once
 
 #include <algorithm>
@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -43,32 +44,72 @@ inline void build_grid(const std::vector<Body>& bodies, double cell, PointGrid& 
   grid.build(bodies.size(), [&](std::size_t i) { return bodies[i].position; }, cell);
 }
 
+struct PeriodicBox {
+  Vec3<double> low{}, length{};              ///< m
+  bool periodic[3] = {false, false, false};  ///< x, y, z
+  double beyond = 0.0;                       ///< m, by how much bodies may be outside of the box
+};
+
 /// Finds pairs and remembers a wider list of them, which holds while no body has moved by half of the margin. What it finds does not
 /// depend on the age of that list.
 class PairFinder {
  public:
-  /// Appends all pairs with gap <= reach, sorted by (key_a, key_b), key_a < key_b.
-  void find(const std::vector<Body>& bodies, double reach, std::vector<Contact>& contacts) {
+  PeriodicBox box;
+
+  /// Appends all pairs with gap <= reach, sorted by (key_a, key_b), key_a < key_b. Throws std::invalid_argument where a body might touch
+  /// another one twice, across two boundaries.
+  void find(const std::vector<Body>& own, double reach, std::vector<Contact>& contacts) {
+    const bool images = !own.empty() && (box.periodic[0] || box.periodic[1] || box.periodic[2]);
+    if (images) add_images(own, reach);
+    const std::vector<Body>& bodies = images ? all_ : own;
+    const int count = int(own.size());
     if (!current(bodies, reach)) build(bodies, reach);
     for (const auto& pair : pairs_) {
+      if (pair.first >= count) continue;  // of an image: this contact across a boundary is found from the other side too
       const Body &a = bodies[pair.first], &b = bodies[pair.second];
       const Vec3<double> separation = a.position - b.position;
       const double touch = a.radius + b.radius, far = touch + reach, square = dot(separation, separation);
       if (square > far * far) continue;
       const double distance = std::sqrt(square);
-      contacts.emplace_back();
-      Contact& c = contacts.back();
-      c.a = pair.first;
-      c.b = pair.second;
-      c.key_a = a.id;
-      c.key_b = b.id;
-      c.gap = distance - touch;
       // Coincident centres have no direction; any will do to drive them apart.
-      c.normal = distance > 0.0 ? separation * (1.0 / distance) : Vec3<double>{0.0, 1.0, 0.0};
+      const Vec3<double> normal = distance > 0.0 ? separation * (1.0 / distance) : Vec3<double>{0.0, 1.0, 0.0};
+      const int partner = pair.second < count ? pair.second : origin_[std::size_t(pair.second - count)];
+      contacts.push_back({pair.first, partner, a.id, b.id, distance - touch, normal});
     }
   }
 
  private:
+  /// Fills all_ and origin_.
+  void add_images(const std::vector<Body>& own, double reach) {
+    all_ = own;
+    origin_.clear();
+    double largest = 0.0;
+    for (const Body& b : all_) largest = std::max(largest, b.radius);
+    const double range = 2.0 * largest + reach + box.beyond;
+    double Vec3<double>::* const axes[3] = {&Vec3<double>::x, &Vec3<double>::y, &Vec3<double>::z};
+    for (int k = 0; k < 3; ++k) {
+      const double low = box.low.*axes[k], length = box.length.*axes[k];
+      const auto at = [&](const Body& b) { return b.position.*axes[k]; };
+      if (!box.periodic[k]) continue;
+      if (length < 2.0 * range) {
+        // Between bodies that all lie in one plane across the axis (logs in cross-section) no image can touch anything.
+        const auto ends = std::minmax_element(all_.begin(), all_.end(), [&](const Body& a, const Body& b) { return at(a) < at(b); });
+        if (length - (at(*ends.second) - at(*ends.first)) > 2.0 * largest + reach) continue;
+        throw std::invalid_argument(std::string("the periodic box is too short along ") + "xyz"[k] + ": " + std::to_string(length) +
+                                    " m; a body would touch another one twice; it needs " + std::to_string(2.0 * range) +
+                                    " m or a boundary that is not periodic");
+      }
+      const std::size_t n = all_.size();
+      for (std::size_t i = 0; i < n; ++i) {
+        const double shift = at(all_[i]) < low + range ? length : at(all_[i]) > low + length - range ? -length : 0.0;
+        if (shift == 0.0) continue;
+        all_.push_back(all_[i]);
+        all_.back().position.*axes[k] += shift;
+        origin_.push_back(i < own.size() ? int(i) : origin_[i - own.size()]);
+      }
+    }
+  }
+
   bool current(const std::vector<Body>& bodies, double reach) const {
     if (bodies.size() != reference_.size() || reach > reach_ || reach < 0.25 * reach_) return false;
     const double limit = 0.25 * margin_ * margin_;  // (margin / 2)^2
@@ -115,67 +156,14 @@ class PairFinder {
     if (!std::is_sorted(pairs_.begin(), pairs_.end(), before)) std::sort(pairs_.begin(), pairs_.end(), before);
     reference_ = bodies;
   }
+  std::vector<Body> all_;    ///< and their images
+  std::vector<int> origin_;  ///< of each image the index of its body
   PointGrid grid_;
   std::vector<Body> reference_;
   std::vector<std::pair<int, int>> pairs_, found_;
   std::vector<int> start_;
   double reach_ = 0.0, margin_ = 0.0;
 };
-
-namespace detail {
-inline void wall_contact(const Wall& wall, int body, const Body& b, std::int64_t key, double gap, const Vec3<double>& normal,
-                         const Vec3<double>& velocity, std::vector<Contact>& contacts) {
-  Contact c;
-  c.a = body;
-  c.b = -1;
-  c.key_a = b.id;
-  c.key_b = key;
-  c.gap = gap;
-  c.normal = normal;
-  c.point_velocity = velocity;
-  c.wall_material = wall.material;
-  c.wall_stiffness = wall.stiffness;
-  contacts.push_back(c);
-}
-}  // namespace detail
-
-/// A plane; the free space is on the side of the normal, or on both: then a body is on the side of its centre, and one whose centre lies on
-/// the plane on that of the normal.
-struct Plane : Wall {
-  Vec3<double> point{};                ///< m, any of the plane
-  Vec3<double> normal{0.0, 1.0, 0.0};  ///< unit
-  Vec3<double> velocity{};             ///< m/s, of the surface; moving `point` along is the caller's
-  bool two_sided = false;
-};
-
-inline void plane_contacts(const std::vector<Body>& bodies, const Plane& plane, double reach, std::vector<Contact>& contacts) {
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    const double height = dot(bodies[i].position - plane.point, plane.normal);
-    const double side = plane.two_sided && height < 0.0 ? -1.0 : 1.0, gap = side * height - bodies[i].radius;
-    if (gap <= reach) detail::wall_contact(plane, int(i), bodies[i], plane.id, gap, side * plane.normal, plane.velocity, contacts);
-  }
-}
-
-/// The inside of a drum: a circular cylinder without ends that turns about its axis.
-struct Drum : Wall {
-  Vec3<double> point{};              ///< m, any of the axis
-  Vec3<double> axis{0.0, 0.0, 1.0};  ///< unit
-  double radius = 1.0;               ///< m
-  double omega = 0.0;                ///< rad/s, right-handed about the axis
-  Vec3<double> velocity{};           ///< m/s, of the axis; moving `point` along is the caller's
-};
-
-inline void cylinder_contacts(const std::vector<Body>& bodies, const Drum& drum, double reach, std::vector<Contact>& contacts) {
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    Vec3<double> arm = bodies[i].position - drum.point;
-    arm -= dot(arm, drum.axis) * drum.axis;
-    const double distance = norm(arm), gap = drum.radius - distance - bodies[i].radius;
-    if (gap > reach || !(distance > 0.0)) continue;
-    const Vec3<double> outward = arm * (1.0 / distance);
-    detail::wall_contact(drum, int(i), bodies[i], drum.id, gap, -outward,
-                         drum.velocity + (drum.omega * drum.radius) * cross(drum.axis, outward), contacts);
-  }
-}
 
 }  // namespace impact
 }  // namespace dembark
