@@ -104,21 +104,10 @@ void FixLcpImpact::init() {
   check_order();
   find_meshes();
   reset_dt();
-  on_root([this] { begin_file(); });
-}
-
-void FixLcpImpact::begin_file() {
-  const std::string &path = options_.impacts_file;
-  if (path.empty() || !file_.path().empty()) return;
   std::string about;
   for (std::size_t w = 0; w < options_.walls.size(); ++w)
     about += (w ? ", " : "") + std::to_string(-1 - static_cast<long>(w)) + " = " + options_.walls[w];
-  try {
-    if (file_kept_ < 0) file_.begin(path, about.empty() ? "there is none" : about);
-    else file_.resume(path, file_kept_);
-  } catch (const std::runtime_error &e) {
-    throw std::runtime_error(std::string("impacts: ") + e.what());
-  }
+  on_root([&] { file_.open(options_.impacts_file, about.empty() ? "there is none" : about); });
 }
 
 void FixLcpImpact::reset_dt() {
@@ -215,7 +204,7 @@ void FixLcpImpact::take_meshes(double dt) {
         domain->minimum_image(nearest);
         now[i].velocity[c] = vec(nearest) * (1.0 / dt);
       }
-    mesh.update(now);
+    mesh.update(std::move(now));
     // At the very first set-up nothing has moved yet, and the engine does not tell what will.
     mesh.velocity_known = !moving || dt > 0.0 || mesh.speed > 0.0;
   }
@@ -257,7 +246,7 @@ void FixLcpImpact::take_bodies() {
 void FixLcpImpact::apply() {
   all_push_.resize(bodies_.size());
   const double turn = 1.0 / options_.torque_scale(domain->dimension);
-  for (std::size_t i = 0; i < bodies_.size(); ++i) all_push_[order_[i]] = {force_[i], turn * torque_[i]};
+  for (std::size_t i = 0; i < bodies_.size(); ++i) all_push_[order_[i]] = {pushes_[i].force, turn * pushes_[i].torque};
   own_push_.resize(own_atom_.size());
   if (comm->nprocs == 1) {
     own_push_.swap(all_push_);
@@ -275,12 +264,11 @@ void FixLcpImpact::apply() {
 
 /// The forces of the moment, on the first rank.
 void FixLcpImpact::solve(double kick) {
-  force_.assign(bodies_.size(), Vec());
-  torque_.assign(bodies_.size(), Vec());
   const double time = clock_time_ + double(update->ntimestep - clock_step_) * update->dt;
   Surroundings &around = options_.around;
   const auto search = [&](double reach, std::vector<Contact> &contacts) { around.find(bodies_, reach, contacts); };
-  report_ = system_->step(bodies_, search, around.wall_speed(), time, kick, force_, torque_);
+  report_ = system_->step(bodies_, search, around.wall_speed(), time, kick);
+  pushes_ = system_->pushes();
   file_.append(system_->take_finished());
   results_.clear();
   last_step_ = update->ntimestep;
@@ -304,8 +292,7 @@ void FixLcpImpact::setup(int) {
   do_step(0.0, [this] {
     // A run that goes on where one has ended: the forces of this step are known.
     if (last_step_ != update->ntimestep || !last_.hold(bodies_, box())) return solve(0.5);  // half a kick follows, from the full step
-    force_ = last_.force;
-    torque_ = last_.torque;
+    pushes_ = last_.pushes;
   });
   fill_local();
 }
@@ -326,8 +313,7 @@ void FixLcpImpact::keep_end_of_step() {
   on_root([this] {
     if (!kept_) {  // of the step that has just been done
       last_.keep(bodies_);
-      last_.force = force_;
-      last_.torque = torque_;
+      last_.pushes = pushes_;
       kept_ = true;
     }
     take_bodies();

@@ -44,15 +44,10 @@ class FixLcpImpact : public Fix {
   double memory_usage();
 
  private:
-  typedef dembark::Vec3<double> Vec;
-  struct Push {
-    Vec force, torque;
-  };
   static constexpr int local_columns = 13;
 
   void check_order();
   void find_meshes();
-  void begin_file();
   void gather_atoms();
   void gather_meshes(double dt);
   void take_bodies();
@@ -78,17 +73,15 @@ class FixLcpImpact : public Fix {
   std::vector<std::vector<dembark::Triangle>> mesh_;  // on the first rank: of each mesh as it is now, empty where it stands
   std::vector<int> own_atom_;                         // of each own body, in the order in which they are gathered
   std::vector<dembark::impact::Body> own_body_;
-  std::vector<Push> own_push_;
+  std::vector<dembark::impact::Push> own_push_;
 
   // On the first rank: all bodies of the group by number, as they came and what each of them gets, and the model.
   std::vector<int> counts_, offsets_;  // bytes, of the last gather
   std::vector<dembark::impact::Body> all_body_, bodies_;
-  std::vector<Push> all_push_;
+  std::vector<dembark::impact::Push> all_push_, pushes_;
   std::vector<std::size_t> order_;
-  std::vector<Vec> force_, torque_;
   std::unique_ptr<dembark::impact::System> system_;
   dembark::impact::ImpactFile file_;
-  long long file_kept_ = -1;                             // bytes, from a restart file; -1: none
   std::vector<dembark::impact::ContactResult> results_;  // of the step of a restart file
 
   dembark::impact::LastForces last_;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "dembark/impact/types.hpp"
-#include "dembark/impact/walls.hpp"
+#include "dembark/impact/geometry.hpp"
 
 namespace dembark_liggghts {
 

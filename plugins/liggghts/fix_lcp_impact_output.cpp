@@ -49,7 +49,7 @@ void FixLcpImpact::fill_local() {
 double FixLcpImpact::compute_vector(int i) { return to_numbers(report_)[std::size_t(i)]; }
 
 double FixLcpImpact::memory_usage() {
-  return double(bodies_.size() * (sizeof(Body) + 4 * sizeof(Vec)) + std::size_t(report_.contacts) * sizeof(Contact) +
+  return double(bodies_.size() * (sizeof(Body) + 2 * sizeof(Push)) + std::size_t(report_.contacts) * sizeof(Contact) +
                 std::size_t(local_capacity_) * local_columns * sizeof(double));
 }
 
@@ -65,15 +65,12 @@ void FixLcpImpact::archive(Archive &a) {
     if (options_.walls[k] != walls[k])
       throw std::invalid_argument("wall " + std::to_string(k + 1) + " is " + walls[k] + " in the restart file and " + options_.walls[k] +
                                   " in the command; keep the order, add walls at the end, take them away from the end");
-  std::string path = options_.impacts_file;
-  long long bytes = file_.path().empty() ? file_kept_ : file_.bytes();
   std::vector<double> state = system_->state();
   std::vector<ContactResult> contacts = results();
-  a.all(std::tie(last_step_, last_dt_, clock_time_, clock_step_, last_, report_, path, bytes, state, contacts));
+  a.all(std::tie(last_step_, last_dt_, clock_time_, clock_step_, last_, report_, file_, state, contacts));
   a.end();
   results_ = contacts;
   if (!a.reading()) return;
-  file_kept_ = path == options_.impacts_file ? bytes : -1;  // another file begins anew
   system_->restore(state);
   kept_ = true;
 }

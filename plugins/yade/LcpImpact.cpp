@@ -221,7 +221,7 @@ void LcpImpact::gatherWalls() {
 		if (mesh.empty()) continue;
 		if (around.meshes.size() == meshes) around.meshes.emplace_back();
 		static_cast<impact::Wall&>(around.meshes[meshes]) = common;
-		around.meshes[meshes++].update(mesh);
+		around.meshes[meshes++].update(std::move(mesh));
 	}
 	around.meshes.resize(meshes);
 }
@@ -244,34 +244,35 @@ void LcpImpact::findContacts(double reach, std::vector<impact::Contact>& contact
 void LcpImpact::prepare() {
 	const impact::Settings now = settings();
 	if (system && impact::to_numbers(now) == impact::to_numbers(system->settings())) return;
-	const std::vector<double> state = system ? system->state() : lcp_impact::decode(savedState);
-	system                          = std::make_unique<impact::System>(now);
-	if (!state.empty()) system->restore(state);
+	const bool                begins = !system;
+	const std::vector<double> state  = system ? system->state() : std::vector<double>();
+	system                           = std::make_unique<impact::System>(now);
+	if (!begins) return system->restore(state);
+	if (savedState.empty()) return;
+	impact::Archive saved(lcp_impact::decode(savedState));
+	archive(saved);
 }
 
 void LcpImpact::action() {
 	if (scene->isPeriodic) fail("LcpImpact: the scene is periodic; use an aperiodic one");
 	if (stiffnessRows.empty()) fail("LcpImpact.stiffness is not set; give the stiffness of the logs' boundaries in N/m");
 	const bool first = steps == 0 && velocityAtStart;
-	Vectors    force, torque;
 	try {
 		gatherLogs(integrator().gravity);
 		gatherWalls();
-		force.resize(logs.size());
-		torque.resize(logs.size());
 		prepare();
 		const auto search = [&](double reach, std::vector<impact::Contact>& contacts) { findContacts(reach, contacts); };
-		auto       report = system->step(logs, search, around.wall_speed(), scene->time, first ? 0.5 : 1.0, force, torque);
+		auto       report = system->step(logs, search, around.wall_speed(), scene->time, first ? 0.5 : 1.0);
 		std::tie(contactCount, activeCount, impactsBegun, peakForce, impulseSum, dissipatedEnergy, elasticEnergy, pivots,
 		         blockSteps, pivotsTotal, certificate, worstCertificate, highestForce) = report.fields();
 	} catch (const std::exception& error) {
 		if (std::string(error.what()).rfind("dembark: ", 0) == 0) throw;
 		fail(std::string("LcpImpact, step ") + std::to_string(scene->iter) + ": " + error.what());
 	}
-	if (first) moveBack(force, torque);
+	if (first) moveBack();
 	for (std::size_t i = 0; i < logs.size(); ++i) {
-		scene->forces.addForce(static_cast<Body::id_t>(logs[i].id), eigen(force[i]));
-		scene->forces.addTorque(static_cast<Body::id_t>(logs[i].id), eigen(torque[i]));
+		scene->forces.addForce(static_cast<Body::id_t>(logs[i].id), eigen(system->pushes()[i].force));
+		scene->forces.addTorque(static_cast<Body::id_t>(logs[i].id), eigen(system->pushes()[i].torque));
 	}
 	pushWalls();
 	writeImpacts();
@@ -279,11 +280,13 @@ void LcpImpact::action() {
 	lastIteration = scene->iter;
 }
 
-void LcpImpact::moveBack(const Vectors& force, const Vectors& torque) const {
+/// Velocities of the full step to those of half a step before.
+void LcpImpact::moveBack() const {
 	for (std::size_t i = 0; i < logs.size(); ++i) {
 		if (std::isinf(logs[i].mass)) continue;
 		State&         state = *Body::byId(static_cast<Body::id_t>(logs[i].id), scene)->state;
-		const Vector3r f = eigen(logs[i].force) + eigen(force[i]), t = eigen(logs[i].torque) + eigen(torque[i]);
+		const Vector3r f     = eigen(logs[i].force) + eigen(system->pushes()[i].force);
+		const Vector3r t     = eigen(logs[i].torque) + eigen(system->pushes()[i].torque);
 		for (int k = 0; k < 3; ++k) {
 			if (!(state.blockedDOFs & State::axisDOF(k))) state.vel[k] -= 0.5 * scene->dt * f[k] / state.mass;
 			if (!(state.blockedDOFs & State::axisDOF(k, true))) state.angVel[k] -= 0.5 * scene->dt * t[k] / state.inertia[k];
@@ -306,25 +309,30 @@ void LcpImpact::pushWalls() {
 	}
 }
 
+/// What saved scenes keep: the state of the model, and where its file of impacts ends.
+void LcpImpact::archive(impact::Archive& a) {
+	impact::FormatVersion format{3.0};
+	std::vector<double>   state = system->state();
+	a.all(std::tie(format, state, file));
+	a.end();
+	if (a.reading()) system->restore(state);
+}
+
 void LcpImpact::preSave(LcpImpact&) {
-	if (system) savedState = lcp_impact::encode(system->state());
+	if (!system) return;
+	impact::Archive out;
+	archive(out);
+	savedState = lcp_impact::encode(out.numbers());
 }
 
 void LcpImpact::writeImpacts() {
 	const std::vector<impact::Impact> ended = system->take_finished();
-	if (impactsFile.empty()) return;
 	try {
-		if (file.path() != impactsFile) {
-			// Going on from a saved scene: lines that the run wrote after saving will come again.
-			if (writtenFile == impactsFile && writtenBytes > 0) file.resume(impactsFile, writtenBytes);
-			else file.begin(impactsFile, "");
-		}
+		file.open(impactsFile, "");
 		file.append(ended);
 	} catch (const std::runtime_error& error) {
 		fail(std::string("LcpImpact.impactsFile: ") + error.what(), 1);
 	}
-	writtenFile  = impactsFile;
-	writtenBytes = file.bytes();
 }
 
 boost::python::list LcpImpact::contacts() const {

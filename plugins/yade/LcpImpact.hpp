@@ -9,7 +9,7 @@
 
 #include "dembark/impact/impact_file.hpp"
 #include "dembark/impact/system.hpp"
-#include "dembark/impact/walls.hpp"
+#include "dembark/impact/geometry.hpp"
 
 namespace yade {
 
@@ -85,9 +85,7 @@ public:
 		((vector<Real>,dampingRows,,Attr::hidden,"Material id (-1 = all) and damping, in turn"))
 		((vector<Real>,frictionRows,,Attr::hidden,"Two material ids (-1 = all) and six numbers, in turn"))
 		((vector<shared_ptr<LogWall>>,wallList,,Attr::hidden,"Walls"))
-		((string,savedState,"",Attr::hidden,"State of the contacts, filled in before saving"))
-		((string,writtenFile,"",Attr::hidden,"File that writtenBytes belongs to"))
-		((long,writtenBytes,0,Attr::hidden,"Length of the file of impacts"))
+		((string,savedState,"",Attr::hidden,"State of the contacts and of the file of impacts, filled in before saving"))
 		, /*ctor*/
 		, /*py*/
 		.add_property("stiffness",&LcpImpact::getStiffness,&LcpImpact::setStiffness,"Stiffness [N/m] of the logs' boundaries, > 0: a number, or a dict by id or label of the material. Required.")
@@ -100,8 +98,6 @@ public:
 	// clang-format on
 
 private:
-	using Vectors = std::vector<::dembark::Vec3<double>>;
-
 	const NewtonIntegrator&     integrator() const;
 	void                        gatherLogs(const Vector3r& gravity);
 	::dembark::impact::Body     logOf(const Body&);
@@ -110,9 +106,10 @@ private:
 	void                        findContacts(double reach, std::vector<::dembark::impact::Contact>&);
 	::dembark::impact::Settings settings() const;
 	void                        prepare();
-	void                        moveBack(const Vectors& force, const Vectors& torque) const;
+	void                        moveBack() const;
 	void                        pushWalls();
 	void                        writeImpacts();
+	void                        archive(::dembark::impact::Archive&);
 	std::string                 wallName(std::size_t number) const;
 
 	std::unique_ptr<::dembark::impact::System> system;

@@ -27,9 +27,12 @@ using Key = std::pair<std::int64_t, std::int64_t>;
 inline bool turned(const Contact& c) { return c.b >= 0 && c.key_b < c.key_a; }
 inline Key key_of(const Contact& c) { return turned(c) ? Key(c.key_b, c.key_a) : Key(c.key_a, c.key_b); }
 
+struct ContactHistory;
+
 /// A contact with key_a < key_b for pairs, and what follows from the materials.
 struct Row : Contact {
-  int history = -1;  ///< index into what is remembered, or -1
+  int memory = -1;                         ///< index into what is remembered, or -1
+  const ContactHistory* before = nullptr;  ///< what is known of it, maybe by another name; see history.hpp
   const PairLaw* law = nullptr;
   double stiffness = 0.0;           ///< s, N/m, both springs in series
   double viscous = 0.0;             ///< c / tau, N/m
@@ -41,6 +44,7 @@ struct Row : Contact {
 
 class Assembly {
  public:
+  std::vector<Row>& rows() { return rows_; }
   const std::vector<Row>& rows() const { return rows_; }
   std::size_t size() const { return rows_.size(); }
   const Eigen::SparseMatrix<double>& matrix() const { return matrix_; }
@@ -53,10 +57,10 @@ class Assembly {
     sorted_.clear();
     for (std::size_t i = 0; i < contacts.size(); ++i) {
       const Key key = key_of(contacts[i]);
-      const int history = recall(key);
-      if (history < 0 && !screening.near(i)) continue;
+      const int memory = recall(key);
+      if (memory < 0 && !screening.near(i)) continue;
       screening.keep(i);
-      sorted_.push_back({key, int(i), history});
+      sorted_.push_back({key, int(i), memory});
     }
     sort();
     const std::size_t pairs = settings.materials.size() * settings.materials.size();
@@ -66,7 +70,7 @@ class Assembly {
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       const Contact& c = contacts[std::size_t(sorted_[i].contact)];
       if (i > 0 && sorted_[i - 1].key == sorted_[i].key) refuse(c, "the same two keys come twice; every contact needs its own");
-      rows_[i].history = sorted_[i].history;
+      rows_[i].memory = sorted_[i].memory;
       fill(bodies, c, settings, rows_[i]);
     }
   }
@@ -104,7 +108,7 @@ class Assembly {
  private:
   struct Sorted {
     Key key;
-    int contact, history;
+    int contact, memory;
   };
   /// What the contacts of two materials have in common.
   struct Springs {

@@ -29,9 +29,6 @@ struct NormalSum {
   Vec3<double> force{};  ///< N
   int active = 0;        ///< contacts with N > 0
 };
-struct TangentialSum {
-  Vec3<double> force{}, torque{};  ///< N, N m
-};
 /// m/s and rad/s.
 struct Velocity {
   Vec3<double> velocity{}, spin{};
@@ -47,7 +44,7 @@ class Motion {
  public:
   std::vector<BodyResponse> response;
   std::vector<NormalSum> normal;
-  std::vector<TangentialSum> tangential;
+  std::vector<Push> tangential;
   std::vector<Velocity> change;  ///< v' - v, omega' - omega; see move()
   std::vector<int> damped;       ///< bodies with lambda > 0, in the order of the contacts
 
@@ -57,7 +54,7 @@ class Motion {
     interval_ = kick * dt;
     response.resize(bodies.size());
     normal.assign(bodies.size(), NormalSum());
-    tangential.assign(bodies.size(), TangentialSum());
+    tangential.assign(bodies.size(), Push());
     change.resize(bodies.size());
     moved_.resize(bodies.size());
     acceleration_.resize(bodies.size());
@@ -86,7 +83,7 @@ class Motion {
     normal[r.b].force -= force * r.normal;
     ++normal[r.b].active;
   }
-  void clear_tangential() { std::fill(tangential.begin(), tangential.end(), TangentialSum()); }
+  void clear_tangential() { std::fill(tangential.begin(), tangential.end(), Push()); }
   void add_tangential(const Row& r, const Vec3<double>& t) {
     const Vec3<double> moment = cross(r.normal, t);
     tangential[r.a].force += t;

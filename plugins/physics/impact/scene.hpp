@@ -1,13 +1,14 @@
 // A few bodies, walls and constant forces on their own, without an engine: the leapfrog that engines run, around impact::System.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
 #include <vector>
 
+#include "geometry.hpp"
 #include "system.hpp"
-#include "walls.hpp"
 
 namespace dembark {
 namespace impact {
@@ -21,8 +22,6 @@ class Scene {
   bool row = false;    ///< bodies along x that never change places: contacts between neighbours by number, and with the planes only
 
   Scene(Settings settings, std::vector<Body> bodies) : system_(std::move(settings)), bodies_(std::move(bodies)) {
-    force_.resize(bodies_.size());
-    torque_.resize(bodies_.size());
     velocity_.resize(bodies_.size());
     spin_.resize(bodies_.size());
   }
@@ -39,22 +38,19 @@ class Scene {
 
   /// Contact forces of the moment. Asking twice changes nothing.
   const StepReport& forces() {
-    force_.assign(bodies_.size(), {});
-    torque_.assign(bodies_.size(), {});
     const double kick = count_ == 0 ? 0.5 : 1.0, dt = system_.settings().dt;
-    contacts_.clear();
-    if (row) row_contacts();
-    else if (reach > 0.0) around.find(bodies_, reach, contacts_);
-    const auto search = [this](double far, std::vector<Contact>& contacts) { around.find(bodies_, far, contacts); };
-    const StepReport& report = row || reach > 0.0 ? system_.step(bodies_, contacts_, time(), kick, force_, torque_)
-                                                  : system_.step(bodies_, search, around.wall_speed(), time(), kick, force_, torque_);
+    const auto search = [this](double far, std::vector<Contact>& contacts) {
+      if (row) row_contacts(contacts);
+      else around.find(bodies_, far, contacts);
+    };
+    const StepReport& report = system_.step(bodies_, search, around.wall_speed(), time(), kick, row ? INFINITY : reach);
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       const Body& b = bodies_[i];
       velocity_[i] = b.velocity;
       spin_[i] = b.spin;
       if (count_ == 0) continue;
-      velocity_[i] += (0.5 * dt / b.mass) * (b.force + force_[i]);
-      spin_[i] += (0.5 * dt / b.inertia) * (b.torque + torque_[i]);
+      velocity_[i] += (0.5 * dt / b.mass) * (b.force + system_.pushes()[i].force);
+      spin_[i] += (0.5 * dt / b.inertia) * (b.torque + system_.pushes()[i].torque);
     }
     return report;
   }
@@ -64,8 +60,8 @@ class Scene {
     const double dt = system_.settings().dt, kick = (count_ == 0 ? 0.5 : 1.0) * dt;
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       Body& b = bodies_[i];
-      b.velocity += (kick / b.mass) * (b.force + force_[i]);
-      b.spin += (kick / b.inertia) * (b.torque + torque_[i]);
+      b.velocity += (kick / b.mass) * (b.force + system_.pushes()[i].force);
+      b.spin += (kick / b.inertia) * (b.torque + system_.pushes()[i].torque);
       b.position += dt * b.velocity;
     }
     for (Plane& p : around.planes) p.point += dt * p.velocity;
@@ -113,23 +109,21 @@ class Scene {
     for (Drum& d : around.drums) a(d.point);
   }
 
-  void row_contacts() {
+  void row_contacts(std::vector<Contact>& contacts) {
     for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
       const Body &a = bodies_[i], &b = bodies_[i + 1];
-      contacts_.push_back(
-          {int(i), int(i + 1), a.id, b.id, b.position.x - a.position.x - a.radius - b.radius, Vec3<double>{-1.0, 0.0, 0.0}});
+      contacts.push_back({int(i), int(i + 1), a.id, b.id, b.position.x - a.position.x - a.radius - b.radius, Vec3<double>{-1.0, 0.0, 0.0}});
     }
     for (const Plane& p : around.planes) {
       const std::size_t end = p.normal.x > 0.0 ? 0 : bodies_.size() - 1;
       const double gap = (bodies_[end].position.x - p.point.x) * p.normal.x - bodies_[end].radius;
-      detail::wall_contact(p, int(end), bodies_[end], p.id, gap, p.normal, p.velocity, contacts_);
+      detail::wall_contact(p, int(end), bodies_[end], p.id, gap, p.normal, p.velocity, contacts);
     }
   }
 
   System system_;
   std::vector<Body> bodies_;
-  std::vector<Contact> contacts_;
-  std::vector<Vec3<double>> force_, torque_, velocity_, spin_;
+  std::vector<Vec3<double>> velocity_, spin_;
   std::int64_t count_ = 0;
 };
 

@@ -127,6 +127,13 @@ struct Settings {
   auto fields() { return std::tie(dt, theta, friction_sweeps, lcp.method, lcp.tolerance, materials, pairs); }
 };
 
+/// What contacts do to a body.
+struct Push {
+  Vec3<double> force{}, torque{};  ///< N, N m
+
+  auto fields() { return std::tie(force, torque); }
+};
+
 /// Of the last step, and totals since the system began (marked).
 struct StepReport {
   int contacts = 0;                ///< candidates
@@ -151,9 +158,9 @@ struct StepReport {
 
   /// At the beginning of a step: the totals.
   StepReport totals() const {
-    StepReport t;
-    t.impacts_begun = impacts_begun, t.impulse_sum = impulse_sum, t.dissipated_energy = dissipated_energy, t.pivots_total = pivots_total;
-    t.worst_certificate = worst_certificate, t.peak_force_so_far = peak_force_so_far;
+    StepReport t = *this;
+    t.contacts = t.active = t.pivots = t.block_steps = 0;
+    t.peak_force = t.elastic_energy = t.certificate = 0.0;
     return t;
   }
 };
