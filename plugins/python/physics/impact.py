@@ -283,17 +283,18 @@ def _walls(walls: Sequence[Plane | Drum], materials: int) -> tuple[Floats, Float
         if not isinstance(wall, Plane | Drum):
             raise TypeError(f"walls must be Plane or Drum objects, not {wall!r}")
         hard = float(numbers("wall stiffness", wall.stiffness, "N/m", low=0.0, low_open=True, infinite=True))
+        head = [_wall_key(number), materials + number, hard]
         if isinstance(wall, Drum):
             centre = numbers("centre", wall.centre, "m")
             if centre.shape != (2,):
                 raise ValueError(f"centre must have two components (m), not {wall.centre!r}")
             size = float(numbers("radius", wall.radius, "m", low=0.0, low_open=True))
-            drums.append([_wall_key(number), materials + number, hard, *centre, 0, 0, 0, 1, size, float(numbers("omega", wall.omega, "rad/s"))])
+            drums.append([*head, *centre, 0, 0, 0, 1, size, float(numbers("omega", wall.omega, "rad/s"))])
         else:
             normal = _three("normal", wall.normal, "")
             if not normal.any():
                 raise ValueError("normal must not be zero")
-            planes.append([_wall_key(number), materials + number, hard, *_three("point", wall.point, "m"), *(normal / np.linalg.norm(normal)),
+            planes.append([*head, *_three("point", wall.point, "m"), *(normal / np.linalg.norm(normal)),
                            *_three("velocity", wall.velocity, "m/s")])
     return np.array(planes, dtype=float).reshape(-1, 12), np.array(drums, dtype=float).reshape(-1, 11)
 
