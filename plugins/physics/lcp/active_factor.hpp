@@ -45,7 +45,7 @@ class ActiveFactor {
     const Index k = size();
     auto row = rows_.row(k);
     row.setZero();
-    m.add_column(p, 1.0, row.data());
+    m.each(p, [&row](Index i, double value) { row[i] = value; });
     for (const Index a : order_) row[a] = 0.0;
     const Eigen::RowVectorXd l = rows_.col(p).head(k).transpose();
     const double square = m.diagonal(p) - l.squaredNorm();

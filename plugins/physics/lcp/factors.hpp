@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/SparseCholesky>
+#include <type_traits>
 
 #include "matrices.hpp"
 
@@ -17,105 +18,107 @@ struct NotDefinite {
   double pivot, diagonal;
 };
 
-/// The indices of an active set, and the way between it and all unknowns.
-class ActiveIndices {
+/// L L^T by the function below Eigen::LLT, which tells where it failed and makes no norm.
+class DenseCholesky {
  public:
-  std::vector<Index> index;
-
-  Index size() const { return Index(index.size()); }
-  Index operator[](Index k) const { return index[std::size_t(k)]; }
-
-  void take(const std::vector<char>& active) {
-    index.clear();
-    for (std::size_t i = 0; i < active.size(); ++i)
-      if (active[i]) index.push_back(Index(i));
-  }
-
-  /// z_A += solve(right_A); arrays of full length.
-  template <class Solve>
-  void add_solution(const Eigen::ArrayXd& right, Eigen::ArrayXd& z, Solve solve) {
-    x_.resize(size());
-    for (Index k = 0; k < size(); ++k) x_[k] = right[(*this)[k]];
-    solve(x_);
-    for (Index k = 0; k < size(); ++k) z[(*this)[k]] += x_[k];
-  }
-
- private:
-  Eigen::VectorXd x_;
-};
-
-/// Dense, L L^T. By the function below Eigen::LLT, which tells where it failed and makes no norm.
-class DenseFactor {
- public:
-  /// Throws NotDefinite.
-  void compute(const DenseBlock& m, const std::vector<char>& active) {
-    active_.take(active);
-    const Index n = active_.size();
+  /// Pivots, up to the first that fails. The diagonal is taken `scale` times.
+  Eigen::ArrayXd compute(const DenseBlock& m, const std::vector<Index>& index, double scale) {
+    const Index n = Index(index.size());
     lower_.resize(n, n);
     for (Index k = 0; k < n; ++k) {
-      const auto column = m.column(active_[k]);
-      for (Index r = k; r < n; ++r) lower_(r, k) = column[active_[r]];
+      const double* column = m.values + index[std::size_t(k)] * m.n;
+      for (Index r = k; r < n; ++r) lower_(r, k) = column[index[std::size_t(r)]];
     }
+    lower_.diagonal() *= scale;
     const Index failed = Eigen::internal::llt_inplace<double, Eigen::Lower>::blocked(lower_);
-    const double least = definite_fraction(m.n);
-    for (Index k = 0; k < (failed < 0 ? n : failed); ++k) check(m, k, lower_(k, k) * lower_(k, k), least);
-    if (failed >= 0) check(m, failed, m.diagonal(active_[failed]) - lower_.row(failed).head(failed).squaredNorm(), least);
+    if (failed < 0) return lower_.diagonal().array().square();
+    Eigen::ArrayXd pivots = lower_.diagonal().head(failed + 1).array().square();
+    pivots[failed] = scale * m.diagonal(index[std::size_t(failed)]) - lower_.row(failed).head(failed).squaredNorm();
+    return pivots;
   }
 
-  void add_solution(const Eigen::ArrayXd& right, Eigen::ArrayXd& z) {
-    active_.add_solution(right, z, [this](Eigen::VectorXd& x) {
-      lower_.triangularView<Eigen::Lower>().solveInPlace(x);
-      lower_.triangularView<Eigen::Lower>().transpose().solveInPlace(x);
-    });
+  void solve(Eigen::VectorXd& x) const {
+    lower_.triangularView<Eigen::Lower>().solveInPlace(x);
+    lower_.triangularView<Eigen::Lower>().transpose().solveInPlace(x);
   }
 
  private:
-  void check(const DenseBlock& m, Index k, double pivot, double least) const {
-    const double diagonal = m.diagonal(active_[k]);
-    if (!(pivot > least * diagonal)) throw NotDefinite{active_[k], pivot, diagonal};
-  }
-
-  ActiveIndices active_;
   Eigen::MatrixXd lower_;
 };
 
-/// Sparse, L D L^T, in the order of the block, which is made fill-reducing once for the whole pattern.
-class SparseFactor {
+/// L D L^T, in the order of the block, which is made fill-reducing once for the whole pattern.
+class SparseCholesky {
  public:
-  /// Throws NotDefinite.
-  void compute(const SparseBlock& m, const std::vector<char>& active) {
-    active_.take(active);
-    const Index n = active_.size();
-    if (n == 0) return;
-    place_.assign(active.size(), -1);
-    for (Index k = 0; k < n; ++k) place_[std::size_t(active_[k])] = int(k);
+  Eigen::ArrayXd compute(const SparseBlock& m, const std::vector<Index>& index, double scale) {
+    const Index n = Index(index.size());
+    if (n == 0) return {};
+    place_.assign(std::size_t(m.n), -1);
+    for (Index k = 0; k < n; ++k) place_[std::size_t(index[std::size_t(k)])] = int(k);
     upper_.resize(n, n);
     upper_.reserve(m.start[m.n] - m.start[0]);
     for (Index k = 0; k < n; ++k) {
-      const Index j = active_[k];
       upper_.startVec(k);
-      for (int p = m.start[j]; p < m.start[j + 1] && m.row[p] <= j; ++p)
-        if (const int i = place_[std::size_t(m.row[p])]; i >= 0) upper_.insertBack(i, k) = m.value[p];
+      m.each(index[std::size_t(k)], [this, k, scale](Index row, double value) {
+        const int i = place_[std::size_t(row)];
+        if (i >= 0 && i <= k) upper_.insertBackByOuterInner(k, i) = i < k ? value : scale * value;
+      });
     }
     upper_.finalize();
-    factor_.compute(upper_);
-    const double least = definite_fraction(m.n);
-    const auto pivots = factor_.vectorD();
-    for (Index k = 0; k < n; ++k) {
-      const Index i = active_[k];
-      if (!(pivots[k] > least * m.diagonal(i))) throw NotDefinite{i, pivots[k], m.diagonal(i)};
-    }
+    factor_.compute_natural(upper_);
+    return factor_.vectorD().array();
   }
 
-  void add_solution(const Eigen::ArrayXd& right, Eigen::ArrayXd& z) {
-    if (active_.size() > 0) active_.add_solution(right, z, [this](Eigen::VectorXd& x) { x = factor_.solve(x); });
+  void solve(Eigen::VectorXd& x) const {
+    if (x.size() > 0) x = factor_.solve(x);
   }
 
  private:
-  ActiveIndices active_;
+  struct Ldlt : Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Upper, Eigen::NaturalOrdering<int>> {
+    /// compute() of Eigen 3.4 copies the matrix in order to put it into the order that it has.
+    void compute_natural(const Eigen::SparseMatrix<double>& upper) {
+      analyzePattern_preordered(upper, true);
+      factorize_preordered<true>(upper);
+    }
+  };
+
   std::vector<int> place_;
   Eigen::SparseMatrix<double> upper_;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Upper, Eigen::NaturalOrdering<int>> factor_;
+  Ldlt factor_;
+};
+
+template <class Matrix>
+class Factor {
+ public:
+  /// Of the block of the active set, less `shift` of its diagonal. Throws NotDefinite.
+  void compute(const Matrix& m, const std::vector<char>& active, double shift = 0.0) {
+    index_.clear();
+    for (Index i = 0; i < m.n; ++i)
+      if (active[std::size_t(i)]) index_.push_back(i);
+    const Eigen::ArrayXd pivots = cholesky_.compute(m, index_, 1.0 - shift);
+    least_pivot_ = 1.0;
+    for (Index k = 0; k < pivots.size(); ++k) {
+      const Index i = index_[std::size_t(k)];
+      const double diagonal = m.diagonal(i);
+      if (!(pivots[k] > definite_fraction(m.n) * diagonal)) throw NotDefinite{i, pivots[k], diagonal};
+      least_pivot_ = std::min(least_pivot_, pivots[k] / diagonal);
+    }
+  }
+
+  /// Of the last factor, in units of the diagonal.
+  double least_pivot() const { return least_pivot_; }
+
+  /// z_A += M_AA^-1 right_A; arrays of full length.
+  void add_solution(const Eigen::ArrayXd& right, Eigen::ArrayXd& z) {
+    x_ = right(index_);
+    cholesky_.solve(x_);
+    z(index_) += x_.array();
+  }
+
+ private:
+  std::conditional_t<std::is_same_v<Matrix, DenseBlock>, DenseCholesky, SparseCholesky> cholesky_;
+  std::vector<Index> index_;
+  Eigen::VectorXd x_;
+  double least_pivot_ = 1.0;
 };
 
 }  // namespace dembark::lcp

@@ -30,6 +30,15 @@ class Relaxation {
     for (int k = 0; k < count; ++k) rows.template relax<false>();
   }
 
+  /// Until a sweep leaves the set of positive forces as it is, or so many times.
+  void find_set(int most) {
+    conjugate_.take_face(rows);
+    for (int k = 0; k < most; ++k) {
+      sweep(1);
+      if (conjugate_.take_face(rows)) break;
+    }
+  }
+
   /// To four digits of each row's own scale, or as near as a few sweeps come.
   void approach() {
     sweep(2);

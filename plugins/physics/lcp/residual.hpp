@@ -61,9 +61,18 @@ struct Unknowns : Residual {
     active.assign(std::size_t(m.n), 0);
   }
 
+  /// w and s of z.
   template <class Matrix>
   void measure(const Matrix& m) {
-    m.multiply(q.data(), z.data(), w.data(), s.data());
+    w = q;
+    s = q.abs();
+    for (Index j = 0; j < m.n; ++j)
+      if (z[j] != 0.0)
+        m.each(j, [x = z[j], w_ = w.data(), s_ = s.data()](Index i, double value) {
+          const double t = value * x;
+          w_[i] += t;
+          s_[i] += std::fabs(t);
+        });
   }
 
   /// The set of the positive z.

@@ -132,8 +132,7 @@ class SinglePivots {
     for (int pass = 0;; ++pass) {
       u.measure(m);
       if (pass == 3 || u.active_error() <= 0.05 * fraction) break;
-      right_ = -u.w;
-      factor_.add_solution(right_, u.z);
+      factor_.add_solution(-u.w, u.z);
     }
     factor_.set_values(u);
     peak_ = 0.0;
@@ -145,7 +144,6 @@ class SinglePivots {
   }
 
   ActiveFactor factor_;
-  Eigen::ArrayXd right_;
   double load_ = 0.0;  ///< sum of sqrt(M_jj) |z_j|
   double rest_ = 0.0;  ///< most of |q_j| / sqrt(M_jj)
   double peak_ = 0.0;  ///< most of load_ + rest_ since values were computed afresh: the running values carry its rounding

@@ -190,8 +190,8 @@ TEST_CASE("factors of an active set solve its equations and leave the rest alone
   const Eigen::SparseMatrix<double> S = sparse(M);
   const Vector diagonal = M.diagonal();
   const lcp::SparseBlock columns{n, S.outerIndexPtr(), S.innerIndexPtr(), S.valuePtr(), diagonal.data()};
-  lcp::DenseFactor dense;
-  lcp::SparseFactor factor;
+  lcp::Factor<lcp::DenseBlock> dense;
+  lcp::Factor<lcp::SparseBlock> factor;
   for (int trial = 0; trial < 30; ++trial) {
     const std::vector<char> active = trial == 0 ? std::vector<char>(n, 0) : p.flags(n);
     dense.compute({M.data(), n}, active);
@@ -232,7 +232,7 @@ TEST_CASE("block steps that go round begin elsewhere, then give way to single pi
   u.reset(block);
   u.q = q;
   u.active = start;
-  lcp::ActiveSet<lcp::SparseBlock, lcp::SparseFactor> steps;
+  lcp::ActiveSet<lcp::SparseBlock> steps;
   const lcp::Outcome outcome = steps.run(block, u, options, nullptr);
   CHECK(outcome.used_fallback);
   CHECK(outcome.pivots > 0);
