@@ -1,10 +1,10 @@
 // That a matrix is positive definite is shown by a factor of the whole of it, or for less where that is possible. What is cheap never
 // changes an answer: where it is silent, the factor decides.
 //
-// Sparse matrices of a sequence: B = D^-1/2 M0 D^-1/2, D the diagonal of M0. A factor of M0 - sigma D shows that the least eigenvalue of B is
-// at least sigma. Then every symmetric M with |D^-1/2 (M - M0) D^-1/2| < sigma in the largest absolute row sum, which is no less than the
-// spectral norm, is positive definite (Weyl's inequality). That costs one look at each entry. With the diagonal of M in the place of D the
-// bound is sigma / (1 + sigma).
+// Sparse matrices of a sequence: B = D^-1/2 M0 D^-1/2, D the diagonal of M0. A factor of M0 - sigma D shows that the least eigenvalue of B
+// is at least sigma. Then every symmetric M with |D^-1/2 (M - M0) D^-1/2| < sigma in the largest absolute row sum, which is no less than
+// the spectral norm, is positive definite (Weyl's inequality). That costs one look at each entry. With the diagonal of M in the place of D
+// the bound is sigma / (1 + sigma).
 //
 // Dense matrices of moderate condition: B less a shift c on its diagonal is factorised in single precision. When all pivots are positive,
 // L L^T = B - c I + E, where E is rounding: |E| <= gamma |L| |L^T| entry by entry (N. J. Higham, Accuracy and Stability of Numerical
@@ -19,7 +19,7 @@ namespace dembark::lcp {
 
 /// The matrix of a sequence that is known to be definite, and by how much.
 struct DefiniteMargin {
-  double sigma = 0.0;  ///< shown, or to be tried; 0: no matrix yet
+  double sigma = 0.0;   ///< shown, or to be tried; 0: no matrix yet
   Eigen::ArrayXd base;  ///< values of the matrix; empty: none is shown
 };
 
@@ -88,7 +88,9 @@ class DefiniteProof {
       Eigen::Map<Eigen::ArrayXXf> panel(tile(i, 0), rows, first + rows);
       if (height < rows) panel.setZero();
       for (Index j = 0; j < first + height; ++j)
-        panel.col(j).head(height) = (Eigen::Map<const Eigen::ArrayXd>(m.values + j * n + first, height) * inverse.segment(first, height) * inverse[j]).cast<float>();
+        panel.col(j).head(height) =
+            (Eigen::Map<const Eigen::ArrayXd>(m.values + j * n + first, height) * inverse.segment(first, height) * inverse[j])
+                .cast<float>();
       for (Index r = 0; r < rows; ++r) panel(r, first + r) = 1.0f - shift;
     }
   }
