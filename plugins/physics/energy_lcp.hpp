@@ -67,7 +67,7 @@ class LcpSolver {
 
   /// Column-major n x n array.
   const LcpResult& solve_dense(const double* m, const Eigen::VectorXd& q, const LcpOptions& options, const std::vector<char>* start) {
-    const lcp::DenseBlock block{m, q.size()};
+    const lcp::Matrix block = lcp::dense_matrix(m, q.size());
     lcp::check_options(options);
     if (options.check_input) {
       lcp::check_finite(q.data(), block.n);
@@ -81,7 +81,8 @@ class LcpSolver {
     std::iota(order_.begin(), order_.end(), 0);
     load(q, start);
     result_.islands = block.n > 0;
-    if (block.n > 0) solve_block(block, 0, 0, options, start);
+    lcp::DefiniteMargin alone;
+    if (block.n > 0) solve_block(block, 0, alone, options, start);
     return finish(block, options);
   }
 
@@ -95,17 +96,10 @@ class LcpSolver {
   /// Before block steps: a sweep of a full matrix costs much against its factor.
   static constexpr int most_sweeps = 8;
 
-  /// The links of the chain for one kind of matrix.
-  template <class Matrix>
-  struct Chain {
-    lcp::Relaxation<lcp::MatrixRows<Matrix>> relaxation;
-    lcp::ActiveSet<Matrix> exact;
-  };
-
   /// Whether a dense matrix is best left dense: one island and not mostly zeros.
-  bool compact(const lcp::DenseBlock& m) const {
+  bool compact(const lcp::Matrix& m) const {
     if (m.n <= 1) return m.n == 0;  // a single unknown needs no factor
-    const auto column = [&m](Index j) { return m.values + j * m.n; };
+    const auto column = [&m](Index j) { return m.value + j * m.n; };
     if (m.n > small_island) {
       const double enough = dense_fraction * double(m.n) * double(m.n);
       Index entries = 0;
@@ -141,20 +135,21 @@ class LcpSolver {
     load(q, start);
     result_.islands = islands_.count();
     // The certificate is that of the whole, so what stops at a tolerance of it cannot go island by island.
-    if (options.method == LcpMethod::pgs && q.size() > 0) solve_block(islands_.whole(), 0, 0, options, start);
+    if (options.method == LcpMethod::pgs && q.size() > 0) solve_block(islands_.whole(), 0, margins_[0], options, start);
     for (int t = 0; t < islands_.count() && options.method != LcpMethod::pgs; ++t) solve_island(t, options, start);
     return finish(islands_.whole(), options);
   }
 
   void solve_island(int island, const LcpOptions& options, const std::vector<char>* start) {
-    const lcp::SparseBlock block = islands_.block(island);
+    lcp::Matrix block = islands_.block(island);
     const double full = double(block.n) * double(block.n);
     if (block.n == 1) return solve_single(islands_.first(island), block.diagonal(0));
-    if (block.n > small_island && (block.n > dense_limit || double(islands_.entries(island)) < dense_fraction * full))
-      return solve_block(block, islands_.first(island), island, options, start);
-    dense_values_.setZero(block.n, block.n);
-    for (Index j = 0; j < block.n; ++j) lcp::add_column(block, j, 1.0, dense_values_.col(j).data());
-    solve_block(lcp::DenseBlock{dense_values_.data(), block.n}, islands_.first(island), island, options, start);
+    if (block.n <= small_island || (block.n <= dense_limit && double(islands_.entries(island)) >= dense_fraction * full)) {
+      dense_values_.setZero(block.n, block.n);
+      for (Index j = 0; j < block.n; ++j) block.add_column(j, 1.0, dense_values_.col(j).data());
+      block = lcp::dense_matrix(dense_values_.data(), block.n);
+    }
+    solve_block(block, islands_.first(island), margins_[std::size_t(island)], options, start);
   }
 
   void solve_single(int at, double m) {
@@ -166,14 +161,13 @@ class LcpSolver {
   }
 
   /// One island, whose unknowns begin at `first`.
-  template <class Matrix>
-  void solve_block(const Matrix& m, int first, int island, const LcpOptions& options, bool started) {
+  void solve_block(const lcp::Matrix& m, int first, lcp::DefiniteMargin& margin, const LcpOptions& options, bool started) {
     const auto flags = active_.begin() + first;
     unknowns_.reset(m);
     unknowns_.q = q_.segment(first, m.n);
     std::copy_n(flags, m.n, unknowns_.active.begin());
     try {
-      if (options.check_input) prove(m, island);
+      if (options.check_input) definite_.check(m, margin);
       add(run(m, options, started));
     } catch (const lcp::NotDefinite& what) {
       lcp::fail_definite(order_[std::size_t(first + what.row)], what);
@@ -182,14 +176,9 @@ class LcpSolver {
     z_.segment(first, m.n) = unknowns_.z.max(0.0);
   }
 
-  void prove(const lcp::DenseBlock& m, int) { definite_.check(m); }
-  void prove(const lcp::SparseBlock& m, int island) { definite_.check(m, margins_[std::size_t(island)]); }
-
-  template <class Matrix>
-  lcp::Outcome run(const Matrix& m, const LcpOptions& options, bool started) {
-    auto& [relaxation, exact] = chain(m);
+  lcp::Outcome run(const lcp::Matrix& m, const LcpOptions& options, bool started) {
     const bool automatic = options.method == LcpMethod::automatic;
-    if (options.method == LcpMethod::pgs) return lcp::gauss_seidel(m, unknowns_, options, relaxation.rows);
+    if (options.method == LcpMethod::pgs) return lcp::gauss_seidel(m, unknowns_, options, relaxation_.rows);
     if (options.method != LcpMethod::block && (!automatic || m.n <= small_island)) {
       if (m.n > dense_limit)
         lcp::fail("methods energy and murty keep n^2 numbers and take islands up to ", dense_limit, " unknowns, not ", m.n,
@@ -198,14 +187,14 @@ class LcpSolver {
     }
     if (!started) {
       const double fraction = lcp::rounding_fraction(options.tolerance);
-      relaxation.rows.start(m, unknowns_, fraction);
+      relaxation_.rows.start(m, unknowns_, fraction);
       bool solved = false;
-      if (automatic && std::is_same_v<Matrix, lcp::SparseBlock>) solved = relaxation.solve(fraction);
-      else relaxation.find_set(most_sweeps);
-      relaxation.rows.store(unknowns_);
+      if (automatic && !m.dense()) solved = relaxation_.solve(fraction);
+      else relaxation_.find_set(most_sweeps);
+      relaxation_.rows.store(unknowns_);
       if (solved) return {};
     }
-    return exact.run(m, unknowns_, options, &relaxation);
+    return exact_.run(m, unknowns_, options, &relaxation_);
   }
 
   void add(const lcp::Outcome& outcome) {
@@ -216,8 +205,7 @@ class LcpSolver {
   }
 
   /// z, w and the certificate, from the M and q that were given: independent of whatever the methods kept.
-  template <class Matrix>
-  const LcpResult& finish(const Matrix& m, const LcpOptions& options) {
+  const LcpResult& finish(const lcp::Matrix& m, const LcpOptions& options) {
     unknowns_.reset(m);
     unknowns_.q = q_;
     unknowns_.z = z_;
@@ -233,9 +221,6 @@ class LcpSolver {
     return result_;
   }
 
-  auto& chain(const lcp::DenseBlock&) { return dense_; }
-  auto& chain(const lcp::SparseBlock&) { return sparse_; }
-
   LcpResult result_;
   lcp::Islands islands_;
   std::vector<int> order_;  ///< the unknowns, island after island; so do the next three go
@@ -243,8 +228,8 @@ class LcpSolver {
   std::vector<char> active_;
   lcp::Unknowns unknowns_;  ///< of one island
   lcp::SinglePivots singles_;
-  Chain<lcp::DenseBlock> dense_;
-  Chain<lcp::SparseBlock> sparse_;
+  lcp::Relaxation<lcp::MatrixRows> relaxation_;
+  lcp::ActiveSet exact_;
   lcp::DefiniteProof definite_;
   std::vector<lcp::DefiniteMargin> margins_;  ///< of the islands
   Eigen::MatrixXd dense_values_;

@@ -7,10 +7,9 @@
 
 namespace dembark::lcp {
 
-template <class Matrix>
 class ActiveSet {
  public:
-  using Descent = Relaxation<MatrixRows<Matrix>>;
+  using Descent = Relaxation<MatrixRows>;
 
   /// Pivots from u.active; leaves z, w, s and the set in u. When the number of violations has reached no new least value for `patience`
   /// steps, the set that `descent` finds from the best z takes over (null: not at all); it goes on at the next stall until it is at its
@@ -75,14 +74,13 @@ class ActiveSet {
     }
   }
 
-  Factor<Matrix> factor_;
+  Factor factor_;
   Eigen::ArrayXd best_;  ///< z with the fewest violations
   std::vector<Index> violations_;
 };
 
 /// Projected Gauss-Seidel to the tolerance, checked every few sweeps. Outcome.pivots counts sweeps.
-template <class Matrix>
-inline Outcome gauss_seidel(const Matrix& m, Unknowns& u, const LcpOptions& options, MatrixRows<Matrix>& rows) {
+inline Outcome gauss_seidel(const Matrix& m, Unknowns& u, const LcpOptions& options, MatrixRows& rows) {
   Outcome outcome;
   const int limit = options.max_iterations > 0 ? options.max_iterations : 100000;
   rows.start(m, u, rounding_fraction(options.tolerance));

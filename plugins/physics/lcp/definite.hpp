@@ -26,34 +26,30 @@ struct DefiniteMargin {
 class DefiniteProof {
  public:
   /// Throws NotDefinite unless m is positive definite beyond rounding.
-  void check(const SparseBlock& m, DefiniteMargin& margin) {
-    if (near(m, margin)) return;
+  void check(const Matrix& m, DefiniteMargin& margin) {
+    if (near(m, margin) || holds(m)) return;
     margin.base.resize(0);
     const std::vector<char> all(std::size_t(m.n), 1);
     if (margin.sigma > least_sigma) {  // a second matrix of this pattern: more will come
       try {
-        sparse_.compute(m, all, margin.sigma);
+        factor_.compute(m, all, margin.sigma);
         margin.base = values(m);
         return;
       } catch (const NotDefinite&) {
         margin.sigma *= 0.1;
       }
     }
-    sparse_.compute(m, all);
-    if (margin.sigma == 0.0) margin.sigma = 0.25 * sparse_.least_pivot();
-  }
-
-  void check(const DenseBlock& m) {
-    if (!holds(m)) dense_.compute(m, std::vector<char>(std::size_t(m.n), 1));
+    factor_.compute(m, all);
+    if (margin.sigma == 0.0) margin.sigma = 0.25 * factor_.least_pivot();
   }
 
 #if !defined(__x86_64__) || !defined(__GNUC__)
-  static bool holds(const DenseBlock&) { return false; }
+  static bool holds(const Matrix&) { return false; }
 #else
-  /// Whether single precision shows it. The diagonal must be positive; the lower triangle is read.
-  bool holds(const DenseBlock& m) {
+  /// Whether single precision shows it, for a dense matrix. The diagonal must be positive; the lower triangle is read.
+  bool holds(const Matrix& m) {
     const double shift = shift_of(m.n);
-    if (m.n < 32 || shift > 0.1 || !__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) return false;
+    if (!m.dense() || m.n < 32 || shift > 0.1 || !__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) return false;
     load(m, float(shift));
     for (Index i = 0; i * rows < m.n; ++i)
       for (Index j = 0; j <= i; ++j)
@@ -78,7 +74,7 @@ class DefiniteProof {
   float* tile(Index i, Index j) { return tiles_.data() + rows * rows * (i * (i + 1) / 2 + j); }
 
   /// The scaled and shifted lower triangle; rows beyond n continue the identity.
-  void load(const DenseBlock& m, float shift) {
+  void load(const Matrix& m, float shift) {
     const Index n = m.n, count = (n + rows - 1) / rows;
     Eigen::ArrayXd inverse = Eigen::ArrayXd::Zero(rows * count);
     for (Index i = 0; i < n; ++i) inverse[i] = 1.0 / std::sqrt(m.diagonal(i));
@@ -89,8 +85,7 @@ class DefiniteProof {
       if (height < rows) panel.setZero();
       for (Index j = 0; j < first + height; ++j)
         panel.col(j).head(height) =
-            (Eigen::Map<const Eigen::ArrayXd>(m.values + j * n + first, height) * inverse.segment(first, height) * inverse[j])
-                .cast<float>();
+            (Eigen::Map<const Eigen::ArrayXd>(m.value + j * n + first, height) * inverse.segment(first, height) * inverse[j]).cast<float>();
       for (Index r = 0; r < rows; ++r) panel(r, first + r) = 1.0f - shift;
     }
   }
@@ -139,10 +134,13 @@ class DefiniteProof {
   /// Below this the matrices of a sequence are hardly ever as near to each other.
   static constexpr double least_sigma = 1e-6;
 
-  static Eigen::Map<const Eigen::ArrayXd> values(const SparseBlock& m) { return {m.value + m.start[0], m.start[m.n] - m.start[0]}; }
+  static Eigen::Map<const Eigen::ArrayXd> values(const Matrix& m) {
+    if (m.dense()) return {m.value, m.n * m.n};
+    return {m.value + m.start[0], m.start[m.n] - m.start[0]};
+  }
 
-  static bool near(const SparseBlock& m, const DefiniteMargin& margin) {
-    if (margin.base.size() == 0) return false;
+  static bool near(const Matrix& m, const DefiniteMargin& margin) {
+    if (margin.base.size() != values(m).size()) return false;
     const double n = double(m.n), most = 0.75 * margin.sigma - n * n * std::numeric_limits<double>::epsilon();
     Eigen::ArrayXd inverse(m.n);
     for (Index i = 0; i < m.n; ++i) inverse[i] = 1.0 / std::sqrt(m.diagonal(i));
@@ -155,8 +153,7 @@ class DefiniteProof {
     return true;
   }
 
-  Factor<SparseBlock> sparse_;
-  Factor<DenseBlock> dense_;
+  Factor factor_;
 };
 
 }  // namespace dembark::lcp

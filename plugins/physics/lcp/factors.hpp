@@ -3,7 +3,6 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/SparseCholesky>
-#include <type_traits>
 
 #include "matrices.hpp"
 
@@ -18,75 +17,6 @@ struct NotDefinite {
   double pivot, diagonal;
 };
 
-/// L L^T by the function below Eigen::LLT, which tells where it failed and makes no norm.
-class DenseCholesky {
- public:
-  /// Pivots, up to the first that fails. The diagonal is taken `scale` times.
-  Eigen::ArrayXd compute(const DenseBlock& m, const std::vector<Index>& index, double scale) {
-    const Index n = Index(index.size());
-    lower_.resize(n, n);
-    for (Index k = 0; k < n; ++k) {
-      const double* column = m.values + index[std::size_t(k)] * m.n;
-      for (Index r = k; r < n; ++r) lower_(r, k) = column[index[std::size_t(r)]];
-    }
-    lower_.diagonal() *= scale;
-    const Index failed = Eigen::internal::llt_inplace<double, Eigen::Lower>::blocked(lower_);
-    if (failed < 0) return lower_.diagonal().array().square();
-    Eigen::ArrayXd pivots = lower_.diagonal().head(failed + 1).array().square();
-    pivots[failed] = scale * m.diagonal(index[std::size_t(failed)]) - lower_.row(failed).head(failed).squaredNorm();
-    return pivots;
-  }
-
-  void solve(Eigen::VectorXd& x) const {
-    lower_.triangularView<Eigen::Lower>().solveInPlace(x);
-    lower_.triangularView<Eigen::Lower>().transpose().solveInPlace(x);
-  }
-
- private:
-  Eigen::MatrixXd lower_;
-};
-
-/// L D L^T, in the order of the block, which is made fill-reducing once for the whole pattern.
-class SparseCholesky {
- public:
-  Eigen::ArrayXd compute(const SparseBlock& m, const std::vector<Index>& index, double scale) {
-    const Index n = Index(index.size());
-    if (n == 0) return {};
-    place_.assign(std::size_t(m.n), -1);
-    for (Index k = 0; k < n; ++k) place_[std::size_t(index[std::size_t(k)])] = int(k);
-    upper_.resize(n, n);
-    upper_.reserve(m.start[m.n] - m.start[0]);
-    for (Index k = 0; k < n; ++k) {
-      upper_.startVec(k);
-      m.each(index[std::size_t(k)], [this, k, scale](Index row, double value) {
-        const int i = place_[std::size_t(row)];
-        if (i >= 0 && i <= k) upper_.insertBackByOuterInner(k, i) = i < k ? value : scale * value;
-      });
-    }
-    upper_.finalize();
-    factor_.compute_natural(upper_);
-    return factor_.vectorD().array();
-  }
-
-  void solve(Eigen::VectorXd& x) const {
-    if (x.size() > 0) x = factor_.solve(x);
-  }
-
- private:
-  struct Ldlt : Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Upper, Eigen::NaturalOrdering<int>> {
-    /// compute() of Eigen 3.4 copies the matrix in order to put it into the order that it has.
-    void compute_natural(const Eigen::SparseMatrix<double>& upper) {
-      analyzePattern_preordered(upper, true);
-      factorize_preordered<true>(upper);
-    }
-  };
-
-  std::vector<int> place_;
-  Eigen::SparseMatrix<double> upper_;
-  Ldlt factor_;
-};
-
-template <class Matrix>
 class Factor {
  public:
   /// Of the block of the active set, less `shift` of its diagonal. Throws NotDefinite.
@@ -94,13 +24,15 @@ class Factor {
     index_.clear();
     for (Index i = 0; i < m.n; ++i)
       if (active[std::size_t(i)]) index_.push_back(i);
-    const Eigen::ArrayXd pivots = cholesky_.compute(m, index_, 1.0 - shift);
+    dense_ = m.dense();
+    if (dense_) factorise_dense(m, 1.0 - shift);
+    else factorise_sparse(m, 1.0 - shift);
     least_pivot_ = 1.0;
-    for (Index k = 0; k < pivots.size(); ++k) {
+    for (Index k = 0; k < pivots_.size(); ++k) {
       const Index i = index_[std::size_t(k)];
       const double diagonal = m.diagonal(i);
-      if (!(pivots[k] > definite_fraction(m.n) * diagonal)) throw NotDefinite{i, pivots[k], diagonal};
-      least_pivot_ = std::min(least_pivot_, pivots[k] / diagonal);
+      if (!(pivots_[k] > definite_fraction(m.n) * diagonal)) throw NotDefinite{i, pivots_[k], diagonal};
+      least_pivot_ = std::min(least_pivot_, pivots_[k] / diagonal);
     }
   }
 
@@ -110,15 +42,68 @@ class Factor {
   /// z_A += M_AA^-1 right_A; arrays of full length.
   void add_solution(const Eigen::ArrayXd& right, Eigen::ArrayXd& z) {
     x_ = right(index_);
-    cholesky_.solve(x_);
+    if (dense_) {
+      lower_.triangularView<Eigen::Lower>().solveInPlace(x_);
+      lower_.triangularView<Eigen::Lower>().transpose().solveInPlace(x_);
+    } else if (x_.size() > 0) {
+      x_ = sparse_.solve(x_);
+    }
     z(index_) += x_.array();
   }
 
  private:
-  std::conditional_t<std::is_same_v<Matrix, DenseBlock>, DenseCholesky, SparseCholesky> cholesky_;
+  /// L L^T by the function below Eigen::LLT, which tells where it failed and makes no norm. Pivots up to the first that fails.
+  void factorise_dense(const Matrix& m, double scale) {
+    const Index n = Index(index_.size());
+    lower_.resize(n, n);
+    for (Index k = 0; k < n; ++k) {
+      const double* column = m.value + index_[std::size_t(k)] * m.n;
+      for (Index r = k; r < n; ++r) lower_(r, k) = column[index_[std::size_t(r)]];
+    }
+    lower_.diagonal() *= scale;
+    const Index failed = Eigen::internal::llt_inplace<double, Eigen::Lower>::blocked(lower_);
+    pivots_ = lower_.diagonal().head(failed < 0 ? n : failed + 1).array().square();
+    if (failed >= 0) pivots_[failed] = scale * m.diagonal(index_[std::size_t(failed)]) - lower_.row(failed).head(failed).squaredNorm();
+  }
+
+  /// L D L^T, in the order of the block, which is made fill-reducing once for the whole pattern.
+  void factorise_sparse(const Matrix& m, double scale) {
+    const Index n = Index(index_.size());
+    place_.assign(std::size_t(m.n), -1);
+    for (Index k = 0; k < n; ++k) place_[std::size_t(index_[std::size_t(k)])] = int(k);
+    upper_.resize(n, n);
+    upper_.reserve(m.start[m.n] - m.start[0]);
+    for (Index k = 0; k < n; ++k) {
+      upper_.startVec(k);
+      m.each(index_[std::size_t(k)], [this, k, scale](Index row, double value) {
+        const int i = place_[std::size_t(row)];
+        if (i >= 0 && i <= k) upper_.insertBackByOuterInner(k, i) = i < k ? value : scale * value;
+      });
+    }
+    upper_.finalize();
+    pivots_.resize(0);
+    if (n == 0) return;
+    sparse_.compute_natural(upper_);
+    pivots_ = sparse_.vectorD();
+  }
+
+  struct Ldlt : Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Upper, Eigen::NaturalOrdering<int>> {
+    /// compute() of Eigen 3.4 copies the matrix in order to put it into the order that it has.
+    void compute_natural(const Eigen::SparseMatrix<double>& upper) {
+      analyzePattern_preordered(upper, true);
+      factorize_preordered<true>(upper);
+    }
+  };
+
+  bool dense_ = false;
   std::vector<Index> index_;
-  Eigen::VectorXd x_;
+  Eigen::ArrayXd pivots_;
   double least_pivot_ = 1.0;
+  Eigen::VectorXd x_;
+  Eigen::MatrixXd lower_;
+  std::vector<int> place_;
+  Eigen::SparseMatrix<double> upper_;
+  Ldlt sparse_;
 };
 
 }  // namespace dembark::lcp

@@ -37,12 +37,12 @@ class Islands {
   int first(int t) const { return first_[std::size_t(t)]; }
   /// The unknowns, island after island.
   const std::vector<int>& order() const { return order_; }
-  SparseBlock block(int t) const { return columns(first(t), first(t + 1)); }
-  SparseBlock whole() const { return columns(0, int(n_)); }
+  Matrix block(int t) const { return columns(first(t), first(t + 1)); }
+  Matrix whole() const { return columns(0, int(n_)); }
 
  private:
-  SparseBlock columns(int from, int to) const {
-    return {to - from, start_.data() + from, row_.data(), value_.data(), diagonal_.data() + from, from};
+  Matrix columns(int from, int to) const {
+    return {to - from, value_.data(), diagonal_.data() + from, start_.data() + from, row_.data(), from};
   }
 
   /// Number of the island of every unknown; islands count in the order of their first unknowns.
@@ -80,7 +80,7 @@ class Islands {
       const std::vector<double> ones(inner_.size(), 1.0);
       const Eigen::Map<const Eigen::SparseMatrix<double>> pattern(n_, n_, Index(inner_.size()), outer_.data(), inner_.data(), ones.data());
       Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> permutation;
-      Eigen::AMDOrdering<int>()(Eigen::SparseMatrix<double>(pattern), permutation);
+      Eigen::AMDOrdering<int>()(pattern.selfadjointView<Eigen::Upper>(), permutation);
       by_degree.assign(permutation.indices().data(), permutation.indices().data() + n_);
     }
     order_.resize(std::size_t(n_));

@@ -1,50 +1,11 @@
-// The matrix of one island, dense or sparse, and its rows as relaxation.hpp sees them.
+// The rows of a matrix as relaxation.hpp sees them.
 #pragma once
 
 #include "residual.hpp"
 
 namespace dembark::lcp {
 
-/// Column-major symmetric matrix that lies elsewhere.
-struct DenseBlock {
-  const double* values = nullptr;
-  Index n = 0;
-
-  double diagonal(Index i) const { return values[i * n + i]; }
-
-  /// Calls visit(row, value) for the entries of column j.
-  template <class Visit>
-  void each(Index j, Visit visit) const {
-    const double* column = values + j * n;
-    for (Index i = 0; i < n; ++i) visit(i, column[i]);
-  }
-};
-
-/// Compressed columns, both triangles, rows ascending.
-struct SparseBlock {
-  Index n = 0;
-  const int* start = nullptr;  ///< n + 1
-  const int* row = nullptr;
-  const double* value = nullptr;
-  const double* diagonals = nullptr;
-  int first = 0;  ///< the number that rows begin with
-
-  double diagonal(Index i) const { return diagonals[i]; }
-
-  template <class Visit>
-  void each(Index j, Visit visit) const {
-    for (int p = start[j]; p < start[j + 1]; ++p) visit(Index(row[p] - first), value[p]);
-  }
-};
-
-/// out += x times column j.
-template <class Matrix>
-inline void add_column(const Matrix& m, Index j, double x, double* out) {
-  m.each(j, [x, out](Index i, double value) { out[i] += x * value; });
-}
-
 /// The rows of a matrix for Relaxation: a force acts on all rows through its column.
-template <class Matrix>
 class MatrixRows {
  public:
   static constexpr double worth_steps = 80.0;
@@ -78,7 +39,7 @@ class MatrixRows {
     for (Index i = 0; i < m_.n; ++i) {
       const double next = std::max(u_.z[i] - u_.w[i] * u_.unit[i] * u_.unit[i], 0.0), step = next - u_.z[i];
       if (step == 0.0) continue;
-      add_column(m_, i, step, u_.w.data());
+      m_.add_column(i, step, u_.w.data());
       u_.z[i] = next;
       if (Measured) most = std::max(most, std::fabs(step) / (base_[i] + next));
     }
@@ -94,7 +55,7 @@ class MatrixRows {
       const Index* face;
       double* sum;
       double pulled(Index k) const { return sum[face[k]] * unit[face[k]]; }
-      void push(Index k, double force) const { add_column(m, face[k], force * unit[face[k]], sum); }
+      void push(Index k, double force) const { m.add_column(face[k], force * unit[face[k]], sum); }
     };
 
     void load(const MatrixRows& rows, const std::vector<Index>& face) {

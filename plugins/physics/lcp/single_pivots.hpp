@@ -19,7 +19,6 @@ class SinglePivots {
   /// criterion: the index with the most negative p_i = -value_i^2 / diagonal_i of the transformed system, that is, the exchange
   /// that releases the most energy (G. N. Kolesnikov, Resources and Technology 10 (2013)). That rule has no proof of an end:
   /// when it comes back to a set that it left, or goes on for 50 n pivots, least index takes over.
-  template <class Matrix>
   Outcome run(const Matrix& m, Unknowns& u, bool least_index, const LcpOptions& options) {
     const Index n = m.n;
     const double fraction = rounding_fraction(options.tolerance);
@@ -69,7 +68,6 @@ class SinglePivots {
     return x ^ (x >> 31);
   }
 
-  template <class Matrix>
   void rebuild(const Matrix& m, Unknowns& u) {
     factor_.clear(m, u.q.data());
     for (Index i = 0; i < m.n; ++i)
@@ -77,7 +75,6 @@ class SinglePivots {
     weigh(u);
   }
 
-  template <class Matrix>
   void exchange(const Matrix& m, Unknowns& u, Index p) {
     char& flag = u.active[std::size_t(p)];
     if (flag) {
@@ -103,7 +100,6 @@ class SinglePivots {
   }
 
   /// The next index, or -1. |M_ij| <= sqrt(M_ii M_jj) turns the sum of sqrt(M_jj) |z_j| into a bound of s_i without a product.
-  template <class Matrix>
   Index choose(const Matrix& m, const Unknowns& u, double fraction, bool least_index, bool fresh) const {
     constexpr double last_digit = std::numeric_limits<double>::epsilon();
     const double scale = fresh ? u.scale() : 0.0;
@@ -126,7 +122,6 @@ class SinglePivots {
   }
 
   /// z with iterative refinement, w and s from M and q; true when all conditions hold.
-  template <class Matrix>
   bool refresh(const Matrix& m, Unknowns& u, double fraction) {
     for (Index i = 0; i < m.n; ++i) u.z[i] = u.active[std::size_t(i)] ? factor_.value(i) : 0.0;
     for (int pass = 0;; ++pass) {
