@@ -1,9 +1,6 @@
 // Methods that exchange one pair w_i <-> z_i at a time: the energy criterion and Murty's least index.
 #pragma once
 
-#include <cstdint>
-#include <unordered_set>
-
 #include "active_factor.hpp"
 
 namespace dembark::lcp {
@@ -26,11 +23,8 @@ class SinglePivots {
     peak_ = 0.0;
     rest_ = (u.q * u.unit).abs().maxCoeff();
     rebuild(m, u);
-    std::unordered_set<std::uint64_t> seen;
-    std::uint64_t key = 0;
-    for (Index i = 0; i < n; ++i)
-      if (u.active[std::size_t(i)]) key ^= set_key(i);
-    if (!least_index) seen.insert(key);
+    std::vector<char> landmark = u.active;  // a set that comes back meets it: R. P. Brent, BIT 20 (1980) 176
+    int next_landmark = 1;
     bool fresh = false;
     for (Index checks = 0;;) {
       const Index p = choose(m, u, fraction, least_index, fresh);
@@ -50,24 +44,19 @@ class SinglePivots {
       }
       exchange(m, u, p);
       ++outcome.pivots;
-      key ^= set_key(p);
-      if (!least_index && (!seen.insert(key).second || outcome.pivots > 50 * n)) {
+      if (!least_index && (u.active == landmark || outcome.pivots > 50 * n)) {
         least_index = outcome.used_fallback = true;
         refresh(m, u, fraction);
+      }
+      if (outcome.pivots == next_landmark) {
+        landmark = u.active;
+        next_landmark *= 2;
       }
     }
     return outcome;
   }
 
  private:
-  /// A number per index whose xor names a set; fixed, so that runs repeat.
-  static std::uint64_t set_key(Index i) {
-    std::uint64_t x = std::uint64_t(i) + 0x9e3779b97f4a7c15ull;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
-    return x ^ (x >> 31);
-  }
-
   void rebuild(const Matrix& m, Unknowns& u) {
     factor_.clear(m, u.q.data());
     for (Index i = 0; i < m.n; ++i)

@@ -67,7 +67,7 @@ class PointGrid {
 
  private:
   /// The box of the points, as long as the grid has not many more cells than there are points. Otherwise the twentieth part of them at
-  /// either end may be far away from the others: points beyond as much as these are spread lie in the cells of the border. Where that does
+  /// either end may be far away from the others: those farther than the others are spread lie in the cells of the border. Where that does
   /// not suffice the cells grow.
   template <class Point>
   void find_bounds(std::size_t n, Point point, double cell) {
@@ -80,14 +80,19 @@ class PointGrid {
     for (const std::size_t ends : {std::size_t(0), n / 20}) {
       for (int k = 0; k < 3 && n > 0; ++k) {
         for (std::size_t i = 0; i < n; ++i) along[i] = point(i).*axes[k];
-        const auto [least, most] = std::minmax_element(along.begin(), along.end());
-        const double from = *least, to = *most;
-        std::nth_element(along.begin(), along.begin() + std::ptrdiff_t(ends), along.end());
-        const double first = along[ends];
-        std::nth_element(along.begin(), along.end() - 1 - std::ptrdiff_t(ends), along.end());
-        const double last = along[n - 1 - ends];
-        low_.*axes[k] = std::max(from, first - (last - first));
-        length.*axes[k] = std::min(to, last + (last - first)) - low_.*axes[k];
+        double first = *std::min_element(along.begin(), along.end()), last = *std::max_element(along.begin(), along.end());
+        if (ends > 0) {
+          std::nth_element(along.begin(), along.begin() + std::ptrdiff_t(ends), along.end());
+          first = along[ends];
+          std::nth_element(along.begin(), along.end() - 1 - std::ptrdiff_t(ends), along.end());
+          last = along[n - 1 - ends];
+        }
+        const double spread = last - first;
+        double from = first, to = last;
+        for (const double p : along)
+          if (p >= first - spread && p <= last + spread) from = std::min(from, p), to = std::max(to, p);
+        low_.*axes[k] = from;
+        length.*axes[k] = to - from;
       }
       if (few()) break;
     }

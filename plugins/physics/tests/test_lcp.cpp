@@ -360,3 +360,44 @@ TEST_CASE("a sequence of sparse matrices: what is near to a proven one is taken,
     CHECK_THROWS_AS(solver.solve(sparse(bad), q), std::invalid_argument);
   }
 }
+
+TEST_CASE("a sequence that goes over to a matrix that is not definite is refused from there on, however small its steps") {
+  Problems p;
+  const int n = 90;
+  const Matrix M = band(n, 2, p);
+  const double least = Eigen::SelfAdjointEigenSolver<Matrix>(M).eigenvalues()[0];
+  const Vector q = p.vector(n);
+  for (const double step : {0.3, 0.03, 0.003}) {
+    LcpSolver solver;
+    for (int k = 0; k * step < 1.5; ++k) {
+      Matrix moved = M;
+      moved.diagonal().array() -= k * step * least;
+      CAPTURE(step, k);
+      if (k * step < 0.999) CHECK(violation(moved, q, solver.solve(sparse(moved), q)) < 1e-13);
+      if (k * step > 1.001) CHECK_THROWS_WITH(solver.solve(sparse(moved), q), Catch::Contains("not positive definite"));
+    }
+  }
+}
+
+TEST_CASE("matrices near to a proven one need no factor, others get one of their own") {
+  Problems p;
+  const int n = 60;
+  Eigen::SparseMatrix<double> S = sparse(band(n, 2, p));
+  const Vector diagonal = Matrix(S).diagonal();
+  const lcp::Matrix columns{n, S.valuePtr(), diagonal.data(), S.outerIndexPtr(), S.innerIndexPtr()};
+  lcp::DefiniteProof proof;
+  lcp::DefiniteMargin margin;
+  proof.check(columns, margin);
+  CHECK(margin.base.size() == 0);  // one matrix is no sequence
+  proof.check(columns, margin);
+  REQUIRE(margin.base.size() == S.nonZeros());
+  const Eigen::ArrayXd first = margin.base;
+  S.coeffRef(1, 0) *= 1.0 + 1e-6, S.coeffRef(0, 1) *= 1.0 + 1e-6;
+  proof.check(columns, margin);
+  CHECK((margin.base == first).all());
+  for (int i = 0; i < n; ++i)
+    for (int j : {i - 1, i + 1})
+      if (j >= 0 && j < n) S.coeffRef(i, j) = 0.0;
+  proof.check(columns, margin);
+  CHECK_FALSE((margin.base == first).all());
+}
