@@ -24,10 +24,11 @@ class Factor {
     index_.clear();
     for (Index i = 0; i < m.n; ++i)
       if (active[std::size_t(i)]) index_.push_back(i);
+    least_pivot_ = 1.0;
+    if (index_.empty()) return;
     dense_ = m.dense();
     if (dense_) factorise_dense(m, 1.0 - shift);
     else factorise_sparse(m, 1.0 - shift);
-    least_pivot_ = 1.0;
     for (Index k = 0; k < pivots_.size(); ++k) {
       const Index i = index_[std::size_t(k)];
       const double diagonal = m.diagonal(i);
@@ -41,11 +42,12 @@ class Factor {
 
   /// z_A += M_AA^-1 right_A; arrays of full length.
   void add_solution(const Eigen::ArrayXd& right, Eigen::ArrayXd& z) {
+    if (index_.empty()) return;
     x_ = right(index_);
     if (dense_) {
       lower_.triangularView<Eigen::Lower>().solveInPlace(x_);
       lower_.triangularView<Eigen::Lower>().transpose().solveInPlace(x_);
-    } else if (x_.size() > 0) {
+    } else {
       x_ = sparse_.solve(x_);
     }
     z(index_) += x_.array();
@@ -81,8 +83,6 @@ class Factor {
       });
     }
     upper_.finalize();
-    pivots_.resize(0);
-    if (n == 0) return;
     sparse_.compute_natural(upper_);
     pivots_ = sparse_.vectorD();
   }
