@@ -1,12 +1,14 @@
 """Single contact: the eight impact tests of Chung and Ooi (2011).
 
-Each engine is held against three things: the same scheme written down again, from which it may differ by round-off; what is known exactly
-(Hertz; the restitution coefficient that was asked for; the contact law, integrated until the step does not matter); and, for information,
-theories of another contact (rigid bodies that slide throughout; partial slip after Mindlin and Deresiewicz).
+Each engine is held against four things: the same scheme written down again, from which it may differ by round-off; what is known exactly
+(Hertz; the restitution coefficient that was asked for; the contact law, integrated until the step does not matter); the curves
+that they published; and, for information, theories of another contact (rigid bodies that slide throughout; partial slip after Mindlin and
+Deresiewicz).
 """
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,8 +17,12 @@ from dembark.physics.exact.impacts import Impacts
 from dembark.postproc.instruments.impact_tests import head_on, mirrored, oblique, restitutions
 from dembark.postproc.instruments.impacts import Flight, Solutions, read
 from dembark.postproc.instruments.logs import number
+from dembark.postproc.instruments.published_curves import beside_published
 from dembark.postproc.measurement import Measurement
 from dembark.postproc.replica import Array, Replica
+
+PUBLISHED = Path(__file__).with_name("reference") / "chung_ooi_2011.csv"
+LABELS = {"published": "Chung and Ooi (2011), DEM", "finite_elements": "Chung and Ooi (2011), finite elements"}
 
 
 def sweep(p: Mapping[str, Any]) -> Array:
@@ -48,7 +54,8 @@ def impacts(p: Mapping[str, Any]) -> Impacts:
 def measure(replicas: Sequence[Replica]) -> Measurement:
     """Values and curves of the run (there is one)."""
     p = replicas[0].parameters
-    return measured(p, read(replicas[0], impacts(p), p["lead_steps"] * p["time_step"]))
+    found = measured(p, read(replicas[0], impacts(p), p["lead_steps"] * p["time_step"]))
+    return beside_published(found, PUBLISHED, replicas[0].record["variant"], LABELS)
 
 
 def measured(p: Mapping[str, Any], flight: Flight) -> Measurement:
