@@ -14,7 +14,7 @@ INPUTS = ("speed", "friction", "restitution", "youngs_modulus", "poisson_ratio",
 
 
 def setup(p: Parameters) -> Setup:
-    """Sphere k of set s is body s n + k, counted from 0, of type s + 1, n measured angles; plane s has type `samples` + s + 1."""
+    """Sphere k of set s is body s n + k, counted from 0, of type s + 1; n: measured angles. The types of the planes follow."""
     with MEASURED.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     angles, readings = (np.radians([float(row[key]) for row in rows]) for key in ("angle", "angle_digitised"))

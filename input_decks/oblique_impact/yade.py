@@ -16,7 +16,8 @@ for k in range(count):
     O.bodies.append(utils.wall((0, 0, 0), axis=2, sense=1, material=O.materials[materials[count + k]], mask=1 << k))
 
 
-def pairs(values):
+def of_pairs(values):
+    """A number for the sphere and the plane of each set."""
     return MatchMaker(matches=[(materials[k], materials[count + k], value) for k, value in enumerate(values)])
 
 
@@ -27,7 +28,8 @@ O.engines = [
     InteractionLoop(
         [Ig2_Wall_Sphere_ScGeom()],
         [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
-            restitution=pairs(p.restitutions), staticFriction=pairs(p.frictions), kineticFriction=pairs(p.frictions), criticalSlipDistance=0)],
+            restitution=of_pairs(p.restitutions), staticFriction=of_pairs(p.frictions), kineticFriction=of_pairs(p.frictions),
+            criticalSlipDistance=0)],
         [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding=p.presliding)],
     ),
     # Between forces and motion, where positions and forces belong to the same time.

@@ -39,8 +39,8 @@ def head_on(one: Impacts, flight: Flight, known: Solutions) -> Found:
         curves += [
             profile(f"force_overlap_{key}", f"Force over overlap, {key.upper()}", "δ (µm)", "N (kN)", 1e6 * flight.overlaps[inside, k],
                     [found[inside]], reference=1e-3 * forces[inside, k], reference_label="Hertz"),
-            profile(f"force_time_{key}", f"Force over time, {key.upper()}", "time since touch (µs)", "N (kN)", 1e6 * since_touch[:, k], [found],
-                    reference=1e-3 * pulse[:, k], reference_label="Hertz")]
+            profile(f"force_time_{key}", f"Force over time, {key.upper()}", "time since touch (µs)", "N (kN)", 1e6 * since_touch[:, k],
+                    [found], reference=1e-3 * pulse[:, k], reference_label="Hertz")]
     return values, curves
 
 
@@ -100,12 +100,12 @@ def _rebounds(one: Impacts, found: Rebounds, known: Solutions, sweep: str, swept
     rigid, law, exactly, throughout = sliding_throughout(one), known.law[0], "the law, exactly", "sliding throughout"
     after, due, before = found.numbers(one), law.numbers(one), one.sliding / one.closing
     if sweep == "direction":
+        angle, due_angle = (np.degrees(np.arctan2(each["patch"], each["restitution"])) for each in (after, due))
         entries: list[Entry] = [
             ("tangential_restitution", "Tangential restitution", "angle (°)", "v_t after / v_t", swept, found.slide[0] / one.slide[0],
              law.slide[0] / one.slide[0], exactly),
             ("spin", "Spin after", "angle (°)", "ω (rad/s)", swept, found.spin[0], rigid.spin[0], throughout),
-            ("contact_angle", "Rebound angle of the point of contact", "angle (°)", "angle after (°)", swept,
-             *(np.degrees(np.arctan2(each["patch"], each["restitution"])) for each in (after, due)), exactly)]
+            ("contact_angle", "Rebound angle of the point of contact", "angle (°)", "angle after (°)", swept, angle, due_angle, exactly)]
     elif sweep == "slide":
         entries = [("scaled_spin", "Spin after", "v_s / μ v_n", "r ω / μ v_n", before / one.friction, after["spin"] / one.friction,
                     due["spin"] / one.friction, exactly)]

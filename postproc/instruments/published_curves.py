@@ -17,15 +17,15 @@ from dembark.postproc.statistics import Estimate
 
 
 def beside_published(found: Measurement, path: Path, variant: str, labels: Mapping[str, str]) -> Measurement:
-    """`found` with a value <method>_<quantity> for each published curve of `variant`, where the run is farthest from it, and the curves.
+    """`found` with a value <method>_<quantity> for each published curve of `variant` that it has, where it is farthest, and the curves.
 
     `path`: a table of points with the columns variant, quantity, material, method, x, y and the 95 % limits of their reading,
     x_uncertainty and y_uncertainty. The curve <quantity>_<material> of `found` is interpolated to those inside its range. Farthest is
     where the difference exceeds its uncertainty most, of all materials. `labels`: who published, by method.
     """
-    with path.open(encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["variant"] == variant]
     own = {one["name"]: one for one in found.profiles}
+    with path.open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["variant"] == variant and f"{row['quantity']}_{row['material']}" in own]
     values, curves, excess = dict(found.values), list(found.profiles), dict[str, float]()
     for (method, quantity, material), points in groupby(rows, lambda row: (row["method"], row["quantity"], row["material"])):
         one, name = own[f"{quantity}_{material}"], f"{method}_{quantity}"

@@ -109,11 +109,12 @@ def _panel(axes: Any, entries: Sequence[tuple[str, Mapping[str, Any]]], handles:
             same = all(_same(other, one) for _, other in entries)
             if not same or not number:
                 shown = "reference" if same else f"reference ({engine_name(engine)})"
-                points = {"marker": "o", "markersize": 2.5, "linestyle": "none"} if one.get("reference_low") else {"linestyle": DASHES[number % 3]}
-                handles.setdefault(shown, line(_numbers(one["reference"]), color=INK if same else paint, linewidth=0.9, zorder=3, **points))
-                if one.get("reference_low"):
+                measured, ink = one.get("reference_low") is not None, INK if same else paint
+                style = {"marker": "o", "markersize": 2.5, "linestyle": "none"} if measured else {"linestyle": DASHES[number % 3]}
+                handles.setdefault(shown, line(_numbers(one["reference"]), color=ink, linewidth=0.9, zorder=3, **style))
+                if measured:
                     bars = axes.hlines if upward else axes.vlines
-                    bars(place, _numbers(one["reference_low"]), _numbers(one["reference_high"]), color=INK if same else paint, linewidth=0.9)
+                    bars(place, _numbers(one["reference_low"]), _numbers(one["reference_high"]), color=ink, linewidth=0.9)
         if one.get("low") is not None:
             fill = axes.fill_betweenx if upward else axes.fill_between
             fill(place, _numbers(one["low"]), _numbers(one["high"]), color=paint, alpha=0.18, linewidth=0)
