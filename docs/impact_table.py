@@ -1,8 +1,4 @@
-"""Prints the table of docs/single_impacts.md: the experiment of Kharaz et al. (2001) beside this project and other codes.
-
-    .venv/bin/dembark validate --profile quick --case oblique_impact
-    .venv/bin/python docs/impact_table.py results/quick
-"""
+"""Prints the table of docs/single_impacts.md, which has the commands: Kharaz et al. (2001) beside this project and other codes."""
 
 from __future__ import annotations
 
@@ -12,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.validation.judge.result import METRICS, QuantityRecord, read
+from dembark.validation.judge.result import METRICS, read
 
 REFERENCE = Path(__file__).resolve().parents[1] / "input_decks/oblique_impact/reference"
-QUANTITIES = {"e_t": ("e_t", "{:.3f}"), "spin": ("spin (rad/s)", "{:.0f}"), "centre_angle": ("rebound angle, centre (°)", "{:.1f}"),
-              "contact_angle": ("rebound angle, point of contact (°)", "{:.1f}")}
+QUANTITIES = {"tangential_restitution": ("e_t", "{:.3f}"), "spin": ("spin (rad/s)", "{:.0f}"),
+              "centre_angle": ("rebound angle, centre (°)", "{:.1f}"), "contact_angle": ("rebound angle, point of contact (°)", "{:.1f}")}
+VERDICTS = {"pass": "pass", "fail": "**fail**", "info": "open"}
 
 
 def others(quantity: str, angle: float) -> dict[str, float]:
@@ -43,13 +40,14 @@ def main(results: Path) -> None:
         known = [one for each in of_engine if (one := each.find(f"{quantity}_{angle:.0f}"))]
         due = float(row["value"])
         near = min(others(quantity, angle).items(), key=lambda entry: abs(entry[1] - due), default=None)
-        told = "–" if near is None else f"{digits.format(near[1])}, {near[0]}"
-        print(f"| {label} | {angle:.1f}° | {digits.format(due)} ± {digits.format(_half(known[0]))} | "
-              + " | ".join(f"{digits.format(one.value)} ± {digits.format(one.half)}" for one in known) + f" | {told} | {known[0].standing} |")
+        cells = [label, f"{angle:.1f}°", f"{digits.format(due)} ± {digits.format(_half(known[0].reference_interval))}",
+                 *(f"{digits.format(one.value)} ± {digits.format(one.half)}" for one in known),
+                 "–" if near is None else f"{digits.format(near[1])}, {near[0]}", VERDICTS[known[0].verdict]]
+        print(f"| {' | '.join(cells)} |".replace("| -", "| −"))
 
 
-def _half(one: QuantityRecord) -> float:
-    low, high = one.reference_interval or (0.0, 0.0)
+def _half(interval: tuple[float, float] | None) -> float:
+    low, high = interval or (0.0, 0.0)
     return 0.5 * (high - low)
 
 

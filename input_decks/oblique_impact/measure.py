@@ -19,7 +19,7 @@ from dembark.postproc.resampling import profile
 from dembark.postproc.statistics import Estimate
 
 MEASURED = Path(__file__).with_name("reference") / "kharaz_2001.csv"
-TITLES = {"e_t": ("Tangential restitution", "e_t"), "spin": ("Rebound spin", "ω (rad/s)"),
+TITLES = {"tangential_restitution": ("Tangential restitution", "e_t"), "spin": ("Rebound spin", "ω (rad/s)"),
           "centre_angle": ("Rebound angle of the centre", "angle after (°)"),
           "contact_angle": ("Rebound angle of the point of contact", "angle after (°)")}
 
@@ -37,7 +37,7 @@ def rebounds(replica: Replica) -> dict[str, Array]:
     (v, _), (v_after, w_after) = ((frame.velocities[order], frame.omegas[order, 0]) for frame in (first, last)
                                   for order in [np.argsort(frame.ids)])
     along, away = v_after[:, 1], v_after[:, 2]
-    return {"e_t": along / v[:, 1], "spin": -w_after, "centre_angle": np.degrees(np.arctan2(along, away)),
+    return {"tangential_restitution": along / v[:, 1], "spin": -w_after, "centre_angle": np.degrees(np.arctan2(along, away)),
             "contact_angle": np.degrees(np.arctan2(along + replica.parameters["radius"] * w_after, away))}
 
 

@@ -20,8 +20,8 @@ CASE = find("oblique_impact")
 oblique = module("oblique_impact")
 ENGINES = ("liggghts", "yade")
 # What the law cannot, for it has no partial slip; the first three by far.
-LACKING = {"e_t_2", "e_t_4", "spin_6", "e_t_10"}
-FAR_OFF = LACKING - {"e_t_10"}
+LACKING = {"tangential_restitution_2", "tangential_restitution_4", "spin_6", "tangential_restitution_10"}
+FAR_OFF = LACKING - {"tangential_restitution_10"}
 
 
 def impacts(p: dict[str, Any]) -> Impacts:
@@ -77,7 +77,7 @@ def test_every_sphere_does_what_the_law_demands_in_this_scheme(engine: str, fini
     """Inputs of each set, angle, and the plane that a sphere meets."""
     run = finished("coarse", engine)
     found, due = oblique.rebounds(run), oblique.rebounds(flown(run.parameters, impacts(run.parameters)))
-    for name, scale in (("e_t", 1.0), ("spin", 600.0), ("centre_angle", 90.0), ("contact_angle", 90.0)):
+    for name, scale in (("tangential_restitution", 1.0), ("spin", 600.0), ("centre_angle", 90.0), ("contact_angle", 90.0)):
         np.testing.assert_allclose(found[name], due[name], rtol=0.0, atol=1e-9 * scale)
 
 
@@ -85,8 +85,8 @@ def test_every_sphere_does_what_the_law_demands_in_this_scheme(engine: str, fini
 def test_the_study_says_what_agrees_and_what_does_not(engine: str, finished: Any) -> None:
     found = studied([finished(variant, engine) for variant in CASE.studies["linear"].variants])
     assert len(found) == 40 and FAR_OFF <= names(found, "fail") <= LACKING, found
-    assert {"e_t_30", "e_t_50", "spin_50", "contact_angle_39"} <= names(found, "pass")
-    assert found["e_t_2"]["value"] > 0.95 and found["e_t_2"]["reference"] < 0.8
+    assert {"tangential_restitution_30", "tangential_restitution_50", "spin_50", "contact_angle_39"} <= names(found, "pass")
+    assert found["tangential_restitution_2"]["value"] > 0.95 and found["tangential_restitution_2"]["reference"] < 0.8
     for one in found.values():
         # The joint interval is U_val, with all three parts.
         assert one["interval"][1] > one["value"] and one["reference_interval"][1] > one["reference"]
@@ -98,13 +98,14 @@ def test_a_run_without_friction_fails_where_it_matters(engine: str, finished: An
     run = finished("coarse", engine, friction=0.0, friction_uncertainty=0.0)
     finer = SimpleNamespace(parameters=run.parameters | {"time_step": 1e-8}, grains=run.grains)
     failed = names(studied([run, finer]), "fail")
-    assert {"e_t_20", "e_t_30", "e_t_50", "spin_6", "spin_84", "contact_angle_20", "contact_angle_30"} <= failed
+    assert {f"tangential_restitution_{angle}" for angle in (20, 30, 39, 50, 60)} <= failed
+    assert {"spin_6", "spin_84", "contact_angle_20", "contact_angle_30"} <= failed
 
 
 @pytest.mark.parametrize(("wrong", "seen"), [
     (lambda one: replace(one, restitution=0.9 * one.restitution), {"centre_angle_40", "centre_angle_50", "centre_angle_60"}),
-    (lambda one: replace(one, g_star=0.5 * one.g_star), {"e_t_20", "spin_11"}),
-    (lambda one: replace(one, friction=1.25 * one.friction), {"e_t_39", "e_t_50", "spin_50", "spin_70"}),
+    (lambda one: replace(one, g_star=0.5 * one.g_star), {"tangential_restitution_20", "spin_11"}),
+    (lambda one: replace(one, friction=1.25 * one.friction), {"tangential_restitution_39", "spin_50", "spin_70"}),
     (lambda one: replace(one, slide=0.9 * one.slide), {"centre_angle_40", "centre_angle_50", "centre_angle_60"}),
 ], ids=["restitution", "half the shear stiffness", "friction", "tangential velocity"])
 def test_wrong_physics_is_seen(wrong: Any, seen: set[str]) -> None:
@@ -115,8 +116,8 @@ def test_wrong_physics_is_seen(wrong: Any, seen: set[str]) -> None:
 
 def test_an_input_that_is_not_known_leaves_checks_open() -> None:
     found = by_scheme(friction_uncertainty=0.03)
-    assert {"e_t_30", "spin_50"} <= names(found, "info")
-    assert "wider" in found["e_t_30"]["reason"]
+    assert {"tangential_restitution_30", "spin_50"} <= names(found, "info")
+    assert "wider" in found["tangential_restitution_30"]["reason"]
 
 
 def test_uncertainties_of_inputs_add_up_in_squares() -> None:
@@ -125,9 +126,9 @@ def test_uncertainties_of_inputs_add_up_in_squares() -> None:
     only = {name: 0.0 for name in p if name.endswith("_uncertainty")} | {"friction_uncertainty": 1e-3, "restitution_uncertainty": 1e-2}
     run = flown(p | only, impacts(p | only))
     found = judged("oblique_impact", oblique.measure([run]))
-    row = next(row for row in oblique.measured() if row["name"] == "e_t_60")
+    row = next(row for row in oblique.measured() if row["name"] == "tangential_restitution_60")
     slope = 1.0 / np.tan(np.radians(row["angle"]))
     of_angle = 0.092 * 1.98 * np.radians(row["angle_digitised"]) / np.sin(np.radians(row["angle"])) ** 2
     due = np.sqrt((1.98 * 1e-3 * slope) ** 2 + (0.092 * 1e-2 * slope) ** 2 + of_angle**2)
-    half = 0.5 * np.diff(found["e_t_60"]["interval"])[0]
+    half = 0.5 * np.diff(found["tangential_restitution_60"]["interval"])[0]
     assert half == pytest.approx(due, rel=0.05)
