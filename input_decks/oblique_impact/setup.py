@@ -10,7 +10,7 @@ from dembark.input_decks.common.setup import Parameters, Setup, strides
 
 MEASURED = Path(__file__).with_name("reference") / "kharaz_2001.csv"
 # Each set of inputs after the first lowers one of them by its uncertainty.
-INPUTS = ("speed", "friction", "restitution", "youngs_modulus", "poisson_ratio", "target_youngs_modulus", "target_poisson_ratio")
+INPUTS = ("speed", "friction", "restitution", "poisson_ratio", "target_poisson_ratio")
 
 
 def setup(p: Parameters) -> Setup:

@@ -114,6 +114,10 @@ def test_wrong_physics_is_seen(wrong: Any, seen: set[str]) -> None:
     assert seen <= names(by_scheme(wrong), "fail") - names(right, "fail")
 
 
+def test_runs_of_other_measured_angles_are_done_again() -> None:
+    assert all("reference/kharaz_2001.csv" in deck.sources(CASE, engine) for engine in ENGINES)
+
+
 def test_an_input_that_is_not_known_leaves_checks_open() -> None:
     found = by_scheme(friction_uncertainty=0.03)
     assert {"tangential_restitution_30", "spin_50"} <= names(found, "info")
