@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 from types import SimpleNamespace
 from typing import Any
@@ -12,7 +12,7 @@ import pytest
 
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.physics.exact.contact_law import stepped
-from dembark.physics.exact.impacts import Impacts
+from dembark.physics.exact.impacts import Impacts, partial_slip
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
 
@@ -112,6 +112,19 @@ def test_wrong_physics_is_seen(wrong: Any, seen: set[str]) -> None:
     right = by_scheme()
     assert FAR_OFF <= names(right, "fail") <= LACKING
     assert seen <= names(by_scheme(wrong), "fail") - names(right, "fail")
+
+
+def test_partial_slip_accounts_for_what_the_law_lacks_below_5_degrees() -> None:
+    """The table of docs/single_impacts.md."""
+    rows, every = oblique.measured(), impacts(defaults("oblique_impact"))
+    one = Impacts(*(getattr(every, field.name)[..., : len(rows)] for field in fields(Impacts)))
+    found = partial_slip(one, 200, 1500)
+    kept = {row["name"]: (found.slide[0] / one.slide[0])[k] for k, row in enumerate(rows)}
+    due = {"tangential_restitution_2": 0.771, "tangential_restitution_4": 0.748, "tangential_restitution_10": 0.639,
+           "tangential_restitution_20": 0.591}
+    assert {name: kept[name] for name in due} == pytest.approx(due, abs=2e-3)
+    measured = {row["name"]: row["value"] for row in rows}
+    assert all(abs(kept[name] - measured[name]) < 0.025 for name in ("tangential_restitution_2", "tangential_restitution_4"))
 
 
 def test_runs_of_other_measured_angles_are_done_again() -> None:
