@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import sys
 from pathlib import Path
 
@@ -13,7 +14,6 @@ from dembark.validation.judge.result import METRICS, read
 REFERENCE = Path(__file__).resolve().parents[1] / "input_decks/oblique_impact/reference"
 QUANTITIES = {"tangential_restitution": ("e_t", "{:.3f}"), "spin": ("spin (rad/s)", "{:.0f}"),
               "centre_angle": ("rebound angle, centre (°)", "{:.1f}"), "contact_angle": ("rebound angle, point of contact (°)", "{:.1f}")}
-VERDICTS = {"pass": "pass", "fail": "**fail**", "info": "open"}
 
 
 def others(quantity: str, angle: float) -> dict[str, float]:
@@ -31,7 +31,7 @@ def others(quantity: str, angle: float) -> dict[str, float]:
 def main(results: Path) -> None:
     """The table of the results in `results`, the folder of a profile."""
     of_engine = [read(path) for path in sorted((results / "oblique_impact/study-linear").glob(f"*/{METRICS}"))]
-    print("| quantity | at | experiment | LIGGGHTS | YADE | nearest other code | verdict |", "|---|---|---|---|---|---|---|", sep="\n")
+    print("| quantity | at | experiment | LIGGGHTS | YADE | E ± U_val | allowed | nearest other code |", "|" + 8 * "---|", sep="\n")
     with (REFERENCE / "kharaz_2001.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     for row in rows:
@@ -40,10 +40,15 @@ def main(results: Path) -> None:
         known = [one for each in of_engine if (one := each.find(f"{quantity}_{angle:.0f}"))]
         due = float(row["value"])
         near = min(others(quantity, angle).items(), key=lambda entry: abs(entry[1] - due), default=None)
-        cells = [label, f"{angle:.1f}°", f"{digits.format(due)} ± {digits.format(_half(known[0].reference_interval))}",
-                 *(f"{digits.format(one.value)} ± {digits.format(one.half)}" for one in known),
-                 "–" if near is None else f"{digits.format(near[1])}, {near[0]}", VERDICTS[known[0].verdict]]
-        print(f"| {' | '.join(cells)} |".replace("| -", "| −"))
+        one, datum_half = known[0], _half(known[0].reference_interval)
+        error, joint = (one.value or 0.0) - due, math.hypot(one.half or 0.0, datum_half)
+        allowed = (one.tolerance or 0.0) * (due if one.deviation_kind == "relative" else 1.0)
+        shown = f"{digits.format(error)} ± {digits.format(joint)}"
+        cells = [label, f"{angle:.1f}°", f"{digits.format(due)} ± {digits.format(datum_half)}",
+                 *(f"{digits.format(each.value)} ± {digits.format(each.half)}" for each in known),
+                 f"**{shown}**" if one.verdict == "fail" else shown, digits.format(allowed),
+                 "–" if near is None else f"{digits.format(near[1])}, {near[0]}"]
+        print(f"| {' | '.join(cells)} |".replace("| -", "| −").replace("**-", "**−"))
 
 
 def _half(interval: tuple[float, float] | None) -> float:
