@@ -1,21 +1,29 @@
 """Single contact: the eight impact tests of Chung and Ooi (2011).
 
-Each engine is held against three things: the same scheme written down again, from which it may differ by round-off; what is known exactly
-(Hertz; the restitution coefficient that was asked for; the contact law, integrated until the step does not matter); and, for information,
-theories of another contact (rigid bodies that slide throughout; partial slip after Mindlin and Deresiewicz).
+Each engine is held against four things: the same scheme written down again, from which it may differ by round-off; what is known exactly
+(Hertz; the restitution coefficient that was asked for; the contact law, integrated until the step does not matter); the curves
+that they published; and, for information, theories of another contact (rigid bodies that slide throughout; partial slip after Mindlin and
+Deresiewicz).
 """
+
+from pathlib import Path
 
 import numpy as np
 
 from dembark.postproc.instruments.impact_tests import head_on, mirrored, oblique, restitutions
 from dembark.postproc.instruments.impacts import Flight, Solutions, impacts, read, sweep
+from dembark.postproc.instruments.published_curves import beside_published
 from dembark.postproc.measurement import Measurement, Numbers, Replicas, number
+
+PUBLISHED = Path(__file__).with_name("reference") / "chung_ooi_2011.csv"
+LABELS = {"published": "Chung and Ooi (2011), DEM", "finite_elements": "Chung and Ooi (2011), finite elements"}
 
 
 def measure(replicas: Replicas) -> Measurement:
     """Values and curves of the run (there is one)."""
     p = replicas[0].parameters
-    return measured(p, read(replicas[0], impacts(p), p["lead_steps"] * p["time_step"]))
+    found = measured(p, read(replicas[0], impacts(p), p["lead_steps"] * p["time_step"]))
+    return beside_published(found, PUBLISHED, replicas[0].record["variant"], LABELS)
 
 
 def measured(p: Numbers, flight: Flight) -> Measurement:

@@ -116,8 +116,12 @@ def _panel(axes: Any, entries: Sequence[tuple[str, Mapping[str, Any]]], handles:
             same = all(_same(other, one) for _, other in entries)
             if not same or not number:
                 shown = "reference" if same else f"reference ({engine_name(engine)})"
-                handles.setdefault(shown, line(_numbers(one["reference"]), color=INK if same else paint, linestyle=DASHES[number % 3],
-                                              linewidth=0.9, zorder=3))
+                measured, ink = one.get("reference_low") is not None, INK if same else paint
+                style = {"marker": "o", "markersize": 2.5, "linestyle": "none"} if measured else {"linestyle": DASHES[number % 3]}
+                handles.setdefault(shown, line(_numbers(one["reference"]), color=ink, linewidth=0.9, zorder=3, **style))
+                if measured:
+                    bars = axes.hlines if upward else axes.vlines
+                    bars(place, _numbers(one["reference_low"]), _numbers(one["reference_high"]), color=ink, linewidth=0.9)
         if one.get("low") is not None:
             fill = axes.fill_betweenx if upward else axes.fill_between
             fill(place, _numbers(one["low"]), _numbers(one["high"]), color=paint, alpha=0.18, linewidth=0)
@@ -155,7 +159,7 @@ def _numbers(values: Sequence[float | None]) -> np.ndarray[Any, Any]:
 
 def profile_table(of_engine: Mapping[str, Mapping[str, Any]]) -> tuple[list[str], list[list[Any]]]:
     """Header and rows of one profile of all engines; engines may have different places."""
-    header = ["engine", "place", "value", "low", "high", "reference"]
+    header = ["engine", "place", "value", "low", "high", "reference", "reference_low", "reference_high"]
     rows = []
     for engine, one in of_engine.items():
         columns = [one.get(key) or [None] * len(one["place"]) for key in header[1:]]

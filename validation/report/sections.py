@@ -12,6 +12,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from dembark.postproc import pictures
+from dembark.validation.judge.result import ComparedRecord
 from dembark.validation.judge.tally import Counts, tally
 from dembark.validation.report import fields, figures, front
 from dembark.validation.report.figures import engine_name
@@ -139,8 +140,9 @@ def _section(gathered: Gathered, name: str, pages: list[Page], folder: Path) -> 
     printed = [[one for one in part.figures if one.printed]
                for part in (*variants[:VARIANTS], *(part for part in parts if part.page.is_study))]
     main = [one for number, found in enumerate(printed) for one in (found[:1] if number else found)]
-    kinds = {kind: [row for row in rows if row.record.evidence == kind] for kind in ("identity", "code")}
-    lines = [line(kinds["identity"], "Identities"), line(kinds["code"], "Engines beside each other")]
+    engines, others = ([row for row in rows if isinstance(row.record, ComparedRecord) is compared] for compared in (True, False))
+    kinds = {kind: [row for row in others if row.record.evidence == kind] for kind in ("identity", "code")}
+    lines = [line(kinds["identity"], "Identities"), line(engines, "Engines beside each other"), line(kinds["code"], "Other codes")]
     drawn = next((shown for part in variants if (shown := _pictures(part.page))), [])
     return Section(name, known.title if known else name.replace("_", " "), known.description if known else "",
                    known.source if known else (),
