@@ -40,9 +40,9 @@ public:
 		((long,step,-1,Attr::readonly,"Last step whose works are in the sums; -1 = none"))
 		, /*ctor*/
 		, /*py*/
-		.def("__getitem__",&EnergyAccount::get,(boost::python::arg("name")),"One of the energies [J] by its name.")
 		.def("keys",&EnergyAccount::keys,"Names of the energies.")
 		.def("items",&EnergyAccount::items,"Tuples (name, energy [J]).")
+		.def("__getitem__",&EnergyAccount::get,(boost::python::arg("name")),"One of the energies [J] by its name.")
 		.def("energies",&EnergyAccount::energies,"All energies [J] by name.")
 		.def("reset",&EnergyAccount::reset,"Begin anew with the next step: all works are zero there.")
 	);
