@@ -107,7 +107,13 @@ void FixLcpImpact::init() {
   std::string about;
   for (std::size_t w = 0; w < options_.walls.size(); ++w)
     about += (w ? ", " : "") + std::to_string(-1 - static_cast<long>(w)) + " = " + options_.walls[w];
-  on_root([&] { file_.open(options_.impacts_file, about.empty() ? "there is none" : about); });
+  on_root([&] {
+    try {
+      file_.open(options_.impacts_file, about.empty() ? "there is none" : about);
+    } catch (const std::runtime_error &e) {
+      throw std::runtime_error(std::string("impacts: ") + e.what());
+    }
+  });
 }
 
 void FixLcpImpact::reset_dt() {
