@@ -30,11 +30,11 @@ namespace dembark::capillary {
 
 struct LiquidWall {
   std::string name;
-  double pool = 0.0;                      // m^3 that it owns
-  double share = 0.0;                     // 0...1 of that which a new bridge asks for
-  double part = 0.0;                      // 0...1 of a broken bridge that it gets; with Return::taken what it gave
-  double change = 0.0;                    // of the pool, by this process, since all of them last settled it
-  std::vector<double> of_grain{}, own{};  // for each grain, its part and the wall's of the bridges between them
+  double pool = 0.0;                  // m^3 that it owns
+  double share = 0.0;                 // 0...1 of that which a new bridge asks for
+  double part = 0.0;                  // 0...1 of a broken bridge that it gets; with Return::taken what it gave
+  double change = 0.0;                // of the pool, by this process, since all of them last settled it
+  std::vector<double> of_grain, own;  // for each grain, its part and the wall's of the bridges between them
 
   /// Nullptr, or what is wrong.
   const char* error() const {
@@ -310,7 +310,7 @@ class LiquidLedger {
   template <class Visit>
   void each_tally(Visit visit) {
     visit(of_pairs_);
-    for (LiquidWall& wall : walls) {
+    for (LiquidWall& wall : walls) {  // NOLINT(misc-const-correctness): visits change it
       visit(wall.of_grain);
       visit(wall.own);
     }

@@ -130,7 +130,7 @@ class DefiniteProof {
   std::vector<float> tiles_;
 #endif
 
- private:
+ private:  // NOLINT(readability-redundant-access-specifiers): the part above is there on x86-64 only
   /// Below this the matrices of a sequence are hardly ever as near to each other.
   static constexpr double least_sigma = 1e-6;
 
