@@ -33,7 +33,7 @@ struct Drive {
   /// Tangential force that resists along x after a step of `by` (m) at this overlap.
   double move(double by, double overlap) { return -step({by, 0, 0}, overlap).x; }
   Vec3<double> step(const Vec3<double>& by, double overlap) {
-    return partial_slip_step(law, normal(overlap), stiffness(overlap), 0.0, pi * R * overlap, by, 1.0, state, rings);
+    return partial_slip_step(law, {0, 0, 1}, 0.0, normal(overlap), stiffness(overlap), 0.0, pi * R * overlap, by, 1.0, state, rings);
   }
 };
 
@@ -68,7 +68,7 @@ TEST_CASE("partial slip under a constant normal force follows Cattaneo and Mindl
     const double x = i / 200.0, force = d.move(all / 200.0, held);
     worst = std::max(worst, std::abs(force / limit - (1.0 - std::pow(1.0 - x, 1.5))));
   }
-  CHECK(worst < 0.0138);
+  CHECK(worst < 0.01);
   // Where all slides, the limit is exact.
   for (int i = 0; i < 20; ++i) CHECK_THAT(d.move(all / 50.0, held), WithinRel(limit, 1e-12));
   CHECK_THAT(d.state.slip, WithinRel(0.4 * all, 0.1));
@@ -98,10 +98,10 @@ TEST_CASE("a cycle of displacement dissipates what Mindlin and Deresiewicz give"
       return worst;
     };
     for (int i = 0; i < steps; ++i) d.move(most / steps, held);
-    CHECK(sweep(most, -most) < 0.0276);
+    CHECK(sweep(most, -most) < 0.02);
     const double before = d.state.dissipated_energy;
-    CHECK(sweep(-most, most) < 0.0276);
-    CHECK(sweep(most, -most) < 0.0276);
+    CHECK(sweep(-most, most) < 0.02);
+    CHECK(sweep(most, -most) < 0.02);
     // Area of the loop: integral of the two curves, with the virgin curve V(x) = 1 - (1 - x)^1.5 in units of limit and yield.
     double area = 0.0;
     const auto virgin = [](double x) { return 1.0 - std::pow(1.0 - x, 1.5); };
@@ -123,7 +123,7 @@ TEST_CASE("load that grows with the tangential force below the angle of friction
   CHECK(d.state.slip == 0.0);
 }
 
-TEST_CASE("six rings meet the row of springs through oblique impacts") {
+TEST_CASE("eight rings meet the row of springs through oblique impacts") {
   // Prescribed overlap held sin(t): what the rings do to a sphere that strikes obliquely.
   for (double across : {0.05, 0.3, 1.0, 3.0}) {
     Drive d;
@@ -187,7 +187,7 @@ TEST_CASE("an impact at 2 degrees returns what Kharaz, Gorham and Salman measure
       overlap += in * dt;
       if (!(overlap > 0.0)) break;
       const auto n = hertz(elastic, r, m, overlap, -in);
-      const double force = partial_slip_step(law, n.force, n.tangential_stiffness, 0.0, n.contact_area,
+      const double force = partial_slip_step(law, {0, 0, 1}, 0.0, n.force, n.tangential_stiffness, 0.0, n.contact_area,
                                              Vec3<double>{along - r * spin, 0, 0}, dt, state, rings)
                                .x;
       in -= n.force / m * dt;
