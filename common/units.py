@@ -1,4 +1,5 @@
-"""Numbers as users write them: `0.02`, `20 mm`, `30 deg`, `1/2`; returned in the SI unit that a parameter declares.
+"""Numbers as users write them: `0.02`, `20 mm`, `30 deg`, `1/2`; returned in the SI unit that a parameter declares. Durations and sizes of
+memory, `2 h 30 min`, `1.5 GB`, and back.
 
 What counts as a number is decided here and nowhere else. The unit library alone would take `0,3` for 0, `4.5.6` for 2.7 and `9 81` for 729.
 """
@@ -7,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, cast
 
@@ -20,12 +22,17 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _VALUE = re.compile(rf"\s*(?P<number>{_NUMBER}(?:\s*/\s*{_NUMBER})?)\s*\*?\s*(?P<unit>[^\W\d].*|[%°].*|)\s*")
 _IN_UNIT = re.compile(r"(?:[^\W\d]+\d?|[%°]|(?:\^|\*\*)\s*\(?[-+]?\d+(?:\.\d+)?\)?|[*/·()]|\s+)*")
 # Products and powers of these are known without the library, which takes a while to load.
-_SYMBOL = r"(?:m|s|kg|N|Pa|J|W|rad|K|d|R)(?:\^[1-9])?"
+_SYMBOL = r"(?:m|s|kg|N|Pa|J|W|rad|K)(?:\^[1-9])?"
 _PLAIN = re.compile(rf"1|{_SYMBOL}(?:[*/ ]{_SYMBOL})*")
+# What a quantity may be measured in, a grain's diameter or a vessel's radius, is a day and the gas constant to the library.
+_SCALES = ("d", "R")
 _POWER = re.compile(r"([^\W\d]+)(\d)")
 _EXAMPLES = {"m": "4 mm", "m^2": "4 mm^2", "m^3": "0.08 mm^3", "s": "2 ms", "m/s": "2 cm/s", "m/s^2": "9.81 m/s^2", "kg": "2 g",
              "kg/m^3": "2.5 g/cm^3", "Pa": "5 MPa", "Pa*s": "1 mPa*s", "N": "2 mN", "N/m": "72 mN/m", "rad": "20 deg", "rad/s": "14 rpm",
              "1": "0.3"}
+_TIMES = {"s": 1.0, "sec": 1.0, "min": 60.0, "h": 3600.0, "hour": 3600.0, "hours": 3600.0, "d": 86400.0, "day": 86400.0, "days": 86400.0}
+_SIZES = {"kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12, "KiB": 2.0**10, "MiB": 2.0**20, "GiB": 2.0**30, "TiB": 2.0**40}
+_PART = re.compile(r"\s*([0-9]+(?:\.[0-9]*)?|\.[0-9]+)\s*([A-Za-z]+)")
 
 
 @cache
@@ -41,14 +48,22 @@ def _angle_power(quantity: pint.Quantity[float]) -> float:
 
 
 def known_unit(unit: str) -> bool:
-    """Whether `unit` is `1` or a unit that can be converted to."""
-    if _PLAIN.fullmatch(unit):
+    """Whether `unit` is `1`, a scale (d, R) or a unit that can be converted to."""
+    if unit in _SCALES or _PLAIN.fullmatch(unit):
         return True
     try:
         _registry().Unit(unit)
     except Exception:  # noqa: BLE001 (the parser of unit texts raises many kinds, none of which means anything else here)
         return False
     return True
+
+
+def si_unit(unit: str) -> bool:
+    """Whether `unit` is `1` or one of SI without a factor, so that engines may read its numbers: `Pa*s`, not `mm`, nor `d`, which is a
+    day."""
+    if _PLAIN.fullmatch(unit):
+        return True
+    return known_unit(unit) and math.isclose(_registry().Quantity(1.0, unit).to_base_units().magnitude, 1.0)
 
 
 def example(unit: str) -> str:
@@ -120,3 +135,50 @@ def _converted(number: str, given: str, unit: str, head: str, shown: str) -> flo
     if not quantity.unitless and _angle_power(quantity) != _angle_power(1 * target):
         raise DembarkError(f"{head}{shown} mixes up angles and plain ratios; give e.g. {example(unit)}")
     return value
+
+
+def seconds(text: str) -> float:
+    """A positive duration in s, of a text such as `90 s`, `10 min`, `2 h 30 min`, `1 d`; DembarkError when it is none."""
+    return _total(text, _TIMES, "duration", '"90 s", "10 min", "2 h 30 min", "1 d"')
+
+
+def size(text: str) -> float:
+    """A positive amount of memory in bytes, of a text such as `800 MB`, `1.5 GB`, `2 GiB`; DembarkError when it is none."""
+    return _total(text, _SIZES, "amount of memory", '"800 MB", "1.5 GB", "2 GiB"')
+
+
+def _total(text: str, units: Mapping[str, float], what: str, examples: str) -> float:
+    # A comma between two durations is another mistake.
+    if re.search(r"\d,\d", text):
+        refuse_comma(text)
+    parts = _PART.findall(text)
+    total = sum(float(number) * units.get(unit, math.nan) for number, unit in parts)
+    if _PART.sub("", text).strip() or not total > 0.0:
+        raise DembarkError(f"{text!r} is no {what}", f"wanted is a positive one with its unit: {examples}")
+    return total
+
+
+def size_text(count: float) -> str:
+    """Bytes for people: `12 MB`, `3.4 GB`."""
+    for unit in ("GB", "MB", "kB"):
+        if count >= _SIZES[unit]:
+            return f"{count / _SIZES[unit]:.3g} {unit}"
+    return f"{count:.0f} B"
+
+
+def core_hours(core_seconds: float) -> str:
+    """Core-hours for people, from core-seconds: `0.02`, `1.3`, `120`."""
+    hours = core_seconds / 3600.0
+    return f"{hours:.0f}" if hours >= 99.5 else f"{hours:.2g}"
+
+
+def duration(seconds: float | None) -> str:
+    """A duration for people, from s: `45 s`, `3 min 20 s`, `2 h 5 min`; `–` for none."""
+    if seconds is None:
+        return "–"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"

@@ -42,7 +42,7 @@ copy() {  # copy FILE TARGET
   changed=$((changed + 1))
 }
 # The models and what they include; the rest of that folder is liggghts-dembark's own way into a finished library.
-for file in "$here"/plugins/liggghts/*_model_*.h "$here"/plugins/liggghts/{bridge_reach,contact_data,energy_tally,model_properties,settings_choice}.h "$here"/plugins/liggghts/engine_access.{h,cpp}; do
+for file in "$here"/plugins/liggghts/*_model_*.h "$here"/plugins/liggghts/{bridge_reach,contact_data,model_properties}.h "$here"/plugins/liggghts/engine_access.{h,cpp}; do
   copy "$file" "$src/$(basename "$file")"
 done
 # Liquid that grains and walls own.
@@ -54,7 +54,7 @@ for file in "$here"/plugins/liggghts/fix_energy_account*; do
   copy "$file" "$src/$(basename "$file")"
 done
 # States to resume from.
-for file in "$here"/plugins/liggghts/{fix_resume_exact,resume_state,state_files}.{h,cpp}; do
+for file in "$here"/plugins/liggghts/{fix_resume_exact*,state_files.h}; do
   copy "$file" "$src/$(basename "$file")"
 done
 # The fix for impacts of logs solves its equations with Eigen, a library of headers; without it LIGGGHTS would not compile any more.
@@ -71,7 +71,16 @@ while IFS= read -r file; do
   copy "$here/plugins/physics/$file" "$src/dembark/$file"
 done < <(cd "$here/plugins/physics" && find . -name '*.hpp' -not -path './tests/*' -not -path './python/*' | sed 's|^\./||' | sort)
 
-# The combinations that liggghts-dembark holds.
+# The combinations that liggghts-dembark holds: a bracket stands for one model after the other.
+combinations() {  # combinations LINE
+  local bracket='^([^(]*\()([^(]*)\(([^)]*)\)(.*)$' model
+  if [[ $1 =~ $bracket ]]; then
+    local before=${BASH_REMATCH[1]}${BASH_REMATCH[2]} behind=${BASH_REMATCH[4]}
+    for model in ${BASH_REMATCH[3]//,/}; do combinations "$before$model$behind"; done
+  else
+    echo "${1/GRAN_MODELS/GRAN_MODEL}"
+  fi
+}
 whitelist=$src/style_contact_model_user.whitelist
 while IFS= read -r line; do
   if ! grep -qxF "$line" "$whitelist" 2>/dev/null; then
@@ -80,14 +89,14 @@ while IFS= read -r line; do
     echo "$line" >>"$whitelist"
     changed=$((changed + 1))
   fi
-done < <(grep '^GRAN_MODEL' "$here/plugins/liggghts/granular_combinations_list.h")
+done < <(while IFS= read -r line; do combinations "$line"; done < <(grep '^GRAN_MODELS' "$here/plugins/liggghts/granular_combinations_list.h"))
 
 if [ "$changed" = 0 ]; then echo "dembark: $src is up to date"; else echo "dembark: installed into $src"; fi
 if grep -q 'static_cast< std::ostringstream' "$src/utils.h"; then
   echo "Note: as published, LIGGGHTS 3.8.0 does not compile as C++17; utils.h and finish.cpp need the mending that Debian and others apply."
 fi
 cat <<END
-Next, in that folder: build LIGGGHTS as you always do, with C++17 (g++ 8 or newer; a -std=c++11 in CCFLAGS has to become -std=c++17)${eigen:+
+Next, in that folder: build LIGGGHTS as you always do, with C++17 (g++ 9 or newer; a -std=c++11 in CCFLAGS has to become -std=c++17)${eigen:+
 and $eigen in CCFLAGS}, e.g.
   make auto
 and use  pair_style gran model hertz tangential finnie_rabinowicz [cohesion capillary]  or  fix ... lcp/impact  in your input, as in

@@ -4,11 +4,24 @@
 hold the fields.
 """
 
+from typing import TYPE_CHECKING, Any
+
 from dembark.postproc.contacts import ContactFrame, ContactsDump
 from dembark.postproc.dumptext import DumpError, DumpWarning, TextDump, open_dump
 from dembark.postproc.grains import GrainFrame, GrainsDump
 from dembark.postproc.history import read_times
-from dembark.postproc.trajectory import universe
+
+if TYPE_CHECKING:
+    from dembark.postproc.trajectory import universe
 
 __all__ = ["ContactFrame", "ContactsDump", "DumpError", "DumpWarning", "GrainFrame", "GrainsDump", "TextDump", "open_dump", "read_times",
            "universe"]
+
+
+def __getattr__(name: str) -> Any:
+    """`universe`, when it is asked for: MDAnalysis takes longer to import than all else together, and few need it."""
+    if name == "universe":
+        from dembark.postproc.trajectory import universe
+
+        return universe
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

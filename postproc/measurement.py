@@ -1,4 +1,7 @@
-"""What a case's measure.py returns: values with intervals by name, profiles for the report, remarks and fields."""
+"""What a case's measure.py returns: values with intervals by name, profiles for the report, remarks and fields.
+
+It is also the one module that a measure.py imports for its daily needs: replicas, estimates, profiles and the types of its arguments.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from dembark.postproc.statistics import Estimate
+from dembark.postproc.replica import Array, Replica
+from dembark.postproc.resampling import pooled, profile
+from dembark.postproc.statistics import CONFIDENCE, Estimate, block_mean, exact, over_replicas
 
 if TYPE_CHECKING:
     import xarray as xr
+
+__all__ = ["CONFIDENCE", "Array", "Curve", "Estimate", "Measurement", "Numbers", "Points", "Replica", "Replicas", "Value", "block_mean",
+           "exact", "number", "over_replicas", "pooled", "profile"]
+
+# Parameters of a run by name, in SI units.
+Numbers = Mapping[str, Any]
+# What `profile` returns.
+Curve = dict[str, Any]
+# The results of a study's variants, each the content of a metrics.json.
+Points = Sequence[Mapping[str, Any]]
+Replicas = Sequence[Replica]
 
 
 @dataclass(frozen=True)
@@ -46,3 +62,8 @@ class Measurement:
     profiles: Sequence[Mapping[str, Any]] = ()
     remarks: Sequence[str] = ()
     fields: xr.Dataset | None = field(default=None)
+
+
+def number(value: float, reference: float | None = None, **more: Any) -> Value:
+    """`value` and `reference` without an interval; `more` as in Value."""
+    return Value(exact(value), None if reference is None else exact(reference), **more)

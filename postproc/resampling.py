@@ -43,12 +43,13 @@ def pooled(replicas: Sequence[Mapping[str, Estimate]], name: str) -> Estimate:
 
 def profile(
     name: str, title: str, along: str, across: str, place: Array, values: Sequence[Array], *, half: Array | None = None,
-    vertical: bool = False, reference: Array | None = None, reference_label: str = "", note: str = "",
+    vertical: bool = False, reference: Array | None = None, reference_half: Array | None = None, reference_label: str = "", note: str = "",
 ) -> dict[str, Any]:
     """A profile for figure and CSV: `values` of each replica at the same `place`; the band is Student's interval over replicas (three or
     more), the range of two, or for one the half-widths `half` of its 95 % intervals, where all are known.
 
-    `along` and `across` label the axes of place and value; `vertical` draws the place upwards.
+    `along` and `across` label the axes of place and value; `vertical` draws the place upwards. `reference_half`: half-widths of the 95 %
+    intervals of a measured `reference`.
     """
     table = np.asarray(values, float)
     mean = table.mean(axis=0)
@@ -63,6 +64,8 @@ def profile(
         entry |= {"low": _numbers(mean - spread), "high": _numbers(mean + spread), "band": f"95 % interval over {len(table)} replicas"}
     if reference is not None:
         entry |= {"reference": _numbers(reference), "reference_label": reference_label}
+    if reference is not None and reference_half is not None:
+        entry |= {"reference_low": _numbers(reference - reference_half), "reference_high": _numbers(reference + reference_half)}
     return entry
 
 

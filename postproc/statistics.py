@@ -55,21 +55,27 @@ def correlation_time(series: Array) -> float:
     that mean, about sigma^2 tau / n: this bias is taken out as by U. Wolff, Comput. Phys. Commun. 156 (2004) 143. Without it a series of
     10 correlation times seems to have 20.
     """
-    values = np.asarray(series, float)
-    count = len(values)
-    deviation = values - values.mean()
-    if count < 4 or not np.any(np.abs(deviation) > 1e-14 * np.abs(values).max(initial=0.0)):
-        return 1.0
-    spectrum = np.fft.rfft(deviation, 2 * count)
-    correlation = np.fft.irfft(np.abs(spectrum) ** 2)[:count]
+    return float(_correlation_times(np.asarray(series, float)[:, None])[0])
+
+
+def _correlation_times(values: Array) -> Array:
+    """The same (m,) of the series (n, m)."""
+    count, found = len(values), np.ones(values.shape[1])
+    deviation = values - values.mean(axis=0)
+    varies = (np.abs(deviation) > 1e-14 * np.abs(values).max(axis=0, initial=0.0)).any(axis=0)
+    if count < 4 or not varies.any():
+        return found
+    spectrum = np.fft.rfft(deviation[:, varies], 2 * count, axis=0)
+    correlation = np.fft.irfft(np.abs(spectrum) ** 2, axis=0)[:count]
     correlation /= correlation[0]
-    tau = 2.0 * np.cumsum(correlation) - 1.0
-    ended = np.arange(count) >= _WINDOW * tau
-    lag = int(np.argmax(ended))
-    left = 1.0 - (2.0 * lag + 1.0 - tau[lag]) / count
-    if not ended.any() or left <= 0.0:
-        return float(count)
-    return float(np.clip(tau[lag] / left, 1.0, count))
+    tau = 2.0 * np.cumsum(correlation, axis=0) - 1.0
+    ended = np.arange(count)[:, None] >= _WINDOW * tau
+    lag = np.argmax(ended, axis=0)
+    at_lag = np.take_along_axis(tau, lag[None], axis=0)[0]
+    left = 1.0 - (2.0 * lag + 1.0 - at_lag) / count
+    known = ended.any(axis=0) & (left > 0.0)
+    found[varies] = np.where(known, np.clip(at_lag / np.where(known, left, 1.0), 1.0, count), count)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,16 +99,21 @@ def time_blocks(series: Array, most: int = 10) -> TimeBlocks:
     Neighbouring blocks are still correlated, so their means scatter too little. `widening` makes up for it as it follows for a series
     whose autocorrelation decays exponentially. A single sample has the spread of its four blocks: half of it would be their error.
     """
-    length, tau = len(series), correlation_time(series)
-    blocks = min(most, int(length / (_BLOCK_LENGTH * tau)))
+    length = len(series)
+    blocks, widening, single = (one[0] for one in _division(length, np.array([correlation_time(series)]), most))
+    return TimeBlocks(np.arange(length) * int(blocks) // length, float(widening), bool(single))
+
+
+def _division(length: int, tau: Array, most: int) -> tuple[NDArray[np.int64], Array, NDArray[np.bool_]]:
+    """Numbers of blocks, `widening` and `single` of series of `length` with the correlation times `tau` (m,); all (m,)."""
+    blocks = np.minimum(most, length / (_BLOCK_LENGTH * tau)).astype(np.int64)
     single = blocks < _MIN_BLOCKS
-    blocks = _MIN_BLOCKS if single else blocks
+    blocks = np.where(single, _MIN_BLOCKS, blocks)
     whole, part = _variance_of_mean(length, tau), _variance_of_mean(length / blocks, tau)
-    widening = math.sqrt(blocks if single else whole * (blocks - 1) / (part - whole))
-    return TimeBlocks(np.arange(length) * blocks // length, widening, single)
+    return blocks, np.sqrt(np.where(single, blocks, whole * (blocks - 1) / (part - whole))), single
 
 
-def _variance_of_mean(count: float, tau: float) -> float:
+def _variance_of_mean(count: Array | float, tau: Array) -> Array:
     """Variance of the mean of `count` samples of unit variance with the autocorrelation a^k and the correlation time `tau`.
 
     G. V. Bayley & J. M. Hammersley, J. R. Stat. Soc. Suppl. 8 (1946) 184, for a = (tau - 1) / (tau + 1).
@@ -125,6 +136,20 @@ def block_mean(series: Array, confidence: float = CONFIDENCE) -> Estimate:
     means = np.bincount(blocks.groups, values) / np.bincount(blocks.groups)
     half = student(blocks.count - 1, confidence) * blocks.widening * float(means.std(ddof=1)) / math.sqrt(blocks.count)
     return Estimate(value, half, ONE_SAMPLE if blocks.single else f"{blocks.count} block averages")
+
+
+def block_halves(values: Array, confidence: float = CONFIDENCE) -> Array:
+    """Half-widths (m,) of the intervals that `block_mean` gives the means of the series (n, m)."""
+    count, half = len(values), np.full(values.shape[1], np.inf)
+    if count < 2 * _MIN_BLOCKS:
+        return half
+    blocks, widening, _ = _division(count, _correlation_times(values), _MOST_BLOCKS)
+    for number in np.unique(blocks):
+        chosen, groups = blocks == number, np.arange(count) * int(number) // count
+        starts = np.flatnonzero(np.diff(groups, prepend=-1))
+        means = np.add.reduceat(values[:, chosen], starts, axis=0) / np.diff(starts, append=count)[:, None]
+        half[chosen] = student(number - 1, confidence) * widening[chosen] * means.std(axis=0, ddof=1) / math.sqrt(number)
+    return half
 
 
 def replica_mean(values: Sequence[float], confidence: float = CONFIDENCE) -> Estimate:

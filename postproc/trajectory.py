@@ -173,7 +173,7 @@ def universe(path: str | Path, time_step: float = 1.0, **kwargs: Any) -> MDAnaly
     """MDAnalysis Universe of a dump of grains, for its selections and analysis classes; keywords are those of GrainsReader.
 
     For example `universe(path).select_atoms("type 1 and prop z > 0.05")`. The same as
-    `MDAnalysis.Universe(path, format="DEMGRAINS", time_step=time_step)`, once dembark.postproc is imported.
+    `MDAnalysis.Universe(path, format="DEMGRAINS", time_step=time_step)`, once this function is imported.
     """
     name = str(path)
     return MDAnalysis.Universe(name, name, topology_format="DEMGRAINS", format="DEMGRAINS", time_step=time_step, **kwargs)

@@ -27,7 +27,6 @@ app = typer.Typer(name="dembark", help=_ABOUT,
 
 _SET = 'Change a key; repeat for more. A unit may follow: --set "grain_diameter=4 mm".'
 _OUT = "Folder for the results; default: results/<profile>/<case>/<variant>/<engine>; needed with --set."
-
 _INTERVAL = "Wall time between the states that an interrupted run goes on from: '10 min', or none; default: 10 min."
 
 Profile = Annotated[str, typer.Option(help="Size of the runs: quick, standard, full, ...")]
@@ -117,14 +116,14 @@ def run(
     for line in show.open_lines(result):
         console.print(line, markup=False, soft_wrap=True)
     counted = tally(result.quantities)
-    console.print(counted.sentence, style="bold red" if counted.failed else "bold", soft_wrap=True)
+    show.print_tally(console, counted)
     console.print(str(folder / METRICS), markup=False, soft_wrap=True)
     _strictly(counted.failed, strict)
 
 
 def _interval(text: str | None) -> float | None:
     """Wall time (s) between states of a run, 0 for none; None when it is not said."""
-    from dembark.validation.campaigns.sizes import seconds
+    from dembark.common.units import seconds
 
     if text is None:
         return None
@@ -164,10 +163,9 @@ def make_report(
     from dembark.validation.runs.steps import build_report
 
     folder = directory.resolve() if directory else results.resolve() / profile
-    if directory and not any(folder.glob("*/*/*/metrics.json")):
-        raise DembarkError(f"no results in {folder}", "", "give the folder of a campaign that has measured something")
     if not any(folder.glob("*/*/*/metrics.json")):
-        raise DembarkError(f"no results in {folder}", "", f"run 'dembark validate --profile {profile}' first, or give --results")
+        raise DembarkError(f"no results in {folder}", "", "give the folder of a campaign that has measured something" if directory else
+                           f"run 'dembark validate --profile {profile}' first, or give --results")
     build_report(folder)
     show.console().print(f"{folder / 'report.html'}\n{folder / 'report.pdf'}", markup=False, soft_wrap=True)
 

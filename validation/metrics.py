@@ -55,7 +55,7 @@ def measure(folder: Path, wanted: int | None = None) -> Result:
     numbers = {int(one.record["replica"]) for one in runs}
     return Result(
         case.name, first["variant"], first["engine"], quantities, first["profile"], parameters=parameters, profiles=tuple(found.profiles),
-        remarks=(*_remarks(case, found), *warnings), picture=_picture(case, first),
+        remarks=(*_remarks(case, found), *warnings), picture=measuring.picture(case, first),
         references=measuring.references(case), provenance=_provenance(runs), measured=provenance.measured(),
         inputs=tuple(one.record["inputs"] for one in runs if "inputs" in one.record),
         replicas_missing=tuple(number for number in range(1, (wanted or 0) + 1) if number not in numbers))
@@ -63,12 +63,8 @@ def measure(folder: Path, wanted: int | None = None) -> Result:
 
 def picture(folder: Path) -> Mapping[str, Any] | None:
     """How the report shows the replicas in `folder`, see `measuring.picture`."""
-    runs = replicas(folder)
-    return _picture(find(runs[0].record["case"]), runs[0].record) if runs else None
-
-
-def _picture(case: Case, record: Mapping[str, Any]) -> Mapping[str, Any] | None:
-    return measuring.picture(case, {**record["parameters"], **record["derived"]})
+    first = next(iter(replicas(folder)), None)
+    return measuring.picture(find(first.record["case"]), first.record) if first else None
 
 
 def _remarks(case: Case, found: Measurement) -> tuple[str, ...]:
@@ -77,7 +73,7 @@ def _remarks(case: Case, found: Measurement) -> tuple[str, ...]:
 
 def _write_fields(folder: Path, fields: xarray.Dataset) -> None:
     # Labelled arrays take a second to import, which commands that measure nothing need not wait for.
-    from dembark.postproc.output import labelled
+    from dembark.postproc import labelled
 
     labelled.write(folder / "fields.nc", fields)
 

@@ -14,6 +14,7 @@ from dembark.common.errors import RunError
 from dembark.validation.case.model import Case
 from dembark.validation.doctor import Finding
 from dembark.validation.judge.result import Result
+from dembark.validation.judge.tally import Tally
 
 if TYPE_CHECKING:
     from dembark.validation.runs.perform import Outcome
@@ -107,6 +108,13 @@ def open_lines(result: Result) -> list[str]:
     return [f"{standing}: {', '.join(names)}: {reason}" for (standing, reason), names in reasons.items()]
 
 
+def print_tally(here: Console, counted: Tally, before: str = "") -> None:
+    """How many checks passed, failed and are open: of all together, after what stands `before`, and a line for each kind of evidence."""
+    here.print(before + counted.sentence, style="bold red" if counted.failed else "bold", soft_wrap=True)
+    for line in counted.sentences:
+        here.print(f"  {line}", markup=False, soft_wrap=True)
+
+
 def show_outcome(outcome: Outcome, what: str, advice: str) -> None:
     """What a workflow came to, for people; RunError with `advice` when something of it is missing."""
     here = console()
@@ -114,10 +122,7 @@ def show_outcome(outcome: Outcome, what: str, advice: str) -> None:
         here.print(f"not finished: {line}", markup=False, style="red", soft_wrap=True)
     for line in outcome.problems:
         here.print(f"problem: {line}", markup=False, style="red", soft_wrap=True)
-    here.print(f"{outcome.runs - len(outcome.unfinished)} of {outcome.runs} runs finished; {outcome.tally.sentence}",
-                  style="bold red" if outcome.tally.failed else "bold", soft_wrap=True)
-    for line in outcome.tally.sentences:
-        here.print(f"  {line}", markup=False, soft_wrap=True)
+    print_tally(here, outcome.tally, f"{outcome.runs - len(outcome.unfinished)} of {outcome.runs} runs finished; ")
     if outcome.report:
         here.print(str(outcome.report), markup=False, soft_wrap=True)
     if not outcome.complete:

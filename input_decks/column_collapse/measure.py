@@ -4,16 +4,13 @@ Balances run over all rows of time.csv, shares over the collapse, from the row i
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
 from dembark.postproc.instruments.collapse import Collapse, deposits, read, shares
 from dembark.postproc.instruments.growth import Growth, ordered
-from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.replica import Replica
-from dembark.postproc.statistics import Estimate, exact, over_replicas
+from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas, Value, exact, over_replicas
 
 # What takes the energy, with the titles of the curves; liquid does so in wet columns.
 WAYS = {"kinetic": "Kinetic energy", "friction": "Lost by friction", "normal_viscous": "Lost by normal damping",
@@ -31,7 +28,7 @@ def height_law(aspect: float) -> float | None:
     return aspect**0.4 if aspect > 2.8 else None
 
 
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values, curves and remarks from all replicas of a series."""
     runs = [read(replica) for replica in replicas]
     ways = WAYS | (WET if replicas[0].parameters["bridge_volume"] > 0.0 else {})
@@ -68,7 +65,7 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
     return Measurement(values, [*shares(runs, {"potential": "Potential energy lost"} | ways), deposits(runs)], remarks)
 
 
-def study(_name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
+def study(_name: str, points: Points, along: str) -> Measurement:
     """Exponent of the step's energy error, with the interval that those of the errors give it."""
     points, steps = ordered(points, along)
     errors = Growth.of(points, "step_error", steps)

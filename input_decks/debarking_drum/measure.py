@@ -7,25 +7,19 @@ lost; and the mean force of the shell is the weight.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from dembark.postproc.instruments.drum import PLACES, Drum, estimates, fields, read
+from dembark.postproc.instruments.drum import estimates, fields, profiles, read
 from dembark.postproc.instruments.growth import Growth, ordered
-from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.replica import Array, Replica
-from dembark.postproc.resampling import pooled, profile
-from dembark.postproc.statistics import Estimate
+from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas, Value, pooled
 
-FORCES = np.logspace(1.0, 6.0, 51)  # edges of the histogram of peak forces, N
 CURVES = {"impacts_per_log": ("Impacts per log and revolution", "1"), "peak_force_mean": ("Mean peak force", "kN"),
           "peak_force_p99": ("Peak force that 1 % exceed", "kN"), "dissipated_energy": ("Energy lost per revolution", "kJ"),
           "torque_arm": ("Moment over weight × radius", "1")}
 
 
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values, profiles, remarks and fields of all loads."""
     drums, given = [read(replica) for replica in replicas], replicas[0].parameters
     found, zero, limit, first = [estimates(drum) for drum in drums], Estimate(0.0, 0.0), given["impact_speed"], drums[0]
@@ -49,34 +43,10 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
         remarks.append("The drum's radius is given, so the number of logs follows from it and the filling; log_count is not used.")
     if len(replicas) < 3:
         remarks.append("With fewer than three loads the intervals come from quarter revolutions within the run.")
-    return Measurement(values, _profiles(drums, limit), remarks, fields(replicas))
+    return Measurement(values, profiles(drums, limit), remarks, fields(replicas))
 
 
-def _profiles(drums: Sequence[Drum], limit: float) -> list[dict[str, Any]]:
-    hit = np.nonzero(sum(np.histogram(drum.peak, FORCES)[0] for drum in drums))[0]
-    forces = FORCES[max(0, hit[0] - 1) : hit[-1] + 3] if len(hit) else FORCES
-    turned = (np.arange(20 * drums[0].revolutions) + 0.5) / 20.0
-
-    def curve(name: str, title: str, along: str, across: str, place: Array, get: Callable[[Drum], Array], **more: Any) -> dict[str, Any]:
-        return profile(name, title, along, across, place, [get(drum) for drum in drums], **more)
-
-    note, around, number = f"approach ≥ {limit:g} m/s", "angle past the lowest point (°)", "per log, turn and 10°"
-    return [
-        curve("peak_forces", "Peak forces of impacts", "log₁₀ of the peak force (N)", "per log, turn and decade",
-              np.log10(np.sqrt(forces[1:] * forces[:-1])),
-              lambda one: one.per_log(np.histogram(one.peak, forces)[0]) / np.diff(np.log10(forces)), note=note),
-        curve("peak_forces_exceeded", "Impacts harder than F", "log₁₀ of F (N)", "log₁₀ of number per log, turn", np.log10(forces),
-              lambda one: np.log10(one.exceeding(forces)), note=note),
-        curve("impacts_at_angle", "Where logs meet", around, number, PLACES, lambda one: one.at_angle(one.angle), note="all impacts"),
-        curve("shell_impacts_at_angle", "Where logs meet the shell", around, number, PLACES,
-              lambda one: one.at_angle(one.angle[one.shell]), note="impacts on the shell"),
-        curve("peak_force_at_angle", "How hard they meet", around, "mean peak force (kN)", PLACES, lambda one: 1e-3 * one.peak_at_angle()),
-        curve("power", "Power", "revolutions of the window", "power of the drum (W)", turned, lambda one: one.power(one.work, 20),
-              reference=np.mean([one.power(one.lost, 20) for one in drums], axis=0), reference_label="power that is lost"),
-    ]
-
-
-def study(_name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
+def study(_name: str, points: Points, along: str) -> Measurement:
     """The studies `filling` and `speed`: curves of impacts, peak forces and power, and the power of `along` that each grows with."""
     points, place = ordered(points, along)
     label = {"filling": "filling", "drum_speed": "speed of the drum (rad/s)"}.get(along, along.replace("_", " "))

@@ -16,19 +16,15 @@ O.engines = dembark.log_loop(
 writer = dembark.FrameWriter(
     ["shell_fx", "shell_fy", "shell_fz", "potential_energy", "elastic_energy", "dissipated_energy", "torque", "contacts", "active", "begun",
      "impulse_sum", "pivots", "certificate", "peak_force"], gravity=weight)
-sums = [0.0, 0.0, 0.0]
+means = dembark.StepMeans(p.every)
 
 
 def record() -> None:
-    """Sum up the moment and force of the shell on the logs; write what is due at this step."""
+    """Average the moment and force of the shell on the logs over the steps of a row; write what is due at this step."""
     force = hits.walls[0].force
-    for k, value in enumerate((-O.forces.t(drum)[1], -force[0], -force[2])):
-        sums[k] += value
-    if O.iter == 0:
-        sums[:] = [0.0, 0.0, 0.0]  # the first mean begins after the start
-    elif O.iter % p.every == 0:
-        torque, sideways, upward = (value / p.every for value in sums)
-        sums[:] = [0.0, 0.0, 0.0]
+    averaged = means.add(-O.forces.t(drum)[1], -force[0], -force[2])
+    if averaged:
+        torque, sideways, upward = averaged
         height = p.gravity * sum(body.state.mass * body.state.pos[2] for body in O.bodies if body.id != drum)
         writer.row(sideways, 0, upward, height, hits.elasticEnergy, hits.dissipatedEnergy, torque, hits.contactCount, hits.activeCount,
                    hits.impactsBegun, hits.impulseSum, hits.pivotsTotal, hits.worstCertificate, hits.highestForce)
@@ -36,14 +32,4 @@ def record() -> None:
         writer.frame()
 
 
-def save_sums() -> None:
-    """The means that have begun belong to the saved scene."""
-    O.tags["sums"] = " ".join(value.hex() for value in sums)
-
-
-def load_sums() -> None:
-    """The means as they had begun in the scene that was loaded."""
-    sums[:] = [float.fromhex(word) for word in O.tags["sums"].split()]
-
-
-dembark.run(p.steps, saving=save_sums, loaded=load_sums)
+dembark.run(p.steps, saving=means.save, loaded=means.load)

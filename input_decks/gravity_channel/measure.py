@@ -6,84 +6,36 @@ velocity the mean over the middle half; the thickness of the shear zones is the 
 latter, in cells of one diameter. The studies ask how these grow with the width.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from dembark.postproc.instruments import channel
-from dembark.postproc.instruments.channel import Channel, Mask
+from dembark.postproc.instruments.channel import read_periodic
+from dembark.postproc.instruments.channel_gravity import common_exponential, estimates, profiles, scaled_curves
 from dembark.postproc.instruments.growth import Growth, ordered
-from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.replica import Array, Replica
-from dembark.postproc.resampling import pooled, profile
-from dembark.postproc.statistics import Estimate, exact
+from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas, Value, exact, pooled
 
 # Quantities without a verdict where no steady flow was found.
 FLOW = ("greatest_velocity", "slip_velocity", "velocity_ratio", "shear_zone_thickness", "core_flatness")
-# Axes of the scaled profiles.
-SCALED = ("distance from the layer at the wall over the thickness", "(u_max − u) / (u_max − u_slip)")
 # What grows with the width: the curve's title and label, and the published power.
 GROWN = {"greatest_velocity": ("Greatest velocity", "u_max (m/s)", 0.5), "slip_velocity": ("Velocity at the wall", "u_slip (m/s)", 0.5),
          "thickness": ("Thickness of the shear zones", "thickness / d", 1.0)}
 
 
-def thickness(one: Channel, frames: Mask) -> float:
-    """Thickness of the shear zones in d."""
-    return one.decay_length(frames, cells=2, start=1.0)
-
-
-def common_exponential(curves: Sequence[tuple[Array, Array]]) -> tuple[float, float]:
-    """(a, largest deviation) of the one function a exp(-place) that fits all curves best."""
-    place, value = (np.concatenate(parts) for parts in zip(*curves, strict=True))
-    a = float(np.exp(-place) @ value / np.sum(np.exp(-2.0 * place)))
-    return a, float(np.abs(value - a * np.exp(-place)).max())
-
-
-def _estimates(one: Channel) -> dict[str, Estimate]:
-    zone = one.from_wall < 2.0 * one.diameter
-    return channel.estimates(one, one.flow.sum(axis=(1, 2)) / one.solid.sum(axis=(1, 2)), {
-        "greatest_velocity": lambda f, _: one.core_velocity(f) / one.speed,
-        "slip_velocity": lambda f, _: one.wall_velocity(f) * one.core_velocity(f) / one.speed,
-        "velocity_ratio": lambda f, _: 1.0 / one.wall_velocity(f),
-        "shear_zone_thickness": lambda f, _: thickness(one, f),
-        "shear_inertial_number": lambda f, _: one.shear_inertial(f),
-        "wall_solid_fraction": lambda f, _: float(one.fraction(f)[zone].mean()),
-        "mean_solid_fraction": lambda f, _: float(one.fraction(f).mean()),
-    }, apart=True)
-
-
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values, profiles and remarks of all replicas of a series."""
-    channels = [channel.read_periodic(replica) for replica in replicas]
-    estimates = [_estimates(one) for one in channels]
+    channels = [read_periodic(replica) for replica in replicas]
+    found = [estimates(one) for one in channels]
     unsteady, zero = next((one.remark for one in channels if one.remark), ""), exact(0.0)
     references = {"core_flatness": zero, "force_balance_error": zero}
     details = {"wall_mobilisation": f"the wall's static friction is {replicas[0].derived['wall_static']:g}"}
-    values = {name: Value(pooled(estimates, name), references.get(name), reason=unsteady if name in FLOW else "",
-                          detail=details.get(name, "")) for name in estimates[0]}
+    values = {name: Value(pooled(found, name), references.get(name), reason=unsteady if name in FLOW else "",
+                          detail=details.get(name, "")) for name in found[0]}
     share = channels[0].steady_share
     remark = f"The steady part holds {share:.0%} of the measuring window (MSER-5 and a drift test on the kinetic energy)."
-    return Measurement(values, _profiles(channels), [unsteady[0].upper() + unsteady[1:] + "." if unsteady else remark])
+    return Measurement(values, profiles(channels), [unsteady[0].upper() + unsteady[1:] + "." if unsteady else remark])
 
 
-def _profiles(channels: Sequence[Channel]) -> list[dict[str, Any]]:
-    scaled = [one.scaled_deficit(thickness(one, one.frames)) for one in channels]
-    # The cells' own places only: between them a straight line is far from an exponential.
-    reach = np.mean([where for where, _ in scaled], axis=0)
-    law = np.exp(-reach) * float(np.mean([common_exponential([one])[0] for one in scaled]))
-    return [
-        channel.across(channels, "velocity", "Velocity", "u / √(g W)", lambda c: c.velocity(c.frames) / c.speed),
-        profile("scaled_velocity", "Scaled velocity deficit", *SCALED, reach, [deficit for _, deficit in scaled], reference=law,
-                reference_label="exponential"),
-        channel.across(channels, "fluctuation", "Velocity fluctuation", "standard deviation of u / √(g W)",
-                       lambda c: c.fluctuation(c.frames, apart=True)),
-        channel.across(channels, "solid_fraction", "Solid fraction", "φ", lambda c: c.fraction(c.frames)),
-        channel.across(channels, "inertial_number", "Inertial number", "I", lambda c: c.inertial_numbers(c.frames)),
-    ]
-
-
-def study(_name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
+def study(_name: str, points: Points, along: str) -> Measurement:
     """Exponents of velocities and thickness in the width, and the scaled profiles of all widths."""
     points, widths = ordered(points, along)
     given, cells = points[0]["parameters"], widths / float(points[0]["parameters"]["grain_diameter"])
@@ -111,9 +63,7 @@ def study(_name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measur
     }
     curves = [grown[name].curve(name, title, "width W / d", label, power, "proportional to " + ("√W" if power == 0.5 else "W"))
               for name, (title, label, power) in GROWN.items()]
-    curves += [profile(f"scaled_velocity_{width:.0f}", f"Scaled velocity deficit, W = {width:.0f} d", *SCALED, place, [value],
-                       reference=amplitude * np.exp(-place), reference_label="one exponential for all widths")
-               for (place, value), width in zip(scaled, cells, strict=True)]
+    curves += scaled_curves(scaled, cells, amplitude)
     core, wall = (Growth.of(points, name, cells).values for name in ("solid_fraction", "wall_solid_fraction"))
     loose = ", ".join(f"{one:.3f} and {other:.3f} at {width:.0f} d" for one, other, width in zip(core, wall, cells, strict=True))
     return Measurement(values, curves, [

@@ -4,16 +4,11 @@ The reference follows from the parameters alone, so that the set-up of the decks
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from dembark.physics.exact.liquid_row import Row, Rule, books
-from dembark.postproc.instruments.logs import number
-from dembark.postproc.measurement import Measurement
-from dembark.postproc.replica import Replica
-from dembark.postproc.resampling import profile
+from dembark.postproc.measurement import Measurement, Numbers, Replicas, number, profile
 
 # Diameters and periods of the grains over those of the first, and which of them are wet at the start.
 SIZES = np.array([1.0, 0.7, 1.2, 0.8, 1.0])
@@ -21,7 +16,7 @@ PERIODS = np.array([1.0, 1.37, 0.83, 1.61, 1.13])
 WET = np.array([1.0, 0.0, 0.0, 1.0, 0.0])
 
 
-def case(p: Mapping[str, Any]) -> tuple[Row, Rule]:
+def case(p: Numbers) -> tuple[Row, Rule]:
     """The row of a run with parameters `p`, and how its liquid is shared."""
     radii, gap = 0.5 * p["grain_diameter"] * SIZES, p["gap"] * p["grain_diameter"]
     middles = gap * np.arange(1, 6) + 2.0 * np.cumsum(radii) - radii
@@ -31,7 +26,7 @@ def case(p: Mapping[str, Any]) -> tuple[Row, Rule]:
         Rule(p["liquid_share"], p["liquid_share_factor"], p["liquid_return"], p["max_bridge"] or math.inf, p["contact_angle"]))
 
 
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values and curves of the run (there is one)."""
     p, times = replicas[0].parameters, replicas[0].times()
     due = books(*case(p), p["time_step"], times["step"])

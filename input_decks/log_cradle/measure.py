@@ -1,33 +1,24 @@
 """Log cradle: the velocities after an impact through a row of logs against the exact motion of the row."""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from dembark.physics.exact.chains import Chain, ChainMotion
-from dembark.postproc.instruments.logs import LogRun, energy_curves, number, over_time, read, solver_values
-from dembark.postproc.measurement import Measurement
-from dembark.postproc.replica import Replica
-
-# Curves are drawn of so many logs at most.
-SHOWN = 5
+from dembark.physics.exact.chains import Chain
+from dembark.postproc.instruments.log_exact import row_curves
+from dembark.postproc.instruments.logs import read, solver_values
+from dembark.postproc.measurement import Measurement, Numbers, Replicas, number
 
 
-def row(p: Mapping[str, Any]) -> Chain:
+def row(p: Numbers) -> Chain:
     """The logs of a run with parameters `p`, the first of which moves; a contact is two boundaries in series."""
     n = int(p["log_count"])
     return Chain(np.full(n, p["mass"]), np.full(n - 1, 0.5 * p["stiffness"]), np.full(n - 1, p["gap"]), p["velocity"] * np.eye(n)[0])
 
 
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values and curves of the run (there is one)."""
-    return measured(read(replicas[0]))
-
-
-def measured(run: LogRun) -> Measurement:
-    """The same from a run that was read."""
+    run = read(replicas[0])
     p, chain, duration = run.parameters, row(run.parameters), float(run.times[-1])
     motion, speed, turn = chain.motion(run.times), p["velocity"], chain.highest_frequency * run.time_step
     due, peak = motion.velocities[-1], chain.peak_force(duration)
@@ -48,17 +39,6 @@ def measured(run: LogRun) -> Measurement:
         **solver_values(run),
     }
     shares = ", ".join(f"{value:.4f}" for value in due / speed)
-    return Measurement(values, _curves(run, chain, motion), [
+    return Measurement(values, row_curves(run, chain, motion), [
         (f"Exact velocities after, over that of the first log: {shares} ({motion.events} contacts close or open on the way). All act at "
          "the same time; a row of separate pairs would hand on the whole speed.")])
-
-
-def _curves(run: LogRun, chain: Chain, motion: ChainMotion) -> list[dict[str, Any]]:
-    n, along, forces, due = len(run.masses), run.velocities[:, :, 0], run.neighbour_forces() / 1e3, motion.forces / 1e3
-    return [
-        *(over_time(f"velocity_{log + 1}", f"Velocity of log {log + 1}", "v (m/s)", run.times, along[:, log], motion.velocities[:, log])
-          for log in np.unique(np.linspace(0, n - 1, min(n, SHOWN)).round().astype(int))),
-        *(over_time(f"force_{one + 1}", f"Force of logs {one + 1} and {one + 2}", "N (kN)", run.times, forces[:, one], due[:, one])
-          for one in sorted({0, n - 2})),
-        *energy_curves(run, 0.5 * (motion.forces**2 / chain.stiffness).sum(axis=1)),
-    ]

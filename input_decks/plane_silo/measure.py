@@ -4,16 +4,14 @@ The walls have the area 2 dz for each W dz of the slab, a cylinder's 2 pi R dz f
 R's place, lambda = W / (2 K mu_mob). K is the mean normal stress of both walls over the mean sigma_zz of the cross-section W x period.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from dembark.postproc.instruments import silo
 from dembark.postproc.instruments.column import read
-from dembark.postproc.measurement import Measurement
-from dembark.postproc.replica import Replica
+from dembark.postproc.measurement import Measurement, Replicas
 
 
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values, profiles and remarks of all replicas of a series."""
     given = replicas[0].parameters
     found = silo.measured([read(replica) for replica in replicas], "W", "x", replicas[0].derived)

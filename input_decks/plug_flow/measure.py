@@ -3,18 +3,10 @@
 Only the steady part is used; it is detected in the wall friction (MSER-5 and a drift test).
 """
 
-from collections.abc import Sequence
-from typing import Any
 
-import numpy as np
-
-from dembark.postproc.instruments import channel, channel_fields
-from dembark.postproc.instruments.channel import Channel
+from dembark.postproc.instruments import channel, channel_fields, channel_plug
 from dembark.postproc.instruments.liquid import liquid_values
-from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.replica import Replica
-from dembark.postproc.resampling import pooled
-from dembark.postproc.statistics import CONFIDENCE, Estimate, block_mean
+from dembark.postproc.measurement import Estimate, Measurement, Replicas, Value, pooled
 
 # A wall zone whose velocity deficit is below this cannot be told from the core's own scatter.
 LEAST_DEFICIT = 0.02
@@ -27,11 +19,11 @@ REMARKS = (
 )
 
 
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values, profiles, remarks and fields of all replicas of a series."""
     channels = [channel.read(replica) for replica in replicas]
-    estimates = [_estimates(one) for one in channels]
-    over = {name: pooled(estimates, name) for name in estimates[0]}
+    found = [channel_plug.estimates(one) for one in channels]
+    over = {name: pooled(found, name) for name in found[0]}
     first, unsteady, slip = channels[0], next((one.remark for one in channels if one.remark), ""), 1.0 - over["wall_slip"].value
     faint = f"the walls' layer lags by {slip:.1%} only: no shear zone to measure" if slip < LEAST_DEFICIT else ""
     values = {name: Value(one) for name, one in over.items()}
@@ -45,33 +37,4 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
     size = (f"The channel is {first.width / d:.0f} d wide and filled {first.height / d:.0f} d high; the cells that rest in the laboratory "
             f"cover {window / d:.0f} d of it.")
     remarks = [unsteady + "." if unsteady else steady, size, *REMARKS]
-    return Measurement({**values, **liquid_values(replicas), **fields.values}, _profiles(channels), remarks, fields.fields)
-
-
-def _estimates(one: Channel) -> dict[str, Estimate]:
-    errors = one.flux_errors()
-    # With as many heights as bands, each gets the interval with which all together hold 95 % (Bonferroni).
-    each = [block_mean(column, 1.0 - (1.0 - CONFIDENCE) / errors.shape[1]) for column in errors.T]
-    return {
-        **channel.estimates(one, one.shear.sum(axis=(1, 2)), {
-            "core_velocity": lambda f, b: one.core_velocity(f, b) / one.speed,
-            "wall_slip": one.wall_velocity,
-            "shear_zone_width": one.decay_length,
-            "shear_zone_width_90": one.ninety_width,
-        }),
-        "flux_error": max(each, key=lambda found: abs(found.value) - (found.half if np.isfinite(found.half) else 0.0)),
-        "core_velocity_lagrangian": block_mean(one.core_motion / one.speed),
-        "wall_shear_stress": block_mean(one.shear.mean(axis=(1, 2))),
-    }
-
-
-def _profiles(channels: Sequence[Channel]) -> list[dict[str, Any]]:
-    plate = {"reference": np.ones(len(channels[0].middle)), "reference_label": "the plate, v₀"}
-    return [
-        channel.across(channels, "velocity", "Velocity, Eulerian", "v / v₀", lambda c: c.velocity(c.frames) / c.speed, **plate),
-        channel.across(channels, "velocity_lagrangian", "Velocity, Lagrangian", "v / v₀", lambda c: c.lagrangian() / c.speed, **plate),
-        channel.across(channels, "fluctuation", "Velocity fluctuation", "standard deviation of v / v₀", lambda c: c.fluctuation(c.frames)),
-        channel.across(channels, "solid_fraction", "Solid fraction", "φ", lambda c: c.fraction(c.frames)),
-        channel.upward(channels, "wall_normal", "Wall normal stress", "σ_xx (Pa)", lambda c: c.normal),
-        channel.upward(channels, "wall_shear", "Wall shear stress", "τ (Pa)", lambda c: c.shear),
-    ]
+    return Measurement({**values, **liquid_values(replicas), **fields.values}, channel_plug.profiles(channels), remarks, fields.fields)

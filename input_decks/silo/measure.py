@@ -4,18 +4,15 @@ sigma_zz = rho_b g lambda (1 - exp(-h / lambda)), lambda = R / (2 K mu_mob), h t
 is taken from the material's friction. The study is the classical experiment: the mass that the base feels against the mass filled in.
 """
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 from dembark.postproc.instruments import silo, silo_fields
 from dembark.postproc.instruments.column import read
 from dembark.postproc.instruments.liquid import liquid_values
-from dembark.postproc.measurement import Measurement
-from dembark.postproc.replica import Replica
+from dembark.postproc.measurement import Measurement, Points, Replicas
 
 
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values, profiles, remarks and fields of all replicas of a series."""
     found = silo.measured([read(replica) for replica in replicas], "R", "r", replicas[0].derived)
     fields = silo_fields.measured(replicas, found.values)
@@ -23,6 +20,6 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
                    fields=fields.fields)
 
 
-def study(_name: str, points: Sequence[Mapping[str, Any]], _along: str) -> Measurement:
+def study(_name: str, points: Points, _along: str) -> Measurement:
     """The apparent mass of the fillings `points` against Janssen's law for the base."""
     return silo.fillings(points, "R")

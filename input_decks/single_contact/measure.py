@@ -1,57 +1,32 @@
 """Single contact: the eight impact tests of Chung and Ooi (2011).
 
-Each engine is held against three things: the same scheme written down again, from which it may differ by round-off; what is known exactly
-(Hertz; the restitution coefficient that was asked for; the contact law, integrated until the step does not matter); and, for information,
-theories of another contact (rigid bodies that slide throughout; partial slip after Mindlin and Deresiewicz).
+Each engine is held against four things: the same scheme written down again, from which it may differ by round-off; what is known exactly
+(Hertz; the restitution coefficient that was asked for; the contact law, integrated until the step does not matter); the curves
+that they published; and, for information, theories of another contact (rigid bodies that slide throughout; partial slip after Mindlin and
+Deresiewicz).
 """
 
-import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 
-from dembark.physics.exact.impacts import Impacts
 from dembark.postproc.instruments.impact_tests import head_on, mirrored, oblique, restitutions
-from dembark.postproc.instruments.impacts import Flight, Solutions, read
-from dembark.postproc.instruments.logs import number
-from dembark.postproc.measurement import Measurement
-from dembark.postproc.replica import Array, Replica
+from dembark.postproc.instruments.impacts import Flight, Solutions, impacts, read, sweep
+from dembark.postproc.instruments.published_curves import beside_published
+from dembark.postproc.measurement import Measurement, Numbers, Replicas, number
+
+PUBLISHED = Path(__file__).with_name("reference") / "chung_ooi_2011.csv"
+LABELS = {"published": "Chung and Ooi (2011), DEM", "finite_elements": "Chung and Ooi (2011), finite elements"}
 
 
-def sweep(p: Mapping[str, Any]) -> Array:
-    """What is swept, for the spheres of material A, then for those of B."""
-    return np.tile(p["sweep_from"] + (p["sweep_to"] - p["sweep_from"]) * np.arange(p["points"]) / max(p["points"] - 1, 1), 2)
-
-
-def impacts(p: Mapping[str, Any]) -> Impacts:
-    """The impacts of a run with parameters `p`, from these alone, so that the set-up of the decks is checked, too."""
-    full, value, kind = np.ones(2 * p["points"]), sweep(p), p["sweep"]
-    angle = np.radians(value) if kind in ("direction", "slide", "spin") else 0.0 * full
-    youngs, poisson, density = (np.repeat([p[f"{name}_a"], p[f"{name}_b"]], p["points"])
-                                for name in ("youngs_modulus", "poisson_ratio", "density"))
-    # Sphere and partner share Poisson's ratio.
-    softness = (1.0 + 1.0 / p["stiffness_ratio"]) / youngs
-    mirror, rest = p["partner"] == "mirror", p["partner"] == "rest"
-    larger, denser = (p["size_ratio"], p["density_ratio"]) if rest else (1.0, 1.0) if mirror else (math.inf, 1.0)
-    mass = 4.0 / 3.0 * math.pi * p["radius"] ** 3 * density
-    normal = -p["speed"] * (np.cos(angle) if kind == "direction" else full)
-    slide = p["speed"] * {"direction": np.sin(angle), "slide": np.tan(angle)}.get(kind, 0.0 * full)
-    spin = p["speed"] * np.tan(angle) / p["radius"] if kind == "spin" else 0.0 * full
-    moving = np.array([[1.0], [-1.0 if mirror else 0.0]])
-    return Impacts(1.0 / ((1.0 - poisson**2) * softness), 1.0 / (2.0 * (2.0 - poisson) * (1.0 + poisson) * softness),
-                   value if kind == "restitution" else p["restitution"] * full, p["friction"] * full,
-                   np.array([p["radius"] * full, larger * p["radius"] * full]), np.array([mass, larger**3 * denser * mass]),
-                   moving * slide, moving * normal, moving * spin)
-
-
-def measure(replicas: Sequence[Replica]) -> Measurement:
+def measure(replicas: Replicas) -> Measurement:
     """Values and curves of the run (there is one)."""
     p = replicas[0].parameters
-    return measured(p, read(replicas[0], impacts(p), p["lead_steps"] * p["time_step"]))
+    found = measured(p, read(replicas[0], impacts(p), p["lead_steps"] * p["time_step"]))
+    return beside_published(found, PUBLISHED, replicas[0].record["variant"], LABELS)
 
 
-def measured(p: Mapping[str, Any], flight: Flight) -> Measurement:
+def measured(p: Numbers, flight: Flight) -> Measurement:
     """The same from a run with parameters `p` that was read."""
     one = impacts(p)
     known, after = Solutions(one, p["time_step"], p["lead_steps"]), flight.after.numbers(one)

@@ -24,7 +24,7 @@ class Deck:
             self.engine = engines.find(engine)
         except DembarkError as error:
             pytest.skip(str(error))
-        self.folder = folder
+        self.folder, self.variant = folder, variant
         folder.mkdir(exist_ok=True)
         found = find(case)
         self.values = portable(resolve(found, None, variant, values))
@@ -53,8 +53,8 @@ class Deck:
     def replica(self) -> Replica:
         """What the run has written, with the record that a run of the harness has."""
         facts, numbers = self.engine.facts, {**self.setup.numbers, "steps": self.setup.steps, "time_step": self.setup.time_step}
-        return Replica(self.folder, {"engine": facts.name, "parameters": self.values, "time_step": self.setup.time_step, "derived": numbers,
-                                     "impact_id_offset": facts.impact_id_offset})
+        return Replica(self.folder, {"engine": facts.name, "variant": self.variant, "parameters": self.values, "derived": numbers,
+                                     "time_step": self.setup.time_step, "impact_id_offset": facts.impact_id_offset})
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from dembark.postproc.instruments.logs import LogRun, read
 from dembark.postproc.measurement import Measurement
+from dembark.postproc.replica import Replica
 from dembark.validation import metrics
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
@@ -24,6 +26,13 @@ def module(case: str) -> ModuleType:
 def defaults(case: str, **changes: Any) -> dict[str, Any]:
     """The parameters of `case` in SI units, some of them changed."""
     return {name: one.value for name, one in find(case).parameters.items()} | changes
+
+
+def logs(case: str, run: LogRun) -> Measurement:
+    """What the measure.py of a `case` of logs makes of a run that was read."""
+    replica = Replica(Path(), {})
+    replica.__dict__["_read"] = {read.__wrapped__: run}
+    return module(case).measure([replica])
 
 
 def judged(case: str, found: Measurement) -> dict[str, dict[str, Any]]:

@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
-from dembark.postproc.instruments.logs import LogRun, TouchFrame, beginning, impact_values, loads
+from dembark.input_decks.tests.measuring import defaults, judged, logs, module, names
+from dembark.postproc.instruments.log_stack import beginning, impact_values, loads
+from dembark.postproc.instruments.logs import LogRun, TouchFrame
 
-log_pair, log_cradle, log_pile = (module(name) for name in ("log_pair", "log_cradle", "log_pile"))
+log_pair, log_cradle = (module(name) for name in ("log_pair", "log_cradle"))
 
 
 def row_of_springs(p, mass, stiffness, place, velocity, steps, stride):
@@ -85,7 +86,7 @@ def pair_run(**changes):
 
 
 def of_pair(run):
-    return judged("log_pair", log_pair.measured(run))
+    return judged("log_pair", logs("log_pair", run))
 
 
 @pytest.mark.parametrize(
@@ -147,7 +148,7 @@ def cradle_run(**changes):
 
 
 def of_cradle(run):
-    return judged("log_cradle", log_cradle.measured(run))
+    return judged("log_cradle", logs("log_cradle", run))
 
 
 def test_a_cradle_by_the_scheme_passes_and_another_does_not():
@@ -195,7 +196,7 @@ def stack(*, lift=1.0, count=201, logs=4):
 
 
 def of_pile(run):
-    return judged("log_pile", log_pile.measured(run))
+    return judged("log_pile", logs("log_pile", run))
 
 
 def test_a_stack_at_rest_passes_and_one_that_floats_does_not():

@@ -30,6 +30,7 @@ BASES: dict[str, dict[str, Any]] = {
     "debarking_drum": {},
     "single_contact": {"partner": "rest", "sweep": "spin", "points": 3, "duration": 0.01},
     "liquid_exchange": {},
+    "oblique_impact": {},
 }
 # How many packings there are is the harness's, for a deck makes one; what counts as an impact is the measurement's.
 NOT_READ = {"replicas", "impact_speed"}

@@ -12,6 +12,7 @@ COHESION_MODEL(COHESION_CAPILLARY,capillary,20)
 #ifndef COHESION_MODEL_CAPILLARY_H_
 #define COHESION_MODEL_CAPILLARY_H_
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -29,10 +30,9 @@ COHESION_MODEL(COHESION_CAPILLARY,capillary,20)
 #include "dembark/contact_energy.hpp"
 #include "bridge_reach.h"
 #include "contact_data.h"
-#include "energy_tally.h"
+#include "fix_energy_account.h"
 #include "fix_capillary_liquid.h"
 #include "model_properties.h"
-#include "settings_choice.h"
 
 namespace LIGGGHTS {
 namespace ContactModels {
@@ -50,20 +50,19 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
   dembark_liggghts::EnergyTally* tally_ = nullptr;
   dembark_liggghts::PairTable<dembark::Liquid> liquids_;
 
-  // With carried liquid: who owns it, and where the reach of its bridges is reckoned from; 0 if not known.
-  double find_owner(const dembark_liggghts::PropertyReader& read, double largest_radius) {
+  // With carried liquid: who owns it.
+  void find_owner(const dembark_liggghts::PropertyReader& read) {
     owner_ = static_cast<LAMMPS_NS::FixCapillaryLiquid*>(modify->find_fix_style("capillary/liquid", 0));
     if (!carried_) {
       if (owner_)
         read.fail(
             "fix capillary/liquid is there, but liquid is not carried; write 'carried_liquid on' after the models, or leave the fix out");
-      return 0.0;
+      return;
     }
     if (!owner_) read.fail("carried_liquid on needs the liquid: fix ID all capillary/liquid content C");
     if (read.given("bridgeVolume"))
       read.fail("bridgeVolume is given, but with carried_liquid on a bridge takes its volume from the grains; leave one of them out");
     owner_->place(wall_, offset_, imbalance_);
-    return owner_->likely_bridge(largest_radius);
   }
 
   void check_time_step(const dembark::Liquid& liquid, double radius, double mass) const {
@@ -163,18 +162,21 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
   void connectToProperties(PropertyRegistry& registry) {
     const dembark_liggghts::PropertyReader read(registry, modify, error, "cohesion capillary");
     tally_ = dembark_liggghts::find_energy_tally(modify);
-    const double largest = registry.max_radius() < 1e10 ? registry.max_radius() : 0.0;
-    const double carried_volume = find_owner(read, largest);
+    find_owner(read);
     liquids_ = dembark_liggghts::read_liquids(read, static_cast<dembark::capillary::Model>(model_), viscous_, carried_);
-    const double cube = largest * largest * largest;
+    const double largest = registry.max_radius() < 1e10 ? registry.max_radius() : 0.0, cube = largest * largest * largest;
     for (int i = 1; i <= read.types(); ++i)
       for (int j = 1; j <= read.types(); ++j)
         if (cube > 0.0 && liquids_(i, j).bridge_volume > largest_ratio * cube)
           read.fail("bridgeVolume (m^3) of types " + std::to_string(i) + "-" + std::to_string(j) + " is " +
                     std::to_string(liquids_(i, j).bridge_volume / cube) +
                     " cubes of the largest radius; a bridge between grains has at most a few, give its volume in m^3");
-    const std::vector<double> radii = dembark_liggghts::least_radii(*atom, *modify, world, read.types());
-    neighbor->register_contact_dist_factor(dembark_liggghts::bridge_distance_factor(liquids_, radii, wall_, carried_volume));
+    if (carried_ && largest > 0.0) owner_->look_for_liquid(registry.min_radius(), largest);
+    const auto volume = [this](const dembark::Liquid& liquid, double radius, double other) {
+      return carried_ ? owner_->likely_bridge(radius, other) : liquid.bridge_volume;
+    };
+    neighbor->register_contact_dist_factor(dembark_liggghts::bridge_distance_factor(
+        liquids_, dembark_liggghts::radius_ranges(*atom, *modify, world, read.types()), wall_, volume));
   }
 
   inline void surfacesIntersect(SurfacesIntersectData& d, ForceData& i_forces, ForceData& j_forces) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 
 #include "atom.h"
 #include "contact_interface.h"
@@ -48,15 +49,14 @@ inline void add_force(const dembark::ContactForce& f, const LIGGGHTS::ContactMod
   add(on_j.delta_torque, 1.0, f.torque_2);
 }
 
-/// The friction of a contact among the numbers that the engine stores.
-inline dembark::FrictionState<double> load_friction(const double* h) { return {{h[0], h[1], h[2]}, h[3], h[4]}; }
-inline void store_friction(double* h, const dembark::FrictionState<double>& s) {
-  h[0] = s.displacement.x;
-  h[1] = s.displacement.y;
-  h[2] = s.displacement.z;
-  h[3] = s.slip;
-  h[4] = s.dissipated_energy;
+/// The friction of a contact among the numbers that the engine stores: five in a row.
+static_assert(sizeof(dembark::FrictionState<double>) == 5 * sizeof(double));
+inline dembark::FrictionState<double> load_friction(const double* history) {
+  dembark::FrictionState<double> state;
+  std::memcpy(&state, history, sizeof state);
+  return state;
 }
+inline void store_friction(double* history, const dembark::FrictionState<double>& state) { std::memcpy(history, &state, sizeof state); }
 
 /// Calls `end(i, j, history)` for all pairs with one of `flags` that are farther apart than the contact distance factor allows. Of a
 /// pair that jumps so far in one step the engine's loop tells the models nothing, and its contact would go on when it touches again.

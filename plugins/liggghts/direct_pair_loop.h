@@ -24,7 +24,7 @@
 #include "dembark/contact.hpp"
 #include "bridge_reach.h"
 #include "contact_data.h"
-#include "energy_tally.h"
+#include "fix_energy_account.h"
 #include "model_properties.h"
 #include "pair_packs.h"
 
@@ -32,11 +32,9 @@ namespace dembark_liggghts {
 
 /// The engine's `Granular<...>` for the combination `Style`, with a loop of its own for the plain step.
 template <class Style>
-class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactModels::ContactModel<Style>> {
+class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactModels::ContactModel<Style>>, ScalarLaws {
   typedef LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactModels::ContactModel<Style>> Stock;
   static constexpr bool wet = Style::COHESION == LIGGGHTS::ContactModels::COHESION_CAPILLARY;
-  static constexpr int bridge_flag = LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL;
-  static constexpr int dry_flags = LIGGGHTS::ContactModels::CONTACT_NORMAL_MODEL | LIGGGHTS::ContactModels::CONTACT_TANGENTIAL_MODEL;
 
   LAMMPS_NS::LAMMPS* lmp_;
   double **youngs_modulus_ = nullptr, **shear_modulus_ = nullptr, **damping_factor_ = nullptr;  // effective ones, by types
@@ -50,7 +48,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   dembark::capillary::Model model_ = dembark::capillary::Model::exact;
   PairPacks* const packs_ = choose_pair_packs();
   const std::unique_ptr<PairBlock> block_ = std::make_unique<PairBlock>();
-  std::vector<PairLaw> laws_;  // of this step
+  std::vector<PairLaw<double>> laws_;  // of this step
 
   bool plain_step(LAMMPS_NS::PairGran* pair, int eflag, int vflag, int addflag) const {
     const LAMMPS_NS::Atom* atom = lmp_->atom;
@@ -72,38 +70,34 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
       }
   }
 
-  static void friction(void* caller, const PairBlock& block, int k, const FrictionInput& in, double* force) {
-    const DirectPairLoop& loop = *static_cast<DirectPairLoop*>(caller);
-    const LAMMPS_NS::Atom* const atom = loop.lmp_->atom;
+  Vec3 friction(const PairBlock& block, int k, const Vec3& normal, double twist, const dembark::NormalResponse<double>& response,
+                const Vec3& velocity) override {
+    const LAMMPS_NS::Atom* const atom = lmp_->atom;
     const int i = block.grain[k], j = block.partner[k];
     // What is no number never sticks in a pack: pairs without a normal end up here.
-    if (!(in.normal[0] == in.normal[0])) refuse_coincidence(loop.lmp_->error, atom->tag, i, j);
-    double* const history = block.history[k] + loop.friction_offset_;
+    if (!(normal.x == normal.x)) refuse_coincidence(lmp_->error, atom->tag, i, j);
+    double* const history = block.history[k] + friction_offset_;
     dembark::FrictionState<double> state = load_friction(history);
-    const Vec3 t = contact_friction(loop.friction_(atom->type[i], atom->type[j]), vector(in.normal), in.twist,
-                                    {in.normal_force, in.stiffness, in.damping, in.area, 0.0}, vector(in.velocity), loop.dt_, state);
-    if (loop.update_history_) store_friction(history, state);
-    force[0] = t.x;
-    force[1] = t.y;
-    force[2] = t.z;
+    const Vec3 force = contact_friction(friction_(atom->type[i], atom->type[j]), normal, twist, response, velocity, dt_, state);
+    if (update_history_) store_friction(history, state);
+    return force;
   }
 
-  static void bridges(void* caller, const PairBlock& block, int first, int count, const double* gap, double* pull) {
-    const DirectPairLoop& loop = *static_cast<DirectPairLoop*>(caller);
-    const LAMMPS_NS::Atom* const atom = loop.lmp_->atom;
+  void bridges(const PairBlock& block, int first, int count, const double* gap, double* pull) override {
+    const LAMMPS_NS::Atom* const atom = lmp_->atom;
     for (int n = 0; n < count; ++n) {
       const int k = first + n, i = block.grain[k], j = block.partner[k];
       const bool touching = block.pick[k] & 1;
-      double* const history = block.history[k] + loop.bridge_offset_;
+      double* const history = block.history[k] + bridge_offset_;
       double volume = history[0], rupture_distance = history[1];
       const bool was_there = volume > 0.0;
-      pull[n] = bridge_step(loop.liquids_(atom->type[i], atom->type[j]), atom->radius[i], atom->radius[j], gap[n], touching, volume,
-                            rupture_distance);
+      pull[n] =
+          bridge_step(liquids_(atom->type[i], atom->type[j]), atom->radius[i], atom->radius[j], gap[n], touching, volume, rupture_distance);
       const bool is_there = volume > 0.0;
-      if (is_there && !touching) *block.flags[k] |= bridge_flag;
+      if (is_there && !touching) *block.flags[k] |= LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL;
       if (is_there == was_there) continue;
-      if (is_there) check_reach(loop.lmp_->neighbor, loop.lmp_->error, rupture_distance, atom->radius[i] + atom->radius[j], false);
-      if (!loop.update_history_) continue;
+      if (is_there) check_reach(lmp_->neighbor, lmp_->error, rupture_distance, atom->radius[i] + atom->radius[j], false);
+      if (!update_history_) continue;
       history[0] = volume;
       history[1] = rupture_distance;
     }
@@ -118,7 +112,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
       const std::string word = words[k], value = words[k + 1];
       if (word == "limitForce") limit_force_ = value == "on";
       else if (word == "tangential_damping") tangential_damping_ = value == "on";
-      else if (word == "presliding") presliding_ = value == "linear" ? dembark::Presliding::linear : dembark::Presliding::exponential;
+      else if (word == "presliding") dembark::option_from_name(dembark::presliding_names(), value, presliding_);
       else if (word == "capillary_model") dembark::capillary::model_from_name(words[k + 1], model_);
       else if (value != "off") plain_settings_ = false;
     }
@@ -147,47 +141,18 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
       return;
     }
     pair->evflag = pair->vflag_fdotr = 0;
-    const LAMMPS_NS::NeighList* const list = pair->list;
-    if (list->inum == 0) return;
-    const LAMMPS_NS::Atom* const atom = lmp_->atom;
+    if (pair->list->inum == 0) return;
+    LAMMPS_NS::Atom& atom = *lmp_->atom;
     update_history_ = pair->shearupdate();
     dt_ = update_history_ ? lmp_->update->dt : 0.0;
     collect_laws();
-
-    PairStep step;
-    step.x = atom->x[0];
-    step.v = atom->v[0];
-    step.omega = atom->omega[0];
-    step.radius = atom->radius;
-    step.mass = atom->rmass;
-    step.type = atom->type;
-    step.mask = atom->mask;
-    step.f = atom->f[0];
-    step.torque = atom->torque[0];
-    step.owned = lmp_->force->newton_pair ? atom->nlocal + atom->nghost : atom->nlocal;
-    step.count = list->inum;
-    step.stride = pair->dnum();
-    step.offset = friction_offset_;
-    step.grains = list->ilist;
-    step.numneigh = list->numneigh;
-    step.neighbors = list->firstneigh;
-    step.flags = pair->listgranhistory->firstneigh;
-    step.histories = pair->listgranhistory->firstdouble;
-    step.own_flags = dry_flags | bridge_flag;
-    step.touching_flags = wet ? step.own_flags : dry_flags;
+    const int owned = lmp_->force->newton_pair ? atom.nlocal + atom.nghost : atom.nlocal;
     // The scalar law knows the other curve, and what a step of no length is.
-    step.pack_friction = presliding_ == dembark::Presliding::linear && dt_ > 0.0;
-    step.laws = laws_.data();
-    step.types = friction_.types() + 1;
-    step.dt = dt_;
-    step.limit_force = limit_force_;
-    step.tangential_damping = tangential_damping_;
-    step.frozen = pair->freeze_group_bit();
-    step.caller = this;
-    step.friction = &friction;
-    step.bridges = wet ? &bridges : nullptr;
+    const bool pack_friction = presliding_ == dembark::Presliding::linear && dt_ > 0.0;
     // The factor of relaxed contacts (PairGran::relax) is 1 in this version of the engine.
-    packs_(step, *block_);
+    packs_({atom, *pair, *this, laws_.data(), friction_.types() + 1, owned, friction_offset_, dt_, wet, limit_force_, tangential_damping_,
+            pack_friction},
+           *block_);
   }
 };
 

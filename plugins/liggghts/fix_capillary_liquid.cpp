@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
 
 #include "atom.h"
 #include "comm.h"
@@ -83,51 +84,45 @@ void FixCapillaryLiquid::stop(const std::string &what) {
 }
 
 void FixCapillaryLiquid::parse(int narg, char **arg) {
-  const auto number = [&](int k, const char *what) {
-    if (k >= narg) refuse(std::string(what) + " is missing");
+  int k = 3;
+  const auto number = [&](const std::string &what) {
+    if (k >= narg) refuse(what + " is missing");
     char *end = nullptr;
     const double value = std::strtod(arg[k], &end);
-    if (end == arg[k] || *end || !std::isfinite(value)) refuse(std::string(what) + " '" + arg[k] + "' is not a number");
+    if (end == arg[k] || *end || !std::isfinite(value)) refuse(what + " '" + arg[k] + "' is not a number");
+    ++k;
     return value;
   };
-  for (int k = 3; k < narg;) {
-    const std::string word = arg[k];
+  const auto name = [&] { return k < narg ? std::string(arg[k++]) : ""; };
+  while (k < narg) {
+    const std::string word = arg[k++];
     if (word == "content" || word == "volume") {
       if (content_ > 0.0 || volume_ >= 0.0) refuse("the liquid of a grain is given once: either content or volume");
       double &value = word == "content" ? content_ : volume_;
-      value = number(k + 1, word.c_str());
+      value = number(word);
       if (!(value >= 0.0)) refuse(word + (word == "content" ? " (liquid volume over grain volume)" : " (m^3 a grain)") + " must be >= 0");
-      k += 2;
     } else if (word == "share") {
-      if (k + 1 >= narg || !ledger_.share.set_kind(arg[k + 1])) refuse("share must be followed by cap or fraction");
-      ledger_.share.factor = number(k + 2, "the number of share");
+      if (!ledger_.share.set_kind(name())) refuse("share must be followed by cap or fraction");
+      ledger_.share.factor = number("the number of share");
       if (const char *wrong = ledger_.share.error()) refuse(wrong);
-      k += 3;
     } else if (word == "return") {
-      if (k + 1 >= narg || !capillary::return_from_name(arg[k + 1], ledger_.split))
-        refuse("return must be followed by equal, radius or taken");
-      k += 2;
+      if (!capillary::choose(capillary::return_names(), name(), ledger_.split)) refuse("return must be followed by equal, radius or taken");
     } else if (word == "max_bridge") {
-      ledger_.largest_bridge = number(k + 1, "max_bridge");
+      ledger_.largest_bridge = number(word);
       if (!(ledger_.largest_bridge > 0.0)) refuse("max_bridge (m^3) must be > 0");
-      k += 2;
     } else if (word == "wall") {
-      if (k + 4 >= narg)
+      if (k + 3 >= narg)
         refuse("wall must be followed by the ID of a fix wall/gran, its liquid (m^3), the share it gives and the part it gets back");
-      const double pool = number(k + 2, "the liquid of the wall"), share = number(k + 3, "the share of the wall");
-      parse_wall(arg[k + 1], pool, share, number(k + 4, "the part of the wall"));
-      k += 5;
+      capillary::LiquidWall wall{name()};
+      if (ledger_.wall(wall.name)) refuse("wall " + wall.name + " is given twice");
+      wall.pool = number("the liquid of the wall");
+      wall.share = number("the share of the wall");
+      wall.part = number("the part of the wall");
+      if (const char *wrong = wall.error()) refuse("wall " + wall.name + ": " + wrong);
+      ledger_.walls.push_back(wall);
+      unmet_.push_back(wall.name);
     } else refuse("keyword '" + word + "' is unknown; there are content, volume, share, return, max_bridge, wall");
   }
-}
-
-void FixCapillaryLiquid::parse_wall(const std::string &wall_id, double pool, double share, double part) {
-  if (!(pool >= 0.0)) refuse("the liquid of wall " + wall_id + " (m^3) must be >= 0");
-  if (!(share >= 0.0 && share <= 1.0)) refuse("the share that wall " + wall_id + " gives to a bridge must lie in 0...1");
-  if (!(part >= 0.0 && part <= 1.0)) refuse("the part of a bridge that wall " + wall_id + " gets back must lie in 0...1");
-  if (ledger_.wall(wall_id)) refuse("wall " + wall_id + " is given twice");
-  ledger_.walls.push_back({wall_id, pool, share, part});
-  unmet_.push_back(wall_id);
 }
 
 // The contact models work between these stages.
@@ -188,19 +183,21 @@ int FixCapillaryLiquid::wall_number(const Fix *wall) const {
   return -1;
 }
 
-double FixCapillaryLiquid::initial(int i) const {
-  if (volume_ >= 0.0) return volume_;
-  const double r = atom->radius[i];
-  return content_ * (4.0 / 3.0) * dembark::pi * r * r * r;
+double FixCapillaryLiquid::initial(double radius) const {
+  return volume_ >= 0.0 ? volume_ : content_ * (4.0 / 3.0) * dembark::pi * radius * radius * radius;
 }
 
-double FixCapillaryLiquid::likely_bridge(double largest_radius) const {
-  double mine = std::max(volume_, content_ * (4.0 / 3.0) * dembark::pi * largest_radius * largest_radius * largest_radius), all = 0.0;
-  for (int i = 0; i < atom->nlocal; ++i) mine = std::max(mine, grains().volume[i]);
-  MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_MAX, world);
-  const double share = std::max(2.0 * ledger_.share(1.0, 1.0), ledger_.share(1.0, capillary::flat<double>));
-  // Liquid gathers on some grains: twice as much as at the start is foreseen.
-  return std::min(ledger_.largest_bridge, 2.0 * all * std::min(share, 1.0));
+void FixCapillaryLiquid::look_for_liquid(double least_radius, double largest_radius) {
+  wettest_ = {largest_radius};
+  for (const double radius : {least_radius, largest_radius}) wettest_.add(radius, initial(radius));
+  for (int i = 0; i < atom->nlocal; ++i) wettest_.add(atom->radius[i], grains().volume[i]);
+  double mine[] = {wettest_.volume, wettest_.over_square};
+  MPI_Allreduce(mine, &wettest_.volume, 1, MPI_DOUBLE, MPI_MAX, world);
+  MPI_Allreduce(mine + 1, &wettest_.over_square, 1, MPI_DOUBLE, MPI_MAX, world);
+}
+
+double FixCapillaryLiquid::likely_bridge(double radius, double other) const {
+  return std::min(ledger_.largest_bridge, wettest_.likely_bridge(ledger_.share, ledger_.split, radius, other));
 }
 
 template <class Visit>
@@ -248,7 +245,7 @@ void FixCapillaryLiquid::pre_force(int) {
 
 /// Grains have come, left or gone to other ranks, and the lists may have lost bridges to partners that left or jumped out of reach.
 void FixCapillaryLiquid::after_new_list() {
-  const int wrong = ledger_.admit(grains(), [this](int i) { return initial(i); });
+  const int wrong = ledger_.admit(grains(), [this](int i) { return initial(atom->radius[i]); });
   if (wrong >= 0)
     stop("grain " + std::to_string(atom->tag[wrong]) + " has liquid " + words(grains().volume[wrong]) + " m^3; it must be >= 0");
   double excess = 0.0;
@@ -278,22 +275,21 @@ double FixCapillaryLiquid::count_bridges() const {
   double mine = 0.0, all = 0.0;
   each_pair_bridge([&](int, int j, double, double) { mine += j < atom->nlocal ? 1.0 : 0.5; });
   for (std::size_t w = 0; w < walls_.size(); ++w) {
+    const capillary::LiquidWall &wall = ledger_.walls[w];
     // Between two runs a wall may be gone already.
-    if (modify->find_fix_id(ledger_.walls[w].name.c_str()) != walls_[w].fix) continue;
+    if (modify->find_fix_id(wall.name.c_str()) != walls_[w].fix) continue;
     for (int i = 0; i < atom->nlocal; ++i)
-      if (ledger_.row(i)[1 + 2 * w] + ledger_.row(i)[2 + 2 * w] > 0.0) each_wall_bridge(walls_[w], i, [&](double, double) { mine += 1.0; });
+      if (wall.of_grain[i] + wall.own[i] > 0.0) each_wall_bridge(walls_[w], i, [&](double, double) { mine += 1.0; });
   }
   MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, world);
   return all;
 }
 
 double FixCapillaryLiquid::compute_vector(int n) {
-  if (n == 3) return ledger_.lost;
-  if (n == 4) return count_bridges();
-  if (n == 5) return ledger_.added;
   const capillary::LiquidLedger::Totals now = ledger_.totals(grains());
-  const double held = now.grains + now.bridges + now.walls;
-  const double values[] = {now.grains, now.bridges, now.walls, 0.0, 0.0, 0.0, held, held - ledger_.expected};
+  const double count = n == 4 ? count_bridges() : 0.0;
+  const double values[] = {now.grains, now.bridges,   now.walls,  ledger_.lost,
+                           count,      ledger_.added, now.held(), now.held() - ledger_.expected};
   return values[n];
 }
 
@@ -306,18 +302,24 @@ void FixCapillaryLiquid::unpack_comm(int n, int first, double *buffer) { std::co
 
 void FixCapillaryLiquid::grow_arrays(int n) { ledger_.resize(std::size_t(n)); }
 
-void FixCapillaryLiquid::copy_arrays(int i, int j, int) { std::copy_n(ledger_.row(i), ledger_.row_size(), ledger_.row(j)); }
+void FixCapillaryLiquid::copy_arrays(int i, int j, int) {
+  std::vector<double> row(ledger_.numbers());
+  pack_exchange(i, row.data());
+  unpack_exchange(j, row.data());
+}
 
-void FixCapillaryLiquid::set_arrays(int i) { ledger_.clear_row(i); }
+void FixCapillaryLiquid::set_arrays(int i) {
+  ledger_.each_number(i, [](double &number) { number = 0.0; });
+}
 
 int FixCapillaryLiquid::pack_exchange(int i, double *buffer) {
-  std::copy_n(ledger_.row(i), ledger_.row_size(), buffer);
-  return int(ledger_.row_size());
+  ledger_.each_number(i, [&](double number) { *buffer++ = number; });
+  return int(ledger_.numbers());
 }
 
 int FixCapillaryLiquid::unpack_exchange(int i, double *buffer) {
-  std::copy_n(buffer, ledger_.row_size(), ledger_.row(i));
-  return int(ledger_.row_size());
+  ledger_.each_number(i, [&](double &number) { number = *buffer++; });
+  return int(ledger_.numbers());
 }
 
 int FixCapillaryLiquid::pack_restart(int i, double *buffer) {
@@ -325,49 +327,41 @@ int FixCapillaryLiquid::pack_restart(int i, double *buffer) {
   return 1 + pack_exchange(i, buffer + 1);
 }
 
+/// Of walls that the file does not know nothing is there.
 void FixCapillaryLiquid::unpack_restart(int i, int nth) {
   const double *from = atom->extra[i];
   for (int k = 0; k < nth; ++k) from += static_cast<int>(*from);
-  std::copy_n(from + 1, std::min(ledger_.row_size(), static_cast<std::size_t>(*from) - 1), ledger_.row(i));
+  const double *const end = from + static_cast<int>(*from);
+  ledger_.each_number(i, [&](double &number) {
+    if (++from < end) number = *from;
+  });
 }
 
-int FixCapillaryLiquid::size_restart(int) { return 1 + int(ledger_.row_size()); }
+int FixCapillaryLiquid::size_restart(int) { return 1 + int(ledger_.numbers()); }
 
 int FixCapillaryLiquid::maxsize_restart() { return size_restart(0); }
 
 void FixCapillaryLiquid::write_restart(FILE *file) {
   if (comm->me != 0) return;
-  const std::vector<double> numbers = ledger_.saved(false);
-  const double count = double(numbers.size());
-  std::string names;
-  for (const capillary::LiquidWall &wall : ledger_.walls) names += wall.name + '\n';
-  const int bytes = int((1 + numbers.size()) * sizeof(double) + names.size() + 1);
+  const std::string saved = ledger_.saved(false);
+  const int bytes = int(saved.size() + 1);
   fwrite(&bytes, sizeof(int), 1, file);
-  fwrite(&count, sizeof(double), 1, file);
-  fwrite(numbers.data(), sizeof(double), numbers.size(), file);
-  fwrite(names.c_str(), 1, names.size() + 1, file);
+  fwrite(saved.c_str(), 1, saved.size() + 1, file);
 }
 
 /// The walls of the file, with what they held; init() finds their fixes. What the arguments say of a wall, but for its liquid, holds.
-void FixCapillaryLiquid::restart(char *buffer) {
-  double count;
-  std::memcpy(&count, buffer, sizeof count);
-  std::vector<double> numbers(static_cast<std::size_t>(count));
-  std::memcpy(numbers.data(), buffer + sizeof count, numbers.size() * sizeof(double));
-  const char *name = buffer + (1 + numbers.size()) * sizeof(double);
+void FixCapillaryLiquid::restart(char *buffer) try {
   const std::vector<capillary::LiquidWall> given = ledger_.walls;
-  ledger_.restore(numbers.data(), numbers.size());
-  for (capillary::LiquidWall &wall : ledger_.walls) {
-    const char *const end = std::strchr(name, '\n');
-    wall = {std::string(name, end), wall.pool};
-    name = end + 1;
-  }
+  ledger_.restore(buffer);
+  for (capillary::LiquidWall &wall : ledger_.walls) wall.share = wall.part = 0.0;
   for (const capillary::LiquidWall &wall : given) {
     capillary::LiquidWall *const same = ledger_.wall(wall.name);
     if (same) *same = {wall.name, same->pool, wall.share, wall.part};
     else ledger_.walls.push_back(wall);
   }
   ledger_.resize(std::size_t(atom->nmax));
+} catch (const std::exception &wrong) {
+  refuse(wrong.what());
 }
 
-double FixCapillaryLiquid::memory_usage() { return double((ledger_.row_size() + 2) * std::size_t(atom->nmax) * sizeof(double)); }
+double FixCapillaryLiquid::memory_usage() { return double((ledger_.numbers() + 2) * std::size_t(atom->nmax) * sizeof(double)); }

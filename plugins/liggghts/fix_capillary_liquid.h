@@ -67,8 +67,10 @@ class FixCapillaryLiquid : public Fix {
   int wall_number(const class Fix *wall) const;
   void request_bridge(const Request &request) { requests_.push_back(request); }
   void bridge_broke(const dembark::capillary::BrokenBridge &bridge) { broken_.push_back(bridge); }
-  /// Volume (m^3) of a bridge that grains of up to `largest_radius` may well form; 0: not known. Collective.
-  double likely_bridge(double largest_radius) const;
+  /// Volume (m^3) of a bridge that a grain of `radius` (m) may well form with one of `other`, infinite for a wall.
+  double likely_bridge(double radius, double other) const;
+  /// Has to come before: looks how wet grains of these radii are, or will be. Collective.
+  void look_for_liquid(double least_radius, double largest_radius);
 
  private:
   struct Offsets {
@@ -83,12 +85,11 @@ class FixCapillaryLiquid : public Fix {
   [[noreturn]] void refuse(const std::string &what);
   [[noreturn]] void stop(const std::string &what);
   void parse(int narg, char **arg);
-  void parse_wall(const std::string &id, double pool, double share, double part);
   void find_walls();
   void after_new_list();
   double count_bridges() const;
   dembark::capillary::GrainLiquid grains() const;
-  double initial(int i) const;
+  double initial(double radius) const;
   template <class Visit>
   void each_pair_bridge(Visit visit) const;
   template <class Visit>
@@ -96,6 +97,7 @@ class FixCapillaryLiquid : public Fix {
 
   dembark::capillary::LiquidLedger ledger_;
   double content_ = 0.0, volume_ = -1.0;
+  dembark::capillary::WettestGrains wettest_{};
   std::vector<Wall> walls_;         // by the ledger's numbers
   std::vector<std::string> unmet_;  // names of walls in the arguments that no run has found yet
   std::map<const class Fix *, Offsets> offsets_;

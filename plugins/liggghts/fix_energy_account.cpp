@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
-#include <type_traits>
 
 #include "atom.h"
 #include "comm.h"
@@ -27,10 +26,6 @@ namespace {
 
 // Sums over the same atoms in another order differ by less.
 constexpr double round_off = 1e-14;
-
-// The sums of ranks, and restart files, are those of its numbers.
-constexpr std::size_t ledger_size = sizeof(EnergyLedger) / sizeof(double);
-static_assert(std::is_trivially_copyable<EnergyLedger>::value && ledger_size * sizeof(double) == sizeof(EnergyLedger), "numbers only");
 
 /// Which model of a pair style or a wall has no parts that are known, or nothing.
 template <class Host>
@@ -80,13 +75,12 @@ void FixEnergyAccount::check_models() {
     refuse("it accounts for spheres only: atom_style granular");
   PairGran *const pair = dynamic_cast<PairGran *>(force->pair);
   if (!pair) refuse("it needs pair_style gran model hertz|hooke tangential finnie_rabinowicz ...");
-  const std::string known = "the parts of the contact forces are known with ", needed = unknown_model(*pair);
-  if (!needed.empty()) refuse(known + needed + " only; the pair style has another model");
+  const auto check = [this](const std::string &where, const std::string &missed) {
+    if (!missed.empty()) refuse("the parts of the contact forces are known with " + missed + " only; " + where + " has another model");
+  };
+  check("the pair style", unknown_model(*pair));
   for (int k = 0; k < modify->nfix; ++k)
-    if (FixWallGran *const wall = dynamic_cast<FixWallGran *>(modify->fix[k])) {
-      const std::string missed = unknown_model(*wall);
-      if (!missed.empty()) refuse(known + missed + " only; fix " + wall->id + " has another model");
-    }
+    if (FixWallGran *const wall = dynamic_cast<FixWallGran *>(modify->fix[k])) check("fix " + std::string(wall->id), unknown_model(*wall));
 }
 
 void FixEnergyAccount::check_motion() {
@@ -109,22 +103,13 @@ void FixEnergyAccount::check_motion() {
     movers.push_back(fix);
   }
   if (!moving_) refuse("no grain follows its forces: it needs fix nve/sphere");
-  for (int i = 0; i < atom->nlocal; ++i) {
-    const Fix *mover = nullptr;
-    for (const Fix *fix : movers) {
-      if (!(atom->mask[i] & fix->groupbit)) continue;
-      if (mover) {
-        const std::string line = "Fix energy/account (id " + std::string(id) + "): atom " + std::to_string(atom->tag[i]) +
-                                 " is moved by both fix " + mover->id + " and fix " + fix->id + "; make their groups disjoint";
-        error->one(FLERR, line.c_str());
-      }
-      mover = fix;
-    }
-  }
-}
-
-void *FixEnergyAccount::extract(const char *name, int &) {
-  return std::strcmp(name, dembark_liggghts::energy_tally_name) == 0 ? &tally_ : nullptr;
+  for (std::size_t m = 0; m < movers.size(); ++m)
+    for (std::size_t k = 0; k < m; ++k)
+      for (int i = 0; i < atom->nlocal; ++i)
+        if (atom->mask[i] & movers[k]->groupbit && atom->mask[i] & movers[m]->groupbit)
+          error->one(FLERR, ("Fix energy/account (id " + std::string(id) + "): atom " + std::to_string(atom->tag[i]) +
+                             " is moved by both fix " + movers[k]->id + " and fix " + movers[m]->id + "; make their groups disjoint")
+                                .c_str());
 }
 
 /// Driven grains are to the others what walls are.
@@ -132,9 +117,8 @@ inline dembark::BodyMotion FixEnergyAccount::motion(int i) const {
   // Moment of inertia as in fix nve/sphere.
   const double mass = atom->rmass[i], inertia = (domain->dimension == 2 ? 0.5 : 0.4) * mass * atom->radius[i] * atom->radius[i];
   dembark::BodyMotion grain;
-  grain.mass = {mass, mass, mass, inertia, inertia, inertia};
+  if ((atom->mask[i] & moving_) && !(atom->mask[i] & frozen_)) grain.mass = {mass, mass, mass, inertia, inertia, inertia};
   grain.velocity = dofs(atom->v[i], atom->omega[i]);
-  grain.blocked = (atom->mask[i] & moving_) && !(atom->mask[i] & frozen_) ? 0 : EnergyBody::all_blocked;
   return grain;
 }
 
@@ -151,29 +135,25 @@ inline EnergyBody FixEnergyAccount::body(int i) const {
 /// J, of this rank's grains that follow their forces. In long double, so that the order of the atoms does not show.
 double FixEnergyAccount::kinetic() const {
   long double sum = 0.0;
-  for (int i = 0; i < atom->nlocal; ++i) {
-    const dembark::BodyMotion grain = motion(i);
-    sum += grain.kinetic(grain.velocity);
-  }
+  for (int i = 0; i < atom->nlocal; ++i) sum += motion(i).kinetic();
   return double(sum);
 }
 
 /// Powers of all forces as they are, with the velocities as they are.
 void FixEnergyAccount::measure_powers() {
-  if (tally_.size() != std::size_t(atom->nlocal))
+  if (tally.loads.size() != std::size_t(atom->nlocal))
     error->one(FLERR, "Fix energy/account: atoms came or went between the forces and the end of a step");
   now_.now = Powers();
   accelerations_.resize(gravities_.size());
   for (std::size_t g = 0; g < gravities_.size(); ++g) gravities_[g]->get_gravity(accelerations_[g].data());
   for (int i = 0; i < atom->nlocal; ++i) {
     const EnergyBody grain = body(i);
-    const dembark_liggghts::EnergyTally::Loads &loads = tally_.of(i);
     now_.now.add_body(grain);
-    now_.now.add_loads(grain, [&](std::size_t part) { return dembark::dofs(loads[part].force, loads[part].torque); });
+    now_.now.add_loads(grain, tally.loads[std::size_t(i)]);
   }
   for (std::size_t part = 0; part < dembark::contact_part_count; ++part) {
-    now_.now.power[part] -= tally_.wall_power[part];
-    now_.now.power[Powers::walls] += tally_.wall_power[part];
+    now_.now.power[part] -= tally.wall_power[part];
+    now_.now.power[Powers::walls] += tally.wall_power[part];
   }
 }
 
@@ -185,23 +165,23 @@ void FixEnergyAccount::impose(double change, double of, double &sum) const {
   if (std::abs(all[0]) > round_off * std::abs(all[1])) sum += change;
 }
 
-/// What the input script changed before the run: velocities, or the overlaps of contacts. Collective.
-void FixEnergyAccount::take_setup(EnergyLedger &ledger, bool &begun) const {
-  const double kinetic_now = kinetic();
-  if (begun) {
-    impose(kinetic_now - ledger.kinetic, kinetic_now + ledger.kinetic, ledger.imposed);
-    impose(tally_.normal_stored - ledger.normal_stored, tally_.normal_stored + ledger.normal_stored, ledger.first_stored);
+/// The sums with what the input script changed before the run: velocities, or the overlaps of contacts. Collective.
+EnergyLedger FixEnergyAccount::with_setup() const {
+  EnergyLedger ledger = now_;
+  ledger.kinetic = kinetic();
+  ledger.set_stored(tally.normal_stored, tally.tangential_stored);
+  if (begun_) {
+    impose(ledger.kinetic - now_.kinetic, ledger.kinetic + now_.kinetic, ledger.imposed);
+    impose(ledger.normal_stored - now_.normal_stored, ledger.normal_stored + now_.normal_stored, ledger.first_stored);
   } else {
-    ledger.first_kinetic = kinetic_now;
-    ledger.first_stored = tally_.normal_stored;
+    ledger.first_kinetic = ledger.kinetic;
+    ledger.first_stored = ledger.normal_stored;
   }
-  begun = true;
-  ledger.kinetic = kinetic_now;
-  ledger.set_stored(tally_.normal_stored, tally_.tangential_stored);
+  return ledger;
 }
 
 void FixEnergyAccount::setup_pre_force(int) {
-  tally_.clear(atom->nlocal);
+  tally.clear(atom->nlocal);
   fresh_ = true;
 }
 
@@ -216,20 +196,17 @@ void FixEnergyAccount::pre_initial_integrate() {
   Powers forces;
   for (int i = 0; i < atom->nlocal; ++i) forces.add_forces(motion(i), dofs(atom->f[i], atom->torque[i]));
   int same = forces.power[Powers::all] == now_.now.power[Powers::all] && forces.rate[Powers::all] == now_.now.rate[Powers::all];
-  if (!fresh_) {
-    note_changes();
-    if (!same) measure_powers();
-    return;
-  }
-  take_setup(now_, begun_);
-  if (resumed_) {
+  if (fresh_) {
+    now_ = with_setup();
     // The forces may have been put back to those of the restart file after the set-up; then its powers hold, whatever was tallied since.
-    int all = 0;
-    MPI_Allreduce(&same, &all, 1, MPI_INT, MPI_MIN, world);
-    resumed_ = all;
+    same = same && resumed_;
+    MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, world);
+    begun_ = true;
+    fresh_ = resumed_ = false;
+  } else {
+    note_changes();
   }
-  if (!resumed_) measure_powers();
-  fresh_ = resumed_ = false;
+  if (!same) measure_powers();
 }
 
 void FixEnergyAccount::post_integrate() {
@@ -242,7 +219,7 @@ void FixEnergyAccount::pre_force(int) {
     const double kinetic_now = kinetic();
     impose(kinetic_now - kinetic_before_, kinetic_now + kinetic_before_, now_.imposed);
   }
-  tally_.clear(atom->nlocal);
+  tally.clear(atom->nlocal);
 }
 
 /// The grains have got their velocities: init() has seen to the order.
@@ -254,7 +231,7 @@ void FixEnergyAccount::final_integrate() {
 
 void FixEnergyAccount::end_of_step() {
   note_changes();
-  now_.set_stored(tally_.normal_stored, tally_.tangential_stored);
+  now_.set_stored(tally.normal_stored, tally.tangential_stored);
   shown_ = now_;
 }
 
@@ -262,21 +239,17 @@ void FixEnergyAccount::end_of_step() {
 double FixEnergyAccount::compute_vector(int n) {
   constexpr int numerical_damping = 4 + int(Powers::walls);
   if (!begun_ && !fresh_) return 0.0;
-  EnergyLedger mine = shown_, all;
-  if (fresh_) {
-    mine = now_;
-    bool begun = begun_;
-    take_setup(mine, begun);
-  }
-  MPI_Allreduce(&mine, &all, int(ledger_size), MPI_DOUBLE, MPI_SUM, world);
+  const EnergyLedger mine = fresh_ ? with_setup() : shown_;
+  EnergyLedger all;
+  MPI_Allreduce(&mine, &all, int(dembark::energy_ledger_size), MPI_DOUBLE, MPI_SUM, world);
   return all.energies()[n < numerical_damping ? n : n + 1];
 }
 
 /// Collective. The sums of each rank by themselves: added up otherwise, they would round otherwise.
 void FixEnergyAccount::write_restart(FILE *file) {
   const int ranks = comm->nprocs;
-  std::vector<double> all(comm->me == 0 ? std::size_t(ranks) * ledger_size : 0);
-  MPI_Gather(&now_, int(ledger_size), MPI_DOUBLE, all.data(), int(ledger_size), MPI_DOUBLE, 0, world);
+  std::vector<double> all(comm->me == 0 ? std::size_t(ranks) * dembark::energy_ledger_size : 0);
+  MPI_Gather(&now_, int(dembark::energy_ledger_size), MPI_DOUBLE, all.data(), int(dembark::energy_ledger_size), MPI_DOUBLE, 0, world);
   if (comm->me != 0) return;
   const double head[] = {double(begun_), double(ranks)};
   const int bytes = int(sizeof head + all.size() * sizeof(double));
@@ -287,19 +260,18 @@ void FixEnergyAccount::write_restart(FILE *file) {
 
 /// On another number of ranks the first has the sums of all.
 void FixEnergyAccount::restart(char *buffer) {
-  double head[2];
-  std::memcpy(head, buffer, sizeof head);
+  const double *const head = reinterpret_cast<double *>(buffer), *from = head + 2;
   begun_ = head[0] != 0.0;
   const int ranks = int(head[1]);
   resumed_ = ranks == comm->nprocs;
-  std::array<double, ledger_size> sum{}, part;
-  for (int r = 0; r < ranks; ++r) {
-    if (resumed_ ? r != comm->me : comm->me != 0) continue;
-    std::memcpy(part.data(), buffer + sizeof head + std::size_t(r) * sizeof part, sizeof part);
-    for (std::size_t k = 0; k < ledger_size; ++k) sum[k] += part[k];
-  }
+  std::array<double, dembark::energy_ledger_size> sum{};
+  for (int r = 0; r < ranks; ++r)
+    for (double &number : sum) {
+      const double saved = *from++;
+      if (resumed_ ? r == comm->me : comm->me == 0) number += saved;
+    }
   std::memcpy(&now_, sum.data(), sizeof now_);
   shown_ = now_;
 }
 
-double FixEnergyAccount::memory_usage() { return double(tally_.size() * sizeof(dembark_liggghts::EnergyTally::Loads)); }
+double FixEnergyAccount::memory_usage() { return double(tally.loads.size() * sizeof tally.loads[0]); }

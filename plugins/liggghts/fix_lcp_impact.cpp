@@ -1,7 +1,6 @@
 #include "fix_lcp_impact.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <numeric>
 #include <stdexcept>
@@ -16,47 +15,40 @@
 #include "update.h"
 
 #include "fix_mesh_surface.h"
+#include "multi_vector_container.h"
+
+#include "mesh_triangles.h"
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
-using dembark::impact::Archive;
-using dembark::impact::Body;
-using dembark::impact::Contact;
-using dembark_liggghts::ImpactWall;
+using namespace dembark::impact;
+using dembark::Triangle;
+using Vec = dembark::Vec3<double>;
 
 namespace {
 
-// A body on its way to the first rank: tag, type, mass, radius, position, velocity, spin, force, torque; and back: force, torque.
-constexpr int sent = 19, returned = 6;
+Vec vec(const double *of) { return {of[0], of[1], of[2]}; }
 
-std::vector<std::string> words(int narg, char **arg) { return std::vector<std::string>(arg + std::min(3, narg), arg + narg); }
+void add(const Vec &v, double *to) {
+  to[0] += v.x;
+  to[1] += v.y;
+  to[2] += v.z;
+}
 
 }  // namespace
 
-FixLcpImpact::FixLcpImpact(LAMMPS *lmp, int narg, char **arg)
-    : Fix(lmp, narg, arg),
-      me_(comm->me),
-      file_kept_(-1),
-      kept_(false),
-      last_step_(-1),
-      last_dt_(0.0),
-      clock_time_(0.0),
-      clock_step_(0),
-      local_capacity_(1) {
+FixLcpImpact::FixLcpImpact(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg) {
   if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag || !atom->torque_flag)
     refuse("atoms have no radius, mass, spin or torque of their own; use atom_style granular (or sphere)");
   if (!atom->tag_enable) refuse("atoms have no numbers; use atom_modify id yes");
-  try {
-    options_ = dembark_liggghts::read_impact_options(words(narg, arg), atom->ntypes);
-    system_.reset(new dembark::impact::System(options_.settings));
-  } catch (const std::invalid_argument &e) {
-    refuse(e.what());
-  }
-  mesh_.resize(options_.walls.size());
-
+  checked([&] {
+    const std::vector<std::string> words(arg + std::min(3, narg), arg + narg);
+    options_ = dembark_liggghts::read_impact_options(words, atom->ntypes);
+    system_.reset(new System(options_.settings));
+  });
   restart_global = 1;
   vector_flag = 1;
-  size_vector = dembark::impact::StepReport::size;
+  size_vector = int(to_numbers(report_).size());
   extvector = 0;
   global_freq = 1;
   local_flag = 1;
@@ -73,27 +65,35 @@ int FixLcpImpact::setmask() { return POST_FORCE | POST_RUN; }
 
 void FixLcpImpact::refuse(const std::string &line) { error->fix_error(FLERR, this, line.c_str()); }
 
+/// Runs `work`; what it throws ends the run with its line.
+void FixLcpImpact::checked(const std::function<void()> &work) {
+  std::string wrong;
+  try {
+    return work();
+  } catch (const std::exception &e) {
+    wrong = e.what();
+  }
+  refuse(wrong);
+}
+
 /// Runs `work` on the rank that knows all bodies. What goes wrong there ends the run on all of them with one line, and its report is that
 /// of all. Collective.
 void FixLcpImpact::on_root(const std::function<void()> &work) {
+  if (comm->nprocs == 1) return checked(work);
   std::string wrong;
   try {
-    if (me_ == 0) work();
+    if (comm->me == 0) work();
   } catch (const std::exception &e) {
     wrong = e.what();
-    if (comm->nprocs == 1) refuse(wrong);
   }
-  if (comm->nprocs == 1) return;
-  Archive out;
-  std::size_t length = wrong.size();
-  out(length), out(report_);
-  std::vector<double> shared = out.numbers();
+  std::vector<double> shared = to_numbers(report_);
+  shared.push_back(double(wrong.size()));
   MPI_Bcast(shared.data(), int(shared.size()), MPI_DOUBLE, 0, world);
-  Archive in(shared);
-  in(length), in(report_);
-  if (length == 0) return;
-  wrong.resize(length);
-  MPI_Bcast(&wrong[0], int(length), MPI_CHAR, 0, world);
+  wrong.resize(std::size_t(shared.back()));
+  shared.pop_back();
+  from_numbers(shared, report_);
+  if (wrong.empty()) return;
+  MPI_Bcast(&wrong[0], int(wrong.size()), MPI_CHAR, 0, world);
   refuse(wrong);
 }
 
@@ -103,30 +103,21 @@ void FixLcpImpact::init() {
   if (domain->triclinic) refuse("a triclinic box is not supported; use an orthogonal one");
   check_order();
   find_meshes();
-  take_time_step();
-  on_root([this] {
-    const std::string &path = options_.impacts_file;
-    if (path.empty() || !file_.path().empty()) return;
-    std::string about;
-    for (std::size_t w = 0; w < options_.walls.size(); ++w)
-      about += (w ? ", " : "") + std::to_string(-1 - static_cast<long>(w)) + " = " + options_.walls[w].name;
+  reset_dt();
+  std::string about;
+  for (std::size_t w = 0; w < options_.walls.size(); ++w)
+    about += (w ? ", " : "") + std::to_string(-1 - static_cast<long>(w)) + " = " + options_.walls[w];
+  on_root([&] {
     try {
-      if (file_kept_ < 0) file_.begin(path, about.empty() ? "there is none" : about);
-      else file_.resume(path, file_kept_);
+      file_.open(options_.impacts_file, about.empty() ? "there is none" : about);
     } catch (const std::runtime_error &e) {
       throw std::runtime_error(std::string("impacts: ") + e.what());
     }
   });
 }
 
-void FixLcpImpact::reset_dt() { take_time_step(); }
-
-void FixLcpImpact::take_time_step() {
-  try {
-    system_->set_dt(update->dt);
-  } catch (const std::invalid_argument &e) {
-    refuse(e.what());
-  }
+void FixLcpImpact::reset_dt() {
+  checked([this] { system_->set_dt(update->dt); });
   if (last_dt_ > 0.0 && last_dt_ != update->dt) {
     last_step_ = -1;  // the forces of another time step are not those of this one
     clock_time_ += double(update->ntimestep - clock_step_) * last_dt_;
@@ -149,160 +140,171 @@ void FixLcpImpact::check_order() {
   }
 }
 
-void FixLcpImpact::find_meshes() {
-  mesh_fix_.assign(options_.walls.size(), nullptr);
-  for (std::size_t w = 0; w < options_.walls.size(); ++w) {
-    const ImpactWall &wall = options_.walls[w];
-    if (wall.fix_id.empty()) continue;
-    const int found = modify->find_fix(wall.fix_id.c_str());
-    mesh_fix_[w] = found < 0 ? nullptr : dynamic_cast<FixMeshSurface *>(modify->fix[found]);
-    if (!mesh_fix_[w])
-      refuse("wall " + wall.name + ": there is no fix mesh/surface with the ID " + wall.fix_id + "; define it before the run");
-  }
-}
-
-void FixLcpImpact::gather_meshes(double dt) {
-  for (std::size_t w = 0; w < mesh_fix_.size(); ++w)
-    if (mesh_fix_[w]) mesh_[w].gather(*mesh_fix_[w], *domain, world, dt);
-}
-
-dembark::impact::PeriodicBox FixLcpImpact::box() const {
-  dembark::impact::PeriodicBox box;
-  box.low = {domain->boxlo[0], domain->boxlo[1], domain->boxlo[2]};
-  box.length = {domain->prd[0], domain->prd[1], domain->prd[2]};
+PeriodicBox FixLcpImpact::box() const {
+  PeriodicBox box;
+  box.low = vec(domain->boxlo);
+  box.length = vec(domain->prd);
   for (int k = 0; k < 3; ++k) box.periodic[k] = domain->periodicity[k] && (k < 2 || domain->dimension == 3);
   box.beyond = neighbor->skin;  // by what atoms move between two neighbour lists
   return box;
 }
 
+void FixLcpImpact::find_meshes() {
+  mesh_fix_.clear();
+  mesh_.resize(options_.meshes.size());
+  for (std::size_t k = 0; k < options_.meshes.size(); ++k) {
+    const int found = modify->find_fix(options_.meshes[k].c_str());
+    mesh_fix_.push_back(found < 0 ? nullptr : dynamic_cast<FixMeshSurface *>(modify->fix[found]));
+    if (!mesh_fix_[k])
+      refuse("wall " + options_.walls[std::size_t(wall_number(options_.around.meshes[k].id))] +
+             ": there is no fix mesh/surface with the ID " + options_.meshes[k] + "; define it before the run");
+  }
+}
+
+/// Brings what all ranks have to the first. Collective.
+template <class T>
+void FixLcpImpact::gather(std::vector<T> &own, std::vector<T> &all) {
+  if (comm->nprocs == 1) return all.swap(own);
+  const int bytes = int(own.size() * sizeof(T));
+  counts_.resize(std::size_t(comm->nprocs));
+  offsets_.assign(std::size_t(comm->nprocs), 0);
+  MPI_Gather(&bytes, 1, MPI_INT, counts_.data(), 1, MPI_INT, 0, world);
+  if (comm->me == 0) {
+    std::partial_sum(counts_.begin(), counts_.end() - 1, offsets_.begin() + 1);
+    all.resize(std::size_t(offsets_.back() + counts_.back()) / sizeof(T));
+  }
+  MPI_Gatherv(own.data(), bytes, MPI_BYTE, all.data(), counts_.data(), offsets_.data(), MPI_BYTE, 0, world);
+}
+
+/// Sends the meshes that may have moved to the first rank. dt (s): time since the last call, or 0 if there is none. Collective.
+void FixLcpImpact::gather_meshes(double dt) {
+  for (std::size_t k = 0; k < mesh_.size(); ++k) {
+    TriMesh &mesh = *mesh_fix_[k]->triMesh();
+    mesh_[k].clear();
+    if (!mesh.isMoving() && dt > 0.0) continue;  // it stands, and its surface velocity is constant during a run
+    const auto *velocity = mesh.prop().getElementProperty<MultiVectorContainer<double, 3, 3>>("v");
+    std::vector<Triangle> own;
+    for (int i = 0; i < mesh.sizeLocal(); ++i) {
+      Triangle &triangle = own.emplace_back(dembark_liggghts::triangle_of(mesh, i));
+      for (int c = 0; velocity && c < 3; ++c) triangle.velocity[c] = vec((*velocity)(i)[c]);
+    }
+    gather(own, mesh_[k]);
+  }
+}
+
+/// The corners of a moving mesh get the velocity with which they came, that of the half step as the bodies have it; those of a mesh that
+/// stands and has a surface velocity (a conveyor), and of all with dt = 0, the mesh's own. On the first rank.
+void FixLcpImpact::take_meshes(double dt) {
+  for (std::size_t k = 0; k < mesh_.size(); ++k) {
+    std::vector<Triangle> &now = mesh_[k];
+    if (now.empty()) continue;
+    std::sort(now.begin(), now.end(), [](const Triangle &a, const Triangle &b) { return a.id < b.id; });
+    const bool moving = mesh_fix_[k]->triMesh()->isMoving();
+    Mesh &mesh = options_.around.meshes[k];
+    const std::vector<Triangle> &before = mesh.surface.triangles();
+    for (std::size_t i = 0; moving && dt > 0.0 && now.size() == before.size() && i < now.size(); ++i)
+      for (int c = 0; c < 3; ++c) {
+        // The engine takes a triangle that leaves a periodic box to the other end.
+        const Vec way = now[i].node[c] - before[i].node[c];
+        double nearest[3] = {way.x, way.y, way.z};
+        domain->minimum_image(nearest);
+        now[i].velocity[c] = vec(nearest) * (1.0 / dt);
+      }
+    mesh.update(std::move(now));
+    // At the very first set-up nothing has moved yet, and the engine does not tell what will.
+    mesh.velocity_known = !moving || dt > 0.0 || mesh.speed > 0.0;
+  }
+}
+
 /// Sends the own atoms to the first rank. Collective.
 void FixLcpImpact::gather_atoms() {
   own_atom_.clear();
-  for (int i = 0; i < atom->nlocal; ++i)
-    if (atom->mask[i] & groupbit) own_atom_.push_back(i);
-  own_row_.resize(own_atom_.size() * sent);
-  double *to = own_row_.data();
-  for (const int i : own_atom_) {
-    for (const double value : {double(atom->tag[i]), double(atom->type[i]), atom->rmass[i], atom->radius[i]}) *to++ = value;
-    for (const double *v : {atom->x[i], atom->v[i], atom->omega[i], atom->f[i], atom->torque[i]}) to = std::copy(v, v + 3, to);
+  own_body_.clear();
+  const double turn = options_.torque_scale(domain->dimension);
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!(atom->mask[i] & groupbit)) continue;
+    own_atom_.push_back(i);
+    const double mass = atom->rmass[i], radius = atom->radius[i];
+    own_body_.push_back({atom->tag[i], mass, options_.inertia(mass, radius), radius, atom->type[i] - 1, vec(atom->x[i]), vec(atom->v[i]),
+                         vec(atom->omega[i]), vec(atom->f[i]), turn * vec(atom->torque[i])});
   }
-  if (comm->nprocs == 1) return all_row_.swap(own_row_);
-  const int count = int(own_row_.size());
-  counts_.resize(std::size_t(comm->nprocs));
-  offsets_.assign(std::size_t(comm->nprocs), 0);
-  MPI_Gather(&count, 1, MPI_INT, counts_.data(), 1, MPI_INT, 0, world);
-  if (me_ == 0) {
-    std::partial_sum(counts_.begin(), counts_.end() - 1, offsets_.begin() + 1);
-    all_row_.resize(std::size_t(offsets_.back() + counts_.back()));
-  }
-  MPI_Gatherv(own_row_.data(), count, MPI_DOUBLE, all_row_.data(), counts_.data(), offsets_.data(), MPI_DOUBLE, 0, world);
+  gather(own_body_, all_body_);
 }
 
 /// Fills bodies_ with what was gathered, sorted by tag; on the first rank.
 void FixLcpImpact::take_bodies() {
-  const std::size_t n = all_row_.size() / sent;
-  const auto tag = [this](std::size_t row) { return all_row_[row * sent]; };
+  const std::size_t n = all_body_.size();
+  const auto before = [this](std::size_t a, std::size_t b) { return all_body_[a].id < all_body_[b].id; };
   // Atoms seldom change their places in the engine's arrays: the order of the last step is tried first.
-  bool sorted = order_.size() == n;
-  for (std::size_t i = 1; sorted && i < n; ++i) sorted = tag(order_[i - 1]) < tag(order_[i]);
-  if (!sorted) {
+  if (order_.size() != n || !std::is_sorted(order_.begin(), order_.end(), before)) {
     order_.resize(n);
     std::iota(order_.begin(), order_.end(), std::size_t(0));
-    std::sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) { return tag(a) < tag(b); });
+    std::sort(order_.begin(), order_.end(), before);
   }
   bodies_.resize(n);
-  const double turn = options_.torque_scale(domain->dimension);
   for (std::size_t i = 0; i < n; ++i) {
-    const double *v = &all_row_[order_[i] * sent];
-    const auto vector = [v](int k) { return Vec{v[k], v[k + 1], v[k + 2]}; };
-    if (i > 0 && tag(order_[i - 1]) == v[0]) throw std::runtime_error("two atoms have the number " + std::to_string(std::int64_t(v[0])));
-    bodies_[i] = {std::int64_t(v[0]), v[2], options_.inertia(v[2], v[3]), v[3], int(v[1]) - 1, vector(4), vector(7), vector(10), vector(13),
-                  turn * vector(16)};
+    bodies_[i] = all_body_[order_[i]];
+    if (i > 0 && bodies_[i - 1].id == bodies_[i].id) throw std::runtime_error("two atoms have the number " + std::to_string(bodies_[i].id));
   }
 }
 
 /// Hands the forces of the first rank out to the atoms. Collective.
 void FixLcpImpact::apply() {
-  if (me_ == 0) {
-    const double turn = 1.0 / options_.torque_scale(domain->dimension);
-    for (std::size_t i = 0; i < bodies_.size(); ++i) {
-      const Vec f = force_[i], t = turn * torque_[i];
-      const double row[returned] = {f.x, f.y, f.z, t.x, t.y, t.z};
-      std::copy(row, row + returned, &all_row_[order_[i] * returned]);
-    }
+  all_push_.resize(bodies_.size());
+  const double turn = 1.0 / options_.torque_scale(domain->dimension);
+  for (std::size_t i = 0; i < bodies_.size(); ++i) all_push_[order_[i]] = {pushes_[i].force, turn * pushes_[i].torque};
+  own_push_.resize(own_atom_.size());
+  if (comm->nprocs == 1) {
+    own_push_.swap(all_push_);
+  } else {
     for (std::vector<int> *list : {&counts_, &offsets_})
-      for (int &n : *list) n = n / sent * returned;
+      for (int &n : *list) n = n / int(sizeof(Body)) * int(sizeof(Push));
+    MPI_Scatterv(all_push_.data(), counts_.data(), offsets_.data(), MPI_BYTE, own_push_.data(), int(own_push_.size() * sizeof(Push)),
+                 MPI_BYTE, 0, world);
   }
-  const int count = int(own_atom_.size()) * returned;
-  own_row_.resize(std::size_t(count));
-  if (comm->nprocs == 1) own_row_.swap(all_row_);
-  else MPI_Scatterv(all_row_.data(), counts_.data(), offsets_.data(), MPI_DOUBLE, own_row_.data(), count, MPI_DOUBLE, 0, world);
-  for (std::size_t k = 0; k < own_atom_.size(); ++k)
-    for (int axis = 0; axis < 3; ++axis) {
-      atom->f[own_atom_[k]][axis] += own_row_[k * returned + axis];
-      atom->torque[own_atom_[k]][axis] += own_row_[k * returned + 3 + axis];
-    }
-}
-
-void FixLcpImpact::find_contacts(double reach, std::vector<Contact> &contacts) {
-  pairs_.find(bodies_, box(), reach, contacts);
-  for (std::size_t w = 0; w < options_.walls.size(); ++w) {
-    const ImpactWall &wall = options_.walls[w];
-    if (wall.plane) dembark::impact::plane_contacts(bodies_, *wall.plane, reach, contacts);
-    if (wall.drum) dembark::impact::cylinder_contacts(bodies_, *wall.drum, reach, contacts);
-    if (wall.fix_id.empty()) continue;
-    // Without images: at the end of a mesh that goes through to a periodic boundary they would touch an edge that is none.
-    const std::size_t from = contacts.size();
-    triangles_.find(bodies_, wall.common, mesh_[w].surface, reach, contacts);
-    if (mesh_[w].velocity_known) continue;
-    for (std::size_t k = from; k < contacts.size(); ++k) {  // better no relative motion than a wrong one, which springs would remember
-      const Body &b = bodies_[std::size_t(contacts[k].a)];
-      contacts[k].point_velocity = b.velocity - b.radius * cross(b.spin, contacts[k].normal);
-    }
+  for (std::size_t k = 0; k < own_atom_.size(); ++k) {
+    add(own_push_[k].force, atom->f[own_atom_[k]]);
+    add(own_push_[k].torque, atom->torque[own_atom_[k]]);
   }
 }
 
 /// The forces of the moment, on the first rank.
 void FixLcpImpact::solve(double kick) {
-  force_.assign(bodies_.size(), Vec());
-  torque_.assign(bodies_.size(), Vec());
   const double time = clock_time_ + double(update->ntimestep - clock_step_) * update->dt;
-  double wall_speed = 0.0;
-  // The surface of a cylinder that turns moves along itself, not towards anything.
-  for (const dembark_liggghts::ImpactMesh &mesh : mesh_) wall_speed = std::max(wall_speed, mesh.speed);
-  const auto search = [this](double reach, std::vector<Contact> &contacts) { find_contacts(reach, contacts); };
-  report_ = system_->step(bodies_, search, wall_speed, time, kick, force_, torque_);
+  Surroundings &around = options_.around;
+  const auto search = [&](double reach, std::vector<Contact> &contacts) { around.find(bodies_, reach, contacts); };
+  report_ = system_->step(bodies_, search, around.wall_speed(), time, kick);
+  pushes_ = system_->pushes();
   file_.append(system_->take_finished());
   results_.clear();
   last_step_ = update->ntimestep;
   kept_ = false;
 }
 
-void FixLcpImpact::setup(int) {
-  gather_atoms();
-  gather_meshes(0.0);
-  on_root([this] {
+/// All ranks' atoms and meshes to the first; dt as for gather_meshes(). Then `work` there, and its forces to the atoms. Collective.
+void FixLcpImpact::do_step(double dt, const std::function<void()> &work) {
+  gather_meshes(dt);
+  gather_atoms();  // the last to be gathered: apply() goes the way back
+  on_root([&] {
+    take_meshes(dt);
     take_bodies();
-    // A run that goes on where one has ended: the forces of this step are known.
-    if (last_step_ == update->ntimestep && last_.hold(bodies_, box())) {
-      force_ = last_.force;
-      torque_ = last_.torque;
-    } else {
-      solve(0.5);  // half a kick follows, from the velocity of the full step
-    }
+    options_.around.pairs.box = box();
+    work();
   });
   apply();
+}
+
+void FixLcpImpact::setup(int) {
+  do_step(0.0, [this] {
+    // A run that goes on where one has ended: the forces of this step are known.
+    if (last_step_ != update->ntimestep || !last_.hold(bodies_, box())) return solve(0.5);  // half a kick follows, from the full step
+    pushes_ = last_.pushes;
+  });
   fill_local();
 }
 
 void FixLcpImpact::post_force(int) {
-  gather_atoms();
-  gather_meshes(update->dt);
-  on_root([this] {
-    take_bodies();
-    solve(1.0);
-  });
-  apply();
+  do_step(update->dt, [this] { solve(1.0); });
   if (local_is_read()) fill_local();
 }
 
@@ -317,8 +319,7 @@ void FixLcpImpact::keep_end_of_step() {
   on_root([this] {
     if (!kept_) {  // of the step that has just been done
       last_.keep(bodies_);
-      last_.force = force_;
-      last_.torque = torque_;
+      last_.pushes = pushes_;
       kept_ = true;
     }
     take_bodies();

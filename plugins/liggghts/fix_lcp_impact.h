@@ -20,10 +20,7 @@ FixStyle(lcp/impact,FixLcpImpact)
 
 #include "dembark/impact/impact_file.hpp"
 #include "dembark/impact/last_forces.hpp"
-#include "dembark/impact/periodic.hpp"
 #include "dembark/impact/system.hpp"
-#include "dembark/impact/triangles.hpp"
-#include "fix_lcp_impact_mesh.h"
 #include "fix_lcp_impact_options.h"
 
 namespace LAMMPS_NS {
@@ -47,57 +44,54 @@ class FixLcpImpact : public Fix {
   double memory_usage();
 
  private:
-  typedef dembark::Vec3<double> Vec;
   static constexpr int local_columns = 13;
 
   void check_order();
   void find_meshes();
-  void take_time_step();
-  dembark::impact::PeriodicBox box() const;
   void gather_atoms();
-  void take_bodies();
   void gather_meshes(double dt);
-  void find_contacts(double reach, std::vector<dembark::impact::Contact> &contacts);
+  void take_bodies();
+  void take_meshes(double dt);
   void solve(double kick);
+  void do_step(double dt, const std::function<void()> &work);
+  dembark::impact::PeriodicBox box() const;
   void apply();
   bool local_is_read() const;
   void fill_local();
   const std::vector<dembark::impact::ContactResult> &results() const;
   void keep_end_of_step();
   void archive(dembark::impact::Archive &);
+  void checked(const std::function<void()> &work);
   void on_root(const std::function<void()> &work);
   void refuse(const std::string &line);
+  template <class T>
+  void gather(std::vector<T> &own, std::vector<T> &all);
 
   dembark_liggghts::ImpactOptions options_;
-  int me_;
-  dembark::impact::StepReport report_;            // the same on all ranks
-  std::vector<class FixMeshSurface *> mesh_fix_;  // per wall, null for planes and cylinders
-  std::vector<dembark_liggghts::ImpactMesh> mesh_;
+  dembark::impact::StepReport report_;                // the same on all ranks
+  std::vector<class FixMeshSurface *> mesh_fix_;      // of each mesh
+  std::vector<std::vector<dembark::Triangle>> mesh_;  // on the first rank: of each mesh as it is now, empty where it stands
+  std::vector<int> own_atom_;                         // of each own body, in the order in which they are gathered
+  std::vector<dembark::impact::Body> own_body_;
+  std::vector<dembark::impact::Push> own_push_;
 
-  // Own atoms, in the order in which their rows are gathered, and how many numbers each rank sends.
-  std::vector<int> own_atom_, counts_, offsets_;
-  std::vector<double> own_row_, all_row_;
-
-  // On the first rank: all bodies of the group by number, the row of each, and the forces of the contacts.
-  std::unique_ptr<dembark::impact::System> system_;
-  dembark::impact::PeriodicPairs pairs_;
-  dembark::impact::TriangleFinder triangles_;
-  std::vector<dembark::impact::Body> bodies_;
+  // On the first rank: all bodies of the group by number, as they came and what each of them gets, and the model.
+  std::vector<int> counts_, offsets_;  // bytes, of the last gather
+  std::vector<dembark::impact::Body> all_body_, bodies_;
+  std::vector<dembark::impact::Push> all_push_, pushes_;
   std::vector<std::size_t> order_;
-  std::vector<Vec> force_, torque_;
+  std::unique_ptr<dembark::impact::System> system_;
   dembark::impact::ImpactFile file_;
-  long long file_kept_;  // bytes, from a restart file; -1: none
-
   std::vector<dembark::impact::ContactResult> results_;  // of the step of a restart file
 
   dembark::impact::LastForces last_;
-  bool kept_;  // last_ is that of the last step
-  bigint last_step_;
-  double last_dt_;
+  bool kept_ = false;  // last_ is that of the last step
+  bigint last_step_ = -1;
+  double last_dt_ = 0.0;
   // Time of a step: the engine's own clock does not survive a restart with another time step.
-  double clock_time_;
-  bigint clock_step_;
-  int local_capacity_;
+  double clock_time_ = 0.0;
+  bigint clock_step_ = 0;
+  int local_capacity_ = 1;
 };
 
 }  // namespace LAMMPS_NS

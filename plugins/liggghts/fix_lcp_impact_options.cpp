@@ -1,18 +1,19 @@
 #include "fix_lcp_impact_options.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <iterator>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
 namespace dembark_liggghts {
 namespace {
 
+using namespace dembark::impact;
 using Vec = dembark::Vec3<double>;
-
-const char* const keywords =
-    "stiffness, damping, contact_damping, theta, friction, shear_strength, tangential_ratio, wall, inertia, impacts, method, sweeps";
 
 [[noreturn]] void refuse(const std::string& line) { throw std::invalid_argument(line); }
 
@@ -22,47 +23,38 @@ std::string text(double value) {
   return buffer;
 }
 
-bool is_number(const std::string& word, double& value) {
-  char* end = nullptr;
-  value = std::strtod(word.c_str(), &end);
-  return !word.empty() && *end == '\0' && std::isfinite(value);
-}
-
+/// The words, one after the other. `of`: the keyword that they belong to; `what`: what is wanted, for messages.
 class Words {
  public:
   explicit Words(const std::vector<std::string>& words) : words_(words) {}
 
   bool left() const { return at_ < words_.size(); }
+  bool next_is(const char* word) const { return left() && words_[at_] == word; }
   bool next_is_number() const {
     double ignored;
     return left() && is_number(words_[at_], ignored);
   }
-  bool next_is(const char* word) const { return left() && words_[at_] == word; }
 
   std::string word(const std::string& of, const std::string& what) {
     if (!left()) refuse(of + ": " + what + " is missing");
     return words_[at_++];
   }
-
   double number(const std::string& of, const std::string& what) {
     const std::string found = word(of, what);
     double value;
     if (!is_number(found, value)) refuse(of + ": '" + found + "' is no number; it wants " + what);
     return value;
   }
-
   double at_least(double lowest, const std::string& of, const std::string& what) {
     const double value = number(of, what);
     if (!(value >= lowest)) refuse(of + ": " + what + " must be >= " + text(lowest) + ", not " + text(value));
     return value;
   }
-
   double positive(const std::string& of, const std::string& what) {
     const double value = number(of, what);
     if (!(value > 0.0)) refuse(of + ": " + what + " must be > 0, not " + text(value));
     return value;
   }
-
   int choice(const std::string& of, const std::string& what, const std::vector<std::string>& all) {
     const std::string found = word(of, what);
     std::string list;
@@ -74,146 +66,160 @@ class Words {
   }
 
  private:
+  static bool is_number(const std::string& word, double& value) {
+    char* end = nullptr;
+    value = std::strtod(word.c_str(), &end);
+    return !word.empty() && *end == '\0' && std::isfinite(value);
+  }
+
   const std::vector<std::string>& words_;
   std::size_t at_ = 0;
 };
 
-std::vector<double> per_type(Words& words, const std::string& keyword, const std::string& unit, int types, bool may_be_zero) {
-  std::vector<double> values;
-  while (words.next_is_number()) {
-    const std::string what = "the value (" + unit + ") of type " + std::to_string(values.size() + 1);
-    values.push_back(may_be_zero ? words.at_least(0.0, keyword, what) : words.positive(keyword, what));
-  }
-  if (int(values.size()) != types)
-    refuse(keyword + ": one value (" + unit + ") for each of the " + std::to_string(types) + " atom types, not " +
-           std::to_string(values.size()));
-  return values;
-}
-
-dembark::FinnieRabinowicz no_friction() {
-  dembark::FinnieRabinowicz f = dembark::impact::PairLaw::frictionless();
-  f.critical_slip_distance = 0.0;
-  return f;
-}
-
-dembark::FinnieRabinowicz read_friction(Words& words, const std::string& of) {
-  dembark::FinnieRabinowicz f = no_friction();
-  f.static_friction = f.kinetic_friction = words.at_least(0.0, of, "the friction coefficient");
-  if (!words.next_is_number()) return f;
-  f.kinetic_friction = words.at_least(0.0, of, "the kinetic friction coefficient");
-  f.critical_slip_distance = words.at_least(0.0, of, "the critical slip distance (m), after the static and the kinetic coefficient,");
-  if (f.kinetic_friction > f.static_friction)
-    refuse(of + ": kinetic friction " + text(f.kinetic_friction) + " must not exceed static friction " + text(f.static_friction));
-  return f;
-}
-
 /// Everything that one command says; pair laws come together when all words are read.
-class Reader {
+class Reader : Words {
  public:
-  Reader(const std::vector<std::string>& words, int types) : words_(words), types_(types) {}
+  Reader(const std::vector<std::string>& words, int types) : Words(words), types_(types) {}
 
   ImpactOptions read() {
-    while (words_.left()) keyword(words_.word("lcp/impact", "a keyword"));
+    while (left()) keyword(word("lcp/impact", "a keyword"));
     if (stiffness_.empty()) refuse("stiffness is missing: one value (N/m) for each atom type");
     damping_.resize(stiffness_.size());
-    dembark::impact::Settings& s = options_.settings;
+    Settings& s = options_.settings;
     s.materials.clear();
     s.pairs.clear();
     for (std::size_t i = 0; i < stiffness_.size(); ++i) s.add({stiffness_[i], damping_[i]}, law(friction_));
-    for (const ImpactWall& wall : options_.walls) s.add({wall.common.stiffness, 0.0}, law(wall.friction.value_or(friction_)));
+    for (const auto& [stiffness, friction] : wall_laws_) s.add({stiffness, 0.0}, law(friction.value_or(friction_)));
     options_.types = stiffness_.size();
     return std::move(options_);
   }
 
  private:
-  void keyword(const std::string& word) {
-    if (word == "stiffness") stiffness_ = per_type(words_, word, "N/m", types_, false);
-    else if (word == "damping") damping_ = per_type(words_, word, "N s/m", types_, true);
-    else if (word == "contact_damping") law_.contact_damping = words_.at_least(0.0, word, "the value (N s/m)");
-    else if (word == "theta") {
-      const double theta = options_.settings.theta = words_.number(word, "the value");
-      if (!(theta >= 0.5 && theta <= 1.0)) refuse("theta: the value lies in 0.5...1, not " + text(theta));
-    } else if (word == "friction") friction_ = read_friction(words_, word);
-    else if (word == "shear_strength") {
-      strength_ = words_.positive(word, "the strength (Pa)");
-      if (words_.next_is_number()) law_.contact_area = words_.positive(word, "the contact area (m^2)");
-    } else if (word == "tangential_ratio") law_.tangential_stiffness_ratio = words_.positive(word, "the value");
-    else if (word == "wall") wall();
-    else if (word == "inertia") options_.solid_cylinder = words_.choice(word, "the shape", {"cylinder", "sphere"}) == 0;
-    else if (word == "impacts") options_.impacts_file = words_.word(word, "the name of the file");
-    else if (word == "method") {
+  using Friction = dembark::FinnieRabinowicz;
+
+  void keyword(const std::string& of) {
+    Settings& settings = options_.settings;
+    if (of == "stiffness") stiffness_ = per_type(of, "N/m", false);
+    else if (of == "damping") damping_ = per_type(of, "N s/m", true);
+    else if (of == "contact_damping") law_.contact_damping = at_least(0.0, of, "the value (N s/m)");
+    else if (of == "theta") {
+      settings.theta = number(of, "the value");
+      if (!(settings.theta >= 0.5 && settings.theta <= 1.0)) refuse("theta: the value lies in 0.5...1, not " + text(settings.theta));
+    } else if (of == "friction") friction_ = friction(of);
+    else if (of == "shear_strength") {
+      strength_ = positive(of, "the strength (Pa)");
+      if (next_is_number()) law_.contact_area = positive(of, "the contact area (m^2)");
+    } else if (of == "tangential_ratio") law_.tangential_stiffness_ratio = positive(of, "the value");
+    else if (of == "wall") wall();
+    else if (of == "inertia") options_.solid_cylinder = choice(of, "the shape", {"cylinder", "sphere"}) == 0;
+    else if (of == "impacts") options_.impacts_file = word(of, "the name of the file");
+    else if (of == "method") {
       const std::vector<std::string> methods(std::begin(dembark::lcp_method_names), std::end(dembark::lcp_method_names));
-      options_.settings.lcp.method = dembark::lcp_method(methods[std::size_t(words_.choice(word, "the solver", methods))]);
-    } else if (word == "sweeps") {
-      const double value = words_.at_least(1.0, word, "the number");
+      settings.lcp.method = dembark::lcp_method(methods[std::size_t(choice(of, "the solver", methods))]);
+    } else if (of == "sweeps") {
+      const double value = at_least(1.0, of, "the number");
       if (value != std::floor(value) || value > 100.0) refuse("sweeps: a whole number from 1 to 100, not " + text(value));
-      options_.settings.friction_sweeps = int(value);
-    } else refuse("'" + word + "' is no keyword; there is " + keywords);
+      settings.friction_sweeps = int(value);
+    } else
+      refuse("'" + of +
+             "' is no keyword; there is stiffness, damping, contact_damping, theta, friction, shear_strength, tangential_ratio, wall, "
+             "inertia, impacts, method, sweeps");
   }
 
-  dembark::impact::PairLaw law(const dembark::FinnieRabinowicz& friction) const {
-    dembark::impact::PairLaw law = law_;
+  PairLaw law(const Friction& friction) const {
+    PairLaw law = law_;
     law.friction = friction;
     law.friction.interface_shear_strength = strength_;
     return law;
   }
 
-  int axis(const std::string& of) { return words_.choice(of, "the axis", {"x", "y", "z"}); }
+  std::vector<double> per_type(const std::string& of, const std::string& unit, bool may_be_zero) {
+    std::vector<double> values;
+    while (next_is_number()) {
+      const std::string what = "the value (" + unit + ") of type " + std::to_string(values.size() + 1);
+      values.push_back(may_be_zero ? at_least(0.0, of, what) : positive(of, what));
+    }
+    if (int(values.size()) != types_)
+      refuse(of + ": one value (" + unit + ") for each of the " + std::to_string(types_) + " atom types, not " +
+             std::to_string(values.size()));
+    return values;
+  }
+
+  Friction friction(const std::string& of) {
+    Friction f = no_friction();
+    f.static_friction = f.kinetic_friction = at_least(0.0, of, "the friction coefficient");
+    if (!next_is_number()) return f;
+    f.kinetic_friction = at_least(0.0, of, "the kinetic friction coefficient");
+    f.critical_slip_distance = at_least(0.0, of, "the critical slip distance (m), after the static and the kinetic coefficient,");
+    if (f.kinetic_friction > f.static_friction)
+      refuse(of + ": kinetic friction " + text(f.kinetic_friction) + " must not exceed static friction " + text(f.static_friction));
+    return f;
+  }
+  static Friction no_friction() {
+    Friction f = PairLaw::frictionless();
+    f.critical_slip_distance = 0.0;
+    return f;
+  }
+
+  int axis(const std::string& of) { return choice(of, "the axis", {"x", "y", "z"}); }
 
   void wall() {
     static double Vec::* const axes[3] = {&Vec::x, &Vec::y, &Vec::z};
-    const int shape = words_.choice("wall", "the shape", {"plane", "cylinder", "mesh"});
-    ImpactWall wall;
-    wall.name = words_.word("wall", "the name");
-    const std::string of = "wall " + wall.name;
-    for (const ImpactWall& other : options_.walls)
-      if (other.name == wall.name) refuse(of + ": there is a wall of this name already; give each wall its own");
-    const std::size_t number = options_.walls.size();
-    wall.common.id = dembark::impact::wall_key(std::int64_t(number));
-    wall.common.material = types_ + int(number);
-    wall.common.stiffness = 0.0;
+    const int shape = choice("wall", "the shape", {"plane", "cylinder", "mesh"});
+    const std::string name = word("wall", "the name"), of = "wall " + name;
+    std::vector<std::string>& walls = options_.walls;
+    if (std::find(walls.begin(), walls.end(), name) != walls.end())
+      refuse(of + ": there is a wall of this name already; give each wall its own");
+    Surroundings& around = options_.around;
+    Wall* wall = nullptr;
     if (shape == 0) {
-      dembark::impact::Plane& plane = wall.plane.emplace();
+      Plane& plane = around.planes.emplace_back();
       const int k = axis(of);
-      plane.point.*axes[k] = words_.number(of, "the position (m) along the axis");
+      plane.point.*axes[k] = number(of, "the position (m) along the axis");
       plane.normal = Vec();
-      plane.normal.*axes[k] = words_.choice(of, "the side", {"lo", "hi"}) == 0 ? 1.0 : -1.0;
+      plane.normal.*axes[k] = choice(of, "the side", {"lo", "hi"}) == 0 ? 1.0 : -1.0;
+      wall = &plane;
     } else if (shape == 1) {
-      dembark::impact::Drum& drum = wall.drum.emplace();
+      Drum& drum = around.drums.emplace_back();
       const int k = axis(of);
       drum.axis = Vec();
       drum.axis.*axes[k] = 1.0;
-      drum.point.*axes[k == 0 ? 1 : 0] = words_.number(of, "the first coordinate (m) of the axis");
-      drum.point.*axes[k == 2 ? 1 : 2] = words_.number(of, "the second coordinate (m) of the axis");
-      drum.radius = words_.positive(of, "the radius (m)");
+      drum.point.*axes[k == 0 ? 1 : 0] = number(of, "the first coordinate (m) of the axis");
+      drum.point.*axes[k == 2 ? 1 : 2] = number(of, "the second coordinate (m) of the axis");
+      drum.radius = positive(of, "the radius (m)");
+      wall = &drum;
     } else {
-      wall.fix_id = words_.word(of, "the ID of a fix mesh/surface");
+      options_.meshes.push_back(word(of, "the ID of a fix mesh/surface"));
+      wall = &around.meshes.emplace_back();
     }
-    for (; words_.next_is("stiffness") || words_.next_is("friction") || words_.next_is("omega");) {
-      const std::string word = words_.word(of, "a keyword");
-      if (word == "stiffness") {
-        if (wall.common.stiffness > 0.0) refuse(of + ": stiffness stands twice; the keywords of the fix itself come before the first wall");
-        wall.common.stiffness = words_.positive(of, "stiffness (N/m)");
-      } else if (word == "friction") {
-        wall.friction = read_friction(words_, of + ": friction");
+    wall->id = wall_key(std::int64_t(walls.size()));
+    wall->material = types_ + int(walls.size());
+    wall->stiffness = 0.0;
+    std::optional<Friction> own;
+    for (; next_is("stiffness") || next_is("friction") || next_is("omega");) {
+      const std::string key = word(of, "a keyword");
+      if (key == "stiffness") {
+        if (wall->stiffness > 0.0) refuse(of + ": stiffness stands twice; the keywords of the fix itself come before the first wall");
+        wall->stiffness = positive(of, "stiffness (N/m)");
+      } else if (key == "friction") {
+        own = friction(of + ": friction");
       } else {
-        if (!wall.drum) refuse(of + ": omega is for cylinders; a mesh moves with fix move/mesh");
-        wall.drum->omega = words_.number(of, "omega (rad/s)");
+        if (shape != 1) refuse(of + ": omega is for cylinders; a mesh moves with fix move/mesh");
+        around.drums.back().omega = number(of, "omega (rad/s)");
       }
     }
-    if (!(wall.common.stiffness > 0.0)) refuse(of + ": stiffness (N/m) is missing");
-    if (wall.plane) static_cast<dembark::impact::Wall&>(*wall.plane) = wall.common;
-    if (wall.drum) static_cast<dembark::impact::Wall&>(*wall.drum) = wall.common;
-    options_.walls.push_back(wall);
+    if (!(wall->stiffness > 0.0)) refuse(of + ": stiffness (N/m) is missing");
+    wall_laws_.emplace_back(wall->stiffness, own);
+    walls.push_back(name);
   }
 
-  Words words_;
-  int types_;
+  const int types_;
   ImpactOptions options_;
   std::vector<double> stiffness_, damping_;
-  dembark::impact::PairLaw law_;  ///< but for its friction
-  dembark::FinnieRabinowicz friction_ = no_friction();
-  double strength_ = dembark::unlimited_strength;  ///< Pa
+  PairLaw law_;  ///< but for its friction
+  Friction friction_ = no_friction();
+  double strength_ = dembark::unlimited_strength;                      ///< Pa
+  std::vector<std::pair<double, std::optional<Friction>>> wall_laws_;  ///< stiffness, N/m, and friction; none: that of the fix
 };
 
 }  // namespace

@@ -1,29 +1,20 @@
 // The words of `fix ID group lcp/impact …`, read into numbers.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "dembark/impact/geometry.hpp"
 #include "dembark/impact/types.hpp"
+#include "dembark/impact/geometry.hpp"
 
 namespace dembark_liggghts {
 
-/// A wall of the command, in the order in which the words name it: a plane, a drum, or a fix mesh/surface.
-struct ImpactWall {
-  std::string name;              ///< of the user; appears in messages and in the file of impacts
-  dembark::impact::Wall common;  ///< of a mesh
-  std::optional<dembark::impact::Plane> plane;
-  std::optional<dembark::impact::Drum> drum;
-  std::string fix_id;                                 ///< of the fix mesh/surface, or empty
-  std::optional<dembark::FinnieRabinowicz> friction;  ///< none: that of the fix
-};
-
 struct ImpactOptions {
-  dembark::impact::Settings settings;  ///< a material for each atom type, then one for each wall; without the time step
+  dembark::impact::Settings settings;    ///< a material for each atom type, then one for each wall; without the time step
+  dembark::impact::Surroundings around;  ///< the walls, numbered in the order in which the words name them
+  std::vector<std::string> walls;        ///< their names, for messages and the file of impacts
+  std::vector<std::string> meshes;       ///< IDs of fix mesh/surface, of the meshes in `around`
   std::size_t types = 0;
-  std::vector<ImpactWall> walls;
   bool solid_cylinder = true;  ///< moment of inertia m r^2 / 2, else 2/5 m r^2
   std::string impacts_file;    ///< empty: none
 

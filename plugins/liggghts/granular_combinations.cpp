@@ -2,9 +2,9 @@
 
 #include <cctype>
 #include <cstdint>
-#include <map>
+#include <cstring>
 #include <string>
-#include <utility>
+#include <type_traits>
 
 // The library's headers depend on this order.
 #include "fix_insert_stream.h"
@@ -32,30 +32,24 @@ using LAMMPS_NS::LAMMPS;
 using namespace LIGGGHTS;
 using namespace LIGGGHTS::ContactModels;
 
-/// What of granular_combinations_list.h a user can write, in the words of a script: combinations that differ in one model stand together.
-std::string available() {
-  // By tangential, cohesion and surface model: the rolling models of each normal model.
-  std::map<std::string, std::map<std::string, std::string>> groups;
-  const auto word = [](const std::string& id, const std::string& kind) {
-    std::string name = id.substr(id.rfind(kind, 0) == 0 ? kind.size() : 0);
-    for (char& c : name) c = static_cast<char>(std::tolower(c));
-    return name;
-  };
-  const auto add = [&](const char* normal, const char* tangential, const char* cohesion, const char* rolling, const char* surface) {
-    std::string& of_normal = groups["tangential " + word(tangential, "TANGENTIAL_") + " cohesion " + word(cohesion, "COHESION_") +
-                                    " surface " + word(surface, "SURFACE_")][word(normal, "NORMAL_")];
-    of_normal += (of_normal.empty() ? "" : "|") + word(rolling, "ROLLING_");
-  };
-#define GRAN_MODEL(normal, tangential, cohesion, rolling, surface) add(#normal, #tangential, #cohesion, #rolling, #surface);
-#include "granular_combinations_list.h"
-#undef GRAN_MODEL
+/// "(ROLLING_OFF, ROLLING_CDT)" of the list as a user writes it: "off|cdt".
+std::string words(std::string models, const std::string& kind) {
+  for (std::size_t at; (at = models.find(kind)) != std::string::npos;) models.erase(at, kind.size());
   std::string line;
-  for (const auto& [rest, normals] : groups) {
-    std::map<std::string, std::string> same;  // normal models by their rolling models
-    for (const auto& [normal, rollings] : normals) same[rollings] += (same[rollings].empty() ? "" : "|") + normal;
-    for (const auto& [rollings, names] : same)
-      line += (line.empty() ? "" : "; ") + ("model " + names + " " + rest) + " rolling_friction " + rollings;
-  }
+  for (const char c : models)
+    if (c == ',') line += '|';
+    else if (!std::strchr("() ", c)) line += static_cast<char>(std::tolower(c));
+  return line;
+}
+
+std::string available() {
+  std::string line;
+#define GRAN_MODELS(normal, tangential, cohesion, rolling, surface)                                                                  \
+  line += (line.empty() ? "" : "; ") + ("model " + words(#normal, "NORMAL_")) + " tangential " + words(#tangential, "TANGENTIAL_") + \
+          " cohesion " + words(#cohesion, "COHESION_") + " surface " + words(#surface, "SURFACE_") + " rolling_friction " +          \
+          words(#rolling, "ROLLING_");
+#include "granular_combinations_list.h"
+#undef GRAN_MODELS
   return line;
 }
 
@@ -69,7 +63,7 @@ template <class Host>
 Host* fallback_or_refuse(LAMMPS* lammps, typename Host::ParentType* parent, std::int64_t hash) {
   const int tangential = (hash >> 6) & 63, cohesion = (hash >> 12) & 63;
   if (tangential == TANGENTIAL_FINNIE_RABINOWICZ || cohesion == COHESION_CAPILLARY) {
-    const std::string line = std::string("this combination of contact models is not compiled; there is ") + available();
+    const std::string line = "this combination of contact models is not compiled; there is " + available();
     lammps->error->all(FLERR, line.c_str());
   }
   return stock_fallback<Host>(lammps, parent, hash);
@@ -98,6 +92,15 @@ void add_combination() {
   Walls::Factory::instance().addStyle("gran", Style::HASHCODE, &create<Walls::IGranularWall, MeshWall<ContactModel<Style>>>);
 }
 
+template <int... Ids>
+struct Models {};
+
+template <int Tangential, int Cohesion, int Surface, int... Normal, int... Rolling>
+void add_combinations(Models<Normal...>, Models<Rolling...>) {
+  const auto with = [](auto normal) { (add_combination<decltype(normal)::value, Tangential, Cohesion, Rolling, Surface>(), ...); };
+  (with(std::integral_constant<int, Normal>()), ...);
+}
+
 template <class Host>
 void guard_fallback(GranularCreators<Host>& creators) {
   Creator<Host>& creator = creators[{"gran", static_cast<int>(GranStyle<>::HASHCODE)}];
@@ -112,9 +115,12 @@ void register_contact_models() {
   models.addTangentialModel("finnie_rabinowicz", TANGENTIAL_FINNIE_RABINOWICZ);
   models.addCohesionModel("capillary", COHESION_CAPILLARY);
 
-#define GRAN_MODEL(normal, tangential, cohesion, rolling, surface) add_combination<normal, tangential, cohesion, rolling, surface>();
+#define MODELS(...) Models<__VA_ARGS__>()
+#define GRAN_MODELS(normal, tangential, cohesion, rolling, surface) \
+  add_combinations<tangential, cohesion, surface>(MODELS normal, MODELS rolling);
 #include "granular_combinations_list.h"
-#undef GRAN_MODEL
+#undef GRAN_MODELS
+#undef MODELS
 
   guard_fallback(pair_loops());
   guard_fallback(wall_loops());

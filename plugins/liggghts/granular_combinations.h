@@ -1,7 +1,6 @@
 // Entry of dembark's contact models into the tables of LIGGGHTS.
 //
-// To add a law: write its header like tangential_model_finnie_rabinowicz.h, and give its combinations
-// lines in granular_combinations_list.h.
+// To add a law: write its header like tangential_model_finnie_rabinowicz.h, and name it in granular_combinations_list.h.
 #pragma once
 
 namespace dembark_liggghts {

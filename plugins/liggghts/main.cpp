@@ -18,7 +18,6 @@
 #include "fix_lcp_impact.h"
 #include "fix_resume_exact.h"
 #include "granular_combinations.h"
-#include "resume_state.h"
 
 namespace {
 

@@ -54,7 +54,7 @@ class MeshWall : public LIGGGHTS::Walls::Granular<Models> {
       found->triangles.resize(count);
       for (std::size_t i = 0; i < count; ++i) found->triangles[i] = triangle_of(mesh, int(i));
       try {
-        found->contacts.update(found->triangles);
+        found->contacts.update(found->triangles, moves);
       } catch (const std::invalid_argument& e) {
         lmp_->error->one(FLERR, (std::string("mesh ") + mesh.mesh_id() + ": " + e.what()).c_str());
       }

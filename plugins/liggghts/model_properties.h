@@ -1,7 +1,9 @@
-// Material properties of the contact models, read from `fix property/global` with range checks and defaults.
+// What the contact models read: keywords with named values, and material properties from `fix property/global`, with range checks and
+// defaults.
 #ifndef DEMBARK_MODEL_PROPERTIES_H
 #define DEMBARK_MODEL_PROPERTIES_H
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -12,8 +14,36 @@
 #include "property_registry.h"
 
 #include "dembark/contact.hpp"
+#include "engine_access.h"
 
 namespace dembark_liggghts {
+
+/// A keyword with named values, e.g. `presliding linear|exponential`.
+class ChoiceSetting : public EnumSetting<int> {
+  std::string choices_;
+
+ public:
+  ChoiceSetting(const std::string& name, const std::vector<std::string>& values) : EnumSetting<int>(name) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      addOption(values[i], static_cast<int>(i));
+      choices_ += (i ? ", " : "") + values[i];
+    }
+  }
+  int parseArguments(char** args) override {
+    const int consumed = EnumSetting<int>::parseArguments(args);
+    if (consumed < 0) error_message = name + " '" + args[1] + "' is unknown; it can be " + choices_;
+    return consumed;
+  }
+};
+
+/// Register keyword `name`; `target` gets the index of the chosen value, at once that of the default `values[0]`.
+inline void register_choice(Settings& settings, const std::string& name, int& target, const std::vector<std::string>& values) {
+  Setting*& slot = keywords(settings)[name];
+  if (!slot) slot = new ChoiceSetting(name, values);
+  ChoiceSetting* setting = static_cast<ChoiceSetting*>(slot);
+  setting->registerTarget(target);
+  setting->setDefault(values[0]);
+}
 
 /// One value a pair of types. Types go from 1 to types().
 template <class Value>
@@ -71,20 +101,15 @@ class PropertyReader {
   /// Whether a table of pairs of types is there.
   bool given(const char* name) const { return find(name, "peratomtypepair", false); }
 
-  double scalar(const char* name) const { return find(name, "scalar", true)->compute_scalar(); }
-  double scalar(const char* name, double otherwise) const {
-    LAMMPS_NS::FixPropertyGlobal* const fix = find(name, "scalar", false);
+  // A value that is not given is `otherwise`, or an error where that is NAN.
+  double scalar(const char* name, double otherwise = NAN) const {
+    LAMMPS_NS::FixPropertyGlobal* const fix = find(name, "scalar", std::isnan(otherwise));
     return fix ? fix->compute_scalar() : otherwise;
   }
   double per_type(const char* name, int type) const { return find(name, "peratomtype", true)->compute_vector(type - 1); }
-  double per_pair(const char* name, int i, int j) const { return symmetric(find(name, "peratomtypepair", true), name, i, j); }
-  double per_pair(const char* name, int i, int j, double otherwise) const {
-    LAMMPS_NS::FixPropertyGlobal* const fix = find(name, "peratomtypepair", false);
-    return fix ? symmetric(fix, name, i, j) : otherwise;
-  }
-
- private:
-  double symmetric(LAMMPS_NS::FixPropertyGlobal* fix, const char* name, int i, int j) const {
+  double per_pair(const char* name, int i, int j, double otherwise = NAN) const {
+    LAMMPS_NS::FixPropertyGlobal* const fix = find(name, "peratomtypepair", std::isnan(otherwise));
+    if (!fix) return otherwise;
     const double value = fix->compute_array(i - 1, j - 1);
     if (value != fix->compute_array(j - 1, i - 1))
       fail(std::string(name) + " differs between types " + std::to_string(i) + "-" + std::to_string(j) + " and " + std::to_string(j) + "-" +
@@ -93,24 +118,30 @@ class PropertyReader {
   }
 };
 
-/// The friction laws of all pairs of types.
-inline PairTable<dembark::FinnieRabinowicz> read_friction(const PropertyReader& read, dembark::Presliding presliding) {
-  PairTable<dembark::FinnieRabinowicz> laws(read.types());
+/// The laws of all pairs of types, each as `law(i, j, "i-j")` makes it.
+template <class Law>
+auto for_all_pairs(const PropertyReader& read, Law law) {
+  PairTable<decltype(law(1, 1, std::string()))> laws(read.types());
   for (int i = 1; i <= read.types(); ++i)
-    for (int j = 1; j <= read.types(); ++j) {
-      dembark::FinnieRabinowicz& law = laws(i, j);
-      law.static_friction = read.per_pair("staticFriction", i, j);
-      law.kinetic_friction = read.per_pair("kineticFriction", i, j);
-      law.critical_slip_distance = read.per_pair("criticalSlipDistance", i, j);
-      law.interface_shear_strength = read.per_pair("interfaceShearStrength", i, j, dembark::unlimited_strength);
-      law.healing_time = read.scalar("healingTime", 0.0);
-      law.presliding = presliding;
-      if (law.error()) read.fail(std::string(law.error()) + " (types " + std::to_string(i) + "-" + std::to_string(j) + ")");
-    }
+    for (int j = 1; j <= read.types(); ++j) laws(i, j) = law(i, j, std::to_string(i) + "-" + std::to_string(j));
   return laws;
 }
 
-/// The liquids of all pairs of types. `carried`: bridges take their volume from the grains, none is given.
+inline PairTable<dembark::FinnieRabinowicz> read_friction(const PropertyReader& read, dembark::Presliding presliding) {
+  return for_all_pairs(read, [&](int i, int j, const std::string& pair) {
+    dembark::FinnieRabinowicz law;
+    law.static_friction = read.per_pair("staticFriction", i, j);
+    law.kinetic_friction = read.per_pair("kineticFriction", i, j);
+    law.critical_slip_distance = read.per_pair("criticalSlipDistance", i, j);
+    law.interface_shear_strength = read.per_pair("interfaceShearStrength", i, j, dembark::unlimited_strength);
+    law.healing_time = read.scalar("healingTime", 0.0);
+    law.presliding = presliding;
+    if (law.error()) read.fail(std::string(law.error()) + " (types " + pair + ")");
+    return law;
+  });
+}
+
+/// `carried`: bridges take their volume from the grains, none is given.
 inline PairTable<dembark::Liquid> read_liquids(const PropertyReader& read, dembark::capillary::Model model, bool viscous, bool carried) {
   dembark::Liquid same;
   same.surface_tension = read.scalar("surfaceTension");
@@ -120,21 +151,18 @@ inline PairTable<dembark::Liquid> read_liquids(const PropertyReader& read, demba
     read.fail("liquidViscosity is given, but viscous forces are off; write 'viscous_liquid on' after the models, or leave it out");
   if (viscous) same.viscous.minimum_gap = read.scalar("minimumGap");
   if (const char* wrong = same.viscous.error()) read.fail(std::string("liquidViscosity, minimumGap: ") + wrong);
-  PairTable<dembark::Liquid> liquids(read.types());
-  for (int i = 1; i <= read.types(); ++i)
-    for (int j = 1; j <= read.types(); ++j) {
-      dembark::Liquid& liquid = liquids(i, j) = same;
-      const std::string pair = std::to_string(i) + "-" + std::to_string(j);
-      if (!carried) liquid.bridge_volume = read.per_pair("bridgeVolume", i, j);
-      if (!(liquid.bridge_volume >= 0.0 && liquid.bridge_volume < INFINITY))
-        read.fail("bridgeVolume (m^3) must be >= 0 and finite (types " + pair + ")");
-      const double angle = 0.5 * (read.per_type("contactAngle", i) + read.per_type("contactAngle", j));
-      if (!(angle >= 0.0 && angle <= 0.5 * dembark::pi))
-        read.fail("contactAngle is in radians (stock models take degrees) and must lie in 0...pi/2; the mean of types " +
-                  std::to_string(i) + " and " + std::to_string(j) + " is " + std::to_string(angle));
-      liquid.force = &dembark::capillary::shared_bridge_force(model, angle);
-    }
-  return liquids;
+  return for_all_pairs(read, [&](int i, int j, const std::string& pair) {
+    dembark::Liquid liquid = same;
+    if (!carried) liquid.bridge_volume = read.per_pair("bridgeVolume", i, j);
+    if (!(liquid.bridge_volume >= 0.0 && liquid.bridge_volume < INFINITY))
+      read.fail("bridgeVolume (m^3) must be >= 0 and finite (types " + pair + ")");
+    const double angle = 0.5 * (read.per_type("contactAngle", i) + read.per_type("contactAngle", j));
+    if (!(angle >= 0.0 && angle <= 0.5 * dembark::pi))
+      read.fail("contactAngle is in radians (stock models take degrees) and must lie in 0...pi/2; the mean of types " + std::to_string(i) +
+                " and " + std::to_string(j) + " is " + std::to_string(angle));
+    liquid.force = &dembark::capillary::shared_bridge_force(model, angle);
+    return liquid;
+  });
 }
 
 }  // namespace dembark_liggghts

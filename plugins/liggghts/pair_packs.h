@@ -1,61 +1,82 @@
 // One step of the pairs of spheres under Hertz's law, Finnie-Rabinowicz friction and capillary bridges, computed in packs of contacts
-// with the widest vectors that the processor has. What the loop needs of the engine comes as bare arrays, so that pair_packs.hpp can be
-// compiled once for each instruction set; this file includes nothing, so that all that the loop inlines is compiled for the same one.
+// with the widest vectors that the processor has. pair_packs.hpp is compiled once for each instruction set; what it includes comes
+// through this file, before the set is chosen.
 #ifndef DEMBARK_PAIR_PACKS_H
 #define DEMBARK_PAIR_PACKS_H
+
+#include <cmath>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "atom.h"
+#include "contact_model_constants.h"
+#include "neigh_list.h"
+#include "pair_gran.h"
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define DEMBARK_PAIR_PACKS_X86
+#include <immintrin.h>
+#endif
+
+namespace dembark {
+
+template <class Real>
+struct NormalResponse;
+template <class Real>
+struct Vec3;
+
+}  // namespace dembark
 
 namespace dembark_liggghts {
 
 /// What the laws take of a pair of types; eight numbers, read as two rows of four.
+template <class Real>
 struct PairLaw {
-  double effective_youngs_modulus, effective_shear_modulus, damping;
-  double static_friction, kinetic_friction, interface_shear_strength, kept_slip;
-  double unused;
+  Real effective_youngs_modulus, effective_shear_modulus, damping;
+  Real static_friction, kinetic_friction, interface_shear_strength, kept_slip;
+  Real unused;
 };
 
-/// The pairs in work, as arrays; some room behind for whole packs.
+/// The pairs in work: those that touch, and those with a contact or a bridge stored, to hold or to end it.
 struct PairBlock {
-  static constexpr int capacity = 256, room = capacity + 16;
-  alignas(64) int i[room], j[room], flag[room], run[room];  // neighbours as they come: grains, contact flag, which run below
-  alignas(64) int pick[room];                               // those with a force: 2 * place above, + 1 if they touch
-  int run_start[room];          // of each run of neighbours of one grain: place of what would be the grain's first neighbour
-  int* run_flags[room];         // its flag
-  double* run_histories[room];  // its history
-  alignas(64) int grain[room], partner[room], kind[room];  // pairs with a force
+  static constexpr int capacity = 128, room = capacity + 16;  // some room behind for whole packs
+  alignas(64) int grain[room], partner[room], kind[room];     // kind: place in the table of laws
+  alignas(64) int pick[room];                                 // 2 * place among the grain's neighbours, + 1 if they touch
   int* flags[room];
   double* history[room];
 };
 
-/// A contact whose lane is left to the scalar law.
-struct FrictionInput {
-  double normal[3], velocity[3];
-  double twist, normal_force, stiffness, damping, area;
+/// The laws of single contacts, which the packs leave the rare ones to. `k`: place in the block.
+struct ScalarLaws {
+  /// Friction on the first grain (N); the state is stored.
+  virtual dembark::Vec3<double> friction(const PairBlock& block, int k, const dembark::Vec3<double>& normal, double twist,
+                                         const dembark::NormalResponse<double>& response, const dembark::Vec3<double>& velocity) = 0;
+  /// Pulls (N) of the bridges of `count` pairs over their gaps (m).
+  virtual void bridges(const PairBlock& block, int first, int count, const double* gap, double* pull) = 0;
 };
 
 struct PairStep {
-  // (grains, 3) or (grains)
-  const double *x, *v, *omega, *radius, *mass;
-  const int *type, *mask;
-  double *f, *torque;
-  int owned;  // grains from here on get no forces
-  // neighbour list
-  int count, stride, offset;  // grains; numbers in a history; place of friction's
-  const int *grains, *numneigh;
-  int* const* neighbors;
-  int* const* flags;
-  double* const* histories;
-  // flags of a pair that touches; all that the models own
-  int touching_flags, own_flags;
-  const PairLaw* laws;  // one a pair of types, row by row
-  int types;            // in a row; with 2, only the pair 1-1 is there
+  LAMMPS_NS::Atom& atom;
+  LAMMPS_NS::PairGran& pair;
+  ScalarLaws& scalar;
+  const PairLaw<double>* laws;  // one a pair of types, row by row
+  int types;                    // in a row; with 2, only the pair 1-1 is there
+  int owned;                    // grains from here on get no forces
+  int offset;                   // of friction in a history
   double dt;
-  bool limit_force, tangential_damping, pack_friction;  // the last: false leaves all friction to the scalar law
-  int frozen;                                           // group bit
-  void* caller;
-  // Scalar friction of pair k, on the first grain; its state is stored there.
-  void (*friction)(void* caller, const PairBlock& block, int k, const FrictionInput& input, double* force);
-  // Pull of the bridges of pairs first ... first + count - 1, or nullptr without liquid.
-  void (*bridges)(void* caller, const PairBlock& block, int first, int count, const double* gap, double* pull);
+  bool wet, limit_force, tangential_damping;
+  bool pack_friction;  // false leaves all friction to the scalar law
+
+  // (grains, 3) or (grains)
+  const double *x = atom.x[0], *v = atom.v[0], *omega = atom.omega[0], *radius = atom.radius, *mass = atom.rmass;
+  const int *type = atom.type, *mask = atom.mask;
+  double *f = atom.f[0], *torque = atom.torque[0];
+  int count = pair.list->inum, stride = pair.dnum(), frozen = pair.freeze_group_bit();
+  const int *grains = pair.list->ilist, *numneigh = pair.list->numneigh;
+  int* const* neighbors = pair.list->firstneigh;
+  int* const* flags = pair.listgranhistory->firstneigh;
+  double* const* histories = pair.listgranhistory->firstdouble;
 };
 
 /// The loop with packs of the type `P`.
@@ -67,9 +88,5 @@ typedef void PairPacks(const PairStep& step, PairBlock& block);
 PairPacks* choose_pair_packs();
 
 }  // namespace dembark_liggghts
-
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define DEMBARK_PAIR_PACKS_X86 1
-#endif
 
 #endif

@@ -11,99 +11,56 @@
 namespace dembark_liggghts {
 
 template <class P>
-struct LawPack {
-  P effective_youngs_modulus, effective_shear_modulus, damping, static_friction, kinetic_friction, interface_shear_strength, kept_slip;
-};
-
-template <class P>
-DEMBARK_HOT LawPack<P> law_of_one_kind(const PairLaw& law) {
-  return {law.effective_youngs_modulus, law.effective_shear_modulus,  law.damping,  law.static_friction,
-          law.kinetic_friction,         law.interface_shear_strength, law.kept_slip};
+DEMBARK_HOT PairLaw<P> laws_of_kinds(const PairLaw<double>* laws, const int* kind) {
+  const Quad<P> a = rows<P, 4>([=](int k) { return &laws[kind[k]].effective_youngs_modulus; });
+  const Quad<P> b = rows<P, 4>([=](int k) { return &laws[kind[k]].kinetic_friction; });
+  return {a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w};
 }
 
-template <class P>
-DEMBARK_HOT LawPack<P> laws_of_kinds(const PairLaw* laws, const int* kind) {
-  const Quad<P> a = rows4<P>([=](int k) { return &laws[kind[k]].effective_youngs_modulus; });
-  const Quad<P> b = rows4<P>([=](int k) { return &laws[kind[k]].kinetic_friction; });
-  return {a.x, a.y, a.z, a.w, b.x, b.y, b.z};
-}
+constexpr int touching_flags = LIGGGHTS::ContactModels::CONTACT_NORMAL_MODEL | LIGGGHTS::ContactModels::CONTACT_TANGENTIAL_MODEL;
+constexpr int bridge_flag = LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL;
 
-/// `count` integers, most often 8 or fewer; writes 8 at once.
+/// Appends to the `found` pairs of the block what a pack of grain i's neighbours, from place `first` on, holds; returns their number.
+/// Which pairs touch cannot be foreseen: no branch on it.
 template <class P>
-DEMBARK_HOT void copy(int* to, const int* from, int count) {
-  if constexpr (is_avx512<P>)
-    if (__builtin_expect(count <= 8, 1)) {
-      _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_maskz_loadu_epi32((1u << count) - 1, from));
-      return;
-    }
-  for (int k = 0; k < count; ++k) to[k] = from[k];
-}
-
-template <class P>
-DEMBARK_HOT void fill(int* to, int value, int count) {
-  for (int first = 0; first < count; first += 8) {
-#pragma GCC unroll 8
-    for (int k = 0; k < 8; ++k) to[first + k] = value;
-  }
-}
-
-/// Fills the block with the next neighbours of the grains, from `slot` of number `next` on; their number.
-template <class P>
-inline int take_neighbors(const PairStep& s, PairBlock& b, int& next, int& slot) {
-  constexpr int ahead = 6;  // grains for which the lists, strewn over the memory, are fetched early
-  int pairs = 0;
-  for (int run = 0; next < s.count && pairs < PairBlock::capacity; ++run) {
-    const int i = s.grains[next], all = s.numneigh[i], left = all - slot, space = PairBlock::capacity - pairs;
-    const int count = left < space ? left : space, later = s.grains[next + ahead < s.count ? next + ahead : next];
-    __builtin_prefetch(s.neighbors[later]);
-    __builtin_prefetch(s.flags[later]);
-    copy<P>(b.j + pairs, s.neighbors[i] + slot, count);
-    copy<P>(b.flag + pairs, s.flags[i] + slot, count);
-    fill<P>(b.i + pairs, i, count);
-    fill<P>(b.run + pairs, run, count);
-    b.run_start[run] = pairs - slot;
-    b.run_flags[run] = s.flags[i];
-    b.run_histories[run] = s.histories[i];
-    pairs += count;
-    run -= count == 0;
-    if (count < left) slot += count;
-    else slot = 0, ++next;
-  }
-  return pairs;
-}
-
-constexpr int neighbor_bits = 0x3FFFFFFF;  // the engine's NEIGHMASK
-
-/// Picks the pairs that touch, and those that have a contact or a bridge stored, to hold or to end it. Which pairs touch cannot be
-/// foreseen: no branch on it.
-template <class P>
-inline int pick_pairs(const PairStep& s, PairBlock& b, int pairs) {
+DEMBARK_HOT int pick_pairs(const PairStep& s, PairBlock& b, int i, int first, int found) {
   constexpr int N = P::size;
-  for (int k = pairs; k % N; ++k) b.i[k] = b.j[k] = b.flag[k] = 0;
-  int found = 0;
-  for (int first = 0; first < pairs; first += N) {
-    int* const j = b.j + first;
-#pragma GCC unroll 8
-    for (int k = 0; k < N; ++k) j[k] &= neighbor_bits;
-    const PackVec<P> delta = rows3<P>(s.x, b.i + first) - rows3<P>(s.x, j);
-    const P sum = values<P>(s.radius, b.i + first) + values<P>(s.radius, j);
-    const unsigned there = pairs - first < N ? (1u << (pairs - first)) - 1 : (1u << N) - 1;
-    const unsigned touching = bits(dot(delta, delta) < sum * sum) & there;
-    if constexpr (is_avx512<P>) {
-      const __m256i flag = _mm256_load_si256(reinterpret_cast<const __m256i*>(b.flag + first));
-      const __m256i place = _mm256_add_epi32(_mm256_set1_epi32(2 * first), _mm256_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14));
-      const unsigned taken = (touching | _mm256_test_epi32_mask(flag, flag)) & there;
-      const __m256i marked = _mm256_mask_add_epi32(place, touching, place, _mm256_set1_epi32(1));
-      _mm256_storeu_si256(reinterpret_cast<__m256i*>(b.pick + found), _mm256_maskz_compress_epi32(taken, marked));
-      found += __builtin_popcount(taken);
-    } else {
-#pragma GCC unroll 8
-      for (int k = 0; k < N; ++k) {
-        const int touches = touching >> k & 1;
-        b.pick[found] = 2 * (first + k) + touches;
-        found += touches | (b.flag[first + k] != 0);
-      }
+  const int *const neighbors = s.neighbors[i] + first, *const flags = s.flags[i] + first;
+  const int left = s.numneigh[i] - first;
+  alignas(16) int j[N];  // lanes behind the last neighbour take grain 0
+  unsigned stored = 0;
+#ifdef DEMBARK_PAIR_PACKS_X86
+  if constexpr (N == 4) {
+    const __m128i there = _mm_cmpgt_epi32(_mm_set1_epi32(left), _mm_setr_epi32(0, 1, 2, 3));
+    _mm_store_si128(reinterpret_cast<__m128i*>(j), _mm_and_si128(_mm_maskload_epi32(neighbors, there), _mm_set1_epi32(NEIGHMASK)));
+    stored = 15 & ~_mm_movemask_ps(_mm_castsi128_ps(_mm_cmpeq_epi32(_mm_maskload_epi32(flags, there), _mm_setzero_si128())));
+  }
+#endif
+  if constexpr (N == 2)
+    for (int k = 0; k < N; ++k) {
+      j[k] = k < left ? neighbors[k] & NEIGHMASK : 0;
+      stored |= unsigned(k < left && flags[k] != 0) << k;
     }
+  const double* const x = s.x + 3 * static_cast<long>(i);
+  const PackVec<P> delta = PackVec<P>{x[0], x[1], x[2]} - rows3<P>(s.x, j);
+  const P sum = s.radius[i] + values<P>(s.radius, j);
+  const unsigned touching = bits(dot(delta, delta) < sum * sum), taken = (touching | stored) & ((1u << (left < N ? left : N)) - 1);
+  if constexpr (is_avx512<P>) {
+    const auto append = [found, taken](int* to, __m128i lanes) __attribute__((always_inline)) {
+      _mm_storeu_si128(reinterpret_cast<__m128i*>(to + found), _mm_maskz_compress_epi32(taken, lanes));
+    };
+    const __m128i place = _mm_add_epi32(_mm_set1_epi32(2 * first), _mm_setr_epi32(0, 2, 4, 6));
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(b.grain + found), _mm_set1_epi32(i));
+    append(b.partner, _mm_load_si128(reinterpret_cast<const __m128i*>(j)));
+    append(b.pick, _mm_mask_add_epi32(place, touching, place, _mm_set1_epi32(1)));
+    return found + __builtin_popcount(taken);
+  }
+#pragma GCC unroll 8
+  for (int k = 0; k < N; ++k) {
+    b.grain[found] = i;
+    b.partner[found] = j[k];
+    b.pick[found] = 2 * (first + k) + (touching >> k & 1);
+    found += taken >> k & 1;
   }
   return found;
 }
@@ -112,21 +69,18 @@ inline int pick_pairs(const PairStep& s, PairBlock& b, int pairs) {
 template <class P>
 inline void gather(const PairStep& s, PairBlock& b, int found) {
   for (int k = 0; k < found; ++k) {
-    const int touches = b.pick[k] & 1, place = b.pick[k] >> 1, run = b.run[place], slot = place - b.run_start[run];
-    const long j = b.j[place];
-    b.grain[k] = b.i[place];
-    b.partner[k] = b.j[place];
-    b.history[k] = b.run_histories[run] + static_cast<long>(s.stride) * slot;
-    b.flags[k] = b.run_flags[run] + slot;
+    const long i = b.grain[k], j = b.partner[k];
+    const int place = b.pick[k] >> 1;
+    b.history[k] = s.histories[i] + static_cast<long>(s.stride) * place;
+    b.flags[k] = s.flags[i] + place;
+    b.kind[k] = s.types == 2 ? 3 : s.type[i] * s.types + s.type[j];
     // By the time that the pair's turn has come these are there.
     __builtin_prefetch(b.history[k] + s.offset, 1);
     __builtin_prefetch(b.history[k] + s.offset + 4, 1);
     __builtin_prefetch(s.f + 3 * j, 1);
     __builtin_prefetch(s.torque + 3 * j, 1);
-    *b.flags[k] = (*b.flags[k] & ~s.own_flags) | (-touches & s.touching_flags);
+    *b.flags[k] = (*b.flags[k] & ~(touching_flags | bridge_flag)) | (-(b.pick[k] & 1) & (touching_flags | (s.wet ? bridge_flag : 0)));
   }
-  if (s.types != 2)
-    for (int k = 0; k < found; ++k) b.kind[k] = s.type[b.grain[k]] * s.types + s.type[b.partner[k]];
   // Lanes behind the last pair repeat it.
   for (int k = found; k % 8; ++k) {
     b.grain[k] = b.grain[found - 1];
@@ -143,19 +97,14 @@ __attribute__((noinline)) void scalar_friction(const PairStep& s, const PairBloc
                                                PackVec<P>& tangential) {
   for (int k = 0; k < P::size; ++k) {
     if (!(rest >> k & 1)) continue;
-    double force[3];
-    s.friction(s.caller, b, first + k,
-               {{normal.x[k], normal.y[k], normal.z[k]},
-                {velocity.x[k], velocity.y[k], velocity.z[k]},
-                twist[k],
-                response.force[k],
-                response.tangential_stiffness[k],
-                response.tangential_damping[k],
-                response.contact_area[k]},
-               force);
-    tangential.x.lanes[k] = force[0];
-    tangential.y.lanes[k] = force[1];
-    tangential.z.lanes[k] = force[2];
+    const auto lane = [k](const PackVec<P>& v) { return dembark::Vec3<double>{v.x[k], v.y[k], v.z[k]}; };
+    const dembark::Vec3<double> force = s.scalar.friction(
+        b, first + k, lane(normal), twist[k],
+        {response.force[k], response.tangential_stiffness[k], response.tangential_damping[k], response.contact_area[k], 0.0},
+        lane(velocity));
+    tangential.x.lanes[k] = force.x;
+    tangential.y.lanes[k] = force.y;
+    tangential.z.lanes[k] = force.z;
   }
 }
 
@@ -187,12 +136,11 @@ DEMBARK_HOT void scatter(const PairStep& s, const int* grain, const int* partner
 template <class P>
 inline void compute(const PairStep& s, PairBlock& b, int found) {
   constexpr int N = P::size;
-  const bool one_kind = s.types == 2;
-  LawPack<P> law = law_of_one_kind<P>(s.laws[one_kind ? 3 : 0]);
+  PairLaw<P> law = laws_of_kinds<P>(s.laws, b.kind);
   for (int first = 0; first < found; first += N) {
     const int *i = b.grain + first, *j = b.partner + first, count = found - first < N ? found - first : N;
     const unsigned there = (1u << count) - 1;
-    if (!one_kind) law = laws_of_kinds<P>(s.laws, b.kind + first);
+    if (s.types != 2) law = laws_of_kinds<P>(s.laws, b.kind + first);
     const P radius_i = values<P>(s.radius, i), radius_j = values<P>(s.radius, j), radius_sum = radius_i + radius_j;
     const PackVec<P> delta = rows3<P>(s.x, i) - rows3<P>(s.x, j);
     const P squared = dot(delta, delta), distance = sqrt(squared), overlap = radius_sum - distance, half = 0.5 * overlap;
@@ -212,12 +160,12 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
     const dembark::SurfaceMotion<P> motion =
         dembark::surface_motion<P>(normal, rows3<P>(s.v, i) - rows3<P>(s.v, j), radius_i - half, omega_i, radius_j - half, omega_j);
     dembark::NormalResponse<P> response =
-        adjusted(dembark::hertz<LawPack<P>, P>(law, radius_i * radius_j / radius_sum, reduced_mass, overlap, motion.normal_velocity),
+        adjusted(dembark::hertz<PairLaw<P>, P>(law, radius_i * radius_j / radius_sum, reduced_mass, overlap, motion.normal_velocity),
                  s.limit_force, s.tangential_damping);
 
     const auto history = [=, &b, &s](int k) { return b.history[first + k] + s.offset; };
     const P dt = s.dt, twist = dembark::contact_twist<P>(normal, omega_i, omega_j, dt);
-    const Quad<P> old = rows4<P>(history);
+    const Quad<P> old = rows<P, 4>(history);
     dembark::FrictionState<P> state{{old.x, old.y, old.z}, old.w, collect<P>([=](int k) { return history(k)[4]; })};
     state.displacement = dembark::rotate_to_plane<P>(state.displacement, normal, twist);
     state.displacement += motion.tangential_velocity * dt;
@@ -237,12 +185,12 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
     alignas(64) double energy[N];
     state.dissipated_energy.store(energy);
     if (__builtin_expect(packed == there, 1)) {
-      store_rows4(spring, history);
+      store_rows(spring, history);
 #pragma GCC unroll 8
       for (int k = 0; k < N; ++k) history(k)[4] = energy[k];
     } else {
       alignas(64) double rows[N][4];
-      store_rows4(spring, [&rows](int k) { return rows[k]; });
+      store_rows(spring, [&rows](int k) { return rows[k]; });
       for (int k = 0; k < N; ++k) {
         if (!(packed >> k & 1)) continue;
         __builtin_memcpy(history(k), rows[k], sizeof rows[k]);
@@ -251,28 +199,41 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
       scalar_friction<P>(s, b, first, there & ~packed, normal, twist, motion.tangential_velocity, response, tangential);
     }
 
-    if (s.bridges) {
+    if (s.wet) {
       alignas(64) double gap[N], pull[N];
       (distance - radius_sum).store(gap);
-      s.bridges(s.caller, b, first, count, gap, pull);
+      s.scalar.bridges(b, first, count, gap, pull);
       response.force -= P::load(pull);
     }
     const PackVec<P> force = response.force * normal + tangential, moment = cross(normal, tangential);
     alignas(64) double forces[N][4], moments[N][4];
-    store_rows4(Quad<P>{force.x, force.y, force.z, motion.arm_1}, [&forces](int k) { return forces[k]; });
-    store_rows4(Quad<P>{moment.x, moment.y, moment.z, motion.arm_2}, [&moments](int k) { return moments[k]; });
+    store_rows(Quad<P>{force.x, force.y, force.z, motion.arm_1}, [&forces](int k) { return forces[k]; });
+    store_rows(Quad<P>{moment.x, moment.y, moment.z, motion.arm_2}, [&moments](int k) { return moments[k]; });
     scatter<P>(s, i, j, forces, moments, count);
   }
 }
 
 template <class P>
 void pair_packs(const PairStep& step, PairBlock& block) {
-  for (int next = 0, slot = 0; next < step.count;) {
-    const int pairs = take_neighbors<P>(step, block, next, slot), found = pick_pairs<P>(step, block, pairs);
-    if (found == 0) continue;
+  typedef Part < P, P::size<4 ? P::size : 4> Picks;  // grains have few neighbours
+  constexpr int ahead = 6;                           // grains for which the lists, strewn over the memory, are fetched early
+  int found = 0;
+  const auto finish = [&] {
+    if (found == 0) return;
     gather<P>(step, block, found);
     compute<P>(step, block, found);
+    found = 0;
+  };
+  for (int n = 0; n < step.count; ++n) {
+    const int i = step.grains[n], later = step.grains[n + ahead < step.count ? n + ahead : n];
+    __builtin_prefetch(step.neighbors[later]);
+    __builtin_prefetch(step.flags[later]);
+    for (int first = 0; first < step.numneigh[i]; first += Picks::size) {
+      found = pick_pairs<Picks>(step, block, i, first, found);
+      if (found >= PairBlock::capacity) finish();
+    }
   }
+  finish();
 }
 
 }  // namespace dembark_liggghts

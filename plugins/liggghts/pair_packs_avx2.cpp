@@ -1,9 +1,5 @@
-#include <cmath>
-#include <type_traits>
-
 #include "pair_packs.h"
 #ifdef DEMBARK_PAIR_PACKS_X86
-#include <immintrin.h>
 #pragma GCC target("avx2")
 #include "pair_packs.hpp"
 

@@ -1,9 +1,5 @@
-#include <cmath>
-#include <type_traits>
-
 #include "pair_packs.h"
 #ifdef DEMBARK_PAIR_PACKS_X86
-#include <immintrin.h>
 #pragma GCC target("avx512f,avx512dq,avx512vl,avx512bw,avx2,prefer-vector-width=512")
 #include "pair_packs.hpp"
 

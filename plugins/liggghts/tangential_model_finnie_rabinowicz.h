@@ -22,9 +22,8 @@ TANGENTIAL_MODEL(TANGENTIAL_FINNIE_RABINOWICZ,finnie_rabinowicz,20)
 #include "dembark/contact.hpp"
 #include "dembark/contact_energy.hpp"
 #include "contact_data.h"
-#include "energy_tally.h"
+#include "fix_energy_account.h"
 #include "model_properties.h"
-#include "settings_choice.h"
 
 namespace LIGGGHTS {
 namespace ContactModels {
@@ -46,7 +45,7 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
       : TangentialModelBase(lmp, host, models),
         pair_(dynamic_cast<LAMMPS_NS::PairGran*>(host)),
         wall_(dynamic_cast<LAMMPS_NS::FixWallGran*>(host)) {
-    // "1": the sign turns when the engine swaps the two grains of a pair.
+    // As in dembark::FrictionState. "1": the sign turns when the engine swaps the two grains of a pair.
     offset_ = host->add_history_value("tangential_displacement_x", "1");
     host->add_history_value("tangential_displacement_y", "1");
     host->add_history_value("tangential_displacement_z", "1");
@@ -56,7 +55,7 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
   }
 
   void registerSettings(Settings& settings) {
-    dembark_liggghts::register_choice(settings, "presliding", presliding_, {"linear", "exponential"});
+    dembark_liggghts::register_choice(settings, "presliding", presliding_, dembark::presliding_names());
   }
 
   inline void postSettings(IContactHistorySetup*, ContactModelBase*) {}

@@ -9,7 +9,10 @@
 // r - delta/2 (LIGGGHTS-PUBLIC 3.8.0, `surface default`), and to the middle of the gap of a bridge that resists sliding.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "capillary/bridge.hpp"
 #include "capillary/viscous.hpp"
@@ -20,7 +23,13 @@
 
 namespace dembark {
 
-enum class NormalLaw { hertz, hooke };
+/// False, and `option` as it was, for a word that is none of `names`, which stand in the order of the options.
+template <class Option>
+bool option_from_name(const std::vector<std::string>& names, const std::string& word, Option& option) {
+  const auto found = std::find(names.begin(), names.end(), word);
+  if (found != names.end()) option = static_cast<Option>(found - names.begin());
+  return found != names.end();
+}
 
 /// Liquid of a contact; no bridge ever forms when `force` is null or the volume is zero.
 struct Liquid {
@@ -47,7 +56,7 @@ struct ContactParameters {
   /// The normal law, as it is without the switches above.
   NormalResponse<double> respond(double effective_radius, double effective_mass, double overlap, double normal_velocity) const {
     if (normal_law == NormalLaw::hertz) return hertz(elasticity, effective_radius, effective_mass, overlap, normal_velocity);
-    return hooke(HookeParameters(elasticity, characteristic_velocity), effective_radius, effective_mass, overlap, normal_velocity);
+    return hooke(elasticity, characteristic_velocity, effective_radius, effective_mass, overlap, normal_velocity);
   }
 };
 

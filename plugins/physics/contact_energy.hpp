@@ -19,6 +19,19 @@
 
 namespace dembark {
 
+/// Of a body along x, y, z and about them: velocities and spins, forces and torques, masses and moments of inertia.
+typedef std::array<double, 6> Dofs;
+
+inline Dofs dofs(const Vec3<double>& along, const Vec3<double>& about) { return {along.x, along.y, along.z, about.x, about.y, about.z}; }
+
+DEMBARK_HOT double dot(const Dofs& a, const Dofs& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5];
+}
+
+DEMBARK_HOT void add(Dofs& to, const Dofs& other) {
+  for (std::size_t k = 0; k < to.size(); ++k) to[k] += other[k];
+}
+
 /// What the force of a contact is made of.
 enum class ContactPart {
   normal_elastic,      ///< normal spring
@@ -39,6 +52,21 @@ struct ContactParts {
 
   Vec3<double>& operator[](ContactPart part) { return force[static_cast<std::size_t>(part)]; }
   const Vec3<double>& operator[](ContactPart part) const { return force[static_cast<std::size_t>(part)]; }
+};
+
+/// Where the force of a contact acts: lever arms (m) from the positions of its bodies.
+struct ContactLevers {
+  Vec3<double> one{}, two{};
+
+  ContactLevers() = default;
+  ContactLevers(const Vec3<double>& normal, const RelativeMotion& motion) : one(-motion.arm_1 * normal), two(motion.arm_2 * normal) {}
+  /// Forces and torques on bodies 1 and 2 by this force on body 1.
+  Dofs on_one(const Vec3<double>& force) const { return dofs(force, cross(one, force)); }
+  Dofs on_two(const Vec3<double>& force) const { return dofs(-force, cross(force, two)); }
+  /// m/s, of body 1 against body 2.
+  Vec3<double> velocity(const Dofs& v, const Dofs& w) const {
+    return Vec3<double>{v[0] - w[0], v[1] - w[1], v[2] - w[2]} + cross({v[3], v[4], v[5]}, one) - cross({w[3], w[4], w[5]}, two);
+  }
 };
 
 /// Springs and dash-pots of a touching contact. `spring`: N, what the normal law gives at rest, which grows with overlap^exponent;

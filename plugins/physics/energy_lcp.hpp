@@ -57,24 +57,33 @@ class LcpSolver {
   /// those of q.
   const LcpResult& solve_columns(const int* outer, const int* inner, const double* value, const Eigen::VectorXd& q,
                                  const LcpOptions& options, const std::vector<char>* start) {
-    begin(q, options);
-    if (options.check_input) lcp::check_sparse(outer, inner, value, q.size());
+    lcp::check_options(options);
+    if (options.check_input) {
+      lcp::check_finite(q.data(), q.size());
+      lcp::check_sparse(outer, inner, value, q.size());
+    }
     return solve_islands(outer, inner, value, q, options, start);
   }
 
   /// Column-major n x n array.
   const LcpResult& solve_dense(const double* m, const Eigen::VectorXd& q, const LcpOptions& options, const std::vector<char>* start) {
-    const Index n = q.size();
-    begin(q, options);
-    if (options.check_input) lcp::check_dense(m, n);
-    if (!compact(m, n)) {
-      copy_ = Eigen::Map<const Eigen::MatrixXd>(m, n, n).sparseView(0.0, 0.0);
-      return solve_islands(copy_.outerIndexPtr(), copy_.innerIndexPtr(), copy_.valuePtr(), q, options, start);
+    const lcp::Matrix block = lcp::dense_matrix(m, q.size());
+    lcp::check_options(options);
+    if (options.check_input) {
+      lcp::check_finite(q.data(), block.n);
+      lcp::check_dense(m, block.n);
     }
-    result_.islands = n > 0;
-    const lcp::DenseBlock block{m, n};
-    if (n > 0) solve_block(block, nullptr, q, options, start);
-    return finish(block, q, options);
+    if (!compact(block)) {
+      const Eigen::SparseMatrix<double> columns = Eigen::Map<const Eigen::MatrixXd>(m, block.n, block.n).sparseView(0.0, 0.0);
+      return solve_islands(columns.outerIndexPtr(), columns.innerIndexPtr(), columns.valuePtr(), q, options, start);
+    }
+    order_.resize(std::size_t(block.n));
+    std::iota(order_.begin(), order_.end(), 0);
+    load(q, start);
+    result_.islands = block.n > 0;
+    lcp::DefiniteMargin alone;
+    if (block.n > 0) solve_block(block, 0, alone, options, start);
+    return finish(block, options);
   }
 
  private:
@@ -84,125 +93,108 @@ class LcpSolver {
   /// Larger ones with more than this fraction of nonzeros are solved as dense.
   static constexpr double dense_fraction = 0.25;
   static constexpr Index dense_limit = 8192;
-
-  /// The links of the chain for one kind of matrix.
-  template <class Matrix, class Factor, int Sweeps>
-  struct Chain {
-    /// Before block steps: a sweep of a full matrix costs much against its factor, one of a sparse matrix little.
-    static constexpr int sweeps = Sweeps;
-    lcp::Relaxation<lcp::MatrixRows<Matrix>> relaxation;
-    lcp::ActiveSet<Matrix, Factor> exact;
-  };
-
-  void begin(const Eigen::VectorXd& q, const LcpOptions& options) {
-    lcp::check_options(options);
-    if (options.check_input) lcp::check_finite(q.data(), q.size());
-    result_ = LcpResult();
-    result_.z.setZero(q.size());
-    active_.assign(std::size_t(q.size()), 0);
-  }
+  /// Before block steps: a sweep of a full matrix costs much against its factor.
+  static constexpr int most_sweeps = 8;
 
   /// Whether a dense matrix is best left dense: one island and not mostly zeros.
-  bool compact(const double* m, Index n) const {
-    if (n <= 1) return n == 0;  // a single unknown needs no factor
-    const lcp::DenseBlock block{m, n};
-    if (n > small_island) {
-      const double enough = dense_fraction * double(n) * double(n);
+  bool compact(const lcp::Matrix& m) const {
+    if (m.n <= 1) return m.n == 0;  // a single unknown needs no factor
+    const auto column = [&m](Index j) { return m.value + j * m.n; };
+    if (m.n > small_island) {
+      const double enough = dense_fraction * double(m.n) * double(m.n);
       Index entries = 0;
-      for (Index j = 0; j < n && double(entries) < enough; ++j) entries += (block.column(j) != 0.0).count();
+      for (Index j = 0; j < m.n && double(entries) < enough; ++j) entries += m.n - std::count(column(j), column(j + 1), 0.0);
       if (double(entries) < enough) return false;
     }
     std::vector<Index> queue{0}, left;
-    for (Index i = n; --i > 0;) left.push_back(i);
+    for (Index i = m.n; --i > 0;) left.push_back(i);
     while (!queue.empty() && !left.empty()) {
-      const auto column = block.column(queue.back());
+      const double* reached = column(queue.back());
       queue.pop_back();
-      const auto kept = std::partition(left.begin(), left.end(), [&](Index i) { return column[i] == 0.0; });
+      const auto kept = std::partition(left.begin(), left.end(), [&](Index i) { return reached[i] == 0.0; });
       queue.insert(queue.end(), kept, left.end());
       left.erase(kept, left.end());
     }
     return left.empty();
   }
 
+  /// What is given, in the order of the islands.
+  void load(const Eigen::VectorXd& q, const std::vector<char>* start) {
+    result_ = LcpResult();
+    q_ = q(order_);
+    z_.setZero(q.size());
+    active_.assign(order_.size(), 0);
+    if (start) std::transform(order_.begin(), order_.end(), active_.begin(), [start](int i) { return (*start)[std::size_t(i)] != 0; });
+  }
+
   const LcpResult& solve_islands(const int* outer, const int* inner, const double* value, const Eigen::VectorXd& q,
                                  const LcpOptions& options, const std::vector<char>* start) {
-    const Index n = q.size();
     const bool fill_reducing = options.method == LcpMethod::automatic || options.method == LcpMethod::block;
-    if (!islands_.fits(outer, inner, n, fill_reducing)) islands_.analyse(outer, inner, n, fill_reducing, small_island);
-    islands_.gather(value);
+    if (islands_.take(outer, inner, value, q.size(), fill_reducing, small_island)) margins_.assign(std::size_t(islands_.count()), {});
+    order_ = islands_.order();
+    load(q, start);
     result_.islands = islands_.count();
-    diagonal_.resize(n);
-    islands_.scatter_diagonal(diagonal_.data());
-    const lcp::SparseBlock whole{n, outer, inner, value, diagonal_.data()};
     // The certificate is that of the whole, so what stops at a tolerance of it cannot go island by island.
-    if (options.method == LcpMethod::pgs && n > 0) solve_block(whole, nullptr, q, options, start);
-    for (int t = 0; t < islands_.count() && options.method != LcpMethod::pgs; ++t) solve_island(t, q, options, start);
-    return finish(whole, q, options);
+    if (options.method == LcpMethod::pgs && q.size() > 0) solve_block(islands_.whole(), 0, margins_[0], options, start);
+    for (int t = 0; t < islands_.count() && options.method != LcpMethod::pgs; ++t) solve_island(t, options, start);
+    return finish(islands_.whole(), options);
   }
 
-  void solve_island(int island, const Eigen::VectorXd& q, const LcpOptions& options, const std::vector<char>* start) {
-    const lcp::SparseBlock block = islands_.block(island);
-    const int* order = islands_.order(island);
+  void solve_island(int island, const LcpOptions& options, const std::vector<char>* start) {
+    lcp::Matrix block = islands_.block(island);
     const double full = double(block.n) * double(block.n);
-    if (block.n == 1) return solve_single(order[0], block.diagonal(0), q, start);
-    if (block.n > small_island && (block.n > dense_limit || double(islands_.entries(island)) < dense_fraction * full))
-      return solve_block(block, order, q, options, start);
-    dense_values_.setZero(block.n, block.n);
-    for (Index j = 0; j < block.n; ++j) block.add_column(j, 1.0, dense_values_.col(j).data());
-    solve_block(lcp::DenseBlock{dense_values_.data(), block.n}, order, q, options, start);
+    if (block.n == 1) return solve_single(islands_.first(island), block.diagonal(0));
+    if (block.n <= small_island || (block.n <= dense_limit && double(islands_.entries(island)) >= dense_fraction * full)) {
+      dense_values_.setZero(block.n, block.n);
+      for (Index j = 0; j < block.n; ++j) block.add_column(j, 1.0, dense_values_.col(j).data());
+      block = lcp::dense_matrix(dense_values_.data(), block.n);
+    }
+    solve_block(block, islands_.first(island), margins_[std::size_t(island)], options, start);
   }
 
-  void solve_single(Index i, double m, const Eigen::VectorXd& q, const std::vector<char>* start) {
-    const bool active = q[i] < 0.0;
-    if (!(m > 0.0)) lcp::fail_definite(i, {0, m, m});
-    if (active) result_.z[i] = -q[i] / m;
-    active_[std::size_t(i)] = active;
-    result_.pivots += active != (start && (*start)[std::size_t(i)]);
+  void solve_single(int at, double m) {
+    const bool active = q_[at] < 0.0;
+    if (!(m > 0.0)) lcp::fail_definite(order_[std::size_t(at)], {0, m, m});
+    if (active) z_[at] = -q_[at] / m;
+    result_.pivots += active != (active_[std::size_t(at)] != 0);
+    active_[std::size_t(at)] = active;
   }
 
-  /// One island; order: its unknowns among all, null for all in their order.
-  template <class Matrix>
-  void solve_block(const Matrix& m, const int* order, const Eigen::VectorXd& q, const LcpOptions& options, const std::vector<char>* start) {
-    const auto index = [order](Index k) { return order ? Index(order[k]) : k; };
+  /// One island, whose unknowns begin at `first`.
+  void solve_block(const lcp::Matrix& m, int first, lcp::DefiniteMargin& margin, const LcpOptions& options, bool started) {
+    const auto flags = active_.begin() + first;
     unknowns_.reset(m);
-    for (Index k = 0; k < m.n; ++k) {
-      unknowns_.q[k] = q[index(k)];
-      if (start) unknowns_.active[std::size_t(k)] = (*start)[std::size_t(index(k))] != 0;
-    }
+    unknowns_.q = q_.segment(first, m.n);
+    std::copy_n(flags, m.n, unknowns_.active.begin());
     try {
-      if (options.check_input && !definite_.holds(m)) chain(m).exact.check_definite(m);
-      add(run(m, options, start != nullptr));
+      if (options.check_input) definite_.check(m, margin);
+      add(run(m, options, started));
     } catch (const lcp::NotDefinite& what) {
-      lcp::fail_definite(index(what.row), what);
+      lcp::fail_definite(order_[std::size_t(first + what.row)], what);
     }
-    for (Index k = 0; k < m.n; ++k) {
-      const bool active = unknowns_.active[std::size_t(k)];
-      active_[std::size_t(index(k))] = active;
-      result_.z[index(k)] = active ? std::max(unknowns_.z[k], 0.0) : 0.0;
-    }
+    std::copy_n(unknowns_.active.begin(), m.n, flags);
+    z_.segment(first, m.n) = unknowns_.z.max(0.0);
   }
 
-  template <class Matrix>
-  lcp::Outcome run(const Matrix& m, const LcpOptions& options, bool started) {
-    auto& [relaxation, exact] = chain(m);
+  lcp::Outcome run(const lcp::Matrix& m, const LcpOptions& options, bool started) {
     const bool automatic = options.method == LcpMethod::automatic;
-    if (options.method == LcpMethod::pgs) return lcp::gauss_seidel(m, unknowns_, options, relaxation.rows);
+    if (options.method == LcpMethod::pgs) return lcp::gauss_seidel(m, unknowns_, options, relaxation_.rows);
     if (options.method != LcpMethod::block && (!automatic || m.n <= small_island)) {
       if (m.n > dense_limit)
         lcp::fail("methods energy and murty keep n^2 numbers and take islands up to ", dense_limit, " unknowns, not ", m.n,
                   "; use auto or block");
       return singles_.run(m, unknowns_, options.method == LcpMethod::murty, options);
     }
-    bool solved = false;
     if (!started) {
       const double fraction = lcp::rounding_fraction(options.tolerance);
-      relaxation.rows.start(m, unknowns_, fraction);
-      if (automatic && std::is_same_v<Matrix, lcp::SparseBlock>) solved = relaxation.solve(fraction);
-      else relaxation.sweep(chain(m).sweeps);
-      unknowns_.z = relaxation.rows.forces();
-      unknowns_.take_set();
+      relaxation_.rows.start(m, unknowns_, fraction);
+      bool solved = false;
+      if (automatic && !m.dense()) solved = relaxation_.solve(fraction);
+      else relaxation_.find_set(most_sweeps);
+      relaxation_.rows.store(unknowns_);
+      if (solved) return {};
     }
-    return solved ? lcp::Outcome() : exact.run(m, unknowns_, options, &relaxation);
+    return exact_.run(m, unknowns_, options, &relaxation_);
   }
 
   void add(const lcp::Outcome& outcome) {
@@ -212,36 +204,35 @@ class LcpSolver {
     if (outcome.limit) result_.status = LcpStatus::iteration_limit;
   }
 
-  /// w and the certificate, from the M and q that were given: independent of whatever the methods kept.
-  template <class Matrix>
-  const LcpResult& finish(const Matrix& m, const Eigen::VectorXd& q, const LcpOptions& options) {
+  /// z, w and the certificate, from the M and q that were given: independent of whatever the methods kept.
+  const LcpResult& finish(const lcp::Matrix& m, const LcpOptions& options) {
     unknowns_.reset(m);
-    unknowns_.q = q;
-    unknowns_.z = result_.z;
+    unknowns_.q = q_;
+    unknowns_.z = z_;
     unknowns_.measure(m);
-    result_.w = unknowns_.w;
     result_.certificate = unknowns_.certificate();
-    if (options.method == LcpMethod::pgs) return result_;
     const double fraction = lcp::rounding_fraction(options.tolerance);
-    for (Index i = 0; i < q.size(); ++i)
-      if (active_[std::size_t(i)] || std::fabs(result_.w[i]) <= fraction * unknowns_.s[i]) result_.w[i] = 0.0;
+    for (Index i = 0; i < m.n && options.method != LcpMethod::pgs; ++i)
+      if (active_[std::size_t(i)] || std::fabs(unknowns_.w[i]) <= fraction * unknowns_.s[i]) unknowns_.w[i] = 0.0;
+    result_.z.resize(m.n);
+    result_.w.resize(m.n);
+    result_.z(order_) = z_;
+    result_.w(order_) = unknowns_.w;
     return result_;
   }
 
-  auto& chain(const lcp::DenseBlock&) { return dense_; }
-  auto& chain(const lcp::SparseBlock&) { return sparse_; }
-
   LcpResult result_;
   lcp::Islands islands_;
-  lcp::Unknowns unknowns_;
-  lcp::SinglePivots singles_;
-  Chain<lcp::DenseBlock, lcp::DenseFactor, 8> dense_;
-  Chain<lcp::SparseBlock, lcp::SparseFactor, 15> sparse_;
-  lcp::DefiniteProof definite_;
-  Eigen::SparseMatrix<double> copy_;
-  Eigen::MatrixXd dense_values_;
-  Eigen::VectorXd diagonal_;
+  std::vector<int> order_;  ///< the unknowns, island after island; so do the next three go
+  Eigen::ArrayXd q_, z_;
   std::vector<char> active_;
+  lcp::Unknowns unknowns_;  ///< of one island
+  lcp::SinglePivots singles_;
+  lcp::Relaxation<lcp::MatrixRows> relaxation_;
+  lcp::ActiveSet exact_;
+  lcp::DefiniteProof definite_;
+  std::vector<lcp::DefiniteMargin> margins_;  ///< of the islands
+  Eigen::MatrixXd dense_values_;
 };
 
 }  // namespace dembark

@@ -12,36 +12,31 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
 
 #include "contact_energy.hpp"
 
 namespace dembark {
 
-/// Of a body along x, y, z and about them: velocities and spins, forces and torques, masses and moments of inertia.
-typedef std::array<double, 6> Dofs;
-
-inline Dofs dofs(const Vec3<double>& along, const Vec3<double>& about) { return {along.x, along.y, along.z, about.x, about.y, about.z}; }
-
-DEMBARK_HOT double dot(const Dofs& a, const Dofs& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5];
-}
-
 /// How a body moves.
 struct BodyMotion {
-  Dofs mass{}, velocity{};
-  unsigned blocked = 0;  ///< bit k: forces do not change degree of freedom k; there the body is a wall to the others
-  static constexpr unsigned all_blocked = 63;
+  Dofs mass{};  ///< 0 where forces do not change the velocity; there the body is a wall to the others
+  Dofs velocity{};
 
-  bool is_free(std::size_t k) const { return !(blocked >> k & 1u); }
-  DEMBARK_HOT Dofs free_part(Dofs of, bool free = true) const {
-    if (blocked == (free ? 0 : all_blocked)) return of;
+  DEMBARK_HOT bool is_free(std::size_t k) const { return mass[k] > 0.0; }
+  /// Of one of these, what belongs to the degrees of freedom that forces change, or to the others.
+  DEMBARK_HOT Dofs part(Dofs of, bool free) const {
     for (std::size_t k = 0; k < of.size(); ++k)
       if (is_free(k) != free) of[k] = 0.0;
     return of;
   }
+  DEMBARK_HOT Dofs accelerated(Dofs by) const {
+    for (std::size_t k = 0; k < by.size(); ++k) by[k] = is_free(k) ? by[k] / mass[k] : 0.0;
+    return by;
+  }
   /// J, of the degrees of freedom that forces change.
-  DEMBARK_HOT double kinetic(const Dofs& at) const {
-    const Dofs v = free_part(at);
+  DEMBARK_HOT double kinetic() const { return kinetic(velocity); }
+  DEMBARK_HOT double kinetic(const Dofs& v) const {
     return 0.5 * dot({mass[0] * v[0], mass[1] * v[1], mass[2] * v[2], mass[3] * v[3], mass[4] * v[4], mass[5] * v[5]}, v);
   }
 };
@@ -52,18 +47,12 @@ struct EnergyBody : BodyMotion {
   Dofs weight{}, damping{};  ///< what gravity and numerical damping have in that
   Dofs acceleration{};
 
-  /// After mass and degrees of freedom.
+  /// After the masses.
   DEMBARK_HOT void set_forces(const Dofs& all, const Dofs& of_gravity, const Dofs& of_damping = {}) {
     force = all;
     weight = of_gravity;
     damping = of_damping;
-    acceleration = accelerated(*this, all);
-  }
-  DEMBARK_HOT static Dofs accelerated(const BodyMotion& body, const Dofs& by) {
-    Dofs a = body.free_part(by);
-    for (std::size_t k = 0; k < a.size(); ++k)
-      if (body.is_free(k)) a[k] /= body.mass[k];
-    return a;
+    acceleration = accelerated(all);
   }
   /// Velocity after a kick of duration h.
   DEMBARK_HOT Dofs kicked(double h) const {
@@ -79,44 +68,39 @@ struct Powers {
   typedef std::array<double, count> Each;
   Each power{}, rate{};
 
-  void add(const Powers& other) {
-    for (std::size_t k = 0; k < count; ++k) {
-      power[k] += other.power[k];
-      rate[k] += other.rate[k];
-    }
-  }
   /// Gravity, numerical damping, and all forces together.
   DEMBARK_HOT void add_body(const EnergyBody& body) {
-    if (body.blocked == EnergyBody::all_blocked) return;
-    const Dofs v = body.free_part(body.velocity);
+    const Dofs v = body.part(body.velocity, true);
     add(gravity, body.weight, v, body.acceleration);
     add(damping, body.damping, v, body.acceleration);
     add(all, body.force, v, body.acceleration);
   }
   /// The last of these alone.
   DEMBARK_HOT void add_forces(const BodyMotion& body, const Dofs& force) {
-    if (body.blocked == EnergyBody::all_blocked) return;
-    add(all, force, body.free_part(body.velocity), EnergyBody::accelerated(body, force));
+    add(all, force, body.part(body.velocity, true), body.accelerated(force));
   }
-  /// For engines that add up the parts of contacts' forces body by body: `load(part)` is what acts on this one. A body that is held
-  /// gives the others what it takes.
-  template <class Load>
-  DEMBARK_HOT void add_loads(const EnergyBody& body, Load load) {
-    const Dofs held = body.free_part(body.velocity, false);
+  /// For engines that add up the parts of contacts' forces body by body.
+  DEMBARK_HOT void add_loads(const EnergyBody& body, const std::array<Dofs, contact_part_count>& loads) {
+    const Dofs held = body.part(body.velocity, false);
     for (std::size_t part = 0; part < contact_part_count; ++part) {
-      const Dofs on_body = load(part);
-      add(part, on_body, body.velocity, body.acceleration);
-      if (body.blocked) power[walls] -= dot(on_body, held);
+      add(part, loads[part], body.velocity, body.acceleration);
+      power[walls] -= dot(loads[part], held);
     }
   }
-  /// For engines that know the mean motions when they look at a contact: velocity of body 1 against body 2 there.
-  DEMBARK_HOT void add_contact(const ContactParts& parts, const Vec3<double>& velocity) {
-    for (std::size_t part = 0; part < contact_part_count; ++part) power[part] += dot(parts.force[part], velocity);
+  /// For engines that know the mean motions of the bodies when they look at a contact. Returns the power (W) of the normal spring.
+  double add_contact(const ContactParts& parts, const ContactLevers& levers, const BodyMotion& one, const BodyMotion& two) {
+    const Vec3<double> velocity = levers.velocity(one.velocity, two.velocity);
+    Vec3<double> whole{};
+    for (std::size_t part = 0; part < contact_part_count; ++part) {
+      power[part] += dot(parts.force[part], velocity);
+      whole += parts.force[part];
+    }
+    add_held(one, levers.on_one(whole));
+    add_held(two, levers.on_two(whole));
+    return dot(parts[ContactPart::normal_elastic], velocity);
   }
-  /// The whole force of a contact on one of its bodies, as far as that is held.
-  DEMBARK_HOT void add_held(const BodyMotion& body, const Dofs& load) {
-    if (body.blocked) power[walls] -= dot(load, body.free_part(body.velocity, false));
-  }
+  /// What acts on a body as far as that is held: it gives the others what it takes.
+  DEMBARK_HOT void add_held(const BodyMotion& body, const Dofs& load) { power[walls] -= dot(load, body.part(body.velocity, false)); }
 
  private:
   DEMBARK_HOT void add(std::size_t of, const Dofs& force, const Dofs& velocity, const Dofs& acceleration) {
@@ -125,24 +109,10 @@ struct Powers {
   }
 };
 
-constexpr std::array<const char*, 18> energy_names{"kinetic",
-                                                   "first_kinetic",
-                                                   "gravity",
-                                                   "normal_elastic",
-                                                   "normal_viscous",
-                                                   "tangential_elastic",
-                                                   "tangential_viscous",
-                                                   "capillary",
-                                                   "liquid_viscous",
-                                                   "walls",
-                                                   "numerical_damping",
-                                                   "other",
-                                                   "imposed",
-                                                   "balance",
-                                                   "normal_stored",
-                                                   "tangential_stored",
-                                                   "step_error",
-                                                   "scale"};
+constexpr std::array<const char*, 18> energy_names{{"kinetic", "first_kinetic", "gravity", "normal_elastic", "normal_viscous",
+                                                    "tangential_elastic", "tangential_viscous", "capillary", "liquid_viscous", "walls",
+                                                    "numerical_damping", "other", "imposed", "balance", "normal_stored",
+                                                    "tangential_stored", "step_error", "scale"}};
 typedef std::array<double, energy_names.size()> Energies;  ///< J, in the order of their names
 
 /// The sums of a run, plain numbers: those of several processes add up, and a restart file holds them as they are.
@@ -176,7 +146,7 @@ struct EnergyLedger {
     bool set = false;
     for (std::size_t k = 0; k < after.size(); ++k) {
       const double momentum = body.mass[k] * std::abs(body.velocity[k]) + duration * (std::abs(body.force[k]) + std::abs(body.weight[k]));
-      if (body.mass[k] * std::abs(after[k] - expected[k]) <= round_off * momentum || !body.is_free(k)) continue;
+      if (body.mass[k] * std::abs(after[k] - expected[k]) <= round_off * momentum) continue;
       by_forces[k] = expected[k];
       set = true;
     }
@@ -188,27 +158,20 @@ struct EnergyLedger {
   }
 
   Energies energies() const {
-    double contacts = work[Powers::walls], sizes = std::abs(contacts);
-    for (std::size_t part = 0; part < contact_part_count; ++part) {
-      contacts += work[part];
-      sizes += std::abs(work[part]);
-    }
     const double gravity = work[Powers::gravity], damping = work[Powers::damping], all = work[Powers::all];
-    const double other = all - gravity - damping - contacts;
+    double contacts = 0.0, sizes = 0.0;
+    for (std::size_t k = 0; k <= Powers::walls; ++k) {
+      contacts += work[k];
+      sizes += std::abs(work[k]);
+    }
+    const double other = all - gravity - damping - contacts, balance = kinetic - first_kinetic - all - imposed;
+    const double step_error = work[0] + spring_ahead + normal_stored - first_stored;
     const double scale = first_kinetic + sizes + std::abs(gravity) + std::abs(damping) + std::abs(other) + std::abs(imposed);
-    Energies e{kinetic, first_kinetic, gravity};
-    for (std::size_t k = 0; k <= Powers::walls; ++k) e[3 + k] = work[k];
-    const double rest[] = {damping,
-                           other,
-                           imposed,
-                           kinetic - first_kinetic - all - imposed,
-                           normal_stored,
-                           tangential_stored,
-                           work[0] + spring_ahead + normal_stored - first_stored,
-                           scale};
-    for (std::size_t k = 0; k < std::size(rest); ++k) e[4 + Powers::walls + k] = rest[k];
-    return e;
+    return {kinetic, first_kinetic, gravity, work[0], work[1],       work[2],           work[3],    work[4], work[5], work[Powers::walls],
+            damping, other,         imposed, balance, normal_stored, tangential_stored, step_error, scale};
   }
 };
+constexpr std::size_t energy_ledger_size = sizeof(EnergyLedger) / sizeof(double);
+static_assert(std::is_trivially_copyable_v<EnergyLedger> && energy_ledger_size * sizeof(double) == sizeof(EnergyLedger), "numbers only");
 
 }  // namespace dembark

@@ -25,6 +25,8 @@
 #pragma once
 
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "vec3.hpp"
 
@@ -34,6 +36,8 @@ namespace dembark {
 constexpr double unlimited_strength = 1e30;
 
 enum class Presliding { linear, exponential };
+/// Their names, in their order.
+inline std::vector<std::string> presliding_names() { return {"linear", "exponential"}; }
 
 struct FinnieRabinowicz {
   double static_friction = 0.5;                          ///< mu_s, >= mu_k

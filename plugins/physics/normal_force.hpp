@@ -15,7 +15,8 @@
 #pragma once
 
 #include <cmath>
-#include <limits>
+#include <string>
+#include <vector>
 
 #include "vec3.hpp"  // DEMBARK_HOT
 
@@ -23,6 +24,10 @@ namespace dembark {
 
 constexpr double pi = 3.14159265358979323846;
 constexpr double sqrt_five_sixths = 0.91287092917527685576161630466800355658790782499663875;
+
+enum class NormalLaw { hertz, hooke };
+/// Their names, in their order.
+inline std::vector<std::string> normal_law_names() { return {"hertz", "hooke"}; }
 
 /// Effective Young's modulus (Pa) of two materials, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
 inline double effective_youngs_modulus(double youngs_1, double poisson_1, double youngs_2, double poisson_2) {
@@ -59,6 +64,7 @@ inline double damping_factor(double restitution) {
   return log_e / std::sqrt(log_e * log_e + pi * pi);
 }
 
+/// Of Hertz's law; Hooke's takes the same but for G*.
 struct HertzParameters {
   double effective_youngs_modulus;  ///< E*, Pa, > 0
   double effective_shear_modulus;   ///< G*, Pa, > 0
@@ -68,18 +74,6 @@ struct HertzParameters {
   /// `restitution` e, 0 < e <= 1.
   HertzParameters(double youngs, double shear, double restitution)
       : effective_youngs_modulus(youngs), effective_shear_modulus(shear), damping(damping_factor(restitution)) {}
-};
-
-struct HookeParameters {
-  double effective_youngs_modulus;  ///< E*, Pa, > 0
-  double damping;                   ///< beta
-  double characteristic_velocity;   ///< v_c, m/s, > 0: impact speed at which the overlap equals that of Hertz
-
-  /// `restitution` e, 0 < e <= 1.
-  HookeParameters(double youngs, double restitution, double velocity)
-      : effective_youngs_modulus(youngs), damping(damping_factor(restitution)), characteristic_velocity(velocity) {}
-  HookeParameters(const HertzParameters& same, double velocity)
-      : effective_youngs_modulus(same.effective_youngs_modulus), damping(same.damping), characteristic_velocity(velocity) {}
 };
 
 /// `Parameters`: HertzParameters, or the same three members as packs.
@@ -95,14 +89,15 @@ DEMBARK_HOT NormalResponse<Real> hertz(const Parameters& p, Real effective_radiu
           damping * sqrt(k_t * effective_mass), pi * effective_radius * overlap, stiffness};
 }
 
+/// `characteristic_velocity` v_c, m/s, > 0: impact speed at which the overlap equals that of Hertz.
 template <class Real>
-inline NormalResponse<Real> hooke(const HookeParameters& p, Real effective_radius, Real effective_mass, Real overlap,
-                                  Real normal_velocity) {
+inline NormalResponse<Real> hooke(const HertzParameters& p, double characteristic_velocity, Real effective_radius, Real effective_mass,
+                                  Real overlap, Real normal_velocity) {
   using std::pow;
   using std::sqrt;
   const Real rigidity = sqrt(effective_radius) * p.effective_youngs_modulus;
   const Real k_n = 16.0 / 15.0 * rigidity *
-                   pow(15.0 * effective_mass * p.characteristic_velocity * p.characteristic_velocity / (16.0 * rigidity), Real(0.2));
+                   pow(15.0 * effective_mass * characteristic_velocity * characteristic_velocity / (16.0 * rigidity), Real(0.2));
   const Real damping = -2.0 * p.damping * sqrt(effective_mass * k_n);
   return {k_n * overlap - damping * normal_velocity, k_n, damping, pi * effective_radius * overlap, k_n};
 }

@@ -25,21 +25,9 @@ struct Avx512 {};  ///< F, DQ, VL and BW
 namespace detail {
 
 template <int N>
-struct Vectors;
-template <>
-struct Vectors<2> {
-  typedef double Doubles __attribute__((vector_size(16)));
-  typedef long long Truths __attribute__((vector_size(16)));
-};
-template <>
-struct Vectors<4> {
-  typedef double Doubles __attribute__((vector_size(32)));
-  typedef long long Truths __attribute__((vector_size(32)));
-};
-template <>
-struct Vectors<8> {
-  typedef double Doubles __attribute__((vector_size(64)));
-  typedef long long Truths __attribute__((vector_size(64)));
+struct Vectors {
+  typedef double Doubles __attribute__((vector_size(8 * N)));
+  typedef long long Truths __attribute__((vector_size(8 * N)));
 };
 
 }  // namespace detail
@@ -103,7 +91,7 @@ DEMBARK_HOT Pack<N, Set> sqrt(const Pack<N, Set>& a) {
 #if defined(__x86_64__)
   typedef typename Pack<N, Set>::Lanes Lanes;
   if constexpr (std::is_same_v<Set, Avx512> && N == 8) return Lanes(_mm512_maskz_sqrt_pd(0xFF, __m512d(a.lanes)));
-  else if constexpr (std::is_same_v<Set, Avx2> && N == 4) return Lanes(_mm256_sqrt_pd(__m256d(a.lanes)));
+  else if constexpr (!std::is_same_v<Set, Portable> && N == 4) return Lanes(_mm256_sqrt_pd(__m256d(a.lanes)));
   else if constexpr (N == 2) return Lanes(_mm_sqrt_pd(__m128d(a.lanes)));
 #endif
   Pack<N, Set> root;
@@ -122,7 +110,7 @@ template <int N, class Set>
 DEMBARK_HOT unsigned bits(const Mask<N, Set>& mask) {
 #if defined(__x86_64__)
   if constexpr (std::is_same_v<Set, Avx512> && N == 8) return _mm512_movepi64_mask(__m512i(mask.lanes));
-  else if constexpr (std::is_same_v<Set, Avx2> && N == 4) return _mm256_movemask_pd(__m256d(mask.lanes));
+  else if constexpr (!std::is_same_v<Set, Portable> && N == 4) return _mm256_movemask_pd(__m256d(mask.lanes));
   else if constexpr (N == 2) return _mm_movemask_pd(__m128d(mask.lanes));
 #endif
   unsigned found = 0;

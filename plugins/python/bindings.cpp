@@ -28,29 +28,30 @@ Result make_result(std::size_t n, double*& data) {
   return Result(data, {n}, nb::capsule(data, [](void* p) noexcept { delete[] static_cast<double*>(p); }));
 }
 
-capillary::Model model_of(const std::string& name) {
-  capillary::Model model;
-  if (!capillary::model_from_name(name.c_str(), model)) throw std::invalid_argument("unknown capillary model '" + name + "'");
-  return model;
+/// value(i) for i = 0 ... n - 1.
+template <class Value>
+Result filled(std::size_t n, Value value) {
+  double* out;
+  Result result = make_result(n, out);
+  for (std::size_t i = 0; i < n; ++i) out[i] = value(i);
+  return result;
+}
+
+template <class Option>
+Option option_of(const std::string& what, const std::vector<std::string>& names, const std::string& word) {
+  Option option{};
+  if (option_from_name(names, word, option)) return option;
+  std::string known;
+  for (const std::string& name : names) known += (known.empty() ? "'" : " or '") + name + "'";
+  throw std::invalid_argument(what + " must be " + known + ", not '" + word + "'");
+}
+
+capillary::BridgeForce bridge_force(const std::string& model, double contact_angle) {
+  return {option_of<capillary::Model>("capillary model", capillary::model_names(), model), contact_angle};
 }
 
 Vec3<double> vector(const nb::tuple& t) { return {nb::cast<double>(t[0]), nb::cast<double>(t[1]), nb::cast<double>(t[2])}; }
 nb::tuple tuple(const Vec3<double>& v) { return nb::make_tuple(v.x, v.y, v.z); }
-
-FinnieRabinowicz make_law(double static_friction, double kinetic_friction, double critical_slip_distance, double interface_shear_strength,
-                          double healing_time, const std::string& presliding) {
-  FinnieRabinowicz law;
-  law.static_friction = static_friction;
-  law.kinetic_friction = kinetic_friction;
-  law.critical_slip_distance = critical_slip_distance;
-  law.interface_shear_strength = interface_shear_strength;
-  law.healing_time = healing_time;
-  if (presliding != "linear" && presliding != "exponential")
-    throw std::invalid_argument("presliding must be 'linear' or 'exponential', not '" + presliding + "'");
-  law.presliding = presliding == "linear" ? Presliding::linear : Presliding::exponential;
-  if (law.error()) throw std::invalid_argument(law.error());
-  return law;
-}
 
 /// Bridge law and contact parameters with the lifetime of the Python object that uses them.
 struct Contact {
@@ -77,23 +78,16 @@ NB_MODULE(_physics, m) {
       .def(
           "__init__",
           [](capillary::BridgeForce* self, const std::string& model, double contact_angle) {
-            new (self) capillary::BridgeForce(model_of(model), contact_angle);
+            new (self) capillary::BridgeForce(bridge_force(model, contact_angle));
           },
           "model"_a, "contact_angle"_a)
       .def("force",
            [](const capillary::BridgeForce& self, Array radius_1, Array radius_2, Array gap, Array volume, Array surface_tension) {
-             double* out;
-             const std::size_t n = gap.shape(0);
-             Result result = make_result(n, out);
-             for (std::size_t i = 0; i < n; ++i) out[i] = self.force(radius_1(i), radius_2(i), gap(i), volume(i), surface_tension(i));
-             return result;
+             return filled(gap.shape(0),
+                           [&](std::size_t i) { return self.force(radius_1(i), radius_2(i), gap(i), volume(i), surface_tension(i)); });
            })
       .def("rupture_distance", [](const capillary::BridgeForce& self, Array radius_1, Array radius_2, Array volume) {
-        double* out;
-        const std::size_t n = volume.shape(0);
-        Result result = make_result(n, out);
-        for (std::size_t i = 0; i < n; ++i) out[i] = self.rupture_distance(radius_1(i), radius_2(i), volume(i));
-        return result;
+        return filled(volume.shape(0), [&](std::size_t i) { return self.rupture_distance(radius_1(i), radius_2(i), volume(i)); });
       });
 
   m.def("viscous_resistance", [](Array radius, Array gap, Array volume, Array viscosity, Array minimum_gap) {
@@ -112,8 +106,15 @@ NB_MODULE(_physics, m) {
   m.def("effective_shear_modulus", &effective_shear_modulus);
 
   nb::class_<FinnieRabinowicz>(m, "FinnieRabinowicz")
-      .def("__init__", [](FinnieRabinowicz* self, double s, double k, double c, double t, double h,
-                          const std::string& p) { new (self) FinnieRabinowicz(make_law(s, k, c, t, h, p)); })
+      .def("__init__",
+           [](FinnieRabinowicz* self, double static_friction, double kinetic_friction, double critical_slip_distance,
+              double interface_shear_strength, double healing_time, const std::string& presliding) {
+             const FinnieRabinowicz law{static_friction,        kinetic_friction,
+                                        critical_slip_distance, interface_shear_strength,
+                                        healing_time,           option_of<Presliding>("presliding", presliding_names(), presliding)};
+             if (law.error()) throw std::invalid_argument(law.error());
+             new (self) FinnieRabinowicz(law);
+           })
       .def("friction_coefficient", [](const FinnieRabinowicz& law, double slip) { return friction_coefficient(law, slip); })
       .def("shear_limit", [](const FinnieRabinowicz& law, double mu, double normal_force,
                              double area) { return shear_limit(law, mu, normal_force, area); })
@@ -144,34 +145,22 @@ NB_MODULE(_physics, m) {
            [](Contact* self, const std::string& normal_law, double youngs, double shear, double restitution, double characteristic_velocity,
               bool tangential_damping, bool limit_force, const FinnieRabinowicz& friction, const std::string& capillary_model,
               double contact_angle, double surface_tension, double bridge_volume, double viscosity, double minimum_gap) {
-             new (self) Contact();
-             if (normal_law != "hertz" && normal_law != "hooke")
-               throw std::invalid_argument("normal law must be 'hertz' or 'hooke', not '" + normal_law + "'");
-             ContactParameters& p = self->parameters;
-             p.normal_law = normal_law == "hertz" ? NormalLaw::hertz : NormalLaw::hooke;
-             p.elasticity = {youngs, shear, restitution};
-             p.characteristic_velocity = characteristic_velocity;
-             p.tangential_damping = tangential_damping;
-             p.limit_force = limit_force;
-             p.friction = friction;
+             new (self) Contact{{option_of<NormalLaw>("normal law", normal_law_names(), normal_law),
+                                 {youngs, shear, restitution},
+                                 characteristic_velocity,
+                                 tangential_damping,
+                                 limit_force,
+                                 friction,
+                                 {}}};
              if (bridge_volume > 0.0) {
-               self->bridge = std::make_shared<const capillary::BridgeForce>(model_of(capillary_model), contact_angle);
-               p.liquid = {self->bridge.get(), surface_tension, bridge_volume, {viscosity, minimum_gap}};
+               self->bridge = std::make_shared<const capillary::BridgeForce>(bridge_force(capillary_model, contact_angle));
+               self->parameters.liquid = {self->bridge.get(), surface_tension, bridge_volume, {viscosity, minimum_gap}};
              }
            })
       .def("step",
            [](Contact& self, const nb::tuple& separation, const nb::tuple& v1, const nb::tuple& v2, const nb::tuple& w1,
               const nb::tuple& w2, double radius_1, double radius_2, double mass_1, double mass_2, double dt, bool update) {
-             ContactBodies b;
-             b.separation = vector(separation);
-             b.velocity_1 = vector(v1);
-             b.velocity_2 = vector(v2);
-             b.angular_velocity_1 = vector(w1);
-             b.angular_velocity_2 = vector(w2);
-             b.radius_1 = radius_1;
-             b.radius_2 = radius_2;
-             b.mass_1 = mass_1;
-             b.mass_2 = mass_2;
+             const ContactBodies b{vector(separation), vector(v1), vector(v2), vector(w1), vector(w2), radius_1, radius_2, mass_1, mass_2};
              const ContactState before = self.state;
              const ContactForce f = contact_step(self.parameters, b, dt, self.state, update);
              // A comparison with what is no number is false: such a contact would end without a word.

@@ -46,31 +46,12 @@ void checkVolume(const std::string& what, double volume) {
 
 }  // namespace
 
-void LiquidExchange::begin(long step) {
-	if (step == current) return;
-	if (!requests.empty() || !broken.empty())
+std::unique_lock<std::mutex> LiquidExchange::open(long step) {
+	std::unique_lock<std::mutex> lock(guard);
+	if (step != current && !(requests.empty() && broken.empty()))
 		fail("carriedLiquid=True needs the engine CapillaryLiquid right after InteractionLoop, in each step");
 	current = step;
-}
-
-void LiquidExchange::requestBridge(long step, const Request& request) {
-	const std::lock_guard<std::mutex> lock(guard);
-	begin(step);
-	requests.push_back(request);
-}
-
-void LiquidExchange::bridgeBroke(long step, const Broken& bridge) {
-	const std::lock_guard<std::mutex> lock(guard);
-	begin(step);
-	broken.push_back(bridge);
-}
-
-void LiquidExchange::take(long step, std::vector<Request>& asked, std::vector<Broken>& back) {
-	begin(step);
-	asked.swap(requests);
-	back.swap(broken);
-	requests.clear();
-	broken.clear();
+	return lock;
 }
 
 void CapillaryLiquid::postLoad(CapillaryLiquid&) {
@@ -78,26 +59,28 @@ void CapillaryLiquid::postLoad(CapillaryLiquid&) {
 	ledger.share.factor = shareFactor;
 	if (const char* wrong = ledger.share.error())
 		fail(std::string("CapillaryLiquid.shareFactor: ") + wrong + ", not " + text(shareFactor));
-	if (!capillary::return_from_name(returnRule, ledger.split))
+	if (!capillary::choose(capillary::return_names(), returnRule, ledger.split))
 		fail("CapillaryLiquid.returnRule is '" + returnRule + "'; it must be equal, radius or taken");
 	if (!(content >= 0.0 && content < 1.0))
 		fail("CapillaryLiquid.content is " + text(content) + "; it must be >= 0 and < 1 (liquid volume over solid volume)");
 	checkVolume("maxBridge", maxBridge);
 	ledger.largest_bridge = maxBridge > 0.0 ? maxBridge : capillary::flat<double>;
 	if (saved.empty()) return;
-	ledger.restore(saved.data(), saved.size());
-	for (std::size_t w = 0; w < ledger.walls.size(); ++w) ledger.walls[w].name = std::to_string(w);
+	try {
+		ledger.restore(saved);
+	} catch (const std::runtime_error& wrong) {
+		fail(std::string("CapillaryLiquid: ") + wrong.what());
+	}
 	saved.clear();
 	seen.clear();
 	vanished = true;
 }
 
-void CapillaryLiquid::preSave(CapillaryLiquid&) { saved = ledger.saved(true); }
-
 /// Bodies that are new get their liquid, those that were erased take theirs along. Of a scene that was loaded all are as they were.
 void CapillaryLiquid::meetBodies() {
 	const auto&       bodies = *Omega::instance().getScene()->bodies;
 	const std::size_t known = liquid.size(), count = std::max(bodies.size(), known);
+	const auto        bodyOf = [&](std::size_t id) { return id < bodies.size() ? bodies[id] : shared_ptr<Body>(); };
 	const bool        loaded = seen.empty();
 	seen.resize(count);
 	liquid.resize(count, 0.0);
@@ -106,17 +89,16 @@ void CapillaryLiquid::meetBodies() {
 	ledger.resize(count);
 	bool come = false;
 	for (std::size_t id = 0; id < count; ++id) {
-		const shared_ptr<Body> none, &body = id < bodies.size() ? bodies[id] : none;
-		const Seen             now = body ? Seen{body.get(), body->iterBorn} : Seen{};
-		if (loaded && id < known && body) seen[id] = now;
-		const bool left = seen[id].body ? !(now == seen[id]) : loaded && id < known && !body;
-		if (!left && now == seen[id]) continue;
-		if (left) {
+		const shared_ptr<Body> body = bodyOf(id);
+		const bool             gone = seen[id] ? body != seen[id] : loaded && id < known && !body;
+		if (loaded && id < known) seen[id] = body;
+		if (!gone && body == seen[id]) continue;
+		if (gone) {
 			ledger.remove(static_cast<int>(id), grains());
 			walls[id] = -1;
 			vanished  = true;
 		}
-		seen[id]   = now;
+		seen[id]   = body;
 		liquid[id] = sphereOf(body) ? capillary::GrainLiquid::unset : 0.0;
 		come       = true;
 	}
@@ -138,10 +120,9 @@ void CapillaryLiquid::setVolume(int body, Real amount) {
 }
 
 void CapillaryLiquid::addWall(const std::vector<int>& bodies, Real pool, Real share_, Real part) {
-	checkVolume("addWall: pool", pool);
-	for (const Real each : {share_, part})
-		if (!(each >= 0.0 && each <= 1.0)) fail("CapillaryLiquid.addWall: share and part must be >= 0 and <= 1, not " + text(each));
 	meetBodies();
+	const capillary::LiquidWall wall{std::to_string(ledger.walls.size()), pool, share_, part};
+	if (const char* wrong = wall.error()) fail(std::string("CapillaryLiquid.addWall: ") + wrong);
 	for (const int body : bodies) {
 		if (body < 0 || static_cast<std::size_t>(body) >= liquid.size() || !Body::byId(body) || sphereOf(Body::byId(body)))
 			fail("CapillaryLiquid.addWall: body " + std::to_string(body) +
@@ -149,10 +130,8 @@ void CapillaryLiquid::addWall(const std::vector<int>& bodies, Real pool, Real sh
 		if (walls[body] >= 0) fail("CapillaryLiquid.addWall: body " + std::to_string(body) + " belongs to a wall already");
 	}
 	for (const int body : bodies) walls[body] = static_cast<int>(ledger.walls.size()) - 1;
-	std::vector<std::string> names;
-	for (std::size_t w = 0; w <= ledger.walls.size(); ++w) names.push_back(std::to_string(w));
-	ledger.change_walls(names, grains());
-	ledger.walls.back() = {names.back(), pool, share_, part};
+	ledger.walls.push_back(wall);
+	ledger.resize(liquid.size());
 }
 
 /// Bridges that vanished with a body go back to their sides.
@@ -178,17 +157,18 @@ void CapillaryLiquid::reconcile() {
 }
 
 void CapillaryLiquid::action() {
-	std::vector<LiquidExchange::Request> requests;
-	std::vector<LiquidExchange::Broken>  broken;
-	lawOf(*scene)->exchange->take(scene->iter, requests, broken);
+	LiquidExchange& exchange = *lawOf(*scene)->exchange;
+	const auto      lock     = exchange.open(scene->iter);
 	meetBodies();
-	for (auto& each : requests)
-		if (each.sides.wall) each.sides.other = wallNumber(each.sides.other);
-	for (auto& each : broken)
-		if (each.sides.wall) each.sides.other = wallNumber(each.sides.other);
-	ledger.give_back(broken, grains());
+	const auto number = [this](auto& contacts) {
+		for (auto& each : contacts)
+			if (each.sides.wall) each.sides.other = wallNumber(each.sides.other);
+	};
+	number(exchange.requests);
+	number(exchange.broken);
+	ledger.give_back(exchange.broken, grains());
 	if (vanished) reconcile();
-	ledger.form(requests, grains(), [](const LiquidExchange::Request& r, const capillary::NewBridge<double>& bridge) {
+	ledger.form(exchange.requests, grains(), [](const LiquidExchange::Request& r, const capillary::NewBridge<double>& bridge) {
 		r.phys->setBridge(bridge.volume, bridge.imbalance, r.radius, r.other_radius);
 	});
 }
@@ -201,9 +181,10 @@ Real CapillaryLiquid::volume(int body) {
 }
 
 Real CapillaryLiquid::wallPool(int wall) const {
-	if (wall < 0 || static_cast<std::size_t>(wall) + 1 >= ledger.walls.size())
+	const std::vector<Real> pools = getPools();
+	if (wall < 0 || static_cast<std::size_t>(wall) >= pools.size())
 		fail("CapillaryLiquid.wallPool: there is no wall " + std::to_string(wall));
-	return ledger.walls[wall + 1].pool;
+	return pools[wall];
 }
 
 std::vector<Real> CapillaryLiquid::ofWalls(double capillary::LiquidWall::* of) const {
@@ -215,11 +196,6 @@ std::vector<Real> CapillaryLiquid::ofWalls(double capillary::LiquidWall::* of) c
 capillary::LiquidLedger::Totals CapillaryLiquid::totals() {
 	meetBodies();
 	return ledger.totals(grains());
-}
-
-Real CapillaryLiquid::total() {
-	const auto all = totals();
-	return all.grains + all.bridges + all.walls + ledger.lost;
 }
 
 long CapillaryLiquid::bridgeCount() const {

@@ -21,24 +21,30 @@ public:
 		FinnieRabinowiczPhys* phys;  // valid in the step of the request
 	};
 	typedef ::dembark::capillary::BrokenBridge Broken;
-	void                                       requestBridge(long step, const Request&);
-	void                                       bridgeBroke(long step, const Broken&);
-	/// Everything of `step`.
-	void take(long step, std::vector<Request>&, std::vector<Broken>&);
+	std::vector<Request>                       requests;
+	std::vector<Broken>                        broken;
+
+	/// The lists of `step`, empty at first, as long as the lock is held.
+	std::unique_lock<std::mutex> open(long step);
+	void                         requestBridge(long step, const Request& request) {
+		const auto lock = open(step);
+		requests.push_back(request);
+	}
+	void bridgeBroke(long step, const Broken& bridge) {
+		const auto lock = open(step);
+		broken.push_back(bridge);
+	}
 
 private:
-	void                 begin(long step);
-	std::mutex           guard;
-	long                 current = -1;
-	std::vector<Request> requests;
-	std::vector<Broken>  broken;
+	std::mutex guard;
+	long       current = -1;
 };
 
 class CapillaryLiquid : public GlobalEngine {
 public:
 	void              action() override;
 	void              postLoad(CapillaryLiquid&);
-	void              preSave(CapillaryLiquid&);
+	void              preSave(CapillaryLiquid&) { saved = ledger.saved(true); }
 	void              postSave(CapillaryLiquid&) { saved.clear(); }
 	void              setVolume(int body, Real volume);
 	void              addWall(const std::vector<int>& bodies, Real pool, Real share, Real part);
@@ -47,7 +53,7 @@ public:
 	Real              inGrains() { return totals().grains; }
 	Real              inBridges() { return totals().bridges; }
 	Real              onWalls() { return totals().walls; }
-	Real              total();
+	Real              total() { return totals().held() + ledger.lost; }
 	Real              getLost() const { return ledger.lost; }
 	long              bridgeCount() const;
 	std::vector<Real> getPools() const { return ofWalls(&::dembark::capillary::LiquidWall::pool); }
@@ -62,7 +68,7 @@ public:
 		((Real,maxBridge,0,Attr::triggerPostLoad,"Largest volume [m^3] of a new bridge; 0 = no limit"))
 		((vector<Real>,liquid,,Attr::readonly,"Liquid [m^3] of each body by id, without its bridges"))
 		((vector<int>,walls,,Attr::readonly,"For each body the number of the wall whose liquid it shares, -1 = none"))
-		((vector<Real>,saved,,Attr::hidden,"The ledger's numbers, while the scene is saved and loaded"))
+		((string,saved,,Attr::hidden,"The ledger, while the scene is saved and loaded"))
 		, /*ctor*/
 		, /*py*/
 		.add_property("pools",&CapillaryLiquid::getPools,"Liquid [m^3] of each wall")
@@ -82,12 +88,6 @@ public:
 	// clang-format on
 
 private:
-	/// A body is another one than before if it stands elsewhere in memory or was inserted at another time.
-	struct Seen {
-		const Body* body = nullptr;
-		long        born = -1;
-		bool        operator==(const Seen& other) const { return body == other.body && born == other.born; }
-	};
 	void                                       meetBodies();
 	void                                       reconcile();
 	::dembark::capillary::GrainLiquid          grains() { return {liquid.data(), static_cast<int>(liquid.size())}; }
@@ -97,7 +97,7 @@ private:
 	int wallNumber(Body::id_t body) const { return 1 + walls[body]; }
 
 	::dembark::capillary::LiquidLedger ledger;
-	std::vector<Seen>                  seen;              // by id
+	std::vector<shared_ptr<Body>>      seen;  // by id; kept until the next step, so that no other stands in their place in memory
 	bool                               vanished = false;  // bodies, and maybe bridges with them
 };
 REGISTER_SERIALIZABLE(CapillaryLiquid);

@@ -1,17 +1,86 @@
-#include "EnergyAccount.hpp"
-
+// Energy of a run: the works of all parts of all contacts, of gravity, walls and numerical damping, beside the kinetic energy. Its sums,
+// and the reason why they balance to round-off, are those of dembark/energy_ledger.hpp.
 #include <algorithm>
 #include <cstring>
-#include <type_traits>
+#include <mutex>
+#include <typeinfo>
+#include <vector>
 
+#include <boost/weak_ptr.hpp>
+
+#include <core/Body.hpp>
+#include <core/GlobalEngine.hpp>
 #include <core/InteractionLoop.hpp>
 #include <core/Omega.hpp>
 #include <core/Scene.hpp>
 #include <pkg/dem/NewtonIntegrator.hpp>
 
+#include "ContactView.hpp"
+#include "FinnieRabinowicz.hpp"
+#include "dembark/energy_ledger.hpp"
 #include "report.hpp"
 
 namespace yade {
+
+class EnergyAccount : public GlobalEngine {
+public:
+	virtual ~EnergyAccount() = default;
+	void                action() override;
+	void                preSave(EnergyAccount&);
+	void                postLoad(EnergyAccount&);
+	void                reset();
+	Real                get(const std::string& name);
+	boost::python::list keys() { return energies().keys(); }
+	boost::python::list items() { return energies().items(); }
+	boost::python::dict energies();
+	// clang-format off
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(EnergyAccount,GlobalEngine,"Energies [J] of a scene whose contacts are those of :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz`: kinetic energy, what springs hold, and the works of all parts of the contacts' forces, of gravity, walls, numerical damping and other forces, which balance the kinetic energy to round-off in each step. Stands after :yref:`InteractionLoop` and all engines that add forces, and before :yref:`NewtonIntegrator`. Read like :yref:`O.energy<Omega.energy>`: account['gravity'], account.keys(), account.items().",
+		((vector<Real>,saved,,Attr::hidden,"The numbers of the ledger, when the scene is saved"))
+		((vector<Real>,known,,Attr::hidden,"Kinetic energy [J] of each body by id, -1 = no body"))
+		((long,step,-1,Attr::readonly,"Last step whose works are in the sums; -1 = none"))
+		, /*ctor*/
+		, /*py*/
+		.def("keys",&EnergyAccount::keys,"Names of the energies.")
+		.def("items",&EnergyAccount::items,"Tuples (name, energy [J]).")
+		.def("__getitem__",&EnergyAccount::get,(boost::python::arg("name")),"One of the energies [J] by its name.")
+		.def("energies",&EnergyAccount::energies,"All energies [J] by name.")
+		.def("reset",&EnergyAccount::reset,"Begin anew with the next step: all works are zero there.")
+	);
+	// clang-format on
+
+private:
+	/// What a contact is made of while its forces are known, until the mean velocities of the step are.
+	struct Contact {
+		bool                     acting = false;
+		Body::id_t               one = 0, two = 0;  // the bodies 1 and 2 of the parts
+		::dembark::ContactParts  parts;
+		::dembark::ContactLevers levers;
+		Real                     half = 0.0, work = 0.0;  // J, of the normal spring: in the half step up to here, and in the step
+	};
+
+	const NewtonIntegrator& integrator() const;
+	void                    update();
+	void                    tally(const Scene&);
+	void                    record(const NewtonIntegrator&, bool first);
+	bool                    recordBodies(const NewtonIntegrator&, bool first);
+	void                    recordForces(const Body&, const NewtonIntegrator&);
+	void                    recordContact(Contact&, const Interaction&) const;
+	bool                    changes(const Contact& c) const { return c.acting && (changed[c.one] || changed[c.two]); }
+	void                    begin();
+
+	::dembark::EnergyLedger            ledger;
+	std::vector<const Body*>           present;  // by id, to tell whether it is still the same; to own it could mean to end a Python
+	                                             // object without the interpreter
+	std::vector<::dembark::EnergyBody> bodies;   // by id, before the step that is to be tallied, and then in the mean of it
+	std::vector<bool>                  changed;  // by id: came, left, or is another one than a step ago
+	std::vector<Contact>               contacts;
+	bool                               pending  = false;  // the step `recorded` is not in the sums yet
+	long                               recorded = -1;
+	Real                               length   = 0.0;  // s, of that step
+	boost::weak_ptr<Scene>             home;
+	std::mutex                         guard;
+};
+REGISTER_SERIALIZABLE(EnergyAccount);
 
 YADE_PLUGIN((EnergyAccount));
 
@@ -22,9 +91,7 @@ using dembark_yade::vec;
 
 namespace {
 
-static_assert(State::DOF_ALL == EnergyBody::all_blocked && State::DOF_RX == 8, "blocked degrees of freedom are YADE's bits");
-static_assert(sizeof(::dembark::EnergyLedger) % sizeof(Real) == 0 && std::is_trivially_copyable<::dembark::EnergyLedger>::value,
-              "the ledger is saved as its numbers");
+static_assert(State::DOF_X == 1 && State::DOF_RX == 8 && State::DOF_ALL == 63, "a bit for each degree of freedom, in the order of Dofs");
 
 ::dembark::Dofs dofs(const Vector3r& along, const Vector3r& about) { return ::dembark::dofs(vec(along), vec(about)); }
 
@@ -92,12 +159,12 @@ void EnergyAccount::update() {
 
 void EnergyAccount::preSave(EnergyAccount&) {
 	update();
-	saved.resize(sizeof ledger / sizeof(Real));
+	saved.resize(::dembark::energy_ledger_size);
 	std::memcpy(saved.data(), &ledger, sizeof ledger);
 }
 
 void EnergyAccount::postLoad(EnergyAccount&) {
-	if (saved.size() == sizeof ledger / sizeof(Real)) std::memcpy(static_cast<void*>(&ledger), saved.data(), sizeof ledger);
+	if (saved.size() == ::dembark::energy_ledger_size) std::memcpy(static_cast<void*>(&ledger), saved.data(), sizeof ledger);
 	saved.clear();
 }
 
@@ -122,12 +189,12 @@ void EnergyAccount::recordForces(const Body& body, const NewtonIntegrator& newto
 	EnergyBody&      moved = bodies[id];
 	const State&     state = *body.state;
 	if (!body.isStandalone()) fail(bodyName(id) + " belongs to a clump, whose rotation cannot be tallied; use single spheres");
-	if (newton.exactAsphericalRot && body.isAspherical() && !(moved.blocked & State::DOF_RXRYRZ))
+	if (newton.exactAsphericalRot && body.isAspherical() && moved.is_free(3) && moved.is_free(4) && moved.is_free(5))
 		fail(bodyName(id) +
 		     " is aspherical and turns by another rule than spheres; block its rotation, or set "
 		     "NewtonIntegrator.exactAsphericalRot to False");
 	moved.velocity = dofs(state.vel, state.angVel);
-	if (moved.blocked == EnergyBody::all_blocked) return moved.set_forces({}, {});
+	if (moved.mass == ::dembark::Dofs{}) return moved.set_forces({}, {});
 	const Vector3r force = scene->forces.getForce(id), torque = scene->forces.getTorque(id);
 	const Vector3r weight  = state.mass * newton.gravity;
 	Vector3r       damping = Vector3r::Zero(), dampingTorque = Vector3r::Zero();
@@ -156,16 +223,15 @@ bool EnergyAccount::recordBodies(const NewtonIntegrator& newton, bool first) {
 		const Body* const body = k < all.size() ? all[k].get() : nullptr;
 		const Real        had  = known[k];
 		if (body) {
-			const bool            moves   = newton.mask <= 0 || body->maskCompatible(newton.mask);
-			const unsigned        blocked = moves ? body->state->blockedDOFs : static_cast<unsigned>(State::DOF_ALL);
-			const ::dembark::Dofs mass    = dofs(Vector3r::Constant(body->state->mass), body->state->inertia);
+			const bool      moves = newton.mask <= 0 || body->maskCompatible(newton.mask);
+			::dembark::Dofs mass  = dofs(Vector3r::Constant(body->state->mass), body->state->inertia);
+			for (std::size_t i = 0; i < mass.size(); ++i)
+				if (!moves || body->state->blockedDOFs >> i & 1) mass[i] = 0.0;
 			// After loading nothing is known of a body but its energy.
-			changed[k] =
-				had < 0.0 || (present[k] && (present[k] != body || bodies[k].blocked != blocked || bodies[k].mass != mass));
-			bodies[k].blocked = blocked;
-			bodies[k].mass    = mass;
+			changed[k]     = had < 0.0 || (present[k] && (present[k] != body || bodies[k].mass != mass));
+			bodies[k].mass = mass;
 			recordForces(*body, newton);
-			known[k] = bodies[k].kinetic(bodies[k].velocity);
+			known[k] = bodies[k].kinetic();
 			ledger.kinetic += known[k];
 		} else {
 			changed[k] = had >= 0.0;
@@ -179,14 +245,80 @@ bool EnergyAccount::recordBodies(const NewtonIntegrator& newton, bool first) {
 	return any;
 }
 
+/// Takes up an interaction after its law has run.
+void EnergyAccount::recordContact(Contact& c, const Interaction& interaction) const {
+	c.acting = false;
+	if (!interaction.isReal()) return;
+	const Body::id_t id1 = interaction.getId1(), id2 = interaction.getId2();
+	const IPhys&     data = *interaction.phys;
+	if (typeid(data) != typeid(FinnieRabinowiczPhys))
+		fail("EnergyAccount: bodies " + std::to_string(id1) + " and " + std::to_string(id2) + " interact by " +
+		     data.getClassName() +
+		     ", whose energies it does not know; all contacts must be of "
+		     "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz");
+	const auto& phys  = static_cast<const FinnieRabinowiczPhys&>(data);
+	const Body &body1 = *Body::byId(id1, scene), &body2 = *Body::byId(id2, scene);
+	// Without a law that has seen it, or between two held bodies, a contact has no force.
+	if (phys.preparedBy < 0 || !((phys.wallBody != 1 && body1.isDynamic()) || (phys.wallBody != 2 && body2.isDynamic()))) return;
+
+	Vector3r shift = Vector3r::Zero();
+	if (scene->isPeriodic) shift = scene->cell->intrShiftPos(interaction.cellDist);
+	dembark_yade::ContactView view(phys.wallBody, *static_cast<const ScGeom*>(interaction.geom.get()), body1, body2, shift);
+	view.move(body1.state->vel, body1.state->angVel, body2.state->vel, body2.state->angVel);
+	const auto                      on1      = [&](const Vector3r& force) { return vec(Vector3r(view.sign() * force)); };
+	const ::dembark::Vec3<Real>     along    = on1(phys.normalForce);
+	const ::dembark::ContactBodies& bodies   = view.bodies;
+	const Real                      distance = norm(bodies.separation);
+	::dembark::ContactForce         force;
+	force.overlap            = bodies.radius_1 + (phys.wallBody ? 0.0 : bodies.radius_2) - distance;
+	force.normal             = distance > 0.0 ? bodies.separation * (1.0 / distance) : ::dembark::Vec3<Real>{0.0, 0.0, 1.0};
+	force.capillary_force    = phys.capillaryForce;
+	force.viscous_normal     = phys.viscousForce;
+	force.viscous_tangential = on1(phys.viscousShearForce);
+	force.normal_force       = dot(along, force.normal) + force.capillary_force - force.viscous_normal;
+	force.tangential         = on1(phys.shearForce) - force.viscous_tangential;
+
+	const auto motion = ::dembark::relative_motion(bodies, force.normal, force.overlap);
+	c.acting          = true;
+	c.one             = view.swapped() ? id2 : id1;
+	c.two             = view.swapped() ? id1 : id2;
+	c.parts           = ::dembark::contact_parts(phys.contact, bodies, force, vec(phys.elasticDisplacement));
+	c.levers          = {force.normal, motion};
+	if (phys.wallBody) c.levers.two = vec(view.surface);
+	c.half = 0.5 * scene->dt * dot(c.parts[::dembark::ContactPart::normal_elastic], force.normal) * motion.normal_velocity;
+}
+
 /// Takes up the state before the step: the forces are known, the velocities are still those of half a step ago.
 void EnergyAccount::record(const NewtonIntegrator& newton, bool first) {
 	scene->forces.sync();
 	const bool any = recordBodies(newton, first);
-	if (any) ledger.first_stored += contacts.unexplained(changed, false);
-	const auto stored = contacts.record(*scene, ompThreads);
-	if (any) ledger.first_stored += contacts.unexplained(changed, true);
-	ledger.set_stored(stored.normal, stored.tangential, stored.half);
+	// What the springs of bodies hold that go or come is no work of theirs.
+	if (any)
+		for (const Contact& c : contacts)
+			if (changes(c)) ledger.first_stored += c.work - c.half - c.parts.normal_stored;
+
+	auto& interactions = *scene->interactions;
+	contacts.resize(interactions.size());
+#ifdef YADE_OPENMP
+#pragma omp parallel for schedule(static) num_threads(ompThreads > 0 ? std::min(ompThreads, omp_get_max_threads()) : omp_get_max_threads())
+#endif
+	for (std::size_t i = 0; i < contacts.size(); ++i) {
+		try {
+			recordContact(contacts[i], *interactions[i]);
+		} catch (const std::exception& error) {
+			dembark_yade::postpone(*scene, error);
+		}
+	}
+
+	Real normal = 0.0, tangential = 0.0, ahead = 0.0;
+	for (const Contact& c : contacts) {
+		if (!c.acting) continue;
+		normal += c.parts.normal_stored;
+		tangential += c.parts.tangential_stored;
+		ahead += c.half;
+		if (any && changes(c)) ledger.first_stored += c.parts.normal_stored + c.half;
+	}
+	ledger.set_stored(normal, tangential, ahead);
 }
 
 /// The recorded step is over: its works, by the mean velocities. Those of a body that was erased since are what the forces make.
@@ -201,40 +333,30 @@ void EnergyAccount::tally(const Scene& after) {
 		known[k] = ledger.arrive(body, length, now == present[k] ? dofs(now->state->vel, now->state->angVel) : body.kicked(length));
 		ledger.now.add_body(body);
 	}
-	ledger.now.add(contacts.powers(bodies, length, ompThreads));
+	for (Contact& c : contacts)
+		if (c.acting) c.work = length * ledger.now.add_contact(c.parts, c.levers, bodies[c.one], bodies[c.two]);
 	ledger.kick(length, 0);
 	pending = false;
 	step    = recorded;
 }
 
 Real EnergyAccount::get(const std::string& name) {
-	update();
-	const auto found = std::find(energy_names.begin(), energy_names.end(), name);
-	if (found == energy_names.end()) {
+	if (std::find(energy_names.begin(), energy_names.end(), name) == energy_names.end()) {
 		std::string all;
 		for (const char* each : energy_names) all += (all.empty() ? "" : ", ") + std::string(each);
 		PyErr_SetString(PyExc_KeyError, ("dembark: EnergyAccount has no energy '" + name + "'; it has " + all).c_str());
 		boost::python::throw_error_already_set();
 	}
-	const std::lock_guard<std::mutex> lock(guard);
-	return ledger.energies()[found - energy_names.begin()];
+	return boost::python::extract<Real>(energies()[name]);
 }
 
-boost::python::list EnergyAccount::keys() const {
-	boost::python::list all;
-	for (const char* name : energy_names) all.append(name);
-	return all;
-}
-
-boost::python::list EnergyAccount::items() {
+boost::python::dict EnergyAccount::energies() {
 	update();
 	const std::lock_guard<std::mutex> lock(guard);
-	const ::dembark::Energies         energies = ledger.energies();
-	boost::python::list               all;
-	for (std::size_t k = 0; k < energies.size(); ++k) all.append(boost::python::make_tuple(energy_names[k], energies[k]));
+	const ::dembark::Energies         values = ledger.energies();
+	boost::python::dict               all;
+	for (std::size_t k = 0; k < values.size(); ++k) all[energy_names[k]] = values[k];
 	return all;
 }
-
-boost::python::dict EnergyAccount::energies() { return boost::python::dict(items()); }
 
 }  // namespace yade

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <type_traits>
+#include <vector>
 
 #include <core/Omega.hpp>
 #include <core/Scene.hpp>
@@ -23,6 +24,10 @@ using dembark_yade::text;
 using dembark_yade::vec;
 
 namespace {
+
+using Phys = FinnieRabinowiczPhys;
+using Ip2  = Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys;
+using Law2 = Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz;
 
 const std::string ip2  = "Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.";
 const std::string law2 = "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz.";
@@ -46,14 +51,22 @@ double pairValue(const shared_ptr<MatchMaker>& maker, const char* name, const Ma
 	return value;
 }
 
+/// Sets `option` to the one of `names` that an attribute of the law holds.
+template <class Option>
+void choose(const char* attribute, const std::string& word, const std::vector<std::string>& names, Option& option) {
+	if (::dembark::option_from_name(names, word, option)) return;
+	std::string known = names[0];
+	for (std::size_t k = 1; k < names.size(); ++k) known += (names.size() == 2 ? " or " : ", ") + names[k];
+	fail(law2 + attribute + " is '" + word + "'; it must be " + (names.size() == 2 ? "" : "one of ") + known);
+}
+
 }  // namespace
 
-void Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys::go(const shared_ptr<Material>& material1, const shared_ptr<Material>& material2,
-                                                    const shared_ptr<Interaction>& interaction) try {
+void Ip2::go(const shared_ptr<Material>& material1, const shared_ptr<Material>& material2, const shared_ptr<Interaction>& interaction) try {
 	if (interaction->phys) return;
 	const FrictMat& a    = *YADE_CAST<FrictMat*>(material1.get());
 	const FrictMat& b    = *YADE_CAST<FrictMat*>(material2.get());
-	const auto      phys = shared_ptr<FinnieRabinowiczPhys>(new FinnieRabinowiczPhys());
+	const auto      phys = shared_ptr<Phys>(new Phys());
 
 	if (!(a.young > 0.0 && b.young > 0.0 && a.young < INFINITY && b.young < INFINITY))
 		fail("FrictMat.young of " + pairName(a, b) + " must be > 0 Pa and finite");
@@ -66,13 +79,13 @@ void Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys::go(const shared_ptr<Material>& 
 		fail("restitution of " + pairName(a, b) + " is " + text(phys->restitution) + "; it must be > 0 and <= 1");
 
 	::dembark::FinnieRabinowicz law;
+	law.healing_time = phys->healingTime = healingTime;
 	law.static_friction = phys->staticFriction = pairValue(staticFriction, "staticFriction", a, b);
 	law.kinetic_friction = phys->kineticFriction = pairValue(kineticFriction, "kineticFriction", a, b);
 	law.critical_slip_distance = phys->criticalSlipDistance = pairValue(criticalSlipDistance, "criticalSlipDistance", a, b);
 	law.interface_shear_strength = pairValue(interfaceShearStrength, "interfaceShearStrength", a, b, ::dembark::unlimited_strength);
 	// An infinite number would not survive saving to XML.
-	phys->interfaceShearStrength = law.interface_shear_strength > 1e300 ? 1e300 : law.interface_shear_strength;
-	law.healing_time = phys->healingTime = healingTime;
+	phys->interfaceShearStrength = std::min(law.interface_shear_strength, 1e300);
 	if (const char* wrong = law.error()) fail(std::string(wrong) + ", " + pairName(a, b));
 
 	phys->newBridgeVolume = pairValue(bridgeVolume, "bridgeVolume", a, b, 0.0);
@@ -92,31 +105,24 @@ void Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys::go(const shared_ptr<Material>& 
 	interaction->phys = phys;
 } catch (const std::exception& error) {
 	dembark_yade::postpone(*scene, error);
-	interaction->phys = shared_ptr<FinnieRabinowiczPhys>(new FinnieRabinowiczPhys());  // without values: the law lets go of it
+	interaction->phys = shared_ptr<Phys>(new Phys());  // without values: the law lets go of it
 }
 
-void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::postLoad(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz&) {
+void Law2::postLoad(Law2&) {
 	static std::atomic<long> revisions{0};
 
-	if (normalLaw == "hertz") normal = ::dembark::NormalLaw::hertz;
-	else if (normalLaw == "hooke") normal = ::dembark::NormalLaw::hooke;
-	else fail(law2 + "normalLaw is '" + normalLaw + "'; it must be hertz or hooke");
-
-	if (presliding == "linear") path = ::dembark::Presliding::linear;
-	else if (presliding == "exponential") path = ::dembark::Presliding::exponential;
-	else fail(law2 + "presliding is '" + presliding + "'; it must be linear or exponential");
-
-	wet = capillaryModel != "none";
-	if (wet && !::dembark::capillary::model_from_name(capillaryModel.c_str(), model)) {
-		std::string known = "none";
-		for (const std::string& each : ::dembark::capillary::model_names()) known += ", " + each;
-		fail(law2 + "capillaryModel is '" + capillaryModel + "'; it must be one of " + known);
-	}
+	std::vector<std::string> models = ::dembark::capillary::model_names();
+	models.insert(models.begin(), "none");
+	int chosen = 0;
+	choose("normalLaw", normalLaw, ::dembark::normal_law_names(), normal);
+	choose("presliding", presliding, ::dembark::presliding_names(), path);
+	choose("capillaryModel", capillaryModel, models, chosen);
+	wet      = chosen > 0;
+	model    = static_cast<::dembark::capillary::Model>(wet ? chosen - 1 : 0);
 	revision = ++revisions;
 }
 
-void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::prepare(FinnieRabinowiczPhys& phys, const ScGeom& geom, const Body& body1,
-                                                                const Body& body2) const {
+void Law2::prepare(Phys& phys, const ScGeom& geom, const Body& body1, const Body& body2) const {
 	const bool sphere1 = dynamic_cast<const Sphere*>(body1.shape.get()), sphere2 = dynamic_cast<const Sphere*>(body2.shape.get());
 	if (!sphere1 && !sphere2)
 		fail(pairName(body1, body2) +
@@ -159,8 +165,7 @@ void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::prepare(FinnieRabinowicz
 }
 
 /// Tells CapillaryLiquid, after the forces are known, that the contact touches without a bridge, or that its bridge broke.
-void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::reportBridge(FinnieRabinowiczPhys& phys, const ScGeom& geom,
-                                                                     const Interaction& interaction, double volumeBefore) {
+void Law2::reportBridge(Phys& phys, const ScGeom& geom, const Interaction& interaction, double volumeBefore) {
 	if (phys.bridgeVolume > 0.0) return;
 	const bool                              swapped = phys.wallBody == 1, wall = phys.wallBody != 0;
 	const Body::id_t                        id1 = interaction.getId1(), id2 = interaction.getId2();
@@ -174,10 +179,9 @@ void Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::reportBridge(FinnieRabin
 	}
 }
 
-bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys,
-                                                           Interaction* interaction) try {
-	const ScGeom&         geom = *static_cast<ScGeom*>(igeom.get());
-	FinnieRabinowiczPhys& phys = *static_cast<FinnieRabinowiczPhys*>(iphys.get());
+bool Law2::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* interaction) try {
+	const ScGeom& geom = *static_cast<ScGeom*>(igeom.get());
+	Phys&         phys = *static_cast<Phys*>(iphys.get());
 	if (dembark_yade::postponed(*scene)) return phys.effectiveYoungsModulus > 0.0;
 	const Body::id_t id1 = interaction->getId1(), id2 = interaction->getId2();
 	const Body&      body1  = *Body::byId(id1, scene);
@@ -210,13 +214,11 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 		     1);
 	ContactView view(phys.wallBody, geom, body1, body2, shift);
 	view.move(state1.vel, state1.angVel, state2.vel + shiftVelocity, state2.angVel);
-	const ::dembark::ContactBodies& bodies = view.bodies;
 
+	const double            volumeBefore = phys.bridgeVolume;
 	::dembark::ContactState state{
 		{vec(phys.elasticDisplacement), phys.slip, phys.dissipatedEnergy}, phys.bridgeVolume, phys.ruptureDistance};
-	const double volumeBefore = phys.bridgeVolume;
-
-	const ::dembark::ContactForce out = ::dembark::contact_step(phys.contact, bodies, scene->dt, state);
+	const ::dembark::ContactForce out = ::dembark::contact_step(phys.contact, view.bodies, scene->dt, state);
 	// A comparison with what is no number is false: such a contact would vanish without a word.
 	if (!std::isfinite(out.overlap + out.force.x + out.force.y + out.force.z))
 		fail("the contact of " + pairName(body1, body2) + " has no finite force in step " + std::to_string(scene->iter) +
@@ -259,35 +261,32 @@ bool Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::go(shared_ptr<IGeom>& ig
 
 namespace {
 
-template <class Visit>
-void visitContacts(Visit visit) {
+/// Of value(interaction, phys) over all contacts.
+template <class Value>
+double sum(Value value) {
+	double total = 0.0;
 	// Not the functor's own pointer, which is not set before the first step after loading.
 	for (const auto& interaction : *Omega::instance().getScene()->interactions) {
 		if (!interaction->isReal()) continue;
-		if (const auto* phys = dynamic_cast<const FinnieRabinowiczPhys*>(interaction->phys.get())) visit(*interaction, *phys);
+		if (const auto* phys = dynamic_cast<const Phys*>(interaction->phys.get())) total += value(*interaction, *phys);
 	}
+	return total;
 }
 
 }  // namespace
 
-Real Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::getDissipatedEnergy() const {
-	Real sum = (Real)endedDissipation;
-	visitContacts([&](const Interaction&, const FinnieRabinowiczPhys& phys) { sum += phys.dissipatedEnergy; });
-	return sum;
+Real Law2::getDissipatedEnergy() const {
+	return (Real)endedDissipation + sum([](const Interaction&, const Phys& phys) { return phys.dissipatedEnergy; });
 }
 
-long Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::bridgeCount() const {
-	long count = 0;
-	visitContacts([&](const Interaction&, const FinnieRabinowiczPhys& phys) { count += phys.bridgeVolume > 0.0; });
-	return count;
+long Law2::bridgeCount() const {
+	return static_cast<long>(sum([](const Interaction&, const Phys& phys) { return phys.bridgeVolume > 0.0; }));
 }
 
-long Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::contactCount() const {
-	long count = 0;
-	visitContacts([&](const Interaction& interaction, const FinnieRabinowiczPhys&) {
-		count += static_cast<const ScGeom*>(interaction.geom.get())->penetrationDepth > 0.0;
-	});
-	return count;
+long Law2::contactCount() const {
+	return static_cast<long>(sum([](const Interaction& interaction, const Phys&) {
+		return static_cast<const ScGeom*>(interaction.geom.get())->penetrationDepth > 0.0;
+	}));
 }
 
 }  // namespace yade

@@ -1,14 +1,19 @@
 // LcpImpact: one step, from bodies to forces, its output, and the file of impacts.
+#include "LcpImpact.hpp"
+
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 
-#include <core/Omega.hpp>
+#include <core/InteractionLoop.hpp>
 #include <core/Scene.hpp>
 #include <pkg/common/Facet.hpp>
+#include <pkg/common/FieldApplier.hpp>
+#include <pkg/common/Sphere.hpp>
 #include <pkg/common/Wall.hpp>
 
 #include "CylinderWall.hpp"
-#include "LcpImpactParts.hpp"
 #include "report.hpp"
 
 namespace yade {
@@ -18,163 +23,270 @@ YADE_PLUGIN((LogWall)(LcpImpact)(LogImpact));
 using dembark_yade::fail;
 using dembark_yade::text;
 namespace impact = ::dembark::impact;
-using lcp_impact::eigen;
-using lcp_impact::plain;
 
 namespace lcp_impact {
 
-/// Takes body number `place` of a wall.
-void addShape(const Body& body, std::size_t place, const impact::Wall& common, const std::string& where, LcpImpact::Gathered& all) {
-	const State&      state = *body.state;
-	const std::string id    = std::to_string(body.getId());
-	double            speed = state.vel.norm();
-	if (body.isDynamic()) fail(where + ": body " + id + " can move freely; hold it by blockedDOFs = 'xyzXYZ'");
-	if (const auto* flat = dynamic_cast<const Wall*>(body.shape.get())) {
-		impact::Plane& plane              = all.planes.emplace_back();
-		static_cast<impact::Wall&>(plane) = common;
-		plane.point                       = plain(state.pos);
-		plane.velocity                    = plain(state.vel);
-		plane.normal                      = plain(Vector3r(Vector3r::Unit(flat->axis) * (flat->sense < 0 ? -1.0 : 1.0)));
-		plane.two_sided                   = flat->sense == 0;
-	} else if (const auto* round = dynamic_cast<const CylinderWall*>(body.shape.get())) {
-		impact::Drum& drum               = all.drums.emplace_back();
-		static_cast<impact::Wall&>(drum) = common;
-		drum.point                       = plain(state.pos);
-		drum.axis                        = plain(round->axis);
-		drum.radius                      = round->radius;
-		drum.velocity                    = plain(state.vel);
-		drum.omega                       = state.angVel.dot(round->axis);  // its surface moves along itself
-		if (!(drum.radius > 0.0)) fail(where + ": CylinderWall.radius of body " + id + " is not set; give it in m");
-		if ((state.angVel - drum.omega * round->axis).norm() > 1e-9 * state.angVel.norm())
-			fail(where + ": body " + id + " turns about another axis than its own; make angVel parallel to CylinderWall.axis");
-	} else if (const auto* facet = dynamic_cast<const Facet*>(body.shape.get())) {
-		if (place == 0) all.meshes.push_back({common, {}});
-		::dembark::Triangle& triangle = all.meshes.back().triangles.emplace_back();
-		triangle.id                   = static_cast<std::int64_t>(place);
-		for (int i = 0; i < 3; ++i) {
-			const Vector3r arm = state.ori * facet->vertices[i], velocity = state.vel + state.angVel.cross(arm);
-			triangle.node[i]     = plain(Vector3r(state.pos + arm));
-			triangle.velocity[i] = plain(velocity);
-			speed                = std::max(speed, double(velocity.norm()));
-		}
-	} else {
-		fail(where + ": body " + id + " is a " + body.shape->getClassName() + "; it must be a Wall, a CylinderWall or a Facet");
-	}
-	all.wallSpeed = std::max(all.wallSpeed, speed);
+::dembark::Vec3<double> plain(const Vector3r& v) { return {v[0], v[1], v[2]}; }
+Vector3r                eigen(const ::dembark::Vec3<double>& v) { return Vector3r(v.x, v.y, v.z); }
+constexpr int           unknown = -2;  // plane of the logs
+std::string             logName(Body::id_t id) { return "LcpImpact: log " + std::to_string(id) + " "; }
+
+/// Numbers in hexadecimal: every archive of YADE keeps them, XML too.
+std::string encode(const std::vector<double>& numbers) {
+	std::string text;
+	char        number[40];
+	for (const double x : numbers) text.append(number, std::snprintf(number, sizeof number, "%a ", x));
+	return text;
 }
 
-/// The body of YADE that a wall's contact belongs to.
-Body::id_t bodyOfContact(const LogWall& wall, std::int64_t key) {
-	const std::int64_t feature = -1 - key - impact::wall_number(key) * (std::int64_t(1) << 32);
-	const std::size_t  place   = static_cast<std::size_t>(feature) / 8;
-	return wall.bodies[place < wall.bodies.size() ? place : 0];
+std::vector<double> decode(const std::string& text) {
+	std::vector<double> numbers;
+	char*               next = nullptr;
+	for (const char* at = text.c_str(); *at; at = next + 1) numbers.push_back(std::strtod(at, &next));
+	return numbers;
+}
+
+/// Axis of the blocked translation of a log that moves in a plane, -1 of one that moves freely; the rest is refused.
+int blockedAxis(const State& state, Body::id_t id) {
+	const unsigned translations = state.blockedDOFs & State::DOF_XYZ, rotations = state.blockedDOFs & State::DOF_RXRYRZ;
+	int            axis = -1;
+	for (int i = 0; i < 3; ++i)
+		if (translations == State::axisDOF(i)) axis = i;
+	const bool spins = rotations != State::DOF_RXRYRZ;
+	if (translations == 0 && (rotations == 0 || !spins)) return -1;
+	if (axis >= 0 && (!spins || !(rotations & State::axisDOF(axis, true)))) return axis;
+	fail(logName(id) + "has blockedDOFs '" + state.blockedDOFs_vec_get() +
+	     "'; it must be free (''), held ('xyzXYZ'), or move in a plane, e.g. 'zXY': one translation, and not the rotation about that "
+	     "axis");
+}
+
+double inertia(const State& state, int axis, Body::id_t id) {
+	if ((state.blockedDOFs & State::DOF_RXRYRZ) == State::DOF_RXRYRZ) return INFINITY;
+	const double value = axis >= 0 ? state.inertia[axis] : state.inertia[0];
+	if (!(value > 0.0))
+		fail(logName(id) + "has an inertia of " + text(value) + " kg m^2; set state.inertia, 1/2 m r^2 about the axis of a log");
+	if (axis < 0 && (state.inertia - Vector3r::Constant(value)).cwiseAbs().maxCoeff() > 1e-9 * value)
+		fail(logName(id) +
+		     "has three different inertias and moves freely; make them equal or hold it in a plane, blockedDOFs = 'zXY'");
+	return value;
 }
 
 }  // namespace lcp_impact
 
-void LcpImpact::gatherWalls(Gathered& all) {
-	for (std::size_t w = 0; w < wallList.size(); ++w) {
-		const LogWall&    wall  = *wallList[w];
-		const std::string where = lcp_impact::wallName(w, wall);
-		if (!(wall.stiffness > 0.0)) fail(where + ".stiffness is not set; give the local stiffness of the wall in N/m");
-		if (wall.bodies.empty()) fail(where + ".bodies is empty; give the ids of the bodies that are the wall");
-		impact::Wall common;
-		common.id        = impact::wall_key(static_cast<std::int64_t>(w));
-		common.material  = static_cast<int>(all.materials.size() + w);
-		common.stiffness = wall.stiffness;
-		for (std::size_t k = 0; k < wall.bodies.size(); ++k) {
-			if (!scene->bodies->exists(wall.bodies[k]))
-				fail(where + ".bodies: body " + std::to_string(wall.bodies[k]) + " does not exist");
-			const Body& body = *Body::byId(wall.bodies[k], scene);
-			if (wall.bodies.size() > 1 && !dynamic_cast<const Facet*>(body.shape.get()))
-				fail(where +
-				     ".bodies: a wall of several bodies must be all Facet; make each Wall and CylinderWall a wall of its "
-				     "own");
-			lcp_impact::addShape(body, k, common, where, all);
+using lcp_impact::eigen;
+using lcp_impact::logName;
+using lcp_impact::plain;
+
+std::string LcpImpact::wallName(std::size_t number) const {
+	const std::string& name = wallList[number]->name;
+	return "LcpImpact.walls[" + std::to_string(number) + "]" + (name.empty() ? "" : " '" + name + "'");
+}
+
+/// The NewtonIntegrator of the scene; refuses engines in an order or with settings for which the forces would be wrong.
+const NewtonIntegrator& LcpImpact::integrator() const {
+	bool after = false;
+	for (const auto& each : scene->engines) {
+		if (each.get() == this) after = true;
+		if (const auto* newton = dynamic_cast<const NewtonIntegrator*>(each.get())) {
+			if (!after) fail("LcpImpact stands after NewtonIntegrator; put it right before it in O.engines");
+			if (newton->damping > 0.0)
+				fail("NewtonIntegrator.damping is " + text(newton->damping) +
+				     "; it must be 0 with LcpImpact, which predicts the motion of the step");
+			if (newton->densityScaling) fail("NewtonIntegrator.densityScaling is on; it must be off with LcpImpact");
+			if (newton->mask > 0)
+				fail("NewtonIntegrator.mask is " + std::to_string(newton->mask) +
+				     "; it must be -1 with LcpImpact, hold bodies by blockedDOFs");
+			return *newton;
 		}
+		if (after && (dynamic_cast<const FieldApplier*>(each.get()) || dynamic_cast<const InteractionLoop*>(each.get())))
+			fail(each->getClassName() + " stands after LcpImpact; engines that add forces must stand before it in O.engines");
+	}
+	fail("LcpImpact: O.engines has no NewtonIntegrator after it; add NewtonIntegrator(damping=0)");
+}
+
+/// A sphere as the model sees it, with YADE's id of its material and without forces.
+impact::Body LcpImpact::logOf(const Body& body) {
+	const State&     state = *body.state;
+	const Body::id_t id    = body.getId();
+	if (body.isClump() || body.isClumpMember())
+		fail(logName(id) + "belongs to a clump; LcpImpact knows single spheres only, leave it out by LcpImpact.mask or ids");
+	impact::Body log{id,
+	                 INFINITY,
+	                 INFINITY,
+	                 static_cast<const Sphere&>(*body.shape).radius,
+	                 body.material ? body.material->id : -1,
+	                 plain(state.pos),
+	                 plain(state.vel),
+	                 plain(state.angVel)};
+	if (!body.isDynamic()) return log;
+	if (body.isAspherical()) fail(logName(id) + "is aspherical; set Body.aspherical to False");
+	const int axis = lcp_impact::blockedAxis(state, id);
+	if (plane != lcp_impact::unknown && axis != plane)
+		fail(logName(id) + "has blockedDOFs '" + state.blockedDOFs_vec_get() +
+		     "', others move in another plane or freely; all logs must be blocked alike");
+	plane = axis;
+	if (!(state.mass > 0.0)) fail(logName(id) + "has a mass of " + text(state.mass) + " kg; it must be > 0");
+	log.mass    = state.mass;
+	log.inertia = lcp_impact::inertia(state, axis, id);
+	return log;
+}
+
+/// Fills `logs` and `materials`.
+void LcpImpact::gatherLogs(const Vector3r& gravity) {
+	scene->forces.sync();
+	logs.clear();
+	materials.clear();
+	plane           = lcp_impact::unknown;
+	const auto take = [&](const Body& body) {
+		if (mask != 0 && !body.maskOk(mask)) return;
+		impact::Body& log = logs.emplace_back(logOf(body));
+		materials.push_back(log.material);
+		if (std::isinf(log.mass)) return;
+		Vector3r force  = scene->forces.getForce(body.getId()) + body.state->mass * gravity;
+		Vector3r torque = scene->forces.getTorque(body.getId());
+		if (plane >= 0) force[plane] = 0.0;
+		for (int i = 0; i < 3; ++i)
+			if (body.state->blockedDOFs & State::axisDOF(i, true)) torque[i] = 0.0;
+		log.force  = plain(force);
+		log.torque = plain(torque);
+	};
+	const auto isSphere = [](const shared_ptr<Body>& body) { return body && dynamic_cast<const Sphere*>(body->shape.get()); };
+	if (ids.empty())
+		for (const auto& body : *scene->bodies)
+			if (isSphere(body)) take(*body);
+	std::vector<int> sorted = ids;
+	std::sort(sorted.begin(), sorted.end());
+	sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
+	for (const int id : sorted) {
+		const bool there = scene->bodies->exists(id);
+		if (!there || !isSphere(Body::byId(id, scene)))
+			fail("LcpImpact.ids: body " + std::to_string(id) + (there ? " is no Sphere" : " does not exist") +
+			     "; give ids of spheres");
+		take(*Body::byId(id, scene));
+	}
+	std::sort(materials.begin(), materials.end());
+	materials.erase(std::unique(materials.begin(), materials.end()), materials.end());
+	for (auto& log : logs)
+		log.material = static_cast<int>(std::lower_bound(materials.begin(), materials.end(), log.material) - materials.begin());
+}
+
+/// Adds a body of a wall to the surroundings; of a Facet the triangle to `mesh`.
+void LcpImpact::addShape(const Body& body, const impact::Wall& wall, std::vector<::dembark::Triangle>& mesh) {
+	const State&      state = *body.state;
+	const std::string where = wallName(impact::wall_number(wall.id)), id = std::to_string(body.getId());
+	if (body.isDynamic()) fail(where + ": body " + id + " can move freely; hold it by blockedDOFs = 'xyzXYZ'");
+	if (const auto* flat = dynamic_cast<const Wall*>(body.shape.get())) {
+		const Vector3r normal = Vector3r::Unit(flat->axis) * (flat->sense < 0 ? -1.0 : 1.0);
+		around.planes.push_back({wall, plain(state.pos), plain(normal), plain(state.vel), flat->sense == 0});
+	} else if (const auto* round = dynamic_cast<const CylinderWall*>(body.shape.get())) {
+		const double omega = state.angVel.dot(round->axis);  // its surface moves along itself
+		if (!(round->radius > 0.0)) fail(where + ": CylinderWall.radius of body " + id + " is not set; give it in m");
+		if ((state.angVel - omega * round->axis).norm() > 1e-9 * state.angVel.norm())
+			fail(where + ": body " + id + " turns about another axis than its own; make angVel parallel to CylinderWall.axis");
+		around.drums.push_back({wall, plain(state.pos), plain(round->axis), round->radius, omega, plain(state.vel)});
+	} else if (const auto* facet = dynamic_cast<const Facet*>(body.shape.get())) {
+		::dembark::Triangle triangle;
+		triangle.id = static_cast<std::int64_t>(mesh.size());
+		for (int i = 0; i < 3; ++i) {
+			const Vector3r arm   = state.ori * facet->vertices[i];
+			triangle.node[i]     = plain(Vector3r(state.pos + arm));
+			triangle.velocity[i] = plain(Vector3r(state.vel + state.angVel.cross(arm)));
+		}
+		mesh.push_back(triangle);
+	} else {
+		fail(where + ": body " + id + " is a " + body.shape->getClassName() + "; it must be a Wall, a CylinderWall or a Facet");
 	}
 }
 
-void LcpImpact::findContacts(const Gathered& all, double reach, std::vector<impact::Contact>& contacts) {
-	pairs.find(all.bodies, reach, contacts);
-	for (const impact::Plane& plane : all.planes) impact::plane_contacts(all.bodies, plane, reach, contacts);
-	for (const impact::Drum& drum : all.drums) impact::cylinder_contacts(all.bodies, drum, reach, contacts);
-	for (std::size_t k = 0; k < all.meshes.size(); ++k) triangles.find(all.bodies, all.meshes[k].wall, surfaces[k], reach, contacts);
-	const auto held = [&](int i) { return i < 0 || std::isinf(all.bodies[i].mass); };
+void LcpImpact::gatherWalls() {
+	around.planes.clear();
+	around.drums.clear();
+	std::size_t meshes = 0;  // a mesh keeps what it knows of its triangles
+	for (std::size_t w = 0; w < wallList.size(); ++w) {
+		const LogWall&                   wall = *wallList[w];
+		std::vector<::dembark::Triangle> mesh;
+		if (!(wall.stiffness > 0.0)) fail(wallName(w) + ".stiffness is not set; give the local stiffness of the wall in N/m");
+		if (wall.bodies.empty()) fail(wallName(w) + ".bodies is empty; give the ids of the bodies that are the wall");
+		const impact::Wall common{impact::wall_key(static_cast<std::int64_t>(w)), static_cast<int>(materials.size() + w),
+		                          wall.stiffness};
+		for (const Body::id_t id : wall.bodies) {
+			if (!scene->bodies->exists(id)) fail(wallName(w) + ".bodies: body " + std::to_string(id) + " does not exist");
+			const Body& body = *Body::byId(id, scene);
+			if (wall.bodies.size() > 1 && !dynamic_cast<const Facet*>(body.shape.get()))
+				fail(wallName(w) +
+				     ".bodies: a wall of several bodies must be all Facet; make each Wall and CylinderWall a wall of its "
+				     "own");
+			addShape(body, common, mesh);
+		}
+		if (mesh.empty()) continue;
+		if (around.meshes.size() == meshes) around.meshes.emplace_back();
+		static_cast<impact::Wall&>(around.meshes[meshes]) = common;
+		around.meshes[meshes++].update(std::move(mesh));
+	}
+	around.meshes.resize(meshes);
+}
+
+void LcpImpact::findContacts(double reach, std::vector<impact::Contact>& contacts) {
+	around.find(logs, reach, contacts);
+	const auto held = [&](int i) { return i < 0 || std::isinf(logs[i].mass); };
 	const auto idle = [&](const impact::Contact& c) { return held(c.a) && held(c.b); };
 	contacts.erase(std::remove_if(contacts.begin(), contacts.end(), idle), contacts.end());
-	if (all.axis < 0) return;
-	const auto partner = [&](const impact::Contact& c) {
-		if (c.b >= 0) return "log " + std::to_string(c.key_b);
-		const auto number = static_cast<std::size_t>(impact::wall_number(c.key_b));
-		return lcp_impact::wallName(number, *wallList[number]);
-	};
-	for (const auto& c : contacts)
-		if (std::abs(eigen(c.normal)[all.axis]) > 1e-9)
-			fail("LcpImpact: log " + std::to_string(c.key_a) + " meets " + partner(c) +
-			     " out of the plane it moves in; put all logs at one " + "xyz"[all.axis] + " and walls upright to that plane");
+	if (plane < 0) return;
+	for (const auto& c : contacts) {
+		if (std::abs(eigen(c.normal)[plane]) <= 1e-9) continue;
+		const std::string partner = c.b >= 0 ? "log " + std::to_string(c.key_b) : wallName(impact::wall_number(c.key_b));
+		fail(logName(c.key_a) + "meets " + partner + " out of the plane it moves in; put all logs at one " + "xyz"[plane] +
+		     " and walls upright to that plane");
+	}
+}
+
+/// Makes the model, anew where anything about it has changed, O.dt too; the state is carried over.
+void LcpImpact::prepare() {
+	const impact::Settings now = settings();
+	if (system && impact::to_numbers(now) == impact::to_numbers(system->settings())) return;
+	const bool                begins = !system;
+	const std::vector<double> state  = system ? system->state() : std::vector<double>();
+	system                           = std::make_unique<impact::System>(now);
+	if (!begins) return system->restore(state);
+	if (savedState.empty()) return;
+	impact::Archive saved(lcp_impact::decode(savedState));
+	archive(saved);
 }
 
 void LcpImpact::action() {
-	check(*scene);
-	Gathered all;
-	gather(all);
-	gatherWalls(all);
-	const bool                           first = steps == 0 && velocityAtStart;
-	std::vector<::dembark::Vec3<double>> force(all.bodies.size()), torque(all.bodies.size());
+	if (scene->isPeriodic) fail("LcpImpact: the scene is periodic; use an aperiodic one");
+	if (stiffnessRows.empty()) fail("LcpImpact.stiffness is not set; give the stiffness of the logs' boundaries in N/m");
+	const bool first = steps == 0 && velocityAtStart;
 	try {
-		prepare(all);
-		surfaces.resize(all.meshes.size());
-		for (std::size_t k = 0; k < surfaces.size(); ++k) surfaces[k].update(all.meshes[k].triangles);
-		const auto search = [&](double reach, std::vector<impact::Contact>& contacts) { findContacts(all, reach, contacts); };
-		report(system->step(all.bodies, search, all.wallSpeed, scene->time, first ? 0.5 : 1.0, force, torque));
+		gatherLogs(integrator().gravity);
+		gatherWalls();
+		prepare();
+		const auto search = [&](double reach, std::vector<impact::Contact>& contacts) { findContacts(reach, contacts); };
+		auto       report = system->step(logs, search, around.wall_speed(), scene->time, first ? 0.5 : 1.0);
+		std::tie(contactCount, activeCount, impactsBegun, peakForce, impulseSum, dissipatedEnergy, elasticEnergy, pivots,
+		         blockSteps, pivotsTotal, certificate, worstCertificate, highestForce) = report.fields();
 	} catch (const std::exception& error) {
-		if (std::string(error.what()).rfind("dembark: ", 0) == 0) throw;  // of the search for contacts
+		if (std::string(error.what()).rfind("dembark: ", 0) == 0) throw;
 		fail(std::string("LcpImpact, step ") + std::to_string(scene->iter) + ": " + error.what());
 	}
-	if (first) moveBack(all, force, torque);
-	for (std::size_t i = 0; i < all.bodies.size(); ++i) {
-		scene->forces.addForce(static_cast<Body::id_t>(all.bodies[i].id), eigen(force[i]));
-		scene->forces.addTorque(static_cast<Body::id_t>(all.bodies[i].id), eigen(torque[i]));
+	if (first) moveBack();
+	for (std::size_t i = 0; i < logs.size(); ++i) {
+		scene->forces.addForce(static_cast<Body::id_t>(logs[i].id), eigen(system->pushes()[i].force));
+		scene->forces.addTorque(static_cast<Body::id_t>(logs[i].id), eigen(system->pushes()[i].torque));
 	}
-	for (const auto& wall : wallList) wall->force = Vector3r::Zero();
-	for (const auto& contact : system->contacts()) {
-		if (contact.key_b >= 0) continue;
-		LogWall&         wall = *wallList[impact::wall_number(contact.key_b)];
-		const Body::id_t id   = lcp_impact::bodyOfContact(wall, contact.key_b);
-		const Vector3r   on   = -(contact.normal_force * eigen(contact.normal) + eigen(contact.tangential));
-		wall.force += on;
-		scene->forces.addForce(id, on);
-		scene->forces.addTorque(id, (eigen(contact.point) - Body::byId(id, scene)->state->pos).cross(on));
-	}
+	pushWalls();
 	writeImpacts();
 	if (scene->iter != lastIteration) ++steps;
 	lastIteration = scene->iter;
 }
 
-void LcpImpact::report(const impact::StepReport& now) {
-	contactCount     = now.contacts;
-	activeCount      = now.active;
-	impactsBegun     = now.impacts_begun;
-	peakForce        = now.peak_force;
-	impulseSum       = now.impulse_sum;
-	dissipatedEnergy = now.dissipated_energy;
-	elasticEnergy    = now.elastic_energy;
-	pivots           = now.pivots;
-	blockSteps       = now.block_steps;
-	pivotsTotal      = now.pivots_total;
-	certificate      = now.certificate;
-	worstCertificate = now.worst_certificate;
-	highestForce     = now.peak_force_so_far;
-}
-
-void LcpImpact::moveBack(const Gathered& all, const std::vector<::dembark::Vec3<double>>& force,
-                         const std::vector<::dembark::Vec3<double>>& torque) const {
-	for (std::size_t i = 0; i < all.bodies.size(); ++i) {
-		const impact::Body& log = all.bodies[i];
-		if (std::isinf(log.mass)) continue;
-		State&         state = *Body::byId(static_cast<Body::id_t>(log.id), scene)->state;
-		const Vector3r f = eigen(log.force) + eigen(force[i]), t = eigen(log.torque) + eigen(torque[i]);
+/// Velocities of the full step to those of half a step before.
+void LcpImpact::moveBack() const {
+	for (std::size_t i = 0; i < logs.size(); ++i) {
+		if (std::isinf(logs[i].mass)) continue;
+		State&         state = *Body::byId(static_cast<Body::id_t>(logs[i].id), scene)->state;
+		const Vector3r f     = eigen(logs[i].force) + eigen(system->pushes()[i].force);
+		const Vector3r t     = eigen(logs[i].torque) + eigen(system->pushes()[i].torque);
 		for (int k = 0; k < 3; ++k) {
 			if (!(state.blockedDOFs & State::axisDOF(k))) state.vel[k] -= 0.5 * scene->dt * f[k] / state.mass;
 			if (!(state.blockedDOFs & State::axisDOF(k, true))) state.angVel[k] -= 0.5 * scene->dt * t[k] / state.inertia[k];
@@ -182,21 +294,45 @@ void LcpImpact::moveBack(const Gathered& all, const std::vector<::dembark::Vec3<
 	}
 }
 
+/// The forces of the logs on the bodies of the walls.
+void LcpImpact::pushWalls() {
+	for (const auto& wall : wallList) wall->force = Vector3r::Zero();
+	for (const auto& contact : system->contacts()) {
+		if (contact.key_b >= 0) continue;
+		LogWall&          wall = *wallList[impact::wall_number(contact.key_b)];
+		const std::size_t body = static_cast<std::size_t>(impact::wall_feature(contact.key_b)) / 8;  // of a mesh, the triangle
+		const Body::id_t  id   = wall.bodies[body < wall.bodies.size() ? body : 0];
+		const Vector3r    on   = -(contact.normal_force * eigen(contact.normal) + eigen(contact.tangential));
+		wall.force += on;
+		scene->forces.addForce(id, on);
+		scene->forces.addTorque(id, (eigen(contact.point) - Body::byId(id, scene)->state->pos).cross(on));
+	}
+}
+
+/// What saved scenes keep: the state of the model, and where its file of impacts ends.
+void LcpImpact::archive(impact::Archive& a) {
+	impact::FormatVersion format{3.0};
+	std::vector<double>   state = system->state();
+	a.all(std::tie(format, state, file));
+	a.end();
+	if (a.reading()) system->restore(state);
+}
+
+void LcpImpact::preSave(LcpImpact&) {
+	if (!system) return;
+	impact::Archive out;
+	archive(out);
+	savedState = lcp_impact::encode(out.numbers());
+}
+
 void LcpImpact::writeImpacts() {
 	const std::vector<impact::Impact> ended = system->take_finished();
-	if (impactsFile.empty()) return;
 	try {
-		if (file.path() != impactsFile) {
-			// Going on from a saved scene: lines that the run wrote after saving will come again.
-			if (writtenFile == impactsFile && writtenBytes > 0) file.resume(impactsFile, writtenBytes);
-			else file.begin(impactsFile, "");
-		}
+		file.open(impactsFile, "");
 		file.append(ended);
 	} catch (const std::runtime_error& error) {
 		fail(std::string("LcpImpact.impactsFile: ") + error.what(), 1);
 	}
-	writtenFile  = impactsFile;
-	writtenBytes = file.bytes();
 }
 
 boost::python::list LcpImpact::contacts() const {

@@ -5,11 +5,11 @@
 #include <memory>
 
 #include <core/GlobalEngine.hpp>
+#include <pkg/dem/NewtonIntegrator.hpp>
 
-#include "dembark/impact/geometry.hpp"
 #include "dembark/impact/impact_file.hpp"
 #include "dembark/impact/system.hpp"
-#include "dembark/impact/triangles.hpp"
+#include "dembark/impact/geometry.hpp"
 
 namespace yade {
 
@@ -38,7 +38,6 @@ REGISTER_SERIALIZABLE(LogWall);
 class LcpImpact : public GlobalEngine {
 public:
 	virtual ~LcpImpact() = default;
-	struct Gathered;  // the logs and walls of one step
 	void action() override;
 	void postLoad(LcpImpact&);
 	void preSave(LcpImpact&);
@@ -86,9 +85,7 @@ public:
 		((vector<Real>,dampingRows,,Attr::hidden,"Material id (-1 = all) and damping, in turn"))
 		((vector<Real>,frictionRows,,Attr::hidden,"Two material ids (-1 = all) and six numbers, in turn"))
 		((vector<shared_ptr<LogWall>>,wallList,,Attr::hidden,"Walls"))
-		((string,savedState,"",Attr::hidden,"State of the contacts, filled in before saving"))
-		((string,writtenFile,"",Attr::hidden,"File that writtenBytes belongs to"))
-		((long,writtenBytes,0,Attr::hidden,"Length of the file of impacts"))
+		((string,savedState,"",Attr::hidden,"State of the contacts and of the file of impacts, filled in before saving"))
 		, /*ctor*/
 		, /*py*/
 		.add_property("stiffness",&LcpImpact::getStiffness,&LcpImpact::setStiffness,"Stiffness [N/m] of the logs' boundaries, > 0: a number, or a dict by id or label of the material. Required.")
@@ -101,22 +98,27 @@ public:
 	// clang-format on
 
 private:
-	void                        check(const Scene&) const;
-	void                        gather(Gathered&);
-	void                        gatherWalls(Gathered&);
-	void                        findContacts(const Gathered&, double reach, std::vector<::dembark::impact::Contact>&);
-	void                        prepare(const Gathered&);
+	const NewtonIntegrator&     integrator() const;
+	void                        gatherLogs(const Vector3r& gravity);
+	::dembark::impact::Body     logOf(const Body&);
+	void                        gatherWalls();
+	void                        addShape(const Body&, const ::dembark::impact::Wall&, std::vector<::dembark::Triangle>&);
+	void                        findContacts(double reach, std::vector<::dembark::impact::Contact>&);
+	::dembark::impact::Settings settings() const;
+	void                        prepare();
+	void                        moveBack() const;
+	void                        pushWalls();
 	void                        writeImpacts();
-	void                        report(const ::dembark::impact::StepReport&);
-	void                        moveBack(const Gathered&, const std::vector<::dembark::Vec3<double>>& force,
-	                                     const std::vector<::dembark::Vec3<double>>& torque) const;
-	::dembark::impact::Settings settings(const std::vector<int>& materials) const;
+	void                        archive(::dembark::impact::Archive&);
+	std::string                 wallName(std::size_t number) const;
 
 	std::unique_ptr<::dembark::impact::System> system;
-	::dembark::impact::PairFinder              pairs;
-	::dembark::impact::TriangleFinder          triangles;
-	std::vector<::dembark::SurfaceContacts>    surfaces;  // of the meshes
+	::dembark::impact::Surroundings            around;
 	::dembark::impact::ImpactFile              file;
+	// Of the present step:
+	std::vector<::dembark::impact::Body> logs;        // in the order of their ids; held spheres have infinite mass
+	std::vector<int>                     materials;   // ids of YADE, increasing; the index is that of the model
+	int                                  plane = -1;  // axis of the blocked translation of all logs that move
 };
 REGISTER_SERIALIZABLE(LcpImpact);
 

@@ -1,9 +1,9 @@
 // What a user may write for LcpImpact: numbers, dicts by material, walls; read into rows of numbers, which are saved with the scene.
-#include "LcpImpactParts.hpp"
+#include "LcpImpact.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <functional>
 
 #include <core/Omega.hpp>
 #include <core/Scene.hpp>
@@ -13,39 +13,18 @@
 namespace yade {
 
 using dembark_yade::fail;
-using lcp_impact::Table;
+using dembark_yade::text;
 namespace impact = ::dembark::impact;
-
-namespace lcp_impact {
-
-const Real* Table::find(const std::vector<Real>& rows, int a, int b) const {
-	for (std::size_t i = 0; i < rows.size(); i += keys + width) {
-		const Real x = rows[i], y = rows[i + keys - 1];
-		if (x < 0.0 || (x == a && (keys == 1 || y == b)) || (keys == 2 && x == b && y == a)) return &rows[i + keys];
-	}
-	return nullptr;
-}
-
-void setFriction(impact::PairLaw& pair, const Real* numbers) {
-	::dembark::FinnieRabinowicz& f = pair.friction;
-	f.static_friction              = numbers[0];
-	f.kinetic_friction             = numbers[1];
-	f.critical_slip_distance       = numbers[2];
-	f.interface_shear_strength     = numbers[3];
-	f.healing_time                 = numbers[4];
-	pair.contact_area              = numbers[5];
-}
-
-}  // namespace lcp_impact
 
 namespace lcp_input {
 
-namespace py = boost::python;
-
-const char* const frictionWords[] = {"static", "kinetic", "slip", "strength", "healing", "area"};
+namespace py  = boost::python;
+using Numbers = std::vector<Real>;
 
 /// Python's own text of a value, for messages.
 std::string shown(const py::object& value) { return py::extract<std::string>(py::str(value)); }
+bool        isDict(const py::object& value) { return PyDict_Check(value.ptr()); }
+bool        isText(const py::object& value) { return PyUnicode_Check(value.ptr()); }
 
 Real number(const py::object& value, const std::string& what) {
 	// A bool is a number in Python, but not here.
@@ -55,9 +34,6 @@ Real number(const py::object& value, const std::string& what) {
 	}
 	fail(what + " is " + shown(value) + "; it must be a finite number");
 }
-
-bool isDict(const py::object& value) { return PyDict_Check(value.ptr()); }
-bool isText(const py::object& value) { return PyUnicode_Check(value.ptr()); }
 
 /// Id of a shared material, from its id or its label.
 Real material(const py::object& key, const std::string& what) {
@@ -74,90 +50,126 @@ Real material(const py::object& key, const std::string& what) {
 	     std::to_string(materials.size()) + ")");
 }
 
-using Parse = std::function<std::vector<Real>(const py::object& value, const std::string& what)>;
-using Show  = std::function<py::object(const Real* numbers)>;
+/// An attribute that differs by materials, or by pairs of them. It is kept in rows of ids (-1 = all) and numbers.
+struct Property {
+	std::string name;
+	std::size_t keys, width;
+	Numbers (*parse)(const py::object& value, const std::string& what);
+	py::object (*show)(const Real* numbers);
 
-/// One value for all, or a dict by materials or pairs of them.
-std::vector<Real> read(const Table& table, const py::object& value, const std::string& what, const Parse& parse) {
-	std::vector<Real> rows;
-	const auto        add = [&](std::initializer_list<Real> ids, const py::object& each, const std::string& where) {
-		const std::vector<Real> numbers = parse(each, where);
-		rows.insert(rows.end(), ids);
-		rows.insert(rows.end(), numbers.begin(), numbers.end());
-	};
-	const py::list items = isDict(value) ? py::list(py::extract<py::dict>(value)().items()) : py::list();
-	if (py::len(items) == 0 || (table.keys == 2 && isText(items[0][0]))) {
-		table.keys == 1 ? add({-1}, value, what) : add({-1, -1}, value, what);
+	/// The numbers of a material, or of a pair in either order; nullptr: none.
+	const Real* find(const Numbers& rows, int a, int b = -1) const {
+		for (std::size_t i = 0; i < rows.size(); i += keys + width) {
+			const Real x = rows[i], y = rows[i + keys - 1];
+			if (x < 0.0 || (x == a && (keys == 1 || y == b)) || (keys == 2 && x == b && y == a)) return &rows[i + keys];
+		}
+		return nullptr;
+	}
+
+	/// One value for all, or a dict by materials or pairs of them.
+	Numbers read(const py::object& value) const {
+		Numbers    rows;
+		const auto add = [&](const Numbers& ids, const py::object& each, const std::string& what) {
+			const Numbers numbers = parse(each, what);
+			rows.insert(rows.end(), ids.begin(), ids.end());
+			rows.insert(rows.end(), numbers.begin(), numbers.end());
+		};
+		const py::list items = isDict(value) ? py::list(py::extract<py::dict>(value)().items()) : py::list();
+		if (py::len(items) == 0 || (keys == 2 && isText(items[0][0]))) add(Numbers(keys, -1.0), value, name);
+		else
+			for (py::ssize_t i = 0; i < py::len(items); ++i) {
+				const py::object  key   = items[i][0];
+				const std::string where = name + "[" + shown(key) + "]";
+				const bool        pair  = PyTuple_Check(key.ptr()) && py::len(key) == 2;
+				if (keys == 1) add({material(key, name)}, items[i][1], where);
+				else if (pair) add({material(key[0], name), material(key[1], name)}, items[i][1], where);
+				else fail(name + ": the key " + shown(key) + " is no pair; write {(material, material): friction, ...}");
+			}
 		return rows;
 	}
-	for (py::ssize_t i = 0; i < py::len(items); ++i) {
-		const py::object  key   = items[i][0];
-		const std::string where = what + "[" + shown(key) + "]";
-		if (table.keys == 1) {
-			add({material(key, what)}, items[i][1], where);
-			continue;
+
+	py::object toPython(const Numbers& rows) const {
+		if (rows.empty()) return py::object();
+		if (rows[0] < 0.0) return show(&rows[keys]);
+		py::dict result;
+		for (std::size_t i = 0; i < rows.size(); i += keys + width) {
+			const int first = static_cast<int>(rows[i]), last = static_cast<int>(rows[i + keys - 1]);
+			result[keys == 1 ? py::object(first) : py::make_tuple(first, last)] = show(&rows[i + keys]);
 		}
-		if (!PyTuple_Check(key.ptr()) || py::len(key) != 2)
-			fail(what + ": the key " + shown(key) + " is no pair; write {(material, material): friction, ...}");
-		add({material(key[0], what), material(key[1], what)}, items[i][1], where);
+		return result;
 	}
-	return rows;
+};
+
+/// The words of a friction law, and what they stand for.
+std::array<std::pair<const char*, double*>, 6> wordsOf(impact::PairLaw& law) {
+	::dembark::FinnieRabinowicz& f = law.friction;
+	return {{{"static", &f.static_friction},
+	         {"kinetic", &f.kinetic_friction},
+	         {"slip", &f.critical_slip_distance},
+	         {"strength", &f.interface_shear_strength},
+	         {"healing", &f.healing_time},
+	         {"area", &law.contact_area}}};
 }
 
-py::object toPython(const Table& table, const std::vector<Real>& rows, const Show& show) {
-	if (rows.empty()) return py::object();
-	if (rows[0] < 0.0) return show(&rows[table.keys]);
-	py::dict result;
-	for (std::size_t i = 0; i < rows.size(); i += table.keys + table.width) {
-		const int first = static_cast<int>(rows[i]), last = static_cast<int>(rows[i + table.keys - 1]);
-		result[table.keys == 1 ? py::object(first) : py::make_tuple(first, last)] = show(&rows[i + table.keys]);
-	}
-	return result;
+impact::PairLaw frictionLaw(const Real* numbers) {
+	impact::PairLaw law;
+	for (const auto& [word, to] : wordsOf(law)) *to = *numbers++;
+	return law;
 }
-
-/// A number that must be > 0, or >= 0.
-Parse atLeast(bool positive, const char* must) {
-	return [=](const py::object& value, const std::string& what) {
-		const Real x = number(value, what);
-		if (!(positive ? x > 0.0 : x >= 0.0)) fail(what + " is " + dembark_yade::text(x) + "; it must be " + must);
-		return std::vector<Real>{x};
-	};
-}
+constexpr Real withoutFriction[] = {0.0, 0.0, 0.0, ::dembark::unlimited_strength, 0.0, 0.0};
 
 /// One friction law: a coefficient, or a dict of words.
-std::vector<Real> friction(const py::object& value, const std::string& what) {
-	std::vector<Real> numbers(lcp_impact::withoutFriction, lcp_impact::withoutFriction + lcp_impact::byPair.width);
+Numbers frictionNumbers(const py::object& value, const std::string& what) {
+	impact::PairLaw              law = frictionLaw(withoutFriction);
+	::dembark::FinnieRabinowicz& f   = law.friction;
+	const auto                   all = wordsOf(law);
 	if (isDict(value)) {
-		const py::dict words = py::extract<py::dict>(value);
-		const py::list keys  = words.keys();
+		const py::dict given = py::extract<py::dict>(value);
+		const py::list keys  = given.keys();
 		for (py::ssize_t i = 0; i < py::len(keys); ++i) {
-			const std::string word  = shown(keys[i]);
-			const auto        found = std::find(std::begin(frictionWords), std::end(frictionWords), word);
-			if (found == std::end(frictionWords))
+			const std::string word = shown(keys[i]);
+			const auto found = std::find_if(all.begin(), all.end(), [&](const auto& known) { return known.first == word; });
+			if (found == all.end())
 				fail(what + ": '" + word + "' is unknown; the words are static, kinetic, slip, strength, healing, area");
-			numbers[found - std::begin(frictionWords)] = number(words[word], what + "['" + word + "']");
+			*found->second = number(given[word], what + "['" + word + "']");
 		}
-		if (!words.has_key("static")) fail(what + " has no 'static'; give at least the static friction coefficient");
-		if (!words.has_key("kinetic")) numbers[1] = numbers[0];
+		if (!given.has_key("static")) fail(what + " has no 'static'; give at least the static friction coefficient");
+		if (!given.has_key("kinetic")) f.kinetic_friction = f.static_friction;
 	} else {
-		numbers[0] = numbers[1] = number(value, what);
+		f.static_friction = f.kinetic_friction = number(value, what);
 	}
-	impact::PairLaw pair;
-	lcp_impact::setFriction(pair, numbers.data());
-	if (const char* wrong = pair.friction.error()) fail(what + ": " + wrong);
-	if (!(pair.contact_area >= 0.0))
-		fail(what + ": area is " + dembark_yade::text(pair.contact_area) +
-		     "; it must be > 0 m^2, or 0 = that of the contact of two circles");
+	if (const char* wrong = f.error()) fail(what + ": " + wrong);
+	if (!(law.contact_area >= 0.0))
+		fail(what + ": area is " + text(law.contact_area) + "; it must be > 0 m^2, or 0 = that of the contact of two circles");
+	Numbers numbers;
+	for (const auto& [word, from] : all) numbers.push_back(*from);
 	return numbers;
+}
+
+py::object frictionToPython(const Real* numbers) {
+	impact::PairLaw law = frictionLaw(numbers);
+	py::dict        words;
+	for (const auto& [word, from] : wordsOf(law)) words[word] = *from;
+	return words;
+}
+
+Numbers positive(const py::object& value, const std::string& what) {
+	const Real x = number(value, what);
+	if (!(x > 0.0)) fail(what + " is " + text(x) + "; it must be > 0 N/m");
+	return {x};
+}
+
+Numbers notNegative(const py::object& value, const std::string& what) {
+	const Real x = number(value, what);
+	if (!(x >= 0.0)) fail(what + " is " + text(x) + "; it must be >= 0 N s/m");
+	return {x};
 }
 
 py::object oneNumber(const Real* numbers) { return py::object(*numbers); }
 
-py::object frictionToPython(const Real* numbers) {
-	py::dict words;
-	for (std::size_t i = 0; i < lcp_impact::byPair.width; ++i) words[frictionWords[i]] = numbers[i];
-	return words;
-}
+const Property stiffness{"LcpImpact.stiffness", 1, 1, positive, oneNumber};
+const Property damping{"LcpImpact.damping", 1, 1, notNegative, oneNumber};
+const Property friction{"LcpImpact.friction", 2, 6, frictionNumbers, frictionToPython};
 
 /// Give the words of `kw` that are no plain attributes to their setters, and take them out.
 template <class Object>
@@ -172,14 +184,10 @@ void take(Object& object, py::dict& kw, std::initializer_list<std::pair<const ch
 
 }  // namespace lcp_input
 
-using lcp_impact::byMaterial;
-using lcp_impact::byPair;
-
 void LogWall::postLoad(LogWall&) {
 	const std::string where = "LogWall" + (name.empty() ? "" : " '" + name + "'");
 	// Attributes arrive one after the other; LcpImpact asks for those that never came.
-	if (!(stiffness >= 0.0) || !std::isfinite(stiffness))
-		fail(where + ".stiffness is " + dembark_yade::text(stiffness) + "; it must be > 0 N/m");
+	if (!(stiffness >= 0.0) || !std::isfinite(stiffness)) fail(where + ".stiffness is " + text(stiffness) + "; it must be > 0 N/m");
 	for (const int id : bodies)
 		if (id < 0)
 			fail(where + ".bodies: " + std::to_string(id) + " is no id of a body; give ids as O.bodies.append returns them");
@@ -200,7 +208,65 @@ boost::python::object LogWall::getFriction() const {
 
 void LogWall::setFriction(const boost::python::object& value) {
 	frictionRows.clear();
-	if (!value.is_none()) frictionRows = lcp_input::friction(value, "LogWall.friction");
+	if (!value.is_none()) frictionRows = lcp_input::frictionNumbers(value, "LogWall.friction");
+}
+
+void LcpImpact::postLoad(LcpImpact&) {
+	const auto must = [](bool right, const char* name, double value, const char* what) {
+		if (!right || !std::isfinite(value)) fail(std::string("LcpImpact.") + name + " is " + text(value) + "; it must be " + what);
+	};
+	must(contactDamping >= 0.0, "contactDamping", contactDamping, ">= 0 N s/m");
+	must(theta >= 0.5 && theta <= 1.0, "theta", theta, "in 0.5...1");
+	must(tangentialRatio > 0.0, "tangentialRatio", tangentialRatio, "> 0");
+	must(tolerance > 0.0, "tolerance", tolerance, "> 0");
+	must(sweeps >= 1, "sweeps", sweeps, ">= 1");
+	try {
+		::dembark::lcp_method(method);
+	} catch (const std::invalid_argument&) {
+		fail("LcpImpact.method is '" + method + "'; it must be auto, energy, block, murty or pgs");
+	}
+}
+
+/// The parameters of the model for the materials of the present step.
+impact::Settings LcpImpact::settings() const {
+	const auto of = [&](const lcp_input::Property& property, const std::vector<Real>& rows, int a, int b = -1) {
+		if (const Real* found = property.find(rows, a, b)) return found;
+		const bool pairs = property.keys == 2;
+		const auto name  = [](int id) {
+			return id < 0 ? std::string("a material that is not in O.materials") : "material " + std::to_string(id);
+		};
+		fail(property.name + " has no value for " + name(a) + (pairs ? " and " + name(b) : "") + "; add " +
+		     (pairs ? "the pair" : "it") + " to the dict");
+	};
+	const auto law = [&](const Real* friction) {
+		impact::PairLaw pair            = lcp_input::frictionLaw(friction);
+		pair.tangential_stiffness_ratio = tangentialRatio;
+		pair.contact_damping            = contactDamping;
+		return pair;
+	};
+	const auto between = [&](int a, int b) {
+		return frictionRows.empty() ? lcp_input::withoutFriction : of(lcp_input::friction, frictionRows, a, b);
+	};
+	impact::Settings result;
+	result.dt              = scene->dt;
+	result.theta           = theta;
+	result.friction_sweeps = sweeps;
+	result.lcp.tolerance   = tolerance;
+	result.lcp.method      = ::dembark::lcp_method(method);
+	result.materials.clear();
+	result.pairs.clear();
+	for (const int a : materials) {
+		const double damping = dampingRows.empty() ? 0.0 : *of(lcp_input::damping, dampingRows, a);
+		result.materials.push_back({*of(lcp_input::stiffness, stiffnessRows, a), damping});
+		for (const int b : materials) result.pairs.push_back(law(between(a, b)));
+	}
+	for (std::size_t w = 0; w < wallList.size(); ++w) {
+		const LogWall& wall = *wallList[w];
+		if (wall.frictionRows.empty() && !frictionRows.empty() && frictionRows[0] >= 0.0)
+			fail(wallName(w) + " has no friction, and LcpImpact.friction is by pairs of materials; give the wall its own");
+		result.add({wall.stiffness, 0.0}, law(wall.frictionRows.empty() ? between(-1, -1) : wall.frictionRows.data()));
+	}
+	return result;
 }
 
 void LcpImpact::pyHandleCustomCtorArgs(boost::python::tuple&, boost::python::dict& kw) {
@@ -218,20 +284,12 @@ void LogImpact::pyHandleCustomCtorArgs(boost::python::tuple& words, boost::pytho
 	LcpImpact::pyHandleCustomCtorArgs(words, kw);
 }
 
-boost::python::object LcpImpact::getStiffness() const { return lcp_input::toPython(byMaterial, stiffnessRows, lcp_input::oneNumber); }
-void                  LcpImpact::setStiffness(const boost::python::object& value) {
-	stiffnessRows = lcp_input::read(byMaterial, value, "LcpImpact.stiffness", lcp_input::atLeast(true, "> 0 N/m"));
-}
-
-boost::python::object LcpImpact::getDamping() const { return lcp_input::toPython(byMaterial, dampingRows, lcp_input::oneNumber); }
-void                  LcpImpact::setDamping(const boost::python::object& value) {
-	dampingRows = lcp_input::read(byMaterial, value, "LcpImpact.damping", lcp_input::atLeast(false, ">= 0 N s/m"));
-}
-
-boost::python::object LcpImpact::getFriction() const { return lcp_input::toPython(byPair, frictionRows, lcp_input::frictionToPython); }
-void                  LcpImpact::setFriction(const boost::python::object& value) {
-	frictionRows = lcp_input::read(byPair, value, "LcpImpact.friction", lcp_input::friction);
-}
+boost::python::object LcpImpact::getStiffness() const { return lcp_input::stiffness.toPython(stiffnessRows); }
+boost::python::object LcpImpact::getDamping() const { return lcp_input::damping.toPython(dampingRows); }
+boost::python::object LcpImpact::getFriction() const { return lcp_input::friction.toPython(frictionRows); }
+void                  LcpImpact::setStiffness(const boost::python::object& value) { stiffnessRows = lcp_input::stiffness.read(value); }
+void                  LcpImpact::setDamping(const boost::python::object& value) { dampingRows = lcp_input::damping.read(value); }
+void                  LcpImpact::setFriction(const boost::python::object& value) { frictionRows = lcp_input::friction.read(value); }
 
 boost::python::list LcpImpact::getWalls() const {
 	boost::python::list result;
@@ -246,15 +304,10 @@ void LcpImpact::setWalls(const boost::python::object& value) {
 	for (boost::python::ssize_t i = 0; i < boost::python::len(value); ++i) {
 		const boost::python::object                 each = value[i];
 		boost::python::extract<shared_ptr<LogWall>> object(each);
-		if (object.check()) {
-			walls.push_back(object());
-		} else if (lcp_input::isDict(each)) {
-			boost::python::tuple none;
-			boost::python::dict  words = boost::python::extract<boost::python::dict>(each)().copy();
-			walls.push_back(Serializable_ctor_kwAttrs<LogWall>(none, words));
-		} else {
-			fail(form);
-		}
+		if (!object.check() && !lcp_input::isDict(each)) fail(form);
+		boost::python::tuple none;
+		boost::python::dict  words = object.check() ? boost::python::dict() : boost::python::dict(each);
+		walls.push_back(object.check() ? object() : Serializable_ctor_kwAttrs<LogWall>(none, words));
 	}
 	wallList = walls;
 }

@@ -1,14 +1,41 @@
-#include "Snapshot.hpp"
-
+// State of a YADE scene as lines of LAMMPS dump files and as sums, in C++ because a loop over bodies in Python costs a thousand times more.
 #include <cstdio>
 
+#include <core/Omega.hpp>
 #include <core/Scene.hpp>
+#include <lib/serialization/Serializable.hpp>
 #include <pkg/common/NormShearPhys.hpp>
 #include <pkg/common/Sphere.hpp>
 
-#include "report.hpp"
-
 namespace yade {
+
+class DembarkSnapshot : public Serializable {
+public:
+	virtual ~DembarkSnapshot() = default;
+	std::string grainRows() const;
+	std::string contactRows() const;
+	Real        kineticEnergy() const;
+	// clang-format off
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(DembarkSnapshot,Serializable,"Rows for dump files, and sums, of the present scene. To be used between :yref:`InteractionLoop` and :yref:`NewtonIntegrator`: positions and forces are then of one time, and velocities, which YADE keeps half a step earlier, are moved on by v + dt/2 a to the same.",
+		((vector<int>,types,,,"For each body its type in the dump, 1 = moving grain, 0 = not in the dump"))
+		((vector<int>,columns,,,"For each body the number of the wall to whose force on the grains it contributes, -1 = none"))
+		((int,wallCount,0,,"Number of walls"))
+		((Vector3r,gravity,Vector3r::Zero(),,"Acceleration [m/s^2] that :yref:`NewtonIntegrator` adds"))
+		((Vector3r,low,Vector3r::Zero(),,"Lower corner of the dump's box [m]"))
+		((Vector3r,high,Vector3r::Zero(),,"Upper corner [m]"))
+		((Vector3i,periodic,Vector3i::Zero(),,"1 for each axis along which positions are wrapped into the box"))
+		, /*ctor*/
+		, /*py*/
+		.def("grainRows",&DembarkSnapshot::grainRows,"Lines 'id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass' and three forces for each wall.")
+		.def("contactRows",&DembarkSnapshot::contactRows,"Lines 'x1 y1 z1 x2 y2 z2 id1 id2 periodic fx fy fz' of all contacts and bridges between bodies of the dump.")
+		.def("kineticEnergy",&DembarkSnapshot::kineticEnergy,"Translational kinetic energy [J] of the grains (type 1).")
+	);
+	// clang-format on
+private:
+	Vector3i image(const Vector3r& position) const;
+	Vector3r wrapped(const Vector3r& position) const { return position - image(position).cast<Real>().cwiseProduct(high - low); }
+};
+REGISTER_SERIALIZABLE(DembarkSnapshot);
 
 YADE_PLUGIN((DembarkSnapshot));
 
@@ -18,17 +45,11 @@ int at(const std::vector<int>& values, Body::id_t id, int otherwise) {
 	return id >= 0 && static_cast<std::size_t>(id) < values.size() ? values[id] : otherwise;
 }
 
-/// The numbers of one line; long enough for any double.
-struct Line {
-	std::string& text;
-	char         buffer[40];
-	void         add(const char* format, double value) { text.append(buffer, std::snprintf(buffer, sizeof buffer, format, value)); }
-	void         add(const char* format, const Vector3r& v) {
-		for (int i = 0; i < 3; ++i) add(format, v[i]);
-	}
-	void add(long value) { text.append(buffer, std::snprintf(buffer, sizeof buffer, "%ld ", value)); }
-	void end() { text.back() = '\n'; }
-};
+template <class Numbers>
+void add(std::string& text, const char* format, const Numbers& values) {
+	char buffer[40];  // long enough for any double
+	for (const Real value : values) text.append(buffer, std::snprintf(buffer, sizeof buffer, format, value));
+}
 
 struct Motion {
 	Vector3r force, velocity, angularVelocity;
@@ -76,25 +97,19 @@ std::string DembarkSnapshot::grainRows() const {
 		}
 
 	std::string text;
-	Line        line{text, {}};
 	for (const auto& body : *scene.bodies) {
 		if (!body) continue;
 		const int   type   = at(types, body->getId(), 0);
 		const auto* sphere = type > 0 ? dynamic_cast<const Sphere*>(body->shape.get()) : nullptr;
 		if (!sphere) continue;
-		const Vector3i cell = image(body->state->pos);
-		const Motion   now  = motion(*body, scene, gravity);
-		line.add(body->getId() + 1);
-		line.add(type);
-		line.add("%.10g ", Vector3r(body->state->pos - cell.cast<Real>().cwiseProduct(high - low)));
-		for (int i = 0; i < 3; ++i) line.add(cell[i]);
-		line.add("%.7g ", now.velocity);
-		line.add("%.7g ", now.angularVelocity);
-		line.add("%.7g ", now.force);
-		line.add("%.9g ", sphere->radius);
-		line.add("%.9g ", body->state->mass);
-		for (int k = 0; k < wallCount; ++k) line.add("%.7g ", ofWalls[body->getId() * wallCount + k]);
-		line.end();
+		const Motion now = motion(*body, scene, gravity);
+		add(text, "%.0f ", Vector2r(body->getId() + 1, type));
+		add(text, "%.10g ", wrapped(body->state->pos));
+		add(text, "%.0f ", Vector3r(image(body->state->pos).cast<Real>()));
+		for (const Vector3r& each : {now.velocity, now.angularVelocity, now.force}) add(text, "%.7g ", each);
+		add(text, "%.9g ", Vector2r(sphere->radius, body->state->mass));
+		for (int k = 0; k < wallCount; ++k) add(text, "%.7g ", ofWalls[body->getId() * wallCount + k]);
+		text.back() = '\n';
 	}
 	return text;
 }
@@ -102,7 +117,6 @@ std::string DembarkSnapshot::grainRows() const {
 std::string DembarkSnapshot::contactRows() const {
 	Scene&      scene = *Omega::instance().getScene();
 	std::string text;
-	Line        line{text, {}};
 	for (const auto& interaction : *scene.interactions) {
 		if (!interaction->isReal()) continue;
 		const Body::id_t id1 = interaction->getId1(), id2 = interaction->getId2();
@@ -110,28 +124,15 @@ std::string DembarkSnapshot::contactRows() const {
 		const auto* phys  = dynamic_cast<const NormShearPhys*>(interaction->phys.get());
 		const auto &body1 = Body::byId(id1, &scene), &body2 = Body::byId(id2, &scene);
 		if (!phys || !body1 || !body2 || !(body1->isDynamic() || body2->isDynamic())) continue;
-		const Vector3i cell1 = image(body1->state->pos), cell2 = image(body2->state->pos);
-		const Vector3r size   = high - low;
-		bool           across = false;
-		for (int i = 0; i < 3; ++i) across |= periodic[i] && interaction->cellDist[i] + cell2[i] - cell1[i] != 0;
-		line.add("%.10g ", Vector3r(body1->state->pos - cell1.cast<Real>().cwiseProduct(size)));
-		line.add("%.10g ", Vector3r(body2->state->pos - cell2.cast<Real>().cwiseProduct(size)));
-		line.add(id1 + 1);
-		line.add(id2 + 1);
-		line.add(across ? 1 : 0);
-		line.add("%.7g ", Vector3r(-(phys->normalForce + phys->shearForce)));
-		line.end();
+		const Vector3i apart  = interaction->cellDist + image(body2->state->pos) - image(body1->state->pos);
+		const bool     across = !apart.cwiseProduct(periodic).isZero();
+		add(text, "%.10g ", wrapped(body1->state->pos));
+		add(text, "%.10g ", wrapped(body2->state->pos));
+		add(text, "%.0f ", Vector3r(id1 + 1, id2 + 1, across));
+		add(text, "%.7g ", Vector3r(-(phys->normalForce + phys->shearForce)));
+		text.back() = '\n';
 	}
 	return text;
-}
-
-std::vector<Vector3r> DembarkSnapshot::wallForces() const {
-	Scene& scene = *Omega::instance().getScene();
-	scene.forces.sync();
-	std::vector<Vector3r> sums(wallCount, Vector3r::Zero());
-	for (std::size_t id = 0; id < columns.size(); ++id)
-		if (columns[id] >= 0 && columns[id] < wallCount) sums[columns[id]] -= scene.forces.getForce(static_cast<Body::id_t>(id));
-	return sums;
 }
 
 Real DembarkSnapshot::kineticEnergy() const {
@@ -142,13 +143,6 @@ Real DembarkSnapshot::kineticEnergy() const {
 		if (body && at(types, body->getId(), 0) == 1)
 			sum += 0.5 * body->state->mass * motion(*body, scene, gravity).velocity.squaredNorm();
 	return sum;
-}
-
-long DembarkSnapshot::grainCount() const {
-	long count = 0;
-	for (const auto& body : *Omega::instance().getScene()->bodies)
-		count += body && at(types, body->getId(), 0) > 0 && dynamic_cast<const Sphere*>(body->shape.get());
-	return count;
 }
 
 }  // namespace yade

@@ -27,10 +27,10 @@ endif()
 # A user's mistake is one line, not a trace.
 string(REPLACE "\t\t\t\texcept: # all other exceptions\n"
 "\t\t\t\texcept RuntimeError as error:
-\t\t\t\t\tif str(error).startswith('dembark: ') and yade.runtime.opts.exitAfter:
-\t\t\t\t\t\tline,code,logged=getattr(sys,'dembark_failure',('',2,False))
-\t\t\t\t\t\tif line!=str(error): code,logged=2,False
-\t\t\t\t\t\tif not logged: print(error,file=sys.stderr,flush=True)
+\t\t\t\t\tline,code,logged=getattr(sys,'dembark_failure',('',2,False))
+\t\t\t\t\tif not line or line not in str(error): line,code,logged=str(error),2,False # a PyRunner quotes the line
+\t\t\t\t\tif line.startswith('dembark: ') and yade.runtime.opts.exitAfter:
+\t\t\t\t\t\tif not logged: print(line,file=sys.stderr,flush=True)
 \t\t\t\t\t\tsys.exit(code)
 \t\t\t\t\timport traceback
 \t\t\t\t\ttraceback.print_exc()

@@ -16,14 +16,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 from scipy.special import ive, ndtr
 
 from dembark.postproc import ContactFrame, GrainFrame, spheres
 from dembark.postproc.fields.coarse_graining import WallContacts
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 Array = NDArray[np.float64]
 
@@ -76,6 +79,8 @@ class Rings:
     @cached_property
     def _table(self) -> CubicSpline:
         """Shares (k,) of K_0, K_1 and K_2 in the rings and, at their k + 1 borders, the values of K_1, over the radius of the source."""
+        from scipy.interpolate import CubicSpline  # slow to import, and not needed before something is measured
+
         places = np.linspace(0.0, self.radial[-1], 1 + int(np.ceil(_TABLE * self.radial[-1] / self.width)))
         node, weight = np.polynomial.legendre.leggauss(_POINTS)
         half = 0.5 * np.diff(self.radial)[:, None]

@@ -31,7 +31,9 @@ from dembark.postproc.walls.run import (
     check_inclusions,
     check_meshes,
     check_outputs,
+    checked_frames,
     choose_walls,
+    mesh_notes,
     recorders_of,
     source_lines,
     wall_lines,
@@ -142,7 +144,7 @@ class FieldJob:
         """Compute and write; `advance` is called after each frame."""
         attributes = {**provenance, **self._method()}
         recorders = recorders_of(self.walls, self.source, self.numbers, _PATCH * self.diameter)
-        stream = self.source.frames(self.numbers)
+        stream = checked_frames(self.walls, self.source, self.numbers)
         with ExitStack() as stack:
             netcdf = stack.enter_context(FieldsNetcdf(self.words.out, attributes)) if self.words.out else None
             vtkhdf = stack.enter_context(FieldsVtkhdf(self.words.vtkhdf, attributes)) if self.words.vtkhdf else None
@@ -214,7 +216,7 @@ class FieldJob:
 
     def summary(self) -> list[str]:
         """What was computed, checked and written, in lines."""
-        lines = source_lines(self.source, self.numbers, self.diameter)
+        lines = [*source_lines(self.source, self.numbers, self.diameter), *mesh_notes(self.walls, self.source, self.numbers)]
         if self.left_over:
             lines.append(f"note: the last {self.left_over} frames fill no group of their own and were left out")
         size = " × ".join(f"{1e3 * one:.4g}" for one in self.grid.spacing)

@@ -22,9 +22,8 @@ from dembark.postproc.fields.kernels import CUTOFF
 from dembark.postproc.fields.sums import Fields, FieldSums
 from dembark.postproc.instruments.channel import Channel, free_grains
 from dembark.postproc.instruments.channel import read as read_channel
-from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.output.labelled import labelled, variable, with_interval
-from dembark.postproc.replica import Array, Replica
+from dembark.postproc.labelled import labelled, variable, with_interval
+from dembark.postproc.measurement import Array, Measurement, Replica, Value
 from dembark.postproc.resampling import resampled
 from dembark.postproc.statistics import Estimate, TimeBlocks, block_mean, combined, over_replicas, student, time_blocks
 from dembark.postproc.walls import PlaneWall, wall_contacts

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from dembark.postproc import DumpError, GrainFrame
-from dembark.postproc.replica import Array, Replica
-from dembark.postproc.resampling import profile
+from dembark.postproc.measurement import Array, Replica, profile
 
 PARTS = ("normal_elastic", "normal_viscous", "tangential_elastic", "tangential_viscous", "capillary", "liquid_viscous")
 DISSIPATING = ("normal_viscous", "tangential_viscous", "liquid_viscous")

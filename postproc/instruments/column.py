@@ -22,9 +22,8 @@ from dembark.physics import capillary_force
 from dembark.postproc import ContactFrame, GrainFrame, profiles, stress
 from dembark.postproc.instruments import janssen
 from dembark.postproc.instruments.vessel import Vessel, vessel
-from dembark.postproc.replica import Array, Replica
+from dembark.postproc.measurement import Array, Estimate, Replica, block_mean
 from dembark.postproc.spheres import slice_volumes
-from dembark.postproc.statistics import Estimate, block_mean
 
 Mask = NDArray[np.bool_]
 Bridges = Callable[[Array], Array]

@@ -10,21 +10,26 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray
 from numpy.typing import NDArray
 
 from dembark.postproc import DumpError
-from dembark.postproc.output.labelled import labelled, variable, with_interval
-from dembark.postproc.replica import Array, Replica, once
+from dembark.postproc.labelled import labelled, variable, with_interval
+from dembark.postproc.measurement import Array, Curve, Estimate, Replica, over_replicas, profile
+from dembark.postproc.replica import once
 from dembark.postproc.resampling import resampled
-from dembark.postproc.statistics import Estimate, TimeBlocks, over_replicas, time_blocks
+from dembark.postproc.statistics import TimeBlocks, time_blocks
+
+if TYPE_CHECKING:
+    import xarray
 
 # Edges of the histograms of places, in degrees from the lowest point of the drum, positive the way it turns.
 ANGLES = np.linspace(-180.0, 180.0, 37)
 PLACES = 0.5 * (ANGLES[1:] + ANGLES[:-1])
 CELLS = 32  # of the map, across the drum
+_PEAKS = np.logspace(1.0, 6.0, 51)  # N, edges of the histogram of peak forces
 _FORCES = np.logspace(1.0, 6.0, 26)  # N, five bins a decade
 
 
@@ -169,6 +174,31 @@ def estimates(drum: Drum) -> dict[str, Estimate]:
         "shell_loss_share": over(lambda keep: float(shell[keep].sum() / hits[keep].sum()) if hits[keep].any() else math.nan, loss_blocks),
         "shell_power_angle": over(lambda keep: math.degrees(math.atan2(east[keep].sum(), north[keep].sum())), loss_blocks),
     }
+
+
+def profiles(drums: Sequence[Drum], limit: float) -> list[Curve]:
+    """Impacts by peak force and by place, and the power over the window; `limit` (m/s): approach that counts as an impact."""
+    hit = np.flatnonzero(np.sum([np.histogram(drum.peak, _PEAKS)[0] for drum in drums], axis=0))
+    forces = _PEAKS[max(0, hit[0] - 1) : hit[-1] + 3] if len(hit) else _PEAKS
+    turned = (np.arange(20.0 * drums[0].revolutions) + 0.5) / 20.0
+
+    def curve(name: str, title: str, along: str, across: str, place: Array, get: Callable[[Drum], Array], **more: Any) -> Curve:
+        return profile(name, title, along, across, place, [get(drum) for drum in drums], **more)
+
+    note, around, number = f"approach ≥ {limit:g} m/s", "angle past the lowest point (°)", "per log, turn and 10°"
+    return [
+        curve("peak_forces", "Peak forces of impacts", "log₁₀ of the peak force (N)", "per log, turn and decade",
+              np.log10(np.sqrt(forces[1:] * forces[:-1])),
+              lambda one: one.per_log(np.histogram(one.peak, forces)[0]) / np.diff(np.log10(forces)), note=note),
+        curve("peak_forces_exceeded", "Impacts harder than F", "log₁₀ of F (N)", "log₁₀ of number per log, turn", np.log10(forces),
+              lambda one: np.log10(one.exceeding(forces)), note=note),
+        curve("impacts_at_angle", "Where logs meet", around, number, PLACES, lambda one: one.at_angle(one.angle), note="all impacts"),
+        curve("shell_impacts_at_angle", "Where logs meet the shell", around, number, PLACES,
+              lambda one: one.at_angle(one.angle[one.shell]), note="impacts on the shell"),
+        curve("peak_force_at_angle", "How hard they meet", around, "mean peak force (kN)", PLACES, lambda one: 1e-3 * one.peak_at_angle()),
+        curve("power", "Power", "revolutions of the window", "power of the drum (W)", turned, lambda one: one.power(one.work, 20),
+              reference=np.mean([one.power(one.lost, 20) for one in drums], axis=0), reference_label="power that is lost"),
+    ]
 
 
 def fields(replicas: Sequence[Replica]) -> xarray.Dataset:

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dembark.postproc.replica import Array
-from dembark.postproc.resampling import profile
-from dembark.postproc.statistics import Estimate
+from dembark.postproc.measurement import Array, Estimate, profile
 from dembark.postproc.studies import fitted_exponent, measured, propagated
 
 

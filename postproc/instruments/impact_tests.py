@@ -10,10 +10,7 @@ import numpy as np
 
 from dembark.physics.exact.impacts import Impacts, Rebounds, sliding_throughout
 from dembark.postproc.instruments.impacts import Flight, Solutions, materials
-from dembark.postproc.instruments.logs import number
-from dembark.postproc.measurement import Value
-from dembark.postproc.replica import Array
-from dembark.postproc.resampling import profile
+from dembark.postproc.measurement import Array, Value, number, profile
 
 Found = tuple[dict[str, Value], list[dict[str, Any]]]
 
@@ -23,7 +20,8 @@ def head_on(one: Impacts, flight: Flight, known: Solutions) -> Found:
     after, due = flight.after.numbers(one), {"overlap": one.peak_overlap, "force": one.peak_force, "duration": one.duration}
     # Three frames about the top of something like a half wave: a parabola misses less than (pi h / t_c)^4 / 16 of it.
     sampled = (np.pi * (flight.times[1] - flight.times[0]) / one.duration) ** 4 / 16.0
-    forces, pulse = one.force(flight.overlaps), one.pulse(flight.times[:, None] - flight.times[0] + flight.overlaps[0] / one.closing)
+    since_touch = flight.times[:, None] - flight.times[0] + flight.overlaps[0] / one.closing
+    forces, pulse = one.force(flight.overlaps), one.pulse(since_touch)
     values, curves = {}, []
     for key, which in materials(len(one)).items():
         k = which.start
@@ -38,8 +36,8 @@ def head_on(one: Impacts, flight: Flight, known: Solutions) -> Found:
         curves += [
             profile(f"force_overlap_{key}", f"Force over overlap, {key.upper()}", "δ (µm)", "N (kN)", 1e6 * flight.overlaps[inside, k],
                     [found[inside]], reference=1e-3 * forces[inside, k], reference_label="Hertz"),
-            profile(f"force_time_{key}", f"Force over time, {key.upper()}", "time (µs)", "N (kN)", 1e6 * flight.times, [found],
-                    reference=1e-3 * pulse[:, k], reference_label="Hertz")]
+            profile(f"force_time_{key}", f"Force over time, {key.upper()}", "time since touch (µs)", "N (kN)", 1e6 * since_touch[:, k],
+                    [found], reference=1e-3 * pulse[:, k], reference_label="Hertz")]
     return values, curves
 
 
@@ -99,12 +97,14 @@ def _rebounds(one: Impacts, found: Rebounds, known: Solutions, sweep: str, swept
     rigid, law, exactly, throughout = sliding_throughout(one), known.law[0], "the law, exactly", "sliding throughout"
     after, due, before = found.numbers(one), law.numbers(one), one.sliding / one.closing
     if sweep == "direction":
+        angle, due_angle = (np.degrees(np.arctan2(each["patch"], each["restitution"])) for each in (after, due))
         entries: list[Entry] = [
             ("tangential_restitution", "Tangential restitution", "angle (°)", "v_t after / v_t", swept, found.slide[0] / one.slide[0],
              law.slide[0] / one.slide[0], exactly),
-            ("spin", "Spin after", "angle (°)", "ω (rad/s)", swept, found.spin[0], rigid.spin[0], throughout)]
+            ("spin", "Spin after", "angle (°)", "ω (rad/s)", swept, found.spin[0], rigid.spin[0], throughout),
+            ("contact_angle", "Rebound angle of the point of contact", "angle (°)", "angle after (°)", swept, angle, due_angle, exactly)]
     elif sweep == "slide":
-        entries = [("spin", "Spin after", "v_s / μ v_n", "r ω / μ v_n", before / one.friction, after["spin"] / one.friction,
+        entries = [("scaled_spin", "Spin after", "v_s / μ v_n", "r ω / μ v_n", before / one.friction, after["spin"] / one.friction,
                     due["spin"] / one.friction, exactly)]
     else:
         entries = [
@@ -113,8 +113,8 @@ def _rebounds(one: Impacts, found: Rebounds, known: Solutions, sweep: str, swept
             ("recoil_rigid", "Recoil", "v_s / v_n", "v_s after / v_n after", before, after["patch"] / one.restitution,
              rigid.numbers(one)["patch"] / one.restitution, throughout)]
     theory, label = (known.slip.numbers(one), "partial slip, elastic") if known.slip else (due, exactly)
-    scale, mu = (one.friction, "μ ") if sweep == "slide" else (1.0, "")
-    return [*entries, ("recoil", "Recoil", f"v_s / {mu}v_n", f"v_s after / {mu}v_n after", before / scale,
+    name, scale, mu = ("scaled_recoil", one.friction, "μ ") if sweep == "slide" else ("recoil", 1.0, "")
+    return [*entries, (name, "Recoil", f"v_s / {mu}v_n", f"v_s after / {mu}v_n after", before / scale,
                        after["patch"] / after["restitution"] / scale, theory["patch"] / theory["restitution"] / scale, label)]
 
 

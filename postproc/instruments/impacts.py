@@ -5,13 +5,14 @@ The first half of the spheres is of material A, the second of B, each with a par
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from dembark.physics.exact.contact_law import solved, stepped
 from dembark.physics.exact.impacts import Impacts, Rebounds, partial_slip
-from dembark.postproc.replica import Array, Replica
+from dembark.postproc.measurement import Array, Numbers, Replica
 
 _PHASES = (0.0, 0.25, 0.5, 0.75)
 
@@ -26,6 +27,32 @@ class Flight:
     forces: Array
     after: Rebounds
     momentum_error: float | None
+
+
+def sweep(p: Numbers) -> Array:
+    """What is swept, for the spheres of material A, then for those of B."""
+    return np.tile(p["sweep_from"] + (p["sweep_to"] - p["sweep_from"]) * np.arange(p["points"]) / max(p["points"] - 1, 1), 2)
+
+
+def impacts(p: Numbers) -> Impacts:
+    """The impacts of a run with the parameters `p` of single_contact, from these alone, so that the set-up of the decks is checked, too."""
+    full, value, kind = np.ones(2 * p["points"]), sweep(p), p["sweep"]
+    angle = np.radians(value) if kind in ("direction", "slide", "spin") else 0.0 * full
+    youngs, poisson, density = (np.repeat([p[f"{name}_a"], p[f"{name}_b"]], p["points"])
+                                for name in ("youngs_modulus", "poisson_ratio", "density"))
+    # Sphere and partner share Poisson's ratio.
+    softness = (1.0 + 1.0 / p["stiffness_ratio"]) / youngs
+    mirror, rest = p["partner"] == "mirror", p["partner"] == "rest"
+    larger, denser = (p["size_ratio"], p["density_ratio"]) if rest else (1.0, 1.0) if mirror else (math.inf, 1.0)
+    mass = 4.0 / 3.0 * math.pi * p["radius"] ** 3 * density
+    normal = -p["speed"] * (np.cos(angle) if kind == "direction" else full)
+    slide = p["speed"] * {"direction": np.sin(angle), "slide": np.tan(angle)}.get(kind, 0.0 * full)
+    spin = p["speed"] * np.tan(angle) / p["radius"] if kind == "spin" else 0.0 * full
+    moving = np.array([[1.0], [-1.0 if mirror else 0.0]])
+    return Impacts(1.0 / ((1.0 - poisson**2) * softness), 1.0 / (2.0 * (2.0 - poisson) * (1.0 + poisson) * softness),
+                   value if kind == "restitution" else p["restitution"] * full, p["friction"] * full,
+                   np.array([p["radius"] * full, larger * p["radius"] * full]), np.array([mass, larger**3 * denser * mass]),
+                   moving * slide, moving * normal, moving * spin)
 
 
 def read(replica: Replica, one: Impacts, touch: float) -> Flight:

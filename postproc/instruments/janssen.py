@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from dembark.postproc.replica import Array
 
@@ -26,6 +25,8 @@ def two_parameter(depth: Array, length: float, onset: float, weight: float = 1.0
 
 def fitted_length(depth: Array, measured: Array, start: float, weight: float = 1.0) -> float:
     """lambda (m) that fits the stress `measured` (n,) in Pa best, by least squares from `start` on."""
+    from scipy.optimize import least_squares  # slow to import, and not needed before something is measured
+
     fit = least_squares(lambda p: (stress(depth, np.exp(p[0]), weight) - measured) / measured.max(), [np.log(start)])
     return float(np.exp(fit.x[0]))
 
@@ -33,6 +34,8 @@ def fitted_length(depth: Array, measured: Array, start: float, weight: float = 1
 def fitted_pair(depth: Array, measured: Array, starts: Sequence[tuple[float, float]], limits: Sequence[tuple[float, float]], scale: float,
                 weight: float = 1.0) -> tuple[float, float]:
     """(lambda, onset) in m of the two-parameter form: the best of the fits from all `starts`, within `limits` (low, high) of the two."""
+    from scipy.optimize import least_squares  # as above
+
     fits = [least_squares(lambda p: (two_parameter(depth, p[0], p[1], weight) - measured) / measured.max(), start,
                           bounds=tuple(zip(*limits, strict=True)), x_scale=scale) for start in starts]
     length, onset = min(fits, key=lambda fit: fit.cost).x

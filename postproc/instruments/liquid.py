@@ -6,9 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dembark.postproc.measurement import Value
-from dembark.postproc.replica import Array, Replica
-from dembark.postproc.statistics import Estimate, block_mean, exact, over_replicas
+from dembark.postproc.measurement import Array, Estimate, Replica, Value, block_mean, exact, over_replicas
 
 
 def liquid_values(replicas: Sequence[Replica]) -> dict[str, Value]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,10 +12,8 @@ from numpy.typing import NDArray
 
 from dembark.postproc import DumpError
 from dembark.postproc.dumptext import TextDump
-from dembark.postproc.measurement import Value
-from dembark.postproc.replica import Array, Replica
-from dembark.postproc.resampling import profile
-from dembark.postproc.statistics import CONFIDENCE, Estimate, exact, student
+from dembark.postproc.measurement import Value, number, profile
+from dembark.postproc.replica import Array, Replica, once
 
 # Points of a curve, twice as many at most.
 POINTS = 100
@@ -93,6 +90,7 @@ def read_touches(path: Path) -> list[TouchFrame]:
     return frames
 
 
+@once
 def read(replica: Replica) -> LogRun:
     """The whole run as arrays; DumpError when files do not fit together."""
     frames, history = list(replica.grains()), replica.times()
@@ -108,11 +106,6 @@ def read(replica: Replica) -> LogRun:
                   first.radii, history, replica.impacts(), touches)
 
 
-def number(value: float, reference: float | None = None, **more: Any) -> Value:
-    """`value` and `reference` without an interval; `more` as in Value."""
-    return Value(exact(value), None if reference is None else exact(reference), **more)
-
-
 def solver_values(run: LogRun) -> dict[str, Value]:
     """How well the complementarity problems of all steps were solved, and with how many pivots."""
     rows = run.history
@@ -120,62 +113,6 @@ def solver_values(run: LogRun) -> dict[str, Value]:
     return {
         "certificate": number(rows["worst_certificate"][-1], 0.0),
         "pivots_per_step": number(rows["pivots_total"][-1] / float(rows["step"][-1]), detail=told),
-    }
-
-
-@dataclass(frozen=True)
-class Loads:
-    """What contacts carry in all frames, in N, along x and y.
-
-    `walls` (frames, walls, 2): force of each wall on the logs; `net` (frames, n, 2): sum of the contact forces on each log; `contacts`
-    (frames,): how many carry; `mobilised` (frames,): mean of |T| / N, NaN without contacts.
-    """
-
-    walls: Array
-    net: Array
-    contacts: Array
-    mobilised: Array
-
-
-def loads(run: LogRun, walls: Sequence[int]) -> Loads:
-    """Sums over the contacts of each frame; `walls`: the ids of those to tell apart."""
-    frames, logs = run.positions.shape[:2]
-    on_walls, net, mobilised = np.zeros((frames, len(walls), 2)), np.zeros((frames, logs, 2)), np.full(frames, np.nan)
-    for frame, touch in enumerate(run.touches):
-        on_first = (touch.normals * touch.forces[:, None] + touch.friction)[:, :2]
-        first, second = touch.ids.T
-        np.add.at(net[frame], first - 1, on_first)
-        pair = second > 0
-        np.add.at(net[frame], second[pair] - 1, -on_first[pair])
-        on_walls[frame] = [on_first[second == wall].sum(axis=0) for wall in walls]
-        if len(touch.forces):
-            mobilised[frame] = float(np.mean(np.linalg.norm(touch.friction, axis=1) / touch.forces))
-    return Loads(on_walls, net, np.array([len(touch.forces) for touch in run.touches], float), mobilised)
-
-
-def beginning(run: LogRun, count: int) -> tuple[int, NDArray[np.int64], Array]:
-    """(frame, logs, impacts): the last frame before impact `count` + 1 begins, the logs of the first `count` impacts, and these by time."""
-    order = run.impacts[np.lexsort((run.impacts[:, 1], run.impacts[:, 0], run.impacts[:, 2]))]
-    until = order[count, 2] if len(order) > count else run.times[-1] + 0.5 * run.time_step
-    frame = int(np.flatnonzero(run.times < until - 0.5 * run.time_step)[-1])
-    ids = np.unique(order[:count, :2].astype(np.int64))
-    return frame, ids[ids > 0] - 1, order[:count]
-
-
-def impact_values(run: LogRun) -> dict[str, Value]:
-    """How many impacts there were, the geometric mean of their peak forces and the median of their impulses, with the intervals of as many
-    independent ones; nothing of fewer than two."""
-    count, z = len(run.impacts), student(1e9, CONFIDENCE)
-    if count < 2:
-        return {}
-    basis, peak, impulse = f"{count} impacts as independent ones", np.log(run.impacts[:, 4]), np.sort(run.impacts[:, 5])
-    middle, mean, reach = float(np.median(impulse)), float(np.exp(peak.mean())), 0.5 * z * math.sqrt(count)
-    # The interval of a median is that of its order statistics.
-    low, high = impulse[max(0, math.floor(0.5 * count - reach))], impulse[min(count - 1, math.ceil(0.5 * count + reach))]
-    return {
-        "impact_count": Value(Estimate(float(count), z * math.sqrt(count), "counting statistics")),
-        "impact_peak": Value(Estimate(mean, float(mean * z * peak.std() / math.sqrt(count)), basis)),
-        "impact_impulse": Value(Estimate(middle, float(max(high - middle, middle - low)), basis)),
     }
 
 

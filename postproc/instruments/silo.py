@@ -12,8 +12,7 @@ from dembark.postproc.instruments import janssen
 from dembark.postproc.instruments.column import Column, Mask
 from dembark.postproc.instruments.growth import Growth
 from dembark.postproc.instruments.vessel import overlap
-from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.replica import Array
+from dembark.postproc.measurement import Array, Measurement, Value
 from dembark.postproc.resampling import pooled, profile, resampled
 from dembark.postproc.statistics import Estimate, block_mean, exact, time_blocks
 from dembark.postproc.studies import measured as of_point

@@ -14,9 +14,8 @@ from threadpoolctl import threadpool_limits
 from dembark.postproc.fields.rings import Fields, Rings, coarse_grain
 from dembark.postproc.instruments import janssen
 from dembark.postproc.instruments.vessel import Cylinder, overlap
-from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.output.labelled import labelled, variable, with_interval
-from dembark.postproc.replica import Array, Replica
+from dembark.postproc.labelled import labelled, variable, with_interval
+from dembark.postproc.measurement import Array, Measurement, Replica, Value
 from dembark.postproc.resampling import resampled
 from dembark.postproc.statistics import Estimate, TimeBlocks, block_mean, combined, over_replicas, time_blocks
 from dembark.postproc.studies import propagated

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray
 
-from dembark.postproc.output.labelled import labelled, variable, with_interval, write
+from dembark.postproc.labelled import labelled, variable, with_interval, write
 from dembark.postproc.statistics import Estimate
 
 

@@ -10,6 +10,7 @@ from scenes import contacts_of, frame_of
 
 from dembark.common.errors import DembarkError
 from dembark.postproc import DumpError
+from dembark.postproc.statistics import block_mean
 from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, Motion, PlaneWall, into_box, wall_contacts
 from dembark.postproc.walls.mesh import TriangleTree, nearest_on_triangles, read_stl
 from dembark.postproc.walls.patches import box_patches, cylinder_patches, inclusion_patches, mesh_patches, plane_patches
@@ -323,22 +324,34 @@ def test_histogram_counts_like_one_that_knows_the_range(parts):
         assert histogram.mean == pytest.approx(values.mean(), rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("count", [1, 7, 8, 16, 100])
+@pytest.mark.parametrize("count", [1, 7, 8, 100, 128, 1000])
 def test_blocks_have_the_interval_of_their_means(count):
-    values = np.random.default_rng(count).normal(size=(count, 2))
+    values = np.random.default_rng(count).normal(size=(count, 3, 2))
     blocks = Blocks()
     for value in values:
         blocks.add(value)
-    length = max(1, 2 ** int(np.log2(max(1, count // 8))))
-    whole = count // length
-    assert blocks.count == whole
-    half = blocks.half((2,))
-    if whole < 8:
-        assert np.isinf(half).all()
-    else:
-        means = values[: whole * length].reshape(whole, length, 2).mean(axis=1)
-        np.testing.assert_allclose(half / means.std(axis=0, ddof=1) * np.sqrt(whole), half[0] / means[:, 0].std(ddof=1) * np.sqrt(whole))
-        assert 2.0 < half[0] / means[:, 0].std(ddof=1) * np.sqrt(whole) < 2.4
+    length = max(1, 2 ** int(np.log2(max(1, count // 64))))
+    assert blocks.count == count // length
+    means = values[: blocks.count * length].reshape(blocks.count, length, 3, 2).mean(axis=1)
+    due = [[block_mean(means[:, one, other]).half for other in range(2)] for one in range(3)]
+    np.testing.assert_allclose(blocks.half((3, 2)), due)
+
+
+@pytest.mark.parametrize("tau", [1.0, 5.0, 40.0])
+def test_intervals_of_patches_hold_the_mean_of_correlated_series(tau):
+    """Autoregressive series of 50 correlation times: 95 % intervals hold the true mean as often as those of `block_mean`."""
+    memory, generator, count = (tau - 1.0) / (tau + 1.0), np.random.default_rng(3), int(50 * max(tau, 4.0))
+    value, blocks, total = generator.normal(size=1000), Blocks(), np.zeros(1000)
+    for _ in range(count):
+        value = memory * value + np.sqrt(1.0 - memory**2) * generator.normal(size=1000)
+        blocks.add(value)
+        total += value
+    held = np.abs(total / count) <= blocks.half((1000,))
+    assert 0.92 < held.mean() < 0.985
+    # As if neighbouring blocks were independent, with all of them.
+    means = np.array(blocks._sums[: blocks.count]) / blocks._length
+    naive = 2.0 * means.std(axis=0, ddof=1) / np.sqrt(blocks.count)
+    assert tau < 10.0 or (np.abs(total / count) <= naive).mean() < 0.85
 
 
 def test_series_gives_the_mean_the_deviation_and_the_peaks():

@@ -6,11 +6,10 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
+
+from dembark.postproc.statistics import block_halves
 
 Array = NDArray[np.float64]
-
-_CONFIDENCE = 0.95
 
 
 class Histogram:
@@ -95,10 +94,11 @@ class PeakFinder:
 
 
 class Blocks:
-    """Means over blocks of a series of arrays, for intervals of the mean of correlated values (Flyvbjerg & Petersen, J. Chem. Phys. 91
-    (1989) 461). Blocks double their length, so that there are always 8 to 15 of them once there are 8 values."""
+    """Means over blocks of a series of arrays, for intervals of the mean of correlated values. Blocks double their length, so that memory
+    does not grow: there are always 64 to 127 of them once there are 64 values, which are a series themselves."""
 
-    _LEAST = 8
+    _LEAST = 64
+    _CHUNK = 4096  # series at a time, whose spectra are in memory
 
     def __init__(self) -> None:
         self._sums: list[Array] = []
@@ -121,8 +121,8 @@ class Blocks:
         return len(self._sums) - bool(self._filled)
 
     def half(self, shape: tuple[int, ...]) -> Array:
-        """Half-width of Student's 95 % interval of the mean over the full blocks; inf with fewer than 8."""
-        if self.count < self._LEAST:
-            return np.full(shape, np.inf)
-        means = np.array(self._sums[: self.count]) / self._length
-        return special.stdtrit(self.count - 1, 0.5 + 0.5 * _CONFIDENCE) * means.std(axis=0, ddof=1) / math.sqrt(self.count)
+        """Half-width of the 95 % interval of the mean from the full blocks, corrected for the correlation in time as in `block_mean`; inf
+        with fewer than 8."""
+        means = np.array(self._sums[: self.count]).reshape(self.count, math.prod(shape)) / self._length
+        parts = [block_halves(means[:, start : start + self._CHUNK]) for start in range(0, means.shape[1], self._CHUNK)]
+        return np.concatenate([np.zeros(0), *parts]).reshape(shape)

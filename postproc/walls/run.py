@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from dembark.common.errors import DembarkError
+from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.dumptext import DumpError
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.history import read_times
@@ -27,9 +28,10 @@ Attributes = Mapping[str, str | float | int]
 _SERIES_LIMIT = 400_000_000
 # Distances of the contact points from the grains' centres, over the radius, that raise doubts about the wall's place.
 _DOUBTFUL = (0.7, 1.3)
-# A mesh is in another unit or place when it is larger than so many boxes of grains, or half of those that feel it are farther than so
-# many radii.
-_ROOMS = 50.0
+# A mesh is in another unit or place when it is larger than so many boxes of grains (an inch is 25 mm), or half of the grains that feel it
+# are farther than so many radii. One that is much larger than the box, and may yet be a long floor, is told.
+_ROOMS = 20.0
+_LARGE = 5.0
 _FAR = 2.0
 
 
@@ -65,7 +67,7 @@ class WallJob:
     def run(self, advance: Callable[[], None], provenance: Attributes) -> None:
         """Measure and write; `advance` is called after each frame."""
         recorders = recorders_of(self.walls, self.source, self.numbers, self.patch)
-        for grains, contacts in self.source.frames(self.numbers):
+        for grains, contacts in checked_frames(self.walls, self.source, self.numbers):
             for recorder in recorders:
                 recorder.add(grains, contacts, self.source.time(grains.step))
             advance()
@@ -80,7 +82,7 @@ class WallJob:
 
     def summary(self) -> list[str]:
         """What was measured, checked and written, in lines."""
-        lines = [*source_lines(self.source, self.numbers, self.diameter)]
+        lines = [*source_lines(self.source, self.numbers, self.diameter), *mesh_notes(self.walls, self.source, self.numbers)]
         for one in self.results:
             lines += wall_lines(one, self.source)
         return [*lines, *(f"written: {path}" for path in self.written)]
@@ -119,15 +121,19 @@ def check_inclusions(words: Iterable[WallWord], source: Source) -> None:
             raise DembarkError(f"the load of {word.wall.name} needs contacts", f"{source.path} has none", "name their dump with --contacts")
 
 
-def check_meshes(words: Iterable[WallWord], source: Source, frame: GrainFrame) -> None:
-    """DembarkError when a mesh cannot be what the grains of `frame` feel: its file was in another unit, or it was elsewhere."""
-    time = source.time(frame.step)
+def check_meshes(words: Iterable[WallWord], source: Source, frame: GrainFrame) -> list[WallWord]:
+    """DembarkError when a mesh cannot be what the grains of `frame` feel: its file was in another unit, or it was elsewhere.
+
+    Returns the meshes that no grain feels yet, of which only the size was looked at.
+    """
+    time, unfelt = source.time(frame.step), []
     for word in words:
         if not isinstance(word.wall, MeshWall):
             continue
         wall = word.wall.at(time)
         doubt = _misfit(wall, frame)
         if not doubt:
+            unfelt += [word] * (not frame.wall_forces[wall.name].any())
             continue
         # The mesh as it is, and as it would be in other units: factors between any two of them.
         factors = {name: unit / word.unit for name, unit in STL_UNITS.items()}
@@ -135,14 +141,38 @@ def check_meshes(words: Iterable[WallWord], source: Source, frame: GrainFrame) -
         size = " x ".join(f"{1e3 * extent:.4g}" for extent in np.ptp(wall.triangles.reshape(-1, 3), axis=0))
         right = f"with unit={' or unit='.join(fits)} it fits" if fits else "give the unit of the file, and where the simulation had it"
         raise DembarkError(f"the mesh is {size} mm, and {doubt}", f"in --wall {wall.name}", right)
+    return unfelt
+
+
+def checked_frames(words: Iterable[WallWord], source: Source, numbers: Sequence[int]) -> Iterator[tuple[GrainFrame, ContactFrame | None]]:
+    """The frames with their contacts; DembarkError at the first in which grains feel a mesh that cannot be what they feel."""
+    unfelt = list(words)
+    for grains, contacts in source.frames(numbers):
+        unfelt = check_meshes(unfelt, source, grains)
+        yield grains, contacts
+
+
+def mesh_notes(words: Iterable[WallWord], source: Source, numbers: Sequence[int]) -> list[str]:
+    """A line for each mesh that is much larger than the box of the grains."""
+    frame = source.grains[numbers[0]]
+    sizes = {word.wall.name: float(np.ptp(word.wall.triangles.reshape(-1, 3), axis=0).max())
+             for word in words if isinstance(word.wall, MeshWall)}
+    return [f"note: the mesh {name} is {1e3 * size:.4g} mm wide, the box of the grains {1e3 * _room(frame):.4g} mm; is unit= its file's?"
+            for name, size in sizes.items() if size > _LARGE * _room(frame)]
+
+
+def _room(frame: GrainFrame) -> float:
+    """Width (m) of the box of the grains, or of the grains where they have left it."""
+    return float(max(np.ptp(frame.wrapped, axis=0).max(), (frame.high - frame.low).max(), 2.0 * frame.radii.max()))
 
 
 def _misfit(wall: MeshWall, frame: GrainFrame) -> str:
     """Why the mesh cannot be the wall that grains feel, '' when it can."""
-    corners = wall.triangles.reshape(-1, 3)
-    room = max(np.ptp(frame.wrapped, axis=0).max(), (frame.high - frame.low).max(), 2.0 * frame.radii.max())
-    if np.ptp(corners, axis=0).max() > _ROOMS * room:
-        return f"the box of the grains only {1e3 * room:.4g} mm wide"
+    extent, smallest = np.ptp(wall.triangles.reshape(-1, 3), axis=0).max(), 2.0 * frame.radii.min()
+    if extent > _ROOMS * _room(frame):
+        return f"the box of the grains only {1e3 * _room(frame):.4g} mm wide"
+    if extent < smallest:
+        return f"the smallest grain {1e3 * smallest:.4g} mm wide"
     felt = np.linalg.norm(frame.wall_forces[wall.name], axis=1) > 0.0
     if not felt.any():
         return ""

@@ -32,7 +32,7 @@ class WallStress:
     Time series: `steps`, `times` (T,) in s, `displacements` (T, 3) of the wall (of an inclusion: its centre) in m, `force` (T, 3) of the
     wall on the grains in N, `outside` (T, 3) its part that acts beyond all patches, `normal_force` (T,) the sum of the normal components.
     Patches, components normal, shear_1 and shear_2: `mean` stress (p, 3) in Pa, `deviation` (p, 3) its standard deviation in time, `half`
-    (p, 3) half-width of the 95 % interval of the mean over `blocks` time blocks (inf with fewer than 8), `mean_force` (p, 3) in N along
+    (p, 3) half-width of the 95 % interval of the mean from `blocks` means over time (inf with fewer than 8), `mean_force` (p, 3) in N along
     x, y, z, `contacts` (p,) number of contacts counted in all frames, `series` (T, p, 3) in Pa when it was kept.
     Histograms: `peak_stress`, local maxima in time of the patches' normal stress (Pa); `contact_force`, normal forces of single contacts
     (N). Peaks of the whole wall: `peak_times` (s), `peak_forces` (N), local maxima of `normal_force`.

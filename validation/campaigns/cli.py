@@ -20,7 +20,6 @@ Jobs = Annotated[int | None, typer.Option(min=1, help="Jobs of a cluster at a ti
 Out = Annotated[Path | None, typer.Option(help="Folder of the campaign; default: results/campaigns/<name>.")]
 Dry = Annotated[bool, typer.Option("--dry-run", help="Only show the runs, what they cost and whether the file is right.")]
 
-
 app = typer.Typer()
 
 
@@ -93,9 +92,10 @@ def _conclude(outcome: Outcome, results: Path) -> None:
 @app.command()
 def status(directory: Folder) -> None:
     """Show how far a campaign is: each run with its simulated time, and the time left."""
+    from dembark.common.units import duration
     from dembark.validation import show
     from dembark.validation.campaigns.folder import look
-    from dembark.validation.runs.progress import duration, state_table
+    from dembark.validation.runs.progress import state_table
 
     results = directory.resolve()
     found = look(results)
@@ -107,7 +107,7 @@ def status(directory: Folder) -> None:
             console.print(f"failed: {state.name}: {state.message}", markup=False, style="red", soft_wrap=True)
     if found.running and found.left:
         console.print(f"about {duration(found.left)} left")
-    console.print(f"{found.measured} series measured; {found.tally.sentence}")
+    show.print_tally(console, found.tally, f"{found.measured} series measured; ")
     if found.report:
         console.print(str(found.report), markup=False, soft_wrap=True)
     if not found.running and not found.complete:

@@ -13,12 +13,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from dembark.common.units import core_hours, duration, size_text
 from dembark.validation import engines
 from dembark.validation.campaigns import store
-from dembark.validation.campaigns.sizes import core_hours, size_text
 from dembark.validation.case import deck
 from dembark.validation.runs.plan import Plan, Series, finished
-from dembark.validation.runs.progress import duration
 
 
 @dataclass(frozen=True)
@@ -87,11 +86,6 @@ def estimates(plan: Plan, rates: Rates) -> list[Estimate]:
     return found
 
 
-def total(values: Iterable[float | None]) -> float:
-    """Sum of what is known."""
-    return sum(value for value in values if value is not None)
-
-
 def wall_clock(costs: Sequence[tuple[float, int]], cores: int) -> float:
     """Time (s) until all runs, given as (wall time in s, cores), are done on `cores` cores, the longest first; runs wait for room.
 
@@ -120,19 +114,13 @@ def warnings(plan: Plan, found: Iterable[Estimate], results: Path, room: float) 
     return lines
 
 
-def rate_sources(found: Iterable[Estimate]) -> Mapping[str, list[str]]:
-    """Engines and cases by the source of their rate."""
-    sources: dict[str, list[str]] = {}
+def rate_sources(found: Iterable[Estimate]) -> Mapping[str, Iterable[str]]:
+    """Engines and cases by the source of their rate, each once."""
+    sources: dict[str, dict[str, None]] = {}
     for one in found:
         run = one.series.runs[0]
-        word = f"{run.case.name} in {run.engine.name} {one.rate.value:.2g}"
-        if word not in sources.setdefault(one.rate.source, []):
-            sources[one.rate.source].append(word)
+        sources.setdefault(one.rate.source, {})[f"{run.case.name} in {run.engine.name} {one.rate.value:.2g}"] = None
     return sources
-
-
-def _left(one: Series, results: Path) -> int:
-    return sum(not finished(results / one.place / run.folder_name, run) for run in one.runs)
 
 
 def dry_run(console: Console, plan: Plan, found: Sequence[Estimate], results: Path, cores: int | None) -> None:
@@ -140,12 +128,13 @@ def dry_run(console: Console, plan: Plan, found: Sequence[Estimate], results: Pa
 
     `cores` of this machine give the time that it will take; None when the runs are jobs of a cluster.
     """
-    left = {one.series.place: _left(one.series, results) for one in found}
+    left = {one.series.place: sum(not finished(results / one.series.place / run.folder_name, run) for run in one.series.runs)
+            for one in found}
     console.print(runs_table(found, left))
     runs, to_do = sum(len(one.series.runs) for one in found), sum(left.values())
-    work = total(one.core_seconds and one.core_seconds * left[one.series.place] for one in found)
-    steps = total(one.particle_steps and one.particle_steps * left[one.series.place] for one in found)
-    room = total(one.size and one.size * left[one.series.place] for one in found)
+    # Of all that is known.
+    work, steps, room = (sum((getattr(one, name) or 0.0) * left[one.series.place] for one in found)
+                         for name in ("core_seconds", "particle_steps", "size"))
     done = f", {runs - to_do} finished already" if runs > to_do else ""
     console.print(f"{plan.label}: {runs} runs{done}; to do: {steps:.2g} particle-steps, {core_hours(work)} core-hours, "
                   f"{size_text(room)} on the disk", style="bold", soft_wrap=True)

@@ -12,6 +12,7 @@ from typing import Any
 
 from dembark.common.choices import Value, pick
 from dembark.common.errors import DembarkError
+from dembark.postproc.convergence import REFINEMENT
 from dembark.validation import engines
 from dembark.validation.campaigns.spec import CampaignSpec, SweepSpec, read
 from dembark.validation.case.model import checked
@@ -106,15 +107,10 @@ def points(spec: CampaignSpec) -> list[Point]:
             folder = folders.setdefault((sweep.case.name, *point.resolved.values()), point.variant)
             found.append(replace(point, variant=folder))
     _distinct(spec, found)
-    runs = sum(len(point.sweep.engines) * _replicas(point) for point in found)
+    runs = sum(len(point.sweep.engines) * int(point.resolved.get("replicas") or 1) for point in found)
     if runs > MOST_RUNS:
         raise DembarkError(f"{spec.path} has {runs} runs", "", f"a campaign may have {MOST_RUNS}: make several")
     return found
-
-
-def _replicas(point: Point) -> int:
-    count = point.resolved.get("replicas")
-    return count if isinstance(count, int) else 1
 
 
 def _distinct(spec: CampaignSpec, found: Sequence[Point]) -> None:
@@ -131,9 +127,22 @@ def _sweeps(spec: CampaignSpec, found: Sequence[Point]) -> list[dict[str, Any]]:
     """The sweeps for a JSON file: case, name, title, axes, and their points with folder names and values in SI units."""
     return [{"case": sweep.case.name, "name": sweep.name or f"sweep {sweep.number}", "title": sweep.title, "axes": list(sweep.axes),
              "engines": list(sweep.engines), "profile": sweep.profile,
-             "points": [{"variant": point.variant, "base": point.base, "values": dict(point.values), "changes": dict(point.changes)}
+             "points": [{"variant": point.variant, "base": point.base, "values": dict(point.values), "changes": dict(point.changes),
+                         "formal_orders": _formal_orders(point)}
                         for point in found if point.sweep is sweep]}
             for sweep in spec.sweeps]
+
+
+def _formal_orders(point: Point) -> dict[str, float]:
+    """Formal order of the scheme at a point, by the parameters of the method that vary; DembarkError when it is no positive number."""
+    found, where = {}, f"point {point.variant}"
+    for axis in (axis for axis in point.sweep.axes if axis in REFINEMENT):
+        expression = point.sweep.formal_order or point.sweep.case.formal_order(axis)
+        order = expression.evaluated(point.resolved, "formal_order", where)
+        if not isinstance(order, int | float) or not 0.0 < order < math.inf:
+            raise DembarkError(f"formal_order = {expression.text!r} is {order}", where, "give a positive number, or an expression for one")
+        found[axis] = float(order)
+    return found
 
 
 def campaign(spec: CampaignSpec, only_cases: Sequence[str] = (), only_engines: Sequence[str] = ()) -> Plan:

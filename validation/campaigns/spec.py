@@ -8,22 +8,23 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from dembark.common import units
 from dembark.common.choices import Value, nearest, pick
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
-from dembark.validation.campaigns import sizes
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.folders import discover, files, find
 from dembark.validation.case.model import Case
-from dembark.validation.case.tables import TableReader, load_toml
+from dembark.validation.case.tables import ORDER, TableReader, Types, load_toml
 from dembark.validation.runs.plan import RETRIES, Resources
 
 MEASURE = "measure"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 _PER_RUN = {"ranks": int, "threads": int, "memory": str, "time": str, "restart_interval": str}
 _MEASURING = {"memory": str, "time": str}
-_SWEEP = {"case": str, "name": str, "title": str, "profile": str, "variant": str, "variants": list, "engines": list, "grid": dict,
-          "list": list, "fixed": dict, "derived": dict, "replicas": int, "resources": dict}
+_SWEEP: dict[str, Types] = {
+    "case": str, "name": str, "title": str, "profile": str, "variant": str, "variants": list, "engines": list, "grid": dict, "list": list,
+    "fixed": dict, "derived": dict, "replicas": int, "resources": dict, "formal_order": ORDER}
 # Keys of a sweep that [campaign] may give for all sweeps that do not have them.
 _SHARED = ("case", "variants", "fixed", "derived")
 _CAMPAIGN = {"name": str, "description": str, "profile": str, "engines": list, "replicas": int, "retries": int,
@@ -34,7 +35,8 @@ _CAMPAIGN = {"name": str, "description": str, "profile": str, "engines": list, "
 class SweepSpec:
     """One sweep: `rows` are the changes of its points, in SI units, to each of `variants`; `axes` are the names that vary, slowest first.
 
-    `fixed` are changes of all points; `derived` are parameters that follow from the others of a point.
+    `fixed` are changes of all points; `derived` are parameters that follow from the others of a point; `formal_order` is that of the scheme
+    in a time step or stiffness that varies (None: as the case says).
     """
 
     number: int
@@ -50,6 +52,7 @@ class SweepSpec:
     derived: Mapping[str, Expression]
     replicas: int | None
     resources: Mapping[str, Resources]
+    formal_order: Expression | None = None
 
     @property
     def label(self) -> str:
@@ -119,6 +122,7 @@ class _Reader(TableReader):
         head, resources = data["campaign"], data.get("resources", {})
         self.table(head, "campaign", _CAMPAIGN, ("name",))
         self.folder_name("campaign", head["name"])
+        head = self.named(head["name"]) | head
         if not data["sweeps"]:
             raise self.fail("sweeps", "there are no sweeps", "add a table [[sweeps]]")
         if "profile" in head:
@@ -134,6 +138,13 @@ class _Reader(TableReader):
             self.path, head["name"], head.get("description", "").strip(), head.get("retries", RETRIES),
             tuple(self.sweep(f"sweeps {number}", number, entry, head, base) for number, entry in enumerate(data["sweeps"], start=1)),
             None if measure is None else self.changed(f"resources.{MEASURE}", Resources(), measure))
+
+    def named(self, name: str) -> dict[str, str]:
+        """Case and profile that the name of a campaign such as silo-standard gives to all sweeps that name none."""
+        case, _, profile = name.rpartition("-")
+        if case not in {path.parent.name for path in files()}:
+            return {}
+        return {"case": case} | ({"profile": profile} if profile in find(case).profiles else {})
 
     def folder_name(self, table: str, text: str) -> None:
         if not _NAME.fullmatch(text):
@@ -192,7 +203,8 @@ class _Reader(TableReader):
             number, case, entry.get("name", ""), entry.get("title", ""), profile, variants, chosen,
             (*(("variant",) if len(variants) > 1 else ()), *rows[0]), tuple(rows), fixed,
             self.derived(f"{table}.derived", entry.get("derived", {}), rows[0].keys() | fixed.keys(), case),
-            self.replicas(table, entry, case, head), self.resources(f"{table}.resources", entry.get("resources", {}), base))
+            self.replicas(table, entry, case, head), self.resources(f"{table}.resources", entry.get("resources", {}), base),
+            self.order(table, entry, case.parameters))
 
     def replicas(self, table: str, entry: Mapping[str, Any], case: Case, head: Mapping[str, Any]) -> int | None:
         self.least(table, entry, replicas=1)
@@ -286,7 +298,7 @@ class _Reader(TableReader):
     def changed(self, table: str, base: Resources, data: Mapping[str, Any]) -> Resources:
         """`base` with the numbers that the texts of `data` mean."""
         self.least(table, data, ranks=1, threads=1)
-        read = {"memory": sizes.size, "time": sizes.seconds, "restart_interval": sizes.seconds}
+        read = {"memory": units.size, "time": units.seconds, "restart_interval": units.seconds}
         try:
             numbers: dict[str, Any] = {key: read[key](value) if key in read else value for key, value in data.items()}
         except DembarkError as error:

@@ -21,12 +21,10 @@ from dembark.validation.judge.result import COMPARISON, METRICS, QuantityRecord
 from dembark.validation.judge.tally import Tally
 from dembark.validation.judge.tally import tally as count
 from dembark.validation.runs import schema
-from dembark.validation.runs.schema import KEYS, TABLES, clear, put
+from dembark.validation.runs.schema import FILE, KEYS, TABLES, clear, put
 
 if TYPE_CHECKING:
     import numpy as np
-
-FILE = schema.FILE
 
 
 def collect(results: Path, campaign: str, places: Iterable[Path], sweeps: Iterable[Mapping[str, Any]] | None = None) -> None:

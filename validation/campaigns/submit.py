@@ -9,10 +9,10 @@ from pathlib import Path
 
 from dembark.common.errors import DembarkError
 from dembark.common.lock import lock
-from dembark.validation.campaigns import estimate, expand, folder, store
+from dembark.common.units import size_text
+from dembark.validation.campaigns import estimate, expand, folder
 from dembark.validation.campaigns.folder import Options
-from dembark.validation.campaigns.sizes import size_text
-from dembark.validation.runs import site
+from dembark.validation.runs import schema, site
 from dembark.validation.runs.executor import Local
 from dembark.validation.runs.perform import LOCK, Outcome, Place, perform
 from dembark.validation.runs.plan import Plan
@@ -62,7 +62,7 @@ def _place(chosen: Options, results: Path, plan: Plan, cancel: threading.Event, 
 
 def forecast(plan: Plan, results: Path) -> list[estimate.Estimate]:
     """What each series costs, with the rates of the campaign's own store when it has measured some."""
-    return estimate.estimates(plan, estimate.Rates(results / store.FILE))
+    return estimate.estimates(plan, estimate.Rates(results / schema.FILE))
 
 
 def submit(plan: Plan, file: Path, results: Path, chosen: Options, cancel: threading.Event, say: Say) -> Outcome:

@@ -22,6 +22,8 @@ PROFILES = ("quick", "standard", "full")
 # Kinds of evidence: what a reference is.
 EVIDENCE = ("experiment", "theory", "code", "identity")
 UNSET = "auto"
+# The formal order of a scheme of which nothing else is said.
+FIRST_ORDER = Expression("1")
 
 
 @dataclass(frozen=True)
@@ -99,13 +101,17 @@ class PlannedRun:
 
 @dataclass(frozen=True)
 class Study:
-    """Variants that differ in one parameter, `along`, and are looked at together, in this order."""
+    """Variants that differ in one parameter, `along`, and are looked at together, in this order.
+
+    `formal_order`: that of the scheme in `along`, which the grid convergence index of campaigns along it takes.
+    """
 
     name: str
     title: str
     description: str
     along: str
     variants: tuple[str, ...]
+    formal_order: Expression = FIRST_ORDER
 
     @property
     def folder_name(self) -> str:
@@ -168,6 +174,10 @@ class Case:
     def deck(self, engine: str) -> Path:
         """Deck of `engine` in this folder."""
         return self.folder / engines.facts(engine).deck
+
+    def formal_order(self, along: str) -> Expression:
+        """Formal order of the scheme in the parameter `along`, as the first study along it says; 1 where there is none."""
+        return next((study.formal_order for study in self.studies.values() if study.along == along), FIRST_ORDER)
 
     def with_derived(self, values: Mapping[str, Value]) -> dict[str, Value]:
         """`values` and the numbers that follow from them by the expressions of [derived]; DembarkError for one without a value."""

@@ -7,12 +7,13 @@ from functools import cache
 from typing import Any
 
 from dembark.common.choices import Value
-from dembark.common.units import known_unit
+from dembark.common.units import known_unit, si_unit
 from dembark.validation import engines
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.folders import package_root
 from dembark.validation.case.model import (
     EVIDENCE,
+    FIRST_ORDER,
     OUTPUTS,
     PROFILES,
     STANDARD_OUTPUTS,
@@ -23,7 +24,7 @@ from dembark.validation.case.model import (
     PlannedRun,
     Study,
 )
-from dembark.validation.case.tables import TableReader, Types, load_toml
+from dembark.validation.case.tables import ORDER, TableReader, Types, load_toml
 
 
 @cache
@@ -114,7 +115,7 @@ class CaseReader(TableReader):
         if "evidence" in entry:
             self.pick(entry["evidence"], EVIDENCE, "kind of evidence", table)
         if not known_unit(entry.get("unit", "1")):
-            raise self.fail(table, f"unknown unit {entry['unit']!r}", 'an SI unit, or "1"')
+            raise self.fail(table, f"unknown unit {entry['unit']!r}", 'an SI unit, d or R, or "1"')
         tolerance = entry.get("tolerance")
         if tolerance is not None and "evidence" not in entry:
             raise self.fail(table, "a tolerance without evidence", f"say what the reference is: {', '.join(EVIDENCE)}")
@@ -137,8 +138,8 @@ class CaseReader(TableReader):
             raise self.fail(table, "value is missing", "a value, or optional = true")
         if (entry["type"] == "choice") != ("values" in entry):
             raise self.fail(table, "type and values do not fit", 'values = [...] together with type = "choice"')
-        if not known_unit(entry.get("unit", "1")):
-            raise self.fail(table, f"unknown unit {entry['unit']!r}", 'an SI unit, or "1"')
+        if not si_unit(entry.get("unit", "1")):
+            raise self.fail(table, f"{entry['unit']!r} is no SI unit without a factor", 'such as kg/m^3, or "1"; values may have others')
         parameter = Parameter(name=name, **{**entry, "values": tuple(entry.get("values", ()))})
         self.value(table, parameter, parameter.value)
         return parameter
@@ -156,9 +157,12 @@ class CaseReader(TableReader):
     def runs(self, data: Mapping[str, Any], profiles: Mapping[str, Any], variants: Mapping[str, Any],
              engines: tuple[str, ...], parameters: Mapping[str, Parameter]) -> dict[str, tuple[PlannedRun, ...]]:
         """[runs]: what each profile runs."""
-        result = {}
+        result: dict[str, tuple[PlannedRun, ...]] = {}
         for profile, entries in data.items():
             self.pick(profile, profiles, "profile", "runs")
+            if isinstance(entries, str):
+                result[profile] = result[self.pick(entries, result, "profile above", "runs")]
+                continue
             planned = []
             for one in entries:
                 entry = {"variant": one} if isinstance(one, str) else one
@@ -190,13 +194,15 @@ class CaseReader(TableReader):
     def study(self, name: str, entry: Any, parameters: Mapping[str, Parameter], variants: Mapping[str, Any]) -> Study:
         """[studies.NAME]: variants along a parameter."""
         table = f"studies.{name}"
-        self.table(entry, table, {"title": str, "description": str, "along": str, "variants": list}, ("title", "along", "variants"))
+        keys: dict[str, Types] = {"title": str, "description": str, "along": str, "variants": list, "formal_order": ORDER}
+        self.table(entry, table, keys, ("title", "along", "variants"))
         self.pick(entry["along"], parameters, "parameter", table)
         for variant in entry["variants"]:
             self.pick(variant, variants, "variant", table)
         if len(set(entry["variants"])) < max(3, len(entry["variants"])):
             raise self.fail(table, "a study needs at least three variants, each once")
-        return Study(name, entry["title"], entry.get("description", "").strip(), entry["along"], tuple(entry["variants"]))
+        return Study(name, entry["title"], entry.get("description", "").strip(), entry["along"], tuple(entry["variants"]),
+                     self.order(table, entry, parameters) or FIRST_ORDER)
 
     def constraint(self, text: str, message: Any, parameters: Mapping[str, Parameter]) -> Constraint:
         """An entry of [constraints]: the condition, and the sentence for whoever breaks it."""

@@ -13,6 +13,8 @@ from dembark.validation.case.expressions import Expression
 from dembark.validation.case.model import Parameter, checked
 
 Types = type | tuple[type, ...]
+# Of a formal order: a number, or an expression in the parameters.
+ORDER = (int, float, str)
 _WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", list: "a list [...]", dict: "a table {...}"}
 
 
@@ -64,6 +66,10 @@ class TableReader:
         for name in sorted(expression.names):
             self.pick(name, known, "parameter", table)
         return expression
+
+    def order(self, table: str, data: Mapping[str, Any], known: Iterable[str]) -> Expression | None:
+        """The formal order of a scheme that `data` gives, a number or an expression in the parameters that are `known`; None without."""
+        return self.expression(table, str(data["formal_order"]), known) if "formal_order" in data else None
 
     def table(self, data: Mapping[str, Any], name: str, keys: Mapping[str, Types], required: Iterable[str] = ()) -> None:
         """DembarkError unless `data`, the table `name`, is one that has only `keys`, of these types, and all that are `required`."""

@@ -1,5 +1,5 @@
-"""Whether two engines agree: each compared quantity's difference within the joint interval, and never more than 10 % apart; or, where
-nothing is random, within a bound that the quantity brings along.
+"""Whether two engines agree: each compared quantity's difference, with the joint interval, is within 10 %, and no larger than the interval;
+or, where nothing is random, the difference is within a bound that the quantity brings along.
 
 Packings differ by more than what varies within one, so a comparison of random runs is decided only by intervals over three packings or
 more in each engine. A page compares many quantities, of which one in twenty lies beyond its 95 % interval although nothing is wrong:
@@ -46,7 +46,7 @@ def _pairs(first: Result, second: Result) -> list[ComparedRecord]:
 def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str, engine: str, comparisons: int = 1) -> ComparedRecord:
     """One quantity of two engines with its verdict; `comparisons`: how many quantities are compared together with it.
 
-    pass: the difference is within the joint 95 % interval, which is at most 10 % wide. fail: it is beyond what chance does to one of
+    pass: the difference is within the joint 95 % interval, and both together within 10 %. fail: it is beyond what chance does to one of
     all `comparisons`. info: between the two; or the joint interval is unknown, too wide to tell 10 %, or from fewer than three
     packings in either engine, which cannot hold what varies from one packing to the next.
 
@@ -89,8 +89,9 @@ def _judged(difference: float, halves: tuple[float, float], packings: tuple[floa
     limit = max(half, joint_limit(*halves, *packings, 1.0 - (1.0 - CONFIDENCE) / comparisons))
     if difference > limit:
         return "fail", f"the joint interval is ±{half:.1%}, chance allows ±{limit:.1%}"
-    if half > CAP:
-        return "info", f"the joint interval (±{half:.0%}) is wider than 10 %"
+    if difference + half > CAP:
+        return "info", (f"the joint interval (±{half:.0%}) is wider than 10 %" if half > CAP else
+                        f"the joint interval (±{half:.1%}) reaches beyond 10 %")
     if difference > half:
         return "info", (f"beyond the joint interval (±{half:.1%}), as one of {comparisons} may be by chance (±{limit:.1%}); "
                         "more packings would decide")

@@ -69,7 +69,8 @@ def quantities(case: Case, found: Measurement) -> tuple[QuantityRecord, ...]:
     """The measured quantities as declared, with verdicts, in the order of the declaration; DembarkError for one that is not declared."""
     order = list(case.quantities)
     matched = [(*declared(case, name), name, value) for name, value in found.values.items()]
-    return tuple(_judged(*entry) for entry in sorted(matched, key=lambda entry: order.index(entry[0].name)))
+    return tuple(judged(one, value, name, part)
+                 for one, part, name, value in sorted(matched, key=lambda entry: order.index(entry[0].name)))
 
 
 def declared(case: Case, name: str) -> tuple[Declared, str]:
@@ -83,23 +84,53 @@ def declared(case: Case, name: str) -> tuple[Declared, str]:
     raise DembarkError(f"quantity {name} is measured but not declared", f"{case.folder / 'case.toml'}", f"add a table [quantities.{name}]")
 
 
-def _judged(one: Declared, part: str, name: str, value: Value) -> QuantityRecord:
-    if one.tolerance == "bound" and value.bound is None and value.reference is not None and not value.reason:
+def judged(one: Declared, value: Value, name: str = "", part: str = "") -> QuantityRecord:
+    """A quantity with its verdict, as results hold it (see QuantityRecord); numbers that are not finite become None.
+
+    `name` is that of the measured quantity where the declared one has a `*`, in the place of which `part` stands. DembarkError when the
+    value has a bound that the declaration does not ask for, or none where it does, or where the quantity has an interval.
+    """
+    name = name or one.name
+    tolerance, deviation, half = _tolerance(one, value, name), None, value.estimate.half
+    verdict, reason, reference = value.verdict, value.reason, value.reference
+    if reference is not None:
+        scale = 1.0 if one.absolute else reference.value
+        deviation = (value.estimate.value - reference.value) / scale if scale else math.nan
+        half = math.hypot(half, reference.half) / abs(scale) if scale else math.nan
+    if not verdict:
+        verdict = "info"
+        if not reason and tolerance is not None and deviation is not None:
+            verdict, reason = judge(deviation, half if value.half is None else value.half, tolerance)
+    return QuantityRecord(
+        name=name, label=one.label.replace("*", part), value=_finite(value.estimate.value), unit=one.unit,
+        interval=_interval(value.estimate), basis=value.estimate.basis,
+        reference=_finite(reference.value if reference else None), reference_interval=_interval(reference) if reference else None,
+        deviation=_finite(deviation),
+        deviation_kind="absolute" if one.absolute else "relative", tolerance=_finite(tolerance), verdict=verdict, reason=reason,
+        detail=value.detail or one.detail or one.why, source=one.source, evidence=one.evidence, compared=one.compared and value.compared,
+        deviation_half_width=_finite(value.half), agreement=None if one.agreement is None else one.agreement * value.scale)
+
+
+def _tolerance(one: Declared, value: Value, name: str) -> float | None:
+    if one.tolerance != "bound":
+        if value.bound is not None:
+            raise DembarkError(f"quantity {name} has a bound", 'its tolerance is not the word "bound"', "take the bound away or declare it")
+        return None if one.tolerance is None or value.reference is None else float(one.tolerance)
+    if value.bound is None and value.reference is not None and not value.reason:
         raise DembarkError(f"quantity {name} is declared with tolerance = \"bound\"", "", "give bound=... in its Value")
-    if value.bound is not None and one.tolerance != "bound":
-        raise DembarkError(f"quantity {name} has a bound", "its tolerance is not the word \"bound\"", "take the bound away or declare it")
-    tolerance = None if value.reference is None else value.bound if one.tolerance == "bound" else one.tolerance
-    return judged(
-        name, one.label.replace("*", part), one.unit, value.estimate, reference=value.reference,
-        tolerance=None if tolerance is None else float(tolerance), absolute=one.absolute, deviation_half=value.half, source=one.source,
-        detail=value.detail or one.detail or one.why, reason=value.reason, verdict=value.verdict, compared=one.compared and value.compared,
-        agreement=None if one.agreement is None else one.agreement * value.scale, evidence=one.evidence)
+    if value.bound is not None and value.estimate.half != 0.0:
+        # The noise of a run must not decide what it is allowed.
+        raise DembarkError(f"quantity {name} has a bound and an interval", "a bound is for runs in which nothing is random",
+                           "declare its tolerance as a number, with the reason")
+    return None if value.reference is None else value.bound
 
 
-def picture(case: Case, known: Mapping[str, Any]) -> dict[str, Any] | None:
-    """How the report shows a run: the table [picture] with its expressions evaluated for the numbers `known`; None without one."""
+def picture(case: Case, record: Mapping[str, Any]) -> dict[str, Any] | None:
+    """How the report shows the run with this `record`: the table [picture] with its expressions evaluated for the run's parameters and
+    derived numbers; None without one."""
     if not case.picture:
         return None
+    known = {**record["parameters"], **record["derived"]}
     return {key: Expression(value)(known) if key in _NUMBERS and isinstance(value, str) else value for key, value in case.picture.items()}
 
 
@@ -119,41 +150,20 @@ def statements(case: Case) -> list[str]:
     return [f"{one['short']}: {one['statement']}" for one in references(case) if one["statement"]]
 
 
-def judged(name: str, label: str, unit: str, estimate: Estimate, *, reference: Estimate | None = None, tolerance: float | None = None,
-           absolute: bool = False, deviation_half: float | None = None, verdict: str = "", reason: str = "", detail: str = "",
-           source: str = "", compared: bool = True, agreement: float | None = None, evidence: str = "") -> QuantityRecord:
-    """A quantity with its verdict, as results hold it (see QuantityRecord); numbers that are not finite become None.
-
-    The deviation from the reference is relative unless `absolute`; `deviation_half` is the half-width of its own interval, where value
-    and reference of one run are correlated. `tolerance` None means: nothing to pass or fail. `verdict` is one that was reached by another
-    rule, told in `detail`; `reason` tells why there is none.
-    """
-    deviation, joint = None, estimate.half
-    if reference is not None:
-        scale = 1.0 if absolute else reference.value
-        deviation = (estimate.value - reference.value) / scale if scale else math.nan
-        joint = math.hypot(estimate.half, reference.half) / abs(scale) if scale else math.nan
-    if not verdict:
-        verdict = "info"
-        if not reason and tolerance is not None and deviation is not None:
-            verdict, reason = judge(deviation, joint if deviation_half is None else deviation_half, tolerance)
-    return QuantityRecord(
-        name=name, label=label, value=_finite(estimate.value), unit=unit, interval=_interval(estimate), basis=estimate.basis,
-        reference=_finite(reference.value if reference else None), reference_interval=_interval(reference) if reference else None,
-        deviation=_finite(deviation), deviation_kind="absolute" if absolute else "relative", tolerance=_finite(tolerance), verdict=verdict,
-        reason=reason, detail=detail, source=source, evidence=evidence, compared=compared, deviation_half_width=_finite(deviation_half),
-        agreement=agreement)
-
-
 def judge(deviation: float, half: float, tolerance: float) -> tuple[str, str]:
-    """pass or fail of a deviation with interval half-width `half`; info when the interval is wider than the tolerance, for then
-    neither verdict would mean anything."""
+    """Verdict and reason of a deviation with interval half-width `half`.
+
+    pass: all of the interval is within the tolerance. fail: the deviation is beyond it. info, which is open: the interval reaches beyond
+    the tolerance, or is wider than it, so that neither verdict would mean anything.
+    """
     if not math.isfinite(deviation):
         return "fail", "no finite number"
     if not half <= tolerance:
         wide = f"±{half:.2g}" if math.isfinite(half) else "unknown"
         return "info", f"its interval ({wide}) is wider than what is allowed"
-    return ("pass", "") if abs(deviation) <= tolerance else ("fail", "")
+    if abs(deviation) > tolerance:
+        return "fail", ""
+    return ("pass", "") if abs(deviation) + half <= tolerance else ("info", f"its interval (±{half:.2g}) reaches beyond what is allowed")
 
 
 def _finite(value: float | None) -> float | None:

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import logging
-import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from dembark.common.errors import RunError
 from dembark.common.files import disk_error, write_whole
+from dembark.common.units import duration
 from dembark.validation.judge.result import Result
 from dembark.validation.report import front, numbers, scatter, sections
-from dembark.validation.report.figures import colour, engine_name
+from dembark.validation.report.figures import colour, engine_name, subscripts
 from dembark.validation.report.gather import Gathered, gather
 
 _HERE = Path(__file__).parent
@@ -53,8 +53,9 @@ def write(gathered: Gathered, chapters: Any) -> Path:
         figure = scatter.figure(first["points"])
         ratio = figure and sections.embed(figure, drawn, "scatter", "", ["scatter.csv"])
         measured = [one for page in gathered.pages if not page.is_study for _, one in sorted(page.results.items())]
+        cited = {one["short"]: one for page in gathered.pages for found in page.results.values() for one in found.references}
         context = {**_EMPTY, **own, **first, "style": Markup((_HERE / "style.css").read_text(encoding="utf-8")),
-                   "scatter": ratio, "measured": measured, "references": _references(gathered), "machine": machine(measured),
+                   "scatter": ratio, "measured": measured, "references": list(cited.values()), "machine": machine(measured),
                    "description": gathered.summary.get("description", "")}
         template = _environment().get_template("report.html.j2")
         write_pdf(template.render(context, full=False), folder / "report.pdf")
@@ -70,16 +71,11 @@ _EMPTY: Mapping[str, Any] = {"sections": (), "sweeps": (), "errors": (), "verifi
 def _environment() -> Environment:
     found = Environment(loader=FileSystemLoader(_HERE), autoescape=select_autoescape(["html", "j2"]), undefined=StrictUndefined,
                         trim_blocks=True, lstrip_blocks=True)
-    found.filters |= {"plain": numbers.plain, "compact": numbers.compact, "subscripts": _subscripts,
-                      "duration": numbers.duration, "engine": engine_name}
+    found.filters |= {"plain": numbers.plain, "compact": numbers.compact, "subscripts": subscripts,
+                      "duration": duration, "engine": engine_name}
     found.globals |= {"signs": _SIGNS, "estimate": numbers.with_interval, "unit": numbers.with_unit, "deviation": numbers.deviation,
                       "allowed": numbers.allowed, "colour": colour}
     return found
-
-
-def _subscripts(text: str) -> Markup:
-    """Symbols like σ_zz with real subscripts."""
-    return Markup(re.sub(r"\b([σρμKv])_([a-z]+)", r"\1<sub>\2</sub>", str(escape(text))))
 
 
 def write_pdf(html: str, path: Path) -> None:
@@ -95,10 +91,6 @@ def write_pdf(html: str, path: Path) -> None:
         print(f"dembark: no {path.name}, for Pango is missing ({reason}); report.html holds the same", file=sys.stderr)
         return
     write_whole(path, HTML(string=html, base_url=str(_HERE)).write_pdf())
-
-
-def _references(gathered: Gathered) -> Sequence[Mapping[str, Any]]:
-    return list({one["short"]: one for page in gathered.pages for found in page.results.values() for one in found.references}.values())
 
 
 def machine(measured: Iterable[Result]) -> list[tuple[str, str]]:

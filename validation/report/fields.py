@@ -108,3 +108,9 @@ def long_table(header: Sequence[str], columns: Mapping[str, Sequence[Array]]) ->
     rows = [[engine, *(float(cell) if np.isfinite(cell) else None for cell in cells)]
             for engine, of_engine in columns.items() for cells in zip(*(np.ravel(column) for column in of_engine), strict=True)]
     return ["engine", *header], rows
+
+
+def grid_table(header: Sequence[str], fields: Mapping[str, tuple[Array, Array, Sequence[Array]]]) -> tuple[list[str], list[list[Any]]]:
+    """The same of each engine's fields (n, m) on a grid of places (n,) and (m,), which are the first two columns."""
+    return long_table(header, {engine: [*np.broadcast_arrays(first[:, None], second), *values]
+                               for engine, (first, second, values) in fields.items()})

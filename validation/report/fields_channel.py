@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from dembark.postproc.style import STYLE
-from dembark.validation.report.fields import DIVERGING, SEQUENTIAL, FieldFigure, bar, curve, image, limits, long_table
+from dembark.validation.report.fields import DIVERGING, SEQUENTIAL, FieldFigure, bar, curve, grid_table, image, limits, long_table
 from dembark.validation.report.figures import colour, engine_name
 
 # Name in the dataset, label, colour map, and whether the scale is even about zero.
@@ -60,10 +60,9 @@ def _maps(datasets: Mapping[str, Any]) -> FieldFigure:
         "temperature T = ⟨v′²⟩/3 about the affine mean flow of each cell, solid fraction. "
         f"Gaussian kernel of width {first['width'] / d:g} d; same colour scales for all engines."
     )
-    columns = {engine: [*(np.broadcast_to(axis, one.velocity.shape) for axis in (one.x.values[:, None], one.z.values)),
-                        *(one[name].values for name, *_ in _MAPS)] for engine, one in datasets.items()}
-    return FieldFigure("maps", figure, "Fields over width and height", caption,
-                       {"maps": long_table(["x_m", "z_m", *(name for name, *_ in _MAPS)], columns)})
+    table = grid_table(["x_m", "z_m", *(name for name, *_ in _MAPS)], {
+        engine: (one.x.values, one.z.values, [one[name].values for name, *_ in _MAPS]) for engine, one in datasets.items()})
+    return FieldFigure("maps", figure, "Fields over width and height", caption, {"maps": table})
 
 
 def _profiles(datasets: Mapping[str, Any]) -> FieldFigure:

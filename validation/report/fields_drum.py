@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from dembark.postproc.style import STYLE
-from dembark.validation.report.fields import SEQUENTIAL, FieldFigure, bar, curve, image, limits, long_table
+from dembark.validation.report.fields import SEQUENTIAL, FieldFigure, bar, curve, grid_table, image, limits, long_table
 from dembark.validation.report.figures import engine_name
 
 _SHELL = "#4a4f57"
@@ -49,11 +49,9 @@ def _map(datasets: Mapping[str, Any]) -> FieldFigure:
         f"{first['revolutions']} revolutions{_loads(first)}, from the records of {first['impacts']} impacts; each counts where it began. "
         f"White: nothing was hit. Circles: logs of the last frame. The drum turns clockwise; logs are {first['log_length']:g} m long."
     )
-    columns = {engine: [*(np.broadcast_to(axis, one.impact_power.shape) for axis in (one.x.values[:, None], one.z.values)),
-                        one.impact_power.values]
-               for engine, one in datasets.items()}
-    return FieldFigure("map", figure, "Impact power over the cross-section", caption,
-                       {"power": long_table(["x_m", "z_m", "power_W_per_m2"], columns)})
+    table = grid_table(["x_m", "z_m", "power_W_per_m2"], {
+        engine: (one.x.values, one.z.values, [one.impact_power.values]) for engine, one in datasets.items()})
+    return FieldFigure("map", figure, "Impact power over the cross-section", caption, {"power": table})
 
 
 def _loads(attributes: Mapping[str, Any]) -> str:
@@ -94,9 +92,7 @@ def _shell(datasets: Mapping[str, Any]) -> FieldFigure:
     tables = {
         "shell_power": long_table(["angle_deg", "power_W_per_m2", "half_width"], {
             engine: [one.angle.values, one.shell_power.values, one.shell_power_half.values] for engine, one in datasets.items()}),
-        "shell_peaks": long_table(["angle_deg", "peak_force_N", "impacts_per_revolution"], {
-            engine: [*(np.broadcast_to(axis, one.shell_peaks.shape) for axis in (one.angle.values[:, None], one.force.values)),
-                     one.shell_peaks.values]
-            for engine, one in datasets.items()}),
+        "shell_peaks": grid_table(["angle_deg", "peak_force_N", "impacts_per_revolution"], {
+            engine: (one.angle.values, one.force.values, [one.shell_peaks.values]) for engine, one in datasets.items()}),
     }
     return FieldFigure("shell", figure, "Impacts along the shell", caption, tables)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from dembark.postproc.style import STYLE
-from dembark.validation.report.fields import DIVERGING, SEQUENTIAL, FieldFigure, bar, curve, image, limits, long_table
+from dembark.validation.report.fields import DIVERGING, SEQUENTIAL, FieldFigure, bar, curve, grid_table, image, limits, long_table
 from dembark.validation.report.figures import engine_name
 
 Array = NDArray[np.float64]
@@ -80,10 +80,9 @@ def _maps(datasets: Mapping[str, Any]) -> FieldFigure:
         "momentum are conserved exactly. Each value is divided by the part of its kernel that lies inside the vessel. Same colour scale "
         "for all engines; compression positive, σ_rz is negative where the wall carries weight."
     )
-    columns = {engine: [*(np.broadcast_to(axis, panels[engine]["k"].shape) for axis in (one.radius.values[:, None], one.height.values)),
-                        *panels[engine].values()] for engine, one in shown.items()}
-    return FieldFigure("maps", figure, "Fields over radius and height", caption,
-                       {"maps": long_table(["radius_m", "height_m", *_LABELS], columns)})
+    table = grid_table(["radius_m", "height_m", *_LABELS], {
+        engine: (one.radius.values, one.height.values, list(panels[engine].values())) for engine, one in shown.items()})
+    return FieldFigure("maps", figure, "Fields over radius and height", caption, {"maps": table})
 
 
 def _profiles(datasets: Mapping[str, Any]) -> FieldFigure:

@@ -11,18 +11,20 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
+from dembark.postproc.pictures import saved
 from dembark.postproc.style import STYLE
 from dembark.validation import engines
 from dembark.validation.engines import EngineFacts
-from dembark.validation.pictures import saved
 from dembark.validation.verification.item import Item, Panel
 
 WIDE = 7.2  # inches
 INK = "#4a4f57"
 _DOTS = 220.0
+_SUBSCRIPT = re.compile(r"\b([σρμδλτuvKM])_([a-z]+)")
 DASHES = ((0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
 # Okabe & Ito's palette.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -67,7 +69,12 @@ def png(figure: Figure) -> bytes:
 
 def symbols(text: str) -> str:
     """Symbols like σ_zz with real subscripts, in figures."""
-    return re.sub(r"([σρμKv])_([a-z]+)", r"$\\mathrm{\1_{\2}}$", text)
+    return _SUBSCRIPT.sub(r"$\\mathrm{\1_{\2}}$", text)
+
+
+def subscripts(text: str) -> Markup:
+    """The same in HTML, and no break between a number and its per cent."""
+    return Markup(_SUBSCRIPT.sub(r"\1<sub>\2</sub>", str(escape(text))).replace(" %", "\N{NO-BREAK SPACE}%"))
 
 
 Curves = Mapping[str, Sequence[Mapping[str, Any]]]
@@ -87,7 +94,7 @@ def profile_figure(profiles: Curves, names: Sequence[str], columns: int = 2) -> 
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, tall))
         # Fixed margins: long titles must not make the panels narrow.
-        figure.subplots_adjust(left=0.075, right=0.99, bottom=0.66 / tall, top=1.0 - 0.32 / tall, wspace=0.2, hspace=0.62)
+        figure.subplots_adjust(left=0.09, right=0.99, bottom=0.66 / tall, top=1.0 - 0.32 / tall, wspace=0.25, hspace=0.62)
         handles: dict[str, Any] = {}
         for number, name in enumerate(names):
             axes = figure.add_subplot(rows, columns, number + 1)
@@ -109,8 +116,12 @@ def _panel(axes: Any, entries: Sequence[tuple[str, Mapping[str, Any]]], handles:
             same = all(_same(other, one) for _, other in entries)
             if not same or not number:
                 shown = "reference" if same else f"reference ({engine_name(engine)})"
-                handles.setdefault(shown, line(_numbers(one["reference"]), color=INK if same else paint, linestyle=DASHES[number % 3],
-                                              linewidth=0.9, zorder=3))
+                measured, ink = one.get("reference_low") is not None, INK if same else paint
+                style = {"marker": "o", "markersize": 2.5, "linestyle": "none"} if measured else {"linestyle": DASHES[number % 3]}
+                handles.setdefault(shown, line(_numbers(one["reference"]), color=ink, linewidth=0.9, zorder=3, **style))
+                if measured:
+                    bars = axes.hlines if upward else axes.vlines
+                    bars(place, _numbers(one["reference_low"]), _numbers(one["reference_high"]), color=ink, linewidth=0.9)
         if one.get("low") is not None:
             fill = axes.fill_betweenx if upward else axes.fill_between
             fill(place, _numbers(one["low"]), _numbers(one["high"]), color=paint, alpha=0.18, linewidth=0)
@@ -148,7 +159,7 @@ def _numbers(values: Sequence[float | None]) -> np.ndarray[Any, Any]:
 
 def profile_table(of_engine: Mapping[str, Mapping[str, Any]]) -> tuple[list[str], list[list[Any]]]:
     """Header and rows of one profile of all engines; engines may have different places."""
-    header = ["engine", "place", "value", "low", "high", "reference"]
+    header = ["engine", "place", "value", "low", "high", "reference", "reference_low", "reference_high"]
     rows = []
     for engine, one in of_engine.items():
         columns = [one.get(key) or [None] * len(one["place"]) for key in header[1:]]

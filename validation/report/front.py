@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dembark.validation.case.model import EVIDENCE
 from dembark.validation.judge.result import QuantityRecord
-from dembark.validation.judge.tally import MEANING, Tally, tally
+from dembark.validation.judge.tally import MEANING, Counts, Tally, tally
 from dembark.validation.report import figures, scatter
 from dembark.validation.report.gather import Row
 
 # Lines of each list that the first pages of the PDF hold; what is left out is counted, and in the HTML.
-FAILED, OPEN, MISSING = 8, 14, 6
+MOST = {"failed": 8, "open": 14, "missing": 6}
 
 # What a failure says most about comes first.
 _WEIGHT = ("experiment", "theory", "identity", "", "code")
@@ -54,9 +55,10 @@ def _names(group: Sequence[Row]) -> str:
 
 def evidence(counted: Tally) -> list[dict[str, Any]]:
     """Rows of the table of verdicts: each kind of evidence with its counts, and all together."""
-    kinds = [{"kind": kind or "not stated", "meaning": MEANING[kind] if kind else "the case does not say", "counts": counts}
-             for kind, counts in counted.by_evidence.items()]
-    return [*kinds, {"kind": "all", "meaning": "", "counts": counted}]
+    # That nothing is compared with experiments is worth a row, too.
+    kinds = {kind: Counts() for kind in EVIDENCE} | dict(counted.by_evidence)
+    return [*({"kind": kind or "not stated", "meaning": MEANING[kind] if kind else "the case does not say", "counts": counts}
+              for kind, counts in kinds.items()), {"kind": "all", "meaning": "", "counts": counted}]
 
 
 def context(rows: Sequence[Row], missing: Sequence[str]) -> Mapping[str, Any]:
@@ -65,8 +67,7 @@ def context(rows: Sequence[Row], missing: Sequence[str]) -> Mapping[str, Any]:
     found = scatter.points(rows)
     failed = sorted((row for row in rows if row.record.standing == "failed"), key=lambda row: _WEIGHT.index(row.record.evidence))
     return {"tally": counted, "evidence": evidence(counted), "failed": failed,
-            "open": open_lines(rows), "missing": missing, "points": found, "scatter_lines": len(scatter.lines(found)),
-            "most": {"failed": FAILED, "open": OPEN, "missing": MISSING}}
+            "open": open_lines(rows), "missing": missing, "points": found, "scatter_lines": len(scatter.lines(found)), "most": MOST}
 
 
 def cells(one: QuantityRecord) -> list[Any]:

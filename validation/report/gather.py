@@ -126,7 +126,13 @@ def gather(folder: Path) -> Gathered:
     for case, variant, engine in sorted({run[:3] for run in expected} - failed):
         if engine not in pages[case, variant].results:
             pages[case, variant].missing.append(f"{engine_name(engine)}: it could not be measured")
-    ordered = sorted(pages.values(), key=lambda one: (one.case != "silo", one.case, one.is_study, "wet" in one.variant, one.variant))
+
+    def order(one: Page) -> tuple[Any, ...]:
+        """Variants as the case lists them, for the first ones are shown with all their figures; then those of campaigns by name."""
+        names = list(cases[one.case].variants) if one.case in cases else []
+        return one.case != "silo", one.case, one.is_study, names.index(one.variant) if one.variant in names else len(names), one.variant
+
+    ordered = sorted(pages.values(), key=order)
     return Gathered(folder, ordered, verification.read(folder), cases, unread, summary)
 
 

@@ -78,10 +78,3 @@ def compact(value: float | str | None) -> str:
         mantissa, power = text.split("e")
         text = f"{mantissa}·10{str(int(power)).translate(_SUPERSCRIPTS)}"
     return text.replace("-", "−")
-
-
-def duration(seconds: float | None) -> str:
-    """Seconds as s, min or h."""
-    if seconds is None:
-        return "–"
-    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.1f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

@@ -86,7 +86,7 @@ def figure(found: Sequence[Point], tolerance: float = 0.10) -> Figure | None:
     with matplotlib.rc_context(STYLE | {"axes.grid": False}):
         result = Figure(figsize=(WIDE, tall))
         side = 2.3 / WIDE
-        left = result.add_axes((0.055, 1.0 - (0.25 + 2.05) / tall, side, 2.05 / tall))
+        left = result.add_axes((0.085, 1.0 - (0.25 + 2.05) / tall, side, 2.05 / tall))
         right = result.add_axes((0.76, 0.42 / tall, 0.23, 1.0 - (0.25 + 0.42) / tall))
         values = [value for one in drawn for value in (one.value, one.reference)]
         ends = 10.0 ** np.array([math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)) + 1e-9)])

@@ -11,7 +11,8 @@ from typing import Any
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from dembark.validation import pictures
+from dembark.postproc import pictures
+from dembark.validation.judge.result import ComparedRecord
 from dembark.validation.judge.tally import Counts, tally
 from dembark.validation.report import fields, figures, front
 from dembark.validation.report.figures import engine_name
@@ -75,7 +76,7 @@ def embed(figure: Figure, folder: Path, name: str, caption: str, files: Sequence
     """The figure inside the document, in the PDF if `main`, and as a file `name`.svg beside its data."""
     data = figures.svg(figure)
     (folder / f"{name}.svg").write_bytes(data)
-    return Shown(_image(data, "svg+xml", name), caption, [f"figures/{file}" for file in files],
+    return Shown(_image(data, "svg+xml", name), caption[:1].upper() + caption[1:], [f"figures/{file}" for file in files],
                  _image(figures.png(figure), "png", name) if main else "")
 
 
@@ -139,8 +140,9 @@ def _section(gathered: Gathered, name: str, pages: list[Page], folder: Path) -> 
     printed = [[one for one in part.figures if one.printed]
                for part in (*variants[:VARIANTS], *(part for part in parts if part.page.is_study))]
     main = [one for number, found in enumerate(printed) for one in (found[:1] if number else found)]
-    kinds = {kind: [row for row in rows if row.record.evidence == kind] for kind in ("identity", "code")}
-    lines = [line(kinds["identity"], "Identities"), line(kinds["code"], "Engines beside each other")]
+    engines, others = ([row for row in rows if isinstance(row.record, ComparedRecord) is compared] for compared in (True, False))
+    kinds = {kind: [row for row in others if row.record.evidence == kind] for kind in ("identity", "code")}
+    lines = [line(kinds["identity"], "Identities"), line(engines, "Engines beside each other"), line(kinds["code"], "Other codes")]
     drawn = next((shown for part in variants if (shown := _pictures(part.page))), [])
     return Section(name, known.title if known else name.replace("_", " "), known.description if known else "",
                    known.source if known else (),
@@ -185,7 +187,7 @@ def _profiles(page: Page, folder: Path) -> list[Shown]:
         chosen = names[start : start + PANELS]
         stem = f"{page.anchor}-profiles" + (f"-{start // PANELS + 1}" if start else "")
         found.append(embed(figures.profile_figure(curves, chosen), folder, stem,
-                           f"{page.name}: engines over the reference; bands over replicas where there are any.",
+                           f"{page.name}: engines over the reference; bands: 95 % intervals over replicas, where there are several.",
                            [f"{page.anchor}-{name}.csv" for name in chosen], main=not start))
     return found
 

@@ -17,7 +17,7 @@ from types import FrameType
 from typing import Any
 
 from dembark.common.errors import DembarkError, Interrupted, Killed
-from dembark.common.files import read_json, write_json
+from dembark.common.files import write_json
 from dembark.common.lock import Busy
 from dembark.validation.campaigns import expand
 from dembark.validation.runs.plan import Resources, Run, Series
@@ -55,11 +55,6 @@ class Report:
         # Telling the progress is never worth a run: a full disk is reported by what needs the space.
         with suppress(DembarkError):
             write_json(self._path, self._facts)
-
-
-def read_report(path: Path) -> dict[str, Any]:
-    """What a job has told; empty when it has not begun."""
-    return read_json(path) or {}
 
 
 def _simulate(run: Run, out: Path, used: Resources, cancel: threading.Event, progress: Report) -> None:

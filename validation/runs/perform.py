@@ -62,7 +62,7 @@ def perform(plan: Plan, results: Path, place: Place, cancel: threading.Event, co
     times (s) by places of series. `cores` of this machine are for the steps, and for the runs if these work here.
     """
     folders = {str(one.place / run.folder_name): run for one in plan.series for run in one.runs}
-    tasks = [Task(run, results / one.place, plan.of(one)) for one in plan.series for run in one.runs]
+    tasks = [Task(run, results / one.place, plan.resources.get(one.place, Resources())) for one in plan.series for run in one.runs]
     todo, table, problems = steps(plan, results), Table(results, plan.label), list[str]()
     table.enter(folders, results, {step.name: step.kind for step in todo}, plan.whole)
     if estimates:
@@ -145,8 +145,9 @@ def perform_series(one: Series, out: Path, cancel: threading.Event, used: Resour
 
 def _load() -> None:
     """Import what measures and draws: meanwhile the engines run."""
-    for name in ("metrics", "pictures.packings", "pictures.sections"):
-        import_module(f"dembark.validation.{name}")
+    for name in ("dembark.validation.metrics", "dembark.postproc.pictures.packings", "dembark.postproc.pictures.sections",
+                 "dembark.postproc.output", "scipy.optimize", "scipy.interpolate"):
+        import_module(name)
 
 
 def refuse_foreign(one: Series, out: Path) -> None:

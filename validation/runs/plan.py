@@ -133,10 +133,6 @@ class Plan:
     measure: Resources | None = None
     whole: bool = True
 
-    def of(self, one: Series) -> Resources:
-        """What each run of a series may use."""
-        return self.resources.get(one.place, Resources())
-
 
 def studies(all_series: Iterable[Series]) -> list[PlannedStudy]:
     """The studies that `all_series` hold all variants of, engine by engine."""

@@ -18,6 +18,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
+from dembark.common.units import duration
 from dembark.validation.runs.table import State
 
 INTERVAL = 10.0
@@ -54,16 +55,6 @@ class OutputParser:
             self.step = int(step.group(1))
             return True
         return False
-
-
-def duration(seconds: float) -> str:
-    """`45 s`, `3 min 20 s`, `2 h 5 min`."""
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    return f"{whole // 3600} h {whole % 3600 // 60} min"
 
 
 def describe(state: State) -> str:  # noqa: PLR0911 - one return for each state

@@ -14,8 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
-from dembark.common.files import write_whole
-from dembark.validation.runs.job import read_report
+from dembark.common.files import read_json, write_whole
 from dembark.validation.runs.plan import Plan, Resources, Run, finished
 from dembark.validation.runs.simulate import Progress, no_progress
 from dembark.validation.runs.site import Row, Site, word
@@ -190,7 +189,8 @@ class Queue:
             job.future.set_exception(RunError(f"{job.title} failed", "its job was refused", word(done)))
 
     def _attend(self, job: _Job, row: Row | None) -> None:
-        told = read_report(job.report)
+        # Empty before the job has begun.
+        told = read_json(job.report) or {}
         facts = {key: told[key] for key in ("step", "steps", "time_step", "attempt", "resumed_from", "host") if key in told}
         if told.get("state") == "running":
             job.progress(state="running")

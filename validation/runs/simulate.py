@@ -15,7 +15,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from select import select
@@ -108,24 +108,18 @@ def simulate(run: Run, out: Path, cancel: threading.Event, used: Resources | Non
         sweep(target)
         if finished(target, run):
             return False
-        _run_into(run, target, progress, _Ended(cancel, lost), used or Resources())
+        _run_into(run, target, progress, cancel, lost, used or Resources())
     return True
 
 
-@dataclass(frozen=True)
-class _Ended:
-    """Whether an attempt has to end, by whoever's will: its user's, or another process's that has taken its lock."""
-
-    cancel: threading.Event
-    lost: threading.Event
-
-    def is_set(self) -> bool:
-        return self.cancel.is_set() or self.lost.is_set()
-
-
-def _run_into(run: Run, target: Path, progress: Progress, ended: _Ended, used: Resources) -> None:
+def _run_into(run: Run, target: Path, progress: Progress, cancel: threading.Event, lost: threading.Event, used: Resources) -> None:
     work = restarts.work_folder(run, target)
     computed = kept = False
+
+    def ended() -> bool:
+        """Whether the attempt has to end, by whoever's will: its user's, or another process's that has taken its lock."""
+        return cancel.is_set() or lost.is_set()
+
     try:
         for other in restarts.work_folders(target):
             if other != work:
@@ -143,7 +137,7 @@ def _run_into(run: Run, target: Path, progress: Progress, ended: _Ended, used: R
         kept, going_on = _going_on(run, work)
         raise RunError(f"{run.name} failed", str(disk_error(error, target)), going_on) from None
     except Interrupted:
-        if ended.lost.is_set():
+        if lost.is_set():
             kept = True
             raise Killed(f"{run.name} was given up", "another process has taken its lock, because this one was held up") from None
         kept, going_on = _going_on(run, work)
@@ -184,7 +178,7 @@ def _forget_failure(target: Path) -> None:
         kept.rmdir()
 
 
-def _execute(run: Run, work: Path, step: int | None, progress: Progress, ended: _Ended, used: Resources) -> dict[str, Any]:
+def _execute(run: Run, work: Path, step: int | None, progress: Progress, ended: Callable[[], bool], used: Resources) -> dict[str, Any]:
     """One attempt in `work`, from `step` on (None: from the start); the record of the finished run."""
     words: dict[str, Value] = {}
     every = 0
@@ -242,11 +236,11 @@ def _with_log(work: Path, told: restarts.Attempts) -> restarts.Attempts:
 
 
 def _listen(process: subprocess.Popen[bytes], work: Path, parser: OutputParser, update: Callable[[], None],
-            ended: _Ended) -> None:
+            ended: Callable[[], bool]) -> None:
     looked = time.monotonic()
     with (work / "engine.log").open("wb", buffering=0) as log:
         for chunk in chunks(process):
-            if ended.is_set():
+            if ended():
                 raise Interrupted("interrupted")
             if time.monotonic() - looked > 2.0:
                 looked = time.monotonic()

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dembark.common import units
 from dembark.common.choices import nearest
 from dembark.common.errors import DembarkError
-from dembark.validation.campaigns import sizes
 from dembark.validation.case.tables import TableReader, load_toml
 from dembark.validation.runs.plan import Resources
 
@@ -146,7 +146,7 @@ def read(path: Path) -> Site:
     reader.table(answers, "answers", _ANSWERS, ("job", "line", "waiting", "running"))
     _check(reader, jobs, commands, answers)
     try:
-        jobs = jobs | {"memory": sizes.size(jobs["memory"])} | {key: sizes.seconds(jobs[key]) for key in ("time", "poll", "latency")}
+        jobs = jobs | {"memory": units.size(jobs["memory"])} | {key: units.seconds(jobs[key]) for key in ("time", "poll", "latency")}
     except DembarkError as error:
         raise reader.fail("jobs", str(error)) from None
     return Site(path, jobs, commands, answers, data.get("preamble", ""))

@@ -14,7 +14,8 @@ from typing import Any
 from dembark import common, postproc, validation
 from dembark.common.errors import DembarkError, RunError
 from dembark.common.files import retire
-from dembark.validation import analysis, pictures, provenance
+from dembark.postproc import pictures
+from dembark.validation import analysis, provenance
 from dembark.validation.judge.result import COMPARISON, METRICS, Result, write
 from dembark.validation.runs.plan import Plan, PlannedStudy, Run, finished, studies, variants
 
@@ -163,7 +164,7 @@ def build_report(results: Path) -> None:
     """Write report.html and report.pdf into `results` (results/<profile> or a campaign's folder); RunError when that fails."""
     build: Callable[[Path], Path]
     if (results / CAMPAIGN_FILE).is_file():
-        from dembark.validation.campaigns.report import build
+        from dembark.validation.campaigns.report.build import build
     else:
         from dembark.validation import verification
         from dembark.validation.report import build

@@ -50,6 +50,6 @@ def write(folder):
 
 
 for name, function in (("verification", write), ("metrics", measure), ("metrics", picture), ("metrics", study), ("judge.compare", compare),
-                       ("report", build), ("campaigns.report", build)):
+                       ("report", build), ("campaigns.report.build", build)):
     module = sys.modules.setdefault(f"dembark.validation.{name}", types.ModuleType(f"dembark.validation.{name}"))
     setattr(module, function.__name__, function)

@@ -4,14 +4,16 @@ import math
 
 import pytest
 
+from dembark.postproc.measurement import Value
 from dembark.postproc.statistics import exact
+from dembark.validation.case.model import Declared
 from dembark.validation.judge.compare import pair
 from dembark.validation.judge.measuring import judged
 from dembark.validation.judge.result import as_json
 
 
 def entry(value, agreement, half=0.0):
-    return judged("speed", "speed", "m/s", exact(value, half), agreement=agreement)
+    return judged(Declared("speed", "speed", "m/s", agreement=agreement), Value(exact(value, half)))
 
 
 @pytest.mark.parametrize(
@@ -34,5 +36,6 @@ def test_deterministic_numbers_agree_within_their_bound(one, other, verdict):
 
 def test_numbers_without_a_bound_are_compared_by_their_intervals():
     assert "agreement" not in as_json(entry(1.0, None))
-    assert pair(entry(1.0, None, 0.06), entry(1.05, None, 0.06), "liggghts", "yade").verdict == "pass"
+    assert pair(entry(1.0, None, 0.03), entry(1.04, None, 0.03), "liggghts", "yade").verdict == "pass"
+    assert pair(entry(1.0, None, 0.06), entry(1.05, None, 0.06), "liggghts", "yade").verdict == "info"
     assert pair(entry(1.0, None), entry(1.05, None), "liggghts", "yade").verdict == "fail"

@@ -54,6 +54,13 @@ def test_runs_are_named_or_tables(decks: Path) -> None:
     assert [(run.variant, run.engines) for run in case.runs["quick"]] == [("dry", ("liggghts", "yade")), ("wet", ("liggghts",))]
 
 
+def test_a_profile_may_run_the_same_as_another(decks: Path) -> None:
+    case = load(edited(decks, 'standard = [{variant = "dry"}]', 'standard = "quick"'))
+    assert case.runs["standard"] == case.runs["quick"]
+    with pytest.raises(DembarkError, match="did you mean quick"):
+        load(edited(decks, 'standard = "quick"', 'standard = "quik"'))
+
+
 def test_bodies_are_counted_with_derived_numbers(decks: Path) -> None:
     case = load(edited(decks, 'steps = "100"', 'steps = "100"\ntwice = "2 * grain_count"'))
     case = load(edited(decks, '[case]', '[case]\nparticles = "twice"'))
@@ -142,6 +149,7 @@ variants = ["dry", "wet", "large"]
 @pytest.mark.parametrize(("old", "new", "words"), [
     ('type = "int"', 'type = "integer"', ["integer", "int"]),
     ('unit = "m"', 'unit = "metrez"', ["metrez", "parameters.grain_diameter"]),
+    ('unit = "m"', 'unit = "d"', ["'d' is no SI unit without a factor", "parameters.grain_diameter"]),
     ("value = 0.005", "value = -0.005", ["out of range", "parameters.grain_diameter"]),
     ("value = 0.005\n", "", ["value is missing"]),
     ('doc = "diameter"', "", ["doc is missing"]),

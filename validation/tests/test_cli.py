@@ -81,6 +81,7 @@ def test_run_measures_and_shows_verdicts(dembark: Dembark, tmp_path: Path) -> No
     done = dembark("run", "box", "--engine", "liggghts", "--variant", "wet", "--set", "grain_diameter=4 mm", "--out", "o")
     assert done.returncode == 0, done.stderr
     assert "FAIL" in done.stdout and "0 of 1 check passed, 1 FAILED" in done.stdout and str(tmp_path / "o/metrics.json") in done.stdout
+    assert "  evidence (not stated): 0 of 1 check passed, 1 FAILED" in done.stdout.splitlines()
     assert "box wet liggghts 1: finished" in done.stderr
     assert read_json(tmp_path / "o/metrics.json")["parameters"]["grain_diameter"] == 0.004
 

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from dembark.common.errors import RunError
+from dembark.postproc.measurement import Value
 from dembark.postproc.statistics import Estimate, over_replicas
+from dembark.validation.case.model import Declared
 from dembark.validation.judge.compare import pair
 from dembark.validation.judge.measuring import judge, judged
 from dembark.validation.judge.result import QuantityRecord, as_json
@@ -21,7 +23,8 @@ def entry(value, half, basis="5 replicas"):
 @pytest.mark.parametrize(
     ("one", "other", "verdict"),
     [
-        ((1.0, 0.04), (1.05, 0.04), "pass"),
+        ((1.0, 0.04), (1.04, 0.04), "pass"),
+        ((1.0, 0.04), (1.05, 0.04), "info"),
         ((1.0, 0.01), (1.05, 0.01), "fail"),
         ((1.0, 0.2), (1.15, 0.2), "info"),
         ((1.0, 0.05), (1.3, 0.05), "fail"),
@@ -60,27 +63,29 @@ def test_one_of_many_comparisons_may_lie_beyond_its_interval():
     ("deviation", "half", "verdict"),
     [
         (0.05, 0.02, "pass"),
-        (-0.1, 0.1, "pass"),
+        (-0.1, 0.0, "pass"),
+        (0.08, 0.03, "info"),
+        (-0.1, 0.1, "info"),
         (0.11, 0.02, "fail"),
         (0.0, 0.2, "info"),
         (0.5, float("inf"), "info"),
         (0.0, float("nan"), "info"),
     ],
 )
-def test_verdict_needs_an_interval_narrower_than_the_tolerance(deviation, half, verdict):
+def test_a_pass_needs_the_whole_interval_within_the_tolerance(deviation, half, verdict):
     assert judge(deviation, half, 0.1)[0] == verdict
 
 
 def test_nan_fails():
-    broken = judged("q", "q", "1", Estimate(float("nan"), 0.1), reference=Estimate(1.0, 0.0), tolerance=0.1)
+    broken = judged(Declared("q", "q", tolerance=0.1), Value(Estimate(float("nan"), 0.1), Estimate(1.0, 0.0)))
     assert broken.verdict == "fail"
     assert as_json(broken)["value"] is None
 
 
 def test_a_bound_that_is_not_finite_is_none_in_the_file() -> None:
     """A column too small for an interval allows anything; JSON has no number for that."""
-    entry = as_json(judged("field_balance", "balance", "1", Estimate(0.1, math.inf), reference=Estimate(0.0, 0.0), tolerance=math.inf,
-                           absolute=True))
+    entry = as_json(judged(Declared("field_balance", "balance", tolerance=math.inf, absolute=True),
+                           Value(Estimate(0.1, math.inf), Estimate(0.0, 0.0))))
     assert entry["tolerance"] is None and entry["interval"] is None
     json.dumps(entry, allow_nan=False)
 

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dembark.postproc.measurement import Value
 from dembark.postproc.statistics import Estimate
+from dembark.validation.case.model import Declared
 from dembark.validation.judge.measuring import judged
 from dembark.validation.judge.result import QuantityRecord
 
@@ -60,16 +62,12 @@ class Item:
 def exact(name: str, label: str, error: float, source: str, *, tolerance: float = ROUND_OFF, detail: str = "",
           unit: str = "1") -> QuantityRecord:
     """An error that is due to be zero to `tolerance`."""
-    return _judged(name, label, unit, float(error), 0.0, tolerance, source, detail, "identity")
+    declared = Declared(name, label, unit, "identity", tolerance, absolute=True, source=source, detail=detail, compared=False)
+    return judged(declared, Value(Estimate(float(error), 0.0), Estimate(0.0, 0.0)))
 
 
 def order(name: str, label: str, steps: Array, errors: Array, due: float, source: str, detail: str = "") -> QuantityRecord:
     """Observed order of convergence, the slope of ln(error) over ln(step), against the one of theory."""
     slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
-    return _judged(name, label, "1", slope, due, ORDER_TOLERANCE, source, detail, "theory")
-
-
-def _judged(name: str, label: str, unit: str, value: float, due: float, tolerance: float, source: str, detail: str,
-            evidence: str) -> QuantityRecord:
-    return judged(name, label, unit, Estimate(value, 0.0), reference=Estimate(due, 0.0), absolute=True, tolerance=tolerance, source=source,
-                  detail=detail, compared=False, evidence=evidence)
+    declared = Declared(name, label, "1", "theory", ORDER_TOLERANCE, absolute=True, source=source, detail=detail, compared=False)
+    return judged(declared, Value(Estimate(slope, 0.0), Estimate(due, 0.0)))

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.statistics import Estimate
+from dembark.postproc.measurement import Estimate, Measurement, Value
 
 
 def measure(replicas):

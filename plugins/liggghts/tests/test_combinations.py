@@ -5,12 +5,11 @@ from pathlib import Path
 
 import pytest
 from rig import liggghts_driver, walls
+from rig.combinations import LIST
 from rig.scenarios import Grain, Material, Scenario
 
 ROOT = Path(__file__).resolve().parents[3]
-LIST = re.findall(r"^GRAN_MODEL\((\w+), TANGENTIAL_(\w+), COHESION_(\w+), ROLLING_(\w+), SURFACE_(\w+)\)$",
-                  (ROOT / "plugins/liggghts/granular_combinations_list.h").read_text(), re.MULTILINE)
-COMBINATIONS = {tuple(word.lower() for word in each) for each in LIST}
+COMBINATIONS = set(LIST)
 ROLLING = "\n".join(f"fix p_{name} all property/global {name} peratomtypepair 2 0.1 0.1 0.1 0.1"
                     for name in ("coefficientRollingFriction", "coefficientRollingViscousDamping"))
 CASE = Scenario(name="two grains", material=Material(bridge_volume=2e-10), wall=True, steps=3, stride=1, time_step=1e-5, grains=(

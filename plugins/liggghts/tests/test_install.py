@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rig.cloud import DECK, cloud, deviation
+from rig.combinations import KINDS, LIST
 from rig.liggghts_driver import read_dump, run_deck
 
 ROOT = Path(__file__).parents[3]
@@ -40,8 +41,8 @@ def test_copies_once(tmp_path):
     assert install(source).returncode == 0
     assert {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in source.rglob("*") if path.is_file()} == before
     for name in ("tangential_model_finnie_rabinowicz.h", "cohesion_model_capillary.h", "fix_lcp_impact.cpp", "fix_resume_exact.cpp",
-                 "resume_state.h",
-                 "fix_energy_account.cpp", "energy_tally.h"):
+                 "state_files.h",
+                 "fix_energy_account.cpp", "fix_energy_account.h"):
         assert (source / name).read_bytes() == (ROOT / "plugins/liggghts" / name).read_bytes()
     assert (source / "dembark/capillary/bridge.hpp").exists() and not (source / "dembark/tests").exists()
     lines = (source / "style_contact_model_user.whitelist").read_text().splitlines()
@@ -60,8 +61,8 @@ def test_every_included_header_is_there(tmp_path):
 def test_whitelist_is_what_liggghts_dembark_compiles(tmp_path):
     source = stand_in(tmp_path / "src")
     install(source)
-    text = (ROOT / "plugins/liggghts/granular_combinations_list.h").read_text()
-    expected = set(re.findall(r"^GRAN_MODEL.*$", text, re.MULTILINE))
+    prefixed = [[f"{kind}_{model}".removeprefix("NORMAL_").upper() for kind, model in zip(KINDS, each, strict=True)] for each in LIST]
+    expected = {f"GRAN_MODEL({', '.join(each)})" for each in prefixed}
     assert len(expected) == 18
     assert set((source / "style_contact_model_user.whitelist").read_text().splitlines()) == expected
 

@@ -139,3 +139,13 @@ def test_data_of_a_state_do_not_count_against_the_limit_of_a_fix(tmp_path):
         sizes.append((folder / "whole.restart").stat().st_size)
     assert 0 < sizes[0] - sizes[1] < 200
     assert (tmp_path / "500" / "bed.500.restart").stat().st_size > sizes[0] + 8 * 6 * 64
+
+
+def test_file_of_the_stock_command_says_that_it_has_no_parts(tmp_path):
+    """It has the name of a state, and nothing behind the engine's end of the file that could be taken for a part."""
+    states = STATES.format(every=500)
+    assert run_deck(tmp_path, bed(False, f"{states}run 700\nwrite_restart bed.700.restart", ranks=1)).code == 0
+    deck = bed(False, f"{states}run 800 upto", ranks=1, resume=True).replace("resume_state bed", "read_restart bed.700.restart")
+    done = run_deck(tmp_path, deck)
+    assert done.code == 0, done.error
+    assert "at step 700 approximately: file bed.700.restart does not hold the forces and histories" in done.output

@@ -26,8 +26,9 @@
 #include <string>
 #include <vector>
 
+#include "bridge_table.hpp"
 #include "closed_forms.hpp"
-#include "exact_bridge.hpp"
+#include "liquid.hpp"
 
 namespace dembark::capillary {
 
@@ -37,15 +38,7 @@ enum class Model { exact, willett, willett_full, rabinovich, bagheri, constant }
 inline std::vector<std::string> model_names() { return {"exact", "willett", "willett_full", "rabinovich", "bagheri", "constant"}; }
 
 /// False, and `model` as it was, for a name that is none of model_names().
-inline bool model_from_name(const char* name, Model& model) {
-  const std::vector<std::string> names = model_names();
-  for (std::size_t i = 0; i < names.size(); ++i)
-    if (name && names[i] == name) {
-      model = static_cast<Model>(i);
-      return true;
-    }
-  return false;
-}
+inline bool model_from_name(const char* name, Model& model) { return name && choose(model_names(), name, model); }
 
 /// Force law of one model and one contact angle. Immutable; copies share the tables, so that it may be read from many threads.
 class BridgeForce {

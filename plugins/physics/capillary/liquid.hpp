@@ -17,9 +17,18 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <tuple>
 #include <vector>
 
 namespace dembark::capillary {
+
+/// Whether `name` is one of `names`, which stand in the order of an enumeration; it then is `value`.
+template <class Enumeration>
+inline bool choose(const std::vector<std::string>& names, const std::string& name, Enumeration& value) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found != names.end()) value = static_cast<Enumeration>(found - names.begin());
+  return found != names.end();
+}
 
 /// Radius of a wall in the functions below.
 template <class Real>
@@ -35,6 +44,9 @@ inline Real cap_share(Real radius, Real other) {
   return Real(0.5) * sine * sine / (Real(1) + cosine);  // 1 - cosine without cancellation
 }
 
+/// The names that users write, in the order of ShareRule::Kind.
+inline std::vector<std::string> share_names() { return {"cap", "fraction"}; }
+
 /// What a new bridge asks of one side.
 struct ShareRule {
   enum class Kind { cap, fraction };
@@ -42,10 +54,7 @@ struct ShareRule {
   double factor = 1.0;  // c above: 0...2 of the cap, 0...1 as a fraction
 
   /// Whether there is a kind of that name, which then holds.
-  bool set_kind(const std::string& name) {
-    kind = name == "cap" ? Kind::cap : Kind::fraction;
-    return name == "cap" || name == "fraction";
-  }
+  bool set_kind(const std::string& name) { return choose(share_names(), name, kind); }
   /// Nullptr, or what is wrong.
   const char* error() const {
     if (kind == Kind::cap) return factor > 0.0 && factor <= 2.0 ? nullptr : "the factor of the facing cap must lie in (0, 2]";
@@ -63,14 +72,6 @@ enum class Return { equal, radius, taken };
 
 /// The names that users write, in the order of `Return`.
 inline std::vector<std::string> return_names() { return {"equal", "radius", "taken"}; }
-
-/// Whether there is a rule of that name, which then is `rule`.
-inline bool return_from_name(const std::string& name, Return& rule) {
-  const std::vector<std::string> names = return_names();
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found != names.end()) rule = static_cast<Return>(found - names.begin());
-  return found != names.end();
-}
 
 /// Volume (m^3) that a holder of `liquid` gives per unit share when the shares asked of it in one step add up to `demand`.
 template <class Real>
@@ -119,5 +120,61 @@ inline NewBridge<Real> form_wall_bridge(Real given_i, Real given_wall, Real wall
   if (rule != Return::taken) bridge.imbalance = bridge.volume * (Real(1) - Real(2) * wall_part);
   return bridge;
 }
+
+/// The two sides of a contact: a grain, and another grain or a wall by its number.
+struct BridgeSides {
+  int grain = 0, other = 0;
+  bool wall = false;
+
+  bool operator<(const BridgeSides& b) const { return std::tie(wall, grain, other) < std::tie(b.wall, b.grain, b.other); }
+};
+
+/// A touching contact without a bridge. Engines derive from it what they need to find the contact again.
+struct BridgeRequest {
+  BridgeSides sides;
+  double radius = 0.0, other_radius = 0.0;  // m; of a wall `flat`
+
+  bool operator<(const BridgeRequest& r) const { return sides < r.sides; }
+};
+
+/// A bridge that broke. `imbalance`: as in NewBridge.
+struct BrokenBridge {
+  BridgeSides sides;
+  double volume = 0.0, imbalance = 0.0;
+
+  bool operator<(const BrokenBridge& b) const { return std::tie(sides, volume, imbalance) < std::tie(b.sides, b.volume, b.imbalance); }
+};
+
+/// Liquid (m^3) that a grain of `radius` gathers from others, of radius `other`, that keep `liquid` each: with it bridges between them give
+/// back to each side what they took from it. Return::taken moves no liquid.
+inline double gathered(const ShareRule& share, Return split, double radius, double other, double liquid) {
+  if (split == Return::taken) return 0.0;
+  const double back = split == Return::radius ? radius / other : 1.0;
+  return liquid * back * share(other, radius) / share(radius, other);
+}
+
+/// How wet grains are at most, from which the size of their bridges can be foreseen.
+struct WettestGrains {
+  double largest_radius = 0.0;  ///< m
+  double volume = 0.0;          ///< m^3, the most on one grain
+  double over_square = 0.0;     ///< m, the most over the square of the radius
+
+  void add(double radius, double liquid) {
+    volume = std::max(volume, liquid);
+    if (radius > 0.0) over_square = std::max(over_square, liquid / (radius * radius));
+  }
+
+  /// Volume (m^3) of a bridge between grains of these radii (m; `other` flat: a wall). Liquid gathers on some grains: twice as much as now
+  /// is foreseen, of which a bridge to a grain may take as much as one to a wall.
+  double likely_bridge(const ShareRule& share, Return split, double radius, double other) const {
+    const double partner = other < flat<double> ? other : radius;
+    const auto liquid = [&](double r) {
+      return std::min(volume, std::max(over_square * r * r, gathered(share, split, r, largest_radius, volume)));
+    };
+    const double own = liquid(radius), its = liquid(partner);
+    const double pair = share(radius, partner) * own + share(partner, radius) * its;
+    return 2.0 * std::min(std::max(pair, share(radius, flat<double>) * std::min(own, its)), std::max(own, its));
+  }
+};
 
 }  // namespace dembark::capillary

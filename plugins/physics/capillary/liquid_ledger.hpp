@@ -12,46 +12,36 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <iomanip>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
 #include <string>
-#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "liquid.hpp"
 
 namespace dembark::capillary {
 
-/// The two sides of a contact: a grain, and another grain or a wall by its number.
-struct BridgeSides {
-  int grain = 0, other = 0;
-  bool wall = false;
-
-  bool operator<(const BridgeSides& b) const { return std::tie(wall, grain, other) < std::tie(b.wall, b.grain, b.other); }
-};
-
-/// A touching contact without a bridge. Engines derive from it what they need to find the contact again.
-struct BridgeRequest {
-  BridgeSides sides;
-  double radius = 0.0, other_radius = 0.0;  // m; of a wall `flat`
-
-  bool operator<(const BridgeRequest& r) const { return sides < r.sides; }
-};
-
-/// A bridge that broke. `imbalance`: as in NewBridge.
-struct BrokenBridge {
-  BridgeSides sides;
-  double volume = 0.0, imbalance = 0.0;
-
-  bool operator<(const BrokenBridge& b) const { return std::tie(sides, volume, imbalance) < std::tie(b.sides, b.volume, b.imbalance); }
-};
-
 struct LiquidWall {
   std::string name;
-  double pool = 0.0;   // m^3 that it owns
-  double share = 0.0;  // 0...1 of that which a new bridge asks for
-  double part = 0.0;   // 0...1 of a broken bridge that it gets; with Return::taken what it gave
+  double pool = 0.0;                      // m^3 that it owns
+  double share = 0.0;                     // 0...1 of that which a new bridge asks for
+  double part = 0.0;                      // 0...1 of a broken bridge that it gets; with Return::taken what it gave
+  double change = 0.0;                    // of the pool, by this process, since all of them last settled it
+  std::vector<double> of_grain{}, own{};  // for each grain, its part and the wall's of the bridges between them
+
+  /// Nullptr, or what is wrong.
+  const char* error() const {
+    if (!(pool >= 0.0 && std::isfinite(pool))) return "its liquid (m^3) must be >= 0 and finite";
+    if (!(share >= 0.0 && share <= 1.0 && part >= 0.0 && part <= 1.0)) return "share and part must lie in 0...1";
+    return nullptr;
+  }
 };
 
 /// What grains of a process own, without bridges: the first `owned` are its own. A grain that is new has the volume `unset`.
@@ -75,17 +65,18 @@ class LiquidLedger {
   /// Copies numbers of owned grains to their copies, if there are any.
   std::function<void(std::vector<double>&)> copy_to_others;
 
-  /// Numbers that belong to a grain and go where it goes.
-  std::size_t row_size() const { return 1 + 2 * walls.size(); }
-  double* row(int grain) { return &tallies_[std::size_t(grain) * row_size()]; }
-  const double* row(int grain) const { return &tallies_[std::size_t(grain) * row_size()]; }
-  void clear_row(int grain) { std::fill_n(row(grain), row_size(), 0.0); }
   void resize(std::size_t grains) {
-    tallies_.resize(grains * row_size(), 0.0);
+    each_tally([grains](std::vector<double>& tally) { tally.resize(grains, 0.0); });
     demands_.resize(grains, 0.0);
     grants_.resize(grains, -1.0);
-    returned_.resize(walls.size(), 0.0);
   }
+
+  /// The numbers that belong to a grain and go where it goes: `visit(number)` for each, always in the same order.
+  template <class Visit>
+  void each_number(int grain, Visit visit) {
+    each_tally([&](std::vector<double>& tally) { visit(tally[grain]); });
+  }
+  std::size_t numbers() const { return 1 + 2 * walls.size(); }
 
   LiquidWall* wall(const std::string& name) {
     const auto found = std::find_if(walls.begin(), walls.end(), [&](const LiquidWall& wall) { return wall.name == name; });
@@ -94,32 +85,18 @@ class LiquidLedger {
 
   /// The walls that there are now; new ones are dry. Bridges to walls that are gone belong to their grains, as they will not break.
   void change_walls(const std::vector<std::string>& names, GrainLiquid grains) {
-    const std::size_t old_size = row_size();
-    const std::vector<double> old = tallies_;
     std::vector<LiquidWall> now;
-    std::vector<int> place(walls.size(), -1);  // of the former walls among those of now
     for (const std::string& name : names) {
-      const LiquidWall* const known = wall(name);
-      if (known) place[std::size_t(known - walls.data())] = int(now.size());
-      now.push_back(known ? *known : LiquidWall{name});
+      LiquidWall* const known = wall(name);
+      now.push_back(known ? std::exchange(*known, {}) : LiquidWall{name});
     }
-    for (std::size_t w = 0; w < walls.size(); ++w) {
-      if (place[w] >= 0) continue;
-      lost += walls[w].pool;
-      expected -= walls[w].pool;
+    for (const LiquidWall& gone : walls) {
+      lost += gone.pool;
+      expected -= gone.pool;
+      for (int i = 0; i < std::min(grains.owned, int(gone.own.size())); ++i) grains.volume[i] += gone.of_grain[i] + gone.own[i];
     }
-    walls = now;
-    tallies_.assign(old.size() / old_size * row_size(), 0.0);
-    for (int i = 0; i < grains.owned; ++i) {
-      const double* from = &old[std::size_t(i) * old_size];
-      *row(i) = *from++;
-      for (const int w : place) {
-        if (w >= 0) std::copy_n(from, 2, row(i) + 1 + 2 * w);
-        else grains.volume[i] += from[0] + from[1];
-        from += 2;
-      }
-    }
-    returned_.resize(walls.size(), 0.0);
+    walls = std::move(now);
+    resize(of_pairs_.size());
   }
 
   /// Gives new grains what `initial(i)` says. Returns a grain with an impossible volume, or -1.
@@ -147,31 +124,31 @@ class LiquidLedger {
   /// A grain of an engine that tells which ones it deletes: its liquid leaves with its part of its bridges. Their other sides get
   /// theirs when reconcile_pairs() finds the bridges gone.
   void remove(int grain, GrainLiquid grains) {
-    const double* const tally = row(grain);
-    double all = grains.volume[grain] + tally[0];
-    for (std::size_t w = 0; w < walls.size(); ++w) {
-      all += tally[1 + 2 * w];
-      returned_[w] += tally[2 + 2 * w];
+    double all = grains.volume[grain] + of_pairs_[grain];
+    for (LiquidWall& wall : walls) {
+      all += wall.of_grain[grain];
+      wall.change += wall.own[grain];
     }
     lost += all;
     expected -= all;
     if (counted_ > 0) --counted_;
     grains.volume[grain] = 0.0;
-    clear_row(grain);
+    each_number(grain, [](double& number) { number = 0.0; });
   }
 
   void give_back(std::vector<BrokenBridge>& broken, GrainLiquid grains) {
     std::sort(broken.begin(), broken.end());
     for (const BrokenBridge& b : broken) {
-      const auto [grain, other, wall] = b.sides;
-      const double own = returned(b.volume, b.imbalance), its = returned(b.volume, -b.imbalance);
-      if (wall) {
-        give_back(own, row(grain)[1 + 2 * other], grains.volume[grain]);
-        give_back(its, row(grain)[2 + 2 * other], returned_[other]);
-        continue;
+      double back = returned(b.volume, b.imbalance);
+      for (const Account& side : accounts(b.sides, grains)) {
+        if (side.owner) {
+          *side.tally -= back;
+          *side.owner += back;
+          // What rounding leaves of the tally of the last bridge goes back with it.
+          if (std::abs(*side.tally) <= 1e-3 * rounding * back) *side.owner += std::exchange(*side.tally, 0.0);
+        }
+        back = returned(b.volume, -b.imbalance);
       }
-      give_back(own, *row(grain), grains.volume[grain]);
-      if (other < grains.owned) give_back(its, *row(other), grains.volume[other]);
     }
     broken.clear();
   }
@@ -187,12 +164,11 @@ class LiquidLedger {
     };
     requests.erase(std::remove_if(requests.begin(), requests.end(), dry), requests.end());
     std::sort(requests.begin(), requests.end());
-    if (grant(requests, grains))
-      for (const Request& r : requests) withdraw(r, grains, store);
-    for (const int i : asked_) demands_[i] = 0.0;
-    asked_.clear();
+    grant(requests, grains);
+    for (const Request& r : requests) withdraw(r, grains, store);
     requests.clear();
-    settle_walls();
+    std::vector<long double> none;
+    if (std::any_of(wall_grants_.begin(), wall_grants_.end(), [](double grant) { return grant != 0.0; })) settle_walls(none);
   }
 
   /// Compares the tallies with the bridges between grains that are really there: `each(visit)` calls visit(i, j, volume, imbalance) for
@@ -205,7 +181,7 @@ class LiquidLedger {
       if (j < grains.owned) held[j] += returned(volume, -imbalance);
     });
     for (int i = 0; i < grains.owned; ++i) {
-      double& tallied = *row(i);
+      double& tallied = of_pairs_[i];
       const double back = tallied - held[i], noise = rounding * std::max(tallied, grains.volume[i]);
       if (back < -noise) {
         excess = -back / held[i];
@@ -225,9 +201,9 @@ class LiquidLedger {
   void reconcile_walls(GrainLiquid grains, EachBridge each) {
     for (int i = 0; i < grains.owned; ++i)
       for (std::size_t w = 0; w < walls.size(); ++w) {
-        double* const tally = row(i) + 1 + 2 * w;
-        if (tally[0] == 0.0 && tally[1] == 0.0) continue;
-        const double tallied = tally[0] + tally[1];
+        double &of_grain = walls[w].of_grain[i], &own = walls[w].own[i];
+        if (of_grain == 0.0 && own == 0.0) continue;
+        const double tallied = of_grain + own;
         double held = 0.0;
         each(i, w, [&](double& volume, double&) { held += volume; });
         if (held > 0.0 && std::abs(tallied - held) <= rounding * held) continue;
@@ -240,25 +216,26 @@ class LiquidLedger {
           continue;
         }
         const double kept = held > 0.0 ? held / tallied : 0.0;
-        grains.volume[i] = remaining(grains.volume[i], -(1.0 - kept) * tally[0]);
-        returned_[w] += (1.0 - kept) * tally[1];
-        tally[0] *= kept;
-        tally[1] *= kept;
+        grains.volume[i] = remaining(grains.volume[i], -(1.0 - kept) * of_grain);
+        walls[w].change += (1.0 - kept) * own;
+        of_grain *= kept;
+        own *= kept;
       }
   }
 
   struct Totals {
     double grains, bridges, walls;
     long long count;  // of grains
+    double held() const { return grains + bridges + walls; }
   };
   /// Of all processes. Collective.
-  Totals totals(GrainLiquid grains) const {
+  Totals totals(GrainLiquid grains) {
     std::vector<long double> sums(4, 0.0L);
     for (int i = 0; i < grains.owned; ++i) {
       sums[0] += std::max(grains.volume[i], 0.0);
-      for (std::size_t k = 0; k < row_size(); ++k) sums[1] += row(i)[k];
+      each_number(i, [&](double tallied) { sums[1] += tallied; });
     }
-    for (const double back : returned_) sums[2] += back;
+    for (const LiquidWall& wall : walls) sums[2] += wall.change;
     sums[3] = grains.owned;
     sum_over_processes(sums);
     double pools = double(sums[2]);
@@ -270,7 +247,7 @@ class LiquidLedger {
   /// or, within a run, something is wrong: then the missing part of it is returned, otherwise 0. Collective.
   double audit(GrainLiquid grains, bool in_run) {
     const Totals there = totals(grains);
-    const double now = there.grains + there.bridges + there.walls, missing = expected - now;
+    const double now = there.held(), missing = expected - now;
     double wrong = 0.0;
     if (counted_ < 0) {
       expected = now;
@@ -286,75 +263,84 @@ class LiquidLedger {
     return wrong;
   }
 
-  /// What a restart file has to hold besides the names of the walls: these sums, the walls' liquid and, where they do not travel with the
-  /// grains, the rows.
-  std::vector<double> saved(bool rows) const {
-    std::vector<double> numbers{lost, added, expected, double(counted_), double(walls.size())};
-    for (std::size_t w = 0; w < walls.size(); ++w)
-      numbers.insert(numbers.end(), {walls[w].pool + returned_[w], walls[w].share, walls[w].part});
-    if (rows) numbers.insert(numbers.end(), tallies_.begin(), tallies_.end());
-    return numbers;
+  /// What a restart file or a saved scene has to hold: these sums, the walls and, where they do not travel with the grains, the tallies.
+  std::string saved(bool tallies) {
+    std::ostringstream text;
+    text << std::setprecision(std::numeric_limits<double>::max_digits10) << format << ' ' << lost << ' ' << added << ' ' << expected << ' '
+         << counted_ << ' ' << walls.size() << ' ' << (tallies ? of_pairs_.size() : 0);
+    for (const LiquidWall& wall : walls)
+      text << ' ' << wall.name << ' ' << wall.pool + wall.change << ' ' << wall.share << ' ' << wall.part;
+    if (tallies)
+      each_tally([&](const std::vector<double>& tally) {
+        for (const double number : tally) text << ' ' << number;
+      });
+    return text.str();
   }
-  void restore(const double* numbers, std::size_t count) {
-    lost = numbers[0];
-    added = numbers[1];
-    expected = numbers[2];
-    counted_ = static_cast<long long>(numbers[3]);
-    walls.clear();
-    const double* at = numbers + 5;
-    for (std::size_t w = 0; w < static_cast<std::size_t>(numbers[4]); ++w, at += 3) walls.push_back({"", at[0], at[1], at[2]});
-    returned_.assign(walls.size(), 0.0);
-    tallies_.assign(at, numbers + count);
+  /// std::runtime_error for what another version saved.
+  void restore(const std::string& saved) {
+    std::istringstream text(saved);
+    std::string found;
+    std::size_t wall_count = 0, grains = 0;
+    text >> found >> lost >> added >> expected >> counted_ >> wall_count >> grains;
+    if (found != format || !text) throw std::runtime_error("the liquid was saved by another version of dembark; start from new files");
+    walls.assign(wall_count, {});
+    for (LiquidWall& wall : walls) text >> wall.name >> wall.pool >> wall.share >> wall.part;
+    resize(grains);
+    each_tally([&](std::vector<double>& tally) {
+      for (double& number : tally) text >> number;
+    });
   }
 
  private:
+  static constexpr const char* format = "liquid-2";
   // Tallies and bridges differ by the rounding of sums only; more than this part of them is a bridge that came or went unseen.
   static constexpr double rounding = 1e-11;
 
-  /// What rounding leaves of the tally of the last bridge goes back with it.
-  static void give_back(double amount, double& tally, double& owner) {
-    tally -= amount;
-    owner += amount;
-    if (std::abs(tally) > 1e-3 * rounding * amount) return;
-    owner += tally;
-    tally = 0.0;
+  /// Where a side of a bridge keeps what it owns, and its part of bridges; none of a grain of another process.
+  struct Account {
+    double *owner = nullptr, *tally = nullptr;
+  };
+  std::array<Account, 2> accounts(const BridgeSides& sides, GrainLiquid grains) {
+    const auto [grain, other, wall] = sides;
+    double& own = grains.volume[grain];
+    if (wall) return {{{&own, &walls[other].of_grain[grain]}, {&walls[other].change, &walls[other].own[grain]}}};
+    return {{{&own, &of_pairs_[grain]}, other < grains.owned ? Account{&grains.volume[other], &of_pairs_[other]} : Account{}}};
   }
 
-  void demand(int grain, double share_of_it) {
-    if (demands_[grain] == 0.0) asked_.push_back(grain);
-    demands_[grain] += share_of_it;
+  template <class Visit>
+  void each_tally(Visit visit) {
+    visit(of_pairs_);
+    for (LiquidWall& wall : walls) {
+      visit(wall.of_grain);
+      visit(wall.own);
+    }
   }
 
-  /// Fills in what each grain and wall grants per unit share. Returns whether anything was asked for here.
+  /// Fills in what each grain and wall grants per unit share.
   template <class Request>
-  bool grant(const std::vector<Request>& requests, GrainLiquid grains) {
-    // All processes have to know whether any pair asks, and of each wall what it got back and what is asked of it.
-    const std::size_t n = walls.size();
-    std::vector<long double> common(1 + 2 * n, 0.0L);
+  void grant(const std::vector<Request>& requests, GrainLiquid grains) {
+    // All processes have to know whether any pair asks, and what is asked of each wall.
+    std::vector<long double> common(1 + walls.size(), 0.0L);
+    if (!requests.empty()) demands_.assign(demands_.size(), 0.0);
     for (const Request& r : requests) {
-      demand(r.sides.grain, share(r.radius, r.other_radius));
+      demands_[r.sides.grain] += share(r.radius, r.other_radius);
       if (r.sides.wall) {
-        common[1 + n + r.sides.other] += walls[r.sides.other].share;
+        common[1 + r.sides.other] += walls[r.sides.other].share;
         continue;
       }
       common[0] = 1.0L;
-      if (r.sides.other < grains.owned) demand(r.sides.other, share(r.other_radius, r.radius));
+      if (r.sides.other < grains.owned) demands_[r.sides.other] += share(r.other_radius, r.radius);
     }
-    std::copy(returned_.begin(), returned_.end(), common.begin() + 1);
-    sum_over_processes(common);
-    wall_grants_.assign(n, 0.0);
-    taken_.assign(n, 0.0L);
-    for (std::size_t w = 0; w < n; ++w) {
-      walls[w].pool += double(common[1 + w]);
-      wall_grants_[w] = walls[w].share * capillary::grant(walls[w].pool, double(common[1 + n + w]));
-      returned_[w] = 0.0;
-    }
+    settle_walls(common);
+    wall_grants_.clear();
+    for (std::size_t w = 0; w < walls.size(); ++w)
+      wall_grants_.push_back(walls[w].share * capillary::grant(walls[w].pool, double(common[1 + w])));
     // -1: nothing was asked of this grain where it is owned.
     const bool copies = common[0] != 0.0L && copy_to_others;
-    if (copies) std::fill(grants_.begin(), grants_.end(), -1.0);
-    for (const int i : asked_) grants_[i] = capillary::grant(grains.volume[i], demands_[i]);
+    if (copies) grants_.assign(grants_.size(), -1.0);
+    for (int i = 0; i < grains.owned && !requests.empty(); ++i)
+      if (demands_[i] > 0.0) grants_[i] = capillary::grant(grains.volume[i], demands_[i]);
     if (copies) copy_to_others(grants_);
-    return !requests.empty();
   }
 
   template <class Request, class Store>
@@ -369,29 +355,24 @@ class LiquidLedger {
     }
     if (!(bridge.volume > 0.0)) return;
     store(r, bridge);
-    const double own = returned(bridge.volume, bridge.imbalance), its = returned(bridge.volume, -bridge.imbalance);
-    grains.volume[grain] = remaining(grains.volume[grain], bridge.from_i);
-    if (wall) {
-      row(grain)[1 + 2 * other] += own;
-      row(grain)[2 + 2 * other] += its;
-      taken_[other] += bridge.from_j;
-      return;
-    }
-    row(grain)[0] += own;
-    if (other >= grains.owned) return;
-    grains.volume[other] = remaining(grains.volume[other], bridge.from_j);
-    row(other)[0] += its;
+    const auto [own, its] = accounts(r.sides, grains);
+    *own.owner = remaining(*own.owner, bridge.from_i);
+    *own.tally += returned(bridge.volume, bridge.imbalance);
+    if (!its.owner) return;
+    *its.owner = wall ? *its.owner - bridge.from_j : remaining(*its.owner, bridge.from_j);
+    *its.tally += returned(bridge.volume, -bridge.imbalance);
   }
 
-  void settle_walls() {
-    if (std::all_of(wall_grants_.begin(), wall_grants_.end(), [](double grant) { return grant == 0.0; })) return;
-    sum_over_processes(taken_);
-    for (std::size_t w = 0; w < walls.size(); ++w) walls[w].pool = remaining(walls[w].pool, double(taken_[w]));
+  /// Puts what all processes gave and took into the pools, and the sums of all into `sums`. Collective.
+  void settle_walls(std::vector<long double>& sums) {
+    const std::size_t first = sums.size();
+    for (LiquidWall& wall : walls) sums.push_back(std::exchange(wall.change, 0.0));
+    sum_over_processes(sums);
+    for (std::size_t w = 0; w < walls.size(); ++w) walls[w].pool = remaining(walls[w].pool, -double(sums[first + w]));
   }
 
-  std::vector<double> tallies_, demands_, grants_, returned_, wall_grants_;
-  std::vector<long double> taken_;
-  std::vector<int> asked_;
+  std::vector<double> of_pairs_;  // for each grain, its part of its bridges to grains
+  std::vector<double> demands_, grants_, wall_grants_;
   long long counted_ = -1;  // grains when liquid was last counted; -1: never
 };
 

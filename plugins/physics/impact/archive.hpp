@@ -1,9 +1,11 @@
-// State as numbers that survive as doubles, bit for bit: one description of a type, `each`, serves to write it and to read it back.
+// State as numbers that survive as doubles, bit for bit. A type names its members once, in `fields()`, a tuple of references; restart
+// files, saved scenes, messages between ranks, tables for Python and comparisons are made from that.
 #pragma once
 
 #include <cstddef>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -12,6 +14,11 @@
 
 namespace dembark {
 namespace impact {
+
+/// Of what follows among the fields; numbers of another one are refused.
+struct FormatVersion {
+  double number;
+};
 
 class Archive {
  public:
@@ -25,18 +32,18 @@ class Archive {
   /// Writes or reads; throws std::invalid_argument with one line if the numbers are not those of `value`.
   template <class T>
   void operator()(T& value) {
-    if constexpr (std::is_arithmetic_v<T>) {
+    if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
       if (!reading_) return numbers_.push_back(double(value));
       if (at_ == numbers_.size()) wrong("are too few for what it says it holds");
       value = T(numbers_[at_++]);
     } else {
-      value.each(*this);
+      all(value.fields());
     }
   }
-  void operator()(Vec3<double>& v) { (*this)(v.x), (*this)(v.y), (*this)(v.z); }
+  void operator()(Vec3<double>& v) { all(std::tie(v.x, v.y, v.z)); }
   template <class A, class B>
   void operator()(std::pair<A, B>& p) {
-    (*this)(p.first), (*this)(p.second);
+    all(std::tie(p.first, p.second));
   }
   template <class T>
   void operator()(std::vector<T>& list) {
@@ -47,12 +54,16 @@ class Archive {
     resize(text);
     for (char& c : text) (*this)(c);
   }
+  /// A tuple of references.
+  template <class Fields>
+  void all(const Fields& fields) {
+    std::apply([this](auto&... field) { ((*this)(field), ...); }, fields);
+  }
 
-  /// The version of what follows; another one is refused.
-  void version(double number) {
-    double found = number;
+  void operator()(FormatVersion& version) {
+    double found = version.number;
     (*this)(found);
-    if (found != number) throw std::invalid_argument("impact state: not written by this version of dembark");
+    if (found != version.number) throw std::invalid_argument("impact state: not written by this version of dembark");
   }
   /// All has been read.
   void end() const {
@@ -75,6 +86,22 @@ class Archive {
   std::vector<double> numbers_;
   std::size_t at_ = 0;
 };
+
+/// The numbers of `value`.
+template <class T>
+std::vector<double> to_numbers(const T& value) {
+  Archive out;
+  out(const_cast<T&>(value));  // writing changes nothing
+  return out.numbers();
+}
+
+/// Sets `value` from its numbers; throws std::invalid_argument with one line if they are not.
+template <class T>
+void from_numbers(std::vector<double> numbers, T& value) {
+  Archive in(std::move(numbers));
+  in(value);
+  in.end();
+}
 
 }  // namespace impact
 }  // namespace dembark

@@ -15,40 +15,64 @@
 #include <utility>
 #include <vector>
 
-#include "candidates.hpp"
 #include "types.hpp"
 
 namespace dembark {
 namespace impact {
 
-/// One contact, oriented (key_a < key_b for pairs), with what follows from the materials.
-struct Row {
-  int a = 0, b = -1;
-  std::int64_t key_a = 0, key_b = -1;
-  double gap = 0.0;
-  Vec3<double> normal{}, point_velocity{}, place{};
+/// Of a contact, with the lower id first for pairs.
+using Key = std::pair<std::int64_t, std::int64_t>;
+
+/// Whether the bodies of a contact come in the other order than their ids.
+inline bool turned(const Contact& c) { return c.b >= 0 && c.key_b < c.key_a; }
+inline Key key_of(const Contact& c) { return turned(c) ? Key(c.key_b, c.key_a) : Key(c.key_a, c.key_b); }
+
+struct ContactHistory;
+
+/// A contact with key_a < key_b for pairs, and what follows from the materials.
+struct Row : Contact {
+  int memory = -1;                         ///< index into what is remembered, or -1
+  const ContactHistory* before = nullptr;  ///< what is known of it, maybe by another name; see history.hpp
   const PairLaw* law = nullptr;
   double stiffness = 0.0;           ///< s, N/m, both springs in series
   double viscous = 0.0;             ///< c / tau, N/m
   double compliance = 0.0;          ///< 1 / (s + c/tau), m/N
   double arm_a = 0.0, arm_b = 0.0;  ///< m, from the centres to the contact
   double radius = 0.0;              ///< m, R* = r_a r_b / (r_a + r_b), where friction asks for it
+  Vec3<double> point{};             ///< m, of contact
 };
 
 class Assembly {
  public:
+  std::vector<Row>& rows() { return rows_; }
   const std::vector<Row>& rows() const { return rows_; }
   std::size_t size() const { return rows_.size(); }
   const Eigen::SparseMatrix<double>& matrix() const { return matrix_; }
 
-  /// Takes the contacts of a step. Throws std::invalid_argument with one line about the contact that is wrong.
-  void update(const std::vector<Body>& bodies, const std::vector<Contact>& contacts, const std::vector<Sorted>& sorted,
-              const Settings& settings) {
+  /// Takes those contacts of a step of which something is remembered or that `screening` finds near. recall(key): index of what is
+  /// remembered of a contact, or -1. Throws std::invalid_argument with one line about the contact that is wrong.
+  template <class Screen, class Recall>
+  void take(const std::vector<Body>& bodies, const std::vector<Contact>& contacts, Screen& screening, Recall recall,
+            const Settings& settings) {
+    sorted_.clear();
+    for (std::size_t i = 0; i < contacts.size(); ++i) {
+      const Key key = key_of(contacts[i]);
+      const int memory = recall(key);
+      if (memory < 0 && !screening.near(i)) continue;
+      screening.keep(i);
+      sorted_.push_back({key, int(i), memory});
+    }
+    sort();
     const std::size_t pairs = settings.materials.size() * settings.materials.size();
     if (springs_.size() != pairs || dt_ != settings.dt) springs_.assign(pairs, Springs());
     dt_ = settings.dt;
-    rows_.resize(sorted.size());
-    for (std::size_t i = 0; i < rows_.size(); ++i) fill(bodies, contacts[std::size_t(sorted[i].contact)], settings, rows_[i]);
+    rows_.resize(sorted_.size());
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      const Contact& c = contacts[std::size_t(sorted_[i].contact)];
+      if (i > 0 && sorted_[i - 1].key == sorted_[i].key) refuse(c, "the same two keys come twice; every contact needs its own");
+      rows_[i].memory = sorted_[i].memory;
+      fill(bodies, c, settings, rows_[i]);
+    }
   }
 
   void clear() { rows_.clear(); }
@@ -82,56 +106,73 @@ class Assembly {
   }
 
  private:
+  struct Sorted {
+    Key key;
+    int contact, memory;
+  };
   /// What the contacts of two materials have in common.
   struct Springs {
     double wall = -1.0;  ///< N/m, stiffness of the wall it was made for; 0 for pairs of bodies
     double share = 0.0, stiffness = 0.0, viscous = 0.0, compliance = 0.0;  ///< of a in the compliance of both; see Row
   };
+  static constexpr int most_runs = 16;
 
-  static Springs springs_of(const Contact& c, int a, int side, const PairLaw& law, const Settings& settings) {
-    const bool wall = c.b < 0;
-    const double soft_a = 1.0 / settings.materials[std::size_t(a)].stiffness;
-    const double soft_b = 1.0 / (wall ? c.wall_stiffness : settings.materials[std::size_t(side)].stiffness);
-    if (!(soft_b >= 0.0) || std::isinf(soft_b)) throw std::invalid_argument(name_of(c) + ": the wall's stiffness must be > 0 N/m");
+  [[noreturn]] static void refuse(const Contact& c, const std::string& what) {
+    throw std::invalid_argument("contact of " + std::to_string(c.key_a) + " and " + std::to_string(c.key_b) + ": " + what);
+  }
+
+  /// Pairs come sorted, and so do the contacts of each wall: a few ascending runs are merged.
+  void sort() {
+    const auto before = [](const Sorted& p, const Sorted& q) { return p.key < q.key; };
+    auto middle = std::is_sorted_until(sorted_.begin(), sorted_.end(), before);
+    for (int runs = 1; middle != sorted_.end(); ++runs) {
+      if (runs == most_runs) return std::sort(sorted_.begin(), sorted_.end(), before);
+      const auto end = std::is_sorted_until(middle, sorted_.end(), before);
+      std::inplace_merge(sorted_.begin(), middle, end, before);
+      middle = end;
+    }
+  }
+
+  static Springs springs_of(const Contact& c, double stiffness_a, double stiffness_b, const PairLaw& law, double dt) {
+    const double soft_a = 1.0 / stiffness_a, soft_b = 1.0 / stiffness_b;
+    if (!(soft_b >= 0.0) || std::isinf(soft_b)) refuse(c, "the wall's stiffness must be > 0 N/m");
     Springs s;
-    s.wall = wall ? c.wall_stiffness : 0.0;
+    s.wall = c.b < 0 ? c.wall_stiffness : 0.0;
     s.share = soft_a / (soft_a + soft_b);
     s.stiffness = 1.0 / (soft_a + soft_b);
-    s.viscous = law.contact_damping / settings.dt;
+    s.viscous = law.contact_damping / dt;
     s.compliance = 1.0 / (s.stiffness + s.viscous);
     return s;
   }
 
-  void fill(const std::vector<Body>& bodies, const Contact& c, const Settings& settings, Row& r) {
-    const int count = int(bodies.size()), materials = int(settings.materials.size());
-    if (c.a < 0 || c.a >= count || c.b >= count || c.a == c.b)
-      throw std::invalid_argument(name_of(c) + ": bodies " + std::to_string(c.a) + " and " + std::to_string(c.b) + " are not two of " +
-                                  std::to_string(count));
-    if (c.key_a < 0 || (c.b >= 0) != (c.key_b >= 0))
-      throw std::invalid_argument(name_of(c) + ": keys of bodies are >= 0, keys of walls < 0");
-    if (std::max(std::abs(c.key_a), std::abs(c.key_b)) > (std::int64_t(1) << 53))
-      throw std::invalid_argument(name_of(c) + ": keys must stay below 2^53");
+  static void check(const Contact& c, int bodies) {
+    if (c.a < 0 || c.a >= bodies || c.b >= bodies || c.a == c.b)
+      refuse(c, "bodies " + std::to_string(c.a) + " and " + std::to_string(c.b) + " are not two of " + std::to_string(bodies));
+    if (c.key_a < 0 || (c.b >= 0) != (c.key_b >= 0)) refuse(c, "keys of bodies are >= 0, keys of walls < 0");
+    if (std::max(std::abs(c.key_a), std::abs(c.key_b)) > (std::int64_t(1) << 53)) refuse(c, "keys must stay below 2^53");
     if (!(std::isfinite(c.gap) && std::abs(dot(c.normal, c.normal) - 1.0) < unit_tolerance))
-      throw std::invalid_argument(name_of(c) + ": the gap must be finite and the normal a unit vector");
-    const bool turn = turned(c), wall = c.b < 0;
-    const Body& first = bodies[c.a];
-    const int material_b = wall ? c.wall_material : bodies[c.b].material;
-    if (first.material < 0 || first.material >= materials || material_b < 0 || material_b >= materials)
-      throw std::invalid_argument(name_of(c) + ": materials " + std::to_string(first.material) + " and " + std::to_string(material_b) +
-                                  " are not below " + std::to_string(materials));
-    r.a = turn ? c.b : c.a;
-    r.b = turn ? c.a : c.b;
-    r.key_a = turn ? c.key_b : c.key_a;
-    r.key_b = turn ? c.key_a : c.key_b;
-    r.gap = c.gap;
-    r.normal = turn ? -c.normal : c.normal;
-    r.point_velocity = wall ? c.point_velocity : Vec3<double>{};
+      refuse(c, "the gap must be finite and the normal a unit vector");
+  }
+
+  void fill(const std::vector<Body>& bodies, const Contact& c, const Settings& settings, Row& r) {
+    check(c, int(bodies.size()));
+    static_cast<Contact&>(r) = c;
+    if (turned(c)) {
+      std::swap(r.a, r.b);
+      std::swap(r.key_a, r.key_b);
+      r.normal = -c.normal;
+    }
+    const bool wall = c.b < 0;
     const Body& a = bodies[r.a];
-    const int side = wall ? c.wall_material : bodies[r.b].material;
+    const int materials = int(settings.materials.size()), side = wall ? c.wall_material : bodies[r.b].material;
+    if (a.material < 0 || a.material >= materials || side < 0 || side >= materials)
+      refuse(c, "materials " + std::to_string(a.material) + " and " + std::to_string(side) + " are not below " + std::to_string(materials));
     const std::size_t pair = std::size_t(a.material) * std::size_t(materials) + std::size_t(side);
     r.law = &settings.pairs[pair];
     Springs& springs = springs_[pair];
-    if (springs.wall != (wall ? c.wall_stiffness : 0.0)) springs = springs_of(c, a.material, side, *r.law, settings);
+    if (springs.wall != (wall ? c.wall_stiffness : 0.0))
+      springs = springs_of(c, settings.materials[std::size_t(a.material)].stiffness,
+                           wall ? c.wall_stiffness : settings.materials[std::size_t(side)].stiffness, *r.law, dt_);
     r.stiffness = springs.stiffness;
     r.viscous = springs.viscous;
     r.compliance = springs.compliance;
@@ -140,11 +181,12 @@ class Assembly {
     const double share = springs.share, other = wall ? 0.0 : bodies[r.b].radius;
     r.arm_a = a.radius + share * c.gap;
     r.arm_b = wall ? 0.0 : other + (1.0 - share) * c.gap;
-    r.place = a.position - r.arm_a * r.normal;
+    r.point = a.position - r.arm_a * r.normal;
     if (r.law->friction.interface_shear_strength < unlimited_strength)
       r.radius = wall || a.radius == 0.0 ? a.radius : a.radius * other / (a.radius + other);
   }
 
+  std::vector<Sorted> sorted_;
   std::vector<Row> rows_;
   std::vector<Springs> springs_;  ///< of each pair of materials, made where needed
   double dt_ = 0.0;

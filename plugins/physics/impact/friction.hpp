@@ -17,6 +17,7 @@
 #include "assembly.hpp"
 #include "history.hpp"
 #include "motion.hpp"
+#include "normal_forces.hpp"
 #include "types.hpp"
 
 namespace dembark {
@@ -62,7 +63,7 @@ class FrictionForces {
   static bool acts(const Row& row) { return row.law->friction.static_friction > 0.0; }
 
   /// Begins with the springs as the last step left them, turned with the bodies. False if there is no friction.
-  bool begin(const std::vector<Row>& rows, const HistoryKeeper& history, double dt, double kick, Motion& motion) {
+  bool begin(const std::vector<Row>& rows, double dt, double kick, Motion& motion) {
     dt_ = dt;
     kick_ = kick;
     bool any = false;
@@ -72,9 +73,8 @@ class FrictionForces {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       if (!acts(rows[i])) continue;
       any = true;
-      const ContactHistory& before = history.before(i);
-      if (!before.active) continue;
-      const Vec3<double> turned = rotate_to_plane(before.friction.displacement, rows[i].normal, motion.twist(rows[i], dt));
+      if (!rows[i].before->active) continue;
+      const Vec3<double> turned = rotate_to_plane(rows[i].before->friction.displacement, rows[i].normal, motion.twist(rows[i], dt));
       start_[i] = -tangential_stiffness(rows[i]) * turned;
       motion.add_tangential(rows[i], start_[i]);
     }
@@ -83,19 +83,18 @@ class FrictionForces {
   }
 
   /// All of them once, from the velocities with those of the last sweep. False if nothing changed.
-  bool sweep(const std::vector<Row>& rows, const HistoryKeeper& history, const std::vector<char>& active, const Eigen::VectorXd& normal,
-             Motion& motion) {
+  bool sweep(const std::vector<Row>& rows, const Unknowns& normal, Motion& motion) {
     trial_.assign(rows.size(), Vec3<double>());
     bool changed = false;
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const Row& r = rows[i];
       state[i] = {};
-      if (active[i] && acts(r)) {
-        state[i].slip = history.before(i).friction.slip;
+      if (normal.active[i] && acts(r)) {
+        state[i].slip = r.before->friction.slip;
         Vec3<double> velocity = motion.surface_velocity(r);
         velocity -= dot(velocity, r.normal) * r.normal;
-        trial_[i] =
-            friction_sweep(r, normal[Eigen::Index(i)], motion.tangential_response(r), velocity, force[i], start_[i], dt_, kick_, state[i]);
+        trial_[i] = friction_sweep(r, normal.z[Eigen::Index(i)], motion.tangential_response(r), velocity, force[i], start_[i], dt_, kick_,
+                                   state[i]);
       }
       changed = changed || trial_[i].x != force[i].x || trial_[i].y != force[i].y || trial_[i].z != force[i].z;
     }
@@ -103,7 +102,7 @@ class FrictionForces {
     force.swap(trial_);
     motion.clear_tangential();
     for (std::size_t i = 0; i < rows.size(); ++i)
-      if (active[i]) motion.add_tangential(rows[i], force[i]);
+      if (normal.active[i]) motion.add_tangential(rows[i], force[i]);
     return true;
   }
 

@@ -1,7 +1,7 @@
-// Candidates for contact: pairs of discs or spheres, planes, the inside of a drum; triangles in triangles.hpp.
+// Candidates for contact: pairs of discs or spheres, across periodic boundaries too; planes, the inside of a drum, meshes of triangles.
 //
-// Every function appends to `contacts` what lies within `reach` (m): gap <= reach. A candidate that stays open costs little; a pair
-// that is missed acts one step later, with the overlap it has by then. Unbounded space: no periodic images.
+// All searches append to `contacts` what lies within `reach` (m): gap <= reach. A candidate that stays open costs little; a pair that is
+// missed acts one step later, with the overlap it has by then.
 #pragma once
 
 #include <algorithm>
@@ -10,11 +10,13 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
+#include <stdexcept>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
-#include "../surface/point_grid.hpp"
+#include "../surface/surface_contacts.hpp"
 #include "types.hpp"
 
 namespace dembark {
@@ -43,32 +45,72 @@ inline void build_grid(const std::vector<Body>& bodies, double cell, PointGrid& 
   grid.build(bodies.size(), [&](std::size_t i) { return bodies[i].position; }, cell);
 }
 
+struct PeriodicBox {
+  Vec3<double> low{}, length{};              ///< m
+  bool periodic[3] = {false, false, false};  ///< x, y, z
+  double beyond = 0.0;                       ///< m, by how much bodies may be outside of the box
+};
+
 /// Finds pairs and remembers a wider list of them, which holds while no body has moved by half of the margin. What it finds does not
 /// depend on the age of that list.
 class PairFinder {
  public:
-  /// Appends all pairs with gap <= reach, sorted by (key_a, key_b), key_a < key_b.
-  void find(const std::vector<Body>& bodies, double reach, std::vector<Contact>& contacts) {
+  PeriodicBox box;
+
+  /// Appends all pairs with gap <= reach, sorted by (key_a, key_b), key_a < key_b. Throws std::invalid_argument where a body might touch
+  /// another one twice, across two boundaries.
+  void find(const std::vector<Body>& own, double reach, std::vector<Contact>& contacts) {
+    const bool images = !own.empty() && (box.periodic[0] || box.periodic[1] || box.periodic[2]);
+    if (images) add_images(own, reach);
+    const std::vector<Body>& bodies = images ? all_ : own;
+    const int count = int(own.size());
     if (!current(bodies, reach)) build(bodies, reach);
     for (const auto& pair : pairs_) {
+      if (pair.first >= count) continue;  // of an image: this contact across a boundary is found from the other side too
       const Body &a = bodies[pair.first], &b = bodies[pair.second];
       const Vec3<double> separation = a.position - b.position;
       const double touch = a.radius + b.radius, far = touch + reach, square = dot(separation, separation);
       if (square > far * far) continue;
       const double distance = std::sqrt(square);
-      contacts.emplace_back();
-      Contact& c = contacts.back();
-      c.a = pair.first;
-      c.b = pair.second;
-      c.key_a = a.id;
-      c.key_b = b.id;
-      c.gap = distance - touch;
       // Coincident centres have no direction; any will do to drive them apart.
-      c.normal = distance > 0.0 ? separation * (1.0 / distance) : Vec3<double>{0.0, 1.0, 0.0};
+      const Vec3<double> normal = distance > 0.0 ? separation * (1.0 / distance) : Vec3<double>{0.0, 1.0, 0.0};
+      const int partner = pair.second < count ? pair.second : origin_[std::size_t(pair.second - count)];
+      contacts.push_back({pair.first, partner, a.id, b.id, distance - touch, normal});
     }
   }
 
  private:
+  /// Fills all_ and origin_.
+  void add_images(const std::vector<Body>& own, double reach) {
+    all_ = own;
+    origin_.clear();
+    double largest = 0.0;
+    for (const Body& b : all_) largest = std::max(largest, b.radius);
+    const double range = 2.0 * largest + reach + box.beyond;
+    double Vec3<double>::* const axes[3] = {&Vec3<double>::x, &Vec3<double>::y, &Vec3<double>::z};
+    for (int k = 0; k < 3; ++k) {
+      const double low = box.low.*axes[k], length = box.length.*axes[k];
+      const auto at = [&](const Body& b) { return b.position.*axes[k]; };
+      if (!box.periodic[k]) continue;
+      if (length < 2.0 * range) {
+        // Between bodies that all lie in one plane across the axis (logs in cross-section) no image can touch anything.
+        const auto ends = std::minmax_element(all_.begin(), all_.end(), [&](const Body& a, const Body& b) { return at(a) < at(b); });
+        if (length - (at(*ends.second) - at(*ends.first)) > 2.0 * largest + reach) continue;
+        throw std::invalid_argument(std::string("the periodic box is too short along ") + "xyz"[k] + ": " + std::to_string(length) +
+                                    " m; a body would touch another one twice; it needs " + std::to_string(2.0 * range) +
+                                    " m or a boundary that is not periodic");
+      }
+      const std::size_t n = all_.size();
+      for (std::size_t i = 0; i < n; ++i) {
+        const double shift = at(all_[i]) < low + range ? length : at(all_[i]) > low + length - range ? -length : 0.0;
+        if (shift == 0.0) continue;
+        all_.push_back(all_[i]);
+        all_.back().position.*axes[k] += shift;
+        origin_.push_back(i < own.size() ? int(i) : origin_[i - own.size()]);
+      }
+    }
+  }
+
   bool current(const std::vector<Body>& bodies, double reach) const {
     if (bodies.size() != reference_.size() || reach > reach_ || reach < 0.25 * reach_) return false;
     const double limit = 0.25 * margin_ * margin_;  // (margin / 2)^2
@@ -115,6 +157,8 @@ class PairFinder {
     if (!std::is_sorted(pairs_.begin(), pairs_.end(), before)) std::sort(pairs_.begin(), pairs_.end(), before);
     reference_ = bodies;
   }
+  std::vector<Body> all_;    ///< and their images
+  std::vector<int> origin_;  ///< of each image the index of its body
   PointGrid grid_;
   std::vector<Body> reference_;
   std::vector<std::pair<int, int>> pairs_, found_;
@@ -125,17 +169,7 @@ class PairFinder {
 namespace detail {
 inline void wall_contact(const Wall& wall, int body, const Body& b, std::int64_t key, double gap, const Vec3<double>& normal,
                          const Vec3<double>& velocity, std::vector<Contact>& contacts) {
-  Contact c;
-  c.a = body;
-  c.b = -1;
-  c.key_a = b.id;
-  c.key_b = key;
-  c.gap = gap;
-  c.normal = normal;
-  c.point_velocity = velocity;
-  c.wall_material = wall.material;
-  c.wall_stiffness = wall.stiffness;
-  contacts.push_back(c);
+  contacts.push_back({body, -1, b.id, key, gap, normal, velocity, wall.material, wall.stiffness});
 }
 }  // namespace detail
 
@@ -146,6 +180,8 @@ struct Plane : Wall {
   Vec3<double> normal{0.0, 1.0, 0.0};  ///< unit
   Vec3<double> velocity{};             ///< m/s, of the surface; moving `point` along is the caller's
   bool two_sided = false;
+
+  auto fields() { return std::tie(id, material, stiffness, point, normal, velocity); }
 };
 
 inline void plane_contacts(const std::vector<Body>& bodies, const Plane& plane, double reach, std::vector<Contact>& contacts) {
@@ -163,6 +199,8 @@ struct Drum : Wall {
   double radius = 1.0;               ///< m
   double omega = 0.0;                ///< rad/s, right-handed about the axis
   Vec3<double> velocity{};           ///< m/s, of the axis; moving `point` along is the caller's
+
+  auto fields() { return std::tie(id, material, stiffness, point, axis, radius, omega); }
 };
 
 inline void cylinder_contacts(const std::vector<Body>& bodies, const Drum& drum, double reach, std::vector<Contact>& contacts) {
@@ -176,6 +214,103 @@ inline void cylinder_contacts(const std::vector<Body>& bodies, const Drum& drum,
                          drum.velocity + (drum.omega * drum.radius) * cross(drum.axis, outward), contacts);
   }
 }
+
+/// The triangles of a mesh.
+struct Mesh : Wall {
+  SurfaceContacts surface;
+  double speed = 0.0;  ///< m/s, of the fastest corner
+  bool velocity_known = true;
+
+  /// moved: as for the surface.
+  void update(std::vector<Triangle> triangles, bool moved = true) {
+    double square = 0.0;
+    for (const Triangle& t : triangles)
+      for (const Vec3<double>& v : t.velocity) square = std::max(square, dot(v, v));
+    speed = std::sqrt(square);
+    surface.update(std::move(triangles), moved);
+  }
+};
+
+/// Contacts with the triangles of a mesh, with its work space.
+class TriangleFinder {
+ public:
+  /// In the order of the bodies' ids. `mesh.id` must be wall_key(number); a contact's key is wall_key(number, feature of the triangle).
+  void find(const std::vector<Body>& bodies, const Mesh& mesh, double reach, std::vector<Contact>& contacts) {
+    const SurfaceContacts& surface = mesh.surface;
+    double largest = 0.0;
+    for (const Body& b : bodies) largest = std::max(largest, b.radius);
+    const double range = largest + reach;
+    build_grid(bodies, 2.0 * range, grid_);
+    hits_.clear();
+    const std::vector<Triangle>& triangles = surface.triangles();
+    for (int t = 0; t < int(triangles.size()); ++t) {
+      const Triangle& triangle = triangles[std::size_t(t)];
+      const Vec3<double> first = triangle.node[0], across = cross(triangle.node[1] - first, triangle.node[2] - first);
+      const double size = norm(across);
+      const auto [low, high] = box(triangle, range);
+      grid_.in_box(low, high, [&, t](int i) {
+        const Body& b = bodies[std::size_t(i)];
+        if (std::fabs(dot(across, b.position - first)) > 1.001 * size * (b.radius + reach)) return;  // most are far from its plane
+        const ClosestPoint here = closest_point(triangle, b.position);
+        if (here.distance - b.radius <= reach && surface.owner(t, here, b.position, b.radius) == t) hits_.push_back({i, t, here});
+      });
+    }
+    // Faces before edges before corners.
+    const auto order = [&](const Hit& h) {
+      return std::make_tuple(bodies[std::size_t(h.body)].id, (h.closest.feature + 2) / 3, triangles[std::size_t(h.triangle)].id);
+    };
+    std::sort(hits_.begin(), hits_.end(), [&](const Hit& p, const Hit& q) { return order(p) < order(q); });
+    for (const Hit& h : hits_) {
+      const Triangle& t = triangles[std::size_t(h.triangle)];
+      const ClosestPoint& c = h.closest;
+      // A centre on the triangle is pushed to the side of the triangle's own normal.
+      Vec3<double> normal = h.closest.distance > 0.0 ? c.arm : cross(t.node[1] - t.node[0], t.node[2] - t.node[0]);
+      normal *= 1.0 / norm(normal);
+      const Body& b = bodies[std::size_t(h.body)];
+      // Where the velocity is not known, better no relative motion than a wrong one, which springs would remember.
+      const Vec3<double> velocity = mesh.velocity_known
+                                        ? c.weight[0] * t.velocity[0] + c.weight[1] * t.velocity[1] + c.weight[2] * t.velocity[2]
+                                        : b.velocity - b.radius * cross(b.spin, normal);
+      detail::wall_contact(mesh, h.body, b, wall_key(wall_number(mesh.id), 8 * t.id + c.feature), c.distance - b.radius, normal, velocity,
+                           contacts);
+    }
+  }
+
+ private:
+  struct Hit {
+    int body, triangle;
+    ClosestPoint closest;
+  };
+
+  PointGrid grid_;
+  std::vector<Hit> hits_;
+};
+
+/// All that bodies may touch: each other and the walls.
+struct Surroundings {
+  PairFinder pairs;
+  std::vector<Plane> planes;
+  std::vector<Drum> drums;
+  std::vector<Mesh> meshes;  ///< without images: at the end of one that goes through to a periodic boundary they would touch an edge
+
+  void find(const std::vector<Body>& bodies, double reach, std::vector<Contact>& contacts) {
+    pairs.find(bodies, reach, contacts);
+    for (const Plane& p : planes) plane_contacts(bodies, p, reach, contacts);
+    for (const Drum& d : drums) cylinder_contacts(bodies, d, reach, contacts);
+    for (const Mesh& m : meshes) triangles_.find(bodies, m, reach, contacts);
+  }
+  /// m/s, of the fastest surface; that of a drum that turns moves along itself, not towards anything.
+  double wall_speed() const {
+    double speed = 0.0;
+    for (const Plane& p : planes) speed = std::max(speed, norm(p.velocity));
+    for (const Drum& d : drums) speed = std::max(speed, norm(d.velocity));
+    for (const Mesh& m : meshes) speed = std::max(speed, m.speed);
+    return speed;
+  }
+
+ private:
+  TriangleFinder triangles_;
+};
 
 }  // namespace impact
 }  // namespace dembark

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <tuple>
 #include <vector>
 
-#include "archive.hpp"
 #include "assembly.hpp"
 #include "types.hpp"
 
@@ -26,10 +26,7 @@ struct ContactHistory {
   /// As a new one.
   bool idle() const { return !active && elastic == 0.0; }
 
-  template <class Visit>
-  void each(Visit&& visit) {
-    visit(active), visit(deformation), visit(elastic), visit(friction.displacement), visit(friction.slip), visit(normal), visit(impact);
-  }
+  auto fields() { return std::tie(active, deformation, elastic, friction.displacement, friction.slip, normal, impact); }
 };
 
 /// All that a step leaves to the next.
@@ -47,10 +44,7 @@ struct Histories {
     keys.clear();
     contacts.clear();
   }
-  template <class Visit>
-  void each(Visit&& visit) {
-    visit(keys), visit(contacts), visit(report), visit(begun);
-  }
+  auto fields() { return std::tie(keys, contacts, report, begun); }
 };
 
 class HistoryKeeper {
@@ -69,8 +63,6 @@ class HistoryKeeper {
   /// What the step begins from.
   const Histories& base() const { return again_ ? before_ : after_; }
   const Histories& last() const { return after_; }
-  /// Of row i, before the step.
-  const ContactHistory& before(std::size_t i) const { return *from_[i]; }
 
   /// Where in base() the history of a contact is, or -1; fast while keys ascend from call to call.
   int recall(const Key& key) {
@@ -85,21 +77,22 @@ class HistoryKeeper {
     return cursor_ < n && keys[cursor_] == key ? int(cursor_) : -1;
   }
 
-  /// The rows of the step, with what `recall` said about each; may be called again with more of them.
-  void take(const std::vector<Sorted>& sorted, const std::vector<Row>& rows) {
+  /// Tells the rows of the step, with what `recall` said about each, what was before; may be called again with more of them.
+  void take(std::vector<Row>& rows) {
     const std::vector<ContactHistory>& contacts = base().contacts;
     lost_bodies.clear();
-    from_.assign(rows.size(), &blank_);
     left_.assign(contacts.size(), 1);
-    for (std::size_t i = 0; i < rows.size(); ++i)
-      if (sorted[i].memory >= 0) hand_on(std::size_t(sorted[i].memory), i);
+    for (Row& r : rows) {
+      r.before = &blank_;
+      if (r.memory >= 0) hand_on(std::size_t(r.memory), r);
+    }
     orphans_.clear();
     for (std::size_t o = 0; o < left_.size(); ++o)
       if (left_[o]) orphans_.push_back(o);
     if (!base().begun) deform_overlaps(rows);
     if (orphans_.empty()) return;
-    for (std::size_t i = 0; i < rows.size(); ++i)
-      if (rows[i].b < 0 && from_[i] == &blank_) inherit(i, rows[i]);
+    for (Row& r : rows)
+      if (r.b < 0 && r.before == &blank_) inherit(r);
     for (const std::size_t o : orphans_) {
       const Key& key = base().keys[o];
       if (!left_[o] || !contacts[o].active) continue;
@@ -112,10 +105,10 @@ class HistoryKeeper {
   /// lost as they relax, and is part of its loss.
   void finish(const Key& key, const ContactHistory& history) {
     if (again_) return;  // reported the first time
-    finished.push_back(history.impact);
-    finished.back().a = key.first;
-    finished.back().b = key.second;
-    finished.back().dissipated += history.elastic;
+    Impact& impact = finished.emplace_back(history.impact);
+    impact.a = key.first;
+    impact.b = key.second;
+    impact.dissipated += history.elastic;
   }
 
   void add(const Key& key, const ContactHistory& history) { next_.add(key, history); }
@@ -138,32 +131,29 @@ class HistoryKeeper {
     std::swap(after_, next_);
   }
 
-  template <class Visit>
-  void each(Visit&& visit) {
-    visit(before_), visit(after_), visit(finished);
-  }
+  auto fields() { return std::tie(before_, after_, finished); }
 
  private:
-  void hand_on(std::size_t history, std::size_t row) {
-    from_[row] = &base().contacts[history];
-    left_[history] = 0;
+  void hand_on(std::size_t memory, Row& row) {
+    row.before = &base().contacts[memory];
+    left_[memory] = 0;
   }
 
   /// Bodies that overlap from the beginning have been deformed before: else contact damping would take the overlap for a sudden blow.
-  void deform_overlaps(const std::vector<Row>& rows) {
+  void deform_overlaps(std::vector<Row>& rows) {
     overlaps_.assign(rows.size(), ContactHistory());
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const double overlap = -rows[i].gap;
       if (!(overlap > 0.0)) continue;
       overlaps_[i].deformation = overlap;
       overlaps_[i].elastic = 0.5 * rows[i].stiffness * overlap * overlap;
-      from_[i] = &overlaps_[i];
+      rows[i].before = &overlaps_[i];
     }
   }
 
   /// A body that rolls from one feature of a wall to the next keeps its contact: the new one takes on the history of the one that has
   /// gone and points nearly the same way.
-  void inherit(std::size_t i, const Row& row) {
+  void inherit(Row& row) {
     int best = -1;
     double closest = 0.9;
     for (const std::size_t o : orphans_) {
@@ -175,15 +165,14 @@ class HistoryKeeper {
         best = int(o);
       }
     }
-    if (best >= 0) hand_on(std::size_t(best), i);
+    if (best >= 0) hand_on(std::size_t(best), row);
   }
 
   bool again_ = false;
   Histories before_, after_, next_;
-  std::vector<const ContactHistory*> from_;  ///< of each row
-  std::vector<ContactHistory> overlaps_;     ///< see deform_overlaps()
-  std::size_t cursor_ = 0;                   ///< see recall()
-  std::vector<char> left_;                   ///< of base(): no row has taken it on
+  std::vector<ContactHistory> overlaps_;  ///< see deform_overlaps()
+  std::size_t cursor_ = 0;                ///< see recall()
+  std::vector<char> left_;                ///< of base(): no row has taken it on
   std::vector<std::size_t> orphans_;
   const ContactHistory blank_{};
 };

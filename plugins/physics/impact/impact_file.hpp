@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 #include <system_error>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -22,6 +23,14 @@ class ImpactFile {
  public:
   const std::string& path() const { return path_; }
   long long bytes() const { return bytes_; }
+
+  /// Where it is not open: a new file, or that of the saved run which goes on.
+  void open(const std::string& path, const std::string& about) {
+    if (std::exchange(open_, true) && path == path_) return;
+    if (path == path_ && bytes_ > 0) return resume(path, bytes_);
+    path_.clear();
+    if (!path.empty()) begin(path, about);
+  }
 
   /// A new file. about: what the numbers of the walls stand for, or nothing.
   void begin(std::string path, const std::string& about) {
@@ -48,15 +57,16 @@ class ImpactFile {
   void append(const std::vector<Impact>& impacts) {
     if (path_.empty() || impacts.empty()) return;
     std::string lines;
-    char line[320];
-    for (const Impact& i : impacts) {
-      const int length = std::snprintf(line, sizeof line, "%lld %lld %.12g %.12g %.12g %.12g %.12g %.12g %.12g %.12g %.12g\n",
-                                       static_cast<long long>(shown_id(i.a)), static_cast<long long>(shown_id(i.b)), i.time, i.duration,
-                                       i.peak_force, i.impulse, i.relative_speed, i.dissipated, i.point.x, i.point.y, i.point.z);
-      lines.append(line, std::size_t(length));
+    for (const Impact& impact : impacts) {
+      char number[32];
+      for (const double x : table_row(impact)) lines.append(number, std::size_t(std::snprintf(number, sizeof number, "%.12g ", x)));
+      lines.back() = '\n';
     }
     put("a", lines);
   }
+
+  /// What saved runs keep.
+  auto fields() { return std::tie(path_, bytes_); }
 
  private:
   [[noreturn]] void fail(const std::string& what) const { throw std::runtime_error("file " + path_ + " " + what); }
@@ -70,6 +80,7 @@ class ImpactFile {
 
   std::string path_;  ///< empty: none
   long long bytes_ = 0;
+  bool open_ = false;
 };
 
 }  // namespace impact

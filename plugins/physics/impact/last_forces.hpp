@@ -2,12 +2,13 @@
 // computing them anew, from the velocities of the full step, would give others.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
+#include <tuple>
 #include <vector>
 
-#include "periodic.hpp"
+#include "geometry.hpp"
 #include "types.hpp"
 
 namespace dembark {
@@ -15,7 +16,7 @@ namespace impact {
 
 class LastForces {
  public:
-  std::vector<Vec3<double>> force, torque;  ///< N and N m, of the contacts
+  std::vector<Push> pushes;  ///< of the contacts
 
   /// Of a step: its bodies, with the forces of everything else.
   void keep(const std::vector<Body>& bodies) { bodies_ = bodies; }
@@ -32,40 +33,26 @@ class LastForces {
   /// Whether they are those of these bodies: nothing was changed, added or removed since, but for whole lengths of a periodic box and
   /// for the rounding of the forces of everything else.
   bool hold(const std::vector<Body>& bodies, const PeriodicBox& box) const {
-    if (bodies.size() != bodies_.size()) return false;
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const Body &now = bodies[i], &then = bodies_[i];
-      if (now.id != then.id || now.material != then.material || now.mass != then.mass || now.inertia != then.inertia ||
-          now.radius != then.radius || !same(now.velocity, then.velocity) || !same(now.spin, then.spin) || !near(now.force, then.force) ||
-          !near(now.torque, then.torque))
-        return false;
+    const auto near = [](const Vec3<double>& a, const Vec3<double>& b) { return norm(a - b) <= 1e-12 * (norm(a) + norm(b)); };
+    const auto whole = [&box](double Vec3<double>::* axis, int k, const Vec3<double>& moved) {
+      const double length = box.length.*axis, way = moved.*axis;
+      return way == 0.0 || (box.periodic[k] && std::fabs(std::fabs(way) - length) <= 1e-12 * length);
+    };
+    const auto same = [&](const Body& now, const Body& then) {
       const Vec3<double> moved = now.position - then.position;
-      if (!whole(moved.x, box.periodic[0], box.length.x) || !whole(moved.y, box.periodic[1], box.length.y) ||
-          !whole(moved.z, box.periodic[2], box.length.z))
-        return false;
-    }
-    return true;
+      Body put_back = now;  // but for what may differ
+      put_back.position = then.position;
+      put_back.force = then.force;
+      put_back.torque = then.torque;
+      return to_numbers(put_back) == to_numbers(then) && near(now.force, then.force) && near(now.torque, then.torque) &&
+             whole(&Vec3<double>::x, 0, moved) && whole(&Vec3<double>::y, 1, moved) && whole(&Vec3<double>::z, 2, moved);
+    };
+    return std::equal(bodies.begin(), bodies.end(), bodies_.begin(), bodies_.end(), same);
   }
 
-  template <class Visit>
-  void each(Visit&& visit) {
-    visit(force), visit(torque);
-    std::uint64_t size = bodies_.size();
-    visit(size);
-    bodies_.resize(std::size_t(size));
-    for (Body& b : bodies_) {
-      visit(b.id), visit(b.mass), visit(b.inertia), visit(b.radius), visit(b.material);
-      visit(b.position), visit(b.velocity), visit(b.spin), visit(b.force), visit(b.torque);
-    }
-  }
+  auto fields() { return std::tie(pushes, bodies_); }
 
  private:
-  static bool same(const Vec3<double>& a, const Vec3<double>& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
-  static bool near(const Vec3<double>& a, const Vec3<double>& b) { return norm(a - b) <= 1e-12 * (norm(a) + norm(b)); }
-  static bool whole(double moved, bool periodic, double length) {
-    return moved == 0.0 || (periodic && std::fabs(std::fabs(moved) - length) <= 1e-12 * length);
-  }
-
   std::vector<Body> bodies_;
 };
 

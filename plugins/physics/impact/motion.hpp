@@ -29,9 +29,6 @@ struct NormalSum {
   Vec3<double> force{};  ///< N
   int active = 0;        ///< contacts with N > 0
 };
-struct TangentialSum {
-  Vec3<double> force{}, torque{};  ///< N, N m
-};
 /// m/s and rad/s.
 struct Velocity {
   Vec3<double> velocity{}, spin{};
@@ -47,7 +44,7 @@ class Motion {
  public:
   std::vector<BodyResponse> response;
   std::vector<NormalSum> normal;
-  std::vector<TangentialSum> tangential;
+  std::vector<Push> tangential;
   std::vector<Velocity> change;  ///< v' - v, omega' - omega; see move()
   std::vector<int> damped;       ///< bodies with lambda > 0, in the order of the contacts
 
@@ -57,7 +54,7 @@ class Motion {
     interval_ = kick * dt;
     response.resize(bodies.size());
     normal.assign(bodies.size(), NormalSum());
-    tangential.assign(bodies.size(), TangentialSum());
+    tangential.assign(bodies.size(), Push());
     change.resize(bodies.size());
     moved_.resize(bodies.size());
     acceleration_.resize(bodies.size());
@@ -86,7 +83,7 @@ class Motion {
     normal[r.b].force -= force * r.normal;
     ++normal[r.b].active;
   }
-  void clear_tangential() { std::fill(tangential.begin(), tangential.end(), TangentialSum()); }
+  void clear_tangential() { std::fill(tangential.begin(), tangential.end(), Push()); }
   void add_tangential(const Row& r, const Vec3<double>& t) {
     const Vec3<double> moment = cross(r.normal, t);
     tangential[r.a].force += t;
@@ -97,8 +94,7 @@ class Motion {
   }
 
   /// Rate of the gap (m/s) with the velocities v.
-  template <class Pair>
-  double gap_rate(const Pair& r) const {
+  double gap_rate(const Contact& r) const {
     return dot(r.normal, (*bodies_)[r.a].velocity - (r.b >= 0 ? (*bodies_)[r.b].velocity : r.point_velocity));
   }
   /// Takes the forces but the normal ones over, for gap_acceleration.
@@ -106,8 +102,7 @@ class Motion {
     for (std::size_t b = 0; b < response.size(); ++b) acceleration_[b] = response[b].inverse * (response[b].free + tangential[b].force);
   }
   /// Acceleration of the gap (m/s^2) by all forces but the normal ones.
-  template <class Pair>
-  double gap_acceleration(const Pair& r) const {
+  double gap_acceleration(const Contact& r) const {
     return dot(r.normal, r.b >= 0 ? acceleration_[r.a] - acceleration_[r.b] : acceleration_[r.a]);
   }
   /// What a body adds to the change of its gaps (m): rate (s) times v, and scale (s^2) times the acceleration by all forces; after move().
@@ -115,8 +110,7 @@ class Motion {
     return rate * (*bodies_)[b].velocity + (scale / interval_) * change[b].velocity;
   }
   /// As gap_acceleration, by all forces; after move().
-  template <class Pair>
-  double whole_gap_acceleration(const Pair& r) const {
+  double whole_gap_acceleration(const Contact& r) const {
     const Vec3<double> gain = r.b >= 0 ? change[r.a].velocity - change[r.b].velocity : change[r.a].velocity;
     return dot(r.normal, gain) / interval_;
   }

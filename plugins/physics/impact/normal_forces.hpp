@@ -25,6 +25,19 @@ class UnsolvedStep : public std::runtime_error {
 };
 
 /// w = q + A z, w >= 0, z >= 0, z w = 0; A as in assembly.hpp.
+struct Unknowns {
+  Eigen::VectorXd q, z, w;
+  std::vector<char> active;  ///< z > 0
+
+  void resize(std::size_t n) {
+    for (Eigen::VectorXd* v : {&q, &z, &w}) v->resize(Eigen::Index(n));
+    active.resize(n);
+  }
+  void flag() {
+    for (std::size_t i = 0; i < active.size(); ++i) active[i] = z[Eigen::Index(i)] > 0.0;
+  }
+};
+
 class NormalForces {
  public:
   /// The rows of a step. scale: h tau^2 (s^2).
@@ -45,14 +58,13 @@ class NormalForces {
 
   /// Begins at z and `active`, and leaves both, and w; counts in `report` what it did. last: to rounding in any case. Throws UnsolvedStep
   /// where the solver ends at its limit of iterations, or its certificate is worse than the tolerance that was asked for.
-  void solve(Assembly& assembly, const Motion& motion, const Eigen::VectorXd& q, bool last, std::vector<char>& active, Eigen::VectorXd& z,
-             Eigen::VectorXd& w, StepReport& report) {
-    if (!relaxes_) return solve_exactly(assembly, motion, q, active, z, w, report);
-    before_ = active;
-    const bool found = planar_ ? relax(flat_, q, last, z, w, report) : relax(spatial_, q, last, z, w, report);
-    flag(z, active);
-    if (!found) return solve_exactly(assembly, motion, q, active, z, w, report);
-    for (std::size_t i = 0; i < active.size(); ++i) report.pivots += active[i] != before_[i];
+  void solve(Assembly& assembly, const Motion& motion, bool last, Unknowns& of, StepReport& report) {
+    if (!relaxes_) return solve_exactly(assembly, motion, of, report);
+    before_ = of.active;
+    const bool found = planar_ ? relax(flat_, last, of, report) : relax(spatial_, last, of, report);
+    of.flag();
+    if (!found) return solve_exactly(assembly, motion, of, report);
+    for (std::size_t i = 0; i < before_.size(); ++i) report.pivots += of.active[i] != before_[i];
   }
 
  private:
@@ -61,33 +73,27 @@ class NormalForces {
   /// Of the forces between the sweeps of friction.
   static constexpr double approach_fraction = 1e-12;
 
-  static void flag(const Eigen::VectorXd& z, std::vector<char>& active) {
-    for (std::size_t i = 0; i < active.size(); ++i) active[i] = z[Eigen::Index(i)] > 0.0;
-  }
-
   template <int Width>
-  bool relax(lcp::Relaxation<Lines<Width>>& relaxation, const Eigen::VectorXd& q, bool last, Eigen::VectorXd& z, Eigen::VectorXd& w,
-             StepReport& report) const {
+  bool relax(lcp::Relaxation<Lines<Width>>& relaxation, bool last, Unknowns& of, StepReport& report) const {
     const double fraction = last ? lcp::rounding_fraction(options_.tolerance) : approach_fraction;
-    relaxation.rows.start(q, fraction, z);
+    relaxation.rows.start(of.q, fraction, of.z);
     if (!last) relaxation.approach();
     const bool found = !last || relaxation.solve(fraction);
-    relaxation.rows.store(z);
+    relaxation.rows.store(of.z);
     if (!last || !found) return found;
-    relaxation.rows.store_gaps(relaxation.residual(), w);
+    relaxation.rows.store_gaps(relaxation.residual(), of.w);
     report.certificate = std::max(report.certificate, relaxation.residual().certificate().worst());
     return true;
   }
 
-  void solve_exactly(Assembly& assembly, const Motion& motion, const Eigen::VectorXd& q, std::vector<char>& active, Eigen::VectorXd& z,
-                     Eigen::VectorXd& w, StepReport& report) {
+  void solve_exactly(Assembly& assembly, const Motion& motion, Unknowns& of, StepReport& report) {
     if (!assembled_) assembly.assemble(motion.response, scale_);
     assembled_ = true;
-    const LcpResult& result = solver_.solve(assembly.matrix(), q, options_, &active);
+    const LcpResult& result = solver_.solve(assembly.matrix(), of.q, options_, &of.active);
     check(result);
-    z = result.z;
-    w = result.w;
-    flag(z, active);
+    of.z = result.z;
+    of.w = result.w;
+    of.flag();
     report.pivots += result.pivots;
     report.block_steps += result.block_steps;
     report.certificate = std::max(report.certificate, result.certificate.worst());

@@ -1,10 +1,9 @@
 // A few bodies, walls and constant forces on their own, without an engine: the leapfrog that engines run, around impact::System.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <stdexcept>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -18,14 +17,11 @@ namespace impact {
 /// bodies stay as they are (weight).
 class Scene {
  public:
-  std::vector<Plane> planes;
-  std::vector<Drum> drums;
+  Surroundings around;
   double reach = 0.0;  ///< m, of the search for candidates; 0 = as large as the motion asks for
   bool row = false;    ///< bodies along x that never change places: contacts between neighbours by number, and with the planes only
 
   Scene(Settings settings, std::vector<Body> bodies) : system_(std::move(settings)), bodies_(std::move(bodies)) {
-    force_.resize(bodies_.size());
-    torque_.resize(bodies_.size());
     velocity_.resize(bodies_.size());
     spin_.resize(bodies_.size());
   }
@@ -42,22 +38,19 @@ class Scene {
 
   /// Contact forces of the moment. Asking twice changes nothing.
   const StepReport& forces() {
-    force_.assign(bodies_.size(), {});
-    torque_.assign(bodies_.size(), {});
     const double kick = count_ == 0 ? 0.5 : 1.0, dt = system_.settings().dt;
-    contacts_.clear();
-    if (row) row_contacts();
-    else if (reach > 0.0) find_contacts(reach, contacts_);
-    const auto search = [this](double far, std::vector<Contact>& contacts) { find_contacts(far, contacts); };
-    const StepReport& report = row || reach > 0.0 ? system_.step(bodies_, contacts_, time(), kick, force_, torque_)
-                                                  : system_.step(bodies_, search, wall_speed(), time(), kick, force_, torque_);
+    const auto search = [this](double far, std::vector<Contact>& contacts) {
+      if (row) row_contacts(contacts);
+      else around.find(bodies_, far, contacts);
+    };
+    const StepReport& report = system_.step(bodies_, search, around.wall_speed(), time(), kick, row ? INFINITY : reach);
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       const Body& b = bodies_[i];
       velocity_[i] = b.velocity;
       spin_[i] = b.spin;
       if (count_ == 0) continue;
-      velocity_[i] += (0.5 * dt / b.mass) * (b.force + force_[i]);
-      spin_[i] += (0.5 * dt / b.inertia) * (b.torque + torque_[i]);
+      velocity_[i] += (0.5 * dt / b.mass) * (b.force + system_.pushes()[i].force);
+      spin_[i] += (0.5 * dt / b.inertia) * (b.torque + system_.pushes()[i].torque);
     }
     return report;
   }
@@ -67,12 +60,12 @@ class Scene {
     const double dt = system_.settings().dt, kick = (count_ == 0 ? 0.5 : 1.0) * dt;
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       Body& b = bodies_[i];
-      b.velocity += (kick / b.mass) * (b.force + force_[i]);
-      b.spin += (kick / b.inertia) * (b.torque + torque_[i]);
+      b.velocity += (kick / b.mass) * (b.force + system_.pushes()[i].force);
+      b.spin += (kick / b.inertia) * (b.torque + system_.pushes()[i].torque);
       b.position += dt * b.velocity;
     }
-    for (Plane& p : planes) p.point += dt * p.velocity;
-    for (Drum& d : drums) d.point += dt * d.velocity;
+    for (Plane& p : around.planes) p.point += dt * p.velocity;
+    for (Drum& d : around.drums) d.point += dt * d.velocity;
     ++count_;
   }
 
@@ -96,63 +89,41 @@ class Scene {
 
   /// Everything needed to go on bit for bit.
   std::vector<double> state() const {
-    std::vector<double> out = system_.state();
-    out.push_back(double(count_));
-    const auto put = [&](const Vec3<double>& v) { out.insert(out.end(), {v.x, v.y, v.z}); };
-    for (const Body& b : bodies_) put(b.position), put(b.velocity), put(b.spin);
-    for (const Plane& p : planes) put(p.point);
-    for (const Drum& d : drums) put(d.point);
-    return out;
+    Archive out;
+    const_cast<Scene*>(this)->archive(out);  // writing changes nothing
+    return out.numbers();
   }
   void restore(const std::vector<double>& state) {
-    const std::size_t own = 1 + 9 * bodies_.size() + 3 * (planes.size() + drums.size());
-    if (state.size() < own) throw std::invalid_argument("state of " + std::to_string(state.size()) + " numbers belongs to another system");
-    system_.restore(std::vector<double>(state.begin(), state.end() - std::ptrdiff_t(own)));
-    const double* at = state.data() + (state.size() - own);
-    count_ = std::int64_t(*at++);
-    const auto get = [&](Vec3<double>& v) { v = {at[0], at[1], at[2]}, at += 3; };
-    for (Body& b : bodies_) get(b.position), get(b.velocity), get(b.spin);
-    for (Plane& p : planes) get(p.point);
-    for (Drum& d : drums) get(d.point);
+    Archive in(state);
+    archive(in);
+    in.end();
   }
 
  private:
-  double wall_speed() const {
-    double speed = 0.0;
-    for (const Plane& p : planes) speed = std::max(speed, norm(p.velocity));
-    for (const Drum& d : drums) speed = std::max(speed, norm(d.velocity));  // turning, its surface moves along itself
-    return speed;
+  void archive(Archive& a) {
+    std::vector<double> system = system_.state();
+    a(system), a(count_);
+    if (a.reading()) system_.restore(system);
+    for (Body& b : bodies_) a(b.position), a(b.velocity), a(b.spin);
+    for (Plane& p : around.planes) a(p.point);
+    for (Drum& d : around.drums) a(d.point);
   }
 
-  void find_contacts(double far, std::vector<Contact>& contacts) {
-    pairs_.find(bodies_, far, contacts);
-    for (const Plane& p : planes) plane_contacts(bodies_, p, far, contacts);
-    for (const Drum& d : drums) cylinder_contacts(bodies_, d, far, contacts);
-  }
-
-  void row_contacts() {
+  void row_contacts(std::vector<Contact>& contacts) {
     for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
-      Contact c;
-      c.a = int(i);
-      c.b = int(i + 1);
-      c.key_a = bodies_[i].id;
-      c.key_b = bodies_[i + 1].id;
-      c.gap = bodies_[i + 1].position.x - bodies_[i].position.x - bodies_[i].radius - bodies_[i + 1].radius;
-      c.normal = {-1.0, 0.0, 0.0};
-      contacts_.push_back(c);
+      const Body &a = bodies_[i], &b = bodies_[i + 1];
+      contacts.push_back({int(i), int(i + 1), a.id, b.id, b.position.x - a.position.x - a.radius - b.radius, Vec3<double>{-1.0, 0.0, 0.0}});
     }
-    for (const Plane& p : planes) {
+    for (const Plane& p : around.planes) {
       const std::size_t end = p.normal.x > 0.0 ? 0 : bodies_.size() - 1;
       const double gap = (bodies_[end].position.x - p.point.x) * p.normal.x - bodies_[end].radius;
-      detail::wall_contact(p, int(end), bodies_[end], p.id, gap, p.normal, p.velocity, contacts_);
+      detail::wall_contact(p, int(end), bodies_[end], p.id, gap, p.normal, p.velocity, contacts);
     }
   }
 
   System system_;
   std::vector<Body> bodies_;
-  std::vector<Contact> contacts_;
-  std::vector<Vec3<double>> force_, torque_, velocity_, spin_;
-  PairFinder pairs_;
+  std::vector<Vec3<double>> velocity_, spin_;
   std::int64_t count_ = 0;
 };
 

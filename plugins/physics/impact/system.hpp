@@ -37,9 +37,7 @@
 #include <utility>
 #include <vector>
 
-#include "archive.hpp"
 #include "assembly.hpp"
-#include "candidates.hpp"
 #include "friction.hpp"
 #include "geometry.hpp"
 #include "history.hpp"
@@ -72,34 +70,45 @@ class System {
   /// Appends all candidates with gap <= reach (m) to `contacts`.
   using Search = std::function<void(double reach, std::vector<Contact>& contacts)>;
 
-  /// Adds the forces (N) and torques (N m) of the contacts, body damping included, to `force` and `torque`, in the order of the bodies.
+  /// The forces of the contacts of a step; see pushes().
   /// time: s, of this step. kick: see above, in (0, 1]. A call with the time of the last one does that step again, from the state
   /// before it: histories, totals and records count it once. Wrong bodies or contacts leave the system as it was.
   /// search: asked again with a larger reach where the motion that comes out could have closed gaps beyond the first. wall_speed (m/s):
-  /// the fastest that a wall surface moves towards anything.
+  /// the fastest that a wall surface moves towards anything. reach: 0, or what the search is asked for once, whatever moves.
   const StepReport& step(const std::vector<Body>& bodies, const Search& search, double wall_speed, double time, double kick,
-                         std::vector<Vec3<double>>& force, std::vector<Vec3<double>>& torque) {
-    begin(bodies, kick, force, torque);
-    double reach = default_reach(bodies, settings_.dt, wall_speed);
-    found_.clear();
-    search(reach, found_);
-    return run(bodies, found_, time, force, torque, [&] {
-      const double swept = 1.1 * screening_.swept(motion_, wall_speed);
-      if (swept <= reach) return false;
-      reach = swept;
-      found_.clear();
-      search(reach, found_);
-      return true;
-    });
+                         double reach = 0.0) {
+    begin(bodies, kick);
+    const bool again = history_.last().begun && time == time_, widens = reach == 0.0;
+    const StepReport last = report_;
+    history_.begin(again);
+    report_ = history_.base().report;
+    try {
+      double swept = widens ? default_reach(bodies, settings_.dt, wall_speed) : reach;
+      do {
+        reach = swept;
+        found_.clear();
+        search(reach, found_);
+        motion_.clear_tangential();
+        motion_.accelerate();
+        screening_.begin(found_, motion_, (2.0 * settings_.theta - 1.0) * settings_.dt, h_ * settings_.dt * settings_.dt);
+        do solve_contacts(bodies);
+        while (screening_.missed(found_, motion_));
+        swept = 1.1 * screening_.swept(motion_, wall_speed);
+      } while (widens && swept > reach);
+    } catch (...) {
+      assembly_.clear();
+      report_ = last;
+      throw;
+    }
+    report_.contacts = int(found_.size());
+    weight_ = again ? weight_ : kick_;
+    time_ = time;
+    finish(bodies);
+    return report_;
   }
 
-  /// The same with all candidates as given.
-  const StepReport& step(const std::vector<Body>& bodies, const std::vector<Contact>& contacts, double time, double kick,
-                         std::vector<Vec3<double>>& force, std::vector<Vec3<double>>& torque) {
-    begin(bodies, kick, force, torque);
-    return run(bodies, contacts, time, force, torque, [] { return false; });
-  }
-
+  /// Of the contacts on each body, body damping included, in the order of the bodies.
+  const std::vector<Push>& pushes() const { return pushes_; }
   const StepReport& report() const { return report_; }
   /// Of the last step, sorted by (key_a, key_b): the candidates that were solved for. The others are open.
   const std::vector<ContactResult>& contacts() const {
@@ -108,7 +117,7 @@ class System {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const Row& r = rows[i];
       const Eigen::Index k = Eigen::Index(i);
-      results_[i] = {r.a, r.b, r.key_a, r.key_b, r.gap, normal_[k], gap_[k], friction_.force[i], r.normal, r.place};
+      results_[i] = {r.a, r.b, r.key_a, r.key_b, r.normal, r.gap, forces_.z[k], friction_.force[i], r.point, forces_.w[k]};
     }
     return results_;
   }
@@ -116,82 +125,39 @@ class System {
   std::vector<Impact> take_finished() { return std::exchange(history_.finished, {}); }
 
   /// Everything needed to go on bit for bit, as numbers that survive as doubles.
-  std::vector<double> state() const {
-    Archive out;
-    const_cast<System*>(this)->archive(out);  // writing changes nothing
-    return out.numbers();
-  }
+  std::vector<double> state() const { return to_numbers(*this); }
   /// Throws std::invalid_argument if `state` is none.
   void restore(const std::vector<double>& state) {
-    Archive in(state);
-    archive(in);
-    in.end();
+    from_numbers(state, *this);
     assembly_.clear();
     report_ = history_.last().report;
   }
+  auto fields() { return std::tie(format_, time_, weight_, history_); }
 
  private:
-  void archive(Archive& a) {
-    a.version(2.0);
-    a(time_), a(weight_), a(history_);
-  }
-
-  void begin(const std::vector<Body>& bodies, double kick, const std::vector<Vec3<double>>& force,
-             const std::vector<Vec3<double>>& torque) {
+  void begin(const std::vector<Body>& bodies, double kick) {
     if (!(kick > 0.0 && kick <= 1.0)) throw std::invalid_argument("kick must be > 0 and <= 1, not " + std::to_string(kick));
-    if (force.size() != bodies.size() || torque.size() != bodies.size())
-      throw std::invalid_argument(std::to_string(bodies.size()) + " bodies need as many forces and torques, not " +
-                                  std::to_string(force.size()) + " and " + std::to_string(torque.size()));
     motion_.begin(bodies, settings_.dt, kick);
     kick_ = kick;
     h_ = settings_.theta * kick + (1.0 - settings_.theta) * (1.0 - kick);
     g_ = settings_.theta * kick - (1.0 - settings_.theta) * (1.0 - kick);
   }
 
-  /// widen(): gets more candidates where there may be any.
-  template <class Widen>
-  const StepReport& run(const std::vector<Body>& bodies, const std::vector<Contact>& contacts, double time,
-                        std::vector<Vec3<double>>& force, std::vector<Vec3<double>>& torque, Widen widen) {
-    const bool again = history_.last().begun && time == time_;
-    const StepReport last = report_;
-    history_.begin(again);
-    report_ = history_.base().report;
-    try {
-      do {
-        motion_.clear_tangential();
-        motion_.accelerate();
-        screening_.begin(contacts, motion_, (2.0 * settings_.theta - 1.0) * settings_.dt, h_ * settings_.dt * settings_.dt);
-        do solve_contacts(bodies, contacts);
-        while (screening_.missed(contacts, motion_));
-      } while (widen());
-    } catch (...) {
-      assembly_.clear();
-      report_ = last;
-      throw;
-    }
-    report_.contacts = int(contacts.size());
-    weight_ = again ? weight_ : kick_;
-    time_ = time;
-    finish(bodies, force, torque);
-    return report_;
-  }
-
   /// Forces of the contacts that are near, and the motion of the bodies with them.
-  void solve_contacts(const std::vector<Body>& bodies, const std::vector<Contact>& contacts) {
-    candidates_.take(contacts, screening_, [&](const Key& key) { return history_.recall(key); });
-    assembly_.update(bodies, contacts, candidates_.sorted(), settings_);
-    const std::vector<Row>& rows = assembly_.rows();
-    history_.take(candidates_.sorted(), rows);
+  void solve_contacts(const std::vector<Body>& bodies) {
+    assembly_.take(bodies, found_, screening_, [&](const Key& key) { return history_.recall(key); }, settings_);
+    std::vector<Row>& rows = assembly_.rows();
+    history_.take(rows);
     damp_bodies(bodies);
     begin_rows();
-    bool friction = friction_.begin(rows, history_, settings_.dt, kick_, motion_);
+    bool friction = friction_.begin(rows, settings_.dt, kick_, motion_);
     solver_.prepare(assembly_, motion_, h_ * settings_.dt * settings_.dt, settings_.lcp);
     for (int sweep = 0;; ++sweep) {
       const bool last = !friction || sweep == settings_.friction_sweeps;
       solve(last);
       motion_.move();
       if (last) return;
-      friction = friction_.sweep(rows, history_, active_, normal_, motion_);
+      friction = friction_.sweep(rows, forces_, motion_);
       if (!friction && !solver_.approaches()) return;  // nothing has changed since the last solve, which was exact
     }
   }
@@ -199,11 +165,10 @@ class System {
   void damp_bodies(const std::vector<Body>& bodies) {
     const double response = g_ * settings_.dt;
     const auto damp = [&](int b) { motion_.damp(b, settings_.materials[bodies[b].material].damping, response); };
-    const std::vector<Row>& rows = assembly_.rows();
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      if (!history_.before(i).active) continue;
-      damp(rows[i].a);
-      if (rows[i].b >= 0) damp(rows[i].b);
+    for (const Row& r : assembly_.rows()) {
+      if (!r.before->active) continue;
+      damp(r.a);
+      if (r.b >= 0) damp(r.b);
     }
     for (const std::int64_t id : history_.lost_bodies)
       for (std::size_t b = 0; b < bodies.size(); ++b)
@@ -213,16 +178,16 @@ class System {
   void begin_rows() {
     const std::vector<Row>& rows = assembly_.rows();
     const std::size_t n = rows.size();
-    active_.resize(n);
-    for (Eigen::VectorXd* v : {&offset_, &q_, &normal_, &gap_}) v->resize(Eigen::Index(n));
+    forces_.resize(n);
+    offset_.resize(Eigen::Index(n));
     for (std::size_t i = 0; i < n; ++i) {
       const Row& r = rows[i];
-      const ContactHistory& before = history_.before(i);
+      const ContactHistory& before = *r.before;
       offset_[Eigen::Index(i)] =
           r.gap + (2.0 * settings_.theta - 1.0) * settings_.dt * motion_.gap_rate(r) + r.viscous * r.compliance * before.deformation;
-      active_[i] = before.active;
+      forces_.active[i] = before.active;
       // Where to begin: the contact force as if the spring were at rest.
-      normal_[Eigen::Index(i)] = before.active ? r.stiffness * before.deformation : 0.0;
+      forces_.z[Eigen::Index(i)] = before.active ? r.stiffness * before.deformation : 0.0;
     }
   }
 
@@ -234,31 +199,32 @@ class System {
     const double scale = h_ * settings_.dt * settings_.dt;
     motion_.accelerate();
     for (std::size_t i = 0; i < rows.size(); ++i)
-      q_[Eigen::Index(i)] = offset_[Eigen::Index(i)] + scale * motion_.gap_acceleration(rows[i]);
-    solver_.solve(assembly_, motion_, q_, last, active_, normal_, gap_, report_);
+      forces_.q[Eigen::Index(i)] = offset_[Eigen::Index(i)] + scale * motion_.gap_acceleration(rows[i]);
+    solver_.solve(assembly_, motion_, last, forces_, report_);
     for (std::size_t i = 0; i < rows.size(); ++i)
-      if (active_[i]) motion_.add_normal(rows[i], normal_[Eigen::Index(i)]);
+      if (forces_.active[i]) motion_.add_normal(rows[i], forces_.z[Eigen::Index(i)]);
   }
 
   /// Forces out; energies, impacts and histories on.
-  void finish(const std::vector<Body>& bodies, std::vector<Vec3<double>>& force, std::vector<Vec3<double>>& torque) {
+  void finish(const std::vector<Body>& bodies) {
     const std::vector<Row>& rows = assembly_.rows();
     const double length = weight_ * settings_.dt;       // s, the stretch of time this step stands for
     const double middle = 1.0 - 0.5 * weight_ / kick_;  // where its mean velocity lies between v (0) and v' (1)
     history_.settle(report_);
     motion_.go_back(middle);
     for (std::size_t i = 0; i < rows.size(); ++i)
-      if (active_[i] || !history_.before(i).idle()) finish_contact(i, length);
+      if (forces_.active[i] || !rows[i].before->idle()) finish_contact(i, length);
+    pushes_.assign(bodies.size(), {});
     for (const int b : motion_.damped) {
       const Vec3<double> change = motion_.change[b].velocity;
       // lambda on theta v' + (1 - theta) v_{n-1/2}
       const Vec3<double> on = -motion_.response[b].damping * (bodies[b].velocity + (g_ / kick_) * change);
-      force[b] += on;
+      pushes_[b].force += on;
       report_.dissipated_energy -= length * dot(on, bodies[b].velocity + middle * change);
     }
     for (std::size_t b = 0; b < bodies.size(); ++b) {
-      force[b] += motion_.normal[b].force + motion_.tangential[b].force;
-      torque[b] += motion_.tangential[b].torque;
+      pushes_[b].force += motion_.normal[b].force + motion_.tangential[b].force;
+      pushes_[b].torque += motion_.tangential[b].torque;
     }
     report_.pivots_total += report_.pivots;
     report_.peak_force_so_far = std::max(report_.peak_force_so_far, report_.peak_force);
@@ -269,10 +235,10 @@ class System {
   /// What contact i leaves to the next step, and its part of the report.
   void finish_contact(std::size_t i, double length) {
     const Row& r = assembly_.rows()[i];
-    const double n = normal_[Eigen::Index(i)];
-    const ContactHistory& before = history_.before(i);
+    const double n = forces_.z[Eigen::Index(i)];
+    const ContactHistory& before = *r.before;
     ContactHistory now = before;
-    now.active = active_[i];
+    now.active = forces_.active[i];
     now.friction = now.active && FrictionForces::acts(r) ? friction_.state[i] : FrictionState<double>();
     now.normal = r.normal;
     now.deformation = (n + r.viscous * before.deformation) * r.compliance;
@@ -292,7 +258,7 @@ class System {
       impact = Impact();
       impact.time = time_;
       impact.relative_speed = -motion_.gap_rate(r);
-      impact.point = r.place;
+      impact.point = r.point;
     }
     impact.dissipated += lost;
     if (now.active) {
@@ -308,9 +274,9 @@ class System {
     if (!now.idle()) history_.add({r.key_a, r.key_b}, now);
   }
 
+  FormatVersion format_{3.0};
   Settings settings_;
   Screening screening_;
-  Candidates candidates_;
   Assembly assembly_;
   HistoryKeeper history_;
   Motion motion_;
@@ -318,9 +284,10 @@ class System {
   NormalForces solver_;
   StepReport report_;
   std::vector<Contact> found_;  ///< by the search of the step
+  std::vector<Push> pushes_;
   double time_ = 0.0, kick_ = 1.0, weight_ = 1.0, h_ = 1.0, g_ = 1.0;
-  std::vector<char> active_;
-  Eigen::VectorXd offset_, q_, normal_, gap_;  ///< gap_: D, of the deformed bodies
+  Unknowns forces_;         ///< z: N, w: D, of the deformed bodies
+  Eigen::VectorXd offset_;  ///< m, of q, but for the accelerations
   mutable std::vector<ContactResult> results_;
 };
 

@@ -8,7 +8,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -21,6 +20,7 @@
 #include "../energy_lcp.hpp"
 #include "../finnie_rabinowicz.hpp"
 #include "../vec3.hpp"
+#include "archive.hpp"
 
 namespace dembark {
 namespace impact {
@@ -37,6 +37,8 @@ struct Body {
   Vec3<double> spin{};      ///< rad/s
   Vec3<double> force{};     ///< N, everything but these contacts (weight, ...)
   Vec3<double> torque{};    ///< N m
+
+  auto fields() { return std::tie(id, mass, inertia, radius, material, position, velocity, spin, force, torque); }
 };
 
 /// Inertia (kg m^2) of a solid cylinder about its axis, m r^2 / 2.
@@ -56,6 +58,8 @@ struct Wall {
 inline std::int64_t wall_key(std::int64_t number, std::int64_t feature = 0) { return -1 - (number * (std::int64_t(1) << 32) + feature); }
 /// The number of the wall that a key belongs to.
 inline std::int64_t wall_number(std::int64_t key) { return (-1 - key) / (std::int64_t(1) << 32); }
+/// That of the feature.
+inline std::int64_t wall_feature(std::int64_t key) { return (-1 - key) % (std::int64_t(1) << 32); }
 /// What users see of a key: the id of a body, or -1, -2, ... for the first, second, ... wall.
 inline std::int64_t shown_id(std::int64_t key) { return key < 0 ? -1 - wall_number(key) : key; }
 
@@ -81,6 +85,8 @@ constexpr double unit_tolerance = 1e-6;
 struct Material {
   double stiffness = 1e7;  ///< s, N/m, > 0, of one body at its boundary (a wall brings its own with each contact)
   double damping = 0.0;    ///< lambda, N s/m, >= 0: body damping, on the absolute velocity while the body is in contact
+
+  auto fields() { return std::tie(stiffness, damping); }
 };
 
 /// Of a pair of materials. The default is without friction.
@@ -94,6 +100,11 @@ struct PairLaw {
     FinnieRabinowicz law;
     law.static_friction = law.kinetic_friction = 0.0;
     return law;
+  }
+  auto fields() {
+    FinnieRabinowicz& f = friction;
+    return std::tie(f.static_friction, f.kinetic_friction, f.critical_slip_distance, f.interface_shear_strength, f.healing_time,
+                    f.presliding, tangential_stiffness_ratio, contact_damping, contact_area);
   }
 };
 
@@ -113,6 +124,14 @@ struct Settings {
     pairs.swap(wider);
     materials.push_back(material);
   }
+  auto fields() { return std::tie(dt, theta, friction_sweeps, lcp.method, lcp.tolerance, materials, pairs); }
+};
+
+/// What contacts do to a body.
+struct Push {
+  Vec3<double> force{}, torque{};  ///< N, N m
+
+  auto fields() { return std::tie(force, torque); }
 };
 
 /// Of the last step, and totals since the system began (marked).
@@ -131,27 +150,17 @@ struct StepReport {
   double worst_certificate = 0.0;  ///< total
   double peak_force_so_far = 0.0;  ///< N, total
 
-  static constexpr std::size_t size = 13;
-  /// Calls visit(value) for each, in the order above: that of every output.
-  template <class Visit>
-  void each(Visit&& visit) {
-    visit(contacts), visit(active), visit(impacts_begun), visit(peak_force), visit(impulse_sum), visit(dissipated_energy);
-    visit(elastic_energy), visit(pivots), visit(block_steps), visit(pivots_total), visit(certificate), visit(worst_certificate);
-    visit(peak_force_so_far);
-  }
-
-  std::array<double, size> values() const {
-    std::array<double, size> out{};
-    std::size_t k = 0;
-    StepReport(*this).each([&](auto value) { out[k++] = double(value); });
-    return out;
+  /// In the order of every output.
+  auto fields() {
+    return std::tie(contacts, active, impacts_begun, peak_force, impulse_sum, dissipated_energy, elastic_energy, pivots, block_steps,
+                    pivots_total, certificate, worst_certificate, peak_force_so_far);
   }
 
   /// At the beginning of a step: the totals.
   StepReport totals() const {
-    StepReport t;
-    t.impacts_begun = impacts_begun, t.impulse_sum = impulse_sum, t.dissipated_energy = dissipated_energy, t.pivots_total = pivots_total;
-    t.worst_certificate = worst_certificate, t.peak_force_so_far = peak_force_so_far;
+    StepReport t = *this;
+    t.contacts = t.active = t.pivots = t.block_steps = 0;
+    t.peak_force = t.elastic_energy = t.certificate = 0.0;
     return t;
   }
 };
@@ -160,17 +169,14 @@ struct StepReport {
 struct ContactResult {
   int a = -1, b = -1;                  ///< as in Contact; not known of a restored step
   std::int64_t key_a = 0, key_b = -1;  ///< key_a < key_b for pairs
-  double gap = 0.0;                    ///< m, at step n, of the undeformed bodies
-  double normal_force = 0.0;           ///< N, on a along the normal
-  double deformed_gap = 0.0;           ///< D, m, between the deformed boundaries
-  Vec3<double> tangential{};           ///< N, on a
   Vec3<double> normal{};
-  Vec3<double> point{};  ///< m
+  double gap = 0.0;           ///< m, at step n, of the undeformed bodies
+  double normal_force = 0.0;  ///< N, on a along the normal
+  Vec3<double> tangential{};  ///< N, on a
+  Vec3<double> point{};       ///< m
+  double deformed_gap = 0.0;  ///< D, m, between the deformed boundaries
 
-  template <class Visit>
-  void each(Visit&& visit) {
-    visit(key_a), visit(key_b), visit(gap), visit(normal_force), visit(deformed_gap), visit(tangential), visit(normal), visit(point);
-  }
+  auto fields() { return std::tie(key_a, key_b, normal, gap, normal_force, tangential, point, deformed_gap); }
 };
 
 /// One impact: a contact from the first step with N > 0 to the last.
@@ -184,60 +190,48 @@ struct Impact {
   double dissipated = 0.0;      ///< J, in this contact
   Vec3<double> point{};         ///< m, of contact at the beginning
 
-  template <class Visit>
-  void each(Visit&& visit) {
-    visit(a), visit(b), visit(time), visit(duration), visit(peak_force), visit(impulse), visit(relative_speed), visit(dissipated);
-    visit(point);
-  }
+  auto fields() { return std::tie(a, b, time, duration, peak_force, impulse, relative_speed, dissipated, point); }
 };
 
-/// Whether two laws are the same in every parameter.
-inline bool operator==(const PairLaw& p, const PairLaw& q) {
-  const auto all = [](const PairLaw& l) {
-    const FinnieRabinowicz& f = l.friction;
-    return std::tie(f.static_friction, f.kinetic_friction, f.critical_slip_distance, f.interface_shear_strength, f.healing_time,
-                    f.presliding, l.tangential_stiffness_ratio, l.contact_damping, l.contact_area);
-  };
-  return all(p) == all(q);
-}
-
-inline bool operator==(const Settings& a, const Settings& b) {
-  const auto same = [](const Material& p, const Material& q) { return p.stiffness == q.stiffness && p.damping == q.damping; };
-  return a.dt == b.dt && a.theta == b.theta && a.friction_sweeps == b.friction_sweeps && a.lcp.method == b.lcp.method &&
-         a.lcp.tolerance == b.lcp.tolerance && a.pairs == b.pairs &&
-         std::equal(a.materials.begin(), a.materials.end(), b.materials.begin(), b.materials.end(), same);
+/// The row of a contact or an impact in a table: its fields in their order, with the second key as users see it.
+template <class Record>
+std::vector<double> table_row(const Record& record) {
+  std::vector<double> row = to_numbers(record);
+  row[1] = double(shown_id(std::int64_t(row[1])));
+  return row;
 }
 
 /// The one clear line about what is wrong with the settings, or an empty string.
 inline std::string settings_error(const Settings& s) {
-  if (!(s.dt > 0.0) || std::isinf(s.dt)) return "time step must be > 0 s and finite, not " + std::to_string(s.dt);
-  if (!(s.theta >= 0.5 && s.theta <= 1.0)) return "theta must lie between 0.5 and 1, not " + std::to_string(s.theta);
-  if (s.friction_sweeps < 1) return "friction sweeps must be >= 1, not " + std::to_string(s.friction_sweeps);
+  std::string error;
+  const auto must = [&error](bool right, const std::string& what, auto value) {
+    if (!right && error.empty()) error = what + ", not " + std::to_string(value);
+  };
+  must(s.dt > 0.0 && std::isfinite(s.dt), "time step must be > 0 s and finite", s.dt);
+  must(s.theta >= 0.5 && s.theta <= 1.0, "theta must lie between 0.5 and 1", s.theta);
+  must(s.friction_sweeps >= 1, "friction sweeps must be >= 1", s.friction_sweeps);
   const std::size_t n = s.materials.size();
-  if (n == 0) return "at least one material is needed";
-  if (s.pairs.size() != n * n)
-    return std::to_string(n) + " materials need " + std::to_string(n * n) + " pair laws, not " + std::to_string(s.pairs.size());
-  for (std::size_t i = 0; i < n; ++i) {
+  if (error.empty() && n == 0) return "at least one material is needed";
+  must(s.pairs.size() == n * n, std::to_string(n) + " materials need " + std::to_string(n * n) + " pair laws", s.pairs.size());
+  for (std::size_t i = 0; error.empty() && i < n; ++i) {
     const Material& m = s.materials[i];
     const std::string which = "material " + std::to_string(i) + ": ";
-    if (!(m.stiffness > 0.0) || std::isinf(m.stiffness))
-      return which + "stiffness must be > 0 N/m and finite, not " + std::to_string(m.stiffness);
-    if (!(m.damping >= 0.0) || std::isinf(m.damping))
-      return which + "damping must be >= 0 N s/m and finite, not " + std::to_string(m.damping);
+    must(m.stiffness > 0.0 && std::isfinite(m.stiffness), which + "stiffness must be > 0 N/m and finite", m.stiffness);
+    must(m.damping >= 0.0 && std::isfinite(m.damping), which + "damping must be >= 0 N s/m and finite", m.damping);
   }
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = 0; j < n; ++j) {
-      const PairLaw &p = s.pairs[i * n + j], &q = s.pairs[j * n + i];
-      const std::string which = "materials " + std::to_string(i) + " and " + std::to_string(j) + ": ";
-      if (p.friction.error()) return which + p.friction.error();
-      if (!(p.tangential_stiffness_ratio > 0.0) || std::isinf(p.tangential_stiffness_ratio))
-        return which + "tangential stiffness ratio must be > 0, not " + std::to_string(p.tangential_stiffness_ratio);
-      if (!(p.contact_damping >= 0.0) || std::isinf(p.contact_damping))
-        return which + "contact damping must be >= 0 N s/m and finite, not " + std::to_string(p.contact_damping);
-      if (!(p.contact_area >= 0.0)) return which + "contact area must be >= 0 m^2, not " + std::to_string(p.contact_area);
-      if (!(p == q)) return which + "the pair laws must be the same in both orders";
-    }
-  return {};
+  for (std::size_t k = 0; error.empty() && k < n * n; ++k) {
+    const PairLaw& p = s.pairs[k];
+    const double ratio = p.tangential_stiffness_ratio;
+    const std::string which = "materials " + std::to_string(k / n) + " and " + std::to_string(k % n) + ": ";
+    if (p.friction.error()) return which + p.friction.error();
+    must(ratio > 0.0 && std::isfinite(ratio), which + "tangential stiffness ratio must be > 0", ratio);
+    must(p.contact_damping >= 0.0 && std::isfinite(p.contact_damping), which + "contact damping must be >= 0 N s/m and finite",
+         p.contact_damping);
+    must(p.contact_area >= 0.0, which + "contact area must be >= 0 m^2", p.contact_area);
+    if (error.empty() && to_numbers(p) != to_numbers(s.pairs[k % n * n + k / n]))
+      return which + "the pair laws must be the same in both orders";
+  }
+  return error;
 }
 
 }  // namespace impact

@@ -22,7 +22,6 @@ class ActiveFactor {
   double diagonal(Index i) const { return diagonal_[i]; }  ///< transformed diagonal, > 0
 
   /// The empty active set: value = q, diagonal = M_ii.
-  template <class Matrix>
   void clear(const Matrix& m, const double* q) {
     const Index n = m.n;
     value_ = Eigen::Map<const Row>(q, n);
@@ -40,12 +39,11 @@ class ActiveFactor {
   bool rotated() const { return rotated_; }
 
   /// Throws NotDefinite.
-  template <class Matrix>
   void insert(const Matrix& m, Index p) {
     const Index k = size();
     auto row = rows_.row(k);
     row.setZero();
-    m.add_column(p, 1.0, row.data());
+    m.each(p, [&row](Index i, double value) { row[i] = value; });
     for (const Index a : order_) row[a] = 0.0;
     const Eigen::RowVectorXd l = rows_.col(p).head(k).transpose();
     const double square = m.diagonal(p) - l.squaredNorm();

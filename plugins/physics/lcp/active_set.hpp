@@ -7,13 +7,9 @@
 
 namespace dembark::lcp {
 
-template <class Matrix, class Factor>
 class ActiveSet {
  public:
-  using Descent = Relaxation<MatrixRows<Matrix>>;
-
-  /// Throws NotDefinite unless the whole matrix is positive definite.
-  void check_definite(const Matrix& m) { factor_.compute(m, std::vector<char>(std::size_t(m.n), 1)); }
+  using Descent = Relaxation<MatrixRows>;
 
   /// Pivots from u.active; leaves z, w, s and the set in u. When the number of violations has reached no new least value for `patience`
   /// steps, the set that `descent` finds from the best z takes over (null: not at all); it goes on at the next stall until it is at its
@@ -45,8 +41,7 @@ class ActiveSet {
             descent->rows.start(m, u, fraction);
           }
           const bool finished = descent->finish(fraction);
-          u.z = descent->rows.forces();
-          u.take_set();
+          descent->rows.store(u);
           if (finished || ++descents == most_descents) descent = nullptr;
           stalled = 0;
           continue;
@@ -66,12 +61,11 @@ class ActiveSet {
   /// z, w, s of the active set and the list of violated indices; refined when it looks like the end.
   void evaluate(const Matrix& m, Unknowns& u, double fraction) {
     factor_.compute(m, u.active);
-    right_ = -u.q;
     u.z.setZero();
+    u.w = u.q;
     for (int pass = 0; pass < 4; ++pass) {
-      factor_.add_solution(right_, u.z);
+      factor_.add_solution(-u.w, u.z);
       u.measure(m);
-      right_ = -u.w;
       violations_.clear();
       const double scale = u.scale(), error = u.active_error();
       for (Index i = 0; i < m.n; ++i)
@@ -81,13 +75,12 @@ class ActiveSet {
   }
 
   Factor factor_;
-  Eigen::ArrayXd right_, best_;  ///< best: z with the fewest violations
+  Eigen::ArrayXd best_;  ///< z with the fewest violations
   std::vector<Index> violations_;
 };
 
 /// Projected Gauss-Seidel to the tolerance, checked every few sweeps. Outcome.pivots counts sweeps.
-template <class Matrix>
-inline Outcome gauss_seidel(const Matrix& m, Unknowns& u, const LcpOptions& options, MatrixRows<Matrix>& rows) {
+inline Outcome gauss_seidel(const Matrix& m, Unknowns& u, const LcpOptions& options, MatrixRows& rows) {
   Outcome outcome;
   const int limit = options.max_iterations > 0 ? options.max_iterations : 100000;
   rows.start(m, u, rounding_fraction(options.tolerance));

@@ -50,38 +50,11 @@ inline void check_diagonal(Index i, double value) {
        "; it must be > 0 beyond rounding");
 }
 
-constexpr Index tile = 32;
-
 inline void check_entry(Index i, Index j, double value) {
   if (!std::isfinite(value)) fail("M[", i, ",", j, "] is ", value, "; every entry must be a finite number");
 }
 
-/// Finite, symmetric, diagonal > 0. Tile by tile, so that both triangles come from the cache.
-inline void check_dense(const double* m, Index n) {
-  Eigen::ArrayXd root(n);
-  for (Index i = 0; i < n; ++i) {
-    check_entry(i, i, m[i * n + i]);
-    check_diagonal(i, m[i * n + i]);
-    root[i] = std::sqrt(m[i * n + i]);
-  }
-  const Eigen::Map<const Eigen::ArrayXXd> matrix(m, n, n);
-  for (Index a = 0; a < n; a += tile)
-    for (Index b = 0; b <= a; b += tile) {
-      const Index rows = std::min(tile, n - a), columns = std::min(tile, n - b);
-      const auto allowed = symmetry_fraction * (root.segment(a, rows).matrix() * root.segment(b, columns).matrix().transpose()).array();
-      const auto difference = (matrix.block(a, b, rows, columns) - matrix.block(b, a, columns, rows).transpose()).abs();
-      if ((difference <= allowed).all()) continue;
-      for (Index j = b; j < b + columns; ++j)
-        for (Index i = a; i < a + rows; ++i) {
-          check_entry(i, j, matrix(i, j));
-          check_entry(j, i, matrix(j, i));
-          if (!(std::fabs(matrix(i, j) - matrix(j, i)) <= symmetry_fraction * root[i] * root[j]))
-            fail_symmetry(i, j, matrix(i, j), matrix(j, i));
-        }
-    }
-}
-
-/// The same for compressed columns with ascending rows. `outer` has n + 1 entries.
+/// Finite, symmetric, diagonal > 0. Compressed columns with ascending rows; `outer` has n + 1 entries.
 inline void check_sparse(const int* outer, const int* inner, const double* value, Index n) {
   std::vector<double> root(std::size_t(n), 0.0);
   for (Index j = 0; j < n; ++j)
@@ -104,6 +77,23 @@ inline void check_sparse(const int* outer, const int* inner, const double* value
       const double allowed = symmetry_fraction * root[std::size_t(i)] * root[std::size_t(j)];
       if (!(std::fabs(value[p] - partner) <= allowed)) fail_symmetry(i, j, value[p], partner);
     }
+}
+
+/// The same for a column-major array. Tile by tile, so that both triangles come from the cache.
+inline void check_dense(const double* m, Index n) {
+  constexpr Index tile = 32;
+  const Eigen::Map<const Eigen::ArrayXXd> matrix(m, n, n);
+  const Eigen::ArrayXd root = matrix.matrix().diagonal().array().sqrt();
+  bool good = (root > 0.0).all();
+  for (Index a = 0; a < n && good; a += tile)
+    for (Index b = 0; b <= a && good; b += tile) {
+      const Index rows = std::min(tile, n - a), columns = std::min(tile, n - b);
+      const auto allowed = symmetry_fraction * (root.segment(a, rows).matrix() * root.segment(b, columns).matrix().transpose()).array();
+      good = ((matrix.block(a, b, rows, columns) - matrix.block(b, a, columns, rows).transpose()).abs() <= allowed).all();
+    }
+  if (good) return;
+  const Eigen::SparseMatrix<double> entries = matrix.matrix().sparseView(0.0, 0.0);  // to name the one that is wrong
+  check_sparse(entries.outerIndexPtr(), entries.innerIndexPtr(), entries.valuePtr(), n);
 }
 
 }  // namespace dembark::lcp

@@ -17,105 +17,93 @@ struct NotDefinite {
   double pivot, diagonal;
 };
 
-/// The indices of an active set, and the way between it and all unknowns.
-class ActiveIndices {
+class Factor {
  public:
-  std::vector<Index> index;
-
-  Index size() const { return Index(index.size()); }
-  Index operator[](Index k) const { return index[std::size_t(k)]; }
-
-  void take(const std::vector<char>& active) {
-    index.clear();
-    for (std::size_t i = 0; i < active.size(); ++i)
-      if (active[i]) index.push_back(Index(i));
+  /// Of the block of the active set, less `shift` of its diagonal. Throws NotDefinite.
+  void compute(const Matrix& m, const std::vector<char>& active, double shift = 0.0) {
+    index_.clear();
+    for (Index i = 0; i < m.n; ++i)
+      if (active[std::size_t(i)]) index_.push_back(i);
+    least_pivot_ = 1.0;
+    if (index_.empty()) return;
+    dense_ = m.dense();
+    if (dense_) factorise_dense(m, 1.0 - shift);
+    else factorise_sparse(m, 1.0 - shift);
+    for (Index k = 0; k < pivots_.size(); ++k) {
+      const Index i = index_[std::size_t(k)];
+      const double diagonal = m.diagonal(i);
+      if (!(pivots_[k] > definite_fraction(m.n) * diagonal)) throw NotDefinite{i, pivots_[k], diagonal};
+      least_pivot_ = std::min(least_pivot_, pivots_[k] / diagonal);
+    }
   }
 
-  /// z_A += solve(right_A); arrays of full length.
-  template <class Solve>
-  void add_solution(const Eigen::ArrayXd& right, Eigen::ArrayXd& z, Solve solve) {
-    x_.resize(size());
-    for (Index k = 0; k < size(); ++k) x_[k] = right[(*this)[k]];
-    solve(x_);
-    for (Index k = 0; k < size(); ++k) z[(*this)[k]] += x_[k];
+  /// Of the last factor, in units of the diagonal.
+  double least_pivot() const { return least_pivot_; }
+
+  /// z_A += M_AA^-1 right_A; arrays of full length.
+  void add_solution(const Eigen::ArrayXd& right, Eigen::ArrayXd& z) {
+    if (index_.empty()) return;
+    x_ = right(index_);
+    if (dense_) {
+      lower_.triangularView<Eigen::Lower>().solveInPlace(x_);
+      lower_.triangularView<Eigen::Lower>().transpose().solveInPlace(x_);
+    } else {
+      x_ = sparse_.solve(x_);
+    }
+    z(index_) += x_.array();
   }
 
  private:
-  Eigen::VectorXd x_;
-};
-
-/// Dense, L L^T. By the function below Eigen::LLT, which tells where it failed and makes no norm.
-class DenseFactor {
- public:
-  /// Throws NotDefinite.
-  void compute(const DenseBlock& m, const std::vector<char>& active) {
-    active_.take(active);
-    const Index n = active_.size();
+  /// L L^T by the function below Eigen::LLT, which tells where it failed and makes no norm. Pivots up to the first that fails.
+  void factorise_dense(const Matrix& m, double scale) {
+    const Index n = Index(index_.size());
     lower_.resize(n, n);
     for (Index k = 0; k < n; ++k) {
-      const auto column = m.column(active_[k]);
-      for (Index r = k; r < n; ++r) lower_(r, k) = column[active_[r]];
+      const double* column = m.value + index_[std::size_t(k)] * m.n;
+      for (Index r = k; r < n; ++r) lower_(r, k) = column[index_[std::size_t(r)]];
     }
+    lower_.diagonal() *= scale;
     const Index failed = Eigen::internal::llt_inplace<double, Eigen::Lower>::blocked(lower_);
-    const double least = definite_fraction(m.n);
-    for (Index k = 0; k < (failed < 0 ? n : failed); ++k) check(m, k, lower_(k, k) * lower_(k, k), least);
-    if (failed >= 0) check(m, failed, m.diagonal(active_[failed]) - lower_.row(failed).head(failed).squaredNorm(), least);
+    pivots_ = lower_.diagonal().head(failed < 0 ? n : failed + 1).array().square();
+    if (failed >= 0) pivots_[failed] = scale * m.diagonal(index_[std::size_t(failed)]) - lower_.row(failed).head(failed).squaredNorm();
   }
 
-  void add_solution(const Eigen::ArrayXd& right, Eigen::ArrayXd& z) {
-    active_.add_solution(right, z, [this](Eigen::VectorXd& x) {
-      lower_.triangularView<Eigen::Lower>().solveInPlace(x);
-      lower_.triangularView<Eigen::Lower>().transpose().solveInPlace(x);
-    });
-  }
-
- private:
-  void check(const DenseBlock& m, Index k, double pivot, double least) const {
-    const double diagonal = m.diagonal(active_[k]);
-    if (!(pivot > least * diagonal)) throw NotDefinite{active_[k], pivot, diagonal};
-  }
-
-  ActiveIndices active_;
-  Eigen::MatrixXd lower_;
-};
-
-/// Sparse, L D L^T, in the order of the block, which is made fill-reducing once for the whole pattern.
-class SparseFactor {
- public:
-  /// Throws NotDefinite.
-  void compute(const SparseBlock& m, const std::vector<char>& active) {
-    active_.take(active);
-    const Index n = active_.size();
-    if (n == 0) return;
-    place_.assign(active.size(), -1);
-    for (Index k = 0; k < n; ++k) place_[std::size_t(active_[k])] = int(k);
+  /// L D L^T, in the order of the block, which is made fill-reducing once for the whole pattern.
+  void factorise_sparse(const Matrix& m, double scale) {
+    const Index n = Index(index_.size());
+    place_.assign(std::size_t(m.n), -1);
+    for (Index k = 0; k < n; ++k) place_[std::size_t(index_[std::size_t(k)])] = int(k);
     upper_.resize(n, n);
     upper_.reserve(m.start[m.n] - m.start[0]);
     for (Index k = 0; k < n; ++k) {
-      const Index j = active_[k];
       upper_.startVec(k);
-      for (int p = m.start[j]; p < m.start[j + 1] && m.row[p] <= j; ++p)
-        if (const int i = place_[std::size_t(m.row[p])]; i >= 0) upper_.insertBack(i, k) = m.value[p];
+      m.each(index_[std::size_t(k)], [this, k, scale](Index row, double value) {
+        const int i = place_[std::size_t(row)];
+        if (i >= 0 && i <= k) upper_.insertBackByOuterInner(k, i) = i < k ? value : scale * value;
+      });
     }
     upper_.finalize();
-    factor_.compute(upper_);
-    const double least = definite_fraction(m.n);
-    const auto pivots = factor_.vectorD();
-    for (Index k = 0; k < n; ++k) {
-      const Index i = active_[k];
-      if (!(pivots[k] > least * m.diagonal(i))) throw NotDefinite{i, pivots[k], m.diagonal(i)};
+    sparse_.compute_natural(upper_);
+    pivots_ = sparse_.vectorD();
+  }
+
+  struct Ldlt : Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Upper, Eigen::NaturalOrdering<int>> {
+    /// compute() of Eigen 3.4 copies the matrix in order to put it into the order that it has.
+    void compute_natural(const Eigen::SparseMatrix<double>& upper) {
+      analyzePattern_preordered(upper, true);
+      factorize_preordered<true>(upper);
     }
-  }
+  };
 
-  void add_solution(const Eigen::ArrayXd& right, Eigen::ArrayXd& z) {
-    if (active_.size() > 0) active_.add_solution(right, z, [this](Eigen::VectorXd& x) { x = factor_.solve(x); });
-  }
-
- private:
-  ActiveIndices active_;
+  bool dense_ = false;
+  std::vector<Index> index_;
+  Eigen::ArrayXd pivots_;
+  double least_pivot_ = 1.0;
+  Eigen::VectorXd x_;
+  Eigen::MatrixXd lower_;
   std::vector<int> place_;
   Eigen::SparseMatrix<double> upper_;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Upper, Eigen::NaturalOrdering<int>> factor_;
+  Ldlt sparse_;
 };
 
 }  // namespace dembark::lcp

@@ -13,13 +13,14 @@
 
 namespace dembark::lcp {
 
-/// Rows: the matrix as what its rows do to each other, MatrixRows for one that is stored and impact::Lines for contacts between bodies.
-///   near()           so many rows, the first, may carry a force; widen() takes others in that turn out to, and tells whether there were
-///   any force(i)         z_i; set_force(i, z) leaves the sums as they are until gather() makes them anew gap(i), unit(i)  w_i with those
-///   sums, 1 / sqrt(M_ii) relax<Measured>  one sweep; returns the largest step in units of the row's own scale energy()         z^T M z / 2
-///   + q^T z, after gather() measure(r)       the residual, after gather() worth_steps      so many steps of conjugate gradients cost what
-///   a factor costs Face             of a face scaled to a unit diagonal: load(rows, face), clear(), and sums() with pulled(k) and push(k,
-///   force)
+/// Rows, the matrix as what its rows do to each other: MatrixRows for one that is stored, impact::Lines for contacts between bodies.
+/// - near(): so many rows, the first, may carry a force. widen() takes others in that turn out to, and tells whether there were any.
+/// - force(i): z_i. set_force(i, z) leaves the sums as they are until gather() makes them anew.
+/// - gap(i), unit(i): w_i with those sums, 1 / sqrt(M_ii).
+/// - relax<Measured>(): one sweep; returns the largest step in units of the row's own scale.
+/// - energy(): z^T M z / 2 + q^T z, and measure(r): the residual, both after gather().
+/// - worth_steps: so many steps of conjugate gradients cost what a factor costs.
+/// - Face, of a face scaled to a unit diagonal: load(rows, face), clear(), and sums() with pulled(k) and push(k, force).
 template <class Rows>
 class Relaxation {
  public:
@@ -28,6 +29,15 @@ class Relaxation {
   /// So many sweeps, unmeasured.
   void sweep(int count) {
     for (int k = 0; k < count; ++k) rows.template relax<false>();
+  }
+
+  /// Until a sweep leaves the set of positive forces as it is, or so many times.
+  void find_set(int most) {
+    conjugate_.take_face(rows);
+    for (int k = 0; k < most; ++k) {
+      sweep(1);
+      if (conjugate_.take_face(rows)) break;
+    }
   }
 
   /// To four digits of each row's own scale, or as near as a few sweeps come.

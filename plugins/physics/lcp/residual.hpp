@@ -1,4 +1,4 @@
-// What every way of solving is judged by: the residual of z and the certificate that follows from it.
+// A matrix, dense or sparse, and what every way of solving is judged by: the residual of z and the certificate that follows from it.
 #pragma once
 
 #include <cmath>
@@ -12,6 +12,35 @@ using Eigen::Index;
 
 /// A violation below this fraction of s_i = |q_i| + sum_j |M_ij z_j| is rounding: the residual of a backward stable solution.
 inline double rounding_fraction(double tolerance) { return std::max(64.0 * std::numeric_limits<double>::epsilon(), 0.01 * tolerance); }
+
+/// A symmetric matrix that lies elsewhere: all columns one after the other, or compressed ones of both triangles with ascending rows.
+struct Matrix {
+  Index n = 0;
+  const double* value = nullptr;
+  const double* diagonals = nullptr;
+  const int* start = nullptr;  ///< n + 1; null: all entries are stored
+  const int* row = nullptr;
+  int first = 0;  ///< the number that rows begin with
+
+  bool dense() const { return !start; }
+  double diagonal(Index i) const { return diagonals[dense() ? i * (n + 1) : i]; }
+
+  /// Calls visit(row, value) for the entries of column j.
+  template <class Visit>
+  void each(Index j, Visit visit) const {
+    if (dense())
+      for (Index i = 0; i < n; ++i) visit(i, value[j * n + i]);
+    else
+      for (int p = start[j]; p < start[j + 1]; ++p) visit(Index(row[p] - first), value[p]);
+  }
+
+  /// out += x times column j.
+  void add_column(Index j, double x, double* out) const {
+    each(j, [x, out](Index i, double entry) { out[i] += x * entry; });
+  }
+};
+
+inline Matrix dense_matrix(const double* values, Index n) { return {n, values, values}; }
 
 /// w = q + M z of some rows, with what has been added up in each.
 struct Residual {
@@ -52,7 +81,6 @@ struct Unknowns : Residual {
   Eigen::ArrayXd q;
   std::vector<char> active;
 
-  template <class Matrix>
   void reset(const Matrix& m) {
     resize(m.n);
     q.resize(m.n);
@@ -61,9 +89,17 @@ struct Unknowns : Residual {
     active.assign(std::size_t(m.n), 0);
   }
 
-  template <class Matrix>
+  /// w and s of z.
   void measure(const Matrix& m) {
-    m.multiply(q.data(), z.data(), w.data(), s.data());
+    w = q;
+    s = q.abs();
+    for (Index j = 0; j < m.n; ++j)
+      if (z[j] != 0.0)
+        m.each(j, [x = z[j], w_ = w.data(), s_ = s.data()](Index i, double value) {
+          const double t = value * x;
+          w_[i] += t;
+          s_[i] += std::fabs(t);
+        });
   }
 
   /// The set of the positive z.

@@ -1,9 +1,6 @@
 // Methods that exchange one pair w_i <-> z_i at a time: the energy criterion and Murty's least index.
 #pragma once
 
-#include <cstdint>
-#include <unordered_set>
-
 #include "active_factor.hpp"
 
 namespace dembark::lcp {
@@ -19,7 +16,6 @@ class SinglePivots {
   /// criterion: the index with the most negative p_i = -value_i^2 / diagonal_i of the transformed system, that is, the exchange
   /// that releases the most energy (G. N. Kolesnikov, Resources and Technology 10 (2013)). That rule has no proof of an end:
   /// when it comes back to a set that it left, or goes on for 50 n pivots, least index takes over.
-  template <class Matrix>
   Outcome run(const Matrix& m, Unknowns& u, bool least_index, const LcpOptions& options) {
     const Index n = m.n;
     const double fraction = rounding_fraction(options.tolerance);
@@ -27,11 +23,8 @@ class SinglePivots {
     peak_ = 0.0;
     rest_ = (u.q * u.unit).abs().maxCoeff();
     rebuild(m, u);
-    std::unordered_set<std::uint64_t> seen;
-    std::uint64_t key = 0;
-    for (Index i = 0; i < n; ++i)
-      if (u.active[std::size_t(i)]) key ^= set_key(i);
-    if (!least_index) seen.insert(key);
+    std::vector<char> landmark = u.active;  // a set that comes back meets it: R. P. Brent, BIT 20 (1980) 176
+    int next_landmark = 1;
     bool fresh = false;
     for (Index checks = 0;;) {
       const Index p = choose(m, u, fraction, least_index, fresh);
@@ -51,25 +44,19 @@ class SinglePivots {
       }
       exchange(m, u, p);
       ++outcome.pivots;
-      key ^= set_key(p);
-      if (!least_index && (!seen.insert(key).second || outcome.pivots > 50 * n)) {
+      if (!least_index && (u.active == landmark || outcome.pivots > 50 * n)) {
         least_index = outcome.used_fallback = true;
         refresh(m, u, fraction);
+      }
+      if (outcome.pivots == next_landmark) {
+        landmark = u.active;
+        next_landmark *= 2;
       }
     }
     return outcome;
   }
 
  private:
-  /// A number per index whose xor names a set; fixed, so that runs repeat.
-  static std::uint64_t set_key(Index i) {
-    std::uint64_t x = std::uint64_t(i) + 0x9e3779b97f4a7c15ull;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
-    return x ^ (x >> 31);
-  }
-
-  template <class Matrix>
   void rebuild(const Matrix& m, Unknowns& u) {
     factor_.clear(m, u.q.data());
     for (Index i = 0; i < m.n; ++i)
@@ -77,7 +64,6 @@ class SinglePivots {
     weigh(u);
   }
 
-  template <class Matrix>
   void exchange(const Matrix& m, Unknowns& u, Index p) {
     char& flag = u.active[std::size_t(p)];
     if (flag) {
@@ -103,7 +89,6 @@ class SinglePivots {
   }
 
   /// The next index, or -1. |M_ij| <= sqrt(M_ii M_jj) turns the sum of sqrt(M_jj) |z_j| into a bound of s_i without a product.
-  template <class Matrix>
   Index choose(const Matrix& m, const Unknowns& u, double fraction, bool least_index, bool fresh) const {
     constexpr double last_digit = std::numeric_limits<double>::epsilon();
     const double scale = fresh ? u.scale() : 0.0;
@@ -126,14 +111,12 @@ class SinglePivots {
   }
 
   /// z with iterative refinement, w and s from M and q; true when all conditions hold.
-  template <class Matrix>
   bool refresh(const Matrix& m, Unknowns& u, double fraction) {
     for (Index i = 0; i < m.n; ++i) u.z[i] = u.active[std::size_t(i)] ? factor_.value(i) : 0.0;
     for (int pass = 0;; ++pass) {
       u.measure(m);
       if (pass == 3 || u.active_error() <= 0.05 * fraction) break;
-      right_ = -u.w;
-      factor_.add_solution(right_, u.z);
+      factor_.add_solution(-u.w, u.z);
     }
     factor_.set_values(u);
     peak_ = 0.0;
@@ -145,7 +128,6 @@ class SinglePivots {
   }
 
   ActiveFactor factor_;
-  Eigen::ArrayXd right_;
   double load_ = 0.0;  ///< sum of sqrt(M_jj) |z_j|
   double rest_ = 0.0;  ///< most of |q_j| / sqrt(M_jj)
   double peak_ = 0.0;  ///< most of load_ + rest_ since values were computed afresh: the running values carry its rounding

@@ -66,45 +66,37 @@ class PointGrid {
   }
 
  private:
-  /// The box of the points, as long as the grid has not many more cells than there are points. Otherwise that of fewer and fewer of them,
-  /// without those far away from the others; where none is, the cells grow.
+  /// The box of the points, as long as the grid has not many more cells than there are points. Otherwise the twentieth part of them at
+  /// either end may be far away from the others: those farther than the others are spread lie in the cells of the border. Where that does
+  /// not suffice the cells grow.
   template <class Point>
   void find_bounds(std::size_t n, Point point, double cell) {
     double Vec3<double>::* const axes[3] = {&Vec3<double>::x, &Vec3<double>::y, &Vec3<double>::z};
-    Vec3<double> high{};
+    Vec3<double> length{};
     low_ = {};
-    for (int k = 0; k < 3; ++k)
-      for (std::size_t i = 0; i < n; ++i) {
-        const double p = point(i).*axes[k];
-        low_.*axes[k] = i == 0 ? p : std::min(low_.*axes[k], p);
-        high.*axes[k] = i == 0 ? p : std::max(high.*axes[k], p);
+    const auto cells = [&](int k) { return std::floor(length.*axes[k] / cell) + 1.0; };
+    const auto few = [&] { return cells(0) * cells(1) * cells(2) <= 8.0 * double(n) + 64.0; };
+    std::vector<double> along(n);
+    for (const std::size_t ends : {std::size_t(0), n / 20}) {
+      for (int k = 0; k < 3 && n > 0; ++k) {
+        for (std::size_t i = 0; i < n; ++i) along[i] = point(i).*axes[k];
+        double first = *std::min_element(along.begin(), along.end()), last = *std::max_element(along.begin(), along.end());
+        if (ends > 0) {
+          std::nth_element(along.begin(), along.begin() + std::ptrdiff_t(ends), along.end());
+          first = along[ends];
+          std::nth_element(along.begin(), along.end() - 1 - std::ptrdiff_t(ends), along.end());
+          last = along[n - 1 - ends];
+        }
+        const double spread = last - first;
+        double from = first, to = last;
+        for (const double p : along)
+          if (p >= first - spread && p <= last + spread) from = std::min(from, p), to = std::max(to, p);
+        low_.*axes[k] = from;
+        length.*axes[k] = to - from;
       }
-    const auto cells = [&](int k) { return std::floor((high.*axes[k] - low_.*axes[k]) / cell) + 1.0; };
-    const double most = 8.0 * double(n) + 64.0;
-    while (cells(0) * cells(1) * cells(2) > most) {
-      bool narrower = false;
-      for (const auto axis : axes) {
-        const double low = low_.*axis, length = high.*axis - low;
-        double inside = 0.0, mean = 0.0, spread = 0.0;
-        const auto each_inside = [&](auto add) {
-          for (std::size_t i = 0; i < n; ++i)
-            if (const double p = point(i).*axis - low; p >= 0.0 && p <= length) add(p);
-        };
-        each_inside([&](double p) { mean += p, inside += 1.0; });
-        mean /= inside;
-        each_inside([&](double p) { spread += std::fabs(p - mean) / inside; });
-        // Evenly spread points all lie within two mean deviations.
-        double first = mean, last = mean;
-        each_inside([&](double p) {
-          if (std::fabs(p - mean) <= 4.0 * spread) first = std::min(first, p), last = std::max(last, p);
-        });
-        if (!(last - first < length)) continue;
-        narrower = true;
-        low_.*axis = low + first;
-        high.*axis = low + last;
-      }
-      if (!narrower) cell *= 1.5;
+      if (few()) break;
     }
+    while (!few()) cell *= 1.5;
     for (int k = 0; k < 3; ++k) count_[k] = int(cells(k));
     inverse_ = 1.0 / cell;
   }

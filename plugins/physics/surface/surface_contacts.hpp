@@ -30,13 +30,12 @@ class SurfaceContacts {
   SurfaceContacts(double smooth_angle, double weld) : smooth_angle_(smooth_angle), weld_(weld) {}
 
   /// The triangles as they are now. Which of them stand beside each other is found anew only when they are others, have changed their
-  /// shape or have moved against each other.
-  void update(const std::vector<Triangle>& triangles) {
-    const bool same =
-        triangles.size() == triangles_.size() && std::equal(triangles.begin(), triangles.end(), triangles_.begin(),
-                                                            [](const Triangle& a, const Triangle& b) { return a.id == b.id; });
-    triangles_ = triangles;
-    if (!same || !moved_as_one()) join();
+  /// shape or have moved against each other. moved: whether any has since the last call.
+  void update(std::vector<Triangle> triangles, bool moved = true) {
+    const bool same = std::equal(triangles.begin(), triangles.end(), triangles_.begin(), triangles_.end(),
+                                 [](const Triangle& a, const Triangle& b) { return a.id == b.id; });
+    triangles_.swap(triangles);
+    if (!same || (moved && !moved_as_one())) join();
   }
 
   const std::vector<Triangle>& triangles() const { return triangles_; }

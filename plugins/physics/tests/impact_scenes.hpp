@@ -1,6 +1,7 @@
 // Bodies and comparisons that several tests of the impact model share.
 #pragma once
 
+#include <cmath>
 #include <cstring>
 #include <random>
 #include <vector>
@@ -54,6 +55,19 @@ inline std::vector<Body> crowd(int n, unsigned seed = 7) {
 /// All pairs with gap <= reach (m).
 inline void find_pairs(const std::vector<Body>& bodies, double reach, std::vector<dembark::impact::Contact>& contacts) {
   dembark::impact::PairFinder().find(bodies, reach, contacts);
+}
+
+/// A step with these candidates; adds what the contacts do to the bodies to `force` and `torque`.
+inline const dembark::impact::StepReport& step(dembark::impact::System& system, const std::vector<Body>& bodies,
+                                               const std::vector<dembark::impact::Contact>& contacts, double time, double kick,
+                                               std::vector<Vec3<double>>& force, std::vector<Vec3<double>>& torque) {
+  const auto all = [&](double, std::vector<dembark::impact::Contact>& found) { found = contacts; };
+  const dembark::impact::StepReport& report = system.step(bodies, all, 0.0, time, kick, INFINITY);
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    force[i] += system.pushes()[i].force;
+    torque[i] += system.pushes()[i].torque;
+  }
+  return report;
 }
 
 /// A lattice of triangles whose neighbours overlap or miss each other by `gap`, at random.

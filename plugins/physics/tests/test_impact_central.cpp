@@ -123,7 +123,7 @@ TEST_CASE("a wall of its own stiffness sends a log back") {
     wall.stiffness = sw;
     wall.normal = {1, 0, 0};
     wall.velocity = {speed, 0, 0};
-    scene.planes.push_back(wall);
+    scene.around.planes.push_back(wall);
     scene.run(8000);
     CHECK_THAT(scene.velocity()[0].x - speed, WithinRel(2.0 * std::exp(-pi * 1e-3 / 2), 1e-5));
     const auto impacts = scene.system().take_finished();

@@ -49,7 +49,7 @@ struct Incline {
   Scene scene;
   Incline(double slope, double mu, double inertia, double dt = 2e-5)
       : scene(settings(dt, mu), {log_at(0, 0, r - m * g * std::cos(slope) / 5e6, slope, inertia)}) {
-    scene.planes.push_back(floor_plane());
+    scene.around.planes.push_back(floor_plane());
   }
 };
 
@@ -91,7 +91,7 @@ TEST_CASE("a spinning log on a floor comes to roll with a third of its surface s
   b.spin = {0, 0, -30.0};
   const double mu = 0.3, slip_time = 30.0 * r / (3.0 * mu * g);
   Scene scene(settings(2e-5, mu), {b});
-  scene.planes.push_back(floor_plane());
+  scene.around.planes.push_back(floor_plane());
   scene.run(std::int64_t(0.9 * slip_time / 2e-5));
   CHECK_THAT(scene.velocity()[0].x, WithinRel(0.9 * 30.0 * r / 3.0, 1e-3));
   scene.run(std::int64_t(0.3 * slip_time / 2e-5));
@@ -108,7 +108,7 @@ TEST_CASE("friction that falls with slip: the kinetic coefficient holds a slidin
   Settings s = settings(2e-5, 0.5, 0.2);
   s.pairs[0].friction.critical_slip_distance = 1e-4;
   Scene scene(s, {b});
-  scene.planes.push_back(floor_plane());
+  scene.around.planes.push_back(floor_plane());
   scene.run(20000);
   CHECK_THAT(scene.velocity()[0].x, WithinRel(2.0 - 0.2 * g * 0.4, 2e-3));
 }
@@ -119,12 +119,12 @@ TEST_CASE("the exponential curve before sliding holds a block too, and leads to 
   for (const double push : {0.5, 1.2}) {  // of the limit
     Body b = log_at(0, 0, r - m * g / 5e6, 0.0, INFINITY);
     Scene scene(s, {b});
-    scene.planes.push_back(floor_plane());
+    scene.around.planes.push_back(floor_plane());
     scene.run(2000);
     b = scene.bodies()[0];
     b.force.x = push * 0.4 * m * g;
     Scene pushed(s, {b});
-    pushed.planes.push_back(floor_plane());
+    pushed.around.planes.push_back(floor_plane());
     pushed.run(10000);
     const double early = pushed.velocity()[0].x;
     pushed.run(10000);
@@ -141,7 +141,7 @@ TEST_CASE("more sweeps change nothing about what is at rest") {
     s.friction_sweeps = sweeps;
     std::vector<Body> logs{log_at(0, -0.12, 0.0999), log_at(1, 0.12, 0.0999), log_at(2, 0.0, 0.26)};
     Scene scene(s, logs);
-    scene.planes.push_back(floor_plane());
+    scene.around.planes.push_back(floor_plane());
     scene.run(20000);
     const auto& c = scene.system().contacts();
     REQUIRE(scene.system().report().active == 4);
@@ -162,7 +162,7 @@ TEST_CASE("the interface carries no more than its shear strength") {
   s.pairs[0].friction.interface_shear_strength = 1e5;
   s.pairs[0].contact_area = 1e-4;
   Scene scene(s, {b});
-  scene.planes.push_back(floor_plane());
+  scene.around.planes.push_back(floor_plane());
   scene.run(2000);
   const double strength = 1e5 * 1e-4;
   CHECK_THAT(norm(scene.system().contacts()[0].tangential), WithinRel(strength * (1 - std::exp(-0.5 * m * g / strength)), 1e-4));
@@ -203,13 +203,13 @@ TEST_CASE("logs in a groove come to rest at any step, however stiff they are") {
       for (int i = 0; i < 3; ++i) logs.push_back(log_at(i, 0.201 * i - 0.201, 0.11));
       for (int i = 0; i < 2; ++i) logs.push_back(log_at(3 + i, 0.201 * i - 0.1, 0.29));
       Scene scene(s, logs);
-      scene.planes.push_back(floor_plane());
+      scene.around.planes.push_back(floor_plane());
       for (const double side : {1.0, -1.0}) {
         Plane p = floor_plane();
         p.id = wall_key(side > 0 ? 1 : 2);
         p.normal = {side * std::sqrt(0.5), std::sqrt(0.5), 0};
         p.point = {-side * 0.36, 0, 0};
-        scene.planes.push_back(p);
+        scene.around.planes.push_back(p);
       }
       scene.run(std::int64_t(5.0 / s.dt));
       double weight = 0.0, carried = 0.0, speed = 0.0;  // a log that rolls on the floor goes on: only what is vertical must be over
@@ -230,7 +230,7 @@ TEST_CASE("a turning drum carries logs up") {
   drum.stiffness = 1e7;
   drum.omega = 0.02;  // slow: it swings about that angle with the drum's speed
   Scene scene(settings(2e-4, mu), {log_at(0, 0, -R + r, 0.0, INFINITY)});
-  scene.drums.push_back(drum);
+  scene.around.drums.push_back(drum);
   scene.run(120000);
   const Vec3<double> x = scene.bodies()[0].position;
   CHECK_THAT(std::atan2(x.x, -x.y), WithinAbs(std::atan(mu), 0.01));
@@ -240,7 +240,7 @@ TEST_CASE("a turning drum carries logs up") {
   fast.velocity = {omega * (R - r), 0, 0};
   Scene round(settings(5e-5, 2.0), {fast});
   drum.omega = omega;
-  round.drums.push_back(drum);
+  round.around.drums.push_back(drum);
   double highest = -R;
   for (int i = 0; i < 400; ++i) {
     round.run(100);

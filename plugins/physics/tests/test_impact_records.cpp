@@ -8,10 +8,8 @@
 #include <vector>
 #include "catch.hpp"
 
-#include "dembark/impact/archive.hpp"
 #include "dembark/impact/impact_file.hpp"
 #include "dembark/impact/last_forces.hpp"
-#include "dembark/impact/periodic.hpp"
 #include "impact_scenes.hpp"
 
 using namespace dembark;
@@ -60,24 +58,24 @@ TEST_CASE("pairs across a periodic boundary") {
     logs[std::size_t(i)].radius = 0.12;
     logs[std::size_t(i)].position = {at[i], 0.0, 0.0};
   }
-  PeriodicBox box;
+  PairFinder pairs;
+  PeriodicBox& box = pairs.box;
   box.low = {-1.0, -1.0, -1.0};
   box.length = {2.0, 2.0, 2.0};
-  PeriodicPairs pairs;
   std::vector<Contact> contacts;
-  pairs.find(logs, box, 0.01, contacts);
+  pairs.find(logs, 0.01, contacts);
   CHECK(contacts.empty());
   box.periodic[0] = box.periodic[2] = true;
-  pairs.find(logs, box, 0.01, contacts);
+  pairs.find(logs, 0.01, contacts);
   REQUIRE(contacts.size() == 1);
   const Contact& c = contacts.front();
   CHECK((c.a == 0 && c.b == 1));
   CHECK(c.gap == Approx(-0.04));
   CHECK(c.normal.x == Approx(1.0));  // from b, which is at -1.1 for a, to a
   box.length.x = 0.45;
-  CHECK_THROWS_WITH(pairs.find(logs, box, 0.01, contacts), Catch::Contains("periodic box is too short along x"));
+  CHECK_THROWS_WITH(pairs.find(logs, 0.01, contacts), Catch::Contains("periodic box is too short along x"));
   logs.resize(1);  // in one plane across the axis
-  CHECK_NOTHROW(pairs.find(logs, box, 0.01, contacts));
+  CHECK_NOTHROW(pairs.find(logs, 0.01, contacts));
 }
 
 TEST_CASE("the forces of the last step hold for the bodies that it left, and for no others") {
@@ -88,8 +86,7 @@ TEST_CASE("the forces of the last step hold for the bodies that it left, and for
   LastForces last;
   CHECK_FALSE(last.hold(bodies, box));
   last.keep(bodies);
-  last.force.assign(3, {1.0, 2.0, 3.0});
-  last.torque.assign(3, {});
+  last.pushes.assign(3, {{1.0, 2.0, 3.0}, {}});
   std::vector<Body> end = bodies;
   for (Body& b : end) b.velocity.y -= 0.1;
   last.move(end);
@@ -116,7 +113,7 @@ TEST_CASE("the forces of the last step hold for the bodies that it left, and for
   in(again);
   in.end();
   CHECK(again.hold(end, box));
-  CHECK(again.force[2].z == 3.0);
+  CHECK(again.pushes[2].force.z == 3.0);
   std::vector<double> broken = out.numbers();
   broken.pop_back();
   Archive few(broken);
@@ -162,11 +159,11 @@ TEST_CASE("a step done again loses once more what contacts held that are no cand
   find_pairs(logs, 1e-3, contacts);
   REQUIRE(contacts.size() == 1);
   std::vector<Vec3<double>> force(2), torque(2);
-  system.step(logs, contacts, 0.0, 1.0, force, torque);
+  step(system, logs, contacts, 0.0, 1.0, force, torque);
   const double held = system.report().elastic_energy, before = system.report().dissipated_energy;
   REQUIRE(held > 0.0);
   for (int again = 0; again < 2; ++again) {
-    system.step(logs, std::vector<Contact>(), 1e-4, 1.0, force, torque);
+    step(system, logs, {}, 1e-4, 1.0, force, torque);
     CHECK(system.report().dissipated_energy - before == Approx(held));
     CHECK(system.take_finished().size() == (again ? 0 : 1));
   }

@@ -157,7 +157,7 @@ TEST_CASE("rows of the active factor follow inserts and removals like the transf
   const int n = 20;
   const Matrix M = p.definite(n, 0.1);
   const Vector q = p.vector(n);
-  const lcp::DenseBlock block{M.data(), n};
+  const lcp::Matrix block = lcp::dense_matrix(M.data(), n);
   lcp::ActiveFactor factor;
   factor.clear(block, q.data());
   std::vector<char> active(n, 0);
@@ -189,12 +189,12 @@ TEST_CASE("factors of an active set solve its equations and leave the rest alone
   const Matrix M = band(n, 5, p);
   const Eigen::SparseMatrix<double> S = sparse(M);
   const Vector diagonal = M.diagonal();
-  const lcp::SparseBlock columns{n, S.outerIndexPtr(), S.innerIndexPtr(), S.valuePtr(), diagonal.data()};
-  lcp::DenseFactor dense;
-  lcp::SparseFactor factor;
+  const lcp::Matrix columns{n, S.valuePtr(), diagonal.data(), S.outerIndexPtr(), S.innerIndexPtr()};
+  lcp::Factor dense;
+  lcp::Factor factor;
   for (int trial = 0; trial < 30; ++trial) {
     const std::vector<char> active = trial == 0 ? std::vector<char>(n, 0) : p.flags(n);
-    dense.compute({M.data(), n}, active);
+    dense.compute(lcp::dense_matrix(M.data(), n), active);
     factor.compute(columns, active);
     const Eigen::ArrayXd right = p.vector(n).array();
     Eigen::ArrayXd a = Eigen::ArrayXd::Zero(n), b = a;
@@ -227,12 +227,12 @@ TEST_CASE("block steps that go round begin elsewhere, then give way to single pi
   // Single pivots, where there is no other place to begin from.
   const Eigen::SparseMatrix<double> S = sparse(M);
   const Vector diagonal = M.diagonal();
-  const lcp::SparseBlock block{5, S.outerIndexPtr(), S.innerIndexPtr(), S.valuePtr(), diagonal.data()};
+  const lcp::Matrix block{5, S.valuePtr(), diagonal.data(), S.outerIndexPtr(), S.innerIndexPtr()};
   lcp::Unknowns u;
   u.reset(block);
   u.q = q;
   u.active = start;
-  lcp::ActiveSet<lcp::SparseBlock, lcp::SparseFactor> steps;
+  lcp::ActiveSet steps;
   const lcp::Outcome outcome = steps.run(block, u, options, nullptr);
   CHECK(outcome.used_fallback);
   CHECK(outcome.pivots > 0);
@@ -323,7 +323,7 @@ TEST_CASE("the cheap proof of definiteness never holds for a matrix that is not,
   lcp::DefiniteProof proof;
   for (const int n : {32, 45, 64, 130}) {
     const Matrix M = p.definite(n, 1.0);
-    const lcp::DenseBlock block{M.data(), n};
+    const lcp::Matrix block = lcp::dense_matrix(M.data(), n);
 #if defined(__x86_64__) && defined(__GNUC__)
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) CHECK(proof.holds(block));
 #endif
@@ -334,7 +334,7 @@ TEST_CASE("the cheap proof of definiteness never holds for a matrix that is not,
       values[0] = least;
       Matrix bad = eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose();
       bad = 0.5 * (bad + bad.transpose()).eval();
-      CHECK_FALSE(proof.holds(lcp::DenseBlock{bad.data(), n}));
+      CHECK_FALSE(proof.holds(lcp::dense_matrix(bad.data(), n)));
     }
   }
 }
@@ -359,4 +359,45 @@ TEST_CASE("a sequence of sparse matrices: what is near to a proven one is taken,
     bad(60, 61) = bad(61, 60) = std::nan("");
     CHECK_THROWS_AS(solver.solve(sparse(bad), q), std::invalid_argument);
   }
+}
+
+TEST_CASE("a sequence that goes over to a matrix that is not definite is refused from there on, however small its steps") {
+  Problems p;
+  const int n = 90;
+  const Matrix M = band(n, 2, p);
+  const double least = Eigen::SelfAdjointEigenSolver<Matrix>(M).eigenvalues()[0];
+  const Vector q = p.vector(n);
+  for (const double step : {0.3, 0.03, 0.003}) {
+    LcpSolver solver;
+    for (int k = 0; k * step < 1.5; ++k) {
+      Matrix moved = M;
+      moved.diagonal().array() -= k * step * least;
+      CAPTURE(step, k);
+      if (k * step < 0.999) CHECK(violation(moved, q, solver.solve(sparse(moved), q)) < 1e-13);
+      if (k * step > 1.001) CHECK_THROWS_WITH(solver.solve(sparse(moved), q), Catch::Contains("not positive definite"));
+    }
+  }
+}
+
+TEST_CASE("matrices near to a proven one need no factor, others get one of their own") {
+  Problems p;
+  const int n = 60;
+  Eigen::SparseMatrix<double> S = sparse(band(n, 2, p));
+  const Vector diagonal = Matrix(S).diagonal();
+  const lcp::Matrix columns{n, S.valuePtr(), diagonal.data(), S.outerIndexPtr(), S.innerIndexPtr()};
+  lcp::DefiniteProof proof;
+  lcp::DefiniteMargin margin;
+  proof.check(columns, margin);
+  CHECK(margin.base.size() == 0);  // one matrix is no sequence
+  proof.check(columns, margin);
+  REQUIRE(margin.base.size() == S.nonZeros());
+  const Eigen::ArrayXd first = margin.base;
+  S.coeffRef(1, 0) *= 1.0 + 1e-6, S.coeffRef(0, 1) *= 1.0 + 1e-6;
+  proof.check(columns, margin);
+  CHECK((margin.base == first).all());
+  for (int i = 0; i < n; ++i)
+    for (int j : {i - 1, i + 1})
+      if (j >= 0 && j < n) S.coeffRef(i, j) = 0.0;
+  proof.check(columns, margin);
+  CHECK_FALSE((margin.base == first).all());
 }

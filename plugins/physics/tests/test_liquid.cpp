@@ -31,11 +31,8 @@ struct Assembly {
 
   GrainLiquid grains() { return {liquid.data(), int(liquid.size())}; }
   void begin(const std::vector<LiquidWall>& walls = {}) {
-    ledger.resize(liquid.size());
-    std::vector<std::string> names;
-    for (const LiquidWall& wall : walls) names.push_back(wall.name);
-    ledger.change_walls(names, grains());
     ledger.walls = walls;
+    ledger.resize(liquid.size());
   }
   void touch(const std::vector<BridgeSides>& contacts) {
     std::vector<BridgeRequest> requests;
@@ -153,6 +150,34 @@ TEST_CASE("both sides of a pair reckon the same bridge", "[liquid]") {
     if (rule == Return::taken) REQUIRE_THAT(returned(one.volume, one.imbalance), WithinAbs(one.from_i, 1e-15 * one.volume));
     if (rule == Return::radius) REQUIRE_THAT(returned(one.volume, one.imbalance), WithinRel(one.volume * ra / (ra + rb), 1e-14));
   }
+}
+
+TEST_CASE("grains that have gathered their liquid get back what bridges take", "[liquid]") {
+  const auto split = GENERATE(Return::equal, Return::radius);
+  const auto share = GENERATE(ShareRule{}, ShareRule{ShareRule::Kind::fraction, 0.3});
+  for (const double other : {1e-3, 2e-3, 2e-2}) {
+    const double radius = 1e-3, liquid = 1e-10, mine = gathered(share, split, radius, other, liquid);
+    const NewBridge<double> bridge = form_bridge(share(radius, other) * mine, share(other, radius) * liquid, radius, other, split);
+    CHECK_THAT(returned(bridge.volume, bridge.imbalance), WithinRel(bridge.from_i, 1e-13));
+  }
+}
+
+TEST_CASE("bridges are foreseen by the sizes of the grains", "[liquid]") {
+  const double small = 1e-3, large = 1e-2, content = 0.01;
+  WettestGrains wettest{large};
+  for (const double radius : {small, large}) wettest.add(radius, content * std::pow(radius, 3));
+  const auto likely = [&](double radius, double other) { return wettest.likely_bridge(ShareRule{}, Return::equal, radius, other); };
+  // Grains of one size: twice what a wall asks of them.
+  CHECK_THAT(likely(large, large), WithinRel(content * std::pow(large, 3), 1e-14));
+  CHECK(likely(large, flat<double>) == likely(large, large));
+  // Small ones gather films as thick as those of the large ones, but no more.
+  CHECK(likely(small, small) >= content * std::pow(small, 3));
+  CHECK_THAT(likely(small, small), WithinRel(content * large * small * small, 1e-14));
+  CHECK(likely(small, large) < 0.1 * likely(large, large));
+  CHECK(likely(small, large) == likely(large, small));
+  // One small grain that was made wet counts as it is.
+  wettest.add(small, content * std::pow(large, 3));
+  CHECK(likely(small, small) == likely(large, large));
 }
 
 TEST_CASE("a wall keeps its part", "[liquid]") {
@@ -318,10 +343,10 @@ TEST_CASE("two processes reckon a pair across their border alike", "[liquid]") {
 TEST_CASE("what a restart file holds brings everything back", "[liquid]") {
   Assembly row = row_on_wall(Return::taken), again;
   row.ledger.remove(2, row.grains());
-  const std::vector<double> saved = row.ledger.saved(true);
+  const std::string saved = row.ledger.saved(true);
   again.liquid = row.liquid;
-  again.ledger.restore(saved.data(), saved.size());
-  again.ledger.resize(again.liquid.size());
+  again.ledger.restore(saved);
   CHECK(again.total() == row.total());
   CHECK(again.ledger.saved(true) == saved);
+  CHECK_THROWS_WITH(again.ledger.restore("liquid-1 0 0 0"), Catch::Contains("another version"));
 }

@@ -70,7 +70,7 @@ TEST_CASE("the linear law returns its coefficient of restitution and its charact
 
   const ContactParameters elastic = parameters(NormalLaw::hooke, 1.0);
   const double effective_mass = 0.5 * mass, root = std::sqrt(0.5 * radius), e_star = elastic.elasticity.effective_youngs_modulus;
-  const double k = hooke(HookeParameters{e_star, 1.0, 1.0}, 0.5 * radius, effective_mass, 1.0, 0.0).force;
+  const double k = hooke(HertzParameters{e_star, 1.0, 1.0}, 1.0, 0.5 * radius, effective_mass, 1.0, 0.0).force;
   // At the characteristic velocity the linear spring stores the impact energy at Hertz's overlap scaled by the source's factor.
   CHECK_THAT(k, WithinRel(16.0 / 15.0 * root * e_star * std::pow(15.0 * effective_mass / (16.0 * root * e_star), 0.2), 1e-12));
   CHECK_THAT(head_on(elastic, 0.1, 2e-8).peak, WithinRel(0.1 * std::sqrt(k * effective_mass), 1e-5));

@@ -251,3 +251,28 @@ TEST_CASE("a triangle without area is refused by its number") {
   surface.update({});
   CHECK(surface.triangles().empty());
 }
+
+TEST_CASE("points far away on either side add no work to the grid, and none is lost") {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  std::vector<V> points(1000);
+  for (V& p : points) p = {6 * unit(random), 6 * unit(random), 6 * unit(random)};
+  const auto visits = [&points](std::vector<double> far) {
+    std::vector<V> moved = points;
+    for (std::size_t k = 0; k < far.size(); ++k) moved[7 * k].x += far[k];
+    PointGrid grid;
+    grid.build(moved.size(), [&](std::size_t i) { return moved[i]; }, 0.3);
+    int count = 0, close = 0, pairs = 0;
+    grid.pairs([&](int i, int j) { ++count, close += norm(moved[std::size_t(i)] - moved[std::size_t(j)]) <= 0.3; });
+    for (std::size_t i = 0; i < moved.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j) pairs += norm(moved[i] - moved[j]) <= 0.3;
+    CHECK(close == pairs);
+    int inside = 0;
+    grid.in_box({-1e301, -1, -1}, {1e301, 7, 7}, [&](int) { ++inside; });
+    CHECK(inside == 1000);
+    return count;
+  };
+  const int plain = visits({});
+  for (const std::vector<double>& far : {std::vector<double>{1e4}, {-1e4}, {1e300}, {-1e300}, {-1e300, 1e300, 1e5, -1e7}})
+    CHECK(visits(far) <= plain + 50);
+}

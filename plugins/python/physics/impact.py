@@ -7,6 +7,7 @@ Formulas: docs/python_impact.md.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Unpack
@@ -21,6 +22,9 @@ from dembark.physics.friction import FinnieRabinowicz
 Floats = NDArray[np.float64]
 Friction = float | FinnieRabinowicz | None
 
+# Rows of the bodies as _physics.ImpactScene takes them.
+_BODY = np.dtype([("id", float), ("mass", float), ("inertia", float), ("radius", float), ("material", float), ("position", float, 3),
+                  ("velocity", float, 3), ("spin", float, 3), ("force", float, 3), ("torque", float, 3)])
 _REPORT = ("contacts", "active", "impacts_begun", "peak_force", "impulse_sum", "dissipated_energy", "elastic_energy", "pivots",
            "block_steps", "pivots_total", "certificate", "worst_certificate", "peak_force_so_far", "kinetic_energy")
 
@@ -37,7 +41,13 @@ class Impact:
     impulse: float  # N s
     relative_speed: float  # m/s, approach along the normal at the beginning, positive = closing
     dissipated: float  # J, in this contact
-    place: tuple[float, float, float]  # m, at the beginning
+    point: tuple[float, float, float]  # m, of contact at the beginning
+
+    @property
+    def place(self) -> tuple[float, float, float]:
+        """Former name of `point`, for one version."""
+        warnings.warn("Impact.place is now Impact.point; the old name goes with the next version", FutureWarning, stacklevel=2)
+        return self.point
 
 
 @dataclass(frozen=True)
@@ -123,6 +133,12 @@ def _three(name: str, value: Sequence[float], unit: str) -> Floats:
     return np.append(array, 0.0)[:3]
 
 
+def _bodies(n: int) -> NDArray[np.void]:
+    bodies = np.zeros(n, _BODY)
+    bodies["id"] = np.arange(n)
+    return bodies
+
+
 def _law(friction: Friction) -> FinnieRabinowicz:
     if isinstance(friction, FinnieRabinowicz):
         return friction
@@ -130,8 +146,18 @@ def _law(friction: Friction) -> FinnieRabinowicz:
     return FinnieRabinowicz(static_friction=mu, kinetic_friction=mu, critical_slip_distance=0.0)
 
 
+def _pair_law(law: FinnieRabinowicz, ratio: float, contact_damping: float) -> list[float]:
+    """The row of a pair of materials; the area of contact is that of its springs."""
+    return [law.static_friction, law.kinetic_friction, law.critical_slip_distance, law.interface_shear_strength, law.healing_time,
+            law.presliding == "exponential", ratio, contact_damping, 0.0]
+
+
 def _theta(theta: float) -> float:
     return float(numbers("theta", theta, "", low=0.5, high=1.0))
+
+
+def _wall_key(number: int) -> int:
+    return -1 - (number << 32)
 
 
 def _impact(row: list[float]) -> Impact:
@@ -143,10 +169,9 @@ def _impact(row: list[float]) -> Impact:
 class _Scene:
     """Arguments of _physics.ImpactScene, kept until the time step is known."""
 
-    bodies: Floats
+    bodies: NDArray[np.void]
     materials: Floats
-    laws: list[FinnieRabinowicz]
-    pairs: Floats
+    pairs: list[list[float]]
     planes: Floats
     drums: Floats
     theta: float
@@ -160,9 +185,9 @@ class _Scene:
     def at(self, dt: float) -> _physics.ImpactScene:
         dt = float(numbers("dt", dt, "s", low=0.0, low_open=True))
         if self.built is None:
-            laws = [law._law for law in self.laws]
-            self.built = _physics.ImpactScene(dt, self.theta, self.sweeps, self.method, self.materials, laws, self.pairs, self.bodies,
-                                              self.planes, self.drums, self.reach, self.row)
+            bodies = self.bodies.view(float).reshape(len(self.bodies), -1)
+            self.built = _physics.ImpactScene(dt, self.theta, self.sweeps, self.method, self.materials, np.array(self.pairs, dtype=float),
+                                              bodies, self.planes, self.drums, self.reach, self.row)
             self.dt = dt
         elif dt != self.dt:
             raise ValueError(f"dt must stay {self.dt:g} s, as the system began, not {dt:g}")
@@ -217,27 +242,26 @@ class ImpactChain:
         if (np.diff(x) < 0.0).any():
             raise ValueError("position must ascend along the row (m)")
         n = x.size
-        bodies = np.zeros((n, 19))
-        bodies[:, 0] = _each("mass", mass, "kg", n, low=0.0, low_open=True)
-        bodies[:, 1] = np.inf
-        bodies[:, 2] = _each("radius", radius, "m", n, low=0.0)
-        bodies[:, 4] = x
-        bodies[:, 7] = _each("velocity", velocity, "m/s", n)
-        bodies[:, 13] = _each("force", force, "N", n)
-        materials, bodies[:, 3] = _materials(stiffness, damping, n)
+        bodies = _bodies(n)
+        bodies["mass"] = _each("mass", mass, "kg", n, low=0.0, low_open=True)
+        bodies["inertia"] = np.inf
+        bodies["radius"] = _each("radius", radius, "m", n, low=0.0)
+        bodies["position"][:, 0] = x
+        bodies["velocity"][:, 0] = _each("velocity", velocity, "m/s", n)
+        bodies["force"][:, 0] = _each("force", force, "N", n)
+        materials, bodies["material"] = _materials(stiffness, damping, n)
         walls = []
         for number, (name, wall, side) in enumerate((("left_wall", left_wall, 1.0), ("right_wall", right_wall, -1.0))):
             if wall is None:
                 continue
             place, hard = wall if isinstance(wall, tuple) else (wall, np.inf)
-            walls.append([number, 0, float(numbers(f"{name} stiffness", hard, "N/m", low=0.0, low_open=True, infinite=True)),
+            walls.append([_wall_key(number), 0, float(numbers(f"{name} stiffness", hard, "N/m", low=0.0, low_open=True, infinite=True)),
                           float(numbers(name, place, "m")), 0, 0, side, 0, 0, 0, 0, 0])
         count = len(materials)
-        pairs = np.tile([1.0, float(numbers("contact_damping", contact_damping, "N s/m", low=0.0)), 0.0], (count * count, 1))
-        self._scene = _Scene(bodies, materials, [_law(None)] * (count * count), pairs, np.array(walls, dtype=float).reshape(-1, 12),
+        law = _pair_law(_law(None), 1.0, float(numbers("contact_damping", contact_damping, "N s/m", low=0.0)))
+        self._scene = _Scene(bodies, materials, [law] * (count * count), np.array(walls, dtype=float).reshape(-1, 12),
                              np.zeros((0, 11)), _theta(theta), 1, method, 0.0, True)
-        wall_key = [-1 - (number << 32) for number in range(2)]
-        self._columns = [(0, wall_key[0]), *((i, i + 1) for i in range(n - 1)), (n - 1, wall_key[1])]
+        self._columns = [(0, _wall_key(0)), *((i, i + 1) for i in range(n - 1)), (n - 1, _wall_key(1))]
 
     def run(self, duration: float, dt: float, *, every: int = 1) -> ImpactMotion:
         """Go on for `duration` (s) in steps of `dt` (s); samples the beginning, every `every`-th step and the end. dt must not change."""
@@ -259,19 +283,30 @@ def _walls(walls: Sequence[Plane | Drum], materials: int) -> tuple[Floats, Float
         if not isinstance(wall, Plane | Drum):
             raise TypeError(f"walls must be Plane or Drum objects, not {wall!r}")
         hard = float(numbers("wall stiffness", wall.stiffness, "N/m", low=0.0, low_open=True, infinite=True))
+        head = [_wall_key(number), materials + number, hard]
         if isinstance(wall, Drum):
             centre = numbers("centre", wall.centre, "m")
             if centre.shape != (2,):
                 raise ValueError(f"centre must have two components (m), not {wall.centre!r}")
             size = float(numbers("radius", wall.radius, "m", low=0.0, low_open=True))
-            drums.append([number, materials + number, hard, *centre, 0, 0, 0, 1, size, float(numbers("omega", wall.omega, "rad/s"))])
+            drums.append([*head, *centre, 0, 0, 0, 1, size, float(numbers("omega", wall.omega, "rad/s"))])
         else:
             normal = _three("normal", wall.normal, "")
             if not normal.any():
                 raise ValueError("normal must not be zero")
-            planes.append([number, materials + number, hard, *_three("point", wall.point, "m"), *(normal / np.linalg.norm(normal)),
+            planes.append([*head, *_three("point", wall.point, "m"), *(normal / np.linalg.norm(normal)),
                            *_three("velocity", wall.velocity, "m/s")])
     return np.array(planes, dtype=float).reshape(-1, 12), np.array(drums, dtype=float).reshape(-1, 11)
+
+
+class _Contact(dict[str, object]):
+    """Of ImpactSystem.contacts()."""
+
+    def __missing__(self, key: str) -> object:
+        if key != "place":
+            raise KeyError(key)
+        warnings.warn("'place' is now 'point'; the old name goes with the next version", FutureWarning, stacklevel=2)
+        return self["point"]
 
 
 class ImpactSystem:
@@ -302,32 +337,32 @@ class ImpactSystem:
             raise ValueError(f"position must have the shape (bodies, 2) or (bodies, 3), not {x.shape}")
         n, d = x.shape
         self._dimension = d
-        bodies = np.zeros((n, 19))
-        m = bodies[:, 0] = _each("mass", mass, "kg", n, low=0.0, low_open=True, infinite=True)
-        r = bodies[:, 2] = _each("radius", radius, "m", n, low=0.0, low_open=True)
+        bodies = _bodies(n)
+        m = bodies["mass"] = _each("mass", mass, "kg", n, low=0.0, low_open=True, infinite=True)
+        r = bodies["radius"] = _each("radius", radius, "m", n, low=0.0, low_open=True)
         if isinstance(inertia, str):
             if inertia not in ("cylinder", "sphere"):
                 raise ValueError(f"inertia must be 'cylinder', 'sphere' or numbers (kg m^2), not {inertia!r}")
-            bodies[:, 1] = (0.5 if inertia == "cylinder" else 0.4) * m * r**2
+            bodies["inertia"] = (0.5 if inertia == "cylinder" else 0.4) * m * r**2
         else:
-            bodies[:, 1] = _each("inertia", inertia, "kg m^2", n, low=0.0, low_open=True, infinite=True)
-        bodies[:, 4:7] = _vectors("position", x, "m", n, d)
+            bodies["inertia"] = _each("inertia", inertia, "kg m^2", n, low=0.0, low_open=True, infinite=True)
+        bodies["position"] = _vectors("position", x, "m", n, d)
         if velocity is not None:
-            bodies[:, 7:10] = _vectors("velocity", velocity, "m/s", n, d)
+            bodies["velocity"] = _vectors("velocity", velocity, "m/s", n, d)
         if spin is not None:
             if d == 3:
-                bodies[:, 10:13] = _vectors("spin", spin, "rad/s", n, 3)
+                bodies["spin"] = _vectors("spin", spin, "rad/s", n, 3)
             else:
-                bodies[:, 12] = _each("spin", spin, "rad/s", n)
+                bodies["spin"][:, 2] = _each("spin", spin, "rad/s", n)
         if force is not None:
-            bodies[:, 13:16] = _vectors("force", force, "N", n, d)
+            bodies["force"] = _vectors("force", force, "N", n, d)
         if gravity is not None:
             finite = np.where(np.isinf(m), 0.0, m)
-            bodies[:, 13:16] += finite[:, None] * _vectors("gravity", gravity, "m/s^2", n, d)
+            bodies["force"] += finite[:, None] * _vectors("gravity", gravity, "m/s^2", n, d)
         if int(friction_sweeps) < 1:
             raise ValueError(f"friction_sweeps must be >= 1, not {friction_sweeps}")
 
-        materials, bodies[:, 3] = _materials(stiffness, damping, n)
+        materials, bodies["material"] = _materials(stiffness, damping, n)
         own = len(materials)
         planes, drums = _walls(walls, own)
         laws = [_law(friction)] * own + [_law(friction if wall.friction is None else wall.friction) for wall in walls]
@@ -335,10 +370,9 @@ class ImpactSystem:
         ratio = float(numbers("tangential_ratio", tangential_ratio, "", low=0.0, low_open=True))
         viscous = float(numbers("contact_damping", contact_damping, "N s/m", low=0.0))
         # A wall's law holds with every body; walls do not touch each other.
-        table = [laws[max(i, j)] for i in range(count) for j in range(count)]
+        pairs = [_pair_law(laws[max(i, j)], ratio, viscous) for i in range(count) for j in range(count)]
         self._scene = _Scene(
-            bodies, np.vstack([materials, np.tile([1.0, 0.0], (len(walls), 1))]), table, np.tile([ratio, viscous, 0.0], (count * count, 1)),
-            planes, drums, _theta(theta),
+            bodies, np.vstack([materials, np.tile([1.0, 0.0], (len(walls), 1))]), pairs, planes, drums, _theta(theta),
             int(friction_sweeps), method, float(numbers("reach", reach, "m", low=0.0)), False)
 
     def run(self, duration: float, dt: float, *, every: int = 1) -> ImpactMotion:
@@ -347,10 +381,10 @@ class ImpactSystem:
 
     def contacts(self) -> list[dict[str, object]]:
         """What the last instant was solved for: contacts with a force now or before, and pairs that the free motion could close. Of each
-        a, b (as in Impact), gap (m), normal_force (N), opening (m), tangential (N, on a), normal (towards a), place (m)."""
+        a, b (as in Impact), gap (m), normal_force (N), opening (m), tangential (N, on a), normal (towards a), point (m)."""
         rows = np.asarray(self._scene.begun().contacts())
-        return [{"a": int(r[0]), "b": int(r[1]), "gap": float(r[2]), "normal_force": float(r[3]), "opening": float(r[4]),
-                 "tangential": r[5:8].copy(), "normal": r[8:11].copy(), "place": r[11:14].copy()} for r in rows]
+        return [_Contact({"a": int(r[0]), "b": int(r[1]), "gap": float(r[5]), "normal_force": float(r[6]), "opening": float(r[13]),
+                          "tangential": r[7:10].copy(), "normal": r[2:5].copy(), "point": r[10:13].copy()}) for r in rows]
 
     def state(self) -> Floats:
         """Everything needed to go on bit for bit."""

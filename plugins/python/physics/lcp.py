@@ -86,7 +86,7 @@ class LcpSolver:
         n = len(right)
         limit = _limit(max_iterations)
         flags = np.zeros(0, dtype=bool) if start is None else _flags(start, n)
-        rest = (flags, start is not None, method, float(tolerance), limit, bool(check))
+        rest = (flags, _physics.LcpOptions(method, float(tolerance), limit, bool(check)))
         if sparse.issparse(M):
             matrix = _columns(M, n)
             return _result(self._solver.solve_columns(matrix.indptr, matrix.indices, matrix.data, right, *rest))

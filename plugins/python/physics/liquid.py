@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from dembark import _physics
 from dembark.physics._checks import numbers
 
-LIQUID_SHARES: tuple[str, ...] = ("cap", "fraction")
+LIQUID_SHARES: tuple[str, ...] = tuple(_physics.liquid_shares())
 LIQUID_RETURNS: tuple[str, ...] = tuple(_physics.liquid_returns())
 
 
@@ -48,11 +48,9 @@ def liquid_share(radius: ArrayLike, other: ArrayLike, *, share: str = "cap", fac
     """
     if share not in LIQUID_SHARES:
         raise ValueError(f"share {share!r} is unknown; it can be {', '.join(LIQUID_SHARES)}")
-    if wrong := _physics.liquid_share_error(share == "cap", float(factor)):
-        raise ValueError(f"{wrong}, not {factor:g}")
     shape, (own, others) = _columns(numbers("radius", radius, "m", low=0.0, low_open=True),
                                     numbers("other", other, "m", low=0.0, low_open=True, infinite=True))
-    return _shaped(_physics.liquid_share(own, others, share == "cap", float(factor)), shape)
+    return _shaped(_physics.liquid_share(own, others, share, float(factor)), shape)
 
 
 def liquid_grant(liquid: ArrayLike, demand: ArrayLike) -> NDArray[np.float64] | float:

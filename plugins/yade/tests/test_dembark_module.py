@@ -144,6 +144,17 @@ def test_a_deck_without_numbers_says_where_they_come_from(yade):
     assert_one_line(yade(script(yade, "bare", "p = dembark.parameters()\nprint('went on')\n")), ("dembark deck",))
 
 
+@pytest.mark.parametrize("run", ["O.run(5, True)", "O.step()"])
+def test_a_mistake_in_a_runner_is_one_line_with_its_code(yade, run):
+    body = f"""
+        O.engines = [PyRunner(command="dembark.fail('no word', 3)", iterPeriod=1, initRun=True)]
+        O.dt = 1
+        {run}
+        print('went on')
+        """
+    assert_one_line(yade(script(yade, "runner", body)), ("no word",), 3)
+
+
 def assert_one_line(done, parts, code=2):
     lines = [line for line in done.stderr.splitlines() if line.startswith("dembark: ")]
     assert len(lines) == 1, done.stderr

@@ -50,6 +50,14 @@ told("engine", lambda: O.run(5, True))
 newton.damping = 0
 O.run(5, True)
 assert O.iter == 5
+# The same from Python, in a script and in an engine.
+told("helper", lambda: dembark.log((0, 0, 0), -1.0, 0.1))
+scene()
+O.engines = [*O.engines, PyRunner(command="dembark.fail('no word', 3)", iterPeriod=1, firstIterRun=1)]
+told("runner", lambda: O.run(5, True))
+O.engines = O.engines[:-1]
+O.run(5, True)
+assert O.iter == 6
 json.dump(said, open("said.json", "w"))
 print("went on")
 """
@@ -62,6 +70,8 @@ def test_a_mistake_is_a_runtime_error_and_the_session_goes_on(yade, threads):
     done = yade(path, threads=threads)
     assert "went on" in done.stdout, done.stderr
     said = json.loads((yade.folder / "said.json").read_text())
+    assert said["helper"].startswith("dembark: log: ") and "\n" not in said["helper"]
+    assert "\ndembark: no word\n" in said["runner"] and "Traceback" not in said["runner"] + done.stderr
     for name, parts in (("step", ("restitution of", "is 2")), ("run", ("restitution of", "is 2")), ("engine", ("damping is 0.2",))):
         assert said[name].startswith("dembark: ") and "\n" not in said[name]
         assert all(part in said[name] for part in parts), said[name]

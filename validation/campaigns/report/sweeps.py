@@ -15,11 +15,13 @@ from dembark.validation.report.gather import Page
 
 @dataclass(frozen=True)
 class Point:
-    """One point of a sweep: the swept `values` (None = the parameter is not set), the folder name `variant`, `results` by engine."""
+    """One point of a sweep: the swept `values` (None = the parameter is not set), the folder name `variant`, `results` by engine, and the
+    scheme's `formal_orders` in parameters of the method that vary."""
 
     values: Mapping[str, Any]
     variant: str
     results: Mapping[str, Result]
+    formal_orders: Mapping[str, float] = field(default_factory=dict)
 
     def quantity(self, engine: str, name: str) -> QuantityRecord | None:
         """The measured quantity of that name; None where it was not measured or has no number."""
@@ -74,6 +76,10 @@ class Sweep:
                 found.setdefault(one.name, one)
         return sorted(found.values(), key=lambda one: one.name not in failed)
 
+    def formal_order(self, axis: str, others: Mapping[str, Any]) -> float:
+        """Formal order of the scheme along `axis` where the other axes have the values `others`; 1 where nothing is known of it."""
+        return next((point.formal_orders.get(axis, 1.0) for point in self.points if others.items() <= point.values.items()), 1.0)
+
     def lines(self, along: str, engine: str, name: str) -> list[tuple[dict[str, Any], list[tuple[float, QuantityRecord]]]]:
         """Measured values against `along`, one line for each combination of the other axes: (those values, [(place, quantity)])."""
         lines: dict[tuple[Any, ...], list[tuple[float, QuantityRecord]]] = {}
@@ -93,7 +99,8 @@ def sweeps(facts: Sequence[Mapping[str, Any]], pages: Iterable[Page], cases: Map
 
 def _sweep(facts: Mapping[str, Any], number: int, measured: Mapping[tuple[str, str], Mapping[str, Result]], known: Case | None) -> Sweep:
     case, axes = facts["case"], tuple(facts["axes"])
-    points = tuple(Point(point["values"], point["variant"], measured.get((case, point["variant"]), {})) for point in facts["points"])
+    points = tuple(Point(point["values"], point["variant"], measured.get((case, point["variant"]), {}), point.get("formal_orders", {}))
+                   for point in facts["points"])
     along = " × ".join(axis.replace("_", " ") for axis in axes) or "one point"
     title = facts.get("title") or f"{case.replace('_', ' ').capitalize()}: {along}"
     # A case that has gone since leaves its results without units of the axes.
@@ -117,20 +124,16 @@ class NumericalError:
     parameter: str
     at: str
     finest: float
+    formal_order: float
     found: Convergence
 
 
 def numerical_errors(sweeps: Iterable[Sweep]) -> list[NumericalError]:
     """What the sweeps along the time step or the stiffness say, for every quantity that is checked or compared."""
-    result = []
-    for sweep in sweeps:
-        for parameter in (axis for axis in sweep.axes if axis in REFINEMENT and len(sweep.levels(axis)) > 1):
-            for one in sweep.quantities():
-                for engine in sweep.engines:
-                    for others, line in sweep.lines(parameter, engine, one.name):
-                        if len(line) > 1:
-                            result.append(_judged(sweep, engine, parameter, others, line))
-    return result
+    return [_judged(sweep, engine, parameter, others, line)
+            for sweep in sweeps for parameter in sweep.axes if parameter in REFINEMENT and len(sweep.levels(parameter)) > 1
+            for one in sweep.quantities() for engine in sweep.engines
+            for others, line in sweep.lines(parameter, engine, one.name) if len(line) > 1]
 
 
 def _judged(sweep: Sweep, engine: str, parameter: str, others: Mapping[str, Any],
@@ -138,5 +141,6 @@ def _judged(sweep: Sweep, engine: str, parameter: str, others: Mapping[str, Any]
     h = [refinement(parameter, place) for place, _ in line]
     halves = [math.inf if one.half is None else one.half for _, one in line]
     finest = min(range(len(h)), key=h.__getitem__)
-    found = convergence(h, [float(one.value or 0.0) for _, one in line], halves)
-    return NumericalError(sweep, engine, line[finest][1], parameter, words(others), line[finest][0], found)
+    formal = sweep.formal_order(parameter, others)
+    found = convergence(h, [float(one.value or 0.0) for _, one in line], halves, formal)
+    return NumericalError(sweep, engine, line[finest][1], parameter, words(others), line[finest][0], formal, found)

@@ -101,6 +101,30 @@ def test_sweeps_of_the_same_points_with_different_numbers_take_a_name(tmp_path: 
     assert [point.variant for point in found] == ["dry_grain_count=10", "flat_dry_grain_count=10"]
 
 
+ORDERS = """
+[[sweeps]]
+case = "log_pair"
+engines = ["liggghts"]
+variants = ["steps_40"]
+grid = { theta = [0.5, 1.0], time_step = [1e-5, 2e-5] }
+"""
+
+
+def test_the_formal_order_is_that_of_the_scheme(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The case's study says it, the sweep may say another, and neither is needed."""
+    monkeypatch.delenv("DEMBARK_DECKS")
+    for text, due in ((ORDERS, [2.0, 2.0, 1.0, 1.0]), (ORDERS + "formal_order = 1.5\n", [1.5] * 4)):
+        (sweep,) = campaign(spec_of(tmp_path, text)).facts["sweeps"]
+        assert [point["formal_orders"] for point in sweep["points"]] == [{"time_step": order} for order in due]
+    text = ORDERS.replace("log_pair", "log_pile").replace("steps_40", "smooth_logs")
+    assert {point["formal_orders"]["time_step"] for point in campaign(spec_of(tmp_path, text)).facts["sweeps"][0]["points"]} == {1.0}
+    for order in ("0", '"theta - 2"'):
+        with pytest.raises(DembarkError, match=r"formal_order = .* is .*, point .*, give a positive number"):
+            campaign(spec_of(tmp_path, f"{ORDERS}formal_order = {order}\n"))
+    with pytest.raises(DembarkError, match="unknown parameter 'thet'"):
+        spec_of(tmp_path, ORDERS + 'formal_order = "2 * thet"\n')
+
+
 def test_derived_parameters_follow_from_the_others(tmp_path: Path) -> None:
     spec = spec_of(tmp_path, """
 [[sweeps]]
@@ -136,7 +160,7 @@ def test_only_what_is_chosen(tmp_path: Path) -> None:
     spec = spec_of(tmp_path, '[[sweeps]]\ncase = "box"\ngrid = { grain_count = [10, 20] }\n[resources.yade]\nthreads = 2\n')
     whole, chosen = expand.plan(file=spec.path), expand.plan(file=spec.path, engines=["yade"])
     assert {one.place.name for one in chosen.series} == {"yade"} and len(expand.plan(file=spec.path, cases=["box"]).series) == 4
-    assert {one.place.name: whole.of(one).threads for one in whole.series} == {"liggghts": 1, "yade": 2}
+    assert {one.place.name: whole.resources[one.place].threads for one in whole.series} == {"liggghts": 1, "yade": 2}
     assert [one.place.name for one in whole.series] == ["yade", "yade", "liggghts", "liggghts"]  # the longest first
     assert whole.facts["sweeps"][0]["axes"] == ["grain_count"] and whole.label == "boxes" and whole.whole and not chosen.whole
     with pytest.raises(DembarkError, match="did you mean box"):

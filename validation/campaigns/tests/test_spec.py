@@ -6,11 +6,7 @@ from pathlib import Path
 
 import pytest
 from harness import decks, stand_in  # noqa: F401
-from hypothesis import given
-from hypothesis import strategies as st
 
-from dembark.common.errors import DembarkError
-from dembark.validation.campaigns import sizes
 from dembark.validation.campaigns.expand import points
 from dembark.validation.campaigns.spec import locate, read
 from dembark.validation.cli import main
@@ -221,24 +217,9 @@ def test_shipped_campaigns_are_right(monkeypatch: pytest.MonkeyPatch) -> None:
         assert locate(name) == path.resolve()
 
 
-@given(st.integers(0, 400), st.integers(0, 23), st.integers(0, 59), st.integers(0, 59))
-def test_durations_add_up(days: int, hours: int, minutes: int, rest: int) -> None:
-    wanted = 86400 * days + 3600 * hours + 60 * minutes + rest
-    text = f"{days} d {hours}h {minutes} min {rest} s"
-    if wanted:
-        assert sizes.seconds(text) == wanted
-    else:
-        with pytest.raises(DembarkError):
-            sizes.seconds(text)
-
-
-@pytest.mark.parametrize("text", ["", " ", "s", "1", "1 m", "1 h 2", "1 h, 2 min", "nan s", "inf s", "1e3 s", "0 s"])
-def test_texts_that_are_no_duration(text: str) -> None:
-    with pytest.raises(DembarkError, match="no duration"):
-        sizes.seconds(text)
-
-
-@given(st.floats(1.0, 1e15))
-def test_sizes_are_written_as_they_are(count: float) -> None:
-    number, unit = sizes.size_text(count).split()
-    assert float(number) * {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9}[unit] == pytest.approx(count, rel=0.006, abs=0.5)
+def test_a_name_gives_case_and_profile(write) -> None:
+    named = write('[campaign]\nname = "box-quick"\n\n[[sweeps]]\nvariant = "wet"\ngrid = { grain_count = [10, 20] }\n')
+    (sweep,) = read(named).sweeps
+    assert (sweep.case.name, sweep.profile) == ("box", "quick")
+    other = write('[campaign]\nname = "box-quick"\nprofile = "standard"\n\n[[sweeps]]\ngrid = { grain_count = [10, 20] }\n')
+    assert read(other).sweeps[0].profile == "standard"

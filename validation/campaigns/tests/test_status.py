@@ -11,6 +11,8 @@ import pytest
 from dembark.common.lock import lock
 from dembark.validation.campaigns import folder
 from dembark.validation.campaigns.folder import look
+from dembark.validation.cli import main
+from dembark.validation.judge.result import QuantityRecord, Result, write
 from dembark.validation.runs import schema
 from dembark.validation.runs.perform import LOCK
 from dembark.validation.runs.steps import CAMPAIGN_FILE
@@ -48,6 +50,17 @@ def test_without_a_submitter_nothing_runs(results: Path) -> None:
     found = look(results)
     assert not found.running and [state.state for state in found.states] == ["finished", "waiting", "waiting", "waiting"]
     assert found.left is None and found.headline == "boxes: 1 of 4 done, 0 running, 3 waiting, 0 failed; nobody runs it now"
+
+
+def test_status_counts_checks_by_kind_of_evidence(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    checks = (QuantityRecord("a", 1.0, "pass", tolerance=0.1, evidence="identity"),
+              QuantityRecord("b", 1.0, "fail", tolerance=0.1, evidence="experiment"))
+    write(results / "box/n=1/yade/metrics.json", Result("box", "n=1", "yade", checks))
+    assert main(["status", str(results)]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told[told.index("1 series measured; 1 of 2 checks passed, 1 FAILED") + 1 :][:2] == [
+        "  experiment (measured values): 0 of 1 check passed, 1 FAILED",
+        "  identity (conservation laws, the scheme against itself): 1 of 1 check passed, none failed"]
 
 
 def test_a_result_of_other_inputs_does_not_count(results: Path) -> None:

@@ -6,13 +6,14 @@ from pathlib import Path
 import pytest
 
 from dembark.common.errors import RunError
+from dembark.postproc.measurement import Value
 from dembark.postproc.statistics import Estimate
+from dembark.validation.case.model import Declared
 from dembark.validation.judge import result
 from dembark.validation.judge.measuring import judged
 from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result
 
-RECORD = judged("mass", "mass", "kg", Estimate(1.02, 0.01, "3 replicas"), reference=Estimate(1.0, 0.0), tolerance=0.05,
-                evidence="identity")
+RECORD = judged(Declared("mass", "mass", "kg", "identity", 0.05), Value(Estimate(1.02, 0.01, "3 replicas"), Estimate(1.0, 0.0)))
 RESULT = Result("silo", "dry", "yade", (RECORD,), "quick", parameters={"gravity": 9.81}, profiles=({"name": "stress", "place": [0.0]},),
                 remarks=("note",), provenance={"commit": "a"}, inputs=("f00",))
 
@@ -66,5 +67,5 @@ def test_unreadable_results_of_a_folder_are_named(tmp_path: Path) -> None:
 
 
 def test_a_relative_deviation_from_zero_is_no_pass() -> None:
-    record = judged("drift", "drift", "1", Estimate(0.0, 0.0), reference=Estimate(0.0, 0.0), tolerance=0.1)
+    record = judged(Declared("drift", "drift", tolerance=0.1), Value(Estimate(0.0, 0.0), Estimate(0.0, 0.0)))
     assert record.verdict == "fail" and record.deviation is None

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from dembark.validation import pictures, verification
+from dembark.postproc import pictures
+from dembark.postproc.pictures import saved
+from dembark.validation import verification
 from dembark.validation.judge import result
 from dembark.validation.judge.compare import compare
 from dembark.validation.judge.result import QuantityRecord, Result
-from dembark.validation.pictures import saved
 from dembark.validation.verification.item import Item, exact
 
 CASES = ("silo", "plane_silo", "plug_flow", "gravity_channel", "column_collapse", "debarking_drum", "log_pile", "log_pair", "log_cradle",

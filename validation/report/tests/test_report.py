@@ -14,6 +14,7 @@ import pytest
 from dembark.common.errors import RunError
 from dembark.validation import report
 from dembark.validation.judge import result
+from dembark.validation.judge.tally import tally
 from dembark.validation.report import figures, front, numbers, scatter, sections
 from dembark.validation.report.build import write_pdf
 from dembark.validation.report.gather import Row, gather
@@ -105,18 +106,6 @@ def test_csv_holds_every_quantity_and_profile(results):
     np.testing.assert_allclose([float(row["value"]) for row in table], own["value"])
 
 
-def test_pdf_of_a_full_profile_is_short_and_begins_with_two_pages_of_verdicts(tmp_path, monkeypatch):
-    folder = full_size.write(tmp_path / "quick", variants=2, profiles=4)
-    for case in full_size.CASES:
-        full_size.change(folder / case / "variant_0/yade/metrics.json", "quantity_3", verdict="fail", value=1.4, deviation=0.4)
-    kept = []
-    monkeypatch.setattr(build_module, "write_pdf", lambda html, path: kept.append(html) or write_pdf(html, path))
-    report.build(folder)
-    assert pdf.page_count((folder / "report.pdf").read_bytes()) <= 40
-    pages = pdf.pages(kept[0])
-    assert "Bias and scatter" in pages[0] + pages[1] and pages[2].startswith("Silo")
-
-
 def test_nothing_to_report_is_an_error(tmp_path, monkeypatch):
     monkeypatch.setenv("DEMBARK_DECKS", str(tmp_path))
     with pytest.raises(RunError, match="nothing to report"):
@@ -136,6 +125,17 @@ def test_scatter_is_of_checks_against_experiment_and_theory_only():
     drawn = scatter.figure(found)
     assert len(drawn.axes[1].get_yticklabels()) == len({one.line for one in found}) == 2
     assert scatter.figure([]) is None and scatter.statistics(found) is None
+
+
+def test_each_kind_of_evidence_has_a_row_even_without_a_check():
+    rows = front.evidence(tally([row(3).record, row(6).record]))
+    assert [(one["kind"], one["counts"].checks) for one in rows] == [
+        ("experiment", 0), ("theory", 1), ("code", 0), ("identity", 0), ("not stated", 1), ("all", 2)]
+
+
+def test_symbols_have_subscripts_and_no_number_is_parted_from_its_per_cent():
+    assert figures.subscripts("<δ_max> in 95 % of runs") == "&lt;δ<sub>max</sub>&gt; in 95\N{NO-BREAK SPACE}% of runs"
+    assert figures.symbols("u_max / peak_force") == r"$\mathrm{u_{max}}$ / peak_force"
 
 
 def test_open_checks_are_one_line_for_each_case_and_reason():
@@ -186,6 +186,13 @@ def test_parameters_without_needless_zeros(value, text):
 )
 def test_deviations_are_no_percentages_near_a_reference_of_zero(changes, text):
     assert numbers.deviation(row(3, **changes).record) == text
+
+
+def test_variants_come_as_the_case_lists_them(tmp_path):
+    for variant in ("theta_half", "damped", "a_point=2", "equal", "study-first_order"):
+        (tmp_path / "log_pair" / variant / "yade").mkdir(parents=True)
+        result.write(tmp_path / "log_pair" / variant / "yade/metrics.json", result.Result("log_pair", variant, "yade", ()))
+    assert [page.variant for page in gather(tmp_path).pages] == ["equal", "theta_half", "damped", "a_point=2", "study-first_order"]
 
 
 def test_profiles_with_a_reference_come_first():

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from dembark.validation.runs.progress import Monitor, OutputParser, describe, duration, headline, state_table
+from dembark.common.units import duration
+from dembark.validation.runs.progress import Monitor, OutputParser, describe, headline, state_table
 from dembark.validation.runs.table import State, Table
 
 

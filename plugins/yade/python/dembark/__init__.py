@@ -3,7 +3,7 @@
 The files have the schema of the LIGGGHTS decks. Standard library only; SI units.
 """
 
-from yade.dembark.frames import FrameWriter
+from yade.dembark.frames import FrameWriter, StepMeans
 from yade.dembark.logs import LogWriter, drum, log, log_loop, log_wall, logs
 from yade.dembark.report import fail, finish
 from yade.dembark.scene import (
@@ -26,7 +26,7 @@ from yade.dembark.states import options, run, table
 from yade.dembark.writers import DumpWriter, EnergyWriter, HistoryWriter, energies
 
 __all__ = [
-    "DumpWriter", "EnergyWriter", "FrameWriter", "HistoryWriter", "LogWriter", "Recorder", "begin", "box", "contact_loop", "drum",
-    "energies", "engine_loop", "fail", "finish", "grains", "log", "log_loop", "log_wall", "logs", "materials", "options", "packing",
-    "pairs", "parameters", "periodic", "plane", "planes", "run", "slab_loop", "table",
+    "DumpWriter", "EnergyWriter", "FrameWriter", "HistoryWriter", "LogWriter", "Recorder", "StepMeans", "begin", "box", "contact_loop",
+    "drum", "energies", "engine_loop", "fail", "finish", "grains", "log", "log_loop", "log_wall", "logs", "materials", "options",
+    "packing", "pairs", "parameters", "periodic", "plane", "planes", "run", "slab_loop", "table",
 ]

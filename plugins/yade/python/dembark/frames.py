@@ -27,6 +27,35 @@ def motion(body, gravity=(0.0, 0.0, 0.0)):
     return force, velocity, spin
 
 
+class StepMeans:
+    """Means of numbers over every `every` steps, as those of LIGGGHTS' fix ave/time; the first begins after step 0.
+
+    Those that have begun belong to a saved scene: give `save` and `load` to `run` as `saving` and `loaded`.
+    """
+
+    def __init__(self, every):
+        self.every = every
+        self.sums = []
+
+    def add(self, *values):
+        """Take the numbers of this step; the means, in the last step of each, else an empty list."""
+        if O.iter == 0:
+            return []
+        self.sums = [one + value for one, value in zip(self.sums or [0.0] * len(values), values, strict=True)]
+        if O.iter % self.every:
+            return []
+        means, self.sums = [one / self.every for one in self.sums], []
+        return means
+
+    def save(self):
+        """Write the sums into the scene."""
+        O.tags["sums"] = " ".join(value.hex() for value in self.sums)
+
+    def load(self):
+        """The sums as they are in the scene."""
+        self.sums = [float.fromhex(word) for word in O.tags["sums"].split()]
+
+
 class FrameWriter:
     """Appends frames of the moving spheres to grains.dump, and rows to time.csv.
 

@@ -1,7 +1,7 @@
 """Errors in one line, and what a run says of itself."""
 
-import os
 import sys
+import threading
 
 from yade import Omega
 
@@ -9,11 +9,25 @@ O = Omega()
 
 
 def fail(line, code=2):
-    """Say in one line on stderr what is wrong, where and what would be right, and end the process."""
+    """Raise RuntimeError with one line about what is wrong, where and what would be right, as the classes of the plugin do.
+
+    A script that runs by `yade -x` ends with this line on stderr and `code`; a session goes on.
+    """
     sys.stdout.flush()
-    print(f"dembark: {line}", file=sys.stderr, flush=True)
-    # SystemExit would not leave the thread in which YADE runs its engines.
-    os._exit(code)
+    # The start script reads this. What ends YADE's own thread is written into its log.
+    sys.dembark_failure = f"dembark: {line}", code, threading.current_thread() is not threading.main_thread()
+    raise RuntimeError(sys.dembark_failure[0])
+
+
+def _show(kind, error, trace, show=sys.excepthook):
+    # A PyRunner shows the exception and quotes it, with its trace, in the one that it throws: the line is enough.
+    if str(error) == getattr(sys, "dembark_failure", ("",))[0]:
+        sys.last_traceback = None
+    else:
+        show(kind, error, trace)
+
+
+sys.excepthook = _show
 
 
 def announce(steps):

@@ -40,6 +40,10 @@ class _Snapshot:
         self.shot.columns, self.shot.types = columns, types
         return self.shot
 
+    def forces(self):
+        """Force (N) of each wall, with its glued grains, on the grains."""
+        return [sum((-O.forces.f(body) for body in (*ids, *self.glued.get(name, ()))), Vector3.Zero) for name, ids in self.walls.items()]
+
 
 class DumpWriter:
     """Appends frames to grains.dump and contacts.dump.
@@ -108,7 +112,7 @@ class HistoryWriter:
         """Append the present state, and print `<step> <time> <kinetic energy>` for whoever watches."""
         shot = self._snapshot.current()
         energy = shot.kineticEnergy()
-        forces = (f"{component:.9g}" for force in shot.wallForces() for component in force)
+        forces = (f"{component:.9g}" for force in self._snapshot.forces() for component in force)
         where = []
         if self._liquid:
             # A scene that was loaded has engines of its own.

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dembark.common.errors import DembarkError
-from dembark.validation.campaigns import report
+from dembark.validation.campaigns.report.build import build
 from dembark.validation.judge import result
 from dembark.validation.judge.result import QuantityRecord, Result
 
@@ -47,7 +47,7 @@ def fill(folder: Path, shift: float = 0.0, killed: str = "", broken: str = "") -
 
 def test_a_whole_report_with_tables(tmp_path: Path) -> None:
     folder = fill(tmp_path / "one", shift=5e-3)
-    page = report.build(folder)
+    page = build(folder)
     text = page.read_text(encoding="utf-8")
     assert (folder / "report.pdf").read_bytes().startswith(b"%PDF")
     names = {path.name for path in (folder / "figures").iterdir()}
@@ -58,15 +58,15 @@ def test_a_whole_report_with_tables(tmp_path: Path) -> None:
 
 
 def test_runs_that_failed_are_missing_and_named(tmp_path: Path) -> None:
-    text = report.build(fill(tmp_path / "one", killed="dry_f=0.2_r=0.02")).read_text(encoding="utf-8")
+    text = build(fill(tmp_path / "one", killed="dry_f=0.2_r=0.02")).read_text(encoding="utf-8")
     assert text.count("the engine was killed") >= 2 and "2 results are missing" in text and "not measured" in text
 
 
 def test_a_quantity_without_tolerance_that_failed_is_shown(tmp_path: Path) -> None:
-    text = report.build(fill(tmp_path / "one", broken="dry_f=0.8_r=0.04")).read_text(encoding="utf-8")
+    text = build(fill(tmp_path / "one", broken="dry_f=0.8_r=0.04")).read_text(encoding="utf-8")
     assert "23 of 24 checks passed, 1 FAILED" in text and "YADE: contacts of a log" in text
 
 
 def test_a_folder_without_results_is_refused_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(DembarkError, match="nothing to report"):
-        report.build(tmp_path)
+        build(tmp_path)

@@ -24,11 +24,13 @@ def content(variant: str, engine: str, *quantities: QuantityRecord) -> Result:
     return Result("silo", variant, engine, tuple(quantities), provenance={"commit": "a" * 40})
 
 
-def sweep(case: str, axes: tuple[str, ...], points: dict[str, dict[str, Any]], contents: tuple[Result, ...] = ()) -> Sweep:
+def sweep(case: str, axes: tuple[str, ...], points: dict[str, dict[str, Any]], contents: tuple[Result, ...] = (),
+          **more: Any) -> Sweep:
     pages = {one.variant: Page(case, one.variant, Path()) for one in contents}
     for one in contents:
         pages[one.variant].results[one.engine] = one
-    facts = {"case": case, "axes": axes, "points": [{"variant": variant, "values": values} for variant, values in points.items()]}
+    facts = {"case": case, "axes": axes,
+             "points": [{"variant": variant, "values": values, **more} for variant, values in points.items()]}
     return sweeps([facts], pages.values(), folders.discover())[0]
 
 
@@ -41,11 +43,11 @@ def grid(frictions: tuple[float, ...] = (0.2, 0.4, 0.8), radii: tuple[float, ...
     return sweep("silo", ("wall_friction", "cylinder_radius"), points, contents)
 
 
-def steps(engine_error: float, half: float) -> Sweep:
+def steps(engine_error: float, half: float, **more: Any) -> Sweep:
     points = {f"h{h}": {"time_step_fraction": h} for h in (0.05, 0.1, 0.2)}
     contents = tuple(content(name, "yade", quantity("k", 1.0 + engine_error * values["time_step_fraction"] ** 2, half))
                      for name, values in points.items())
-    return sweep("silo", ("time_step_fraction",), points, contents)
+    return sweep("silo", ("time_step_fraction",), points, contents, **more)
 
 
 def test_a_grid_gives_lines_and_maps() -> None:
@@ -84,6 +86,14 @@ def test_numerical_error_is_told_from_scatter() -> None:
     assert exact.finest == 0.05
     (noisy,) = numerical_errors([steps(2.0, 0.1)])
     assert noisy.found.kind == "scatter" and noisy.found.order is None and noisy.found.uncertainty > 0.1
+
+
+def test_a_second_order_scheme_that_shows_its_order_takes_the_small_factor() -> None:
+    """The error at the finest step, 2 h², times 1.25; what shows another order than the formal one takes 3."""
+    (right,) = numerical_errors([steps(2.0, 1e-6, formal_orders={"time_step_fraction": 2.0})])
+    assert right.formal_order == 2.0 and right.found.uncertainty == pytest.approx(1.25 * 2.0 * 0.05**2)
+    (wrong,) = numerical_errors([steps(2.0, 1e-6)])
+    assert wrong.formal_order == 1.0 and wrong.found.uncertainty == pytest.approx(3.0 * 2.0 * 0.05**2 * 3.0)
 
 
 def test_table_holds_every_quantity_once(tmp_path: Path) -> None:

@@ -1,0 +1,84 @@
+"""single_contact beside the curves of Chung and Ooi (2011): what agrees with them passes, and wrong physics is seen."""
+
+from __future__ import annotations
+
+import csv
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dembark.input_decks.tests.measuring import judged, module, names
+from dembark.postproc.instruments.published_curves import beside_published
+from dembark.postproc.measurement import Measurement
+from dembark.postproc.resampling import profile
+from dembark.validation.case.folders import find
+
+ENGINES = ("liggghts", "yade")
+single_contact = module("single_contact")
+# Of each test in which a curve was published, those that the law does not follow; README.md says why.
+DIFFERENT = {
+    "test_1": set(), "test_2": set(), "test_4": {"published_tangential_restitution", "published_contact_angle"},
+    "test_5": {"published_scaled_recoil", "published_scaled_spin", "finite_elements_scaled_recoil", "finite_elements_scaled_spin"},
+    **{variant: {"published_stick", "published_recoil"} for variant in ("test_6", "test_8_a", "test_8_b")}}
+FORCES = {"published_force_overlap", "published_force_time"}
+CONTROLS = [("test_1", {"youngs_modulus_a": 4.3e10}, FORCES), ("test_2", {"density_a": 2400.0}, {"published_force_time"}),
+            ("test_4", {"friction": 0.08}, {"published_spin"}), ("test_4", {"friction": 0.01}, {"published_spin"}),
+            ("test_4", {"poisson_ratio_a": 0.0}, {"published_spin"})]
+
+
+@pytest.fixture(scope="module")
+def verdicts(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """What a run at eight times the step of the variant is worth beside the published curves, by (variant, engine); each is done once."""
+    @cache
+    def get(variant: str, engine: str, **changes: Any) -> dict[str, dict[str, Any]]:
+        step = 8.0 * float(find("single_contact").variants[variant]["time_step"])
+        one = decks("single_contact", engine, tmp_path_factory.mktemp(f"{variant}-{engine}"), {"time_step": step, **changes}, variant)
+        one.run()
+        found = judged("single_contact", single_contact.measure([one.replica()]))
+        return {name: one for name, one in found.items() if name.startswith(("published_", "finite_elements_"))}
+
+    return get
+
+
+def published(variant: str) -> set[str]:
+    with single_contact.PUBLISHED.open(encoding="utf-8") as file:
+        return {f"{row['method']}_{row['quantity']}" for row in csv.DictReader(file) if row["variant"] == variant}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("variant", DIFFERENT)
+def test_every_published_curve_has_a_verdict(variant: str, engine: str, verdicts: Any) -> None:
+    found = verdicts(variant, engine)
+    assert found.keys() == published(variant)
+    assert names(found, "fail") == DIFFERENT[variant], found
+
+
+@pytest.mark.parametrize(("variant", "changes", "seen"), CONTROLS)
+def test_wrong_physics_is_seen(variant: str, changes: dict[str, float], seen: set[str], verdicts: Any) -> None:
+    assert not seen & names(verdicts(variant, "liggghts"), "fail")
+    assert seen <= names(verdicts(variant, "liggghts", **changes), "fail")
+
+
+@pytest.mark.parametrize(("shift", "verdict"), [(0.0, "pass"), (0.05, "pass"), (0.2, "fail")])
+def test_the_tolerance_is_that_of_the_declaration(shift: float, verdict: str, tmp_path: Path) -> None:
+    """A run whose curve is the published one, but for a `shift`; 0.1 is allowed."""
+    place = np.linspace(0.0, 2.0, 41)
+    table = tmp_path / "published.csv"
+    table.write_text("variant,quantity,material,method,x,y,x_uncertainty,y_uncertainty\n" +
+                     "".join(f"test_6,recoil,a,published,{x:g},{2.0 * x:g},0.006,0.03\n" for x in (-1.0, 0.5, 1.0, 1.5)))
+    curve = profile("recoil_a", "Recoil", "v", "v after", place, [2.0 * place + shift])
+    measured = beside_published(Measurement({}, [curve]), table, "test_6", single_contact.LABELS)
+    (name, one), = judged("single_contact", measured).items()
+    assert (name, one["verdict"]) == ("published_recoil", verdict)
+    assert "3 points" in one["detail"]  # that outside of the run's range is left out
+    assert measured.profiles[1]["reference_high"][0] - measured.profiles[1]["reference"][0] == pytest.approx(np.hypot(0.03, 0.012))
+
+
+def test_curves_that_a_run_does_not_have_are_left_out() -> None:
+    """test_7 has none published; spheres of test_4 without friction have none of their own."""
+    found = Measurement({}, [])
+    for variant in ("test_7", "test_4"):
+        assert beside_published(found, single_contact.PUBLISHED, variant, single_contact.LABELS) == found

@@ -1,0 +1,177 @@
+"""Logs in cross-section: the last frame as a figure, and all frames as an animation beside the report."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import EllipseCollection, LineCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from dembark.common.files import read_json
+from dembark.postproc import GrainFrame, GrainsDump
+from dembark.postproc.dumptext import TextDump
+from dembark.postproc.pictures import saved
+from dembark.postproc.pictures.packings import HEIGHT
+from dembark.postproc.style import STYLE
+
+_MAP = "cividis"
+_PIXELS = 300
+_OVERSAMPLING = 3
+_SHELL = "#4a4f57"
+_CHAIN = "#d55e00"
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Section:
+    """Frames of logs in a plane, in m and s: `places` (frames, n, 2), `radii` (n,), `speeds` (frames, n) over `rim_speed`, `times`
+    (frames,).
+
+    `links` (m, 2, 2) are contacts of the last frame with `forces` (m,) in N. `drum_radius` 0: there is no drum. The drum turns by
+    `drum_speed` (rad/s) about the axis across the plane, clockwise when positive.
+    """
+
+    places: Array
+    radii: Array
+    speeds: Array
+    times: Array
+    drum_radius: float
+    drum_speed: float
+    label: str
+    links: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
+    forces: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def view(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom and top edge of what is shown, m."""
+        if self.drum_radius > 0.0:
+            half = 1.04 * self.drum_radius
+            return -half, half, -half, half
+        return self._around(self.places)
+
+    @property
+    def last_view(self) -> tuple[float, float, float, float]:
+        """The same of the last frame alone: logs that have fallen need no room above them."""
+        return self.view if self.drum_radius > 0.0 else self._around(self.places[-1:])
+
+    def _around(self, places: Array) -> tuple[float, float, float, float]:
+        low, high = (places - self.radii[:, None]).min(axis=(0, 1)), (places + self.radii[:, None]).max(axis=(0, 1))
+        return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+def scene(folder: Path, cross_section: str, drum_radius: float = 0.0, drum_speed: float = 0.0, speed: float = 0.0, frames: int = 0,
+          chains: bool = False) -> Section:
+    """The frames of the run in `folder`, seen along the axis that `cross_section` ("xz" or "xy") leaves out.
+
+    Speeds are over `speed` (m/s), or else over that of the drum's rim. `frames` > 1: only so many of them, evenly spaced, the last
+    included. `chains`: the contact forces of the last one, from contacts.dump. DumpError when a file cannot be read.
+    """
+    axes = ["xyz".index(letter) for letter in cross_section]
+    dump = GrainsDump(folder / "grains.dump")
+    shown = np.unique(np.linspace(0, len(dump) - 1, frames if 1 < frames < len(dump) else len(dump)).round().astype(int))
+    frames_shown = [dump[int(number)] for number in shown]
+    record = read_json(folder / "run.json") or {}
+    scale = speed or abs(drum_speed) * drum_radius or 1.0
+    label = "speed / speed of the rim" if not speed and drum_radius else "speed / (m/s)" if scale == 1.0 else f"speed / ({scale:g} m/s)"
+    links, forces = _chains(folder, frames_shown[-1], axes) if chains else (np.zeros((0, 2, 2)), np.zeros(0))
+    return Section(
+        np.array([frame.positions[:, axes] for frame in frames_shown]), frames_shown[0].radii,
+        np.array([np.linalg.norm(frame.velocities, axis=1) / scale for frame in frames_shown]),
+        np.array([frame.step for frame in frames_shown]) * float(record.get("time_step", 1.0)), drum_radius, drum_speed, label, links,
+        forces)
+
+
+def _chains(folder: Path, frame: GrainFrame, axes: list[int]) -> tuple[Array, Array]:
+    """Ends (m, 2, 2) in m and normal forces (m,) in N of the contacts in the last frame of contacts.dump: from log to log, or to the
+    wall."""
+    dump = TextDump(folder / "contacts.dump")
+    values = dump.frame(len(dump) - 1).values
+    place = {int(number): row for number, row in zip(frame.ids, frame.positions[:, axes], strict=True)}
+    ends = [(place[int(row[0])], place.get(int(row[1]), row[[10 + axis for axis in axes]])) for row in values]
+    return np.array(ends).reshape(len(ends), 2, 2), values[:, 6]
+
+
+def picture(section: Section) -> bytes:
+    """The last frame as a PNG, with a colour scale."""
+    top = limit(section)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(HEIGHT + 1.1, HEIGHT), layout="constrained")
+        axes = figure.subplots()
+        draw(axes, section, top)
+        bar = figure.colorbar(ScalarMappable(Normalize(0.0, top), _MAP), ax=axes, shrink=0.75, aspect=22, pad=0.02, extend="max")
+        bar.set_label(section.label)
+        bar.outline.set_linewidth(0.4)
+    return saved(figure)
+
+
+def draw(axes: Axes, section: Section, top: float) -> None:
+    """The last frame in `axes`, speeds up to `top` on the colour scale."""
+    if section.drum_radius > 0.0:
+        axes.add_patch(Circle((0.0, 0.0), section.drum_radius, fill=False, edgecolor=_SHELL, linewidth=1.6))
+        _arrow(axes, section)
+    size = 2.0 * section.radii
+    axes.add_collection(EllipseCollection(
+        size, size, np.zeros_like(size), units="x", offsets=section.places[-1], offset_transform=axes.transData, array=section.speeds[-1],
+        cmap=_MAP, norm=Normalize(0.0, top), edgecolor="white", linewidth=0.3))
+    if len(section.forces):
+        widths = 4.0 * np.sqrt(section.forces / section.forces.max())
+        axes.add_collection(LineCollection(list(section.links), linewidths=widths, colors=_CHAIN, alpha=0.85, capstyle="round"))
+    left, right, bottom, upper = section.last_view
+    axes.set(xlim=(left, right), ylim=(bottom, upper), aspect="equal")
+    axes.axis("off")
+
+
+def limit(section: Section) -> float:
+    """Upper end of the colour scale: what 2 % of the speeds exceed."""
+    return float(np.percentile(section.speeds, 98.0)) or 1.0
+
+
+def _arrow(axes: Axes, section: Section) -> None:
+    if section.drum_speed == 0.0:
+        return
+    radius, turn = 0.93 * section.drum_radius, math.copysign(1.0, section.drum_speed)
+    ends = [(radius * math.cos(angle), radius * math.sin(angle)) for angle in (math.pi / 2 + 0.28 * turn, math.pi / 2 - 0.28 * turn)]
+    axes.annotate("", ends[1], ends[0], arrowprops={"arrowstyle": "->", "color": _SHELL,
+                                                    "connectionstyle": f"arc3,rad={-0.28 * turn}", "linewidth": 1.0})
+
+
+def animate(section: Section, path: Path, *, duration: int = 60) -> Path:
+    """All frames as a GIF at `path`, each for `duration` ms; marks on the shell turn with the drum. Returns `path`."""
+    left, right, bottom, upper = section.view
+    scale = _OVERSAMPLING * _PIXELS / max(right - left, upper - bottom)
+    width, height = round((right - left) * scale), round((upper - bottom) * scale)
+    paint = matplotlib.colormaps[_MAP]
+    top = limit(section)
+
+    def at(place: Array) -> tuple[float, float]:
+        return (place[0] - left) * scale, (upper - place[1]) * scale
+
+    images = []
+    for places, speeds, time in zip(section.places, section.speeds, section.times, strict=True):
+        image = Image.new("RGB", (width, height), "white")
+        draw = ImageDraw.Draw(image)
+        if section.drum_radius > 0.0:
+            radius, middle = section.drum_radius * scale, at(np.zeros(2))
+            draw.ellipse([middle[0] - radius, middle[1] - radius, middle[0] + radius, middle[1] + radius], outline=_SHELL,
+                         width=2 * _OVERSAMPLING)
+            for mark in range(12):
+                angle = 2.0 * math.pi * mark / 12.0 - section.drum_speed * time
+                way = np.array([math.cos(angle), math.sin(angle)])
+                draw.line([at(section.drum_radius * way), at(1.035 * section.drum_radius * way)], fill=_SHELL, width=2 * _OVERSAMPLING)
+        for place, size, speed in zip(places, section.radii * scale, speeds, strict=True):
+            x, y = at(place)
+            colour = tuple(int(255 * part) for part in paint(min(1.0, speed / top))[:3])
+            draw.ellipse([x - size, y - size, x + size, y + size], fill=colour, outline="white", width=max(1, _OVERSAMPLING // 2))
+        images.append(image.resize((width // _OVERSAMPLING, height // _OVERSAMPLING), Image.Resampling.LANCZOS).quantize(32))
+    images[0].save(path, save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)
+    return path

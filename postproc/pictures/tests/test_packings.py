@@ -1,0 +1,40 @@
+"""Grains of a picture have the pressure that their contacts give them, and are drawn without a display."""
+
+import io
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from dembark.common.errors import RunError
+from dembark.postproc import render
+from dembark.postproc.fields.coarse_graining import WallContacts
+from dembark.postproc.pictures import packings, saved
+from dembark.validation.verification import scenes
+
+
+def test_pressure_in_a_grain_between_two_others():
+    """A row of three, pressed with the force F: F d over three volumes in the middle one, half of that at the ends."""
+    place = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    frame = scenes.grains(place, np.full(3, 0.5), low=-np.ones(3), high=np.full(3, 3.0))
+    pairs = np.array([[0, 1], [1, 2]])
+    links = scenes.contacts(place[pairs[:, 0]], np.tile([1.0, 0.0, 0.0], (2, 1)), np.tile([-6.0, 0.0, 0.0], (2, 1)), pairs)
+    middle = 6.0 * 1.0 / (3.0 * np.pi / 6.0)
+    np.testing.assert_allclose(packings.grain_pressure(frame, links), [0.5 * middle, middle, 0.5 * middle])
+    wall = WallContacts(np.array([[-0.5, 0.0, 0.0]]), place[:1], np.array([[6.0, 0.0, 0.0]]))
+    np.testing.assert_allclose(packings.grain_pressure(frame, links, [wall]), [middle, middle, 0.5 * middle])
+
+
+def test_a_renderer_that_dies_gives_its_reason(monkeypatch):
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    with pytest.raises(RunError, match="the renderer ended with code 1"):
+        render.picture(render.Scene(np.zeros((1, 3)), np.ones(1), np.ones(1), "v"))
+
+
+def test_picture_is_drawn_without_a_display(monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    random = np.random.default_rng(1)
+    scene = render.Scene(random.uniform(0, 1, (50, 3)), np.full(50, 0.1), random.uniform(0, 1, 50), "v")
+    image = np.asarray(Image.open(io.BytesIO(saved(render.picture(scene)))).convert("L"))
+    assert image.min() < 100 and image.max() > 250

@@ -1,0 +1,53 @@
+"""Frames that are picked, contact forces as lines, and the view of the last frame in pictures of logs."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from dembark.postproc.pictures import sections as cross_section
+
+HEAD = "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF {}\n{}\nITEM: BOX BOUNDS ff ff ff\n-1 1\n-1 1\n-1 1\nITEM: {} "
+GRAINS = "id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass\n"
+LOG = "{} 1 {} {} 0 0 0 0 1 0 0 0 0 0 0 0 0 0.1 1\n"
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    """Two logs that sink from y = 2 to y = 0.1 in eleven frames; at the end they touch each other and the first touches a wall."""
+    grains = contacts = ""
+    columns = " ".join(f"f_impacts[{i}]" for i in range(1, 14)) + "\n"
+    for frame in range(11):
+        y = 2.0 - 0.19 * frame
+        grains += HEAD.format(frame, "ATOMS", 2, "ATOMS") + GRAINS + LOG.format(1, 0.0, y) + LOG.format(2, 0.2, y)
+        rows = ["1 2 -1 0 0 0 400 0 0 0 0.1 0.1 0\n", "1 -1 0 1 0 0 100 0 0 0 0 0 0\n"] if frame == 10 else []
+        contacts += HEAD.format(frame, "ENTRIES", len(rows), "ENTRIES") + columns + "".join(rows)
+    (tmp_path / "grains.dump").write_text(grains)
+    (tmp_path / "contacts.dump").write_text(contacts)
+    return tmp_path
+
+
+def test_chains_join_logs_and_reach_to_walls(run: Path) -> None:
+    found = cross_section.scene(run, "xy", speed=1.0, chains=True)
+    assert found.forces.tolist() == [400.0, 100.0]
+    np.testing.assert_allclose(found.links, [[[0.0, 0.1], [0.2, 0.1]], [[0.0, 0.1], [0.0, 0.0]]], atol=1e-12)
+    assert not len(cross_section.scene(run, "xy", speed=1.0).forces)
+    axes = Figure().subplots()
+    cross_section.draw(axes, found, 1.0)
+    lines = [one for one in axes.collections if type(one).__name__ == "LineCollection"]
+    assert len(lines) == 1
+    wide, narrow = lines[0].get_linewidths()
+    assert wide == pytest.approx(2.0 * narrow)
+
+
+def test_frames_are_picked_evenly_with_the_last(run: Path) -> None:
+    assert cross_section.scene(run, "xy", speed=1.0, frames=3).times.tolist() == [0.0, 5.0, 10.0]
+    for count in (0, 11, 50):
+        assert len(cross_section.scene(run, "xy", speed=1.0, frames=count).times) == 11
+
+
+def test_the_picture_has_no_room_for_what_has_fallen(run: Path) -> None:
+    found = cross_section.scene(run, "xy", speed=1.0)
+    assert found.view == pytest.approx((-0.1, 0.3, 0.0, 2.1))
+    assert found.last_view == pytest.approx((-0.1, 0.3, 0.0, 0.2))

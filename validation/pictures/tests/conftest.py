@@ -1,7 +1,0 @@
-"""Makes the writers of synthetic runs importable."""
-
-import sys
-from pathlib import Path
-
-_HERE = Path(__file__).resolve()
-sys.path[:0] = [str(_HERE.parents[2] / "checks" / "tests"), str(_HERE.parents[3] / "postproc" / "tests")]
