@@ -28,9 +28,9 @@ def others(quantity: str, angle: float) -> dict[str, float]:
     return found
 
 
-def main(results: Path) -> None:
-    """The table of the results in `results`, the folder of a profile."""
-    of_engine = [read(path) for path in sorted((results / "oblique_impact/study-linear").glob(f"*/{METRICS}"))]
+def main(results: Path, study: str) -> None:
+    """The table of a `study` of the case in `results`, the folder of a profile."""
+    of_engine = [read(path) for path in sorted((results / "oblique_impact" / f"study-{study}").glob(f"*/{METRICS}"))]
     print("| quantity | at | experiment | LIGGGHTS | YADE | E ± U_val | allowed | nearest other code |", "|" + 8 * "---|", sep="\n")
     with (REFERENCE / "kharaz_2001.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -57,4 +57,4 @@ def _half(interval: tuple[float, float] | None) -> float:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), sys.argv[2])

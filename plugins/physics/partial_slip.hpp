@@ -139,6 +139,11 @@ inline Vec3<double> partial_slip_step(const FinnieRabinowicz& law, const Vec3<do
   const Vec3<double> other = cross(normal, rings.axis);
 
   const double a = std::sqrt(contact_area / pi);
+  if (!(a > 0.0)) {
+    rings = {};
+    state.displacement = {};
+    return {};
+  }
   double lost = stiffness * detail::follow(rings, a);
 
   // Widths in units of the radius, and the displacement (m) at which each ring yields per limit (N) of the whole contact: its fraction of
