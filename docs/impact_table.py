@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.validation.judge.result import METRICS, read
+from dembark.validation.judge.result import METRICS, ComparedRecord, read
 
 REFERENCE = Path(__file__).resolve().parents[1] / "input_decks/oblique_impact/reference"
 QUANTITIES = {"tangential_restitution": ("e_t", "{:.3f}"), "spin": ("spin (rad/s)", "{:.0f}"),
@@ -30,8 +30,10 @@ def others(quantity: str, angle: float) -> dict[str, float]:
 
 def main(results: Path) -> None:
     """The table of the results in `results`, the folder of a profile."""
-    of_engine = [read(path) for path in sorted((results / "oblique_impact/study-linear").glob(f"*/{METRICS}"))]
-    print("| quantity | at | experiment | LIGGGHTS | YADE | E ± U_val | allowed | nearest other code |", "|" + 8 * "---|", sep="\n")
+    of_engine, linear = ([read(path) for path in sorted((results / "oblique_impact" / f"study-{study}").glob(f"*/{METRICS}"))]
+                         for study in ("partial_slip", "linear"))
+    print("| quantity | at | experiment | LIGGGHTS | YADE | E ± U_val | E ± U_val, `linear` | allowed | nearest other code |", "|" + 9 * "---|",
+          sep="\n")
     with (REFERENCE / "kharaz_2001.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     for row in rows:
@@ -41,14 +43,18 @@ def main(results: Path) -> None:
         due = float(row["value"])
         near = min(others(quantity, angle).items(), key=lambda entry: abs(entry[1] - due), default=None)
         one, datum_half = known[0], _half(known[0].reference_interval)
-        error, joint = (one.value or 0.0) - due, math.hypot(one.half or 0.0, datum_half)
         allowed = (one.tolerance or 0.0) * (due if one.deviation_kind == "relative" else 1.0)
-        shown = f"{digits.format(error)} ± {digits.format(joint)}"
         cells = [label, f"{angle:.1f}°", f"{digits.format(due)} ± {digits.format(datum_half)}",
                  *(f"{digits.format(each.value)} ± {digits.format(each.half)}" for each in known),
-                 f"**{shown}**" if one.verdict == "fail" else shown, digits.format(allowed),
+                 *(_error(each, due, datum_half, digits) for each in (one, linear[0].find(one.name)) if each), digits.format(allowed),
                  "–" if near is None else f"{digits.format(near[1])}, {near[0]}"]
         print(f"| {' | '.join(cells)} |".replace("| -", "| −").replace("**-", "**−"))
+
+
+def _error(one: ComparedRecord, due: float, datum_half: float, digits: str) -> str:
+    """E ± U_val, bold where the check fails."""
+    shown = f"{digits.format((one.value or 0.0) - due)} ± {digits.format(math.hypot(one.half or 0.0, datum_half))}"
+    return f"**{shown}**" if one.verdict == "fail" else shown
 
 
 def _half(interval: tuple[float, float] | None) -> float:

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <string>
 
 #include "atom.h"
 #include "contact_interface.h"
@@ -57,6 +58,24 @@ inline dembark::FrictionState<double> load_friction(const double* history) {
   return state;
 }
 inline void store_friction(double* history, const dembark::FrictionState<double>& state) { std::memcpy(history, &state, sizeof state); }
+
+/// The same of partial slip. `flags`: of the numbers, whether the sign turns when the engine swaps the two grains of a pair: the normal
+/// turns over, and with it what lies across the axis.
+constexpr int ring_numbers = sizeof(dembark::SlipRings) / sizeof(double);
+inline int add_rings(LIGGGHTS::IContactHistorySetup& host) {
+  int first = 0;
+  for (int k = 0; k < ring_numbers; ++k) {
+    const int at = host.add_history_value("slip_ring_" + std::to_string(k + 1), k < dembark::SlipRings::count ? "1" : "0");
+    if (k == 0) first = at;
+  }
+  return first;
+}
+inline dembark::SlipRings load_rings(const double* history) {
+  dembark::SlipRings rings;
+  std::memcpy(&rings, history, sizeof rings);
+  return rings;
+}
+inline void store_rings(double* history, const dembark::SlipRings& rings) { std::memcpy(history, &rings, sizeof rings); }
 
 /// Calls `end(i, j, history)` for all pairs with one of `flags` that are farther apart than the contact distance factor allows. Of a
 /// pair that jumps so far in one step the engine's loop tells the models nothing, and its contact would go on when it touches again.

@@ -40,8 +40,8 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   double **youngs_modulus_ = nullptr, **shear_modulus_ = nullptr, **damping_factor_ = nullptr;  // effective ones, by types
   PairTable<dembark::FinnieRabinowicz> friction_;
   PairTable<dembark::Liquid> liquids_;
-  int friction_offset_ = 0, bridge_offset_ = 0;  // in the history of a contact
-  double dt_ = 0.0;                              // of this step
+  int friction_offset_ = 0, rings_offset_ = -1, bridge_offset_ = 0;  // in the history of a contact
+  double dt_ = 0.0;                                                  // of this step
   bool update_history_ = false;
   bool plain_settings_ = true, tallied_ = false, limit_force_ = false, tangential_damping_ = true;
   dembark::Presliding presliding_ = dembark::Presliding::linear;
@@ -78,8 +78,11 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     if (!(normal.x == normal.x)) refuse_coincidence(lmp_->error, atom->tag, i, j);
     double* const history = block.history[k] + friction_offset_;
     dembark::FrictionState<double> state = load_friction(history);
-    const Vec3 force = contact_friction(friction_(atom->type[i], atom->type[j]), normal, twist, response, velocity, dt_, state);
+    dembark::SlipRings rings;
+    if (rings_offset_ >= 0) rings = load_rings(block.history[k] + rings_offset_);
+    const Vec3 force = contact_friction(friction_(atom->type[i], atom->type[j]), normal, twist, response, velocity, dt_, state, &rings);
     if (update_history_) store_friction(history, state);
+    if (update_history_ && rings_offset_ >= 0) store_rings(block.history[k] + rings_offset_, rings);
     return force;
   }
 
@@ -127,7 +130,9 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     registry.connect("betaeff", damping_factor_, "model hertz");
     const PropertyReader read(registry, lmp_->modify, lmp_->error, "pair_style gran");
     friction_ = read_friction(read, presliding_);
-    friction_offset_ = Stock::get_history_offset(models::TangentialModel<models::TANGENTIAL_FINNIE_RABINOWICZ>::history_name);
+    typedef models::TangentialModel<models::TANGENTIAL_FINNIE_RABINOWICZ> Friction;
+    friction_offset_ = Stock::get_history_offset(Friction::history_name);
+    if (presliding_ == dembark::Presliding::partial_slip) rings_offset_ = Stock::get_history_offset(Friction::rings_name);
     if (wet && plain_settings_) {
       liquids_ = read_liquids(read, model_, false, false);
       bridge_offset_ = Stock::get_history_offset(models::CohesionModel<models::COHESION_CAPILLARY>::history_name);
@@ -147,11 +152,11 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     dt_ = update_history_ ? lmp_->update->dt : 0.0;
     collect_laws();
     const int owned = lmp_->force->newton_pair ? atom.nlocal + atom.nghost : atom.nlocal;
-    // The scalar law knows the other curve, and what a step of no length is.
+    // The scalar law knows the other curves, and what a step of no length is.
     const bool pack_friction = presliding_ == dembark::Presliding::linear && dt_ > 0.0;
     // The factor of relaxed contacts (PairGran::relax) is 1 in this version of the engine.
-    packs_({atom, *pair, *this, laws_.data(), friction_.types() + 1, owned, friction_offset_, dt_, wet, limit_force_, tangential_damping_,
-            pack_friction},
+    packs_({atom, *pair, *this, laws_.data(), friction_.types() + 1, owned, friction_offset_, rings_offset_, ring_numbers, dt_, wet,
+            limit_force_, tangential_damping_, pack_friction},
            *block_);
   }
 };

@@ -64,6 +64,7 @@ struct PairStep {
   int types;                    // in a row; with 2, only the pair 1-1 is there
   int owned;                    // grains from here on get no forces
   int offset;                   // of friction in a history
+  int rings, ring_numbers;      // the same of partial slip; -1: there is none
   double dt;
   bool wet, limit_force, tangential_damping;
   bool pack_friction;  // false leaves all friction to the scalar law

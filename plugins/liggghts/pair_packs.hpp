@@ -179,6 +179,8 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
       forget(state.displacement.x), forget(state.displacement.y), forget(state.displacement.z);
       forget(state.slip);
       forget(state.dissipated_energy);
+      for (int k = 0; s.rings >= 0 && k < count; ++k)
+        if (apart >> k & 1) __builtin_memset(b.history[first + k] + s.rings, 0, s.ring_numbers * sizeof(double));
     }
     const unsigned packed = (s.pack_friction ? bits(sticks) | apart : apart) & there;
     const Quad<P> spring{state.displacement.x, state.displacement.y, state.displacement.z, state.slip};

@@ -1,6 +1,6 @@
 // LIGGGHTS adapter of the Finnie-Rabinowicz tangential law: fetches the contact, calls dembark/contact.hpp, adds the force.
 //
-//   pair_style gran model hertz tangential finnie_rabinowicz [presliding linear|exponential]
+//   pair_style gran model hertz tangential finnie_rabinowicz [presliding linear|exponential|partial_slip]
 //
 // Works compiled out of tree into liggghts-dembark and, unchanged, copied into a LIGGGHTS src/ folder.
 #ifdef TANGENTIAL_MODEL
@@ -31,6 +31,7 @@ namespace ContactModels {
 template <>
 class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase {
   int offset_;
+  int rings_ = -1;  // offset, with partial slip
   int presliding_ = 0;
   dembark_liggghts::PairTable<dembark::FinnieRabinowicz> laws_;
   LAMMPS_NS::PairGran* const pair_;  // nullptr: these are contacts with a wall
@@ -40,6 +41,7 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
 
  public:
   static constexpr const char* history_name = "finnie_rabinowicz";
+  static constexpr const char* rings_name = "slip_rings";
 
   TangentialModel(LAMMPS* lmp, IContactHistorySetup* host, class ContactModelBase* models)
       : TangentialModelBase(lmp, host, models),
@@ -58,7 +60,11 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     dembark_liggghts::register_choice(settings, "presliding", presliding_, dembark::presliding_names());
   }
 
-  inline void postSettings(IContactHistorySetup*, ContactModelBase*) {}
+  inline void postSettings(IContactHistorySetup* host, ContactModelBase* models) {
+    if (static_cast<dembark::Presliding>(presliding_) != dembark::Presliding::partial_slip) return;
+    rings_ = dembark_liggghts::add_rings(*host);
+    models->add_history_offset(rings_name, rings_);
+  }
 
   void connectToProperties(PropertyRegistry& registry) {
     const dembark_liggghts::PropertyReader read(registry, modify, error, "tangential finnie_rabinowicz");
@@ -80,30 +86,39 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     const dembark::NormalResponse<double> response{d.Fn, d.kt, d.gammat, dembark::pi * radius * d.deltan, d.kn};
     double* const history = d.contact_history + offset_;
     dembark::FrictionState<double> state = dembark_liggghts::load_friction(history);
+    dembark::SlipRings rings;
+    if (rings_ >= 0) rings = dembark_liggghts::load_rings(d.contact_history + rings_);
     dembark::ContactForce out;
     out.normal = vector(d.en);
     const double twist = contact_twist(out.normal, vector(d.omega_i), d.is_wall ? dembark::Vec3<double>{} : vector(d.omega_j), dt);
-    out.tangential = contact_friction(laws_(d.itype, d.jtype), out.normal, twist, response, motion.tangential_velocity, dt, state);
-    if (update_history) dembark_liggghts::store_friction(history, state);
+    out.tangential = contact_friction(laws_(d.itype, d.jtype), out.normal, twist, response, motion.tangential_velocity, dt, state, &rings);
+    if (update_history) store(d.contact_history, state, rings);
     assemble(motion, out);
     dembark_liggghts::add_force(out, d, i_forces, j_forces);
     if (!tally_) return;
     dembark::ContactParts parts;
-    split_touching(parts, out.normal, d.deltan, d.kn * d.deltan, exponent_, d.Fn, d.kt, out.tangential, state.displacement);
+    split_touching(parts, out.normal, d.deltan, d.kn * d.deltan, exponent_, d.Fn, d.kt, out.tangential, state.displacement,
+                   rings_ >= 0 ? &rings : nullptr);
     tally_->add(d, out.normal, parts, motion);
   }
 
   inline void surfacesClose(SurfacesCloseData& d, ForceData&, ForceData&) {
     if (d.contact_flags) *d.contact_flags &= ~CONTACT_TANGENTIAL_MODEL;
-    if (d.contact_history) dembark_liggghts::store_friction(d.contact_history + offset_, {});
+    if (d.contact_history) store(d.contact_history, {}, {});
   }
 
   inline void beginPass(SurfacesIntersectData&, ForceData&, ForceData&) {
     if (!pair_) return;
     dembark_liggghts::end_parted_pairs(*pair_, *atom, neighbor->contactDistanceFactor, CONTACT_TANGENTIAL_MODEL,
-                                       [this](int, int, double* history) { dembark_liggghts::store_friction(history + offset_, {}); });
+                                       [this](int, int, double* history) { store(history, {}, {}); });
   }
   inline void endPass(SurfacesIntersectData&, ForceData&, ForceData&) {}
+
+ private:
+  void store(double* history, const dembark::FrictionState<double>& state, const dembark::SlipRings& rings) const {
+    dembark_liggghts::store_friction(history + offset_, state);
+    if (rings_ >= 0) dembark_liggghts::store_rings(history + rings_, rings);
+  }
 };
 
 }  // namespace ContactModels

@@ -19,6 +19,7 @@
 #include "finnie_rabinowicz.hpp"
 #include "kinematics.hpp"
 #include "normal_force.hpp"
+#include "partial_slip.hpp"
 #include "vec3.hpp"
 
 namespace dembark {
@@ -65,6 +66,7 @@ struct ContactState {
   FrictionState<double> friction{};
   double bridge_volume = 0.0;     ///< m^3; 0 = no bridge
   double rupture_distance = 0.0;  ///< m, of the bridge that is there
+  SlipRings rings{};              ///< for Presliding::partial_slip
 };
 
 /// The two bodies as an engine sees them. `separation` = position of 1 minus position of 2 (minus the nearest wall point),
@@ -102,10 +104,13 @@ inline RelativeMotion relative_motion(const ContactBodies& b, const Vec3<double>
 }
 
 /// Friction of touching surfaces (N, on body 1): the spring turns with the pair by `twist` (rad, of contact_twist), then it sticks or
-/// slips.
+/// slips. `rings`: for Presliding::partial_slip, else not used.
 inline Vec3<double> contact_friction(const FinnieRabinowicz& law, const Vec3<double>& normal, double twist,
                                      const NormalResponse<double>& response, const Vec3<double>& velocity, double dt,
-                                     FrictionState<double>& state) {
+                                     FrictionState<double>& state, SlipRings* rings) {
+  if (law.presliding == Presliding::partial_slip)
+    return partial_slip_step(law, normal, twist, response.force, response.tangential_stiffness, response.tangential_damping,
+                             response.contact_area, velocity, dt, state, *rings);
   state.displacement = rotate_to_plane(state.displacement, normal, twist);
   return friction_step(law, response.force, response.tangential_stiffness, response.tangential_damping, response.contact_area, velocity, dt,
                        state);
@@ -150,8 +155,8 @@ inline ContactForce contact_step(const ContactParameters& p, const ContactBodies
   // Coincident centres have no direction; any will do to drive them apart.
   out.normal = distance > 0.0 ? b.separation * (1.0 / distance) : Vec3<double>{0.0, 0.0, 1.0};
 
-  ContactState scratch = stored;
-  ContactState& state = update ? stored : scratch;
+  ContactState scratch;
+  ContactState& state = update ? stored : (scratch = stored);
   const bool touching = out.overlap > 0.0;
   out.capillary_force = bridge_step(p.liquid, b.radius_1, b.radius_2, -out.overlap, touching, state.bridge_volume, state.rupture_distance);
   const bool viscous = p.liquid.viscous.on() && state.bridge_volume > 0.0;
@@ -166,9 +171,11 @@ inline ContactForce contact_step(const ContactParameters& p, const ContactBodies
     out.normal_force = response.force;
     out.normal_stiffness = response.normal_stiffness;
     out.tangential_stiffness = response.tangential_stiffness;
-    out.tangential = contact_friction(p.friction, out.normal, twist, response, motion.tangential_velocity, step, state.friction);
+    out.tangential =
+        contact_friction(p.friction, out.normal, twist, response, motion.tangential_velocity, step, state.friction, &state.rings);
   } else {
     state.friction = {};
+    if (p.friction.presliding == Presliding::partial_slip) state.rings = {};
   }
   assemble(motion, out);
   out.interacting = touching || state.bridge_volume > 0.0;

@@ -70,16 +70,18 @@ struct ContactLevers {
 };
 
 /// Springs and dash-pots of a touching contact. `spring`: N, what the normal law gives at rest, which grows with overlap^exponent;
-/// `normal_force`: N, what it gave; `stiffness`: k_t; `tangential`: N, on body 1; `displacement`: xi after the step.
+/// `normal_force`: N, what it gave; `stiffness`: k_t; `tangential`: N, on body 1; `displacement`: xi after the step, of `rings` where the
+/// contact slips in parts.
 inline void split_touching(ContactParts& parts, const Vec3<double>& normal, double overlap, double spring, double exponent,
-                           double normal_force, double stiffness, const Vec3<double>& tangential, const Vec3<double>& displacement) {
+                           double normal_force, double stiffness, const Vec3<double>& tangential, const Vec3<double>& displacement,
+                           const SlipRings* rings) {
   const Vec3<double> held = -stiffness * displacement;
   parts[ContactPart::normal_elastic] = spring * normal;
   parts[ContactPart::normal_viscous] = (normal_force - spring) * normal;
   parts[ContactPart::tangential_elastic] = held;
   parts[ContactPart::tangential_viscous] = tangential - held;
   parts.normal_stored = spring * overlap / (1.0 + exponent);
-  parts.tangential_stored = 0.5 * stiffness * dot(displacement, displacement);
+  parts.tangential_stored = rings ? stored_energy(*rings, stiffness) : 0.5 * stiffness * dot(displacement, displacement);
 }
 
 /// What the liquid of a bridge does.
@@ -88,9 +90,9 @@ inline void split_bridge(ContactParts& parts, const ContactForce& force) {
   parts[ContactPart::liquid_viscous] = force.viscous_normal * force.normal + force.viscous_tangential;
 }
 
-/// The parts of `force`, which `contact_step` has returned when it left `displacement` (xi). Of the bodies only radii and masses count.
+/// The parts of `force`, which `contact_step` has returned when it left `state`. Of the bodies only radii and masses count.
 inline ContactParts contact_parts(const ContactParameters& p, const ContactBodies& bodies, const ContactForce& force,
-                                  const Vec3<double>& displacement) {
+                                  const ContactState& state) {
   ContactParts parts;
   split_bridge(parts, force);
   if (!(force.overlap > 0.0)) return parts;
@@ -98,7 +100,8 @@ inline ContactParts contact_parts(const ContactParameters& p, const ContactBodie
   // At rest there is no damping: what is left of the law is its spring.
   const NormalResponse<double> spring = p.respond(bodies.effective_radius(), bodies.effective_mass(), force.overlap, 0.0);
   split_touching(parts, force.normal, force.overlap, spring.force, p.normal_law == NormalLaw::hertz ? 1.5 : 1.0, force.normal_force,
-                 spring.tangential_stiffness, force.tangential, displacement);
+                 spring.tangential_stiffness, force.tangential, state.friction.displacement,
+                 p.friction.presliding == Presliding::partial_slip ? &state.rings : nullptr);
   return parts;
 }
 

@@ -16,7 +16,8 @@
 // return mapping, the excess displacement goes to s and to dissipated energy. The pre-sliding curve is
 //     linear        T = k_t xi, or
 //     exponential   dT = k_t (du - T |du| / T_max), under monotone loading T = T_max (1 - exp(-k_t u / T_max))
-// (P. R. Dahl, AIAA J. 14 (1976) 1675).
+//                   (P. R. Dahl, AIAA J. 14 (1976) 1675), or
+//     partial slip  of a Hertzian contact, with its loading history: partial_slip.hpp.
 //
 // Ingredients switch off: mu_k = mu_s gives Coulomb friction, tau_s >= unlimited_strength no saturation, and both together with
 // `linear` the law of LIGGGHTS's `tangential history`.
@@ -35,9 +36,9 @@ namespace dembark {
 /// Shear strengths from here on (Pa) mean that the interface has no limit of its own; also +inf.
 constexpr double unlimited_strength = 1e30;
 
-enum class Presliding { linear, exponential };
+enum class Presliding { linear, exponential, partial_slip };
 /// Their names, in their order.
-inline std::vector<std::string> presliding_names() { return {"linear", "exponential"}; }
+inline std::vector<std::string> presliding_names() { return {"linear", "exponential", "partial_slip"}; }
 
 struct FinnieRabinowicz {
   double static_friction = 0.5;                          ///< mu_s, >= mu_k

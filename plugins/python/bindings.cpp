@@ -118,18 +118,22 @@ NB_MODULE(_physics, m) {
       .def("friction_coefficient", [](const FinnieRabinowicz& law, double slip) { return friction_coefficient(law, slip); })
       .def("shear_limit", [](const FinnieRabinowicz& law, double mu, double normal_force,
                              double area) { return shear_limit(law, mu, normal_force, area); })
-      .def("drive", [](const FinnieRabinowicz& law, Array normal_force, Array stiffness, Array area, Points path, Array time_step) {
+      .def("drive", [](const FinnieRabinowicz& law, Array normal_force, Array stiffness, Array area, Points path, Array time_step,
+                       const nb::tuple& plane) {
         const std::size_t n = path.shape(0);
         double* force = new double[3 * n];
         Vectors forces(force, {n, 3}, nb::capsule(force, [](void* p) noexcept { delete[] static_cast<double*>(p); }));
         double *slip, *dissipated;
         Result slips = make_result(n, slip), energies = make_result(n, dissipated);
         FrictionState<double> state;
+        SlipRings rings;
+        const Vec3<double> normal = vector(plane);
         Vec3<double> last{};
         for (std::size_t i = 0; i < n; ++i) {
           const Vec3<double> here{path(i, 0), path(i, 1), path(i, 2)};
           const double dt = time_step(i);
-          const Vec3<double> t = friction_step(law, normal_force(i), stiffness(i), 0.0, area(i), (here - last) * (1.0 / dt), dt, state);
+          const NormalResponse<double> response{normal_force(i), stiffness(i), 0.0, area(i), 0.0};
+          const Vec3<double> t = contact_friction(law, normal, 0.0, response, (here - last) * (1.0 / dt), dt, state, &rings);
           last = here;
           force[3 * i] = -t.x;
           force[3 * i + 1] = -t.y;

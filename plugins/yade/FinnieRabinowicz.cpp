@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstring>
 #include <type_traits>
 #include <vector>
 
@@ -28,6 +29,10 @@ namespace {
 using Phys = FinnieRabinowiczPhys;
 using Ip2  = Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys;
 using Law2 = Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz;
+
+// What slipRings holds: the members of SlipRings one after the other.
+constexpr std::size_t ringNumbers = sizeof(::dembark::SlipRings) / sizeof(double);
+static_assert(std::is_trivially_copyable<::dembark::SlipRings>::value, "numbers only");
 
 const std::string ip2  = "Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.";
 const std::string law2 = "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz.";
@@ -61,6 +66,23 @@ void choose(const char* attribute, const std::string& word, const std::vector<st
 }
 
 }  // namespace
+
+::dembark::ContactState Phys::state() const {
+	::dembark::ContactState now{{vec(elasticDisplacement), slip, dissipatedEnergy}, bridgeVolume, ruptureDistance, {}};
+	if (slipRings.size() == ringNumbers) std::memcpy(&now.rings, slipRings.data(), sizeof now.rings);
+	return now;
+}
+
+void Phys::setState(const ::dembark::ContactState& now) {
+	elasticDisplacement = vec(now.friction.displacement);
+	slip                = now.friction.slip;
+	dissipatedEnergy    = now.friction.dissipated_energy;
+	bridgeVolume        = now.bridge_volume;
+	ruptureDistance     = now.rupture_distance;
+	if (contact.friction.presliding != ::dembark::Presliding::partial_slip) return;
+	slipRings.resize(ringNumbers);
+	std::memcpy(slipRings.data(), &now.rings, sizeof now.rings);
+}
 
 void Ip2::go(const shared_ptr<Material>& material1, const shared_ptr<Material>& material2, const shared_ptr<Interaction>& interaction) try {
 	if (interaction->phys) return;
@@ -215,10 +237,9 @@ bool Law2::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* i
 	ContactView view(phys.wallBody, geom, body1, body2, shift);
 	view.move(state1.vel, state1.angVel, state2.vel + shiftVelocity, state2.angVel);
 
-	const double            volumeBefore = phys.bridgeVolume;
-	::dembark::ContactState state{
-		{vec(phys.elasticDisplacement), phys.slip, phys.dissipatedEnergy}, phys.bridgeVolume, phys.ruptureDistance};
-	const ::dembark::ContactForce out = ::dembark::contact_step(phys.contact, view.bodies, scene->dt, state);
+	const double                  volumeBefore = phys.bridgeVolume;
+	::dembark::ContactState       state        = phys.state();
+	const ::dembark::ContactForce out          = ::dembark::contact_step(phys.contact, view.bodies, scene->dt, state);
 	// A comparison with what is no number is false: such a contact would vanish without a word.
 	if (!std::isfinite(out.overlap + out.force.x + out.force.y + out.force.z))
 		fail("the contact of " + pairName(body1, body2) + " has no finite force in step " + std::to_string(scene->iter) +
@@ -226,13 +247,9 @@ bool Law2::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* i
 		     1);
 
 	if (!(out.overlap > 0.0) && phys.dissipatedEnergy > 0.0) endedDissipation += phys.dissipatedEnergy;
-	phys.elasticDisplacement = vec(state.friction.displacement);
-	phys.slip                = state.friction.slip;
-	phys.dissipatedEnergy    = state.friction.dissipated_energy;
-	phys.bridgeVolume        = state.bridge_volume;
-	phys.ruptureDistance     = state.rupture_distance;
-	phys.capillaryForce      = out.capillary_force;
-	phys.viscousForce        = out.viscous_normal;
+	phys.setState(state);
+	phys.capillaryForce = out.capillary_force;
+	phys.viscousForce   = out.viscous_normal;
 	if (carriedLiquid) reportBridge(phys, geom, *interaction, volumeBefore);
 	if (!out.interacting) return false;
 

@@ -25,7 +25,9 @@ public:
 	long                         preparedBy = -1;
 	int                          wallBody   = 0;  // 1 or 2: this body of the interaction is a wall; 0: two spheres
 
-	void postLoad(FinnieRabinowiczPhys&) { preparedBy = -1; }
+	void                    postLoad(FinnieRabinowiczPhys&) { preparedBy = -1; }
+	::dembark::ContactState state() const;
+	void                    setState(const ::dembark::ContactState& now);
 	/// A bridge of carried liquid forms between spheres of these radii (m; infinite = a wall).
 	void setBridge(double volume, double imbalance, double radius1, double radius2) {
 		bridgeVolume    = volume;
@@ -37,6 +39,7 @@ public:
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR(FinnieRabinowiczPhys,NormShearPhys,"Contact of :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz`. :yref:`NormPhys.normalForce` holds the force along the normal with damping and bridge, so that it and :yref:`NormShearPhys.shearForce` are the whole force.",
 		((Vector3r,elasticDisplacement,Vector3r::Zero(),,"Elastic tangential displacement [m] of the sphere (of body 1, of two spheres), in the plane of contact"))
 		((Real,slip,0,,"Slip [m] since the contact last stuck"))
+		((std::vector<Real>,slipRings,,Attr::readonly,"State of a contact with ``presliding='partial_slip'``: displacements [m] of eight rings along an axis and across it, the axis, the radius [m] of the first ring and of the contact"))
 		((Real,dissipatedEnergy,0,,"Energy [J] lost by slip and tangential damping since the contact began"))
 		((Real,bridgeVolume,0,,"Volume [m^3] of the liquid bridge that is there; 0 = no bridge"))
 		((Real,ruptureDistance,0,,"Gap [m] beyond which that bridge breaks"))
@@ -101,7 +104,7 @@ public:
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz,LawFunctor,"Normal force of Hertz or Hooke with damping from a coefficient of restitution, tangential force of Finnie and Rabinowicz, and a liquid bridge with capillary and, if wanted, viscous force. A body whose shape is not a :yref:`Sphere` is a wall of infinite radius and mass; a sphere that is not dynamic has infinite mass; two bodies of which neither is dynamic have no force. A bridge keeps its interaction until it ruptures, at any gap.",
 		((string,normalLaw,"hertz",Attr::triggerPostLoad,"'hertz' or 'hooke'"))
 		((Real,characteristicVelocity,NaN,Attr::triggerPostLoad,"Impact speed [m/s] at which the overlap of 'hooke' equals that of 'hertz'. Required for 'hooke'."))
-		((string,presliding,"linear",Attr::triggerPostLoad,"Tangential force before gross slip: 'linear' or 'exponential'"))
+		((string,presliding,"linear",Attr::triggerPostLoad,"Tangential force before gross slip: 'linear', 'exponential' or 'partial_slip'"))
 		((string,capillaryModel,"none",Attr::triggerPostLoad,"'none', or the force law of a bridge: 'exact', 'willett', 'willett_full', 'rabinovich', 'bagheri', 'constant'"))
 		((bool,carriedLiquid,false,Attr::triggerPostLoad,"Bridges take their liquid from the bodies and give it back; needs the engine :yref:`CapillaryLiquid` after the :yref:`InteractionLoop`"))
 		((bool,tangentialDamping,true,Attr::triggerPostLoad,"Viscous tangential force while a contact sticks"))

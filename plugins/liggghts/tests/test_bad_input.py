@@ -73,7 +73,7 @@ def test_bad_value(tmp_path, name, values, words):
 
 @pytest.mark.parametrize(("old", "new", "words"), [
     ("capillary_model exact", "capillary_model magic", ("capillary_model", "magic", "exact, willett, willett_full, rabinovich, bagheri")),
-    ("presliding linear", "presliding curved", ("presliding", "curved", "linear, exponential")),
+    ("presliding linear", "presliding curved", ("presliding", "curved", "linear, exponential, partial_slip")),
     ("model hertz", "model hertz/stiffness", ("combination", "not compiled", "hertz|hooke")),
     ("tangential finnie_rabinowicz", "tangential no_history", ("not compiled",)),
     ("cohesion capillary", "cohesion capillary rolling_friction epsd", ("not compiled", "rolling_friction off|cdt|epsd2")),

@@ -17,7 +17,7 @@ def frames(folder, ranks=1, **words) -> np.ndarray:
     return np.stack(tables)
 
 
-@pytest.mark.parametrize("settings", ["", "limitForce on", "tangential_damping off", "presliding exponential"])
+@pytest.mark.parametrize("settings", ["", "limitForce on", "tangential_damping off", "presliding exponential", "presliding partial_slip"])
 @pytest.mark.parametrize("cohesion", ["", "cohesion capillary"])
 def test_same_motion_as_in_the_engines_loop(tmp_path, cohesion, settings):
     ours = frames(tmp_path / "ours", cohesion=cohesion, rolling="", settings=settings)

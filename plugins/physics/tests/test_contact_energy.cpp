@@ -43,7 +43,7 @@ Account impact(const ContactParameters& p, double dt) {
   out.scale = start;
   for (double t = 0.0; t < 4e-3; t += dt) {
     const ContactForce f = contact_step(p, b, dt, state);
-    const ContactParts parts = contact_parts(p, b, f, state.friction.displacement);
+    const ContactParts parts = contact_parts(p, b, f, state);
     Vec3<double> rest = f.force, rest_torque = f.torque_2;
     const double arm_2 = relative_motion(b, f.normal, f.overlap).arm_2;
     for (const Vec3<double>& part : parts.force) {

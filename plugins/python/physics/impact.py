@@ -141,6 +141,8 @@ def _bodies(n: int) -> NDArray[np.void]:
 
 def _law(friction: Friction) -> FinnieRabinowicz:
     if isinstance(friction, FinnieRabinowicz):
+        if friction.presliding == "partial_slip":
+            raise ValueError("presliding of logs must be 'linear' or 'exponential': partial slip is that of spheres")
         return friction
     mu = float(numbers("friction", 0.0 if friction is None else friction, "", low=0.0))
     return FinnieRabinowicz(static_friction=mu, kinetic_friction=mu, critical_slip_distance=0.0)

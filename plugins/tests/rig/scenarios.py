@@ -235,6 +235,7 @@ def _drop(name: str, material: Material) -> Scenario:
 def _all() -> dict[str, Scenario]:
     undamped = replace(DRY, restitution=1.0)
     strong = replace(DRY, interface_shear_strength=2e4)
+    partial = replace(DRY, presliding="partial_slip")
     linear = _cycles("cycles, linear, limited strength", strong)
     wet_collision = _collision("collision, wet", ALL_OF_IT, 0.6)
     cases = [
@@ -254,6 +255,9 @@ def _all() -> dict[str, Scenario]:
         linear,
         _cycles("cycles, exponential", replace(DRY, presliding="exponential")),
         _cycles("cycles, exponential, limited strength", replace(strong, presliding="exponential")),
+        _cycles("cycles, partial slip", partial),
+        _cycles("cycles, partial slip, wall", replace(strong, presliding="partial_slip"), wall=True),
+        _cycles("cycles, partial slip, rotated frame", partial).rotated(TURN, "cycles, partial slip, rotated frame"),
         _cycles("cycles, healing time", replace(DRY, healing_time=1e-3)),
         _cycles("cycles, wall", strong, wall=True),
         _cycles("cycles, exponential, wall", replace(strong, presliding="exponential"), wall=True),
@@ -262,12 +266,16 @@ def _all() -> dict[str, Scenario]:
         _sliding("sliding, slow weakening", undamped),
         _sliding("sliding, sudden weakening", replace(undamped, critical_slip_distance=1e-6)),
         _sliding("sliding, exponential", replace(undamped, presliding="exponential")),
+        _sliding("sliding, partial slip", replace(undamped, presliding="partial_slip")),
         _sliding("sliding, hooke", replace(undamped, normal_law="hooke", critical_slip_distance=0.0)),
         replace(_cycles("cycles, contact lost in between", DRY), steps=4500),
         loaded(DRY).spinning((1.0, 2.0, 2.0), 200.0, "loaded, rigidly rotating"),
         _collision("collision, equal", DRY, 1.0),
         _collision("collision, unequal", strong, 0.6),
         _collision("collision, exponential", replace(strong, presliding="exponential"), 0.6),
+        _collision("collision, partial slip", replace(strong, presliding="partial_slip"), 0.6),
+        _collision("collision, partial slip, viscous", replace(ALL_OF_IT, viscosity=0.05, presliding="partial_slip"), 0.6),
+        loaded(partial).spinning((1.0, 2.0, 2.0), 200.0, "loaded, partial slip, rigidly rotating"),
         _collision("collision, hooke", replace(DRY, normal_law="hooke", characteristic_velocity=0.5), 0.6),
         wet_collision,
         wet_collision.rotated(TURN, "collision, wet, rotated frame"),

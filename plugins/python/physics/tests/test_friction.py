@@ -17,6 +17,7 @@ COULOMB = FinnieRabinowicz(static_friction=0.4, kinetic_friction=0.4, critical_s
 WEAK = replace(COULOMB, static_friction=0.5, kinetic_friction=0.3)
 EVERY = [COULOMB, WEAK, replace(WEAK, critical_slip_distance=0.0), replace(WEAK, interface_shear_strength=1e6)]
 EVERY += [replace(WEAK, healing_time=5.0)]
+PARTIAL = [replace(law, presliding="partial_slip") for law in EVERY]
 EVERY += [replace(law, presliding="exponential") for law in EVERY]
 
 
@@ -136,6 +137,23 @@ def fine(corners):
     return np.vstack(pieces)
 
 
+def test_partial_slip_is_that_of_cattaneo_and_mindlin():
+    """At a constant load, in any plane: T / (mu N) = 1 - (1 - u / u_max)^1.5 with u_max = 1.5 mu N / k_t."""
+    law, along = replace(COULOMB, presliding="partial_slip"), np.array([1.0, 2.0, -2.0]) / 3.0
+    most = 1.5 * 0.4 * N / K
+    path = most * np.linspace(0.0, 1.2, 601)[1:]
+    expected = 0.4 * N * (1.0 - np.maximum(1.0 - path / most, 0.0)**1.5)
+    np.testing.assert_allclose(law.drive(N, K, AREA, path[:, None] * along) @ along, expected, atol=0.01 * 0.4 * N)
+    np.testing.assert_allclose(law.drive(N, K, AREA, path), law.drive(N, K, AREA, path[:, None] * along) @ along, rtol=1e-12)
+    assert np.abs(COULOMB.drive(N, K, AREA, path) - expected).max() > 0.1 * 0.4 * N
+
+
+def test_partial_slip_without_an_area_or_a_load_carries_nothing():
+    law = replace(COULOMB, presliding="partial_slip")
+    assert not law.drive(N, K, 0.0, RAMP).any()
+    assert not law.drive(-1.0, K, AREA, RAMP).any()
+
+
 @settings(max_examples=30, deadline=None)
 @given(law=LAWS, corners=st.integers(1, 6).flatmap(lambda n: arrays(float, (n, 2), elements=COORDINATES)))
 def test_energy_balance(law, corners):
@@ -154,7 +172,7 @@ def test_energy_balance(law, corners):
 
 
 @settings(max_examples=100, deadline=None)
-@given(law=LAWS, path=PATHS, data=st.data())
+@given(law=st.sampled_from(EVERY + PARTIAL), path=PATHS, data=st.data())
 def test_any_path(law, path, data):
     """Whatever happens: no NaN, force below static friction's limit, dissipation never falls, forces turn with the path."""
     load = data.draw(arrays(float, len(path), elements=st.integers(-500, 5000).map(lambda millinewtons: 1e-3 * millinewtons)))
@@ -172,7 +190,7 @@ def test_any_path(law, path, data):
         np.testing.assert_allclose(law.drive(load, K, AREA, path @ turn.T, time_step=0.3), out.force @ turn.T, atol=1e-9)
 
 
-@pytest.mark.parametrize("law", EVERY)
+@pytest.mark.parametrize("law", EVERY + PARTIAL)
 def test_loops_with_reversals_dissipate(law):
     """The area of the loop of force over displacement is what the state says is lost."""
     points, amplitude = 4000, 5e-5
@@ -192,7 +210,7 @@ def test_loops_with_reversals_dissipate(law):
     ({"healing_time": -1.0}, "healing time"),
     ({"healing_time": np.nan}, "healing_time"),
     ({"static_friction": np.inf}, "static_friction"),
-    ({"presliding": "curved"}, "'linear' or 'exponential'"),
+    ({"presliding": "curved"}, "'linear' or 'exponential' or 'partial_slip'"),
 ])
 def test_bad_parameters(change, words):
     with pytest.raises(ValueError, match=words) as caught:
