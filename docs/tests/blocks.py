@@ -125,6 +125,7 @@ NOT_RUN = (
      "needs a cluster; validation/campaigns/tests/test_slurm_campaign.py runs it on a Slurm of its own"),
     (r"module load .*|sinfo .*|sacctmgr .*|srun .*", "programs of a cluster"),
     (r"export (?!DEMBARK_DECKS).*", "one's own engines and modules; test_names.py looks the variables up in the code"),
+    (r"dembark validate .*|python docs/impact_table\.py .*", "a case in both engines takes minutes; input_decks/tests run it"),
     (r".*pytest .*--slow.*", "starts a Slurm as root and takes minutes; the folder exists"),
 )
 

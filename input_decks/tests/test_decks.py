@@ -34,7 +34,8 @@ TINY: dict[str, dict[str, Any]] = {
     "silo": {"grain_count": 40, "cylinder_radius": 0.018, "settle_time": 0.5, "measure_time": 0.02, "frames": 3},
     "plane_silo": {"grain_count": 40, "silo_width": 0.03, "slab_depth": 0.021, "settle_time": 0.5, "measure_time": 0.02, "frames": 3},
     "plug_flow": {"grain_count": 40, "channel_width": 0.03, "settle_time": 0.5, "run_in": 0.05, "travel": 0.05, "base_speed": 0.005,
-                  "frames": 3},
+                  # Weak dashpots, for the sum of forces on each grain below.
+                  "restitution": 0.9, "frames": 3},
     "gravity_channel": {"channel_width": 0.04, "channel_depth": 0.021, "channel_length": 0.02, "youngs_modulus": 5e6,
                         "solid_fraction": 0.62, "pack_time": 10.0, "run_in": 8.0, "measure": 0.1, "frames": 3},
     "column_collapse": {"grain_count": 60, "column_width": 0.021, "column_depth": 0.021, "settle_time": 0.15, "collapse_time": 0.15,
