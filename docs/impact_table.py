@@ -32,8 +32,8 @@ def main(results: Path) -> None:
     """The table of the results in `results`, the folder of a profile."""
     of_engine, linear = ([read(path) for path in sorted((results / "oblique_impact" / f"study-{study}").glob(f"*/{METRICS}"))]
                          for study in ("partial_slip", "linear"))
-    print("| quantity | at | experiment | LIGGGHTS | YADE | E ± U_val | E ± U_val, `linear` | allowed | nearest other code |", "|" + 9 * "---|",
-          sep="\n")
+    head = ("quantity", "at", "experiment", "LIGGGHTS", "YADE", "E ± U_val", "E ± U_val, `linear`", "allowed", "nearest other code")
+    print(f"| {' | '.join(head)} |", "|" + len(head) * "---|", sep="\n")
     with (REFERENCE / "kharaz_2001.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     for row in rows:

@@ -34,8 +34,8 @@ class FinnieRabinowicz:
     static_friction, kinetic_friction : mu_s >= mu_k >= 0
     critical_slip_distance : s_c, m, >= 0
     interface_shear_strength : tau_s, Pa, > 0; inf = unlimited (Coulomb)
-    presliding : 'linear' (T = k_t u up to the limit), 'exponential' (T = T_max (1 - exp(-k_t u / T_max)), Dahl) or 'partial_slip' (a Hertzian
-        contact whose rim slips first; Mindlin and Deresiewicz, with the loading history)
+    presliding : 'linear' (T = k_t u up to the limit), 'exponential' (T = T_max (1 - exp(-k_t u / T_max)), Dahl) or 'partial_slip' (a
+        Hertzian contact whose rim slips first; Mindlin and Deresiewicz, with the loading history)
     healing_time : s, time constant with which a contact that sticks forgets its slip; 0 = at once
 
     >>> law = FinnieRabinowicz(static_friction=0.5, kinetic_friction=0.4, critical_slip_distance=1e-5, interface_shear_strength=np.inf)
@@ -100,6 +100,7 @@ class FinnieRabinowicz:
 
         force, slip, energy = self._law.drive(
             column("normal_force", normal_force, "N"), column("tangential_stiffness", tangential_stiffness, "N/m", low=0.0, low_open=True),
-            column("contact_area", contact_area, "m^2", low=0.0), points, column("time_step", time_step, "s", low=0.0, low_open=True), normal)
+            column("contact_area", contact_area, "m^2", low=0.0), points, column("time_step", time_step, "s", low=0.0, low_open=True),
+            normal)
         shaped = force[:, 0] if path.ndim == 1 else force[:, : path.shape[1]]
         return FrictionPath(np.array(shaped), slip, energy)

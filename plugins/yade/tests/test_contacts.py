@@ -150,7 +150,8 @@ def test_two_threads_find_the_same_forces(yade):
 
 def test_wrong_words_name_attribute_and_choices(found):
     said = found["messages"]
-    for message, parts in zip(said, (("normalLaw", "'herz'", "hertz or hooke"), ("presliding", "'bent'", "linear, exponential, partial_slip"),
+    for message, parts in zip(said, (("normalLaw", "'herz'", "hertz or hooke"),
+                                     ("presliding", "'bent'", "linear, exponential, partial_slip"),
                                      ("capillaryModel", "'wet'", "none, exact"), ("CylinderWall.radius", "> 0 m"),
                                      ("CylinderWall.axis", "not zero")), strict=True):
         assert message.startswith("dembark: ") and "\n" not in message
