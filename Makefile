@@ -14,10 +14,12 @@ SYSTEM_PYTHON ?= /usr/bin/python3
 JOBS ?= 0
 TEST_JOBS ?= $(shell nproc)
 
+# Without tests: those are no reason to build an engine again.
+code = $(foreach file,$(1),$(if $(findstring /tests/,$(file)),,$(file)))
 physics_sources := $(shell find plugins/physics plugins/python postproc/native -type f -not -name '*.pyc' -not -name '*.py')
-liggghts_sources := $(shell find plugins/liggghts -type f -not -path '*/tests/*') $(filter-out %/tests/%,$(filter plugins/physics/%,$(physics_sources)))
-yade_sources := $(shell find plugins/yade -type f -not -path '*/tests/*' -not -name '*.pyc') $(filter-out %/tests/%,$(filter plugins/physics/%,$(physics_sources)))
-headers := $(filter %.hpp,$(filter-out %/tests/%,$(filter plugins/physics/%,$(physics_sources))))
+liggghts_sources := $(shell find plugins/liggghts -type f -not -path '*/tests/*') $(call code,$(filter plugins/physics/%,$(physics_sources)))
+yade_sources := $(shell find plugins/yade -type f -not -path '*/tests/*' -not -name '*.pyc') $(call code,$(filter plugins/physics/%,$(physics_sources)))
+headers := $(filter %.hpp,$(call code,$(filter plugins/physics/%,$(physics_sources))))
 
 .PHONY: all help system liggghts yade-engine yade-plugin yade lint tidy stubs wheel test validate bench doctor figures install-liggghts clean
 
@@ -53,7 +55,7 @@ $(BUILD)/.physics-tests: CMakeLists.txt $(physics_sources) | system
 	@mkdir -p $(BUILD)/bin && ln -sf ../engines/bin/physics-tests $(BUILD)/bin/
 	@touch $@
 
-$(BUILD)/.python: pyproject.toml CMakeLists.txt $(filter-out %/tests/%,$(physics_sources)) $(VENV)/.complete
+$(BUILD)/.python: pyproject.toml CMakeLists.txt $(call code,$(physics_sources)) $(VENV)/.complete
 	@echo "dembark: installing the Python package into $(VENV)" >&2
 	@PATH=$(CURDIR)/$(BIN):$$PATH packaging/build.py --name "Python package" --log $(BUILD)/python.log --resume make -- \
 	  $(BIN)/pip install --disable-pip-version-check --no-deps --no-build-isolation --editable .

@@ -20,7 +20,8 @@ inline double violation(const Matrix& M, const Vector& q, const LcpResult& r) {
   const Vector w = M * r.z + q;
   const double most = ((q.cwiseAbs() + M.cwiseAbs() * r.z).array() / root.array()).maxCoeff();
   if (most == 0.0) return 0.0;
-  double worst = std::max({0.0, -r.z.minCoeff(), -(w.array() / root.array()).minCoeff() / most, std::fabs(r.z.dot(w)) / (most * most)});
+  const double worst =
+      std::max({0.0, -r.z.minCoeff(), -(w.array() / root.array()).minCoeff() / most, std::fabs(r.z.dot(w)) / (most * most)});
   return std::max(worst, ((w - r.w).array() / root.array()).abs().maxCoeff() / most);
 }
 
