@@ -175,8 +175,8 @@ def bridge():
 
 
 def _contact_state():
-    return {f"{i.id1}-{i.id2}": {k: [float(x).hex() for x in v] if hasattr(v, "norm") else float(v).hex() for k, v in i.phys.dict().items()}
-            for i in O.interactions if i.isReal}
+    exact = lambda v: [float(x).hex() for x in v] if hasattr(v, "__len__") else float(v).hex()
+    return {f"{i.id1}-{i.id2}": {name: exact(value) for name, value in i.phys.dict().items()} for i in O.interactions if i.isReal}
 
 
 def many():
@@ -187,12 +187,13 @@ def many():
     return [O.forces.f(2 * k)[2] for k in range(144)]
 
 
-def save_load():
+def save_load(**law_attributes):
     """State in the middle of sliding, wet contacts after saving and loading, and after some steps more, for each format."""
     found = {}
     for ending in ("xml", "xml.gz", "yade.gz", "bin"):
         grains = [moving((0.0045 * k, 0.0003 * k * k, 0.0024), 0.0025, (0.2 - 0.1 * k, 0.05, -0.1), (3, 4 * k, 5)) for k in range(4)]
-        law = scene_with([utils.wall(0, 2), *grains], {**WET, "interfaceShearStrength": math.inf}, (0, 0, -9.81), capillaryModel="exact")
+        law = scene_with([utils.wall(0, 2), *grains], {**WET, "interfaceShearStrength": math.inf}, (0, 0, -9.81), capillaryModel="exact",
+                         **law_attributes)
         O.run(250, True)
         name = f"saved.{ending}"
         O.save(name)
@@ -206,6 +207,10 @@ def save_load():
                          "model": [law.capillaryModel, law.bridgeCount()]}
         os.remove(name)
     return found
+
+
+def save_load_partial_slip():
+    return save_load(presliding="partial_slip")
 
 
 def energy():

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 
-@pytest.fixture(scope="module")
-def found(yade):
-    return yade.scenes("save_load")["save_load"]
+@pytest.fixture(scope="module", params=["save_load", "save_load_partial_slip"])
+def found(yade, request):
+    return yade.scenes(request.param)[request.param]
 
 
 @pytest.mark.parametrize("ending", ["xml", "xml.gz", "yade.gz", "bin"])
@@ -26,3 +26,11 @@ def test_state_of_contacts_is_the_same_to_the_bit(found, ending):
 def test_loaded_run_goes_on_as_the_straight_one(found, ending):
     straight, resumed = np.asarray(found[ending]["straight"]), np.asarray(found[ending]["resumed"])
     assert np.abs(resumed - straight).max() < 1e-10 * np.abs(straight).max()
+
+
+def test_partial_slip_is_saved(yade):
+    """Rings that hold load, of which a linear contact has none."""
+    for scene, rings in (("save_load_partial_slip", 21), ("save_load", 0)):
+        states = yade.scenes(scene)[scene]["bin"]["after"].values()
+        assert {len(state["slipRings"]) for state in states} == {rings}
+        assert not rings or any(float.fromhex(number) != 0.0 for state in states for number in state["slipRings"][:16])
