@@ -1,6 +1,7 @@
 """fix resume/exact and resume_state: a resumed run is the same to the bit, whatever the models; mistakes are told in one line."""
 
 import shutil
+from dataclasses import replace
 
 import pytest
 from rig import liggghts_driver
@@ -16,11 +17,12 @@ fix loss all property/global coefficientRollingViscousDamping peratomtypepair 2 
 STATES = "fix state all resume/exact {every} bed cut grains.dump\n"
 
 
-def bed(stock, run_command, *, ranks, resume=False):
+def bed(stock, run_command, *, ranks, resume=False, material=BED):
     """A packing of 64 grains with our models, or with those of stock LIGGGHTS that keep histories."""
-    text = packing(BED, run_command, create="resume_state bed" if resume else CREATE, state="" if resume else STATE, every=500)
+    text = packing(material, run_command, create="resume_state bed" if resume else CREATE, state="" if resume else STATE, every=500)
     if stock:
-        ours = {word: liggghts_driver.models(BED, **kind) for word, kind in (("pair", {}), ("wall", {"wall": "primitive type 2 zplane 0"}))}
+        kinds: tuple = (("pair", {}), ("wall", {"wall": "primitive type 2 zplane 0"}))
+        ours = {word: liggghts_driver.models(material, **kind) for word, kind in kinds}
         models = "model hertz tangential history rolling_friction epsd2"
         text = text.replace(ours["wall"], f"{models} primitive type 2 zplane 0").replace(ours["pair"], models)
         text = text.replace("pair_style", STOCK + "pair_style")
@@ -29,16 +31,17 @@ def bed(stock, run_command, *, ranks, resume=False):
     return text if ranks == 2 else text.replace("processors 2 1 1\n", "")
 
 
-@pytest.mark.parametrize("stock", [False, True])
+@pytest.mark.parametrize(("stock", "material"), [(False, BED), (True, BED), (False, replace(BED, presliding="partial_slip"))],
+                         ids=["ours", "stock", "partial slip"])
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_resumed_run_is_the_same_to_the_bit(tmp_path, stock, ranks):
+def test_resumed_run_is_the_same_to_the_bit(tmp_path, stock, material, ranks):
     """States every 700 steps, frames every 500: state 1400 is resumed where frame 1500 was written already."""
     states = STATES.format(every=700)
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     for folder, steps in ((whole, 3000), (broken, 1600)):
-        done = run_deck(folder, bed(stock, f"{states}run {steps}", ranks=ranks), ranks=ranks)
+        done = run_deck(folder, bed(stock, f"{states}run {steps}", ranks=ranks, material=material), ranks=ranks)
         assert done.code == 0, done.error
-    done = run_deck(broken, bed(stock, f"{states}run 3000 upto", ranks=ranks, resume=True), ranks=ranks)
+    done = run_deck(broken, bed(stock, f"{states}run 3000 upto", ranks=ranks, resume=True, material=material), ranks=ranks)
     assert done.code == 0, done.error
     assert "dembark: resumed at step 1400 exactly" in done.output
     for name in ("grains.dump", "bed.2800.restart"):
