@@ -92,7 +92,7 @@ DEMBARK_COLD inline double shift(SlipRings& rings, double a) {
     for (auto* u : {&rings.along, &rings.across}) std::copy(u->begin() + 1, u->end(), u->begin());
     rings.outer /= SlipRings::ratio;
   }
-  for (int i = 0; i < last; ++i) {  // springs that join are without load
+  for (int i = 0; i <= last; ++i) {  // springs that join are without load
     const double now = ring_width(rings, i, a), before = ring_width(rings, i, rings.radius);
     if (!(now > before)) continue;
     rings.along[i] *= before / now;

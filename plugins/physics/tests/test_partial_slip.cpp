@@ -123,6 +123,14 @@ TEST_CASE("load that grows with the tangential force below the angle of friction
   CHECK(d.state.slip == 0.0);
 }
 
+TEST_CASE("springs that join in one step carry nothing, however many they are") {
+  for (double growth : {1.1, 3.0, 10.0, 1000.0}) {
+    Drive d;
+    const double before = d.move(1e-3 * yield(held), held), larger = held * growth * growth;
+    CHECK_THAT(d.move(0.0, larger), WithinRel(before, 1e-12));
+  }
+}
+
 TEST_CASE("eight rings meet the row of springs through oblique impacts") {
   // Prescribed overlap held sin(t): what the rings do to a sphere that strikes obliquely.
   for (double across : {0.05, 0.3, 1.0, 3.0}) {
