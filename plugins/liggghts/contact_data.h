@@ -59,9 +59,10 @@ inline dembark::FrictionState<double> load_friction(const double* history) {
 }
 inline void store_friction(double* history, const dembark::FrictionState<double>& state) { std::memcpy(history, &state, sizeof state); }
 
-/// The same of partial slip. `flags`: of the numbers, whether the sign turns when the engine swaps the two grains of a pair: the normal
-/// turns over, and with it what lies across the axis.
+/// The same of partial slip.
 constexpr int ring_numbers = sizeof(dembark::SlipRings) / sizeof(double);
+/// Adds the numbers of partial slip to a history; returns where they begin. When the engine swaps the two grains of a pair, displacements
+/// along the axis change their sign ("1"). Those across it do not: with the normal, the direction across turns over.
 inline int add_rings(LIGGGHTS::IContactHistorySetup& host) {
   int first = 0;
   for (int k = 0; k < ring_numbers; ++k) {

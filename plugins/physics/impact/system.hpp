@@ -18,9 +18,9 @@
 // becomes 1/(s + c/tau), and B gets the deformation delta_last c / (s tau + c) that is still there.
 //
 // Friction is solved in turn with N: N with the last friction forces in f; friction from N; N again with the friction forces in f,
-// and so on. The last solve is that of N, so D is that of the motion that happens. With LcpMethod::automatic it is made by relaxation.hpp,
-// by elimination.hpp where that would take longer, and by LcpSolver where neither reaches rounding; those before it, which only tell
-// friction its limits, are relaxed to four digits. The other methods solve all of them exactly.
+// and so on. The last solve is that of N, so D is that of the motion that happens. With LcpMethod::automatic it is made by the chain of
+// normal_forces.hpp; those before it, which only tell friction its limits, are relaxed to four digits. The other methods solve all of them
+// exactly.
 //
 // Candidates that would stay open anyway are not solved for, and looked at again afterwards (screening.hpp).
 //
