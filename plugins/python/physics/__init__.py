@@ -3,6 +3,7 @@
 All quantities are in SI units.
 """
 
+from dembark.physics.adams import AdamsEvent, AdamsSolution, integrate_adams
 from dembark.physics.capillary import CAPILLARY_MODELS, capillary_force, rupture_distance
 from dembark.physics.contact import Body, Contact, ContactForce, Trajectory, collide, drop
 from dembark.physics.friction import FinnieRabinowicz, FrictionPath
@@ -17,6 +18,8 @@ __all__ = [
     "LCP_METHODS",
     "LIQUID_RETURNS",
     "LIQUID_SHARES",
+    "AdamsEvent",
+    "AdamsSolution",
     "Body",
     "Contact",
     "ContactForce",
@@ -39,6 +42,7 @@ __all__ = [
     "drop",
     "effective_shear_modulus",
     "effective_youngs_modulus",
+    "integrate_adams",
     "liquid_bridge",
     "liquid_grant",
     "liquid_share",
