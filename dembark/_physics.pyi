@@ -5,6 +5,8 @@ import numpy
 from numpy.typing import NDArray
 
 
+def local_errors(arg0: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], arg1: float, /) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None, None))]: ...
+
 class Adams:
     def __init__(self, derivative: object, events: object | None, event_count: int, step: float, corrections: int, tolerance: float, time: float, state: Sequence[float], scale: Sequence[float]) -> None: ...
 

@@ -62,13 +62,13 @@ struct Contact {
 
 }  // namespace
 
-void bind_adams(nb::module_& m);
+void bind_integration(nb::module_& m);
 void bind_lcp(nb::module_& m);
 void bind_impact(nb::module_& m);
 void bind_liquid(nb::module_& m);
 
 NB_MODULE(_physics, m) {
-  bind_adams(m);
+  bind_integration(m);
   bind_lcp(m);
   bind_impact(m);
   bind_liquid(m);

@@ -3,11 +3,11 @@
 All quantities are in SI units.
 """
 
-from dembark.physics.adams import AdamsEvent, AdamsSolution, integrate_adams
 from dembark.physics.capillary import CAPILLARY_MODELS, capillary_force, rupture_distance
 from dembark.physics.contact import Body, Contact, ContactForce, Trajectory, collide, drop
 from dembark.physics.friction import FinnieRabinowicz, FrictionPath
 from dembark.physics.impact import Drum, Impact, ImpactChain, ImpactMotion, ImpactSystem, Plane
+from dembark.physics.integration import AdamsEvent, AdamsSolution, LocalErrors, integrate_adams, local_errors
 from dembark.physics.lcp import LCP_METHODS, LcpCertificate, LcpResult, LcpSolver, solve_lcp
 from dembark.physics.liquid import LIQUID_RETURNS, LIQUID_SHARES, LiquidBridge, liquid_bridge, liquid_grant, liquid_share
 from dembark.physics.normal import effective_shear_modulus, effective_youngs_modulus
@@ -34,6 +34,7 @@ __all__ = [
     "LcpResult",
     "LcpSolver",
     "LiquidBridge",
+    "LocalErrors",
     "Plane",
     "Trajectory",
     "ViscousResistance",
@@ -46,6 +47,7 @@ __all__ = [
     "liquid_bridge",
     "liquid_grant",
     "liquid_share",
+    "local_errors",
     "rupture_distance",
     "solve_lcp",
     "viscous_resistance",

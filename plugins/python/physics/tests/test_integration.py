@@ -1,4 +1,4 @@
-"""Adams' predictor-corrector beside an integrator of another kind (SciPy's DOP853) and beside exact solutions."""
+"""Adams' predictor-corrector beside an integrator of another kind (SciPy's DOP853) and beside exact solutions; Verlet's local error."""
 
 import numpy as np
 import pytest
@@ -99,3 +99,27 @@ def test_an_error_in_the_users_function_is_the_users_error():
 
     with pytest.raises(KeyError, match="mine"):
         physics.integrate_adams(derivative, [1.0], 1.0, 0.1)
+
+
+def test_local_errors_of_verlet_are_what_a_step_misses():
+    h, n = 0.1, 400
+    x, v = np.array([1.0, 0.3]), np.array([0.0, -0.2])
+    accelerations, missed = [-x], []
+    for _ in range(n):
+        exact = x * np.cos(h) + v * np.sin(h), v * np.cos(h) - x * np.sin(h)
+        a = -x
+        x = x + h * v + h * h / 2 * a
+        v = v + h / 2 * (a - x)
+        accelerations.append(-x)
+        missed.append((exact[0] - x, exact[1] - v))
+    told = physics.local_errors(accelerations, h)
+    true = np.array(missed[2:])
+    assert told.position.shape == told.velocity.shape == (n - 2, 2)
+    for estimate, exact in ((told.position, true[:, 0]), (told.velocity, true[:, 1])):
+        assert np.sqrt(np.mean(estimate**2) / np.mean(exact**2)) == pytest.approx(1.0, abs=0.02)
+        assert np.corrcoef(estimate.ravel(), exact.ravel())[0, 1] > 0.99  # the sign, too
+
+
+def test_local_errors_refuse_too_few_rows():
+    with pytest.raises(ValueError, match=r"accelerations must have shape \(n, k\) with n >= 4, not \(3, 2\)"):
+        physics.local_errors(np.zeros((3, 2)), 1e-5)

@@ -1,4 +1,4 @@
-"""Reference integrator: Adams' predictor-corrector of fourth order, which says when its step is too long and how wrong it is."""
+"""How wrong the steps of an integration are: Adams' predictor-corrector as the reference, and the local error of velocity Verlet."""
 
 from __future__ import annotations
 
@@ -92,3 +92,35 @@ def integrate_adams(derivative: Function, state: ArrayLike, end: float, step: fl
                     break
                 adams.restart()
     return AdamsSolution(np.array(times), np.array(states), np.array(errors), np.array(made), np.array(signals), found)
+
+
+class LocalErrors(NamedTuple):
+    """Exact minus computed of each step, shape (n - 3, k): of positions (m) and velocities (m/s)."""
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+
+def local_errors(accelerations: ArrayLike, step: float) -> LocalErrors:
+    """Local errors of the steps of velocity Verlet, or of leapfrog, from the accelerations that they met.
+
+    accelerations : (n, k), m/s^2: of k components at n >= 4 successive steps; forces of a trajectory that was written every step, over
+        the masses. Angular accelerations give errors of angular velocities
+    step : s
+
+    Rows of the answer are those of the steps that end at the fourth, fifth ... acceleration. To leading order:
+
+        position h^2/6 [a(n+1) - a(n)],   velocity h/24 [-3 a(n+1) + 7 a(n) - 5 a(n-1) + a(n-2)],
+
+    the next term of Taylor's series, and what the corrector of Adams and Moulton has beyond the trapezoid. Raises ValueError for arguments
+    out of range.
+
+    >>> import numpy as np
+    >>> t = 0.1 * np.arange(5)
+    >>> bool(abs(local_errors((t**3)[:, np.newaxis], 0.1).velocity[0, 0] - (0.3**4 - 0.2**4) / 4 + 0.05 * (0.2**3 + 0.3**3)) < 1e-15)
+    True
+    """
+    table = numbers("accelerations", accelerations, "m/s^2")
+    if table.ndim != 2 or len(table) < 4:
+        raise ValueError(f"accelerations must have shape (n, k) with n >= 4, not {table.shape}")
+    return LocalErrors(*_physics.local_errors(np.ascontiguousarray(table), float(numbers("step", step, "s", low=0.0, low_open=True))))

@@ -1,4 +1,5 @@
-// The integrator of Adams as Python sees it. Private; dembark.physics.adams adds checks, shapes, units and documentation.
+// The reference integrator and the local error of Verlet's steps as Python sees them. Private; dembark.physics.integration adds checks,
+// shapes, units and documentation.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/vector.h>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "dembark/integration/adams.hpp"
+#include "dembark/integration/step_error.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -59,7 +61,23 @@ State copied(const std::vector<double>& numbers) {
 
 }  // namespace
 
-void bind_adams(nb::module_& m) {
+void bind_integration(nb::module_& m) {
+  // Errors of position (m) and velocity, rows of the steps from the fourth on, of components with these accelerations.
+  m.def("local_errors", [](nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu> accelerations, double step) {
+    const std::size_t n = accelerations.shape(0), columns = accelerations.shape(1), rows = n < 4 ? 0 : n - 3;
+    auto* out = new double[2 * rows * columns];
+    const nb::capsule owner(out, [](void* p) noexcept { delete[] static_cast<double*>(p); });
+    for (std::size_t c = 0; c < columns; ++c) {
+      AccelerationHistory history;
+      for (std::size_t i = 0; i < n; ++i) {
+        LocalError e;
+        if (!history.step({accelerations(i, c)}, step, e)) continue;
+        out[(i - 3) * columns + c] = e.position[0];
+        out[(rows + i - 3) * columns + c] = e.velocity[0];
+      }
+    }
+    return nb::ndarray<nb::numpy, double, nb::ndim<3>>(out, {2, rows, columns}, owner);
+  });
   nb::class_<Integrator>(m, "Adams")
       .def(
           "__init__",
