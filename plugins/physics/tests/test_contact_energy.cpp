@@ -46,7 +46,7 @@ Account impact(const ContactParameters& p, double dt) {
     const ContactParts parts = contact_parts(p, b, f, state);
     Vec3<double> rest = f.force, rest_torque = f.torque_2;
     const double arm_2 = relative_motion(b, f.normal, f.overlap).arm_2;
-    for (const Vec3<double>& part : parts.force) {
+    for (const Vec3<double>& part : parts.load) {
       rest -= part;
       rest_torque += arm_2 * cross(f.normal, part);
     }

@@ -127,7 +127,7 @@ TEST_CASE("a held body gives the others what it takes", "[energy]") {
 TEST_CASE("the error of the step counts the springs at the positions where they are known", "[energy]") {
   EnergyLedger ledger;
   ledger.now.power[0] = -2.0;
-  ledger.set_stored(0.01, 0.0, 0.5 * 0.01 * -2.0);
+  ledger.set_stored(0.01, 0.0, 0.0, 0.5 * 0.01 * -2.0);
   CHECK(entry(ledger.energies(), "step_error") == 0.0);
   ledger.kick(0.01, 0);
   CHECK(entry(ledger.energies(), "normal_elastic") == -0.02);
