@@ -68,7 +68,8 @@ TEST_CASE("the works of a kick are the same from its beginning, mean and end, an
     CHECK_THAT(entry(mean, "balance"), WithinAbs(0.0, 1e-14 * scale));
     // What acts on the free degrees of freedom is work of the parts and of the walls together.
     double contacts = entry(mean, "walls");
-    for (std::size_t part = 0; part < contact_part_count; ++part) contacts += mean[3 + part];
+    for (std::size_t part = 0; part < force_part_count; ++part) contacts += mean[3 + part];
+    contacts += entry(mean, "rolling_elastic") + entry(mean, "rolling_viscous");
     double expected = 0.0;
     const Dofs after = body.kicked(0.01);
     for (std::size_t k = 0; k < 6; ++k)
