@@ -97,6 +97,19 @@ inline dembark::SlipRings load_rings(const double* history) {
 }
 inline void store_rings(double* history, const dembark::SlipRings& rings) { std::memcpy(history, &rings, sizeof rings); }
 
+/// The rolling spring: three numbers, its angle.
+inline void store(double* history, const Vec3& angle) {
+  history[0] = angle.x;
+  history[1] = angle.y;
+  history[2] = angle.z;
+}
+
+/// Inertia (kg m^2) of the relative spin of two grains of these masses (kg). Frozen ones are of infinite mass, as in the normal models.
+inline double pair_inertia(const LAMMPS_NS::Atom& atom, const LAMMPS_NS::PairGran& pair, int i, double mass_i, int j, double mass_j) {
+  const auto mass = [&](int k, double its) { return atom.mask[k] & pair.freeze_group_bit() ? INFINITY : its; };
+  return dembark::relative_inertia(mass(i, mass_i), atom.radius[i], mass(j, mass_j), atom.radius[j]);
+}
+
 /// Calls `end(i, j, history)` for all pairs with one of `flags` that are farther apart than the contact distance factor allows. Of a
 /// pair that jumps so far in one step the engine's loop tells the models nothing, and its contact would go on when it touches again.
 template <class End>

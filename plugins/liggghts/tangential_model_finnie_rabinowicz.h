@@ -113,7 +113,9 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     const bool rolls = rolling_model() != dembark::RollingModel::off && rolling_(d.itype, d.jtype).on();
     if (rolls) {
       if (angle_ >= 0) angle = vector(d.contact_history + angle_);
-      const dembark::RollingContact contact{out.normal, twist, radius, inertia(d), d.Fn, d.kt, dembark_liggghts::relative_spin(d)};
+      const double inertia = d.is_wall ? dembark::relative_inertia(d.mi, d.radi, INFINITY, INFINITY)
+                                       : dembark_liggghts::pair_inertia(*atom, *pair_, d.i, d.mi, d.j, d.mj);
+      const dembark::RollingContact contact{out.normal, twist, radius, inertia, d.Fn, d.kt, dembark_liggghts::relative_spin(d)};
       add_couple(rolling_step(rolling_(d.itype, d.jtype), contact, dt, angle), out);
     }
     if (update_history) store(d.contact_history, state, rings, angle);
@@ -145,21 +147,11 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     return wall_ ? wall_->contact_match(kind, model) : pair_->contact_match(kind, model);
   }
 
-  /// Frozen grains are to the others of infinite mass, as in the normal models.
-  double inertia(const SurfacesIntersectData& d) const {
-    const auto mass = [&](int i, double its) { return atom->mask[i] & pair_->freeze_group_bit() ? INFINITY : its; };
-    if (d.is_wall) return dembark::relative_inertia(d.mi, d.radi, INFINITY, INFINITY);
-    return dembark::relative_inertia(mass(d.i, d.mi), d.radi, mass(d.j, d.mj), d.radj);
-  }
-
   void store(double* history, const dembark::FrictionState<double>& state, const dembark::SlipRings& rings,
              const dembark::Vec3<double>& angle) const {
     dembark_liggghts::store_friction(history + offset_, state);
     if (rings_ >= 0) dembark_liggghts::store_rings(history + rings_, rings);
-    if (angle_ < 0) return;
-    history[angle_] = angle.x;
-    history[angle_ + 1] = angle.y;
-    history[angle_ + 2] = angle.z;
+    if (angle_ >= 0) dembark_liggghts::store(history + angle_, angle);
   }
 };
 
