@@ -1,15 +1,16 @@
 // Rolling resistance: a couple against the relative rotation of two bodies in contact.
 //
 //   constant torque   M = -mu_r R* N w / |w|                                                                                   (1)
-//   elastic-plastic   M = -k_r theta - c_r w,   dtheta = w dt,   k_r |theta| <= mu_r R* N,   k_r = k_t R*^2                       (2)
-//                     c_r = 2 eta sqrt(7/2 I k_r) below the limit, 0 at it
+//   elastic-plastic   M = -k_r theta - c w,   dtheta = w dt,   k_r |theta| <= mu_r R* N,   |M| <= mu_r R* N                       (2)
+//                     k_r = k_t R*^2,   c = 2 eta sqrt(7/2 I k_r), or the largest smaller value with which |M| keeps the limit
 //
 // with the rolling part w of the relative spin, that of body 1 minus that of body 2, without what turns about the normal. N is the
 // repulsive force of the normal law (>= 0), as in friction. theta is a vector in the contact plane, with which it turns; at the limit the
-// spring yields. 1/I = 1/I_1 + 1/I_2 with I_k = 2/5 m_k r_k^2; 7/2 I is about the point of contact, as in the source.
+// spring yields, and rolling on is not damped. 1/I = 1/I_1 + 1/I_2 with I_k = 2/5 m_k r_k^2; 7/2 I is about the point of contact, as in the source.
 //
-// J. Ai, J.-F. Chen, J. M. Rotter & J. Y. Ooi, Powder Technology 206 (2011) 269, models A and C, the dashpot with f = 0; K. Iwashita &
-// M. Oda, J. Eng. Mech. 124 (1998) 285, for k_r = k_t R*^2. (1) cannot hold a body at rest: at most it takes away the rotation of a step,
+// J. Ai, J.-F. Chen, J. M. Rotter & J. Y. Ooi, Powder Technology 206 (2011) 269, models A and C, whose dashpot has no limit below that
+// of the spring: a fast spin would be stopped by it in the first step of a contact. K. Iwashita & M. Oda, J. Eng. Mech. 124 (1998) 285, for
+// k_r = k_t R*^2. (1) cannot hold a body at rest: at most it takes away the rotation of a step,
 // M <= I |w| / dt, so that it never drives. (2) can.
 //
 // Beside LIGGGHTS-PUBLIC 3.8.0: `cdt` takes the spring of the normal law for N, divides by the whole relative spin (a body that twists rolls
@@ -85,10 +86,13 @@ inline Vec3<double> rolling_step(const RollingResistance& law, const RollingCont
   angle = rotate_to_plane(angle, c.normal, c.twist) + dt * rolling;
   const double held = stiffness * norm(angle);
   if (held > most) angle *= most / held;
-  // A spring at its limit is there to round-off when the forces of a moment are asked for again: no dashpot then, either.
-  constexpr double round_off = 1e-12;
-  if (!(held < most * (1.0 - round_off))) return -stiffness * angle;
-  return -(stiffness * angle + 2.0 * law.damping_ratio * std::sqrt(3.5 * c.inertia * stiffness) * rolling);
+  const Vec3<double> spring = -stiffness * angle, dashpot = -2.0 * law.damping_ratio * std::sqrt(3.5 * c.inertia * stiffness) * rolling;
+  // The largest part of the dashpot with which the couple keeps the limit: |spring + part dashpot| = most.
+  const double size = dot(dashpot, dashpot), along = dot(spring, dashpot), left = std::max(most * most - dot(spring, spring), 0.0);
+  if (!(size + 2.0 * along > left)) return spring + dashpot;
+  const double root = std::sqrt(along * along + size * left);
+  // Of the two forms of the root the one without a difference of like numbers.
+  return spring + (along > 0.0 ? left / (along + root) : (root - along) / size) * dashpot;
 }
 
 }  // namespace dembark

@@ -9,6 +9,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "dembark/contact.hpp"
 
@@ -173,7 +174,9 @@ NB_MODULE(_physics, m) {
       .def("step",
            [](Contact& self, const nb::tuple& separation, const nb::tuple& v1, const nb::tuple& v2, const nb::tuple& w1,
               const nb::tuple& w2, double radius_1, double radius_2, double mass_1, double mass_2, double dt, bool update) {
-             const ContactBodies b{vector(separation), vector(v1), vector(v2), vector(w1), vector(w2), radius_1, radius_2, mass_1, mass_2};
+             ContactBodies b{vector(separation), vector(v1), vector(v2), vector(w1), vector(w2), radius_1, radius_2, mass_1, mass_2, {}};
+             // The velocity of a wall is that of its surface, with what its spin has in it.
+             if (std::isinf(radius_2)) std::swap(b.angular_velocity_2, b.wall_spin);
              const ContactState before = self.state;
              const ContactForce f = contact_step(self.parameters, b, dt, self.state, update);
              // A comparison with what is no number is false: such a contact would end without a word.
