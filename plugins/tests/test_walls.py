@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rig import liggghts_driver, walls, yade_driver
 from rig.motion import deviation
-from rig.scenarios import ALL_OF_IT, SCENARIOS, Grain, Path, Scenario
+from rig.scenarios import ALL_OF_IT, CONSTANT, SCENARIOS, SPRING, Grain, Path, Scenario
 from rig.walls import CYLINDER, FLOOR, Surface
 
 TOLERANCE = 1e-9
@@ -22,6 +22,8 @@ CASES = {
     "approach": _shorter("approach, bridge, wall", 1200),
     "cycles": _shorter("cycles, wall", 2200),
     "exponential": replace(_shorter("cycles, wall", 1500), material=replace(ALL_OF_IT, presliding="exponential")),
+    "rolling spring": replace(_shorter("cycles, wall", 1500), material=replace(ALL_OF_IT, **SPRING)),
+    "constant torque": replace(_shorter("cycles, wall", 1500), material=replace(ALL_OF_IT, **CONSTANT)),
     "sliding": _shorter("sliding, slow weakening", 1000),
     "around": Scenario(
         name="around", material=ALL_OF_IT, wall=True, time_step=1e-5, steps=1500,

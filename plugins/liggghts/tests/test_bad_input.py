@@ -73,6 +73,8 @@ def test_bad_value(tmp_path, name, values, words):
 
 @pytest.mark.parametrize(("old", "new", "words"), [
     ("capillary_model exact", "capillary_model magic", ("capillary_model", "magic", "exact, willett, willett_full, rabinovich, bagheri")),
+    ("presliding linear", "rolling_resistance uphill", ("rolling_resistance", "uphill", "off, constant_torque, elastic_plastic")),
+    ("presliding linear", "rolling_resistance constant_torque", ("coefficientRollingFriction", "property/global", "fix ID all")),
     ("presliding linear", "presliding curved", ("presliding", "curved", "linear, exponential, partial_slip")),
     ("model hertz", "model hertz/stiffness", ("combination", "not compiled", "hertz|hooke")),
     ("tangential finnie_rabinowicz", "tangential no_history", ("not compiled",)),

@@ -9,12 +9,13 @@ from rig import liggghts_driver
 from rig.energy_account import FIX, THERMO, Account
 from rig.liggghts_driver import models, properties, run_deck
 from rig.python_driver import contact
-from rig.scenarios import Grain, Material, Scenario
+from rig.scenarios import CONSTANT, SPRING, Grain, Material, Scenario
 
 from dembark.physics import Body, collide, effective_youngs_modulus
 
 DRY = Material(static_friction=0.5, kinetic_friction=0.4, restitution=0.6, youngs_modulus=5e6)
 WET = replace(DRY, bridge_volume=5e-11, viscosity=0.01, capillary_model="willett")
+ROLLING, CONSTANT_TORQUE = replace(DRY, **SPRING), replace(DRY, **CONSTANT)
 
 
 def grains() -> tuple[Grain, ...]:
@@ -35,7 +36,7 @@ def works_in_python(case: Scenario) -> dict[str, float]:
     out = collide(contact(m), *bodies, time_step=dt, steps=case.steps)
     elastic = effective_youngs_modulus(m.youngs_modulus, m.poisson_ratio, m.youngs_modulus, m.poisson_ratio)
     one, two = (g.radius for g in case.grains)
-    works = dict.fromkeys(("normal_spring", "normal_damping", "tangential", "bridges", "viscous"), 0.0)
+    works = dict.fromkeys(("normal_spring", "normal_damping", "tangential", "bridges", "viscous", "rolling"), 0.0)
     for x, v, spin, c in zip(out.position, out.velocity, out.angular_velocity, out.contacts, strict=True):
         normal = (x[0] - x[1]) / np.linalg.norm(x[0] - x[1])
         moved = v[0] - v[1]
@@ -46,25 +47,29 @@ def works_in_python(case: Scenario) -> dict[str, float]:
         works["normal_damping"] += (c.normal_force - spring) * parting * dt
         works["tangential"] += np.dot(c.tangential, sliding) * dt
         works["bridges"] -= c.capillary_force * parting * dt
+        works["rolling"] += np.dot(c.rolling, spin[0] - spin[1]) * dt
         works["viscous"] += (c.viscous_normal * parting + np.dot(c.viscous_tangential, sliding)) * dt
     return works
 
 
-@pytest.mark.parametrize("material", [DRY, replace(DRY, restitution=1.0), replace(WET, kinetic_friction=0.2)],
-                         ids=["dry", "elastic", "wet"])
+@pytest.mark.parametrize("material", [DRY, replace(DRY, restitution=1.0), replace(WET, kinetic_friction=0.2), ROLLING, CONSTANT_TORQUE],
+                         ids=["dry", "elastic", "wet", "rolling spring", "constant torque"])
 def test_parts_of_an_oblique_impact_are_those_of_the_laws(tmp_path, material):
     case = Scenario(name="impact", material=material, grains=grains(), time_step=2e-6, steps=1250, stride=10)
     account = account_of(tmp_path, case)
     account.assert_balanced()
     np.testing.assert_allclose(account.kinetic, account.full, rtol=1e-14)
     for name, expected in works_in_python(case).items():
-        found = account.tangential_spring + account.tangential_damping if name == "tangential" else getattr(account, name)
+        together = name in ("tangential", "rolling")
+        found = getattr(account, f"{name}_spring") + getattr(account, f"{name}_damping") if together else getattr(account, name)
         assert found[-1] == pytest.approx(expected, rel=1e-9, abs=1e-13 * account.turnover), name
         # Each part is there in the wet case; the spring has given back what it took.
-        assert not material.bridge_volume or name == "normal_spring" or abs(expected) > 1e-4 * account.turnover
+        assert not material.bridge_volume or name in ("normal_spring", "rolling") or abs(expected) > 1e-4 * account.turnover
     assert account.normal_spring.min() < -0.1 * account.turnover
     assert (account.tangential_damping[-1] == 0.0) == (material.restitution == 1.0)
-    assert account.normal_stored[-1] == account.tangential_stored[-1] == 0.0
+    assert account.normal_stored[-1] == account.tangential_stored[-1] == account.rolling_stored[-1] == 0.0
+    assert (account.rolling_damping[-1] < -1e-4 * account.turnover) == (material.rolling_resistance != "off")
+    assert (account.rolling_stored.max() > 0.0) == (account.rolling_spring[-1] < 0.0) == (material.rolling_resistance == "elastic_plastic")
 
 
 def step_errors(folder: Path, time_step: float) -> np.ndarray:
@@ -149,7 +154,7 @@ thermo 250
 """, ranks=ranks))
 
 
-@pytest.mark.parametrize(("material", "steps"), [(DRY, 5000), (WET, 3000)], ids=["dry", "wet"])
+@pytest.mark.parametrize(("material", "steps"), [(DRY, 5000), (WET, 3000), (ROLLING, 3000)], ids=["dry", "wet", "rolling"])
 def test_collapse_balances(tmp_path, material, steps):
     account = column(tmp_path, material, f"run {steps}")
     account.assert_balanced()
@@ -158,6 +163,7 @@ def test_collapse_balances(tmp_path, material, steps):
     # All of it happens: the column falls, everything that can be lost is, and the gate takes up what the grains push.
     assert account.gravity[-1] > account.start[0] and account.walls[-1] < -1e-3 * account.turnover
     present = ("normal_damping", "tangential_spring", "tangential_damping") + (("bridges", "viscous") if material is WET else ())
+    present += ("rolling_spring", "rolling_damping") if material is ROLLING else ()
     for name in present:
         assert getattr(account, name)[-1] < -1e-3 * account.turnover, name
     if material is DRY:

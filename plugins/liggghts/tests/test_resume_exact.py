@@ -7,7 +7,7 @@ import pytest
 from rig import liggghts_driver
 from rig.liggghts_driver import run_deck
 from rig.packing import CREATE, STATE, packing
-from rig.scenarios import Material
+from rig.scenarios import SPRING, Material
 
 BED = Material(static_friction=0.5, kinetic_friction=0.4, interface_shear_strength=1e5, bridge_volume=2e-10)
 STOCK = """\
@@ -31,8 +31,8 @@ def bed(stock, run_command, *, ranks, resume=False, material=BED):
     return text if ranks == 2 else text.replace("processors 2 1 1\n", "")
 
 
-@pytest.mark.parametrize(("stock", "material"), [(False, BED), (True, BED), (False, replace(BED, presliding="partial_slip"))],
-                         ids=["ours", "stock", "partial slip"])
+@pytest.mark.parametrize(("stock", "material"), [(False, BED), (True, BED), (False, replace(BED, presliding="partial_slip", **SPRING))],
+                         ids=["ours", "stock", "partial slip, rolling spring"])
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_resumed_run_is_the_same_to_the_bit(tmp_path, stock, material, ranks):
     """States every 700 steps, frames every 500: state 1400 is resumed where frame 1500 was written already."""

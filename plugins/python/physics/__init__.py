@@ -4,7 +4,7 @@ All quantities are in SI units.
 """
 
 from dembark.physics.capillary import CAPILLARY_MODELS, capillary_force, rupture_distance
-from dembark.physics.contact import Body, Contact, ContactForce, Trajectory, collide, drop
+from dembark.physics.contact import Body, Contact, ContactForce, RollingResistance, Trajectory, collide, drop
 from dembark.physics.friction import FinnieRabinowicz, FrictionPath
 from dembark.physics.impact import Drum, Impact, ImpactChain, ImpactMotion, ImpactSystem, Plane
 from dembark.physics.integration import AdamsEvent, AdamsSolution, LocalErrors, integrate_adams, local_errors
@@ -36,6 +36,7 @@ __all__ = [
     "LiquidBridge",
     "LocalErrors",
     "Plane",
+    "RollingResistance",
     "Trajectory",
     "ViscousResistance",
     "capillary_force",

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from rig.liggghts_driver import Run
 
 NAMES = ("kinetic", "start", "gravity", "normal_spring", "normal_damping", "tangential_spring", "tangential_damping", "bridges", "viscous",
-         "walls", "other", "imposed", "balance", "normal_stored", "tangential_stored", "step_error", "scale")
-WORKS = NAMES[2:12]
-LOSSES = ("normal_damping", "tangential_damping", "viscous")
+         "walls", "other", "imposed", "balance", "normal_stored", "tangential_stored", "step_error", "scale", "rolling_spring", "rolling_damping",
+         "rolling_stored")
+WORKS = NAMES[2:12] + NAMES[17:19]
+LOSSES = ("normal_damping", "tangential_damping", "viscous", "rolling_damping")
 FIX = "fix energy all energy/account"
 COLUMNS = f"thermo_style custom step atoms c_linear c_angular {' '.join(f'f_energy[{k}]' for k in range(1, len(NAMES) + 1))}"
 THERMO = f"""\

@@ -79,6 +79,9 @@ def properties(m: Material, **overrides: str) -> str:
     }
     if m.viscosity > 0.0:
         values |= {"liquidViscosity": f"scalar {m.viscosity!r}", "minimumGap": f"scalar {m.minimum_gap!r}"}
+    if m.rolling_resistance != "off":
+        values |= {"coefficientRollingFriction": pair.format(m.rolling_friction),
+                   "coefficientRollingViscousDamping": pair.format(m.rolling_damping_ratio)}
     assert not overrides.keys() - values.keys()
     values |= overrides
     return "\n".join(f"fix p_{name} all property/global {name} {value}" for name, value in values.items() if value)
@@ -88,6 +91,7 @@ def models(m: Material, tangential: str = "finnie_rabinowicz", wall: str = "") -
     """The words of `pair_style gran` or `fix wall/gran` that choose the models; `wall` stands between models and settings."""
     wet = m.bridge_volume > 0.0
     settings = f" presliding {m.presliding}" if tangential == "finnie_rabinowicz" else ""
+    settings += f" rolling_resistance {m.rolling_resistance}" if m.rolling_resistance != "off" else ""
     settings += f" capillary_model {m.capillary_model}" if wet else ""
     settings += " viscous_liquid on" if wet and m.viscosity > 0.0 else ""
     return f"model {m.normal_law} tangential {tangential}{' cohesion capillary' if wet else ''} {wall}{settings}"

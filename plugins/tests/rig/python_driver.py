@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dembark.physics import Body, Contact, FinnieRabinowicz, collide, drop, effective_shear_modulus, effective_youngs_modulus
+from dembark.physics import Body, Contact, FinnieRabinowicz, RollingResistance, collide, drop, effective_shear_modulus, effective_youngs_modulus
 from rig.motion import Motion
 from rig.scenarios import Material, Scenario, evaluate
 
@@ -16,6 +16,7 @@ def contact(m: Material) -> Contact:
         restitution=m.restitution, normal_law=m.normal_law, characteristic_velocity=m.characteristic_velocity,
         bridge_volume=m.bridge_volume, surface_tension=m.surface_tension, contact_angle=m.contact_angle, capillary_model=m.capillary_model,
         viscosity=m.viscosity, minimum_gap=m.minimum_gap,
+        rolling=RollingResistance(model=m.rolling_resistance, friction=m.rolling_friction, damping_ratio=m.rolling_damping_ratio),
         friction=FinnieRabinowicz(
             static_friction=m.static_friction, kinetic_friction=m.kinetic_friction, critical_slip_distance=m.critical_slip_distance,
             interface_shear_strength=m.interface_shear_strength, presliding=m.presliding, healing_time=m.healing_time))

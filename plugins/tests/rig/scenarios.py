@@ -29,6 +29,9 @@ class Material:
     interface_shear_strength: float = inf
     healing_time: float = 0.0
     presliding: str = "linear"
+    rolling_resistance: str = "off"
+    rolling_friction: float = 0.0
+    rolling_damping_ratio: float = 0.0
     bridge_volume: float = 0.0
     surface_tension: float = 0.072
     contact_angle: float = 0.35
@@ -147,6 +150,8 @@ DRY = Material()
 WET = Material(bridge_volume=2e-10)
 VISCOUS = Material(bridge_volume=2e-10, viscosity=0.2)
 ALL_OF_IT = Material(interface_shear_strength=2e4, bridge_volume=2e-10)
+SPRING = {"rolling_resistance": "elastic_plastic", "rolling_friction": 0.1, "rolling_damping_ratio": 0.3}
+CONSTANT = {"rolling_resistance": "constant_torque", "rolling_friction": 0.1}
 TURN = rotation_matrix((0.3, -0.7, 0.5), 1.1)
 
 
@@ -236,6 +241,8 @@ def _all() -> dict[str, Scenario]:
     undamped = replace(DRY, restitution=1.0)
     strong = replace(DRY, interface_shear_strength=2e4)
     partial = replace(DRY, presliding="partial_slip")
+    rolling, constant = replace(DRY, **SPRING), replace(DRY, **CONSTANT)
+    rolling_cycles = _cycles("cycles, rolling spring", rolling)
     linear = _cycles("cycles, linear, limited strength", strong)
     wet_collision = _collision("collision, wet", ALL_OF_IT, 0.6)
     cases = [
@@ -258,6 +265,14 @@ def _all() -> dict[str, Scenario]:
         _cycles("cycles, partial slip", partial),
         _cycles("cycles, partial slip, wall", replace(strong, presliding="partial_slip"), wall=True),
         _cycles("cycles, partial slip, rotated frame", partial).rotated(TURN, "cycles, partial slip, rotated frame"),
+        rolling_cycles,
+        rolling_cycles.rotated(TURN, "cycles, rolling spring, rotated frame"),
+        _cycles("cycles, rolling spring, wall", rolling, wall=True),
+        _cycles("cycles, rolling spring, partial slip", replace(partial, **SPRING)),
+        _cycles("cycles, rolling spring, hooke", replace(rolling, normal_law="hooke", characteristic_velocity=0.5)),
+        _cycles("cycles, constant torque", constant),
+        _cycles("cycles, constant torque, wall", constant, wall=True),
+        replace(_cycles("cycles, rolling spring, contact lost in between", rolling), steps=4500),
         _cycles("cycles, healing time", replace(DRY, healing_time=1e-3)),
         _cycles("cycles, wall", strong, wall=True),
         _cycles("cycles, exponential, wall", replace(strong, presliding="exponential"), wall=True),
@@ -276,6 +291,12 @@ def _all() -> dict[str, Scenario]:
         _collision("collision, partial slip", replace(strong, presliding="partial_slip"), 0.6),
         _collision("collision, partial slip, viscous", replace(ALL_OF_IT, viscosity=0.05, presliding="partial_slip"), 0.6),
         loaded(partial).spinning((1.0, 2.0, 2.0), 200.0, "loaded, partial slip, rigidly rotating"),
+        _collision("collision, rolling spring", replace(strong, **SPRING), 0.6),
+        _collision("collision, constant torque", constant, 0.6),
+        _collision("collision, rolling spring, viscous", replace(ALL_OF_IT, viscosity=0.05, **SPRING), 0.6),
+        loaded(rolling).spinning((1.0, 2.0, 2.0), 200.0, "loaded, rolling spring, rigidly rotating"),
+        _drop("drop, rolling spring", rolling),
+        _drop("drop, constant torque", constant),
         _collision("collision, hooke", replace(DRY, normal_law="hooke", characteristic_velocity=0.5), 0.6),
         wet_collision,
         wet_collision.rotated(TURN, "collision, wet, rotated frame"),

@@ -59,8 +59,7 @@ def follow(case: Scenario, surface: Surface) -> Motion:
     force, torque = np.zeros_like(x), np.zeros_like(x)
     for k in range(case.steps + 1):
         away, speed = surface.below(x[k, 0].copy(), k * case.time_step)
-        out = state.step(tuple(away), tuple(v[k, 0]), tuple(speed), tuple(w[k, 0]), (0.0, 0.0, 0.0), grain.radius, np.inf, grain.mass,
-                         np.inf,
+        out = state.step(tuple(away), tuple(v[k, 0]), tuple(speed), tuple(w[k, 0]), surface.spin, grain.radius, np.inf, grain.mass, np.inf,
                          case.time_step, k > 0)
         force[k, 0], torque[k, 0] = out[0], out[1]
     keep = slice(case.stride, None, case.stride)

@@ -76,6 +76,8 @@ def run(case, arrays):
         restitution=m["restitution"], staticFriction=m["static_friction"], kineticFriction=m["kinetic_friction"],
         criticalSlipDistance=m["critical_slip_distance"], interfaceShearStrength=min(m["interface_shear_strength"], 1e300),
         healingTime=m["healing_time"])
+    if m["rolling_resistance"] != "off":
+        laws.update(rollingFriction=m["rolling_friction"], rollingDampingRatio=m["rolling_damping_ratio"])
     wet = m["bridge_volume"] > 0.0
     if wet:
         laws.update(bridgeVolume=m["bridge_volume"], contactAngle=m["contact_angle"], surfaceTension=m["surface_tension"],
@@ -103,7 +105,7 @@ def run(case, arrays):
             [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**laws)],
             [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(
                 normalLaw=m["normal_law"], characteristicVelocity=m["characteristic_velocity"], presliding=m["presliding"],
-                capillaryModel=m["capillary_model"] if wet else "none")]),
+                rollingResistance=m["rolling_resistance"], capillaryModel=m["capillary_model"] if wet else "none")]),
         NewtonIntegrator(damping=0, gravity=gravity),
     ]
     O.dt = case["time_step"]

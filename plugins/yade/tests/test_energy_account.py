@@ -14,8 +14,10 @@ YOUNG, POISSON, DENSITY, RESTITUTION, STEP, R = 5e6, 0.3, 2500.0, 0.6, 2e-6, 0.0
 E_STAR, G_STAR = effective_youngs_modulus(YOUNG, POISSON, YOUNG, POISSON), effective_shear_modulus(YOUNG, POISSON, YOUNG, POISSON)
 BRIDGE, TENSION, ANGLE, VISCOSITY, SMALLEST_GAP = 2e-11, 0.072, 0.35, 5e-3, 1e-5
 PARTS = "normal_elastic normal_viscous tangential_elastic tangential_viscous capillary liquid_viscous".split()
-WORKS = ["gravity", *PARTS, "walls", "numerical_damping", "other", "imposed"]
-KEYS = ["kinetic", "first_kinetic", *WORKS, "balance", "normal_stored", "tangential_stored", "step_error", "scale"]
+ROLLING = ["rolling_elastic", "rolling_viscous"]
+WORKS = ["gravity", *PARTS, "walls", "numerical_damping", "other", "imposed", *ROLLING]
+KEYS = ["kinetic", "first_kinetic", *WORKS[:-2], "balance", "normal_stored", "tangential_stored", "step_error", "scale", *ROLLING,
+        "rolling_stored"]
 SCENES = ("impacts elastic dry wet damped box_gate drum periodic carried two_steps briefly save_load come_and_go in_a_step "
           "set_in_a_step reset table messages").split()
 
