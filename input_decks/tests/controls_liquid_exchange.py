@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from dembark.input_decks.tests.measuring import Control
-from dembark.input_decks.tests.test_liquid_measure import STEPS, Table, by_the_rule, due, of_run, replica, values
+from dembark.input_decks.tests.test_liquid_measure import STEPS, Table, by_the_rule, of_run, replica, values
 
 
 def dried(table: Table) -> None:

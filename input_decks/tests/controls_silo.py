@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dembark.input_decks.tests.measuring import Control, dried, judged, measured
 from dembark.input_decks.tests.synthetic import silo, told
-from dembark.input_decks.tests.test_silo_measures import filling, filling_points, SILO
+from dembark.input_decks.tests.test_silo_measures import SILO, filling, filling_points
 
 
 def controls(folder: Path) -> Iterator[Control]:

@@ -56,6 +56,11 @@ SPOILT = {
     "a plain implementation that skips a grain": only(massless, lambda options: options.get("backend") == "numpy")}
 
 
+def given(wrong, graining):
+    """`graining` of what `wrong` makes of a system."""
+    return lambda frame, links, *more, **options: graining(*wrong(frame, links, **options), *more, **options)
+
+
 def spoil(monkeypatch, control):
     """Have all items computed with wrong physics."""
     if control == "gravity doubled":
@@ -72,10 +77,7 @@ def spoil(monkeypatch, control):
                             lambda *given, walls, **more: graining(*given, walls=[stronger(one) for one in walls], **more))
     else:
         for module, name in ((fields_exact, "coarse_grain"), (fields_balance, "coarse_grain"), (fields_rings, "ring_fields")):
-            def changed(frame, links, *more, right=getattr(module, name), **options):
-                return right(*SPOILT[control](frame, links, **options), *more, **options)
-
-            monkeypatch.setattr(module, name, changed)
+            monkeypatch.setattr(module, name, given(SPOILT[control], getattr(module, name)))
 
 
 CONTROLS = [*SPOILT, "gravity doubled", "a base with a hundredth too much force"]
