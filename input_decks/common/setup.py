@@ -61,6 +61,14 @@ def friction(p: Parameters) -> dict[str, Number]:
     return {"grain_static": grain, "wall_static": wall, "grain_kinetic": kinetic[0], "wall_kinetic": kinetic[1]}
 
 
+def rolling(p: Parameters) -> dict[str, Number]:
+    """Coefficients of rolling resistance of grains and walls; none where the case has no such parameters."""
+    if not hasattr(p, "rolling_resistance"):
+        return {}
+    wall = p.rolling_friction if p.wall_rolling_friction is None else p.wall_rolling_friction
+    return {"grain_rolling": p.rolling_friction, "wall_rolling": wall}
+
+
 def liquid(p: Parameters) -> dict[str, Number]:
     """Whether there are bridges (`wet`) of liquid that grains carry (`carried`), and `reach` (m), which no bridge of a wall exceeds.
 
@@ -73,9 +81,10 @@ def liquid(p: Parameters) -> dict[str, Number]:
 
 
 def contacts(p: Parameters, skin: float = 0.1) -> dict[str, Number]:
-    """What the contacts of a deck need: friction, liquid, and the neighbour search's skin: `skin` mean diameters beyond all bridges."""
+    """What the contacts of a deck need: friction, rolling resistance, liquid, and the neighbour search's skin: `skin` mean diameters beyond
+    all bridges."""
     wet = liquid(p)
-    return {**friction(p), **wet, "skin": skin * p.grain_diameter + wet["reach"]}
+    return {**friction(p), **rolling(p), **wet, "skin": skin * p.grain_diameter + wet["reach"]}
 
 
 def rectangle(corner: Sequence[float], first: Sequence[float], second: Sequence[float]) -> Array:

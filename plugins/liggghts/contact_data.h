@@ -10,8 +10,10 @@
 #include "atom.h"
 #include "contact_interface.h"
 #include "error.h"
+#include "fix_mesh_surface.h"
 #include "neigh_list.h"
 #include "pair_gran.h"
+#include "tri_mesh.h"
 
 #include "dembark/contact.hpp"
 
@@ -32,6 +34,23 @@ inline dembark::ContactBodies bodies(const LIGGGHTS::ContactModels::SurfacesClos
   b.angular_velocity_2 = vector(omega[d.j]);
   b.radius_2 = d.radj;
   return b;
+}
+
+/// How a wall turns (rad/s), of a mesh that is rotated by the velocities of its triangle's corners; others do not turn.
+inline Vec3 wall_spin(const LIGGGHTS::ContactModels::SurfacesCloseData& d) {
+  if (!d.mesh || !d.mesh->isRotating()) return {};
+  auto* const velocities = d.mesh->prop().getElementProperty<LAMMPS_NS::MultiVectorContainer<double, 3, 3>>("v");
+  if (!velocities) return {};
+  double corner[3][3];
+  for (int k = 0; k < 3; ++k) d.mesh->node(d.j, k, corner[k]);
+  const auto from_first = [](const auto& row, int k) { return vector(row[k]) - vector(row[0]); };
+  double** const v = velocities->begin()[d.j];
+  return dembark::triangle_spin(from_first(corner, 1), from_first(corner, 2), from_first(v, 1), from_first(v, 2));
+}
+
+/// Relative spin (rad/s) of the two bodies.
+inline Vec3 relative_spin(const LIGGGHTS::ContactModels::SurfacesCloseData& d) {
+  return vector(d.omega_i) - (d.is_wall ? wall_spin(d) : vector(d.omega_j));
 }
 
 /// Adds an assembled force to what acts on the two bodies.
@@ -77,6 +96,19 @@ inline dembark::SlipRings load_rings(const double* history) {
   return rings;
 }
 inline void store_rings(double* history, const dembark::SlipRings& rings) { std::memcpy(history, &rings, sizeof rings); }
+
+/// The rolling spring: three numbers, its angle.
+inline void store(double* history, const Vec3& angle) {
+  history[0] = angle.x;
+  history[1] = angle.y;
+  history[2] = angle.z;
+}
+
+/// Inertia (kg m^2) of the relative spin of two grains of these masses (kg). Frozen ones are of infinite mass, as in the normal models.
+inline double pair_inertia(const LAMMPS_NS::Atom& atom, const LAMMPS_NS::PairGran& pair, int i, double mass_i, int j, double mass_j) {
+  const auto mass = [&](int k, double its) { return atom.mask[k] & pair.freeze_group_bit() ? INFINITY : its; };
+  return dembark::relative_inertia(mass(i, mass_i), atom.radius[i], mass(j, mass_j), atom.radius[j]);
+}
 
 /// Calls `end(i, j, history)` for all pairs with one of `flags` that are farther apart than the contact distance factor allows. Of a
 /// pair that jumps so far in one step the engine's loop tells the models nothing, and its contact would go on when it touches again.

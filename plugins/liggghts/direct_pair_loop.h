@@ -37,14 +37,17 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   static constexpr bool wet = Style::COHESION == LIGGGHTS::ContactModels::COHESION_CAPILLARY;
 
   LAMMPS_NS::LAMMPS* lmp_;
+  LAMMPS_NS::PairGran* pair_;
   double **youngs_modulus_ = nullptr, **shear_modulus_ = nullptr, **damping_factor_ = nullptr;  // effective ones, by types
   PairTable<dembark::FinnieRabinowicz> friction_;
+  PairTable<dembark::RollingResistance> rolling_;
   PairTable<dembark::Liquid> liquids_;
-  int friction_offset_ = 0, rings_offset_ = -1, bridge_offset_ = 0;  // in the history of a contact
-  double dt_ = 0.0;                                                  // of this step
+  int friction_offset_ = 0, rings_offset_ = -1, angle_offset_ = -1, bridge_offset_ = 0;  // in the history of a contact
+  double dt_ = 0.0;                                                                      // of this step
   bool update_history_ = false;
   bool plain_settings_ = true, tallied_ = false, limit_force_ = false, tangential_damping_ = true;
   dembark::Presliding presliding_ = dembark::Presliding::linear;
+  dembark::RollingModel rolling_model_ = dembark::RollingModel::off;
   dembark::capillary::Model model_ = dembark::capillary::Model::exact;
   PairPacks* const packs_ = choose_pair_packs();
   const std::unique_ptr<PairBlock> block_ = std::make_unique<PairBlock>();
@@ -86,6 +89,24 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     return force;
   }
 
+  Vec3 rolling(const PairBlock& block, int k, const Vec3& normal, double twist, double normal_force, double tangential_stiffness,
+               const Vec3& spin) override {
+    const LAMMPS_NS::Atom* const atom = lmp_->atom;
+    const int i = block.grain[k], j = block.partner[k];
+    double* const history = angle_offset_ >= 0 ? block.history[k] + angle_offset_ : nullptr;
+    Vec3 angle = history ? vector(history) : Vec3{};
+    const dembark::RollingContact contact{normal,
+                                          twist,
+                                          dembark::reduced(atom->radius[i], atom->radius[j]),
+                                          pair_inertia(*atom, *pair_, i, atom->rmass[i], j, atom->rmass[j]),
+                                          normal_force,
+                                          tangential_stiffness,
+                                          spin};
+    const Vec3 couple = rolling_step(rolling_(atom->type[i], atom->type[j]), contact, dt_, angle);
+    if (update_history_ && history) store(history, angle);
+    return couple;
+  }
+
   void bridges(const PairBlock& block, int first, int count, const double* gap, double* pull) override {
     const LAMMPS_NS::Atom* const atom = lmp_->atom;
     for (int n = 0; n < count; ++n) {
@@ -107,7 +128,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   }
 
  public:
-  DirectPairLoop(LAMMPS_NS::LAMMPS* lmp, LAMMPS_NS::PairGran* parent, std::int64_t hash) : Stock(lmp, parent, hash), lmp_(lmp) {}
+  DirectPairLoop(LAMMPS_NS::LAMMPS* lmp, LAMMPS_NS::PairGran* parent, std::int64_t hash) : Stock(lmp, parent, hash), lmp_(lmp), pair_(parent) {}
 
   void settings(int count, char** words, LIGGGHTS::IContactHistorySetup* history) override {
     Stock::settings(count, words, history);
@@ -116,6 +137,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
       if (word == "limitForce") limit_force_ = value == "on";
       else if (word == "tangential_damping") tangential_damping_ = value == "on";
       else if (word == "presliding") dembark::option_from_name(dembark::presliding_names(), value, presliding_);
+      else if (word == "rolling_resistance") dembark::option_from_name(dembark::rolling_names(), value, rolling_model_);
       else if (word == "capillary_model") dembark::capillary::model_from_name(words[k + 1], model_);
       else if (value != "off") plain_settings_ = false;
     }
@@ -133,6 +155,8 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     typedef models::TangentialModel<models::TANGENTIAL_FINNIE_RABINOWICZ> Friction;
     friction_offset_ = Stock::get_history_offset(Friction::history_name);
     if (presliding_ == dembark::Presliding::partial_slip) rings_offset_ = Stock::get_history_offset(Friction::rings_name);
+    if (rolling_model_ != dembark::RollingModel::off) rolling_ = read_rolling(read, rolling_model_);
+    if (rolling_model_ == dembark::RollingModel::elastic_plastic) angle_offset_ = Stock::get_history_offset(Friction::angle_name);
     if (wet && plain_settings_) {
       liquids_ = read_liquids(read, model_, false, false);
       bridge_offset_ = Stock::get_history_offset(models::CohesionModel<models::COHESION_CAPILLARY>::history_name);
@@ -155,8 +179,11 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     // The scalar law knows the other curves, and what a step of no length is.
     const bool pack_friction = presliding_ == dembark::Presliding::linear && dt_ > 0.0;
     // The factor of relaxed contacts (PairGran::relax) is 1 in this version of the engine.
-    packs_({atom, *pair, *this, laws_.data(), friction_.types() + 1, owned, friction_offset_, rings_offset_, ring_numbers, dt_, wet,
-            limit_force_, tangential_damping_, pack_friction},
+    // The rolling spring stands behind the rings.
+    const int more = rings_offset_ >= 0 ? rings_offset_ : angle_offset_;
+    const int numbers = (rings_offset_ >= 0 ? ring_numbers : 0) + (angle_offset_ >= 0 ? 3 : 0);
+    packs_({atom, *pair, *this, laws_.data(), friction_.types() + 1, owned, friction_offset_, more, numbers, dt_, wet, limit_force_,
+            tangential_damping_, pack_friction, rolling_model_ != dembark::RollingModel::off},
            *block_);
   }
 };

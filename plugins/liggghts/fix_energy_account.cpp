@@ -51,7 +51,7 @@ FixEnergyAccount::FixEnergyAccount(LAMMPS *lmp, int narg, char **arg) : Fix(lmp,
   restart_global = 1;
   nevery = global_freq = 1;
   vector_flag = 1;
-  size_vector = 17;
+  size_vector = int(dembark::energy_names.size()) - 1;
   extvector = 1;
 }
 
@@ -169,7 +169,7 @@ void FixEnergyAccount::impose(double change, double of, double &sum) const {
 EnergyLedger FixEnergyAccount::with_setup() const {
   EnergyLedger ledger = now_;
   ledger.kinetic = kinetic();
-  ledger.set_stored(tally.normal_stored, tally.tangential_stored);
+  ledger.set_stored(tally.normal_stored, tally.tangential_stored, tally.rolling_stored);
   if (begun_) {
     impose(ledger.kinetic - now_.kinetic, ledger.kinetic + now_.kinetic, ledger.imposed);
     impose(ledger.normal_stored - now_.normal_stored, ledger.normal_stored + now_.normal_stored, ledger.first_stored);
@@ -231,13 +231,13 @@ void FixEnergyAccount::final_integrate() {
 
 void FixEnergyAccount::end_of_step() {
   note_changes();
-  now_.set_stored(tally.normal_stored, tally.tangential_stored);
+  now_.set_stored(tally.normal_stored, tally.tangential_stored, tally.rolling_stored);
   shown_ = now_;
 }
 
 /// The energies in their order, without numerical damping, which LIGGGHTS has not. Collective.
 double FixEnergyAccount::compute_vector(int n) {
-  constexpr int numerical_damping = 4 + int(Powers::walls);
+  constexpr int numerical_damping = 4 + int(dembark::force_part_count);
   if (!begun_ && !fresh_) return 0.0;
   const EnergyLedger mine = fresh_ ? with_setup() : shown_;
   EnergyLedger all;

@@ -21,6 +21,7 @@ FixStyle(energy/account,FixEnergyAccount)
 #include "modify.h"
 
 #include "dembark/energy_ledger.hpp"
+#include "contact_data.h"
 
 namespace dembark_liggghts {
 
@@ -30,13 +31,13 @@ namespace dembark_liggghts {
 struct EnergyTally {
   std::vector<std::array<dembark::Dofs, dembark::contact_part_count>> loads;  ///< on each grain
   std::array<double, dembark::contact_part_count> wall_power{};  ///< W, of each part on the grains, were they moved as the wall is
-  double normal_stored = 0.0, tangential_stored = 0.0;           ///< J
+  double normal_stored = 0.0, tangential_stored = 0.0, rolling_stored = 0.0;  ///< J
 
   /// Begins anew for the forces of a moment, with this many owned grains.
   void clear(int grains) {
     loads.assign(std::size_t(grains), {});
     wall_power = {};
-    normal_stored = tangential_stored = 0.0;
+    normal_stored = tangential_stored = rolling_stored = 0.0;
   }
 
   /// The parts of a contact's force, and what its springs hold; `motion` has the lever arms. Of a pair that two ranks
@@ -47,14 +48,15 @@ struct EnergyTally {
     const dembark::ContactLevers levers(normal, motion);
     const bool owned = !d.is_wall && std::size_t(d.j) < loads.size();
     const double scale = d.is_wall ? d.area_ratio : 1.0, stored = d.is_wall || owned ? scale : 0.5;
-    for (std::size_t p = 0; p < dembark::contact_part_count; ++p) {
-      const dembark::Vec3<double> force = scale * parts.force[p];
-      dembark::add(loads[std::size_t(d.i)][p], levers.on_one(force));
-      if (owned) dembark::add(loads[std::size_t(d.j)][p], levers.on_two(force));
-      if (d.is_wall) wall_power[p] += dot(force, {d.v_j[0], d.v_j[1], d.v_j[2]});
+    for (std::size_t p = 0; p < parts.count; ++p) {
+      const dembark::Vec3<double> load = scale * parts.load[p];
+      dembark::add(loads[std::size_t(d.i)][p], levers.on_one(p, load));
+      if (owned) dembark::add(loads[std::size_t(d.j)][p], levers.on_two(p, load));
+      if (d.is_wall) wall_power[p] += dot(load, p < dembark::force_part_count ? vector(d.v_j) : wall_spin(d));
     }
     normal_stored += stored * parts.normal_stored;
     tangential_stored += stored * parts.tangential_stored;
+    rolling_stored += stored * parts.rolling_stored;
   }
 };
 

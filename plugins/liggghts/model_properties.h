@@ -141,6 +141,15 @@ inline PairTable<dembark::FinnieRabinowicz> read_friction(const PropertyReader& 
   });
 }
 
+inline PairTable<dembark::RollingResistance> read_rolling(const PropertyReader& read, dembark::RollingModel model) {
+  return for_all_pairs(read, [&](int i, int j, const std::string& pair) {
+    dembark::RollingResistance law{model, read.per_pair("coefficientRollingFriction", i, j), 0.0};
+    if (model == dembark::RollingModel::elastic_plastic) law.damping_ratio = read.per_pair("coefficientRollingViscousDamping", i, j, 0.0);
+    if (law.error()) read.fail(std::string(law.error()) + " (types " + pair + ")");
+    return law;
+  });
+}
+
 /// `carried`: bridges take their volume from the grains, none is given.
 inline PairTable<dembark::Liquid> read_liquids(const PropertyReader& read, dembark::capillary::Model model, bool viscous, bool carried) {
   dembark::Liquid same;

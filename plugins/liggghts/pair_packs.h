@@ -52,6 +52,9 @@ struct ScalarLaws {
   /// Friction on the first grain (N); the state is stored.
   virtual dembark::Vec3<double> friction(const PairBlock& block, int k, const dembark::Vec3<double>& normal, double twist,
                                          const dembark::NormalResponse<double>& response, const dembark::Vec3<double>& velocity) = 0;
+  /// Couple of rolling resistance on the first grain (N m); the state is stored.
+  virtual dembark::Vec3<double> rolling(const PairBlock& block, int k, const dembark::Vec3<double>& normal, double twist,
+                                        double normal_force, double tangential_stiffness, const dembark::Vec3<double>& spin) = 0;
   /// Pulls (N) of the bridges of `count` pairs over their gaps (m).
   virtual void bridges(const PairBlock& block, int first, int count, const double* gap, double* pull) = 0;
 };
@@ -64,10 +67,11 @@ struct PairStep {
   int types;                    // in a row; with 2, only the pair 1-1 is there
   int owned;                    // grains from here on get no forces
   int offset;                   // of friction in a history
-  int rings, ring_numbers;      // the same of partial slip; -1: there is none
+  int more, more_numbers;       // the same of partial slip and of a rolling spring; -1: there is none
   double dt;
   bool wet, limit_force, tangential_damping;
   bool pack_friction;  // false leaves all friction to the scalar law
+  bool rolls;
 
   // (grains, 3) or (grains)
   const double *x = atom.x[0], *v = atom.v[0], *omega = atom.omega[0], *radius = atom.radius, *mass = atom.rmass;

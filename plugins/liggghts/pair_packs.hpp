@@ -108,6 +108,25 @@ __attribute__((noinline)) void scalar_friction(const PairStep& s, const PairBloc
   }
 }
 
+/// Couples of the lanes `touching` of the pack at `first`, each by the scalar law, onto both grains.
+template <class P>
+__attribute__((noinline)) void scalar_rolling(const PairStep& s, const PairBlock& b, int first, unsigned touching, const PackVec<P>& normal,
+                                              const P& twist, const PackVec<P>& spin, const dembark::NormalResponse<P>& response) {
+  for (int k = 0; k < P::size; ++k) {
+    if (!(touching >> k & 1)) continue;
+    const auto lane = [k](const PackVec<P>& v) { return dembark::Vec3<double>{v.x[k], v.y[k], v.z[k]}; };
+    const dembark::Vec3<double> couple =
+        s.scalar.rolling(b, first + k, lane(normal), twist[k], response.force[k], response.tangential_stiffness[k], lane(spin));
+    const auto add_to = [&s](int grain, const dembark::Vec3<double>& torque) {
+      if (grain >= s.owned) return;
+      double* const to = s.torque + 3 * static_cast<long>(grain);
+      to[0] += torque.x, to[1] += torque.y, to[2] += torque.z;
+    };
+    add_to(b.grain[first + k], couple);
+    add_to(b.partner[first + k], -couple);
+  }
+}
+
 /// to += scale * row, both of three numbers.
 template <class P>
 DEMBARK_HOT void add(double* to, double scale, const double* row) {
@@ -179,8 +198,8 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
       forget(state.displacement.x), forget(state.displacement.y), forget(state.displacement.z);
       forget(state.slip);
       forget(state.dissipated_energy);
-      for (int k = 0; s.rings >= 0 && k < count; ++k)
-        if (apart >> k & 1) __builtin_memset(b.history[first + k] + s.rings, 0, s.ring_numbers * sizeof(double));
+      for (int k = 0; s.more >= 0 && k < count; ++k)
+        if (apart >> k & 1) __builtin_memset(b.history[first + k] + s.more, 0, s.more_numbers * sizeof(double));
     }
     const unsigned packed = (s.pack_friction ? bits(sticks) | apart : apart) & there;
     const Quad<P> spring{state.displacement.x, state.displacement.y, state.displacement.z, state.slip};
@@ -201,6 +220,7 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
       scalar_friction<P>(s, b, first, there & ~packed, normal, twist, motion.tangential_velocity, response, tangential);
     }
 
+    if (s.rolls) scalar_rolling<P>(s, b, first, there & ~apart, normal, twist, omega_i - omega_j, response);
     if (s.wet) {
       alignas(64) double gap[N], pull[N];
       (distance - radius_sum).store(gap);

@@ -1,6 +1,8 @@
-// LIGGGHTS adapter of the Finnie-Rabinowicz tangential law: fetches the contact, calls dembark/contact.hpp, adds the force.
+// LIGGGHTS adapter of the Finnie-Rabinowicz tangential law and of rolling resistance: fetches the contact, calls dembark/contact.hpp, adds
+// the force.
 //
 //   pair_style gran model hertz tangential finnie_rabinowicz [presliding linear|exponential|partial_slip]
+//              [rolling_resistance off|constant_torque|elastic_plastic]
 //
 // Works compiled out of tree into liggghts-dembark and, unchanged, copied into a LIGGGHTS src/ folder.
 #ifdef TANGENTIAL_MODEL
@@ -32,8 +34,10 @@ template <>
 class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase {
   int offset_;
   int rings_ = -1;  // offset, with partial slip
-  int presliding_ = 0;
+  int angle_ = -1;  // the same of an elastic-plastic rolling spring
+  int presliding_ = 0, rolling_model_ = 0;
   dembark_liggghts::PairTable<dembark::FinnieRabinowicz> laws_;
+  dembark_liggghts::PairTable<dembark::RollingResistance> rolling_;
   LAMMPS_NS::PairGran* const pair_;  // nullptr: these are contacts with a wall
   LAMMPS_NS::FixWallGran* const wall_;
   dembark_liggghts::EnergyTally* tally_ = nullptr;
@@ -42,6 +46,7 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
  public:
   static constexpr const char* history_name = "finnie_rabinowicz";
   static constexpr const char* rings_name = "slip_rings";
+  static constexpr const char* angle_name = "rolling_angle";
 
   TangentialModel(LAMMPS* lmp, IContactHistorySetup* host, class ContactModelBase* models)
       : TangentialModelBase(lmp, host, models),
@@ -58,19 +63,30 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
 
   void registerSettings(Settings& settings) {
     dembark_liggghts::register_choice(settings, "presliding", presliding_, dembark::presliding_names());
+    dembark_liggghts::register_choice(settings, "rolling_resistance", rolling_model_, dembark::rolling_names());
   }
 
   inline void postSettings(IContactHistorySetup* host, ContactModelBase* models) {
-    if (static_cast<dembark::Presliding>(presliding_) != dembark::Presliding::partial_slip) return;
-    rings_ = dembark_liggghts::add_rings(*host);
-    models->add_history_offset(rings_name, rings_);
+    if (static_cast<dembark::Presliding>(presliding_) == dembark::Presliding::partial_slip) {
+      rings_ = dembark_liggghts::add_rings(*host);
+      models->add_history_offset(rings_name, rings_);
+    }
+    if (rolling_model() != dembark::RollingModel::elastic_plastic) return;
+    angle_ = host->add_history_value("rolling_angle_x", "1");
+    host->add_history_value("rolling_angle_y", "1");
+    host->add_history_value("rolling_angle_z", "1");
+    models->add_history_offset(angle_name, angle_);
   }
 
   void connectToProperties(PropertyRegistry& registry) {
     const dembark_liggghts::PropertyReader read(registry, modify, error, "tangential finnie_rabinowicz");
     laws_ = dembark_liggghts::read_friction(read, static_cast<dembark::Presliding>(presliding_));
+    if (rolling_model() != dembark::RollingModel::off) {
+      if (!matches("rolling_friction", "off")) read.fail("rolling_resistance and the model rolling_friction are both on; leave one of them out");
+      rolling_ = dembark_liggghts::read_rolling(read, rolling_model());
+    }
     tally_ = dembark_liggghts::find_energy_tally(modify);
-    exponent_ = (wall_ ? wall_->contact_match("normal", "hertz") : pair_->contact_match("normal", "hertz")) ? 1.5 : 1.0;
+    exponent_ = matches("normal", "hertz") ? 1.5 : 1.0;
     // The engine tells a model of the end of a contact only within this factor of the radii; without it a grain that bounces
     // between two builds of the neighbour list would keep the displacement of its last contact (as it does in `history`).
     neighbor->register_contact_dist_factor(1.01);
@@ -92,32 +108,50 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     out.normal = vector(d.en);
     const double twist = contact_twist(out.normal, vector(d.omega_i), d.is_wall ? dembark::Vec3<double>{} : vector(d.omega_j), dt);
     out.tangential = contact_friction(laws_(d.itype, d.jtype), out.normal, twist, response, motion.tangential_velocity, dt, state, &rings);
-    if (update_history) store(d.contact_history, state, rings);
     assemble(motion, out);
+    dembark::Vec3<double> angle;
+    const bool rolls = rolling_model() != dembark::RollingModel::off && rolling_(d.itype, d.jtype).on();
+    if (rolls) {
+      if (angle_ >= 0) angle = vector(d.contact_history + angle_);
+      const double inertia = d.is_wall ? dembark::relative_inertia(d.mi, d.radi, INFINITY, INFINITY)
+                                       : dembark_liggghts::pair_inertia(*atom, *pair_, d.i, d.mi, d.j, d.mj);
+      const dembark::RollingContact contact{out.normal, twist, radius, inertia, d.Fn, d.kt, dembark_liggghts::relative_spin(d)};
+      add_couple(rolling_step(rolling_(d.itype, d.jtype), contact, dt, angle), out);
+    }
+    if (update_history) store(d.contact_history, state, rings, angle);
     dembark_liggghts::add_force(out, d, i_forces, j_forces);
     if (!tally_) return;
     dembark::ContactParts parts;
     split_touching(parts, out.normal, d.deltan, d.kn * d.deltan, exponent_, d.Fn, d.kt, out.tangential, state.displacement,
                    rings_ >= 0 ? &rings : nullptr);
+    if (rolls) split_rolling(parts, out.rolling, angle, dembark::rolling_stiffness(d.kt, radius));
     tally_->add(d, out.normal, parts, motion);
   }
 
   inline void surfacesClose(SurfacesCloseData& d, ForceData&, ForceData&) {
     if (d.contact_flags) *d.contact_flags &= ~CONTACT_TANGENTIAL_MODEL;
-    if (d.contact_history) store(d.contact_history, {}, {});
+    if (d.contact_history) store(d.contact_history, {}, {}, {});
   }
 
   inline void beginPass(SurfacesIntersectData&, ForceData&, ForceData&) {
     if (!pair_) return;
     dembark_liggghts::end_parted_pairs(*pair_, *atom, neighbor->contactDistanceFactor, CONTACT_TANGENTIAL_MODEL,
-                                       [this](int, int, double* history) { store(history, {}, {}); });
+                                       [this](int, int, double* history) { store(history, {}, {}, {}); });
   }
   inline void endPass(SurfacesIntersectData&, ForceData&, ForceData&) {}
 
  private:
-  void store(double* history, const dembark::FrictionState<double>& state, const dembark::SlipRings& rings) const {
+  dembark::RollingModel rolling_model() const { return static_cast<dembark::RollingModel>(rolling_model_); }
+
+  bool matches(const char* kind, const char* model) const {
+    return wall_ ? wall_->contact_match(kind, model) : pair_->contact_match(kind, model);
+  }
+
+  void store(double* history, const dembark::FrictionState<double>& state, const dembark::SlipRings& rings,
+             const dembark::Vec3<double>& angle) const {
     dembark_liggghts::store_friction(history + offset_, state);
     if (rings_ >= 0) dembark_liggghts::store_rings(history + rings_, rings);
+    if (angle_ >= 0) dembark_liggghts::store(history + angle_, angle);
   }
 };
 

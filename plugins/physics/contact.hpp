@@ -1,8 +1,9 @@
-// One whole contact: kinematics, normal force, Finnie-Rabinowicz friction and liquid bridge, for two spheres or a sphere and a wall.
+// One whole contact: kinematics, normal force, Finnie-Rabinowicz friction, rolling resistance and liquid bridge, for two spheres or a sphere
+// and a wall.
 //
 // contact_step() is the contact as YADE and Python have it. An engine that computes contacts model by model (LIGGGHTS), or many at once,
 // calls the stages that it is made of: surface_motion(), hertz() or hooke() and adjusted(), contact_friction(), bridge_step() and
-// bridge_resistance(), assemble().
+// bridge_resistance(), assemble(), rolling_step() and add_couple().
 //
 // Conventions: the unit normal points from body 2 to body 1; forces are those on body 1. A wall is body 2 with an infinite radius
 // and an infinite mass; its velocity is that of its surface at the contact. Lever arms reach to the middle of the overlap,
@@ -20,6 +21,7 @@
 #include "kinematics.hpp"
 #include "normal_force.hpp"
 #include "partial_slip.hpp"
+#include "rolling_resistance.hpp"
 #include "vec3.hpp"
 
 namespace dembark {
@@ -53,6 +55,7 @@ struct ContactParameters {
   bool limit_force = false;  ///< no attraction by damping: F >= 0
   FinnieRabinowicz friction{};
   Liquid liquid{};
+  RollingResistance rolling{};
 
   /// The normal law, as it is without the switches above.
   NormalResponse<double> respond(double effective_radius, double effective_mass, double overlap, double normal_velocity) const {
@@ -67,6 +70,7 @@ struct ContactState {
   double bridge_volume = 0.0;     ///< m^3; 0 = no bridge
   double rupture_distance = 0.0;  ///< m, of the bridge that is there
   SlipRings rings{};              ///< for Presliding::partial_slip
+  Vec3<double> rolling_angle{};   ///< rad, for RollingModel::elastic_plastic
 };
 
 /// The two bodies as an engine sees them. `separation` = position of 1 minus position of 2 (minus the nearest wall point),
@@ -77,9 +81,11 @@ struct ContactBodies {
   Vec3<double> angular_velocity_1{}, angular_velocity_2{};
   double radius_1 = 0.0, radius_2 = INFINITY;
   double mass_1 = 0.0, mass_2 = INFINITY;
+  Vec3<double> wall_spin{};  ///< rad/s, how a wall turns, which body 1 rolls against
 
   double effective_radius() const { return reduced(radius_1, radius_2); }
   double effective_mass() const { return reduced(mass_1, mass_2); }
+  Vec3<double> relative_spin() const { return angular_velocity_1 - angular_velocity_2 - wall_spin; }
 };
 
 struct ContactForce {
@@ -94,6 +100,7 @@ struct ContactForce {
   Vec3<double> viscous_tangential{};                          ///< N, of the liquid, on body 1
   Vec3<double> force{};                                       ///< N, on body 1, everything; body 2 gets its negative
   Vec3<double> torque_1{}, torque_2{};                        ///< N m
+  Vec3<double> rolling{};                                     ///< N m, couple of rolling resistance on body 1, a part of its torque
 };
 
 typedef SurfaceMotion<double> RelativeMotion;
@@ -146,6 +153,13 @@ inline void assemble(const RelativeMotion& motion, ContactForce& out) {
   out.force = (out.normal_force - out.capillary_force + out.viscous_normal) * out.normal + along_surface;
 }
 
+/// The couple of rolling resistance, into what is assembled.
+inline void add_couple(const Vec3<double>& couple, ContactForce& out) {
+  out.rolling = couple;
+  out.torque_1 += couple;
+  out.torque_2 -= couple;
+}
+
 /// One step of one contact. `dt` in s. With `update` false (the set-up of a run) forces are those of the present state, which
 /// stays as it is.
 inline ContactForce contact_step(const ContactParameters& p, const ContactBodies& b, double dt, ContactState& stored, bool update = true) {
@@ -161,6 +175,7 @@ inline ContactForce contact_step(const ContactParameters& p, const ContactBodies
   out.capillary_force = bridge_step(p.liquid, b.radius_1, b.radius_2, -out.overlap, touching, state.bridge_volume, state.rupture_distance);
   const bool viscous = p.liquid.viscous.on() && state.bridge_volume > 0.0;
   RelativeMotion motion;
+  Vec3<double> couple{};
   if (touching || viscous) motion = relative_motion(b, out.normal, out.overlap);
   if (viscous) bridge_resistance(p.liquid, b, state.bridge_volume, motion, out);
 
@@ -173,11 +188,18 @@ inline ContactForce contact_step(const ContactParameters& p, const ContactBodies
     out.tangential_stiffness = response.tangential_stiffness;
     out.tangential =
         contact_friction(p.friction, out.normal, twist, response, motion.tangential_velocity, step, state.friction, &state.rings);
+    if (p.rolling.on())
+      couple = rolling_step(p.rolling,
+                            {out.normal, twist, b.effective_radius(), relative_inertia(b.mass_1, b.radius_1, b.mass_2, b.radius_2),
+                             response.force, response.tangential_stiffness, b.relative_spin()},
+                            step, state.rolling_angle);
   } else {
     state.friction = {};
+    state.rolling_angle = {};
     if (p.friction.presliding == Presliding::partial_slip) state.rings = {};
   }
   assemble(motion, out);
+  if (p.rolling.on()) add_couple(couple, out);
   out.interacting = touching || state.bridge_volume > 0.0;
   return out;
 }

@@ -40,18 +40,23 @@ enum class ContactPart {
   tangential_viscous,  ///< tangential damping
   capillary,           ///< liquid bridge
   liquid_viscous,      ///< what the liquid of a bridge resists with
+  rolling_elastic,     ///< spring of rolling resistance, yielding included
+  rolling_viscous,     ///< its dashpot, or the whole of a constant torque
 };
-constexpr std::size_t contact_part_count = 6;
+constexpr std::size_t contact_part_count = 8;
+constexpr std::size_t force_part_count = 6;  ///< the parts from here on are couples
 
 /// The parts of a contact's force on body 1 (N; body 2 gets the negatives) and what its springs hold. Their sum is the force; the torques
-/// of a part are those of the contact, -arm n x force, with the lever arms of relative_motion().
+/// of a part are those of the contact, -arm n x force, with the lever arms of relative_motion(). Couples (N m) stand behind the forces.
 struct ContactParts {
-  std::array<Vec3<double>, contact_part_count> force{};
+  std::array<Vec3<double>, contact_part_count> load{};
+  std::size_t count = force_part_count;  ///< without rolling resistance there are no couples
   double normal_stored = 0.0;      ///< J, elastic energy at this overlap
   double tangential_stored = 0.0;  ///< J, k_t xi^2 / 2
+  double rolling_stored = 0.0;     ///< J, k_r theta^2 / 2
 
-  Vec3<double>& operator[](ContactPart part) { return force[static_cast<std::size_t>(part)]; }
-  const Vec3<double>& operator[](ContactPart part) const { return force[static_cast<std::size_t>(part)]; }
+  Vec3<double>& operator[](ContactPart part) { return load[static_cast<std::size_t>(part)]; }
+  const Vec3<double>& operator[](ContactPart part) const { return load[static_cast<std::size_t>(part)]; }
 };
 
 /// Where the force of a contact acts: lever arms (m) from the positions of its bodies.
@@ -63,6 +68,9 @@ struct ContactLevers {
   /// Forces and torques on bodies 1 and 2 by this force on body 1.
   Dofs on_one(const Vec3<double>& force) const { return dofs(force, cross(one, force)); }
   Dofs on_two(const Vec3<double>& force) const { return dofs(-force, cross(force, two)); }
+  /// The same by a part, force or couple.
+  Dofs on_one(std::size_t part, const Vec3<double>& load) const { return part < force_part_count ? on_one(load) : dofs({}, load); }
+  Dofs on_two(std::size_t part, const Vec3<double>& load) const { return part < force_part_count ? on_two(load) : dofs({}, -load); }
   /// m/s, of body 1 against body 2.
   Vec3<double> velocity(const Dofs& v, const Dofs& w) const {
     return Vec3<double>{v[0] - w[0], v[1] - w[1], v[2] - w[2]} + cross({v[3], v[4], v[5]}, one) - cross({w[3], w[4], w[5]}, two);
@@ -84,6 +92,15 @@ inline void split_touching(ContactParts& parts, const Vec3<double>& normal, doub
   parts.tangential_stored = rings ? stored_energy(*rings, stiffness) : 0.5 * stiffness * dot(displacement, displacement);
 }
 
+/// Spring and dashpot of rolling resistance. `couple`: N m, on body 1; `angle`: theta after the step; `stiffness`: k_r.
+inline void split_rolling(ContactParts& parts, const Vec3<double>& couple, const Vec3<double>& angle, double stiffness) {
+  const Vec3<double> held = -stiffness * angle;
+  parts.count = contact_part_count;
+  parts[ContactPart::rolling_elastic] = held;
+  parts[ContactPart::rolling_viscous] = couple - held;
+  parts.rolling_stored = 0.5 * stiffness * dot(angle, angle);
+}
+
 /// What the liquid of a bridge does.
 inline void split_bridge(ContactParts& parts, const ContactForce& force) {
   parts[ContactPart::capillary] = -force.capillary_force * force.normal;
@@ -102,6 +119,8 @@ inline ContactParts contact_parts(const ContactParameters& p, const ContactBodie
   split_touching(parts, force.normal, force.overlap, spring.force, p.normal_law == NormalLaw::hertz ? 1.5 : 1.0, force.normal_force,
                  spring.tangential_stiffness, force.tangential, state.friction.displacement,
                  p.friction.presliding == Presliding::partial_slip ? &state.rings : nullptr);
+  if (p.rolling.on())
+    split_rolling(parts, force.rolling, state.rolling_angle, rolling_stiffness(spring.tangential_stiffness, bodies.effective_radius()));
   return parts;
 }
 

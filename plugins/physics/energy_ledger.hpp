@@ -91,12 +91,18 @@ struct Powers {
   double add_contact(const ContactParts& parts, const ContactLevers& levers, const BodyMotion& one, const BodyMotion& two) {
     const Vec3<double> velocity = levers.velocity(one.velocity, two.velocity);
     Vec3<double> whole{};
-    for (std::size_t part = 0; part < contact_part_count; ++part) {
-      power[part] += dot(parts.force[part], velocity);
-      whole += parts.force[part];
+    for (std::size_t part = 0; part < force_part_count; ++part) {
+      power[part] += dot(parts.load[part], velocity);
+      whole += parts.load[part];
     }
     add_held(one, levers.on_one(whole));
     add_held(two, levers.on_two(whole));
+    for (std::size_t part = force_part_count; part < parts.count; ++part) {
+      const Dofs on_one = levers.on_one(part, parts.load[part]), on_two = levers.on_two(part, parts.load[part]);
+      power[part] += dot(on_one, one.velocity) + dot(on_two, two.velocity);
+      add_held(one, on_one);
+      add_held(two, on_two);
+    }
     return dot(parts[ContactPart::normal_elastic], velocity);
   }
   /// What acts on a body as far as that is held: it gives the others what it takes.
@@ -109,17 +115,17 @@ struct Powers {
   }
 };
 
-constexpr std::array<const char*, 18> energy_names{{"kinetic", "first_kinetic", "gravity", "normal_elastic", "normal_viscous",
+constexpr std::array<const char*, 21> energy_names{{"kinetic", "first_kinetic", "gravity", "normal_elastic", "normal_viscous",
                                                     "tangential_elastic", "tangential_viscous", "capillary", "liquid_viscous", "walls",
                                                     "numerical_damping", "other", "imposed", "balance", "normal_stored",
-                                                    "tangential_stored", "step_error", "scale"}};
+                                                    "tangential_stored", "step_error", "scale", "rolling_elastic", "rolling_viscous", "rolling_stored"}};
 typedef std::array<double, energy_names.size()> Energies;  ///< J, in the order of their names
 
 /// The sums of a run, plain numbers: those of several processes add up, and a restart file holds them as they are.
 struct EnergyLedger {
   double kinetic = 0.0, first_kinetic = 0.0;
   double imposed = 0.0;  ///< kinetic energy that no force made
-  double normal_stored = 0.0, tangential_stored = 0.0;
+  double normal_stored = 0.0, tangential_stored = 0.0, rolling_stored = 0.0;
   double first_stored = 0.0;  ///< of the normal springs at the beginning, and what came and went with bodies
   double spring_ahead = 0.0;  ///< work of the normal springs from the velocities of `work` to the positions of `normal_stored`
   Powers::Each work{};
@@ -132,9 +138,10 @@ struct EnergyLedger {
     spring_ahead -= work[0] - before;
   }
   /// What the springs hold at the present positions; `ahead`: work of the normal springs up to these that is not in `work` yet.
-  void set_stored(double normal, double tangential, double ahead = 0.0) {
+  void set_stored(double normal, double tangential, double rolling, double ahead = 0.0) {
     normal_stored = normal;
     tangential_stored = tangential;
+    rolling_stored = rolling;
     spring_ahead = ahead;
   }
   /// A body after a kick, with the velocity `after`: its kinetic energy (J). What is not as the forces made it was set by somebody.
@@ -168,7 +175,8 @@ struct EnergyLedger {
     const double step_error = work[0] + spring_ahead + normal_stored - first_stored;
     const double scale = first_kinetic + sizes + std::abs(gravity) + std::abs(damping) + std::abs(other) + std::abs(imposed);
     return {kinetic, first_kinetic, gravity, work[0], work[1],       work[2],           work[3],    work[4], work[5], work[Powers::walls],
-            damping, other,         imposed, balance, normal_stored, tangential_stored, step_error, scale};
+            damping, other,         imposed, balance, normal_stored, tangential_stored, step_error, scale,
+            work[6], work[7], rolling_stored};
   }
 };
 constexpr std::size_t energy_ledger_size = sizeof(EnergyLedger) / sizeof(double);

@@ -30,4 +30,14 @@ DEMBARK_HOT Real contact_twist(const Vec3<Real>& normal, const Vec3<Real>& spin_
   return 0.5 * dt * dot(spin_1 + spin_2, normal);
 }
 
+/// Angular velocity (rad/s) of a rigid triangle from two of its edges (m) and from the velocities (m/s) of their ends against their common
+/// beginning.
+inline Vec3<double> triangle_spin(const Vec3<double>& edge_1, const Vec3<double>& edge_2, const Vec3<double>& velocity_1,
+                                  const Vec3<double>& velocity_2) {
+  const Vec3<double> normal = cross(edge_1, edge_2), across = cross(normal, edge_1);
+  const double area = dot(normal, normal);
+  return (1.0 / area) * (dot(velocity_2, normal) * edge_1 - dot(velocity_1, normal) * edge_2 +
+                         (dot(velocity_1, across) / dot(edge_1, edge_1)) * normal);
+}
+
 }  // namespace dembark

@@ -144,18 +144,27 @@ NB_MODULE(_physics, m) {
         return nb::make_tuple(forces, slips, energies);
       });
 
+  nb::class_<RollingResistance>(m, "RollingResistance")
+      .def("__init__", [](RollingResistance* self, const std::string& model, double friction, double damping_ratio) {
+        const RollingResistance law{option_of<RollingModel>("rolling resistance", rolling_names(), model), friction, damping_ratio};
+        if (law.error()) throw std::invalid_argument(law.error());
+        new (self) RollingResistance(law);
+      });
+
   nb::class_<Contact>(m, "Contact")
       .def("__init__",
            [](Contact* self, const std::string& normal_law, double youngs, double shear, double restitution, double characteristic_velocity,
               bool tangential_damping, bool limit_force, const FinnieRabinowicz& friction, const std::string& capillary_model,
-              double contact_angle, double surface_tension, double bridge_volume, double viscosity, double minimum_gap) {
+              double contact_angle, double surface_tension, double bridge_volume, double viscosity, double minimum_gap,
+              const RollingResistance& rolling) {
              new (self) Contact{{option_of<NormalLaw>("normal law", normal_law_names(), normal_law),
                                  {youngs, shear, restitution},
                                  characteristic_velocity,
                                  tangential_damping,
                                  limit_force,
                                  friction,
-                                 {}}};
+                                 {},
+                                 rolling}};
              if (bridge_volume > 0.0) {
                self->bridge = std::make_shared<const capillary::BridgeForce>(bridge_force(capillary_model, contact_angle));
                self->parameters.liquid = {self->bridge.get(), surface_tension, bridge_volume, {viscosity, minimum_gap}};
@@ -174,9 +183,10 @@ NB_MODULE(_physics, m) {
                    "the contact has no finite force: positions, velocities, radii, masses and the time step must be finite numbers");
              }
              return nb::make_tuple(tuple(f.force), tuple(f.torque_1), tuple(f.torque_2), f.overlap, f.normal_force, f.capillary_force,
-                                   tuple(f.tangential), f.viscous_normal, tuple(f.viscous_tangential), f.interacting);
+                                   tuple(f.tangential), f.viscous_normal, tuple(f.viscous_tangential), f.interacting, tuple(f.rolling));
            })
       .def_prop_ro("slip", [](const Contact& self) { return self.state.friction.slip; })
       .def_prop_ro("dissipated_energy", [](const Contact& self) { return self.state.friction.dissipated_energy; })
+      .def_prop_ro("rolling_angle", [](const Contact& self) { return tuple(self.state.rolling_angle); })
       .def_prop_ro("bridge_volume", [](const Contact& self) { return self.state.bridge_volume; });
 }

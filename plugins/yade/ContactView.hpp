@@ -46,7 +46,7 @@ struct ContactView {
 		surface                = sphere.pos + sign() * shift - plane.pos - distance * outward;
 	}
 
-	/// Velocities and angular velocities of the interaction's bodies; that of a wall becomes the velocity of its surface.
+	/// Velocities and angular velocities of the interaction's bodies; of a wall the velocity becomes that of its surface.
 	void move(const Vector3r& velocity1, const Vector3r& spin1, const Vector3r& velocity2, const Vector3r& spin2) {
 		bodies.velocity_1         = vec(swapped() ? velocity2 : velocity1);
 		bodies.angular_velocity_1 = vec(swapped() ? spin2 : spin1);
@@ -54,6 +54,7 @@ struct ContactView {
 			bodies.velocity_2         = vec(velocity2);
 			bodies.angular_velocity_2 = vec(spin2);
 		} else {
+			bodies.wall_spin  = vec(swapped() ? spin1 : spin2);
 			bodies.velocity_2 = vec(Vector3r(swapped() ? velocity1 + spin1.cross(surface) : velocity2 + spin2.cross(surface)));
 		}
 	}

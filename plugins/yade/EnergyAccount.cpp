@@ -277,6 +277,7 @@ void EnergyAccount::recordContact(Contact& c, const Interaction& interaction) co
 	force.viscous_tangential = on1(phys.viscousShearForce);
 	force.normal_force       = dot(along, force.normal) + force.capillary_force - force.viscous_normal;
 	force.tangential         = on1(phys.shearForce) - force.viscous_tangential;
+	force.rolling            = on1(phys.rollingTorque);
 
 	const auto motion = ::dembark::relative_motion(bodies, force.normal, force.overlap);
 	c.acting          = true;
@@ -310,15 +311,16 @@ void EnergyAccount::record(const NewtonIntegrator& newton, bool first) {
 		}
 	}
 
-	Real normal = 0.0, tangential = 0.0, ahead = 0.0;
+	Real normal = 0.0, tangential = 0.0, rolling = 0.0, ahead = 0.0;
 	for (const Contact& c : contacts) {
 		if (!c.acting) continue;
 		normal += c.parts.normal_stored;
 		tangential += c.parts.tangential_stored;
+		rolling += c.parts.rolling_stored;
 		ahead += c.half;
 		if (any && changes(c)) ledger.first_stored += c.parts.normal_stored + c.half;
 	}
-	ledger.set_stored(normal, tangential, ahead);
+	ledger.set_stored(normal, tangential, rolling, ahead);
 }
 
 /// The recorded step is over: its works, by the mean velocities. Those of a body that was erased since are what the forces make.

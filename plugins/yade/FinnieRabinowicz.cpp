@@ -68,7 +68,7 @@ void choose(const char* attribute, const std::string& word, const std::vector<st
 }  // namespace
 
 ::dembark::ContactState Phys::state() const {
-	::dembark::ContactState now{{vec(elasticDisplacement), slip, dissipatedEnergy}, bridgeVolume, ruptureDistance, {}};
+	::dembark::ContactState now{{vec(elasticDisplacement), slip, dissipatedEnergy}, bridgeVolume, ruptureDistance, {}, vec(rollingAngle)};
 	if (slipRings.size() == ringNumbers) std::memcpy(&now.rings, slipRings.data(), sizeof now.rings);
 	return now;
 }
@@ -79,6 +79,7 @@ void Phys::setState(const ::dembark::ContactState& now) {
 	dissipatedEnergy    = now.friction.dissipated_energy;
 	bridgeVolume        = now.bridge_volume;
 	ruptureDistance     = now.rupture_distance;
+	rollingAngle        = vec(now.rolling_angle);
 	if (contact.friction.presliding != ::dembark::Presliding::partial_slip) return;
 	slipRings.resize(ringNumbers);
 	std::memcpy(slipRings.data(), &now.rings, sizeof now.rings);
@@ -110,6 +111,13 @@ void Ip2::go(const shared_ptr<Material>& material1, const shared_ptr<Material>& 
 	phys->interfaceShearStrength = std::min(law.interface_shear_strength, 1e300);
 	if (const char* wrong = law.error()) fail(std::string(wrong) + ", " + pairName(a, b));
 
+	// The law knows whether they are wanted.
+	const ::dembark::RollingResistance resistance{::dembark::RollingModel::off,
+	                                              phys->rollingFriction = pairValue(rollingFriction, "rollingFriction", a, b, 0.0),
+	                                              phys->rollingDampingRatio = pairValue(rollingDampingRatio, "rollingDampingRatio", a, b, 0.0)};
+	if (const char* wrong = resistance.error()) fail(std::string(wrong) + ", " + pairName(a, b));
+	phys->rolls = static_cast<bool>(rollingFriction);
+
 	phys->newBridgeVolume = pairValue(bridgeVolume, "bridgeVolume", a, b, 0.0);
 	if (!(phys->newBridgeVolume >= 0.0 && phys->newBridgeVolume < INFINITY))
 		fail("bridgeVolume of " + pairName(a, b) + " is " + text(phys->newBridgeVolume) + "; it must be >= 0 m^3 and finite");
@@ -138,6 +146,7 @@ void Law2::postLoad(Law2&) {
 	int chosen = 0;
 	choose("normalLaw", normalLaw, ::dembark::normal_law_names(), normal);
 	choose("presliding", presliding, ::dembark::presliding_names(), path);
+	choose("rollingResistance", rollingResistance, ::dembark::rolling_names(), rolling);
 	choose("capillaryModel", capillaryModel, models, chosen);
 	wet      = chosen > 0;
 	model    = static_cast<::dembark::capillary::Model>(wet ? chosen - 1 : 0);
@@ -159,6 +168,9 @@ void Law2::prepare(Phys& phys, const ScGeom& geom, const Body& body1, const Body
 	p.limit_force             = limitForce;
 	p.friction                = {phys.staticFriction,         phys.kineticFriction, phys.criticalSlipDistance,
 	                             phys.interfaceShearStrength, phys.healingTime,     path};
+	if (rolling != ::dembark::RollingModel::off && !phys.rolls)
+		fail(law2 + "rollingResistance='" + rollingResistance + "' needs " + ip2 + "rollingFriction; give it a number or a MatchMaker");
+	p.rolling = {rolling, phys.rollingFriction, phys.rollingDampingRatio};
 	if (carriedLiquid) {
 		if (!wet) fail(law2 + "carriedLiquid needs a capillaryModel other than none");
 		if (!phys.wettable) fail(law2 + "carriedLiquid needs " + ip2 + "surfaceTension and contactAngle");
@@ -214,7 +226,7 @@ bool Law2::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* i
 
 	const bool free1 = phys.wallBody != 1 && body1.isDynamic(), free2 = phys.wallBody != 2 && body2.isDynamic();
 	if (!free1 && !free2) {  // nothing that they do to each other has an effect
-		phys.normalForce = phys.shearForce = Vector3r::Zero();
+		phys.normalForce = phys.shearForce = phys.rollingTorque = Vector3r::Zero();
 		if (const double volume = phys.bridgeVolume; carriedLiquid && volume > 0.0) {
 			bridge_step(phys.contact.liquid, geom.radius1, geom.radius2, -geom.penetrationDepth, false, phys.bridgeVolume,
 			            phys.ruptureDistance);
@@ -259,6 +271,7 @@ bool Law2::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* i
 	phys.shearForce           = view.sign() * tangential;
 	phys.normalForce          = view.sign() * (force - tangential);
 	if (viscous) phys.viscousShearForce = view.sign() * vec(out.viscous_tangential);
+	phys.rollingTorque = view.sign() * vec(out.rolling);
 	phys.kn = out.normal_stiffness;
 	phys.ks = out.tangential_stiffness;
 
@@ -269,7 +282,7 @@ bool Law2::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* i
 		scene->forces.addTorque(first, vec(out.torque_1));
 		if (phys.wallBody == 0) scene->forces.addTorque(second, vec(out.torque_2));
 	}
-	if (phys.wallBody) scene->forces.addTorque(second, -view.surface.cross(force));
+	if (phys.wallBody) scene->forces.addTorque(second, -view.surface.cross(force) - vec(out.rolling));
 	return true;
 } catch (const std::exception& error) {
 	dembark_yade::postpone(*scene, error);

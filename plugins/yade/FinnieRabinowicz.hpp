@@ -47,6 +47,8 @@ public:
 		((Real,capillaryForce,0,,"Force [N] of the bridge, positive = attractive"))
 		((Real,viscousForce,0,,"Force [N] along the normal by which the liquid resists, positive = repulsive"))
 		((Vector3r,viscousShearForce,Vector3r::Zero(),,"Force [N] in the plane of contact by which the liquid resists; it is part of :yref:`NormShearPhys.shearForce`"))
+		((Vector3r,rollingAngle,Vector3r::Zero(),,"State of a contact with ``rollingResistance='elastic_plastic'``: angle [rad] of the rolling spring, of the sphere (of body 1, of two spheres)"))
+		((Vector3r,rollingTorque,Vector3r::Zero(),,"Couple [N m] of rolling resistance on body 2"))
 		((Real,effectiveYoungsModulus,0,Attr::triggerPostLoad,"E* [Pa], 1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2"))
 		((Real,effectiveShearModulus,0,Attr::triggerPostLoad,"G* [Pa], 1/G* = (2-nu1)/G1 + (2-nu2)/G2"))
 		((Real,restitution,1,Attr::triggerPostLoad,"Coefficient of restitution"))
@@ -55,6 +57,9 @@ public:
 		((Real,criticalSlipDistance,0,Attr::triggerPostLoad,"Slip [m] over which friction falls from its static to its kinetic value"))
 		((Real,interfaceShearStrength,1e30,Attr::triggerPostLoad,"Shear strength [Pa] of the interface; 1e30 or more = unlimited"))
 		((Real,healingTime,0,Attr::triggerPostLoad,"Time constant [s] in which slip is forgotten while the contact sticks; 0 = at once"))
+		((Real,rollingFriction,0,Attr::triggerPostLoad,"Coefficient of rolling resistance"))
+		((Real,rollingDampingRatio,0,Attr::triggerPostLoad,"Damping ratio of the rolling spring"))
+		((bool,rolls,false,Attr::triggerPostLoad,"A coefficient of rolling resistance is known"))
 		((Real,newBridgeVolume,0,Attr::triggerPostLoad,"Volume [m^3] of a bridge that forms when the bodies touch"))
 		((bool,wettable,false,Attr::triggerPostLoad,"Surface tension and contact angle are known"))
 		((Real,surfaceTension,0,Attr::triggerPostLoad,"Surface tension [N/m]"))
@@ -79,6 +84,8 @@ public:
 		((shared_ptr<MatchMaker>,kineticFriction,,,"Kinetic friction coefficient, >= 0 and not above the static one. Required."))
 		((shared_ptr<MatchMaker>,criticalSlipDistance,,,"Slip [m] over which friction falls from its static to its kinetic value, >= 0. Required."))
 		((shared_ptr<MatchMaker>,interfaceShearStrength,,,"Shear strength [Pa] of the interface, > 0; not given, or 1e30 and more = unlimited."))
+		((shared_ptr<MatchMaker>,rollingFriction,,,"Coefficient of rolling resistance, >= 0: the largest couple over the normal force and the effective radius. Required with a :yref:`rollingResistance<Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz.rollingResistance>`."))
+		((shared_ptr<MatchMaker>,rollingDampingRatio,,,"Damping ratio, >= 0, of the spring of 'elastic_plastic'; not given = 0."))
 		((shared_ptr<MatchMaker>,bridgeVolume,,,"Volume [m^3] of each liquid bridge, formed when two bodies touch; not given or 0 = dry."))
 		((shared_ptr<MatchMaker>,contactAngle,,,"Contact angle [rad], 0...pi/2. Required with a bridge volume, and with carried liquid."))
 		((Real,surfaceTension,NaN,,"Surface tension [N/m], >= 0. Required with a bridge volume, and with carried liquid."))
@@ -101,10 +108,11 @@ public:
 
 	const shared_ptr<LiquidExchange> exchange = boost::make_shared<LiquidExchange>();
 	// clang-format off
-	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz,LawFunctor,"Normal force of Hertz or Hooke with damping from a coefficient of restitution, tangential force of Finnie and Rabinowicz, and a liquid bridge with capillary and, if wanted, viscous force. A body whose shape is not a :yref:`Sphere` is a wall of infinite radius and mass; a sphere that is not dynamic has infinite mass; two bodies of which neither is dynamic have no force. A bridge keeps its interaction until it ruptures, at any gap.",
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz,LawFunctor,"Normal force of Hertz or Hooke with damping from a coefficient of restitution, tangential force of Finnie and Rabinowicz, rolling resistance if wanted, and a liquid bridge with capillary and, if wanted, viscous force. A body whose shape is not a :yref:`Sphere` is a wall of infinite radius and mass; a sphere that is not dynamic has infinite mass; two bodies of which neither is dynamic have no force. A bridge keeps its interaction until it ruptures, at any gap.",
 		((string,normalLaw,"hertz",Attr::triggerPostLoad,"'hertz' or 'hooke'"))
 		((Real,characteristicVelocity,NaN,Attr::triggerPostLoad,"Impact speed [m/s] at which the overlap of 'hooke' equals that of 'hertz'. Required for 'hooke'."))
 		((string,presliding,"linear",Attr::triggerPostLoad,"Tangential force before gross slip: 'linear', 'exponential' or 'partial_slip'"))
+		((string,rollingResistance,"off",Attr::triggerPostLoad,"Couple against rolling: 'off', 'constant_torque' or 'elastic_plastic'"))
 		((string,capillaryModel,"none",Attr::triggerPostLoad,"'none', or the force law of a bridge: 'exact', 'willett', 'willett_full', 'rabinovich', 'bagheri', 'constant'"))
 		((bool,carriedLiquid,false,Attr::triggerPostLoad,"Bridges take their liquid from the bodies and give it back; needs the engine :yref:`CapillaryLiquid` after the :yref:`InteractionLoop`"))
 		((bool,tangentialDamping,true,Attr::triggerPostLoad,"Viscous tangential force while a contact sticks"))
@@ -124,6 +132,7 @@ private:
 
 	::dembark::NormalLaw        normal   = ::dembark::NormalLaw::hertz;
 	::dembark::Presliding       path     = ::dembark::Presliding::linear;
+	::dembark::RollingModel     rolling  = ::dembark::RollingModel::off;
 	bool                        wet      = false;
 	::dembark::capillary::Model model    = ::dembark::capillary::Model::exact;
 	long                        revision = 0;

@@ -16,7 +16,7 @@ const capillary::BridgeForce bridge(capillary::Model::willett, 0.35);
 /// Sums over an oblique impact of two spheres by leapfrog.
 struct Account {
   double kinetic_change = 0.0, total = 0.0, normal = 0.0, viscous = 0.0, tangential = 0.0, friction = 0.0, capillary = 0.0, liquid = 0.0,
-         scale = 0.0, worst = 0.0;
+         rolling = 0.0, rolling_viscous = 0.0, scale = 0.0, worst = 0.0;
   double half_way = 0.0;  ///< worst difference of what the normal spring took and what it holds
   double unsplit = 0.0;   ///< worst difference of the parts' sum and the force, and of their torques, relative
 };
@@ -46,10 +46,11 @@ Account impact(const ContactParameters& p, double dt) {
     const ContactParts parts = contact_parts(p, b, f, state);
     Vec3<double> rest = f.force, rest_torque = f.torque_2;
     const double arm_2 = relative_motion(b, f.normal, f.overlap).arm_2;
-    for (const Vec3<double>& part : parts.force) {
-      rest -= part;
-      rest_torque += arm_2 * cross(f.normal, part);
+    for (std::size_t k = 0; k < force_part_count; ++k) {
+      rest -= parts.load[k];
+      rest_torque += arm_2 * cross(f.normal, parts.load[k]);
     }
+    rest_torque += parts[ContactPart::rolling_elastic] + parts[ContactPart::rolling_viscous];
     // Next to nothing is left of spring and damping where they cancel.
     const double size = norm(parts[ContactPart::normal_elastic]) + norm(parts[ContactPart::normal_viscous]) + norm(f.force);
     if (size > 0.0) out.unsplit = std::max({out.unsplit, norm(rest) / size, norm(rest_torque) / (size * b.radius_2)});
@@ -69,7 +70,11 @@ Account impact(const ContactParameters& p, double dt) {
     const double normal = work(ContactPart::normal_elastic), tangential = work(ContactPart::tangential_elastic);
     const double viscous = work(ContactPart::normal_viscous) + work(ContactPart::tangential_viscous);
     const double capillary = work(ContactPart::capillary), liquid = work(ContactPart::liquid_viscous);
-    out.total += normal + viscous + tangential + capillary + liquid;
+    const Vec3<double> spin = mean.relative_spin();
+    const double rolling = dot(parts[ContactPart::rolling_elastic], spin) * dt, lost = dot(parts[ContactPart::rolling_viscous], spin) * dt;
+    out.rolling += rolling;
+    out.rolling_viscous += lost;
+    out.total += normal + viscous + tangential + capillary + liquid + rolling + lost;
     out.normal += normal;
     out.viscous += viscous;
     out.tangential += tangential;
@@ -111,6 +116,45 @@ TEST_CASE("works of all parts of a contact balance the kinetic energy to round-o
               CHECK(a.unsplit < 1e-14);
             }
         }
+}
+
+TEST_CASE("rolling resistance is booked: springs lose what they yield, a dashpot and a constant torque take energy only") {
+  for (const double dt : {1e-6, 2e-5})
+    for (const RollingModel model : {RollingModel::constant_torque, RollingModel::elastic_plastic}) {
+      ContactParameters p = parameters(0.4, 0.2, false);
+      p.rolling = {model, 0.1, 0.3};
+      const Account a = impact(p, dt);
+      CHECK(a.worst < 1e-12 * a.scale);
+      CHECK(a.unsplit < 1e-14);
+      CHECK(a.rolling_viscous < -1e-5 * a.scale);
+      if (model == RollingModel::constant_torque) CHECK(a.rolling == 0.0);
+      else CHECK(a.rolling < -1e-5 * a.scale);
+    }
+}
+
+TEST_CASE("what the rolling spring took at constant load is what it holds") {
+  // A pair that is pressed together and rolled within the limit: k_r is constant.
+  ContactParameters p = parameters(1.0, 0.0, false);
+  p.normal_law = NormalLaw::hooke;
+  p.rolling = {RollingModel::elastic_plastic, 1e3, 0.0};
+  ContactState state;
+  ContactBodies b;
+  b.radius_1 = 2e-3;
+  b.mass_1 = 8e-5;
+  b.separation = {0.0, 0.0, 1.99e-3};
+  Vec3<double> before{};
+  double took = 0.0, held = 0.0;
+  const double dt = 1e-7;
+  for (int i = 0; i < 1000; ++i) {
+    b.angular_velocity_1 = {std::cos(0.01 * i), 0.5, 0.0};
+    const ContactParts parts = contact_parts(p, b, contact_step(p, b, dt, state), state);
+    // The mean of the couple before and after the step.
+    took -= 0.5 * dt * dot(before + parts[ContactPart::rolling_elastic], b.angular_velocity_1);
+    before = parts[ContactPart::rolling_elastic];
+    held = parts.rolling_stored;
+  }
+  CHECK(held > 0.0);
+  CHECK_THAT(took, WithinRel(held, 1e-9));
 }
 
 TEST_CASE("each part does what it is due to") {

@@ -4,7 +4,7 @@ All quantities are in SI units.
 """
 
 from dembark.physics.capillary import CAPILLARY_MODELS, capillary_force, rupture_distance
-from dembark.physics.contact import Body, Contact, ContactForce, Trajectory, collide, drop
+from dembark.physics.contact import Body, Contact, ContactForce, RollingResistance, Trajectory, collide, drop
 from dembark.physics.friction import FinnieRabinowicz, FrictionPath
 from dembark.physics.impact import Drum, Impact, ImpactChain, ImpactMotion, ImpactSystem, Plane
 from dembark.physics.lcp import LCP_METHODS, LcpCertificate, LcpResult, LcpSolver, solve_lcp
@@ -32,6 +32,7 @@ __all__ = [
     "LcpSolver",
     "LiquidBridge",
     "Plane",
+    "RollingResistance",
     "Trajectory",
     "ViscousResistance",
     "capillary_force",

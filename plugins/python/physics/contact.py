@@ -43,6 +43,32 @@ class ContactForce:
     viscous_normal: float  # of the liquid, along the normal from body 2 to body 1
     viscous_tangential: Vector  # of the liquid
     interacting: bool  # touching or held by a bridge
+    rolling: Vector  # couple of rolling resistance on body 1, N m, a part of torque_1; body 2 has its negative
+
+
+@dataclass(frozen=True, kw_only=True)
+class RollingResistance:
+    """A couple against the relative rotation of two bodies in contact, but for what turns about the normal.
+
+    model : 'off'; 'constant_torque', M = mu_r R* N against the rolling, or less where that stops it within one step; or 'elastic_plastic',
+        a spring of stiffness k_t R*^2 that yields at the same couple, which holds bodies at rest
+    friction : mu_r, >= 0; N is the repulsive force of the normal law, R* the effective radius
+    damping_ratio : eta, >= 0, of the spring below its limit; 1 is critical
+
+    J. Ai, J.-F. Chen, J. M. Rotter & J. Y. Ooi, Powder Technology 206 (2011) 269, models A and C. ValueError for values out of range.
+
+    >>> law = RollingResistance(model="elastic_plastic", friction=0.1, damping_ratio=0.3)
+    """
+
+    model: str = "off"
+    friction: float = 0.0
+    damping_ratio: float = 0.0
+    _law: _physics.RollingResistance = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        for name in ("friction", "damping_ratio"):
+            numbers(name, getattr(self, name), "")
+        object.__setattr__(self, "_law", _physics.RollingResistance(self.model, float(self.friction), float(self.damping_ratio)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +81,7 @@ class Contact:
     normal_law : 'hertz' or 'hooke' (with characteristic_velocity, m/s)
     bridge_volume : m^3 of each bridge, 0 = dry; with surface_tension (N/m), contact_angle (rad) and capillary_model
     viscosity : Pa s of the liquid, 0 = no viscous force; with minimum_gap (m, > 0), see `viscous_resistance`
+    rolling : rolling resistance
     """
 
     effective_youngs_modulus: float
@@ -71,6 +98,7 @@ class Contact:
     capillary_model: str = "exact"
     viscosity: float = 0.0
     minimum_gap: float = 0.0
+    rolling: RollingResistance = field(default_factory=RollingResistance)
 
     def __post_init__(self) -> None:
         if not 0.0 < self.restitution <= 1.0:
@@ -91,7 +119,7 @@ class Contact:
         return _physics.Contact(self.normal_law, self.effective_youngs_modulus, self.effective_shear_modulus, self.restitution,
                                 self.characteristic_velocity, self.tangential_damping, self.limit_force, self.friction._law,
                                 self.capillary_model, self.contact_angle, self.surface_tension, self.bridge_volume, self.viscosity,
-                                self.minimum_gap)
+                                self.minimum_gap, self.rolling._law)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -138,6 +138,9 @@ def contact_loop(p, materials, walls, static=None, kinetic=None):
     names = {"interfaceShearStrength": "interface_shear_strength", "liquidViscosity": "liquid_viscosity", "minimumGap": "minimum_gap"}
     more = {word: given[key] for word, key in names.items() if key in given}
     law = {"presliding": p.presliding} if "presliding" in given else {}
+    if given.get("rolling_resistance", "off") != "off":
+        more |= {"rollingFriction": pairs(materials, p.grain_rolling, p.wall_rolling), "rollingDampingRatio": p.rolling_damping_ratio}
+        law["rollingResistance"] = p.rolling_resistance
     return InteractionLoop(
         [Ig2_Sphere_Sphere_ScGeom(), *walls],
         [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
