@@ -13,7 +13,19 @@ from pathlib import Path
 import numpy as np
 
 from dembark.postproc.instruments.growth import ordered
-from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas, profile
+from dembark.postproc.measurement import (
+    Array,
+    Curve,
+    Estimate,
+    Measurement,
+    Points,
+    Replica,
+    Replicas,
+    Value,
+    exact,
+    over_replicas,
+    profile,
+)
 from dembark.postproc.studies import fitted_exponent, measured, propagated
 
 PUBLISHED = Path(__file__).with_name("reference") / "anand_2008.csv"
@@ -21,6 +33,7 @@ PUBLISHED = Path(__file__).with_name("reference") / "anand_2008.csv"
 LOW, HIGH, K = 0.1, 0.7, 1.4
 # 95 % limits of a digitised point: the largest difference of two digitisations.
 READ = 0.0035
+TITLES = ("Mass discharged", "time since 10 % have left (s)", "over the mass of all grains")
 ANAND = ("anand", "friction_low", "friction_high", "stiff", "stiffer")
 
 
@@ -73,8 +86,8 @@ def published() -> dict[str, tuple[Array, Array]]:
     with PUBLISHED.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     names = dict.fromkeys(row["digitisation"] for row in rows)
-    return {name: tuple(np.array([(float(row["time"]), float(row["share"])) for row in rows if row["digitisation"] == name]).T)  # type: ignore[misc]
-            for name in names}
+    points = {name: np.array([(float(row["time"]), float(row["share"])) for row in rows if row["digitisation"] == name]) for name in names}
+    return {name: (one[:, 0], one[:, 1]) for name, one in points.items()}
 
 
 def datum() -> dict[str, Estimate]:
@@ -138,13 +151,12 @@ def _beside(runs: Sequence[Discharge], name: str) -> Curve:
     t = t - reached(t, y, LOW)
     first = max(run.shifted()[0] for run in runs)
     t, y = t[t > first], y[t > first]
-    return profile(f"discharge_{name}", "Mass discharged", "time since 10 % have left (s)", "over the mass of all grains", t, _mean(runs, t),
-                   reference=y, reference_half=np.full(len(y), READ), reference_label="Anand et al. (2008), DEM")
+    return profile(f"discharge_{name}", *TITLES, t, _mean(runs, t), reference=y, reference_half=np.full(len(y), READ),
+                   reference_label="Anand et al. (2008), DEM")
 
 
 def _plain(runs: Sequence[Discharge]) -> Curve:
-    return profile("discharge", "Mass discharged", "time since 10 % have left (s)", "over the mass of all grains", runs[0].shifted(),
-                   _mean(runs, runs[0].shifted()))
+    return profile("discharge", *TITLES, runs[0].shifted(), _mean(runs, runs[0].shifted()))
 
 
 def _error(value: Estimate, due: Estimate, of_inputs: float, of_numerics: float) -> str:
@@ -158,14 +170,14 @@ def study(name: str, points: Points, along: str) -> Measurement:
     points, places = ordered(points, along)
     if name != "outlet":
         one = next(point for point in points if point["variant"] == "anand")
-        rates = [measured(point, "rate") for point in points]
-        half, rate, due = float(np.ptp([each.value for each in rates])), measured(one, "rate"), datum()["rate"]
+        found = np.array([measured(point, "rate").value for point in points])
+        half, rate, due = float(np.ptp(found)), measured(one, "rate"), datum()["rate"]
         parts = (0.5 * half, 0.0) if name == "friction" else (0.0, half)
         joint = Estimate(rate.value, math.hypot(rate.half, *parts), "scatter and what is varied")
         return Measurement({"rate": Value(joint, due, detail=_error(rate, due, *parts))},
-                           [profile("rate", "Discharge rate", along, "1/s", places, [np.array([each.value for each in rates])])])
-    found = [measured(point, "mass_rate") for point in points]
-    rates, halves = (np.array([getattr(one, part) for one in found]) for part in ("value", "half"))
+                           [profile("rate", "Discharge rate", along, "1/s", places, [found])])
+    every = [measured(point, "mass_rate") for point in points]
+    rates, halves = (np.array([getattr(one, part) for one in every]) for part in ("value", "half"))
     given = points[0]["parameters"]
     d, g = float(given["grain_diameter"]), float(given["gravity"])
     density = float(np.mean([measured(point, "bulk_density").value for point in points]))
@@ -175,11 +187,14 @@ def study(name: str, points: Points, along: str) -> Measurement:
         return -start / rise / d, rise**1.5 / (density * math.sqrt(g))
 
     k, c = line(rates)
+    power = propagated(lambda logs: fitted_exponent(places - K * d, np.exp(logs)), np.log(rates), halves / rates)
     values = {
-        "exponent": Value(propagated(lambda logs: fitted_exponent(places - K * d, np.exp(logs)), np.log(rates), halves / rates), exact(1.5)),
-        "beverloo_k": Value(propagated(lambda every: line(every)[0], rates, halves), exact(1.5)),
-        "beverloo_c": Value(propagated(lambda every: line(every)[1], rates, halves)),
+        "exponent": Value(power, exact(1.5)),
+        "beverloo_k": Value(propagated(lambda each: line(each)[0], rates, halves), exact(1.5)),
+        "beverloo_c": Value(propagated(lambda each: line(each)[1], rates, halves)),
     }
     law = c * density * math.sqrt(g) * (places - k * d) ** 1.5
-    return Measurement(values, [profile("mass_rate", "Discharge rate", "width of the slot D / d", "kg/m/s", places / d, [rates], half=halves,
-                                        reference=law, reference_label=f"C = {c:.2f}, k = {k:.2f}")])
+    label = f"C = {c:.2f}, k = {k:.2f}"
+    curve = profile("mass_rate", "Discharge rate", "width of the slot D / d", "kg/m/s", places / d, [rates], half=halves, reference=law,
+                    reference_label=label)
+    return Measurement(values, [curve])

@@ -11,8 +11,8 @@ walls = dembark.planes(p, materials, left=(0, 0.0, 1), right=(0, p.bin_width, -1
 def panel(low, high):
     """Id of a thin plate between two x (m), whose upper side is the plane z = 0; without end along the slot."""
     thickness = 0.2 * p.grain_diameter
-    return O.bodies.append(utils.box((0.5 * (low + high), 0, -0.5 * thickness), (0.5 * (high - low), 1e6 * p.grain_diameter, 0.5 * thickness),
-                                     fixed=True, material=materials[1]))
+    centre, extents = (0.5 * (low + high), 0, -0.5 * thickness), (0.5 * (high - low), 1e6 * p.grain_diameter, 0.5 * thickness)
+    return O.bodies.append(utils.box(centre, extents, fixed=True, material=materials[1]))
 
 
 # A plate that ends at a wall reaches into it; boxes that are fixed do not touch each other.

@@ -21,7 +21,7 @@ METHODS = {"surface_speed": "surface_speed", "zero_crossing": "turn", "layer_dep
            "surface_angle": "surface_angle", "flux_balance": "flux_balance", "solid_body": "solid_body"}
 # 95 % limits of a point of the tracked profile: reading of the figure, and scatter about a smooth curve.
 SPEED_READ, PLACE_READ = 0.01, 0.0005
-ALIZADEH = ("alizadeh", "friction_low", "friction_high", "soft", "stiff")
+ALIZADEH = ("alizadeh", "friction_low", "friction_high", "stiff", "stiffer", "smooth")
 
 
 def tracked() -> tuple[Array, Array]:
@@ -43,20 +43,35 @@ def data() -> dict[str, Estimate]:
             "layer_shear": layer_slope(n, -u, turn, top)}
 
 
+def other_code() -> dict[str, dict[str, float]]:
+    """Rows of the table of Sunday et al. by variant: angle, its limit, depth of the layer; NaN where it has none."""
+    with (HERE / "sunday_2020.csv").open(encoding="utf-8") as file:
+        return {row["variant"]: {key: float(row[key] or "nan") for key in ("angle", "angle_limit", "layer", "centrifuging")}
+                for row in csv.DictReader(file)}
+
+
 def measure(replicas: Replicas) -> Measurement:
     """Values and profiles of all replicas of a series."""
-    drums, record = [read(replica) for replica in replicas], replicas[0].record
-    found = [{name: one for name, one in zip([*METHODS, "overhead"], estimates(drum, list(METHODS.values())).values(), strict=True)}
-             for drum in drums]
-    references: dict[str, Estimate] = {"flux_balance": exact(0.0), "solid_body": exact(1.0)}
-    if record["variant"] in ALIZADEH:
-        references |= data()
-    values = {name: Value(pooled(found, name), references.get(name)) for name in found[0]}
-    for name in FLOW if record["variant"] in ALIZADEH else ():
-        values[name] = Value(values[name].estimate, references[name], detail=error(values[name].estimate, references[name], 0.0, 0.0))
-    given = replicas[0].parameters
+    drums, given, variant = [read(replica) for replica in replicas], replicas[0].parameters, replicas[0].record["variant"]
+    found = [dict(zip([*METHODS, "overhead"], estimates(drum, list(METHODS.values())).values(), strict=True)) for drum in drums]
+    over = {name: pooled(found, name) for name in found[0]}
+    # Nothing flows back steadily where grains are carried over the top.
+    flows = over["overhead"].value < 0.1
+    due = {"flux_balance": exact(0.0), "solid_body": exact(1.0)} if flows else {}
+    values = {name: Value(over[name], due.get(name)) for name in METHODS if flows or name == "surface_angle"}
     values["froude"] = Value(exact(given["drum_speed"] ** 2 * given["drum_radius"] / given["gravity"]))
-    return Measurement(values, [speeds(drums, record["variant"] in ALIZADEH), densities(drums)])
+    if variant in ALIZADEH:
+        for name, datum in data().items():
+            values[name] = Value(over[name], datum, detail=error(over[name], datum, 0.0, 0.0))
+    if row := other_code().get(variant):
+        values["centrifuging"] = Value(over["overhead"], exact(row["centrifuging"]))
+        if flows:
+            depth, d = over["layer_depth"], given["grain_diameter"]
+            datum = Estimate(row["angle"], row["angle_limit"], "scatter of the other code")
+            values["repose_angle"] = Value(over["surface_angle"], datum, detail=error(over["surface_angle"], datum, 0.0, 0.0))
+            values["layer_over_diameter"] = Value(Estimate(depth.value / d, depth.half / d, depth.basis), exact(row["layer"])
+                                                  if math.isfinite(row["layer"]) else None)
+    return Measurement(values, [speeds(drums, variant in ALIZADEH), densities(drums)])
 
 
 def error(value: Estimate, datum: Estimate, of_inputs: float, of_numerics: float) -> str:
@@ -89,13 +104,16 @@ def densities(drums: list[Tumbler]) -> Curve:
 
 
 def study(name: str, points: Points, along: str) -> Measurement:
-    """Sensitivity of the flow to what is varied: half the range over the three values is U_input or U_num of the middle one."""
+    """Sensitivity of the flow to what is varied: half the range over the frictions is U_input, the range over the moduli U_num; or the
+    angle against the Froude number."""
     points, places = ordered(points, along)
-    middle, datum = points[len(points) // 2], data()
+    if name == "froude":
+        return angles(points)
+    middle, datum = next(point for point in points if point["variant"] == "alizadeh"), data()
     values = {}
     for quantity in FLOW:
         found = [measured(point, quantity) for point in points]
-        half = 0.5 * float(np.ptp([one.value for one in found]))
+        half = (0.5 if name == "friction" else 1.0) * float(np.ptp([one.value for one in found]))
         one = measured(middle, quantity)
         parts = (half, 0.0) if name == "friction" else (0.0, half)
         values[quantity] = Value(Estimate(one.value, math.hypot(one.half, half), "scatter in time and what is varied"), datum[quantity],
@@ -105,3 +123,11 @@ def study(name: str, points: Points, along: str) -> Measurement:
     return Measurement(values, curves)
 
 
+def angles(points: Points) -> Measurement:
+    """The curve of angles beside that of the other code."""
+    found, place = [measured(point, "repose_angle") for point in points], [measured(point, "froude").value for point in points]
+    rows = [other_code()[point["variant"]] for point in points]
+    datum, limit = (np.array([row[key] for row in rows]) for key in ("angle", "angle_limit"))
+    return Measurement({}, [profile("repose_angle", "Dynamic angle of repose", "log₁₀ of the Froude number", "angle (°)", np.log10(place),
+                                    [np.array([one.value for one in found])], half=np.array([one.half for one in found]), reference=datum,
+                                    reference_half=limit, reference_label="Sunday et al. (2020), DEM")])

@@ -13,10 +13,10 @@ def setup(p: Parameters) -> Setup:
     step = time_step(p)
     steps = window(math.ceil(p.run_in / step), math.ceil(p.measure_time / step / p.frames), p.frames)
     d_max, lined = packing.largest(p), p.wall_lining == "grains"
-    shell = p.drum_radius + p.grain_diameter * lined
+    shell = p.drum_radius + 1.5 * p.grain_diameter * lined
     half = shell + d_max
     box = [(-half, half), (-half, half), (0.0, p.drum_depth)]
-    inside = p.drum_radius - (0.5 * p.grain_diameter * lined + 0.65 * d_max)
+    inside = p.drum_radius - 0.65 * d_max
     bodies = packing.grains(p, close_packed(inside, p.drum_depth, 1.15 * d_max), box)
     if lined:
         bodies = bodies.joined(lining(p), p.grain_diameter, p.grain_density, 2)
@@ -36,7 +36,8 @@ def close_packed(radius: float, depth: float, spacing: float) -> packing.Array:
 
 def lining(p: Parameters) -> packing.Array:
     """Places (n, 3) in m of the grains on the wall: rings along the axis, every other one turned by half a grain, about 1.1 d apart."""
-    rows, around = 2 * max(1, round(p.drum_depth / (2.2 * p.grain_diameter))), int(2.0 * math.pi * p.drum_radius / (1.1 * p.grain_diameter))
+    radius, rows = p.drum_radius + 0.5 * p.grain_diameter, 2 * max(1, round(p.drum_depth / (2.2 * p.grain_diameter)))
+    around = int(2.0 * math.pi * radius / (1.1 * p.grain_diameter))
     k, i = (axis.ravel() for axis in np.meshgrid(np.arange(rows), np.arange(around), indexing="ij"))
     turn = 2.0 * math.pi / around * (i + 0.5 * (k % 2))
-    return np.column_stack((p.drum_radius * np.cos(turn), p.drum_radius * np.sin(turn), p.drum_depth / rows * (k + 0.5)))
+    return np.column_stack((radius * np.cos(turn), radius * np.sin(turn), p.drum_depth / rows * (k + 0.5)))

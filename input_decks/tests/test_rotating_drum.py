@@ -68,7 +68,7 @@ def test_a_known_flow_is_measured_as_it_is() -> None:
 @pytest.mark.parametrize(("changes", "seen"), [
     ({"speed": 0.45}, {"surface_speed"}), ({"speed": 0.25}, {"surface_speed"}), ({"turn": -0.08}, {"zero_crossing", "layer_depth"}),
     ({"surface": -0.04, "turn": -0.08}, {"zero_crossing"}), ({"carried": 0.85}, {"solid_body"}),
-], ids=["fast", "slow", "deep", "less filled", "a wall that slips"])
+], ids=["faster", "slower", "deep", "less filled", "a wall that slips"])
 def test_wrong_flows_fail(changes: dict[str, float], seen: set[str]) -> None:
     assert seen <= names(verdicts(**changes), "fail")
 
@@ -78,7 +78,8 @@ def test_of_other_drums_no_flow_is_judged() -> None:
 
 
 def study(name: str, along: str, values: list[float], speeds: list[float]) -> dict[str, Any]:
-    points = [{"parameters": defaults("rotating_drum", **{along: value}), "quantities": list(verdicts(speed=speed).values())}
+    points = [{"parameters": defaults("rotating_drum", **{along: value}), "variant": "alizadeh" if speed == 0.345 else "other",
+               "quantities": list(verdicts(speed=speed).values())}
               for value, speed in zip(values, speeds, strict=True)]
     return judged("rotating_drum", drum.study(name, points, along))
 
@@ -87,10 +88,10 @@ def test_the_study_adds_what_friction_makes_of_it() -> None:
     found = study("friction", "grain_friction", [0.27, 0.3, 0.33], [0.36, 0.345, 0.33])
     assert 0.005 < 0.5 * np.diff(found["surface_speed"]["interval"])[0] < 0.03
     assert "U_input = 0.01" in found["surface_speed"]["detail"] and "U_num = 0" in found["surface_speed"]["detail"]
-    assert "surface_speed" not in names(study("stiffness", "youngs_modulus", [5e6, 1e7, 2e7], [0.45, 0.345, 0.25]), "pass")
+    assert "surface_speed" not in names(study("stiffness", "youngs_modulus", [5e6, 1e7, 2e7], [0.345, 0.32, 0.28]), "pass")
 
 
-SMALL = {"drum_radius": 0.03, "drum_depth": 0.012, "drum_speed": 3.0, "run_in": 0.7, "measure_time": 0.3, "frames": 10, "youngs_modulus": 5e6}
+SMALL = {"drum_radius": 0.03, "drum_speed": 3.0, "run_in": 0.7, "measure_time": 0.3, "frames": 10}
 
 
 @pytest.mark.parametrize("lining", ["smooth", "grains"])
@@ -107,9 +108,9 @@ def test_grains_go_up_with_the_drum_and_back_along_the_surface(engine: str, lini
         assert found.surface_speed(every) > 0.05 and found.solid_body(every) > 0.8 and abs(found.flux_balance(every)) < 0.2
         frames = list(one.replica().grains())
         glued = frames[-1].select(frames[-1].types == 2)
-        np.testing.assert_allclose(np.hypot(*glued.positions[:, :2].T), 0.03, rtol=1e-6)
+        np.testing.assert_allclose(np.hypot(*glued.positions[:, :2].T), 0.0315, rtol=1e-6)
         turn = np.cross([0.0, 0.0, 3.0], glued.positions)
-        np.testing.assert_allclose(glued.velocities, turn, atol=2e-3 * 0.09)
+        np.testing.assert_allclose(glued.velocities, turn, atol=2e-3 * 0.0945)
 
 
 def test_the_lattice_leaves_no_two_grains_in_touch() -> None:

@@ -139,7 +139,7 @@ def surface_line(plane: Array, cell: float, radius: float, diameter: float) -> f
     angle = float(np.arctan2((plane * x).sum(), -(plane * y).sum()))
     for _ in range(20):
         s, n = np.meshgrid(along, up, indexing="ij")
-        places = np.stack([(s * np.cos(angle) - n * np.sin(angle)) / cell + middle[0], (s * np.sin(angle) + n * np.cos(angle)) / cell + middle[1]])
+        places = np.stack([s * np.cos(angle) - n * np.sin(angle), s * np.sin(angle) + n * np.cos(angle)]) / cell + middle[:, None, None]
         tops = np.array([_fall(up, row) for row in map_coordinates(smooth, places, order=1)])
         turned = float(np.arctan(np.polyfit(along, tops, 1)[0]))
         angle += turned
