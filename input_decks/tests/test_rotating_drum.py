@@ -17,25 +17,27 @@ JUDGED = {"surface_speed", "zero_crossing", "layer_depth"}
 
 
 def flow(angle: float = 27.0, surface: float = -0.03, turn: float = -0.066, speed: float = 0.345, carried: float = 1.0, shear: float = 1.0,
-         variant: str = "alizadeh") -> Any:
-    """A run whose grains fill a segment at random: they turn with the drum (times `carried`) below `turn`, and above it their speed falls
-    linearly to -`speed` at the `surface`; `shear`: exponent of another curve there."""
+         variant: str = "alizadeh", ring: bool = False) -> Any:
+    """A run whose grains fill a segment, on a lattice that is shifted from frame to frame: they turn with the drum (times `carried`) below `turn`, and above it their speed falls
+    linearly to -`speed` at the `surface`; `shear`: exponent of another curve there. `ring`: all turn with the drum, at the wall."""
     given = defaults("rotating_drum", frames=12)
     random, radius, omega = np.random.default_rng(3), given["drum_radius"], given["drum_speed"]
     t = np.radians(angle)
     along, normal = np.array([np.cos(t), np.sin(t)]), np.array([-np.sin(t), np.cos(t)])
 
     def frame(_: int) -> Any:
-        place = random.uniform(-radius, radius, (25000, 2))
+        lattice = np.linspace(-radius, radius, 160)
+        place = np.stack(np.meshgrid(lattice, lattice), axis=-1).reshape(-1, 2) + random.uniform(-0.001, 0.001, 2)
         n = place @ normal
-        place = place[(np.hypot(*place.T) < radius - 0.0015) & (n < surface)]
+        place = place[(np.hypot(*place.T) < radius - 0.0015) & (np.hypot(*place.T) > 0.09 if ring else n < surface)]
         n, s = place @ normal, place @ along
         back = np.clip((n - turn) / (surface - turn), 0.0, 1.0)
-        velocity = np.where(n < turn, -carried * omega * n, -omega * turn * (1.0 - back) - speed * back**shear)[:, None] * along
-        velocity += np.where(n < turn, carried * omega * s, 0.0)[:, None] * normal
-        count = len(place)
-        one = SimpleNamespace(positions=np.column_stack([place, np.zeros(count)]), velocities=np.column_stack([velocity, np.zeros(count)]),
-                              radii=np.full(count, 0.0015), types=np.ones(count, int))
+        turning = ring | (n < turn)
+        velocity = np.where(turning, -carried * omega * n, -omega * turn * (1.0 - back) - speed * back**shear)[:, None] * along
+        velocity += np.where(turning, carried * omega * s, 0.0)[:, None] * normal
+        zero, ones = np.zeros(len(place)), np.ones(len(place))
+        one = SimpleNamespace(positions=np.column_stack([place, zero]), velocities=np.column_stack([velocity, zero]), radii=0.0015 * ones,
+                              types=ones)
         one.select = lambda kept: one if kept.all() else None
         return one
 
