@@ -22,12 +22,20 @@ void CylinderWall::postLoad(CylinderWall&) {
 void Bo1_CylinderWall_Aabb::go(const shared_ptr<Shape>& shape, shared_ptr<Bound>& bound, const Se3r& se3, const Body*) try {
 	if (!bound) bound = shared_ptr<Bound>(new Aabb);
 	bound->min = bound->max = se3.position;
-	if (scene->isPeriodic) fail("a CylinderWall has no end and does not fit a periodic cell; use an aperiodic scene");
 	const CylinderWall& wall = *static_cast<CylinderWall*>(shape.get());
 	if (!(wall.radius > 0.0)) fail("CylinderWall.radius is not set; give it in m");
 	for (int i = 0; i < 3; ++i) {
 		const Real across = wall.radius * math::sqrt(math::max(Real(0), 1.0 - wall.axis[i] * wall.axis[i]));
-		const Real half   = math::abs(wall.axis[i]) > 1e-12 ? std::numeric_limits<Real>::infinity() : across;
+		Real       half   = across;
+		if (math::abs(wall.axis[i]) > 1e-12) {
+			half = std::numeric_limits<Real>::infinity();
+			if (scene->isPeriodic) {
+				// A periodic collider sorts no infinite ends, and begins with pairs along x within one period.
+				if (i == 0 || math::abs(wall.axis[i]) < 1.0 - 1e-12)
+					fail("a CylinderWall in a periodic cell must lie along y or z");
+				half = 1000.5 * scene->cell->getSize()[i];
+			}
+		}
 		bound->min[i]     = se3.position[i] - half;
 		bound->max[i]     = se3.position[i] + half;
 	}

@@ -28,7 +28,7 @@ public:
 	void go(const shared_ptr<Shape>&, shared_ptr<Bound>&, const Se3r&, const Body*) override;
 	FUNCTOR1D(CylinderWall);
 	// clang-format off
-	YADE_CLASS_BASE_DOC(Bo1_CylinderWall_Aabb,BoundFunctor,"Box around a :yref:`CylinderWall`, without end along its axis; not for periodic cells.");
+	YADE_CLASS_BASE_DOC(Bo1_CylinderWall_Aabb,BoundFunctor,"Box around a :yref:`CylinderWall`, without end along its axis. In a periodic cell the axis must be y or z, the collider needs allowBiggerThanPeriod=True, and the cylinder must fit between its own images.");
 	// clang-format on
 };
 REGISTER_SERIALIZABLE(Bo1_CylinderWall_Aabb);

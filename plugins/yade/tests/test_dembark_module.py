@@ -186,18 +186,18 @@ def test_wrong_word_of_the_law_is_one_line_without_a_trace(yade):
     assert_one_line(yade(path), ("presliding", "'bent'", "linear, exponential, partial_slip"))
 
 
-def test_cylinder_in_a_periodic_cell_is_one_line(yade):
+def test_cylinder_along_x_in_a_periodic_cell_is_one_line(yade):
     """Raised in YADE's own thread."""
     path = script(yade, "cell", """
         wall = Body()
-        wall.shape = CylinderWall(radius=0.02)
+        wall.shape = CylinderWall(radius=0.02, axis=(1, 0, 0))
         O.bodies.append([wall, sphere((0, 0, 0), 0.001)])
         O.periodic = True
         O.engines = [InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_CylinderWall_Aabb()]), NewtonIntegrator()]
         O.run(1, True)
         print("went on")
         """)
-    assert_one_line(yade(path), ("CylinderWall", "periodic"))
+    assert_one_line(yade(path), ("CylinderWall", "periodic", "along y or z"))
 
 
 @pytest.mark.parametrize(("call", "parts", "code"), [

@@ -144,7 +144,8 @@ def contact_loop(p, materials, walls, static=None, kinetic=None):
     return InteractionLoop(
         [Ig2_Sphere_Sphere_ScGeom(), *walls],
         [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
-            restitution=p.restitution, staticFriction=pairs(materials, *static), kineticFriction=pairs(materials, *kinetic),
+            restitution=pairs(materials, p.restitution, given.get("wall_restitution", p.restitution)),
+            staticFriction=pairs(materials, *static), kineticFriction=pairs(materials, *kinetic),
             criticalSlipDistance=p.critical_slip_distance, bridgeVolume=0 if p.carried else p.bridge_volume, contactAngle=p.contact_angle,
             surfaceTension=p.surface_tension, **more)],
         [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(

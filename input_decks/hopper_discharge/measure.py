@@ -1,0 +1,200 @@
+"""Discharge of a bin: mass that has left against time, beside a published curve, and the law of Beverloo in the width of the slot.
+
+Times are counted from the moment at which 10 % of the mass have left: published curves do not say how their gate opens. V&V 20: the error
+E = S − D is known within U_val, U_val² = U_num² + U_input² + U_D²; studies of friction and stiffness find U_input and U_num.
+"""
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dembark.postproc.instruments.growth import ordered
+from dembark.postproc.measurement import (
+    Array,
+    Curve,
+    Estimate,
+    Measurement,
+    Points,
+    Replica,
+    Replicas,
+    Value,
+    exact,
+    over_replicas,
+    profile,
+)
+from dembark.postproc.studies import fitted_exponent, measured, propagated
+
+PUBLISHED = Path(__file__).with_name("reference") / "anand_2008.csv"
+# Part of all mass between which the rate is taken, and Beverloo's constant for spheres.
+LOW, HIGH, K = 0.1, 0.7, 1.4
+# 95 % limits of a digitised point: the largest difference of two digitisations.
+READ = 0.0035
+TITLES = ("Mass discharged", "time since 10 % have left (s)", "over the mass of all grains")
+ANAND = ("anand", "friction_low", "friction_high", "stiff", "stiffer")
+
+
+@dataclass(frozen=True)
+class Discharge:
+    """One run: `share` (frames,) of the mass that is below the bottom at the `times` (s) since the gate began to drop; `mass` (kg) of all
+    grains, bulk `density` (kg/m3) above the slot and fill `height` (m) before, `period` (m) along the slot."""
+
+    times: Array
+    share: Array
+    mass: float
+    density: float
+    height: float
+    period: float
+
+    def shifted(self) -> Array:
+        """Times since LOW of the mass has left."""
+        return self.times - reached(self.times, self.share, LOW)
+
+    def rate(self) -> Estimate:
+        """1/s, over the mass of all grains, with the limits of the fit."""
+        return slope(self.times, self.share, HIGH)
+
+    def mass_rate(self) -> float:
+        """kg/m/s, from LOW of all mass to HIGH of what leaves."""
+        return slope(self.times, self.share, HIGH * float(self.share[-1])).value * self.mass / self.period
+
+
+def reached(times: Array, share: Array, level: float) -> float:
+    """When `share`, which rises, reaches `level`; NaN when it never does."""
+    k = int(np.searchsorted(share, level))
+    if k in (0, len(share)):
+        return math.nan
+    return float(times[k - 1] + (times[k] - times[k - 1]) * (level - share[k - 1]) / (share[k] - share[k - 1]))
+
+
+def slope(times: Array, share: Array, high: float) -> Estimate:
+    """Slope of a line through the curve from LOW to `high`; interval: difference of its halves, over two."""
+    inside = (share >= LOW) & (share <= high)
+    if inside.sum() < 4:
+        return Estimate(math.nan, math.inf, "fewer than four frames in the discharge")
+    t, y = times[inside], share[inside]
+    half = len(t) // 2
+    first, second = np.polyfit(t[: half + 1], y[: half + 1], 1)[0], np.polyfit(t[half:], y[half:], 1)[0]
+    return Estimate(float(np.polyfit(t, y, 1)[0]), 0.5 * abs(float(first - second)), "first and second half of the discharge")
+
+
+def published() -> dict[str, tuple[Array, Array]]:
+    """Times (s) and shares of the digitisations of the published curve, by name."""
+    with PUBLISHED.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    names = dict.fromkeys(row["digitisation"] for row in rows)
+    points = {name: np.array([(float(row["time"]), float(row["share"])) for row in rows if row["digitisation"] == name]) for name in names}
+    return {name: (one[:, 0], one[:, 1]) for name, one in points.items()}
+
+
+def datum() -> dict[str, Estimate]:
+    """Rate (1/s) and final share of the published curve: mean of the digitisations, and their difference or that of the halves."""
+    curves = list(published().values())
+    rates, last = [slope(t, y, HIGH) for t, y in curves], [float(y[-1]) for _, y in curves]
+    return {"rate": Estimate(float(np.mean([one.value for one in rates])), float(np.ptp([one.value for one in rates])), "digitisations"),
+            "discharged": Estimate(float(np.mean(last)), READ, "digitisations")}
+
+
+def read(replica: Replica) -> Discharge:
+    """Measure a run; the first frame is that at which the gate begins to drop."""
+    given, frames = replica.parameters, list(replica.grains())
+    first = frames[0]
+    mass, d, period = float(first.masses.sum()), float(given["grain_diameter"]), float(given["bin_depth"])
+    height = 2.0 * float(np.average(first.positions[:, 2], weights=first.masses))
+    above = (np.abs(first.positions[:, 0] - 0.5 * given["bin_width"]) < 0.5 * given["outlet_width"]) & (first.positions[:, 2] > 2.0 * d)
+    above &= first.positions[:, 2] < 0.8 * height
+    density = float(first.masses[above].sum()) / (float(given["outlet_width"]) * period * (0.8 * height - 2.0 * d))
+    # A grain has left when it is wholly below the bottom.
+    share = np.array([one.masses[one.positions[:, 2] < -one.radii].sum() for one in frames]) / mass
+    times = np.array([one.step - first.step for one in frames]) * replica.time_step
+    return Discharge(times, share, mass, density, height, period)
+
+
+def measure(replicas: Replicas) -> Measurement:
+    """Values and the curve of all replicas of a series."""
+    runs, given, known = [read(replica) for replica in replicas], replicas[0].parameters, replicas[0].record["variant"] in ANAND
+    rate, last = over_replicas([run.rate() for run in runs]), over_replicas([_whole(float(run.share[-1]), run) for run in runs])
+    rates = [Estimate(run.mass_rate(), run.rate().half / run.rate().value * run.mass_rate(), run.rate().basis) for run in runs]
+    values = {"rate": Value(rate), "discharged": Value(last), "mass_rate": Value(over_replicas(rates)),
+              "bulk_density": Value(over_replicas([Estimate(run.density, math.inf, "one frame") for run in runs])),
+              "fill_height": Value(exact(runs[0].height / given["outlet_width"]))}
+    if not known:
+        return Measurement(values, [_plain(runs)])
+    due = datum()
+    worst = max((_difference(runs, name) for name in published()), key=lambda one: one.value)
+    values |= {"rate": Value(rate, due["rate"], detail=_error(rate, due["rate"], 0.0, 0.0)), "discharged": Value(last, due["discharged"]),
+               "curve": Value(worst, exact(0.0))}
+    return Measurement(values, [_beside(runs, name) for name in published()])
+
+
+def _whole(share: float, run: Discharge) -> Estimate:
+    return Estimate(share, abs(share - float(run.share[-max(2, len(run.share) // 20)])), "what left in the last twentieth of the time")
+
+
+def _mean(runs: Sequence[Discharge], times: Array) -> list[Array]:
+    return [np.interp(times, run.shifted(), run.share) for run in runs]
+
+
+def _difference(runs: Sequence[Discharge], name: str) -> Estimate:
+    t, y = published()[name]
+    t = t - reached(t, y, LOW)
+    inside = (y > 0.5 * LOW) & (y <= HIGH)
+    apart = np.abs(np.mean(_mean(runs, t[inside]), axis=0) - y[inside])
+    return Estimate(float(apart.max()), READ, "digitisations")
+
+
+def _beside(runs: Sequence[Discharge], name: str) -> Curve:
+    t, y = published()[name]
+    t = t - reached(t, y, LOW)
+    first = max(run.shifted()[0] for run in runs)
+    t, y = t[t > first], y[t > first]
+    return profile(f"discharge_{name}", *TITLES, t, _mean(runs, t), reference=y, reference_half=np.full(len(y), READ),
+                   reference_label="Anand et al. (2008), DEM")
+
+
+def _plain(runs: Sequence[Discharge]) -> Curve:
+    return profile("discharge", *TITLES, runs[0].shifted(), _mean(runs, runs[0].shifted()))
+
+
+def _error(value: Estimate, due: Estimate, of_inputs: float, of_numerics: float) -> str:
+    e, joint = value.value - due.value, math.hypot(value.half, due.half, of_inputs, of_numerics)
+    return (f"E = {e:.3g} {'exceeds' if abs(e) > joint else 'is within'} U_val = {joint:.2g}; U_D = {due.half:.2g}, "
+            f"scatter {value.half:.2g}, U_input = {of_inputs:.2g}, U_num = {of_numerics:.2g}")
+
+
+def study(name: str, points: Points, along: str) -> Measurement:
+    """The law of Beverloo in the width of the slot; or what the parameter that is varied makes of the rate."""
+    points, places = ordered(points, along)
+    if name != "outlet":
+        one = next(point for point in points if point["variant"] == "anand")
+        found = np.array([measured(point, "rate").value for point in points])
+        half, rate, due = float(np.ptp(found)), measured(one, "rate"), datum()["rate"]
+        parts = (0.5 * half, 0.0) if name == "friction" else (0.0, half)
+        joint = Estimate(rate.value, math.hypot(rate.half, *parts), "scatter and what is varied")
+        return Measurement({"rate": Value(joint, due, detail=_error(rate, due, *parts))},
+                           [profile("rate", "Discharge rate", along, "1/s", places, [found])])
+    every = [measured(point, "mass_rate") for point in points]
+    rates, halves = (np.array([getattr(one, part) for one in every]) for part in ("value", "half"))
+    given = points[0]["parameters"]
+    d, g = float(given["grain_diameter"]), float(given["gravity"])
+    density = float(np.mean([measured(point, "bulk_density").value for point in points]))
+
+    def line(values: Array) -> tuple[float, float]:
+        rise, start = np.polyfit(places, values ** (2.0 / 3.0), 1)
+        return -start / rise / d, rise**1.5 / (density * math.sqrt(g))
+
+    k, c = line(rates)
+    power = propagated(lambda logs: fitted_exponent(places - K * d, np.exp(logs)), np.log(rates), halves / rates)
+    values = {
+        "exponent": Value(power, exact(1.5)),
+        "beverloo_k": Value(propagated(lambda each: line(each)[0], rates, halves), exact(1.5)),
+        "beverloo_c": Value(propagated(lambda each: line(each)[1], rates, halves)),
+    }
+    law = c * density * math.sqrt(g) * (places - k * d) ** 1.5
+    label = f"C = {c:.2f}, k = {k:.2f}"
+    curve = profile("mass_rate", "Discharge rate", "width of the slot D / d", "kg/m/s", places / d, [rates], half=halves, reference=law,
+                    reference_label=label)
+    return Measurement(values, [curve])

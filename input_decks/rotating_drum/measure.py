@@ -1,0 +1,133 @@
+"""Rotating drum: flow on the normal of the free surface through the axis, beside particle tracking and another code.
+
+V&V 20: the error E = S − D of a simulated value S against the datum D is known within U_val, U_val² = U_num² + U_input² + U_D². A run knows
+how it scatters in time and the limits of the datum; the studies of friction and stiffness add U_input and U_num.
+"""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+
+from dembark.postproc.instruments.growth import ordered
+from dembark.postproc.instruments.tumbler import Tumbler, estimates, layer_slope, read
+from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, pooled, profile
+from dembark.postproc.studies import measured
+
+HERE = Path(__file__).with_name("reference")
+FLOW = ("surface_speed", "layer_depth", "layer_shear", "zero_crossing")
+METHODS = {"surface_speed": "surface_speed", "zero_crossing": "turn", "layer_depth": "layer_depth", "layer_shear": "shear",
+           "surface_angle": "surface_angle", "flux_balance": "flux_balance", "solid_body": "solid_body"}
+# 95 % limits of a point of the tracked profile: reading of the figure, and scatter about a smooth curve.
+SPEED_READ, PLACE_READ = 0.01, 0.0005
+ALIZADEH = ("alizadeh", "friction_low", "friction_high", "stiff", "stiffer", "smooth")
+
+
+def tracked() -> tuple[Array, Array]:
+    """n (m) and speed (m/s) of the tracked points, from the surface downwards; without one that is out of line by 0.05 m/s."""
+    with (HERE / "alizadeh_2013.csv").open(encoding="utf-8") as file:
+        rows = np.array([(float(row["y"]), float(row["u"])) for row in csv.DictReader(file) if row["used"] == "1"])
+    return rows[:, 0], rows[:, 1]
+
+
+def data() -> dict[str, Estimate]:
+    """What the tracked points say of the quantities, by the same definitions."""
+    n, u = tracked()
+    top, last = float(n.max()), int(np.nonzero(u < 0.0)[0][-1])
+    turn = float(n[last] + (n[last + 1] - n[last]) * u[last] / (u[last] - u[last + 1]))
+    skin = u[n > top - 0.0045]
+    return {"surface_speed": Estimate(-float(skin.mean()), SPEED_READ, "reading of the figure"),
+            "zero_crossing": Estimate(turn, PLACE_READ, "reading of the figure"),
+            "layer_depth": Estimate(top - turn, math.sqrt(2.0) * PLACE_READ, "reading of the figure"),
+            "layer_shear": layer_slope(n, -u, turn, top)}
+
+
+def other_code() -> dict[str, dict[str, float]]:
+    """Rows of the table of Sunday et al. by variant: angle, its limit, depth of the layer; NaN where it has none."""
+    with (HERE / "sunday_2020.csv").open(encoding="utf-8") as file:
+        return {row["variant"]: {key: float(row[key] or "nan") for key in ("angle", "angle_limit", "layer", "centrifuging")}
+                for row in csv.DictReader(file)}
+
+
+def measure(replicas: Replicas) -> Measurement:
+    """Values and profiles of all replicas of a series."""
+    drums, given, variant = [read(replica) for replica in replicas], replicas[0].parameters, replicas[0].record["variant"]
+    found = [dict(zip([*METHODS, "overhead"], estimates(drum, list(METHODS.values())).values(), strict=True)) for drum in drums]
+    over = {name: pooled(found, name) for name in found[0]}
+    # Nothing flows back steadily where grains are carried over the top.
+    flows = over["overhead"].value < 0.1
+    due = {"flux_balance": exact(0.0), "solid_body": exact(1.0)} if flows else {}
+    values = {name: Value(over[name], due.get(name)) for name in METHODS if flows or name == "surface_angle"}
+    values["froude"] = Value(exact(given["drum_speed"] ** 2 * given["drum_radius"] / given["gravity"]))
+    if variant in ALIZADEH:
+        for name, datum in data().items():
+            values[name] = Value(over[name], datum, detail=error(over[name], datum, 0.0, 0.0))
+    if row := other_code().get(variant):
+        values["centrifuging"] = Value(over["overhead"], exact(row["centrifuging"]))
+        if flows:
+            depth, d = over["layer_depth"], given["grain_diameter"]
+            datum = Estimate(row["angle"], row["angle_limit"], "scatter of the other code")
+            values["repose_angle"] = Value(over["surface_angle"], datum, detail=error(over["surface_angle"], datum, 0.0, 0.0))
+            values["layer_over_diameter"] = Value(Estimate(depth.value / d, depth.half / d, depth.basis), exact(row["layer"])
+                                                  if math.isfinite(row["layer"]) else None)
+    return Measurement(values, [speeds(drums, variant in ALIZADEH), densities(drums)])
+
+
+def error(value: Estimate, datum: Estimate, of_inputs: float, of_numerics: float) -> str:
+    """E and the parts of U_val in words."""
+    e, joint = value.value - datum.value, math.hypot(value.half, datum.half, of_inputs, of_numerics)
+    return (f"E = {e:.3g} {'exceeds' if abs(e) > joint else 'is within'} U_val = {joint:.2g}; U_D = {datum.half:.2g}, "
+            f"scatter in time {value.half:.2g}, U_input = {of_inputs:.2g}, U_num = {of_numerics:.2g}")
+
+
+def speeds(drums: list[Tumbler], beside: bool) -> Curve:
+    """The speed along the surface over n, beside what was tracked."""
+    every = np.ones(len(drums[0].solid), bool)
+    known = ~np.isnan([drum.velocity(every) for drum in drums]).any(axis=0)
+    place = drums[0].middle[known]
+    values = [drum.velocity(every)[known] for drum in drums]
+    title, along, across = "Speed along the free surface", "distance from the axis along the normal (m)", "u (m/s), positive with the drum"
+    if not beside:
+        return profile("velocity", title, along, across, place, values)
+    n, u = (part[::-1] for part in tracked())
+    inside = (n > place[0]) & (n < place[-1])
+    return profile("velocity", title, along, across, n[inside], [np.interp(n[inside], place, one) for one in values], reference=u[inside],
+                   reference_half=np.full(inside.sum(), SPEED_READ), reference_label="Alizadeh et al. (2013)")
+
+
+def densities(drums: list[Tumbler]) -> Curve:
+    """The solid fraction over n."""
+    every = np.ones(len(drums[0].solid), bool)
+    return profile("solid_fraction", "Solid fraction on the normal", "distance from the axis along the normal (m)", "φ", drums[0].middle,
+                   [drum.fraction(every) for drum in drums])
+
+
+def study(name: str, points: Points, along: str) -> Measurement:
+    """Sensitivity of the flow to what is varied: half the range over the frictions is U_input, the range over the moduli U_num; or the
+    angle against the Froude number."""
+    points, places = ordered(points, along)
+    if name == "froude":
+        return angles(points)
+    middle, datum = next(point for point in points if point["variant"] == "alizadeh"), data()
+    values = {}
+    for quantity in FLOW:
+        found = [measured(point, quantity) for point in points]
+        half = (0.5 if name == "friction" else 1.0) * float(np.ptp([one.value for one in found]))
+        one = measured(middle, quantity)
+        parts = (half, 0.0) if name == "friction" else (0.0, half)
+        values[quantity] = Value(Estimate(one.value, math.hypot(one.half, half), "scatter in time and what is varied"), datum[quantity],
+                                 detail=error(one, datum[quantity], *parts))
+    curves = [profile(quantity, quantity.replace("_", " "), along, quantity, places,
+                      [np.array([measured(point, quantity).value for point in points])]) for quantity in FLOW]
+    return Measurement(values, curves)
+
+
+def angles(points: Points) -> Measurement:
+    """The curve of angles beside that of the other code."""
+    found, place = [measured(point, "repose_angle") for point in points], [measured(point, "froude").value for point in points]
+    rows = [other_code()[point["variant"]] for point in points]
+    datum, limit = (np.array([row[key] for row in rows]) for key in ("angle", "angle_limit"))
+    return Measurement({}, [profile("repose_angle", "Dynamic angle of repose", "log₁₀ of the Froude number", "angle (°)", np.log10(place),
+                                    [np.array([one.value for one in found])], half=np.array([one.half for one in found]), reference=datum,
+                                    reference_half=limit, reference_label="Sunday et al. (2020), DEM")])

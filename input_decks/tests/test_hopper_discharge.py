@@ -1,0 +1,108 @@
+"""hopper_discharge: a known discharge is measured as it is, wrong ones fail, and both engines empty a small bin alike."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dembark.input_decks.tests.measuring import defaults, judged, module, names
+
+hopper = module("hopper_discharge")
+
+
+def discharge(faster: float = 1.0, left: float = 0.0, late: float = 0.02, variant: str = "anand", **changes: Any) -> Any:
+    """A run that follows the published curve, `faster`, `late` (s) after the gate drops, of which the share `left` never leaves."""
+    given = defaults("hopper_discharge", **changes)
+    count, step, width = 2000, 0.02, given["bin_width"]
+    t, y = hopper.published()["first"]
+    random = np.random.default_rng(2)
+    start = np.column_stack([random.uniform(0.0, width, count), np.zeros(count), random.uniform(0.001, 0.1, count)])
+
+    def frame(k: int) -> Any:
+        place = start.copy()
+        out = round(count * min(float(np.interp(faster * (k * step - late), t, y)), 1.0 - left))
+        place[:out, 2] = -0.1
+        return SimpleNamespace(positions=place, radii=np.full(count, 0.00112), masses=np.ones(count), step=1000 + k)
+
+    return SimpleNamespace(parameters=given, record={"variant": variant}, time_step=step, grains=lambda: [frame(k) for k in range(115)])
+
+
+def verdicts(**changes: Any) -> dict[str, Any]:
+    return judged("hopper_discharge", hopper.measure([discharge(**changes)]))
+
+
+def test_the_published_curve_says_what_it_is_quoted_for() -> None:
+    due = hopper.datum()
+    assert due["rate"].value == pytest.approx(0.818, abs=0.002) and due["rate"].half < 0.01
+    assert due["discharged"].value == pytest.approx(0.907, abs=0.002)
+
+
+def test_the_published_discharge_passes_whenever_its_gate_opens() -> None:
+    for late in (0.0, 0.1):
+        found = verdicts(late=late)
+        assert {"rate", "curve", "discharged"} <= names(found, "pass"), found
+        assert "U_input" in found["rate"]["detail"]
+
+
+@pytest.mark.parametrize(("changes", "seen"), [
+    ({"faster": 1.12}, {"rate"}), ({"faster": 0.88}, {"rate", "curve"}), ({"left": 0.2}, {"discharged"}),
+], ids=["faster", "slower", "steeper slopes remain"])
+def test_wrong_discharges_fail(changes: dict[str, float], seen: set[str]) -> None:
+    assert seen <= names(verdicts(**changes), "fail")
+
+
+def test_of_other_slots_no_discharge_is_judged() -> None:
+    assert not names(verdicts(variant="slot_8"), "pass") | names(verdicts(variant="slot_8"), "fail")
+
+
+def points(exponent: float = 1.5, k: float = 1.5) -> list[dict[str, Any]]:
+    """Rates by the law of Beverloo, C = 1."""
+    made = []
+    for width in (0.01792, 0.025088, 0.03136, 0.04032):
+        given = defaults("hopper_discharge", outlet_width=width)
+        rate = 1500.0 * np.sqrt(9.81) * 0.03 ** (1.5 - exponent) * (width - k * 0.00224) ** exponent
+        made.append({"parameters": given, "variant": "anand", "quantities": [
+            {"name": name, "value": value, "interval": [0.999 * value, 1.001 * value]}
+            for name, value in (("mass_rate", rate), ("bulk_density", 1500.0))]})
+    return made
+
+
+def test_the_law_of_beverloo_is_found() -> None:
+    found = judged("hopper_discharge", hopper.study("outlet", points(), "outlet_width"))
+    assert {"exponent", "beverloo_k"} <= names(found, "pass"), found
+    assert found["beverloo_k"]["value"] == pytest.approx(1.5, abs=1e-9) and found["beverloo_c"]["value"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("changes", "seen"), [({"exponent": 1.0}, {"exponent", "beverloo_k"}), ({"k": 0.5}, {"exponent", "beverloo_k"})],
+                         ids=["as a liquid", "no empty annulus"])
+def test_other_laws_fail(changes: dict[str, float], seen: set[str]) -> None:
+    assert seen <= names(judged("hopper_discharge", hopper.study("outlet", points(**changes), "outlet_width")), "fail")
+
+
+def test_the_study_adds_what_friction_makes_of_it() -> None:
+    runs = [{"parameters": defaults("hopper_discharge", grain_friction=friction), "variant": variant,
+             "quantities": list(verdicts(faster=faster).values())}
+            for friction, faster, variant in ((0.18, 1.02, "friction_low"), (0.2, 1.0, "anand"), (0.22, 0.98, "friction_high"))]
+    found = judged("hopper_discharge", hopper.study("friction", runs, "grain_friction"))
+    assert 0.5 * np.diff(found["rate"]["interval"])[0] > 0.015 and "U_input = 0.01" in found["rate"]["detail"]
+
+
+SMALL = {"grain_count": 300, "bin_width": 0.04, "outlet_width": 0.0134, "settle_time": 0.2, "discharge_time": 0.4, "frames": 41,
+         "fall": 0.15}
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+def test_a_small_bin_stays_shut_and_then_empties_to_its_slopes(engine: str, decks: Any, tmp_path: Path) -> None:
+    one = decks("hopper_discharge", engine, tmp_path, SMALL)
+    one.run()
+    run, frames = hopper.read(one.replica()), list(one.replica().grains())
+    assert run.share[0] == 0.0 and run.height > 0.005 and frames[0].positions[:, 2].min() > 0.001
+    assert 0.5 < run.share[-1] < 0.99
+    # The outermost grains that stay lie at the walls, in two heaps.
+    rest = frames[-1].positions[frames[-1].positions[:, 2] > 0.0]
+    assert np.abs(rest[:, 0] - 0.02).min() > 0.004
+    assert frames[-1].positions[:, 2].min() > -0.15

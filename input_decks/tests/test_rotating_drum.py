@@ -1,0 +1,130 @@
+"""rotating_drum: flows that are known are measured as they are, wrong ones fail, and both engines turn the drum alike."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.postproc.instruments.tumbler import read
+
+drum = module("rotating_drum")
+JUDGED = {"surface_speed", "zero_crossing", "layer_depth"}
+
+
+def flow(angle: float = 27.0, surface: float = -0.03, turn: float = -0.066, speed: float = 0.345, carried: float = 1.0, shear: float = 1.0,
+         variant: str = "alizadeh", ring: bool = False) -> Any:
+    """A run whose grains fill a segment, on a lattice that is shifted from frame to frame: they turn with the drum (times `carried`) below `turn`, and above it their speed falls
+    linearly to -`speed` at the `surface`; `shear`: exponent of another curve there. `ring`: all turn with the drum, at the wall."""
+    given = defaults("rotating_drum", frames=12)
+    random, radius, omega = np.random.default_rng(3), given["drum_radius"], given["drum_speed"]
+    t = np.radians(angle)
+    along, normal = np.array([np.cos(t), np.sin(t)]), np.array([-np.sin(t), np.cos(t)])
+
+    def frame(_: int) -> Any:
+        lattice = np.linspace(-radius, radius, 160)
+        place = np.stack(np.meshgrid(lattice, lattice), axis=-1).reshape(-1, 2) + random.uniform(-0.001, 0.001, 2)
+        n = place @ normal
+        place = place[(np.hypot(*place.T) < radius - 0.0015) & (np.hypot(*place.T) > 0.09 if ring else n < surface)]
+        n, s = place @ normal, place @ along
+        back = np.clip((n - turn) / (surface - turn), 0.0, 1.0)
+        turning = ring | (n < turn)
+        velocity = np.where(turning, -carried * omega * n, -omega * turn * (1.0 - back) - speed * back**shear)[:, None] * along
+        velocity += np.where(turning, carried * omega * s, 0.0)[:, None] * normal
+        zero, ones = np.zeros(len(place)), np.ones(len(place))
+        one = SimpleNamespace(positions=np.column_stack([place, zero]), velocities=np.column_stack([velocity, zero]), radii=0.0015 * ones,
+                              types=ones)
+        one.select = lambda kept: one if kept.all() else None
+        return one
+
+    frames = [frame(k) for k in range(given["frames"])]
+    return SimpleNamespace(parameters=given, record={"variant": variant}, grains=lambda: frames)
+
+
+def verdicts(**changes: Any) -> dict[str, Any]:
+    return judged("rotating_drum", drum.measure([flow(**changes)]))
+
+
+def test_the_tracked_profile_says_what_it_is_quoted_for() -> None:
+    found = drum.data()
+    assert found["surface_speed"].value == pytest.approx(0.33, abs=0.01)
+    assert found["zero_crossing"].value == pytest.approx(-0.0595, abs=0.0005)
+    assert found["layer_depth"].value == pytest.approx(0.030, abs=0.001)
+    assert found["layer_shear"].value == pytest.approx(13.0, rel=0.1)
+
+
+def test_a_known_flow_is_measured_as_it_is() -> None:
+    found = verdicts()
+    assert found["surface_angle"]["value"] == pytest.approx(27.0, abs=0.3)
+    up = 1.2147 * 0.066
+    assert found["zero_crossing"]["value"] == pytest.approx(-0.066 + 0.036 * up / (up + 0.345), abs=6e-4)
+    assert found["layer_shear"]["value"] == pytest.approx((up + 0.345) / 0.036, rel=0.02)
+    assert found["solid_body"]["value"] == pytest.approx(1.0, abs=0.01)
+    assert JUDGED | {"solid_body"} <= names(found, "pass")
+
+
+@pytest.mark.parametrize(("changes", "seen"), [
+    ({"speed": 0.45}, {"surface_speed"}), ({"speed": 0.25}, {"surface_speed"}), ({"turn": -0.08}, {"zero_crossing", "layer_depth"}),
+    ({"surface": -0.04, "turn": -0.08}, {"zero_crossing"}), ({"carried": 0.85}, {"solid_body"}),
+], ids=["faster", "slower", "deep", "less filled", "a wall that slips"])
+def test_wrong_flows_fail(changes: dict[str, float], seen: set[str]) -> None:
+    assert seen <= names(verdicts(**changes), "fail")
+
+
+def test_of_other_drums_no_flow_is_judged() -> None:
+    assert not JUDGED & (names(verdicts(variant="other"), "pass") | names(verdicts(variant="other"), "fail"))
+
+
+def study(name: str, along: str, values: list[float], speeds: list[float]) -> dict[str, Any]:
+    points = [{"parameters": defaults("rotating_drum", **{along: value}), "variant": "alizadeh" if speed == 0.345 else "other",
+               "quantities": list(verdicts(speed=speed).values())}
+              for value, speed in zip(values, speeds, strict=True)]
+    return judged("rotating_drum", drum.study(name, points, along))
+
+
+def test_the_study_adds_what_friction_makes_of_it() -> None:
+    found = study("friction", "grain_friction", [0.27, 0.3, 0.33], [0.36, 0.345, 0.33])
+    assert 0.005 < 0.5 * np.diff(found["surface_speed"]["interval"])[0] < 0.03
+    assert "U_input = 0.01" in found["surface_speed"]["detail"] and "U_num = 0" in found["surface_speed"]["detail"]
+    assert "surface_speed" not in names(study("stiffness", "youngs_modulus", [5e6, 1e7, 2e7], [0.345, 0.32, 0.28]), "pass")
+
+
+SMALL = {"drum_radius": 0.03, "drum_speed": 3.0, "run_in": 0.7, "measure_time": 0.3, "frames": 10}
+
+
+@pytest.mark.parametrize("lining", ["smooth", "grains"])
+@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+def test_grains_go_up_with_the_drum_and_back_along_the_surface(engine: str, lining: str, decks: Any, tmp_path: Path) -> None:
+    one = decks("rotating_drum", engine, tmp_path, {**SMALL, "wall_lining": lining})
+    one.run()
+    found = read(one.replica())
+    every = np.ones(len(found.solid), bool)
+    # A smooth wall of so small a drum slips below the bed, which leans on it only.
+    low, high = (5.0, 25.0) if lining == "smooth" else (25.0, 40.0)
+    assert low < found.surface_angle(every) < high
+    if lining == "grains":
+        assert found.surface_speed(every) > 0.05 and found.solid_body(every) > 0.8 and abs(found.flux_balance(every)) < 0.2
+        frames = list(one.replica().grains())
+        glued = frames[-1].select(frames[-1].types == 2)
+        np.testing.assert_allclose(np.hypot(*glued.positions[:, :2].T), 0.0315, rtol=1e-6)
+        turn = np.cross([0.0, 0.0, 3.0], glued.positions)
+        np.testing.assert_allclose(glued.velocities, turn, atol=2e-3 * 0.0945)
+
+
+def test_the_lattice_leaves_no_two_grains_in_touch() -> None:
+    """Nor one of them and the lining."""
+    from dembark.validation.case import deck
+    from dembark.validation.case.folders import find
+    values = defaults("rotating_drum", **SMALL | {"wall_lining": "grains"})
+    packed = deck.prepare(find("rotating_drum"), values).packing
+    assert packed is not None
+    period = packed.box[2, 1]
+    apart = packed.positions[:, None] - packed.positions
+    apart[..., 2] -= period * np.round(apart[..., 2] / period)
+    far = np.linalg.norm(apart, axis=2) + np.eye(len(apart))
+    moving = packed.types == 1
+    assert far[moving].min() >= 1.005 * values["grain_diameter"] and far.min() >= values["grain_diameter"]
