@@ -199,7 +199,8 @@ def read(replica: Replica) -> Column:
     rows = [_frame_rows(grains, contacts, silo, gravity, edges, sectors, bridges) for grains, contacts in replica.paired_frames()]
     times = replica.times()
     lift = np.sum([times[f"{name}_fz"] for name in (*silo.names, "base")], axis=0)[times["step"] >= outlines[0][0]]
-    return Column(edges, height, silo, diameter, gravity, float(replica.derived["wall_kinetic"]), mass, force_error=block_mean(lift / (mass * gravity) - 1.0),
+    friction, error = float(replica.derived["wall_kinetic"]), block_mean(lift / (mass * gravity) - 1.0)
+    return Column(edges, height, silo, diameter, gravity, friction, mass, force_error=error,
                   **{name: np.array([row[name] for row in rows]) for name in rows[0]})
 
 

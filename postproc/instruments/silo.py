@@ -81,7 +81,8 @@ def predicted(points: Sequence[Mapping[str, Any]]) -> Measurement:
     def height(point: Mapping[str, Any]) -> float:
         """Of the filling over R, at the bulk density of `dry`."""
         wider = float(point["parameters"]["cylinder_radius"]) / float(known["parameters"]["cylinder_radius"])
-        return of_point(known, "filling_height").value * of_point(point, "filled_mass").value / of_point(known, "filled_mass").value / wider**3
+        masses = [of_point(one, "filled_mass").value for one in (point, known)]
+        return of_point(known, "filling_height").value * masses[0] / masses[1] / wider**3
 
     depth = np.array([height(point) for point in held])
     base = Growth.of(held, "apparent_mass_ratio", depth)
@@ -96,13 +97,13 @@ def predicted(points: Sequence[Mapping[str, Any]]) -> Measurement:
     every, top = Growth.of(points, "apparent_mass_ratio", place, place), place[-1]
     pair = janssen.fitted_pair(place, every.values, [(2.0, 0.02), (2.0, 0.5)], ((0.05, 100.0), (0.0, 0.9 * top)), 1.0)
     one = janssen.fitted_length(place, every.values, 2.0)
-    values["filling_two_parameter_gain"] = Value(Estimate(janssen.gain(place, every.values, one, pair), 0.0),
-                                                 detail=f"with it λ is {pair[0]:.2f} R, the zone {pair[1]:.2f} R deep; all {len(points)} silos")
+    values["filling_two_parameter_gain"] = Value(exact(janssen.gain(place, every.values, one, pair)), detail=(
+        f"all {len(points)} silos; with it λ is {pair[0]:.2f} R, the zone {pair[1]:.2f} R deep"))
     curve = profile("apparent_mass", "Apparent mass", "filled mass / (ρ_b π R³)", "force on the base / (g ρ_b π R³)", place, [every.values],
                     half=every.halves, reference=place * janssen.base_share(2.0 * k_mu.value * place),
                     reference_label="Janssen, K and μ_mob of dry alone")
-    remark = ("K of the contact stress, μ_mob and ρ_b are calibrated in `dry` alone; every other point is a prediction. Each is a packing of "
-              "its own, filled by rain, with the wall creeping upward, so that all have the same history.")
+    remark = ("Calibrated in `dry` alone are K of the contact stress, μ_mob and ρ_b; every other point is a prediction. Each is a packing "
+              "of its own, filled by rain, with the wall creeping upward, so that all have the same history.")
     return Measurement(values, [curve], [remark])
 
 
@@ -148,7 +149,7 @@ def _remarks(columns: Sequence[Column], over: Mapping[str, Estimate], wet: bool,
                "static coefficient in its place λ would come out shorter by the first of these shares."),
                ("Calibrated in the column itself, and therefore counted as identities: λ = size / (2 K μ_mob), whose K μ_mob is the walls' "
                 "shear over σ_zz, and Janssen's profile with it. They hold for any shear that is proportional to σ_zz, and tell nothing of "
-                "its size. Predicted: the force on the base, from K of the contact stress and the kinetic friction that the wall was given.")]
+                "its size. Predicted: the force on the base, from K of the contact stress and the kinetic friction given to the wall.")]
     if len(columns) < 3:
         remarks.append("With fewer than three packings the intervals come from time blocks and from sectors of the walls within the "
                        "packing; what varies from packing to packing as a whole is not in them.")
