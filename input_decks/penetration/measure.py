@@ -37,24 +37,30 @@ def bed(replica: Replica) -> dict[str, float]:
 
 def free_flight(replica: Replica) -> float:
     """Largest deviation (m) of the ball's height from the exact one until it touches."""
-    p, rows = replica.parameters, replica.times()
-    time = rows["time"][rows["step"] <= replica.derived["first"]]
+    p, (time, height) = replica.parameters, fall(replica)
     exactly = p["ball_height"] - p["ball_speed"] * time - 0.5 * p["gravity"] * time**2
-    return float(np.abs(rows["ball_height"][: len(time)] - exactly).max(initial=0.0))
+    before = replica.times()["step"] <= replica.derived["first"]
+    return float(np.abs(height - exactly)[before].max(initial=0.0))
+
+
+def fall(replica: Replica) -> tuple[Array, Array]:
+    """Time (s), from the published start on, and height of the ball (m), each (rows,)."""
+    rows = replica.times()
+    return rows["time"] + replica.derived["start"], rows["ball_height"]
 
 
 def flight(replica: Replica) -> dict[str, float]:
     """What the codes are compared in, of the ball's height each millisecond as it was published; no more than the run is long."""
-    rows = replica.times()
-    last = round(1e3 * min(rows["time"][-1], 0.06) - 0.4)
+    rows = fall(replica)
+    last = round(1e3 * rows[0][-1] - 0.4)
     time = 1e-3 * np.arange(1, last + 1)
-    height = np.interp(time, rows["time"], rows["ball_height"])
+    height = np.interp(time, *rows)
     lowest = int(np.argmin(height))
-    found = {f"height_{k}": float(height[k - 1]) for k in (24, 28, 40, 60) if k <= last}
+    found = {f"height_{k}": float(height[k - 1]) for k in (24, 28, 40) if k <= last}
     if lowest < last - 1:
         found |= {"deepest_point": float(height[lowest]), "deepest_time": float(time[lowest])}
-    if last == 60:
-        found["rebound_speed"] = float(height[59] - height[39]) / 0.02
+    if last >= 45:
+        found["rebound_speed"] = float(height[44] - height[39]) / 5e-3
     return found
 
 
@@ -76,9 +82,10 @@ def curves(replicas: Replicas) -> list[Curve]:
     """The height against time, and less the mean of the codes, where the band shows how far single runs of theirs lie from it."""
     with (REFERENCE / "dosta_2024_height.csv").open(encoding="utf-8") as file:
         table = np.array([[float(x) for x in row] for row in list(csv.reader(file))[1:]])
-    table = table[table[:, 0] <= min(one.times()["time"][-1] for one in replicas) + 1e-9]
+    runs = [fall(one) for one in replicas]
+    table = table[(table[:, 0] >= max(one[0][0] for one in runs)) & (table[:, 0] <= min(one[0][-1] for one in runs) + 1e-9)]
     time, mean, low, high = 1e3 * table[:, 0], 1e3 * table[:, 1], 1e3 * table[:, 4], 1e3 * table[:, 5]
-    heights = [1e3 * np.interp(table[:, 0], one.times()["time"], one.times()["ball_height"]) for one in replicas]
+    heights = [1e3 * np.interp(table[:, 0], *one) for one in runs]
 
     def curve(name: str, title: str, across: str, less: Array) -> Curve:
         drawn = profile(name, title, "time (ms)", across, time, [height - less for height in heights], reference=mean - less,
