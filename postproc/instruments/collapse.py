@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from dembark.postproc import DumpError, GrainFrame
+from dembark.postproc.instruments.heaps import height, surface
 from dembark.postproc.measurement import Array, Replica, profile
 
 PARTS = ("normal_elastic", "normal_viscous", "tangential_elastic", "tangential_viscous", "capillary", "liquid_viscous")
@@ -72,7 +73,7 @@ class Collapse:
 
     def height(self) -> float:
         """m, of the column: twice that of its centre of mass."""
-        return float(2.0 * np.average(self.first.positions[:, 2], weights=self.first.masses))
+        return height(self.first)
 
     def front(self) -> float:
         """m, behind which a share FRONT of the mass lies at the end."""
@@ -82,16 +83,7 @@ class Collapse:
 
     def height_at_wall(self) -> float:
         """m, of the deposit: the highest grain within 2 d of the back wall."""
-        return float(_surface(self.last, np.array([0.0, 2.0 * self.diameter]))[0])
-
-
-def _surface(frame: GrainFrame, edges: Array) -> Array:
-    """m, highest point of a grain whose centre is in each cell of x (0 where there is none)."""
-    top = np.zeros(len(edges) - 1)
-    cell = np.searchsorted(edges, frame.positions[:, 0]) - 1
-    inside = (cell >= 0) & (cell < len(top))
-    np.maximum.at(top, cell[inside], (frame.positions[:, 2] + frame.radii)[inside])
-    return top
+        return float(surface(self.last, np.array([0.0, 2.0 * self.diameter]))[0])
 
 
 def read(replica: Replica) -> Collapse:
@@ -116,6 +108,6 @@ def shares(runs: Sequence[Collapse], ways: Mapping[str, str]) -> list[dict[str, 
 def deposits(runs: Sequence[Collapse]) -> dict[str, Any]:
     """Curve of the deposit's surface beside that of the column."""
     width, edges = runs[0].width, np.arange(0.0, 5.0 * runs[0].width, runs[0].diameter)
-    before = np.mean([_surface(one.first, edges) for one in runs], axis=0) / width
+    before = np.mean([surface(one.first, edges) for one in runs], axis=0) / width
     return profile("deposit", "Deposit", "x / W", "height / W", 0.5 * (edges[1:] + edges[:-1]) / width,
-                   [_surface(one.last, edges) / width for one in runs], reference=before, reference_label="when the gate opens")
+                   [surface(one.last, edges) / width for one in runs], reference=before, reference_label="when the gate opens")

@@ -1,0 +1,43 @@
+"""Angle of repose: a dilute bed on a plate between two walls, which make way at the outlets beside the plate, and a pit below."""
+
+import math
+
+import numpy as np
+
+from dembark.input_decks.common import packing
+from dembark.input_decks.common.setup import Array, Parameters, Setup, contacts, rectangle, time_step
+
+
+def setup(p: Parameters) -> Setup:
+    """The plate is 0 < x < plate_width, z = 0; its side walls stand at its ends and move outwards by the outlet at the first frame.
+
+    20 rows of time.csv between two frames. With confinement, front and rear walls stand at y = 0 and y = thickness.
+    """
+    step, d, d_max = time_step(p), p.grain_diameter, packing.largest(p)
+    every = math.ceil(p.discharge_time / step / (20 * (p.frames - 1)))
+    first, stride = every * math.ceil(p.settle_time / step / every), 20 * every
+    steps = first + stride * (p.frames - 1)
+    walled = p.confinement > 0.0
+    margin = 0.15 * d_max if walled else 0.0
+    sites, height = packing.slab(p, p.plate_width, p.thickness - 2.0 * margin, margin=0.15 * d_max, foot=0.15 * d_max)
+    # All grains fit into the pit, in heaps that rise by 0.4 towards the walls.
+    pit = math.sqrt(0.4 * p.grain_count * math.pi / 6.0 * d**3 / 0.58 / p.thickness) + 4.0 * d
+    top, room = height + 2.0 * d_max, p.outlet_width + 2.0 * d_max
+    beside = d_max if walled else 0.0
+    box = [(-room, p.plate_width + room), (-beside, p.thickness + beside), (-pit - 2.0 * d_max, top)]
+    grains = packing.grains(p, sites + (0.0, margin, 0.0), box)
+    numbers = {"first": first, "stride": stride, "every": every, "opened": first + math.ceil(p.outlet_width / (p.gate_speed * step)),
+               "walled": int(walled), "thickness": p.thickness, "pit": -pit, "middle": 0.5 * p.plate_width}
+    # The plate is as thick as a grain. Elements are no longer than the thickness, for LIGGGHTS cannot place those that are much larger
+    # than a period.
+    plate = np.vstack([strip(p, (0.0, 0.0, 0.0), (p.plate_width, 0.0, 0.0)),
+                       *(strip(p, (x, 0.0, -d), (0.0, 0.0, d)) for x in (0.0, p.plate_width))])
+    sides = {name: strip(p, (x, 0.0, -pit - d), (0.0, 0.0, top + pit + d)) for name, x in (("left", 0.0), ("right", p.plate_width))}
+    return Setup(steps, step, grains, {**numbers, **contacts(p, skin=0.2)}, {"plate": plate, **sides})
+
+
+def strip(p: Parameters, corner: tuple[float, float, float], along: tuple[float, float, float]) -> Array:
+    """Triangles (n, 3, 3) in m of a rectangle from `corner` `along` one side and all through the thickness."""
+    side = np.asarray(along)
+    panels = math.ceil(float(np.linalg.norm(side)) / p.thickness)
+    return np.vstack([rectangle(np.asarray(corner) + side * k / panels, (0.0, p.thickness, 0.0), side / panels) for k in range(panels)])

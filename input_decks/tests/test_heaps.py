@@ -1,0 +1,246 @@
+"""granular_collapse and angle_of_repose: both engines form a deposit and a heap, and wrong physics is seen beside the measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dembark.input_decks.common.packing import lattice
+from dembark.input_decks.tests.measuring import defaults, judged, module
+from dembark.postproc import GrainsDump
+from dembark.postproc.instruments.heaps import EDGE, at_rest, flank, front, power_law
+from dembark.postproc.measurement import Measurement
+from dembark.postproc.replica import Replica
+from dembark.postproc.tests.dumps import grains_text
+
+collapse, repose = module("granular_collapse"), module("angle_of_repose")
+ENGINES = ("liggghts", "yade")
+D = 0.005
+Verdicts = dict[str, dict[str, Any]]
+
+
+def block(length: float, high: Callable[[np.ndarray], np.ndarray], depth: float, d: float) -> np.ndarray:
+    """Places (n, 3) of grains that fill 0 < x < `length`, 0 < y < `depth`, 0 < z < high(x) to 0.6."""
+    cell = d * (np.pi / 6.0 / 0.6) ** (1.0 / 3.0)
+    counts = (int(length / cell), round(depth / cell), int(high(np.linspace(0.0, length, 50)).max() / cell) + 1)
+    places = lattice(counts, (length / counts[0], depth / counts[1], cell))
+    return places[places[:, 2] < high(places[:, 0])]
+
+
+def deposit(folder: Path, across: int, aspect: float, run_out: float, height: float, *, noise: float = 0.01, speed: float = 0.0,
+            count: int = 3) -> Measurement:
+    """What is measured where a column `across` grains wide has collapsed into a wedge with this `run_out` and `height` (over W); packings
+    differ by `noise`."""
+    p, runs = defaults("granular_collapse", column_width=across * D, aspect_ratio=aspect), []
+    width, depth = p["column_width"], p["column_depth"]
+    for k in range(count):
+        own = folder / str(k)
+        own.mkdir(parents=True)
+        # The volume over the area at the front is EDGE.
+        end, top = (1.0 + run_out * (1.0 + noise * (k - 1))) * width, height * (1.0 + noise * (k - 1)) * width
+        foot = EDGE / 0.6 * D
+        places = [block(width, lambda x: np.full_like(x, aspect * width), depth, D),
+                  block(end, lambda x, end=end, top=top: top + (foot - top) * np.maximum(x - 4 * D, 0.0) / (end - 4 * D), depth, D)]
+        box = ((-D, 20 * width), (0.0, depth), (-D, 20 * width))
+        (own / "grains.dump").write_text("".join(
+            grains_text(step, where, np.full(len(where), 0.5 * D), box=box, velocities=np.full_like(where, speed))
+            for step, where in enumerate(places)))
+        runs.append(Replica(own, {"parameters": p, "time_step": 1e-5, "engine": "liggghts"}))
+    return collapse.measure(runs)
+
+
+def heap(folder: Path, angle: float, count: int = 3, **changes: Any) -> Verdicts:
+    """What is measured of a heap with slopes of `angle` (deg); packings differ by 0.3 deg."""
+    p, runs = defaults("angle_of_repose", **changes), []
+    d, width = p["grain_diameter"], p["plate_width"]
+    for k in range(count):
+        own = folder / str(k)
+        own.mkdir(parents=True)
+        slope = np.tan(np.radians(angle + 0.3 * (k - 1)))
+        x = (np.arange(30) + 0.5) * d
+        where = np.column_stack([x, np.zeros(30), slope * (0.5 * width - np.abs(x - 0.5 * width)) + 0.5 * d])
+        (own / "grains.dump").write_text(grains_text(0, where, np.full(30, 0.5 * d)) + grains_text(1, where, np.full(30, 0.5 * d)))
+        runs.append(Replica(own, {"parameters": p, "time_step": 1e-5, "engine": "liggghts"}))
+    return judged("angle_of_repose", repose.measure(runs))
+
+
+def verdicts(found: Verdicts) -> dict[str, str]:
+    return {name: one["verdict"] for name, one in found.items() if one["tolerance"] is not None}
+
+
+def test_run_out_and_height_of_a_deposit(tmp_path: Path) -> None:
+    found = judged("granular_collapse", deposit(tmp_path, 24, 0.6, 1.08, 0.59))
+    assert found["run_out"]["value"] == pytest.approx(1.08, rel=0.02) and found["final_height"]["value"] == pytest.approx(0.59, rel=0.03)
+    assert found["aspect_ratio_measured"]["value"] == pytest.approx(0.6, rel=0.02) and found["run_out"]["interval"]
+
+
+def test_what_still_moves_is_told(tmp_path: Path) -> None:
+    assert "still moves" not in deposit(tmp_path / "rests", 12, 0.6, 1.08, 0.59).remarks[0]
+    assert "still moves" in deposit(tmp_path / "moves", 12, 0.6, 1.08, 0.59, speed=0.05).remarks[0]
+
+
+@pytest.mark.parametrize(("aspect", "run_out", "height", "verdict"), [
+    (0.6, 1.08, 0.59, {"run_out": "pass", "height": "pass"}), (2.0, 3.6, 1.13, {"run_out": "pass", "height": "pass"}),
+    # Almost a fluid: it spreads into a thin layer.
+    (0.6, 3.0, 0.15, {"run_out": "fail", "height": "fail"}), (2.0, 12.0, 0.4, {"run_out": "fail", "height": "fail"}),
+    # So much friction that the column only slumps.
+    (0.6, 0.6, 0.59, {"run_out": "fail", "height": "pass"}), (2.0, 1.5, 1.7, {"run_out": "fail", "height": "fail"}),
+])
+def test_columns_as_wide_as_the_measured_ones(aspect: float, run_out: float, height: float, verdict: dict[str, str]) -> None:
+    """Narrower columns run out less far, in proportion to d/W."""
+    given = points("granular_collapse", "column_width", [0.06, 0.085, 0.12], aspect_ratio_measured=lambda _: aspect, final_height=lambda _: height,
+                   run_out=lambda width: run_out * (1.0 - 2.0 * (D / width - 1.0 / 67.0)))
+    found = collapse.study("width", given, "column_width")
+    one = judged("granular_collapse", found)
+    assert one["run_out_of_beads"]["value"] == pytest.approx(run_out) and one["height_of_beads"]["value"] == pytest.approx(height)
+    assert {name: one[f"{name}_of_beads"]["verdict"] for name in verdict} == verdict
+    assert all(word in one["run_out_of_beads"]["detail"] for word in ("U_val", "U_sim", "U_size", "U_input", "U_D"))
+    assert [len(curve["place"]) for curve in found.profiles] == [4, 4]
+
+
+def test_one_packing_decides_nothing() -> None:
+    given = points("granular_collapse", "column_width", [0.06, 0.085, 0.12], aspect_ratio_measured=lambda _: 0.6, final_height=lambda _: 0.59, run_out=lambda _: 1.08)
+    for one in given:
+        for quantity in one["quantities"]:
+            quantity["interval"] = None
+    assert {one["verdict"] for one in judged("granular_collapse", collapse.study("width", given, "column_width")).values()} == {"info"}
+
+
+def points(case: str, along: str, places: list[float], **laws: Callable[[float], float]) -> list[dict[str, Any]]:
+    """Results of variants along a parameter, whose quantities follow `laws` within 1 %."""
+    return [{"parameters": defaults(case) | {along: place}, "quantities": [
+        {"name": name, "value": law(place), "interval": [0.99 * law(place), 1.01 * law(place)], "basis": ""} for name, law in laws.items()]}
+        for place in places]
+
+
+@pytest.mark.parametrize(("name", "places", "power", "verdict"), [
+    ("low", [0.6, 1.0, 2.0], 1.0, "pass"), ("low", [0.6, 1.0, 2.0], 0.5, "fail"), ("low", [0.6, 1.0, 2.0], 1.5, "fail"),
+    ("high", [1.0, 2.0, 4.0], 0.37, "pass"), ("high", [1.0, 2.0, 4.0], 0.0, "fail"), ("high", [1.0, 2.0, 4.0], 1.0, "fail"),
+])
+def test_exponents_in_the_aspect_ratio(name: str, places: list[float], power: float, verdict: str) -> None:
+    law = (lambda a: 1.8 * a**power) if name == "low" else (lambda a: a**power)
+    given = points("granular_collapse", "aspect_ratio", places, aspect_ratio_measured=lambda a: a, run_out=law, final_height=law)
+    found = collapse.study(name, given, "aspect_ratio")
+    (one,) = judged("granular_collapse", found).values()
+    assert one["value"] == pytest.approx(power, abs=1e-9) and one["verdict"] == verdict, one
+    assert len(found.profiles) == 2 and all(len(curve["reference_low"]) == 3 for curve in found.profiles)
+
+
+def test_sensitivities_of_a_study_of_an_input() -> None:
+    given = points("granular_collapse", "grain_friction", [0.4, 0.5, 0.6], run_out=lambda mu: mu**-0.4, final_height=lambda mu: mu**0.1)
+    found = judged("granular_collapse", collapse.study("friction", given, "grain_friction"))
+    assert {name: round(one["value"], 6) for name, one in found.items()} == {"run_out_sensitivity": -0.4, "height_sensitivity": 0.1}
+
+
+def test_the_data_follow_the_laws_that_others_quote() -> None:
+    assert power_law(collapse.points("run_out", 0.35, 2.6)).value == pytest.approx(1.0, abs=0.06)
+    assert collapse.datum("run_out", 1.0).value == pytest.approx(1.8, rel=0.03)
+    for aspect in (0.5, 0.6):
+        assert collapse.datum("final_height", aspect).value == pytest.approx(aspect, rel=0.06)
+
+
+def test_a_heap_like_the_measured_one_passes(tmp_path: Path) -> None:
+    for name, confinement, angle in (("w4", 0.25, 27.4), ("w8", 0.125, 22.8), ("periodic", 0.0, 18.4)):
+        found = heap(tmp_path / name, angle, confinement=confinement)
+        assert found["angle"]["value"] == pytest.approx(angle, abs=0.01) and found["angle"]["verdict"] == "pass"
+        assert found["angle"]["reference"] == pytest.approx(angle, abs=0.06) and "U_input" in found["angle"]["detail"]
+    assert verdicts(heap(tmp_path / "code", 29.2)) == {"angle": "pass", "angle_of_code": "pass"}
+
+
+@pytest.mark.parametrize(("angle", "changes"), [
+    # Without friction nothing stays; without rolling resistance little does.
+    (2.0, {}), (17.0, {}), (2.0, {"confinement": 0.0}), (28.0, {"confinement": 0.0}),
+])
+def test_other_heaps_fail(angle: float, changes: dict[str, Any], tmp_path: Path) -> None:
+    assert set(verdicts(heap(tmp_path, angle, **changes)).values()) == {"fail"}
+
+
+def test_heaps_of_other_beads_stand_beside_the_other_code_alone(tmp_path: Path) -> None:
+    found = heap(tmp_path / "a", 37.0, rolling_friction=0.1, beads="other")
+    assert verdicts(found) == {"angle_of_code": "pass"} and found["angle"]["reference"] is None
+    assert verdicts(heap(tmp_path / "b", 30.0, rolling_friction=0.1, beads="other")) == {"angle_of_code": "fail"}
+
+
+@pytest.mark.parametrize(("factor", "verdict"), [(1.49, "pass"), (1.0, "fail"), (2.0, "fail")])
+def test_the_wall_factor(factor: float, verdict: str) -> None:
+    given = points("angle_of_repose", "confinement", [0.25, 0.125, 0.0], angle=lambda confinement: 18.4 * (1.0 + (factor - 1.0) * confinement / 0.25))
+    found = repose.study("thickness", given, "confinement")
+    one = judged("angle_of_repose", found)["wall_factor"]
+    assert one["value"] == pytest.approx(factor) and one["reference"] == pytest.approx(1.487, abs=1e-3) and one["verdict"] == verdict
+
+
+@pytest.mark.parametrize(("power", "verdict"), [(0.4, "pass"), (0.0, "fail"), (-0.2, "fail")])
+def test_rolling_resistance_raises_the_angle(power: float, verdict: str) -> None:
+    given = points("angle_of_repose", "rolling_friction", [0.2, 0.02, 0.1, 0.05], angle=lambda rolling: 47.0 * (rolling / 0.2) ** power)
+    one = judged("angle_of_repose", repose.study("rolling", given, "rolling_friction"))["rolling_exponent"]
+    assert one["value"] == pytest.approx(power, abs=1e-9) and one["reference"] == pytest.approx(0.4, abs=0.02) and one["verdict"] == verdict
+
+
+def test_single_grains_beyond_the_front_do_not_count(tmp_path: Path) -> None:
+    places = block(0.1, lambda x: np.full_like(x, 2 * D), 5 * D, D)
+    rolled = np.array([[0.15, 0.01, 0.0], [0.2, 0.02, 0.0]])
+    where = np.vstack([places, rolled])
+    (tmp_path / "grains.dump").write_text(grains_text(0, where, np.full(len(where), 0.5 * D)))
+    frame = GrainsDump(tmp_path / "grains.dump")[0]
+    assert front(frame, 5 * D, D) == pytest.approx(0.1, abs=D) and at_rest(frame, 9.81, D)
+
+
+def test_flanks_have_a_sign() -> None:
+    class Frame:
+        positions = np.column_stack([np.arange(20.0) + 0.5, np.zeros(20), -np.arange(20.0)]) * D
+        radii = np.full(20, 0.5 * D)
+    Frame.positions[:, 2] += 20 * D
+    assert flank(Frame, 2 * D, 18 * D, D) == pytest.approx(45.0)  # type: ignore[arg-type]
+
+
+TINY: dict[str, dict[str, Any]] = {
+    "granular_collapse": {"column_width": 0.03, "aspect_ratio": 1.0, "column_depth": 0.02},
+    "angle_of_repose": {"plate_width": 0.16, "fill_height": 0.06, "discharge_time": 0.8, "settle_time": 0.35},
+}
+
+
+@pytest.fixture(scope="module")
+def run(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """A small run of a case in an engine, with some parameters changed."""
+    def get(case: str, engine: str, **changes: Any) -> Replica:
+        one = decks(case, engine, tmp_path_factory.mktemp(f"{case}-{engine}"), TINY[case] | changes)
+        one.run()
+        return one.replica()
+
+    return get
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_column_collapses_and_stays(engine: str, run: Any) -> None:
+    found = collapse.deposit(run("granular_collapse", engine))
+    assert found["aspect_ratio_measured"] == pytest.approx(1.0, abs=0.08) and found["rests"]
+    assert 0.5 < found["run_out"] < 2.5 and 0.6 < found["final_height"] < 1.0
+
+
+def test_a_column_without_friction_does_not_stay(run: Any) -> None:
+    found = collapse.deposit(run("granular_collapse", "liggghts", static_friction=0.0))
+    assert found["run_out"] > 2.5 and found["final_height"] < 0.5
+
+
+@pytest.mark.parametrize(("engine", "confinement"), [("liggghts", 0.25), ("yade", 0.25), ("yade", 0.0)])
+def test_a_heap_stays_on_the_plate(engine: str, confinement: float, run: Any) -> None:
+    one = run("angle_of_repose", engine, confinement=confinement)
+    frames = one.grains()
+    first, last = frames[0], frames[-1]
+    # All are on the plate when the outlets open; a heap stays, and the rest lies in the pit, none of it in the plate.
+    assert (first.positions[:, 2] > 0.0).all()
+    fallen = last.positions[:, 2] < 0.0
+    assert 0.15 < fallen.mean() < 0.8
+    assert (last.positions[fallen, 2] > one.derived["pit"]).all()
+    left, right, _ = repose.flanks(one)
+    assert 10.0 < min(left, right) and max(left, right) < 45.0
+
+
+def test_without_friction_nothing_stays_on_the_plate(run: Any) -> None:
+    one = run("angle_of_repose", "liggghts", confinement=0.0, static_friction=0.0, rolling_resistance="off")
+    heap = one.grains()[-1]
+    assert (heap.positions[:, 2] > 0.0).mean() < 0.15
