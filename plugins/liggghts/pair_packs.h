@@ -24,6 +24,8 @@ namespace dembark {
 template <class Real>
 struct NormalResponse;
 template <class Real>
+struct RingMotion;
+template <class Real>
 struct Vec3;
 
 }  // namespace dembark
@@ -52,6 +54,10 @@ struct ScalarLaws {
   /// Friction on the first grain (N); the state is stored.
   virtual dembark::Vec3<double> friction(const PairBlock& block, int k, const dembark::Vec3<double>& normal, double twist,
                                          const dembark::NormalResponse<double>& response, const dembark::Vec3<double>& velocity) = 0;
+  /// Limits of friction (N): of a contact that has slipped by `slip` (m), and of one that slides now (dembark::sliding_limit).
+  virtual double limit(const PairBlock& block, int k, double normal_force, double contact_area, double slip) = 0;
+  virtual double sliding_limit(const PairBlock& block, int k, const dembark::RingMotion<double>& motion, const double* rings,
+                               double normal_force, double contact_area, double& slip) = 0;
   /// Pulls (N) of the bridges of `count` pairs over their gaps (m).
   virtual void bridges(const PairBlock& block, int first, int count, const double* gap, double* pull) = 0;
 };
