@@ -125,7 +125,7 @@ def liggghts_sample(program: Path, bed: Path, variables: dict[str, object], envi
 
 
 def yade_sample(engine: Engine, bed: Path, law: str, relax: int, steps: int) -> Sample:
-    """One timed run of yade_bed.py with contact law `law` (`stock` or `dembark`)."""
+    """One timed run of yade_bed.py with contact law `law` (`stock`, `dembark`, or a pre-sliding curve of it)."""
     words = [str(engine.executable), "-j1", "-n", "-x", str(HERE / "yade_bed.py")]
     with tempfile.TemporaryDirectory(prefix="dembark-bench-") as name:
         done = _call([*words, f"bed={bed}", f"law={law}", f"relax={relax}", f"steps={steps}", "samples=1"], Path(name),

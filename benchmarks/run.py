@@ -54,6 +54,7 @@ def liggghts_comparisons(bed: Path, cache: Path, wall_clock: bool, relax: int, s
         Comparison("LIGGGHTS, dry", [
             subject("history (stock)", stock, "history"),
             subject("finnie_rabinowicz", law, "finnie_rabinowicz"),
+            subject("finnie_rabinowicz presliding partial_slip", law, "finnie_rabinowicz presliding partial_slip"),
         ], steps, {"finnie_rabinowicz": 0.67}),
         Comparison("LIGGGHTS, wet", [
             subject("history + washino (stock)", stock, "history", "washino/capillary/viscous"),
@@ -70,6 +71,7 @@ def yade_comparison(bed: Path, relax: int, steps: int) -> Comparison:
     return Comparison("YADE, dry", [
         Subject("Law2_ScGeom_MindlinPhys_Mindlin (stock)", lambda: yade_sample(engine, bed, "stock", relax, steps)),
         Subject("Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz", lambda: yade_sample(engine, bed, "dembark", relax, steps)),
+        Subject("the same, presliding partial_slip", lambda: yade_sample(engine, bed, "partial_slip", relax, steps)),
     ], steps, {"Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz": 1.1})
 
 

@@ -1,4 +1,4 @@
-"""The settled bed in YADE under one contact law, timed. Runs inside YADE: `yade -n -j1 -x yade_bed.py bed=FILE law=stock|dembark ...`.
+"""The settled bed in YADE under one contact law, timed. Runs inside YADE: `yade -n -j1 -x yade_bed.py bed=FILE law=stock|dembark|PRESLIDING ...`.
 
 Prints one line of JSON a sample: processor time of the whole loop and of the interaction loop (its share of the loop by the engine's
 own timers), in seconds.
@@ -33,7 +33,7 @@ if options["law"] == "stock":
 else:
     physics = Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
         restitution=restitution, staticFriction=friction, kineticFriction=kinetic, criticalSlipDistance=1e-5)
-    law = Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz()
+    law = Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding="linear" if options["law"] == "dembark" else options["law"])
 motion = NewtonIntegrator(damping=0.3, gravity=(0, 0, -9.81))
 loop = InteractionLoop([Ig2_Sphere_Sphere_ScGeom(), Ig2_Box_Sphere_ScGeom()], [physics], [law])
 O.engines = [

@@ -83,7 +83,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     dembark::FrictionState<double> state = load_friction(history);
     dembark::SlipRings rings;
     if (rings_offset_ >= 0) rings = load_rings(block.history[k] + rings_offset_);
-    const Vec3 force = contact_friction(friction_(atom->type[i], atom->type[j]), normal, twist, response, velocity, dt_, state, &rings);
+    const Vec3 force = contact_friction(law(block, k), normal, twist, response, velocity, dt_, state, &rings);
     if (update_history_) store_friction(history, state);
     if (update_history_ && rings_offset_ >= 0) store_rings(block.history[k] + rings_offset_, rings);
     return force;
@@ -105,6 +105,18 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     const Vec3 couple = rolling_step(rolling_(atom->type[i], atom->type[j]), contact, dt_, angle);
     if (update_history_ && history) store(history, angle);
     return couple;
+  }
+
+  const dembark::FinnieRabinowicz& law(const PairBlock& block, int k) const {
+    const int* const type = lmp_->atom->type;
+    return friction_(type[block.grain[k]], type[block.partner[k]]);
+  }
+  double limit(const PairBlock& block, int k, double normal_force, double contact_area, double slip) override {
+    return shear_limit(law(block, k), friction_coefficient(law(block, k), slip), normal_force, contact_area);
+  }
+  double sliding_limit(const PairBlock& block, int k, const dembark::RingMotion<double>& motion, const double* rings, double normal_force,
+                       double contact_area, double& slip) override {
+    return dembark::sliding_limit(law(block, k), motion, rings, rings + dembark::SlipRings::count, normal_force, contact_area, slip);
   }
 
   void bridges(const PairBlock& block, int first, int count, const double* gap, double* pull) override {
@@ -176,13 +188,13 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     dt_ = update_history_ ? lmp_->update->dt : 0.0;
     collect_laws();
     const int owned = lmp_->force->newton_pair ? atom.nlocal + atom.nghost : atom.nlocal;
-    // The scalar law knows the other curves, and what a step of no length is.
-    const bool pack_friction = presliding_ == dembark::Presliding::linear && dt_ > 0.0;
+    // The scalar law knows the exponential curve, and what a step of no length is.
+    const bool pack_friction = presliding_ != dembark::Presliding::exponential && dt_ > 0.0;
     // The factor of relaxed contacts (PairGran::relax) is 1 in this version of the engine.
     // The rolling spring stands behind the rings.
     const int more = rings_offset_ >= 0 ? rings_offset_ : angle_offset_;
     const int numbers = (rings_offset_ >= 0 ? ring_numbers : 0) + (angle_offset_ >= 0 ? 3 : 0);
-    packs_({atom, *pair, *this, laws_.data(), friction_.types() + 1, owned, friction_offset_, more, numbers, dt_, wet, limit_force_,
+    packs_({atom, *pair, *this, laws_.data(), friction_.types() + 1, owned, friction_offset_, rings_offset_, more, numbers, dt_, wet, limit_force_,
             tangential_damping_, pack_friction, rolling_model_ != dembark::RollingModel::off},
            *block_);
   }

@@ -24,6 +24,8 @@ namespace dembark {
 template <class Real>
 struct NormalResponse;
 template <class Real>
+struct RingMotion;
+template <class Real>
 struct Vec3;
 
 }  // namespace dembark
@@ -55,6 +57,10 @@ struct ScalarLaws {
   /// Couple of rolling resistance on the first grain (N m); the state is stored.
   virtual dembark::Vec3<double> rolling(const PairBlock& block, int k, const dembark::Vec3<double>& normal, double twist,
                                         double normal_force, double tangential_stiffness, const dembark::Vec3<double>& spin) = 0;
+  /// Limits of friction (N): of a contact that has slipped by `slip` (m), and of one that slides now (dembark::sliding_limit).
+  virtual double limit(const PairBlock& block, int k, double normal_force, double contact_area, double slip) = 0;
+  virtual double sliding_limit(const PairBlock& block, int k, const dembark::RingMotion<double>& motion, const double* rings,
+                               double normal_force, double contact_area, double& slip) = 0;
   /// Pulls (N) of the bridges of `count` pairs over their gaps (m).
   virtual void bridges(const PairBlock& block, int first, int count, const double* gap, double* pull) = 0;
 };
@@ -67,7 +73,8 @@ struct PairStep {
   int types;                    // in a row; with 2, only the pair 1-1 is there
   int owned;                    // grains from here on get no forces
   int offset;                   // of friction in a history
-  int more, more_numbers;       // the same of partial slip and of a rolling spring; -1: there is none
+  int rings;                    // of partial slip; -1: there is none
+  int more, more_numbers;       // of partial slip and of a rolling spring together; -1: there is neither
   double dt;
   bool wet, limit_force, tangential_damping;
   bool pack_friction;  // false leaves all friction to the scalar law

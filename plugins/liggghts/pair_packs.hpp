@@ -7,6 +7,7 @@
 #include "dembark/finnie_rabinowicz.hpp"
 #include "dembark/kinematics.hpp"
 #include "dembark/normal_force.hpp"
+#include "dembark/partial_slip.hpp"
 
 namespace dembark_liggghts {
 
@@ -77,6 +78,8 @@ inline void gather(const PairStep& s, PairBlock& b, int found) {
     // By the time that the pair's turn has come these are there.
     __builtin_prefetch(b.history[k] + s.offset, 1);
     __builtin_prefetch(b.history[k] + s.offset + 4, 1);
+    for (int n = 0; s.more >= 0 && n < s.more_numbers + 3; n += 8)
+      __builtin_prefetch(b.history[k] + s.more + (n < s.more_numbers ? n : s.more_numbers - 1), 1);
     __builtin_prefetch(s.f + 3 * j, 1);
     __builtin_prefetch(s.torque + 3 * j, 1);
     *b.flags[k] = (*b.flags[k] & ~(touching_flags | bridge_flag)) | (-(b.pick[k] & 1) & (touching_flags | (s.wet ? bridge_flag : 0)));
@@ -125,6 +128,59 @@ __attribute__((noinline)) void scalar_rolling(const PairStep& s, const PairBlock
     add_to(b.grain[first + k], couple);
     add_to(b.partner[first + k], -couple);
   }
+}
+
+/// Partial slip of the lanes `there`: displacement, slip and energy into `state`; the dash-pot's constant and the share of slip that is
+/// kept of those that slide as a whole. Returns the lanes that it has served: of the others, which are new or have changed much, nothing
+/// has changed.
+template <class P>
+DEMBARK_HOT unsigned partial_slip(const PairStep& s, const PairBlock& b, int first, unsigned there, const PairLaw<P>& law,
+                                  const PackVec<P>& normal, const P& twist, const PackVec<P>& velocity,
+                                  dembark::NormalResponse<P>& response, dembark::FrictionState<P>& state, P& kept_slip) {
+  constexpr int N = P::size;
+  typedef dembark::SlipRings Rings;
+  constexpr int axis = offsetof(Rings, axis) / 8, radius = offsetof(Rings, radius) / 8;
+  static_assert(offsetof(Rings, across) / 8 == Rings::count && offsetof(Rings, outer) / 8 == axis + 3);
+  const auto numbers = [=, &b, &s](int k) { return b.history[first + k] + s.rings; };
+  const Quad<P> old = rows<P, 4>([=](int k) { return numbers(k) + axis; });
+  const P old_radius = collect<P>([=](int k) { return numbers(k)[radius]; });
+  const auto step = dembark::ring_step<P>({old.x, old.y, old.z}, old.w, old_radius, normal, twist, response.tangential_stiffness,
+                                          response.contact_area, velocity, s.dt);
+  const unsigned served = bits(step.goes_on) & there;
+
+  // Lane by lane from here on: a lane's rings are a pack of their own.
+  alignas(64) double motion[sizeof step.motion / sizeof(P)][N], limit[N], slip[N], slides[N] = {}, sums[3][N] = {}, frame[N][4], reach[N];
+  __builtin_memcpy(motion, &step.motion, sizeof motion);
+  dembark::first_limit(law, response.force).store(limit);
+  state.slip.store(slip);
+  step.radius.store(reach);
+  store_rows(Quad<P>{step.axis.x, step.axis.y, step.axis.z, old.w}, [&frame](int k) { return frame[k]; });
+  const auto other_limit = (state.slip > 0.0) | (law.interface_shear_strength < dembark::unlimited_strength);
+  for (unsigned rest = bits(other_limit) & served; rest != 0; rest &= rest - 1) {
+    const int k = __builtin_ctz(rest);
+    limit[k] = s.scalar.limit(b, first + k, response.force[k], response.contact_area[k], slip[k]);
+  }
+  for (int k = 0; k < N; ++k) {
+    if (!(served >> k & 1)) continue;
+    double* const rings = numbers(k);
+    const dembark::RingMotion<double> lane{motion[0][k], motion[1][k], motion[2][k], motion[3][k], motion[4][k], motion[5][k]};
+    dembark::RingSums found;
+    while (dembark::move_rings<P>(lane, limit[k], slides[k] > 0.0, rings, rings + Rings::count, found)) {
+      slides[k] = 1.0;
+      limit[k] = s.scalar.sliding_limit(b, first + k, lane, rings, response.force[k], response.contact_area[k], slip[k]);
+    }
+    sums[0][k] = found.along, sums[1][k] = found.across, sums[2][k] = found.lost;
+    __builtin_memcpy(rings + axis, frame[k], sizeof frame[k]);
+    rings[radius] = reach[k];
+  }
+  const auto all_slides = P::load(slides) > 0.0;
+  const P lost = P::load(sums[2]);
+  state.displacement = P::load(sums[0]) * step.axis + P::load(sums[1]) * step.other;
+  state.slip = P::load(slip);
+  state.dissipated_energy += select(lost > 0.0, lost, P(0.0));
+  response.tangential_damping = select(all_slides, P(0.0), response.tangential_damping);
+  kept_slip = select(all_slides, P(1.0), kept_slip);
+  return served;
 }
 
 /// to += scale * row, both of three numbers.
@@ -186,11 +242,17 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
     const P dt = s.dt, twist = dembark::contact_twist<P>(normal, omega_i, omega_j, dt);
     const Quad<P> old = rows<P, 4>(history);
     dembark::FrictionState<P> state{{old.x, old.y, old.z}, old.w, collect<P>([=](int k) { return history(k)[4]; })};
-    state.displacement = dembark::rotate_to_plane<P>(state.displacement, normal, twist);
-    state.displacement += motion.tangential_velocity * dt;
-    const auto sticks = dembark::plainly_sticks(law, response.force, response.tangential_stiffness, response.contact_area, state);
+    unsigned sticking = 0;
+    P kept_slip = law.kept_slip;
+    if (s.rings < 0) {
+      state.displacement = dembark::rotate_to_plane<P>(state.displacement, normal, twist);
+      state.displacement += motion.tangential_velocity * dt;
+      sticking = bits(dembark::plainly_sticks(law, response.force, response.tangential_stiffness, response.contact_area, state));
+    } else if (s.pack_friction) {
+      sticking = partial_slip<P>(s, b, first, there & ~apart, law, normal, twist, motion.tangential_velocity, response, state, kept_slip);
+    }
     PackVec<P> tangential = dembark::sticking_force<P>(response.tangential_stiffness, response.tangential_damping,
-                                                       motion.tangential_velocity, dt, law.kept_slip, state);
+                                                       motion.tangential_velocity, dt, kept_slip, state);
     if (apart) {  // such a pair has forgotten its contact
       const auto forget = [&touching](P& part) __attribute__((always_inline)) { part = select(touching, part, P(0.0)); };
       forget(response.force);
@@ -201,7 +263,7 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
       for (int k = 0; s.more >= 0 && k < count; ++k)
         if (apart >> k & 1) __builtin_memset(b.history[first + k] + s.more, 0, s.more_numbers * sizeof(double));
     }
-    const unsigned packed = (s.pack_friction ? bits(sticks) | apart : apart) & there;
+    const unsigned packed = (s.pack_friction ? sticking | apart : apart) & there;
     const Quad<P> spring{state.displacement.x, state.displacement.y, state.displacement.z, state.slip};
     alignas(64) double energy[N];
     state.dissipated_energy.store(energy);

@@ -221,9 +221,15 @@ DEMBARK_COLD bool linear_slip(const FinnieRabinowicz& law, Real normal_force, Re
 
 }  // namespace detail
 
+/// T_max (N) of a contact that has not slipped, where the interface has no limit of its own. `Law`: FinnieRabinowicz, or the members used
+/// here as packs.
+template <class Law, class Real>
+DEMBARK_HOT Real first_limit(const Law& law, Real normal_force) {
+  return law.static_friction * select(normal_force > 0.0, normal_force, Real(0.0));
+}
+
 /// Whether a linear spring, displaced already, sticks without a doubt. Most contacts of a dense bed do, far from their limit: they are
-/// told by a bound that needs neither root nor exponential, T_max >= mu_k N (1 - mu_k N / (2 tau_s A)). `Law`: FinnieRabinowicz, or the
-/// members used here as packs.
+/// told by a bound that needs neither root nor exponential, T_max >= mu_k N (1 - mu_k N / (2 tau_s A)). `Law` as in first_limit().
 template <class Law, class Real>
 DEMBARK_HOT auto plainly_sticks(const Law& law, Real normal_force, Real stiffness, Real contact_area, const FrictionState<Real>& state) {
   const Real coulomb = select(state.slip > 0.0, Real(law.kinetic_friction), Real(law.static_friction)) * normal_force;

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <type_traits>
 
 #if defined(__x86_64__)
@@ -120,6 +121,23 @@ DEMBARK_HOT unsigned bits(const Mask<N, Set>& mask) {
 template <int N, class Set>
 DEMBARK_HOT bool any(const Mask<N, Set>& mask) {
   return bits(mask) != 0;
+}
+
+/// Sum of the lanes of `Count` packs, as halves of what they hold, halves of that, and so on: the same bits from packs of any size.
+template <int N, class Set, std::size_t Count>
+DEMBARK_HOT double sum(const Pack<N, Set> (&packs)[Count]) {
+  static_assert((Count & (Count - 1)) == 0);
+  if constexpr (Count > 1) {
+    Pack<N, Set> half[Count / 2];
+    for (std::size_t k = 0; k < Count / 2; ++k) half[k] = packs[k] + packs[k + Count / 2];
+    return sum(half);
+  } else if constexpr (N > 2) {
+    Pack<N / 2, Set> half[2];
+    __builtin_memcpy(half, packs, sizeof half);
+    return sum(half);
+  } else {
+    return packs[0][0] + packs[0][1];
+  }
 }
 
 }  // namespace dembark

@@ -41,24 +41,22 @@ struct SlipRings {
 
 namespace detail {
 
-typedef Pack<SlipRings::count> Rings;  // one number for each ring
-
-/// Inner edges of the rings, in units of `outer`; the outer edge of a ring is the inner one of the ring before.
-constexpr double ring_edges[SlipRings::count + 1] = {1.0,
-                                                     1.0 / 1.2,
-                                                     0.694444444444444444,
-                                                     0.578703703703703703,
-                                                     0.482253086419753086,
-                                                     0.401877572016460905,
-                                                     0.334897976680384087,
-                                                     0.279081647233653406,
-                                                     0.0};
-
-DEMBARK_HOT double sum(const Rings& p) { return ((p[0] + p[1]) + (p[2] + p[3])) + ((p[4] + p[5]) + (p[6] + p[7])); }
+/// Edges of the rings, in units of `outer`; the outer edge of a ring is the inner one of the ring before.
+inline constexpr auto ring_edges = [] {
+  std::array<double, SlipRings::count + 1> edges{1.0};
+  for (int i = 1; i < SlipRings::count; ++i) edges[i] = edges[i - 1] / SlipRings::ratio;
+  return edges;
+}();
 
 /// How far ring i lies inside of the radius a (m).
 inline double ring_width(const SlipRings& rings, int i, double a) {
   return std::min(rings.outer * ring_edges[i], a) - std::min(rings.outer * ring_edges[i + 1], a);
+}
+
+/// What a ring bears of the normal force over what it has of the stiffness; edges in units of the contact radius.
+template <class Real>
+DEMBARK_HOT Real pressure(const Real& high, const Real& low) {
+  return 1.5 - 0.5 * (high * (high + low) + low * low);
 }
 
 }  // namespace detail
@@ -73,6 +71,17 @@ inline double stored_energy(const SlipRings& rings, double stiffness) {
 }
 
 namespace detail {
+
+template <class Real>
+DEMBARK_HOT auto is_unit(const Real& squared) {
+  return (squared > 1.0 - 1e-3) & (squared < 1.0 + 1e-3);
+}
+
+/// Whether a contact radius `a` (m) after `radius` lies in the first ring, as that did.
+template <class Real>
+DEMBARK_HOT auto edges_stay(const Real& outer, const Real& radius, const Real& a) {
+  return (radius > 0.0) & !(a > outer) & !(a * SlipRings::ratio < outer);
+}
 
 /// The rings of a contact whose radius `a` (m) leaves its first ring: edges move by whole rings. Returns the energy lost (J) per k_t.
 DEMBARK_COLD inline double shift(SlipRings& rings, double a) {
@@ -102,20 +111,120 @@ DEMBARK_COLD inline double shift(SlipRings& rings, double a) {
   return held - stored_energy(rings, 1.0);
 }
 
-/// The rings for the contact radius `a` (m). Returns the energy lost (J) per k_t: that of springs that have left the contact, and what
-/// the mean of a ring does not know of those that join.
-DEMBARK_HOT double follow(SlipRings& rings, double a) {
-  if (a > rings.outer || a * SlipRings::ratio < rings.outer || !(rings.radius > 0.0)) return shift(rings, a);
-  const double edge = rings.outer * ring_edges[1], before = rings.radius - edge, now = a - edge;
-  const double squared = rings.along[0] * rings.along[0] + rings.across[0] * rings.across[0];
-  rings.radius = a;
-  if (!(now > before)) return 0.5 / a * (before - now) * squared;
-  rings.along[0] *= before / now;
-  rings.across[0] *= before / now;
-  return 0.5 / a * before * squared * (1.0 - before / now);
+/// The rings of a new contact, of one whose normal jumped, or of one whose radius `a` (m) leaves the first ring. Returns the energy lost
+/// (J) per k_t.
+DEMBARK_COLD inline double rearrange(SlipRings& rings, const Vec3<double>& normal, double twist, double a) {
+  rings.axis = rotate_to_plane(rings.axis, normal, twist);
+  if (!is_unit(dot(rings.axis, rings.axis))) {
+    rings.axis = std::abs(normal.x) < 0.6 ? Vec3<double>{0.0, normal.z, -normal.y} : Vec3<double>{-normal.z, 0.0, normal.x};
+    rings.axis *= 1.0 / norm(rings.axis);
+  }
+  return edges_stay(rings.outer, rings.radius, a) ? 0.0 : shift(rings, a);
 }
 
 }  // namespace detail
+
+/// What a step does to the rings of a contact (`Real` is double) or of a pack of them, as long as edges stay: springs that leave the
+/// contact or join it are those of the first ring.
+template <class Real>
+struct RingMotion {
+  Real size;           ///< edge of the first ring over the radius of the contact
+  Real along, across;  ///< m, displacement of this step
+  Real kept;           ///< share of its displacement that the first ring keeps: springs that join are without load
+  Real released;       ///< N/m, energy lost with springs that join or leave, over the first ring's displacement squared
+  Real stiffness;      ///< N/m, k_t
+};
+
+template <class Real>
+struct RingStep {
+  Vec3<Real> axis, other;  ///< unit, along and across
+  Real radius;             ///< m, of the contact
+  RingMotion<Real> motion;
+  decltype(Real() < Real()) goes_on;  ///< false: a new contact, a normal that jumped, or edges that move; only `radius` is valid then
+};
+
+/// `axis`, `outer` and `radius` are those of the rings after the last step, the rest as in partial_slip_step().
+template <class Real>
+DEMBARK_HOT RingStep<Real> ring_step(const Vec3<Real>& axis, Real outer, Real radius, const Vec3<Real>& normal, Real twist, Real stiffness,
+                                     Real contact_area, const Vec3<Real>& velocity, Real dt) {
+  using std::sqrt;
+  RingStep<Real> s;
+  s.axis = rotate_to_plane(axis, normal, twist);
+  const Real length = dot(s.axis, s.axis);
+  s.axis *= 1.5 - 0.5 * length;
+  s.other = cross(normal, s.axis);
+  s.radius = sqrt(contact_area / pi);
+  const Real edge = outer * detail::ring_edges[1], before = radius - edge, now = s.radius - edge;
+  const auto grows = now > before;
+  const Real kept = select(grows, before / now, Real(1.0));
+  s.motion = {outer / s.radius,
+              dot(velocity, s.axis) * dt,
+              dot(velocity, s.other) * dt,
+              kept,
+              0.5 * stiffness / s.radius * select(grows, before * (1.0 - kept), before - now),
+              stiffness};
+  s.goes_on = detail::is_unit(length) & detail::edges_stay(outer, radius, s.radius);
+  return s;
+}
+
+/// Means of the rings' displacements (m) over the contact: that of the linear spring that carries the same force; and the energy lost (J).
+struct RingSums {
+  double along, across, lost;
+};
+
+/// The step of the rings of one contact, in place, as many at a time as a pack `P` has lanes. `limit` (N): of the whole contact. Returns
+/// whether the middle ring would pass its limit; nothing has changed then, unless the contact is known to be `sliding` as a whole.
+template <class P>
+DEMBARK_HOT bool move_rings(const RingMotion<double>& motion, double limit, bool sliding, double* along, double* across, RingSums& sums) {
+  constexpr int N = P::size, parts = SlipRings::count / N;
+  const double first = along[0] * along[0] + across[0] * across[0], reach = limit / motion.stiffness;
+  P sum_along[parts], sum_across[parts], lost[parts];
+  bool slipped = false;
+#pragma GCC unroll 4
+  for (int part = parts - 1; part >= 0; --part) {
+    const int at = part * N;
+    P high = motion.size * P::load(&detail::ring_edges[at]), x = P::load(along + at), y = P::load(across + at);
+    const P low = motion.size * P::load(&detail::ring_edges[at + 1]);
+    if (part == 0) {
+      high.lanes[0] = 1.0;
+      x.lanes[0] *= motion.kept;
+      y.lanes[0] *= motion.kept;
+    }
+    const P width = high - low, most = reach * detail::pressure(high, low), start_x = x, start_y = y;
+    x += motion.along;
+    y += motion.across;
+    lost[part] = 0.0;
+    const P squared = x * x + y * y;
+    const auto beyond = squared > most * most;
+    if (const unsigned which = bits(beyond)) {  // few rings slip at a time, mostly those at the rim
+      if (part == parts - 1 && which >> (N - 1) && !sliding) return true;
+      const P left = select(beyond, most / sqrt(squared), P(1.0)), slid_x = x * (1.0 - left), slid_y = y * (1.0 - left);
+      x *= left;
+      y *= left;
+      lost[part] = width * ((start_x + x) * slid_x + (start_y + y) * slid_y);
+      slipped = true;
+    }
+    x.store(along + at);
+    y.store(across + at);
+    sum_along[part] = width * x;
+    sum_across[part] = width * y;
+  }
+  sums = {sum(sum_along), sum(sum_across), motion.released * first};
+  if (slipped) sums.lost += 0.5 * motion.stiffness * sum(lost);
+  return false;
+}
+
+/// The limit (N) of a contact that slides as a whole, to go on with in move_rings(): the return of the middle ring to the limit curve,
+/// which adds to the `slip` (m).
+inline double sliding_limit(const FinnieRabinowicz& law, const RingMotion<double>& motion, const double* along, const double* across,
+                            double normal_force, double contact_area, double& slip) {
+  constexpr int middle = SlipRings::count - 1;
+  const double softness = detail::pressure(motion.size * detail::ring_edges[middle], 0.0) / motion.stiffness;
+  const double x = along[middle] + motion.along, y = across[middle] + motion.across, trial = std::sqrt(x * x + y * y);
+  const double more = detail::slip_to_limit(law, 1.0 / softness, trial, slip, normal_force, contact_area);
+  slip += more;
+  return (trial - more) / softness;
+}
 
 /// One step of the law with partial slip: as friction_step(), with `rings` in the contact plane of the last step, which turns to `normal`
 /// and by `twist` (rad, see rotate_to_plane). The radius of the contact follows from its area. `state.displacement` becomes the linear
@@ -123,65 +232,38 @@ DEMBARK_HOT double follow(SlipRings& rings, double a) {
 inline Vec3<double> partial_slip_step(const FinnieRabinowicz& law, const Vec3<double>& normal, double twist, double normal_force,
                                       double stiffness, double damping, double contact_area, const Vec3<double>& velocity, double dt,
                                       FrictionState<double>& state, SlipRings& rings) {
-  using detail::Rings;
   // The forces of a moment that is over; see friction_step().
   if (dt == 0.0 && state.slip > 0.0 && detail::was_sliding(law, normal_force, stiffness, contact_area, state))
     return -stiffness * rotate_to_plane(state.displacement, normal, twist);
 
-  rings.axis = rotate_to_plane(rings.axis, normal, twist);
-  const double length = dot(rings.axis, rings.axis);
-  if (!(std::abs(length - 1.0) < 1e-3)) {  // a new contact, or a normal that jumped
-    rings.axis = std::abs(normal.x) < 0.6 ? Vec3<double>{0.0, normal.z, -normal.y} : Vec3<double>{-normal.z, 0.0, normal.x};
-    rings.axis *= 1.0 / norm(rings.axis);
-  } else {
-    rings.axis *= 1.5 - 0.5 * length;
+  const auto begin = [&](double turn) __attribute__((always_inline)) {
+    return ring_step(rings.axis, rings.outer, rings.radius, normal, turn, stiffness, contact_area, velocity, dt);
+  };
+  RingStep<double> step = begin(twist);
+  double lost = 0.0;
+  if (!step.goes_on) {
+    if (!(step.radius > 0.0)) {
+      rings = {};
+      state.displacement = {};
+      return {};
+    }
+    lost = stiffness * detail::rearrange(rings, normal, twist, step.radius);
+    step = begin(0.0);
   }
-  const Vec3<double> other = cross(normal, rings.axis);
+  rings.axis = step.axis;
+  rings.radius = step.radius;
 
-  const double a = std::sqrt(contact_area / pi);
-  if (!(a > 0.0)) {
-    rings = {};
-    state.displacement = {};
-    return {};
-  }
-  double lost = stiffness * detail::follow(rings, a);
-
-  // Widths in units of the radius, and the displacement (m) at which each ring yields per limit (N) of the whole contact: its fraction of
-  // the normal force over that of the stiffness.
-  const double size = rings.outer / a;
-  Rings high = size * Rings::load(detail::ring_edges), low = size * Rings::load(detail::ring_edges + 1);
-  high.lanes[0] = 1.0;
-  const Rings width = high - low, yield = (1.5 - 0.5 * (high * (high + low) + low * low)) * (1.0 / stiffness);
-
-  const Rings start_along = Rings::load(rings.along.data()), start_across = Rings::load(rings.across.data());
-  Rings along = start_along + dot(velocity, rings.axis) * dt, across = start_across + dot(velocity, other) * dt;
-
-  constexpr int middle = SlipRings::count - 1;
   double limit = shear_limit(law, friction_coefficient(law, state.slip), normal_force, contact_area);
-  const double reached = along[middle] * along[middle] + across[middle] * across[middle], softness = yield[middle];
-  const bool slides = reached > limit * softness * limit * softness;
-  if (slides) {
-    const double trial = std::sqrt(reached);
-    const double slip = detail::slip_to_limit(law, 1.0 / softness, trial, state.slip, normal_force, contact_area);
-    state.slip += slip;
-    limit = (trial - slip) / softness;
+  double *const along = rings.along.data(), *const across = rings.across.data();
+  bool slides = false;
+  RingSums sums;
+  while (move_rings<Pack<2>>(step.motion, limit, slides, along, across, sums)) {
+    slides = true;
+    limit = sliding_limit(law, step.motion, along, across, normal_force, contact_area, state.slip);
   }
-  along.store(rings.along.data());
-  across.store(rings.across.data());
-  const Rings most = limit * yield;
-  // Few rings slip at a time, mostly those at the rim.
-  for (unsigned beyond = bits(along * along + across * across > most * most); beyond != 0; beyond &= beyond - 1) {
-    const int i = __builtin_ctz(beyond);
-    double &x = rings.along[i], &y = rings.across[i];
-    const double kept = most[i] / std::sqrt(x * x + y * y), slid_x = x * (1.0 - kept), slid_y = y * (1.0 - kept);
-    x *= kept;
-    y *= kept;
-    lost += 0.5 * stiffness * width[i] * ((start_along[i] + x) * slid_x + (start_across[i] + y) * slid_y);
-  }
-  along = Rings::load(rings.along.data());
-  across = Rings::load(rings.across.data());
-  state.displacement = detail::sum(width * along) * rings.axis + detail::sum(width * across) * other;
+  lost += sums.lost;
   if (lost > 0.0) state.dissipated_energy += lost;
+  state.displacement = sums.along * step.axis + sums.across * step.other;
   if (slides) return -stiffness * state.displacement;
   return sticking_force(stiffness, damping, velocity, dt, state.slip > 0.0 ? kept_slip(law, dt) : 0.0, state);
 }

@@ -12,6 +12,7 @@
 #include <pkg/dem/ScGeom.hpp>
 
 #include "CapillaryLiquid.hpp"
+#include "SavedFormat.hpp"
 #include "dembark/contact.hpp"
 
 namespace yade {
@@ -140,3 +141,5 @@ private:
 REGISTER_SERIALIZABLE(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz);
 
 }  // namespace yade
+
+DEMBARK_SAVED_FORMAT(FinnieRabinowiczPhys, 1)

@@ -7,6 +7,7 @@
 #include <core/GlobalEngine.hpp>
 #include <pkg/dem/NewtonIntegrator.hpp>
 
+#include "SavedFormat.hpp"
 #include "dembark/impact/impact_file.hpp"
 #include "dembark/impact/system.hpp"
 #include "dembark/impact/geometry.hpp"
@@ -133,3 +134,5 @@ public:
 REGISTER_SERIALIZABLE(LogImpact);
 
 }  // namespace yade
+
+DEMBARK_SAVED_FORMAT(LcpImpact, 1)

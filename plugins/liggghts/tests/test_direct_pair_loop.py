@@ -34,11 +34,11 @@ def test_same_motion_on_two_ranks(tmp_path):
     assert deviation(frames(tmp_path / "two", ranks=2, **words), frames(tmp_path / "one", **words)) < 1e-10
 
 
-@pytest.mark.parametrize("cohesion", ["", "cohesion capillary"])
-def test_same_bits_with_narrower_vectors(tmp_path, monkeypatch, cohesion):
+@pytest.mark.parametrize(("cohesion", "settings"), [("", ""), ("cohesion capillary", ""), ("", "presliding partial_slip")])
+def test_same_bits_with_narrower_vectors(tmp_path, monkeypatch, cohesion, settings):
     # A processor without the wider ones repeats the narrower ones.
     runs = []
     for lanes in (2, 4, 8):
         monkeypatch.setenv("DEMBARK_LANES", str(lanes))
-        runs.append(frames(tmp_path / str(lanes), cohesion=cohesion, rolling="", settings=""))
+        runs.append(frames(tmp_path / str(lanes), cohesion=cohesion, rolling="", settings=settings))
     assert np.array_equal(runs[0], runs[1]) and np.array_equal(runs[1], runs[2])

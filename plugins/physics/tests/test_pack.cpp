@@ -9,6 +9,7 @@
 #include "dembark/kinematics.hpp"
 #include "dembark/normal_force.hpp"
 #include "dembark/pack.hpp"
+#include "dembark/partial_slip.hpp"
 
 using namespace dembark;
 
@@ -121,7 +122,58 @@ void compare() {
   CHECK(moving > 100);
 }
 
+/// Rings of a contact that is rubbed at random, moved by packs of N, in a row of contacts.
+template <int N>
+std::vector<double> rubbed() {
+  std::mt19937 chance(3);
+  const auto uniform = [&chance](double low, double high) { return std::uniform_real_distribution<double>(low, high)(chance); };
+  std::vector<double> trace;
+  int rim = 0, sliding = 0;
+  for (int contact = 0; contact < 50; ++contact) {
+    SlipRings rings;
+    double slip = 0.0;
+    for (int step = 0; step < 60; ++step) {
+      const RingMotion<double> motion{uniform(1.0, 1.2), uniform(-2e-8, 2e-8), uniform(-1e-8, 1e-8),
+                                      uniform(0.9, 1.0), uniform(0.0, 1.0),    5e3};
+      RingSums sums;
+      double limit = 4e-4;
+      FinnieRabinowicz law;
+      law.static_friction = law.kinetic_friction = 0.4;
+      bool slides = false;
+      while (move_rings<Pack<N>>(motion, limit, slides, rings.along.data(), rings.across.data(), sums)) {
+        slides = true;
+        ++sliding;
+        limit = sliding_limit(law, motion, rings.along.data(), rings.across.data(), limit / 0.4, 1e-8, slip);
+      }
+      rim += sums.lost > 0.0 && !slides;
+      trace.insert(trace.end(), {sums.along, sums.across, sums.lost, slip});
+    }
+    trace.insert(trace.end(), rings.along.begin(), rings.along.end());
+    trace.insert(trace.end(), rings.across.begin(), rings.across.end());
+  }
+  CHECK(rim > 100);
+  CHECK(sliding > 100);
+  return trace;
+}
+
 }  // namespace
+
+TEST_CASE("rings of partial slip have the same bits in packs of every size") {
+  const std::vector<double> narrow = rubbed<2>();
+  CHECK(narrow == rubbed<4>());
+  CHECK(narrow == rubbed<8>());
+}
+
+TEST_CASE("sums of packs do not depend on their size") {
+  double numbers[8] = {1.0, 1e-16, -3.0, 0.1, 7e5, 1e-3, 0.3, -1e9};
+  const Pack<2> twos[4] = {Pack<2>::load(numbers), Pack<2>::load(numbers + 2), Pack<2>::load(numbers + 4), Pack<2>::load(numbers + 6)};
+  const Pack<4> fours[2] = {Pack<4>::load(numbers), Pack<4>::load(numbers + 4)};
+  const Pack<8> eights[1] = {Pack<8>::load(numbers)};
+  const double expected = ((numbers[0] + numbers[4]) + (numbers[2] + numbers[6])) + ((numbers[1] + numbers[5]) + (numbers[3] + numbers[7]));
+  CHECK(sum(twos) == expected);
+  CHECK(sum(fours) == expected);
+  CHECK(sum(eights) == expected);
+}
 
 TEST_CASE("laws in packs give the bits of the scalar laws") {
   compare<2>();

@@ -3,6 +3,7 @@
 import builtins
 import math
 import os
+import re
 
 from scene_results import write_results
 from yade import dembark, utils
@@ -263,6 +264,23 @@ def save_load():
     except RuntimeError as error:
         found["lost"] = str(error)
     return found
+
+
+def other_format():
+    """What loading says of scenes whose engine is said to be of another format."""
+    lines = {}
+    for number in ("0", "2"):
+        heap()
+        O.run(10, True)
+        O.save("other.xml")
+        text = open("other.xml", encoding="utf-8").read()
+        text, found = re.subn(r'(class_name="LcpImpact" tracking_level="\d" version=)"\d+"', rf'\1"{number}"', text)
+        open("other.xml", "w", encoding="utf-8").write(text)
+        try:
+            O.load("other.xml")
+        except RuntimeError as error:
+            lines[number] = [found, str(error)]
+    return lines
 
 
 def records():
