@@ -140,7 +140,8 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   }
 
  public:
-  DirectPairLoop(LAMMPS_NS::LAMMPS* lmp, LAMMPS_NS::PairGran* parent, std::int64_t hash) : Stock(lmp, parent, hash), lmp_(lmp), pair_(parent) {}
+  DirectPairLoop(LAMMPS_NS::LAMMPS* lmp, LAMMPS_NS::PairGran* parent, std::int64_t hash)
+      : Stock(lmp, parent, hash), lmp_(lmp), pair_(parent) {}
 
   void settings(int count, char** words, LIGGGHTS::IContactHistorySetup* history) override {
     Stock::settings(count, words, history);
@@ -194,8 +195,8 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     // The rolling spring stands behind the rings.
     const int more = rings_offset_ >= 0 ? rings_offset_ : angle_offset_;
     const int numbers = (rings_offset_ >= 0 ? ring_numbers : 0) + (angle_offset_ >= 0 ? 3 : 0);
-    packs_({atom, *pair, *this, laws_.data(), friction_.types() + 1, owned, friction_offset_, rings_offset_, more, numbers, dt_, wet, limit_force_,
-            tangential_damping_, pack_friction, rolling_model_ != dembark::RollingModel::off},
+    packs_({atom, *pair, *this, laws_.data(), friction_.types() + 1, owned, friction_offset_, rings_offset_, more, numbers, dt_, wet,
+            limit_force_, tangential_damping_, pack_friction, rolling_model_ != dembark::RollingModel::off},
            *block_);
   }
 };
