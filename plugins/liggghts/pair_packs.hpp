@@ -267,7 +267,8 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
     const Quad<P> spring{state.displacement.x, state.displacement.y, state.displacement.z, state.slip};
     alignas(64) double energy[N];
     state.dissipated_energy.store(energy);
-    if (__builtin_expect(packed == there, 1)) {
+    // Lanes behind the last pair repeat it, but for its rings.
+    if (__builtin_expect(packed == there && (s.rings < 0 || count == N), 1)) {
       store_rows(spring, history);
 #pragma GCC unroll 8
       for (int k = 0; k < N; ++k) history(k)[4] = energy[k];
