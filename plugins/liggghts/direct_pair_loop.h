@@ -128,7 +128,8 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   }
 
  public:
-  DirectPairLoop(LAMMPS_NS::LAMMPS* lmp, LAMMPS_NS::PairGran* parent, std::int64_t hash) : Stock(lmp, parent, hash), lmp_(lmp), pair_(parent) {}
+  DirectPairLoop(LAMMPS_NS::LAMMPS* lmp, LAMMPS_NS::PairGran* parent, std::int64_t hash)
+      : Stock(lmp, parent, hash), lmp_(lmp), pair_(parent) {}
 
   void settings(int count, char** words, LIGGGHTS::IContactHistorySetup* history) override {
     Stock::settings(count, words, history);
