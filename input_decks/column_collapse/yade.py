@@ -18,9 +18,9 @@ def potentials():
     return height - p.gravity * math.fsum(0.5 * O.dt * state.mass * state.vel[2] for state in grains), height
 
 
-# As in LIGGGHTS, which has no numerical damping.
-names = EnergyAccount().keys()
-energies = {"kinetic_energy": "kinetic"} | {name: name for name in names if name not in ("kinetic", "numerical_damping")}
+# As in LIGGGHTS, which has no numerical damping; there is no rolling resistance here.
+names = (name for name in EnergyAccount().keys() if name not in ("kinetic", "numerical_damping") and not name.startswith("rolling"))
+energies = {"kinetic_energy": "kinetic"} | {name: name for name in names}
 history = dembark.EnergyWriter("time.csv", energies, more=("potential_energy", "weight_height"), more_values=potentials)
 record = dembark.Recorder(p, walls, boundary="ff pp ff", gravity=weight, history=history, report=p.stride)
 

@@ -82,7 +82,8 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     const dembark_liggghts::PropertyReader read(registry, modify, error, "tangential finnie_rabinowicz");
     laws_ = dembark_liggghts::read_friction(read, static_cast<dembark::Presliding>(presliding_));
     if (rolling_model() != dembark::RollingModel::off) {
-      if (!matches("rolling_friction", "off")) read.fail("rolling_resistance and the model rolling_friction are both on; leave one of them out");
+      if (!matches("rolling_friction", "off"))
+        read.fail("rolling_resistance and the model rolling_friction are both on; leave one of them out");
       rolling_ = dembark_liggghts::read_rolling(read, rolling_model());
     }
     tally_ = dembark_liggghts::find_energy_tally(modify);

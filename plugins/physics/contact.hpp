@@ -1,5 +1,5 @@
-// One whole contact: kinematics, normal force, Finnie-Rabinowicz friction, rolling resistance and liquid bridge, for two spheres or a sphere
-// and a wall.
+// One whole contact: kinematics, normal force, Finnie-Rabinowicz friction, rolling resistance and liquid bridge, for two spheres or a
+// sphere and a wall.
 //
 // contact_step() is the contact as YADE and Python have it. An engine that computes contacts model by model (LIGGGHTS), or many at once,
 // calls the stages that it is made of: surface_motion(), hertz() or hooke() and adjusted(), contact_friction(), bridge_step() and

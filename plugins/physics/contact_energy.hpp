@@ -51,9 +51,9 @@ constexpr std::size_t force_part_count = 6;  ///< the parts from here on are cou
 struct ContactParts {
   std::array<Vec3<double>, contact_part_count> load{};
   std::size_t count = force_part_count;  ///< without rolling resistance there are no couples
-  double normal_stored = 0.0;      ///< J, elastic energy at this overlap
-  double tangential_stored = 0.0;  ///< J, k_t xi^2 / 2
-  double rolling_stored = 0.0;     ///< J, k_r theta^2 / 2
+  double normal_stored = 0.0;            ///< J, elastic energy at this overlap
+  double tangential_stored = 0.0;        ///< J, k_t xi^2 / 2
+  double rolling_stored = 0.0;           ///< J, k_r theta^2 / 2
 
   Vec3<double>& operator[](ContactPart part) { return load[static_cast<std::size_t>(part)]; }
   const Vec3<double>& operator[](ContactPart part) const { return load[static_cast<std::size_t>(part)]; }

@@ -115,10 +115,27 @@ struct Powers {
   }
 };
 
-constexpr std::array<const char*, 21> energy_names{{"kinetic", "first_kinetic", "gravity", "normal_elastic", "normal_viscous",
-                                                    "tangential_elastic", "tangential_viscous", "capillary", "liquid_viscous", "walls",
-                                                    "numerical_damping", "other", "imposed", "balance", "normal_stored",
-                                                    "tangential_stored", "step_error", "scale", "rolling_elastic", "rolling_viscous", "rolling_stored"}};
+constexpr std::array<const char*, 21> energy_names{{"kinetic",
+                                                    "first_kinetic",
+                                                    "gravity",
+                                                    "normal_elastic",
+                                                    "normal_viscous",
+                                                    "tangential_elastic",
+                                                    "tangential_viscous",
+                                                    "capillary",
+                                                    "liquid_viscous",
+                                                    "walls",
+                                                    "numerical_damping",
+                                                    "other",
+                                                    "imposed",
+                                                    "balance",
+                                                    "normal_stored",
+                                                    "tangential_stored",
+                                                    "step_error",
+                                                    "scale",
+                                                    "rolling_elastic",
+                                                    "rolling_viscous",
+                                                    "rolling_stored"}};
 typedef std::array<double, energy_names.size()> Energies;  ///< J, in the order of their names
 
 /// The sums of a run, plain numbers: those of several processes add up, and a restart file holds them as they are.
@@ -174,9 +191,10 @@ struct EnergyLedger {
     const double other = all - gravity - damping - contacts, balance = kinetic - first_kinetic - all - imposed;
     const double step_error = work[0] + spring_ahead + normal_stored - first_stored;
     const double scale = first_kinetic + sizes + std::abs(gravity) + std::abs(damping) + std::abs(other) + std::abs(imposed);
-    return {kinetic, first_kinetic, gravity, work[0], work[1],       work[2],           work[3],    work[4], work[5], work[Powers::walls],
-            damping, other,         imposed, balance, normal_stored, tangential_stored, step_error, scale,
-            work[6], work[7], rolling_stored};
+    return {
+        kinetic,       first_kinetic, gravity, work[0], work[1],       work[2],           work[3],    work[4], work[5], work[Powers::walls],
+        damping,       other,         imposed, balance, normal_stored, tangential_stored, step_error, scale,   work[6], work[7],
+        rolling_stored};
   }
 };
 constexpr std::size_t energy_ledger_size = sizeof(EnergyLedger) / sizeof(double);

@@ -36,8 +36,8 @@ inline Vec3<double> triangle_spin(const Vec3<double>& edge_1, const Vec3<double>
                                   const Vec3<double>& velocity_2) {
   const Vec3<double> normal = cross(edge_1, edge_2), across = cross(normal, edge_1);
   const double area = dot(normal, normal);
-  return (1.0 / area) * (dot(velocity_2, normal) * edge_1 - dot(velocity_1, normal) * edge_2 +
-                         (dot(velocity_1, across) / dot(edge_1, edge_1)) * normal);
+  return (1.0 / area) *
+         (dot(velocity_2, normal) * edge_1 - dot(velocity_1, normal) * edge_2 + (dot(velocity_1, across) / dot(edge_1, edge_1)) * normal);
 }
 
 }  // namespace dembark

@@ -6,16 +6,16 @@
 //
 // with the rolling part w of the relative spin, that of body 1 minus that of body 2, without what turns about the normal. N is the
 // repulsive force of the normal law (>= 0), as in friction. theta is a vector in the contact plane, with which it turns; at the limit the
-// spring yields, and rolling on is not damped. 1/I = 1/I_1 + 1/I_2 with I_k = 2/5 m_k r_k^2; 7/2 I is about the point of contact, as in the source.
+// spring yields, and rolling on is not damped. 1/I = 1/I_1 + 1/I_2 with I_k = 2/5 m_k r_k^2; 7/2 I is about the point of contact.
 //
 // J. Ai, J.-F. Chen, J. M. Rotter & J. Y. Ooi, Powder Technology 206 (2011) 269, models A and C, whose dashpot has no limit below that
 // of the spring: a fast spin would be stopped by it in the first step of a contact. K. Iwashita & M. Oda, J. Eng. Mech. 124 (1998) 285, for
-// k_r = k_t R*^2. (1) cannot hold a body at rest: at most it takes away the rotation of a step,
-// M <= I |w| / dt, so that it never drives. (2) can.
+// k_r = k_t R*^2. (1) cannot hold a body at rest: at most it takes away the rotation of a step, M <= I |w| / dt, so that it never drives.
+// (2) can.
 //
-// Beside LIGGGHTS-PUBLIC 3.8.0: `cdt` takes the spring of the normal law for N, divides by the whole relative spin (a body that twists rolls
-// more freely) and turns the spin round at rest; `epsd2` takes |N|, so that a contact that damping pulls on resists too, adds up torques
-// instead of angles and leaves them behind when the contact turns; it has no dashpot. `epsd` has the dashpot and 9/4 k_n mu_r^2 R*^2.
+// Beside LIGGGHTS-PUBLIC 3.8.0: `cdt` takes the spring of the normal law for N, divides by the whole relative spin (a body that twists
+// rolls more freely) and turns the spin round at rest; `epsd2` takes |N|, so that a contact that damping pulls on resists too, adds up
+// torques instead of angles and leaves them behind when the contact turns; it has no dashpot, and `epsd`, which has one, another stiffness.
 //
 // Limits: mu_r = 0 is free rolling. A sphere that rolls on a plane slows down by 5/7 mu_r g; with (2) it rests on slopes below
 // arctan(mu_r). Units SI.

@@ -40,7 +40,8 @@ def test_something_happens(motions, name):
     ("cycles, linear", {"static_friction": 0.5 + 1e-6}), ("cycles, linear", {"kinetic_friction": 0.3 + 1e-6}),
     ("cycles, linear", {"critical_slip_distance": 1e-5 * (1 + 1e-5)}), ("cycles, healing time", {"healing_time": 1e-3 * (1 + 1e-5)}),
     ("collision, wet", {"interface_shear_strength": 2e4 * (1 + 1e-6)}), ("collision, wet", {"restitution": 0.8 + 1e-6}),
-    ("cycles, rolling spring", {"rolling_friction": 0.1 * (1 + 1e-5)}), ("cycles, rolling spring", {"rolling_damping_ratio": 0.3 + 1e-5}),
+    ("cycles, rolling spring", {"rolling_friction": 0.1 * (1 + 1e-5)}),
+    ("cycles, strong rolling spring", {"rolling_damping_ratio": 0.3 + 1e-5}), ("rolling to rest", {"rolling_damping_ratio": 0.3 + 1e-5}),
     ("drop, constant torque", {"rolling_friction": 0.1 * (1 + 1e-5)}),
     ("approach, bridge", {"bridge_volume": 2e-10 * (1 + 1e-4)}), ("approach, bridge", {"contact_angle": 0.35 + 1e-4})])
 def test_rig_sees_small_differences(motions, name, change):

@@ -68,7 +68,8 @@ void choose(const char* attribute, const std::string& word, const std::vector<st
 }  // namespace
 
 ::dembark::ContactState Phys::state() const {
-	::dembark::ContactState now{{vec(elasticDisplacement), slip, dissipatedEnergy}, bridgeVolume, ruptureDistance, {}, vec(rollingAngle)};
+	::dembark::ContactState now{
+		{vec(elasticDisplacement), slip, dissipatedEnergy}, bridgeVolume, ruptureDistance, {}, vec(rollingAngle)};
 	if (slipRings.size() == ringNumbers) std::memcpy(&now.rings, slipRings.data(), sizeof now.rings);
 	return now;
 }
@@ -112,9 +113,9 @@ void Ip2::go(const shared_ptr<Material>& material1, const shared_ptr<Material>& 
 	if (const char* wrong = law.error()) fail(std::string(wrong) + ", " + pairName(a, b));
 
 	// The law knows whether they are wanted.
-	const ::dembark::RollingResistance resistance{::dembark::RollingModel::off,
-	                                              phys->rollingFriction = pairValue(rollingFriction, "rollingFriction", a, b, 0.0),
-	                                              phys->rollingDampingRatio = pairValue(rollingDampingRatio, "rollingDampingRatio", a, b, 0.0)};
+	const ::dembark::RollingResistance resistance{
+		::dembark::RollingModel::off, phys->rollingFriction = pairValue(rollingFriction, "rollingFriction", a, b, 0.0),
+		phys->rollingDampingRatio = pairValue(rollingDampingRatio, "rollingDampingRatio", a, b, 0.0)};
 	if (const char* wrong = resistance.error()) fail(std::string(wrong) + ", " + pairName(a, b));
 	phys->rolls = static_cast<bool>(rollingFriction);
 
@@ -169,7 +170,8 @@ void Law2::prepare(Phys& phys, const ScGeom& geom, const Body& body1, const Body
 	p.friction                = {phys.staticFriction,         phys.kineticFriction, phys.criticalSlipDistance,
 	                             phys.interfaceShearStrength, phys.healingTime,     path};
 	if (rolling != ::dembark::RollingModel::off && !phys.rolls)
-		fail(law2 + "rollingResistance='" + rollingResistance + "' needs " + ip2 + "rollingFriction; give it a number or a MatchMaker");
+		fail(law2 + "rollingResistance='" + rollingResistance + "' needs " + ip2 +
+		     "rollingFriction; give it a number or a MatchMaker");
 	p.rolling = {rolling, phys.rollingFriction, phys.rollingDampingRatio};
 	if (carriedLiquid) {
 		if (!wet) fail(law2 + "carriedLiquid needs a capillaryModel other than none");
@@ -272,8 +274,8 @@ bool Law2::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* i
 	phys.normalForce          = view.sign() * (force - tangential);
 	if (viscous) phys.viscousShearForce = view.sign() * vec(out.viscous_tangential);
 	phys.rollingTorque = view.sign() * vec(out.rolling);
-	phys.kn = out.normal_stiffness;
-	phys.ks = out.tangential_stiffness;
+	phys.kn            = out.normal_stiffness;
+	phys.ks            = out.tangential_stiffness;
 
 	const Body::id_t first = view.swapped() ? id2 : id1, second = view.swapped() ? id1 : id2;
 	scene->forces.addForce(first, force);

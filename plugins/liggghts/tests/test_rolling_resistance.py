@@ -11,6 +11,7 @@ from rig.scenarios import DRY, SPRING, Grain, Scenario
 from rig.walls import FLOOR, on_mesh
 
 G, FRICTION = 9.81, 0.05
+PROPERTY = "fix p_roll{0} all property/global coefficientRolling{0} peratomtypepair 2 {1}\n"
 ROUGH = replace(DRY, youngs_modulus=5e6, static_friction=0.8, kinetic_friction=0.8, restitution=0.3)
 
 
@@ -25,7 +26,7 @@ def roll(folder, model, *, stock="", slope=0.0, speed=0.1, spin=0.0, steps=60000
     text = deck(case)
     if stock:
         text = text.replace("tangential finnie_rabinowicz", f"tangential finnie_rabinowicz rolling_friction {stock}")
-        text = text.replace("pair_style", f"fix p_rolling all property/global coefficientRollingFriction peratomtypepair 2{f' {FRICTION}' * 4}\npair_style")
+        text = text.replace("pair_style", f"{PROPERTY.format('Friction', f'{FRICTION} ' * 4)}pair_style")
     if mesh:
         text = on_mesh(text, folder, FLOOR)
     done = run_deck(folder, text)
@@ -78,8 +79,8 @@ def test_same_motion_in_both_pair_loops(tmp_path, settings, cohesion):
         (tmp_path / name).mkdir()
         (tmp_path / name / "cloud.data").write_text(cloud())
         text = DECK.format(cohesion=cohesion, rolling="", settings=settings)
-        text = text.replace("coefficientRollingFriction peratomtypepair 2 0 0 0 0", "coefficientRollingFriction peratomtypepair 2 0.1 0 0 0.3")
-        text = text.replace("pair_style", "fix m12 all property/global coefficientRollingViscousDamping peratomtypepair 2 0.3 0 0 0.1\npair_style")
+        text = text.replace("Friction peratomtypepair 2 0 0 0 0", "Friction peratomtypepair 2 0.1 0 0 0.3")
+        text = text.replace("pair_style", PROPERTY.format("ViscousDamping", "0.3 0 0 0.1") + "pair_style")
         done = run_deck(tmp_path / name, edit(text))
         assert done.code == 0, done.error
         return np.stack(read_dump(tmp_path / name / "grains.dump")[1])

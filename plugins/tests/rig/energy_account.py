@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from rig.liggghts_driver import Run
 
 NAMES = ("kinetic", "start", "gravity", "normal_spring", "normal_damping", "tangential_spring", "tangential_damping", "bridges", "viscous",
-         "walls", "other", "imposed", "balance", "normal_stored", "tangential_stored", "step_error", "scale", "rolling_spring", "rolling_damping",
-         "rolling_stored")
+         "walls", "other", "imposed", "balance", "normal_stored", "tangential_stored", "step_error", "scale", "rolling_spring",
+         "rolling_damping", "rolling_stored")
 WORKS = NAMES[2:12] + NAMES[17:19]
 LOSSES = ("normal_damping", "tangential_damping", "viscous", "rolling_damping")
 FIX = "fix energy all energy/account"

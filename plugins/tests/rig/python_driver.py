@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from dembark.physics import Body, Contact, FinnieRabinowicz, RollingResistance, collide, drop, effective_shear_modulus, effective_youngs_modulus
+from dembark.physics import (
+    Body,
+    Contact,
+    FinnieRabinowicz,
+    RollingResistance,
+    collide,
+    drop,
+    effective_shear_modulus,
+    effective_youngs_modulus,
+)
 from rig.motion import Motion
 from rig.scenarios import Material, Scenario, evaluate
 

@@ -237,6 +237,12 @@ def _drop(name: str, material: Material) -> Scenario:
                     grains=(Grain(position=(0.0, 0.0, 5.2e-3), velocity=(0.2, -0.1, -0.5), angular_velocity=(30.0, 50.0, -20.0)),))
 
 
+def _rolling(name: str, material: Material) -> Scenario:
+    """A grain rolls on the wall, is slowed down, stops and rocks."""
+    return Scenario(name=name, material=material, wall=True, gravity=(0.0, 0.0, -9.81), time_step=5e-6, steps=4000, stride=20,
+                    grains=(Grain(position=(0.0, 0.0, 5.001e-3), velocity=(0.008, 0.004, -0.02), angular_velocity=(-0.8, 1.6, 3.0)),))
+
+
 def _all() -> dict[str, Scenario]:
     undamped = replace(DRY, restitution=1.0)
     strong = replace(DRY, interface_shear_strength=2e4)
@@ -268,6 +274,8 @@ def _all() -> dict[str, Scenario]:
         rolling_cycles,
         rolling_cycles.rotated(TURN, "cycles, rolling spring, rotated frame"),
         _cycles("cycles, rolling spring, wall", rolling, wall=True),
+        # Below its limit, with these spins.
+        _cycles("cycles, strong rolling spring", replace(rolling, rolling_friction=3.0)),
         _cycles("cycles, rolling spring, partial slip", replace(partial, **SPRING)),
         _cycles("cycles, rolling spring, hooke", replace(rolling, normal_law="hooke", characteristic_velocity=0.5)),
         _cycles("cycles, constant torque", constant),
@@ -295,6 +303,7 @@ def _all() -> dict[str, Scenario]:
         _collision("collision, constant torque", constant, 0.6),
         _collision("collision, rolling spring, viscous", replace(ALL_OF_IT, viscosity=0.05, **SPRING), 0.6),
         loaded(rolling).spinning((1.0, 2.0, 2.0), 200.0, "loaded, rolling spring, rigidly rotating"),
+        _rolling("rolling to rest", replace(rolling, restitution=0.3)),
         _drop("drop, rolling spring", rolling),
         _drop("drop, constant torque", constant),
         _collision("collision, hooke", replace(DRY, normal_law="hooke", characteristic_velocity=0.5), 0.6),

@@ -10,6 +10,7 @@ from yade import dembark, utils
 
 PAIR = dict(restitution=0.6, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5)
 WET = dict(bridgeVolume=2e-11, surfaceTension=0.072, contactAngle=0.35, liquidViscosity=5e-3, minimumGap=1e-5)
+ROLLING = dict(rollingFriction=0.1, rollingDampingRatio=0.3)
 DENSITY, R = 2500.0, 0.0025
 
 
@@ -63,16 +64,17 @@ def impacts():
     """Oblique impacts, of two grains and of a grain on a wall that moves, listed first or last; with all positions and velocities."""
     found = {}
     wet = dict(capillaryModel="willett")
-    for law in ({}, dict(normalLaw="hooke", characteristicVelocity=0.5), dict(limitForce=True), wet):
+    rolling = [dict(rollingResistance=name) for name in ("constant_torque", "elastic_plastic")]
+    for law in ({}, dict(normalLaw="hooke", characteristicVelocity=0.5), dict(limitForce=True), wet, *rolling):
         name = "+".join(["grains", *map(str, law.values())])
         grains = [grain((0, 0, 0), 0.003, (0.4, 0.9, 0), (0, 5, 30)), grain((0.00551, 0.0005, 0), R, (-0.3, 0, 0.02))]
-        account = scene_with(grains, WET if law is wet else None, law)
+        account = scene_with(grains, WET if law is wet else ROLLING, law)
         found[name] = _motion(600, (0, 1)) | {"energies": account.energies(), "law": law}
-    for order, law in ((0, {}), (1, {}), (0, wet)):
+    for order, law in ((0, {}), (1, {}), (0, wet), (1, rolling[1])):
         wall = utils.wall(0, 2)
         wall.state.vel = Vector3(0.1, 0, 0.2)
         bodies = [wall, grain((0.001, 0.0005, 0.00251), R, (0.9, 0.1, -0.5), (20, -30, 10))]
-        account = scene_with(bodies[::-1] if order else bodies, WET if law else None, law)
+        account = scene_with(bodies[::-1] if order else bodies, WET if law is wet else ROLLING, law)
         found["+".join([f"wall{order}", *law.values()])] = _motion(600, (1 - order, order)) | {"energies": account.energies(), "law": law}
     return found
 
@@ -143,7 +145,7 @@ def box_gate():
     return account.energies()
 
 
-def drum():
+def drum(**law):
     """Grains in a drum that turns and drifts along its axis, one of them carried along, one lowered at a fixed speed."""
     shape = Body()
     shape.shape, shape.state.blockedDOFs = CylinderWall(radius=0.02, axis=(0, 1, 0)), "xyzXYZ"
@@ -151,9 +153,13 @@ def drum():
     grains = [grain((x, y, z), r) for x, y, z, r in dilute_column((4, 3, 4), 0.0055, (-0.011, -0.008, -0.011), 40, 0.005, 0.1, 3, 0.0001)]
     held, guided = grain((0, 0.0, -0.0174), R, (0.05, 0, 0), fixed=True), grain((0.0005, 0, 0.0165), R, (0, 0, -0.2))
     guided.state.blockedDOFs = "zX"
-    account = scene_with([shape, held, guided, *grains], gravity=(0, 0, -9.81), step=1e-5)
+    account = scene_with([shape, held, guided, *grains], ROLLING, law, gravity=(0, 0, -9.81), step=1e-5)
     O.run(6000, True)
     return account.energies()
+
+
+def rolling_drum():
+    return drum(rollingResistance="elastic_plastic")
 
 
 def flying(count, spacing, speed):

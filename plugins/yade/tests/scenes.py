@@ -10,6 +10,7 @@ from scene_results import refusal, write_results
 from yade import dembark, utils
 
 PAIR = dict(restitution=0.6, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5)
+ROLLING = dict(rollingFriction=0.1, rollingDampingRatio=0.3)
 WET = dict(bridgeVolume=2e-10, surfaceTension=0.072, contactAngle=0.35)
 DENSITY, YOUNG, POISSON = 2500.0, 5e6, 0.3
 STEP = 2e-6
@@ -187,13 +188,13 @@ def many():
     return [O.forces.f(2 * k)[2] for k in range(144)]
 
 
-def save_load(**law_attributes):
+def save_load(pair=None, **law_attributes):
     """State in the middle of sliding, wet contacts after saving and loading, and after some steps more, for each format."""
     found = {}
     for ending in ("xml", "xml.gz", "yade.gz", "bin"):
         grains = [moving((0.0045 * k, 0.0003 * k * k, 0.0024), 0.0025, (0.2 - 0.1 * k, 0.05, -0.1), (3, 4 * k, 5)) for k in range(4)]
-        law = scene_with([utils.wall(0, 2), *grains], {**WET, "interfaceShearStrength": math.inf}, (0, 0, -9.81), capillaryModel="exact",
-                         **law_attributes)
+        law = scene_with([utils.wall(0, 2), *grains], {**WET, "interfaceShearStrength": math.inf, **(pair or {})}, (0, 0, -9.81),
+                         capillaryModel="exact", **law_attributes)
         O.run(250, True)
         name = f"saved.{ending}"
         O.save(name)
@@ -210,7 +211,7 @@ def save_load(**law_attributes):
 
 
 def save_load_partial_slip():
-    return save_load(presliding="partial_slip")
+    return save_load(ROLLING, presliding="partial_slip", rollingResistance="elastic_plastic")
 
 
 def energy():

@@ -18,7 +18,7 @@ ROLLING = ["rolling_elastic", "rolling_viscous"]
 WORKS = ["gravity", *PARTS, "walls", "numerical_damping", "other", "imposed", *ROLLING]
 KEYS = ["kinetic", "first_kinetic", *WORKS[:-2], "balance", "normal_stored", "tangential_stored", "step_error", "scale", *ROLLING,
         "rolling_stored"]
-SCENES = ("impacts elastic dry wet damped box_gate drum periodic carried two_steps briefly save_load come_and_go in_a_step "
+SCENES = ("impacts elastic dry wet damped box_gate drum rolling_drum periodic carried two_steps briefly save_load come_and_go in_a_step "
           "set_in_a_step reset table messages").split()
 
 
@@ -92,7 +92,8 @@ def works_of_motion(motion, radii, law):
             "liquid_viscous": dot(resisting, motion), "walls": dot(whole, before[:, 1, 3:6]) if wall else 0.0}
 
 
-@pytest.mark.parametrize("name", ["grains", "grains+hooke+0.5", "grains+True", "grains+willett", "wall0", "wall1", "wall0+willett"])
+@pytest.mark.parametrize("name", ["grains", "grains+hooke+0.5", "grains+True", "grains+willett", "grains+constant_torque",
+                                  "grains+elastic_plastic", "wall0", "wall1", "wall0+willett", "wall1+elastic_plastic"])
 def test_parts_of_an_impact_are_those_of_its_motion(found, name):
     impact = found["impacts"][name]
     energies, radii = impact["energies"], (R, math.inf) if name.startswith("wall") else (0.003, R)
@@ -103,6 +104,9 @@ def test_parts_of_an_impact_are_those_of_its_motion(found, name):
     # All parts act, and what damps takes.
     assert (energies["liquid_viscous"] < -1e-3 * energies["scale"] and energies["capillary"] != 0.0) == ("willett" in name)
     assert all(energies[part] < -1e-3 * energies["scale"] for part in ("normal_viscous", "tangential_elastic"))
+    # The works balance, and so those of rolling are what the other parts leave.
+    assert (energies["rolling_viscous"] < -1e-4 * energies["scale"]) == name.endswith(("torque", "plastic"))
+    assert (energies["rolling_elastic"] < 0.0) == name.endswith("plastic") and energies["rolling_stored"] == 0.0
     assert energies["tangential_viscous"] < -1e-6 * energies["scale"] and abs(energies["normal_elastic"]) > 1e-7 * energies["scale"]
 
 
@@ -155,10 +159,11 @@ def test_error_of_the_step_falls_with_its_square(found):
     assert all(1.6 < order < 2.4 for order in orders), (sizes, orders)
 
 
-@pytest.mark.parametrize("name", ["box_gate", "drum"])
+@pytest.mark.parametrize("name", ["box_gate", "drum", "rolling_drum"])
 def test_work_of_moving_walls(found, name):
     energies = found[name]
     assert_balanced(energies)
+    assert (energies["rolling_elastic"] < -1e-3 * energies["scale"]) == (energies["rolling_viscous"] < 0.0) == name.startswith("rolling")
     assert abs(energies["walls"]) > 2e-3 * energies["scale"]
     assert abs(energies["other"]) < 1e-12 * energies["scale"] and energies["imposed"] == 0.0
 

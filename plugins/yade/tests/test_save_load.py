@@ -28,9 +28,10 @@ def test_loaded_run_goes_on_as_the_straight_one(found, ending):
     assert np.abs(resumed - straight).max() < 1e-10 * np.abs(straight).max()
 
 
-def test_partial_slip_is_saved(yade):
-    """Rings that hold load, of which a linear contact has none."""
+def test_partial_slip_and_rolling_are_saved(yade):
+    """Rings that hold load, of which a linear contact has none, and springs that rolling has turned."""
     for scene, rings in (("save_load_partial_slip", 21), ("save_load", 0)):
         states = yade.scenes(scene)[scene]["bin"]["after"].values()
         assert {len(state["slipRings"]) for state in states} == {rings}
         assert not rings or any(float.fromhex(number) != 0.0 for state in states for number in state["slipRings"][:16])
+        assert any(float.fromhex(number) != 0.0 for state in states for number in state["rollingAngle"]) == bool(rings)
