@@ -92,6 +92,8 @@ def test_html_has_contents_and_everything_and_stands_alone(results):
     assert links and all((folder / link).is_file() for link in links)
     assert not re.search(r'src="(?!data:)', html) and "url(" not in html
     assert "quantity σ<sub>zz</sub> number 11" in html
+    # What fails a check stands with it.
+    assert "fails with: friction off" in html and "fails with: a lost grain" in html and "not counted</th>" not in html
     for text in (html, results[1]):
         assert not re.search(r"\b(None|nan|inf)\b", pdf.text(text))
 
@@ -100,6 +102,7 @@ def test_csv_holds_every_quantity_and_profile(results):
     folder = results[0]
     rows = list(csv.DictReader((folder / "figures/quantities.csv").open()))
     assert len(rows) == 7 * 18 + 4 * 9 + 1
+    assert {row["control"] for row in rows} >= {"friction off", "a lost grain"}
     assert {row["evidence"] for row in rows} == {"experiment", "theory", "code", "identity", ""}
     own = result.read(folder / "silo/variant_0/liggghts/metrics.json").profiles[1]
     table = [row for row in csv.DictReader((folder / "figures/silo-variant_0-curve_1.csv").open()) if row["engine"] == "liggghts"]
