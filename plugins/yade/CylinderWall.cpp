@@ -21,7 +21,7 @@ void CylinderWall::postLoad(CylinderWall&) {
 
 void Bo1_CylinderWall_Aabb::go(const shared_ptr<Shape>& shape, shared_ptr<Bound>& bound, const Se3r& se3, const Body*) try {
 	if (!bound) bound = shared_ptr<Bound>(new Aabb);
-	bound->min = bound->max = se3.position;
+	bound->min = bound->max  = se3.position;
 	const CylinderWall& wall = *static_cast<CylinderWall*>(shape.get());
 	if (!(wall.radius > 0.0)) fail("CylinderWall.radius is not set; give it in m");
 	for (int i = 0; i < 3; ++i) {
@@ -36,8 +36,8 @@ void Bo1_CylinderWall_Aabb::go(const shared_ptr<Shape>& shape, shared_ptr<Bound>
 				half = 1000.5 * scene->cell->getSize()[i];
 			}
 		}
-		bound->min[i]     = se3.position[i] - half;
-		bound->max[i]     = se3.position[i] + half;
+		bound->min[i] = se3.position[i] - half;
+		bound->max[i] = se3.position[i] + half;
 	}
 } catch (const std::exception& error) {
 	dembark_yade::postpone(*scene, error, true);
