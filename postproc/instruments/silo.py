@@ -84,13 +84,16 @@ def predicted(points: Sequence[Mapping[str, Any]]) -> Measurement:
         masses = [of_point(one, "filled_mass").value for one in (point, known)]
         return of_point(known, "filling_height").value * masses[0] / masses[1] / wider**3
 
+    def law(depth: float) -> Estimate:
+        return propagated(lambda values: float(janssen.base_share(2.0 * depth * values[0])), np.array([k_mu.value]), np.array([k_mu.half]),
+                          "K and μ_mob of dry")
+
     depth = np.array([height(point) for point in held])
     base = Growth.of(held, "apparent_mass_ratio", depth)
     fitted = propagated(lambda values: janssen.fitted_friction(depth, values), base.values, base.halves, "the apparent masses")
     values = {"held_out_k_mu": Value(fitted, k_mu, detail=f"fitted to {len(held)} other silos; reference: K and μ_mob of dry alone")}
     for point, y in zip(held, depth, strict=True):
-        law = propagated(lambda values, y=y: float(janssen.base_share(2.0 * y * values[0])), *np.array([[k_mu.value], [k_mu.half]]), "dry")
-        values[f"held_out_mass_{point['variant']}"] = Value(of_point(point, "apparent_mass_ratio"), law,
+        values[f"held_out_mass_{point['variant']}"] = Value(of_point(point, "apparent_mass_ratio"), law(y),
                                                             detail=f"filled {y:.2f} R high; reference: Janssen with K, μ_mob, ρ_b of dry")
     points = sorted(points, key=height)
     place = np.array([height(point) for point in points])
