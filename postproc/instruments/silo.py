@@ -97,11 +97,12 @@ def predicted(points: Sequence[Mapping[str, Any]]) -> Measurement:
                                                             detail=f"filled {y:.2f} R high; reference: Janssen with K, μ_mob, ρ_b of dry")
     points = sorted(points, key=height)
     place = np.array([height(point) for point in points])
-    every, top = Growth.of(points, "apparent_mass_ratio", place, place), place[-1]
-    pair = janssen.fitted_pair(place, every.values, [(2.0, 0.02), (2.0, 0.5)], ((0.05, 100.0), (0.0, 0.9 * top)), 1.0)
-    one = janssen.fitted_length(place, every.values, 2.0)
-    values["filling_two_parameter_gain"] = Value(exact(janssen.gain(place, every.values, one, pair)), detail=(
-        f"all {len(points)} silos; with it λ is {pair[0]:.2f} R, the zone {pair[1]:.2f} R deep"))
+    every = Growth.of(points, "apparent_mass_ratio", place, place)
+    if len({point["parameters"]["cylinder_radius"] for point in points}) == 1:
+        pair = janssen.fitted_pair(place, every.values, [(2.0, 0.02), (2.0, 0.5)], ((0.05, 100.0), (0.0, 0.9 * place[-1])), 1.0)
+        one = janssen.fitted_length(place, every.values, 2.0)
+        values["filling_two_parameter_gain"] = Value(exact(janssen.gain(place, every.values, one, pair)), detail=(
+            f"all {len(points)} silos; with it λ is {pair[0]:.2f} R, the zone {pair[1]:.2f} R deep"))
     curve = profile("apparent_mass", "Apparent mass", "filled mass / (ρ_b π R³)", "force on the base / (g ρ_b π R³)", place, [every.values],
                     half=every.halves, reference=place * janssen.base_share(2.0 * k_mu.value * place),
                     reference_label="Janssen, K and μ_mob of dry alone")
