@@ -84,21 +84,25 @@ def predicted(points: Sequence[Mapping[str, Any]]) -> Measurement:
         masses = [of_point(one, "filled_mass").value for one in (point, known)]
         return of_point(known, "filling_height").value * masses[0] / masses[1] / wider**3
 
+    def law(depth: float) -> Estimate:
+        return propagated(lambda values: float(janssen.base_share(2.0 * depth * values[0])), np.array([k_mu.value]), np.array([k_mu.half]),
+                          "K and μ_mob of dry")
+
     depth = np.array([height(point) for point in held])
     base = Growth.of(held, "apparent_mass_ratio", depth)
     fitted = propagated(lambda values: janssen.fitted_friction(depth, values), base.values, base.halves, "the apparent masses")
     values = {"held_out_k_mu": Value(fitted, k_mu, detail=f"fitted to {len(held)} other silos; reference: K and μ_mob of dry alone")}
     for point, y in zip(held, depth, strict=True):
-        law = propagated(lambda values, y=y: float(janssen.base_share(2.0 * y * values[0])), *np.array([[k_mu.value], [k_mu.half]]), "dry")
-        values[f"held_out_mass_{point['variant']}"] = Value(of_point(point, "apparent_mass_ratio"), law,
+        values[f"held_out_mass_{point['variant']}"] = Value(of_point(point, "apparent_mass_ratio"), law(y),
                                                             detail=f"filled {y:.2f} R high; reference: Janssen with K, μ_mob, ρ_b of dry")
     points = sorted(points, key=height)
     place = np.array([height(point) for point in points])
-    every, top = Growth.of(points, "apparent_mass_ratio", place, place), place[-1]
-    pair = janssen.fitted_pair(place, every.values, [(2.0, 0.02), (2.0, 0.5)], ((0.05, 100.0), (0.0, 0.9 * top)), 1.0)
-    one = janssen.fitted_length(place, every.values, 2.0)
-    values["filling_two_parameter_gain"] = Value(exact(janssen.gain(place, every.values, one, pair)), detail=(
-        f"all {len(points)} silos; with it λ is {pair[0]:.2f} R, the zone {pair[1]:.2f} R deep"))
+    every = Growth.of(points, "apparent_mass_ratio", place, place)
+    if len({point["parameters"]["cylinder_radius"] for point in points}) == 1:
+        pair = janssen.fitted_pair(place, every.values, [(2.0, 0.02), (2.0, 0.5)], ((0.05, 100.0), (0.0, 0.9 * place[-1])), 1.0)
+        one = janssen.fitted_length(place, every.values, 2.0)
+        values["filling_two_parameter_gain"] = Value(exact(janssen.gain(place, every.values, one, pair)), detail=(
+            f"all {len(points)} silos; with it λ is {pair[0]:.2f} R, the zone {pair[1]:.2f} R deep"))
     curve = profile("apparent_mass", "Apparent mass", "filled mass / (ρ_b π R³)", "force on the base / (g ρ_b π R³)", place, [every.values],
                     half=every.halves, reference=place * janssen.base_share(2.0 * k_mu.value * place),
                     reference_label="Janssen, K and μ_mob of dry alone")
