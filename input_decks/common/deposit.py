@@ -8,6 +8,7 @@ random: with more choices the bed is denser and its surface flatter. There are n
 from __future__ import annotations
 
 from functools import cache
+from itertools import chain, product
 from itertools import count as numbers
 
 import numpy as np
@@ -46,7 +47,7 @@ def deposit(count: int, sides: tuple[float, float], choices: int, seed: int) -> 
         if bed.count == count:
             break
         if not len(bed.sites):
-            raise DembarkError("the bed does not grow", f"no sphere finds three that carry it in a box of {sides[0]:g} by {sides[1]:g} radii",
+            raise DembarkError("the bed does not grow", f"no sphere finds three that carry it in {sides[0]:g} by {sides[1]:g} radii",
                                "take a wider box")
         drawn = (uniform(choices * draw + np.arange(choices), seed, 1) * len(bed.sites)).astype(np.int64)
         bed.add(bed.sites[drawn[np.argmin(bed.sites[drawn, 2])]])
@@ -63,6 +64,8 @@ class _Bed:
         self.centres = np.empty((most, 3))
         self.count = 0
         self.sites = np.empty((0, 3))
+        # Numbers of the spheres in cells as wide as two diameters.
+        self.cells: dict[tuple[int, ...], list[int]] = {}
         # Where a centre may be, n·p >= d: two walls across x, two across y, the floor.
         self.normals = np.array([(1.0, 0, 0), (-1.0, 0, 0), (0, 1.0, 0), (0, -1.0, 0), (0, 0, 1.0)])
         self.offsets = np.array([1.0, 1.0 - sides[0], 1.0, 1.0 - sides[1], 1.0])
@@ -72,9 +75,11 @@ class _Bed:
 
     def add(self, place: Array) -> None:
         """Put a sphere at `place` (3,): sites that it covers go, and those that it makes with two others, or walls, come."""
-        there = self.centres[: self.count]
-        near = there[(np.abs(there - place) < 4.0).all(axis=1)]
+        own = tuple(int(x) for x in place // 4.0)
+        around = product(*(range(x - 1, x + 2) for x in own))
+        near = self.centres[sorted(chain.from_iterable(self.cells.get(cell, ()) for cell in around))]
         near = near[((near - place) ** 2).sum(axis=1) < 16.0]
+        self.cells.setdefault(own, []).append(self.count)
         self.centres[self.count] = place
         self.count += 1
         kept = self.sites[((self.sites - place) ** 2).sum(axis=1) >= 4.0 - _TOUCH]

@@ -68,7 +68,7 @@ def measure(replicas: Replicas) -> Measurement:
     """Each quantity over the packings beside the mean of the codes' means."""
     runs, known = [bed(one) | flight(one) for one in replicas], published()
     values = {"free_flight": Value(exact(max(map(free_flight, replicas))), exact(0.0))}
-    for name in runs[0]:
+    for name in (name for name in runs[0] if all(name in run for run in runs)):
         codes = known[name]
         reference = over_replicas([Estimate(mean, 0.0) for mean in codes]) if len(codes) > 1 else Estimate(codes[0], 0.0, "one packing")
         values[name] = Value(over_replicas([Estimate(run[name], math.inf, ONE_RUN) for run in runs]), reference,

@@ -16,7 +16,8 @@ def setup(p: Parameters) -> Setup:
     """
     radius, length, width = 0.5 * p.grain_diameter, p.box_length, p.box_width
     bed = radius * deposit(p.grain_count, (length / radius, width / radius), p.deposit_choices, p.seed)
-    places = np.vstack([bed + (-0.5 * length, -0.5 * width, p.floor), (0.0, 0.0, p.ball_height)])
+    corner = np.array([-0.5 * length, -0.5 * width, p.floor])
+    places = np.vstack([corner + bed, (0.0, 0.0, p.ball_height)])
     bed_top = places[:-1, 2].max() + radius
     gap = p.ball_height - 0.5 * p.ball_diameter - bed_top
     if gap < p.grain_diameter:
@@ -35,7 +36,7 @@ def setup(p: Parameters) -> Setup:
     margin = p.grain_diameter
     # Grains are thrown up, at most twice as fast as the ball came.
     top = p.ball_height + p.ball_diameter + 2.0 * p.ball_speed * p.duration
-    box = np.array([(-0.5 * length - margin, 0.5 * length + margin), (-0.5 * width - margin, 0.5 * width + margin), (p.floor - margin, top)])
+    box = np.column_stack([corner - margin, (margin - corner[0], margin - corner[1], top)])
     packing = Packing(box, places, np.append(np.full(count, p.grain_diameter), p.ball_diameter),
                       np.append(np.full(count, p.grain_density), p.steel_density), np.append(np.ones(count, np.int64), 2), velocities)
     # A wide skin: with the ball the cells of the neighbour search are ten grains wide, so lists are dear, and the ball is fast.

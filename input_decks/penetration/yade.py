@@ -20,7 +20,8 @@ for axis, place, sense in ((0, -0.5 * p.box_length, 1), (0, 0.5 * p.box_length, 
 
 def of_pairs(*values):
     """A number for two grains, a grain and steel, steel and steel."""
-    return MatchMaker(matches=[(*pair, value) for pair, value in zip(((grain, grain), (grain, steel), (steel, steel)), values, strict=True)])
+    pairs = (grain, grain), (grain, steel), (steel, steel)
+    return MatchMaker(matches=[(*pair, value) for pair, value in zip(pairs, values, strict=True)])
 
 
 friction = of_pairs(p.friction, p.grain_steel_friction, p.steel_friction)

@@ -31,6 +31,7 @@ BASES: dict[str, dict[str, Any]] = {
     "single_contact": {"partner": "rest", "sweep": "spin", "points": 3, "duration": 0.01},
     "liquid_exchange": {},
     "oblique_impact": {},
+    "penetration": {"grain_count": 100, "box_length": 0.02, "box_width": 0.02, "ball_diameter": 0.008},
 }
 # How many packings there are is the harness's, for a deck makes one; what counts as an impact is the measurement's.
 NOT_READ = {"replicas", "impact_speed"}
