@@ -198,7 +198,7 @@ def test_flanks_have_a_sign() -> None:
 
 
 TINY: dict[str, dict[str, Any]] = {
-    "granular_collapse": {"column_width": 0.03, "aspect_ratio": 1.0, "column_depth": 0.02},
+    "granular_collapse": {"column_width": 0.03, "collapse_time": 10.0},
     "angle_of_repose": {"plate_width": 0.16, "fill_height": 0.06, "discharge_time": 0.8, "settle_time": 0.35},
 }
 
@@ -221,9 +221,10 @@ def test_a_column_collapses_and_stays(engine: str, run: Any) -> None:
     assert 0.5 < found["run_out"] < 2.5 and 0.6 < found["final_height"] < 1.0
 
 
-def test_a_column_without_friction_does_not_stay(run: Any) -> None:
-    found = collapse.deposit(run("granular_collapse", "liggghts", static_friction=0.0))
-    assert found["run_out"] > 2.5 and found["final_height"] < 0.5
+def test_a_column_without_friction_runs_out_farther(run: Any) -> None:
+    """And leaves less at the wall, though the floor's grains hold some."""
+    rough, smooth = (collapse.deposit(run("granular_collapse", "liggghts", **friction)) for friction in ({}, {"static_friction": 0.0}))
+    assert smooth["run_out"] > 1.1 * rough["run_out"] and smooth["final_height"] < 0.8 * rough["final_height"], (rough, smooth)
 
 
 @pytest.mark.parametrize(("engine", "confinement"), [("liggghts", 0.25), ("yade", 0.25), ("yade", 0.0)])
