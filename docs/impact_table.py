@@ -43,10 +43,10 @@ def main(results: Path) -> None:
         due = float(row["value"])
         near = min(others(quantity, angle).items(), key=lambda entry: abs(entry[1] - due), default=None)
         one, datum_half = known[0], _half(known[0].reference_interval)
-        allowed = (one.tolerance or 0.0) * (due if one.deviation_kind == "relative" else 1.0)
+        allowed = None if one.tolerance is None else one.tolerance * (due if one.deviation_kind == "relative" else 1.0)
         cells = [label, f"{angle:.1f}°", f"{digits.format(due)} ± {digits.format(datum_half)}",
                  *(f"{digits.format(each.value)} ± {digits.format(each.half)}" for each in known),
-                 *(_error(each, due, datum_half, digits) for each in (one, linear[0].find(one.name)) if each), digits.format(allowed),
+                 *(_error(each, due, datum_half, digits) for each in (one, linear[0].find(one.name)) if each), "–" if allowed is None else digits.format(allowed),
                  "–" if near is None else f"{digits.format(near[1])}, {near[0]}"]
         print(f"| {' | '.join(cells)} |".replace("| -", "| −").replace("**-", "**−"))
 

@@ -19,7 +19,8 @@ from dembark.validation.judge.tally import Tally
 if TYPE_CHECKING:
     from dembark.validation.runs.perform import Outcome
 
-_SHOWN = {"passed": "[green]pass[/]", "failed": "[bold red]FAIL[/]", "open": "[yellow]open[/]", "information": ""}
+_SHOWN = {"passed": "[green]pass[/]", "failed": "[bold red]FAIL[/]", "open": "[yellow]open[/]", "information": "",
+          "uncontrolled": "not counted"}
 
 
 def console() -> Console:

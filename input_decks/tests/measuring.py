@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from types import ModuleType
-from typing import Any
+from types import ModuleType, SimpleNamespace
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from dembark.postproc.instruments.liquid import liquid_values
 from dembark.postproc.instruments.logs import LogRun, read
 from dembark.postproc.measurement import Measurement
 from dembark.postproc.replica import Replica
@@ -16,6 +19,17 @@ from dembark.validation.case.folders import find
 from dembark.validation.judge import compare as judge
 from dembark.validation.judge import measuring
 from dembark.validation.judge.result import COMPARISON, METRICS, QuantityRecord, as_json, from_json, write
+
+# The measured quantities with their verdicts, by name.
+Verdicts = Mapping[str, Mapping[str, Any]]
+
+
+class Control(NamedTuple):
+    """Wrong physics by the name that case.toml has for it: what the case measures `right`, without it, and `wrong`, with it."""
+
+    name: str
+    right: Verdicts
+    wrong: Verdicts
 
 
 def module(case: str) -> ModuleType:
@@ -45,6 +59,22 @@ def measure(folder: Path) -> dict[str, Any]:
     return as_json(write(folder / METRICS, metrics.measure(folder)))
 
 
+def measured(folder: Path) -> dict[str, dict[str, Any]]:
+    """The quantities of the runs in `folder` with their verdicts, by name."""
+    return {one["name"]: one for one in measure(folder)["quantities"]}
+
+
+def dried(case: str) -> Control:
+    """What `case` measures of liquid that is kept, and of liquid a thousandth of which dries up unbooked."""
+    def of_run(kept: float) -> dict[str, dict[str, Any]]:
+        rows = np.linspace(1.0, kept, 200)
+        times = {f"liquid_{place}": amount * rows for place, amount in (("grains", 3.0), ("bridges", 1.0), ("walls", 0.5), ("lost", 0.0))}
+        run = SimpleNamespace(parameters={"liquid_content": 0.01, "grain_count": 10}, times=lambda: times | {"bridge_count": 20.0 * rows})
+        return judged(case, Measurement(liquid_values([run])))
+
+    return Control("liquid that dries up", of_run(1.0), of_run(0.999))
+
+
 def compare(folder: Path) -> dict[str, Any]:
     """Content of the `comparison.json` of a case and variant, which is written."""
     return as_json(write(folder / COMPARISON, judge.compare(folder)))
@@ -56,6 +86,6 @@ def pair(*entries: Mapping[str, Any], engines: tuple[str, str] = ("liggghts", "y
     return as_json(judge.pair(one, other, *engines))
 
 
-def names(found: Mapping[str, Mapping[str, Any]], verdict: str) -> set[str]:
+def names(found: Verdicts, verdict: str) -> set[str]:
     """Names of the quantities with this verdict."""
     return {name for name, one in found.items() if one["verdict"] == verdict}

@@ -50,12 +50,23 @@ class Written:
         return self.folder.parent
 
 
+def told(folder: Path, **changes: float) -> Path:
+    """The engine's `folder`, whose records say other parameters than were simulated."""
+    for path in folder.glob("replica-*/run.json"):
+        record = json.loads(path.read_text())
+        path.write_text(json.dumps({**record, "parameters": record["parameters"] | changes}))
+    return folder
+
+
 def silo(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: str = "dry", k: float = 0.8, friction: float = 0.25,
-         noise: float = 0.0, seed: int = 0, lost_wall_force: float = 0.0, bridge_volume: float = 0.0) -> Path:
+         noise: float = 0.0, seed: int = 0, lost_wall_force: float = 0.0, bridge_volume: float = 0.0, smooth: float = 1.0,
+         lost_contacts: int = 0) -> Path:
     """Write a replica whose wall and base forces follow Janssen's law; returns the engine's folder.
 
     `noise`: relative scatter of the wall forces among grains and frames; `lost_wall_force`: share that is missing in time.csv;
-    `bridge_volume` (m3): every grain hangs on the wall by a liquid bridge too, whose pull is rubbed like the rest of the pressure.
+    `bridge_volume` (m3): every grain hangs on the wall by a liquid bridge too, whose pull is rubbed like the rest of the pressure;
+    `smooth`: friction of the wall's lower half over that of its upper one; `lost_contacts`: how many of the 24 between two layers are
+    missing.
     """
     random = np.random.default_rng(seed)
     radius, levels, ring = 0.025, 30, 24
@@ -76,12 +87,14 @@ def silo(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: 
     below, above = np.arange(len(place) - ring), np.arange(ring, len(place))
     for step in steps:
         own = push * (1.0 + noise * random.standard_normal(len(push)))
-        side = np.column_stack([-own[:, None] * outward, friction * (own + pull)])
+        side = np.column_stack([-own[:, None] * outward, np.where(place[:, 2] < 0.5 * top, smooth, 1.0) * friction * (own + pull)])
         carried = np.cumsum((mass * GRAVITY - side[:, 2]).reshape(levels, ring)[::-1], axis=0)[::-1].ravel()
         base = np.zeros_like(side)
         base[:ring, 2] = carried[:ring]
         forces = np.column_stack([np.zeros((len(above), 2)), carried[above]])
-        run.frame(step, place, np.full(len(place), 0.5 * DIAMETER), (place[above], place[below], (above, below), forces), masses=mass,
+        held = above % ring >= lost_contacts
+        run.frame(step, place, np.full(len(place), 0.5 * DIAMETER),
+                  (place[above][held], place[below][held], (above[held], below[held]), forces[held]), masses=mass,
                   walls={"side": side, "base": base})
         lift.append((side[:, 2].sum(), base[:, 2].sum()))
     side_fz, base_fz = np.array(lift).T
@@ -92,10 +105,11 @@ def silo(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: 
 
 
 def plug_flow(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: str = "smooth", slip: float = 0.4,
-              decay: float = 2.0, noise: float = 0.02, seed: int = 0, tilt: float = 0.0) -> Path:
+              decay: float = 2.0, noise: float = 0.02, seed: int = 0, tilt: float = 0.0, lift: float = 1.0, faster: float = 1.0) -> Path:
     """Write a replica with v / v_core = 1 - slip exp(-distance / (decay d)) and flux v0 rho_b; returns the engine's folder.
 
-    `tilt`: a linear variation of the core's velocity from wall to wall, which a flat core must not have.
+    `tilt`: a linear variation of the core's velocity from wall to wall, which a flat core must not have; `lift`: what walls and base
+    carry over the weight; `faster`: velocities over those of the displacements.
     """
     random = np.random.default_rng(seed)
     width, depth, speed, step_length = 20 * DIAMETER, 5 * DIAMETER, 0.02, 1e-5
@@ -107,17 +121,17 @@ def plug_flow(results: Path, *, engine: str = "liggghts", replica: int = 1, vari
     radii = np.full(len(place), 0.5 * DIAMETER)
     mass = DENSITY * 4.0 / 3.0 * np.pi * radii**3
     run = Written(results, "plug_flow", variant, engine, replica, ((-1.0, 1.0), (0.0, depth), (-1.0, 1.0)), "ff pp ff")
-    steps = 100000 + 20000 * np.arange(FRAMES)
+    steps = 100000 + 2000 * np.arange(FRAMES)
     left, right = ((from_wall < 0.6) & (side * (place[:, 0] - 0.5 * width) > 0.0) for side in (-1, 1))
     push, weight = 0.01, mass.sum() * GRAVITY
     neighbour = np.nonzero(place[:, 0] < width - DIAMETER)[0]
     for step in steps:
-        now = place - np.array([0.0, 0.0, 1.0]) * (profile * speed * step_length * (step - steps[0]))[:, None] * 0.1
+        now = place - np.array([0.0, 0.0, 1.0]) * (profile * speed * step_length * (step - steps[0]))[:, None]
         walls = {name: np.zeros_like(place) for name in ("left", "right", "base")}
         walls["left"][left] = [push, 0.0, 0.3 * push]
         walls["right"][right] = [-push, 0.0, 0.3 * push]
         velocity = np.zeros_like(place)
-        velocity[:, 2] = -speed * (profile + noise * random.standard_normal(len(place)))
+        velocity[:, 2] = -faster * speed * (profile + noise * random.standard_normal(len(place)))
         first, forces = now[neighbour], np.tile([-push, 0.0, 0.0], (len(neighbour), 1))
         run.frame(step, now, radii, (first, first + BESIDE, (neighbour, neighbour), forces), velocities=velocity, masses=mass,
                   walls=walls)
@@ -126,6 +140,6 @@ def plug_flow(results: Path, *, engine: str = "liggghts", replica: int = 1, vari
     friction = 0.3 * push * left.sum() * (1.0 + 0.01 * random.standard_normal(count))
     return run.finish(
         {"step": rows, "time": rows * step_length, "kinetic_energy": np.zeros(count), "left_fz": friction, "right_fz": friction,
-         "base_fz": weight - 2.0 * friction},
+         "base_fz": lift * weight - 2.0 * friction},
         {"channel_width": width, "channel_depth": depth, "base_speed": speed, "settle_time": 0.5, "wall_friction": 0.5,
          "grain_count": len(place)})

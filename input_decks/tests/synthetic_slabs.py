@@ -12,10 +12,11 @@ STEP = 1e-5
 
 
 def plane_silo(results: Path, *, replica: int = 1, k: float = 0.7, friction: float = 0.2, noise: float = 0.0, seed: int = 0,
-               tilt: float = 0.0) -> Path:
+               tilt: float = 0.0, smooth: float = 1.0, lost_contacts: int = 0, lost_wall_force: float = 0.0) -> Path:
     """Write a replica whose walls and base follow Janssen's law with lambda = W / (2 k friction); returns the engine's folder.
 
-    `tilt`: the left wall carries 1 + tilt, the right one 1 - tilt of its share, which the mean over both does not show.
+    `tilt`: the left wall carries 1 + tilt, the right one 1 - tilt of its share, which the mean over both does not show;
+    `smooth`, `lost_contacts`, `lost_wall_force`: as of the silo.
     """
     random = np.random.default_rng(seed)
     across, along, levels = 10, 6, 40
@@ -35,17 +36,21 @@ def plane_silo(results: Path, *, replica: int = 1, k: float = 0.7, friction: flo
         for name, sign in (("left", 1.0), ("right", -1.0)):
             push = np.where(side[name], k * stress * DIAMETER**2 * (1.0 + sign * tilt), 0.0)
             push *= 1.0 + noise * random.standard_normal(len(place))
-            walls[name] = np.column_stack([sign * push, np.zeros(len(place)), friction * push])
+            rubbed = np.where(place[:, 2] < 0.5 * top, smooth, 1.0) * push
+            walls[name] = np.column_stack([sign * push, np.zeros(len(place)), friction * rubbed])
         held = walls["left"][:, 2] + walls["right"][:, 2]
         # Each layer's load, evenly on its grains: the sum above a level is what the levels below carry.
         carried = np.repeat(np.cumsum((mass * GRAVITY - held).reshape(levels, layer).sum(axis=1)[::-1])[::-1] / layer, layer)
         base = np.zeros_like(place)
         base[:layer, 2] = carried[:layer]
         forces = np.column_stack([np.zeros((len(above), 2)), carried[above]])
-        run.frame(step, place, np.full(len(place), 0.5 * DIAMETER), (place[above], place[below], (above, below), forces), masses=mass,
+        kept = above % layer >= lost_contacts
+        run.frame(step, place, np.full(len(place), 0.5 * DIAMETER),
+                  (place[above][kept], place[below][kept], (above[kept], below[kept]), forces[kept]), masses=mass,
                   walls={**walls, "base": base})
         lift.append([wall[:, 2].sum() for wall in (walls["left"], walls["right"], base)])
     table = dict(zip(("left_fz", "right_fz", "base_fz"), np.array(lift).T, strict=True))
+    table["left_fz"] = (1.0 - lost_wall_force) * table["left_fz"]
     return run.finish({"step": steps, "time": steps * STEP, "kinetic_energy": 0.0 * steps, **table},
                       {"silo_width": width, "slab_depth": depth, "wall_friction": 0.3})
 

@@ -18,13 +18,14 @@ def parameters(variant, **changes):
     return defaults("single_contact") | find("single_contact").variants[variant] | changes
 
 
-def flown(p):
-    """A run by the scheme that was written down again."""
-    one = single_contact.impacts(p)
-    after = stepped(one, p["time_step"], p["lead_steps"] % 1.0, p["duration"])
-    depth = np.concatenate([np.linspace(-0.2, 1.0, 201), np.linspace(1.0, -0.2, 200)])[:, None] * one.peak_overlap
-    times = np.arange(len(depth)) * p["time_step"]
-    after = replace(after, overlap=one.peak_overlap, force=one.peak_force)
+def flown(p, one=None):
+    """A run by the scheme that was written down again, through the impacts `one`: those of `p` when left out."""
+    one = one or single_contact.impacts(p)
+    after = replace(stepped(one, p["time_step"], p["lead_steps"] % 1.0, p["duration"]), overlap=one.peak_overlap, force=one.peak_force)
+    times = np.linspace(-0.1, 1.1, 401) * one.duration.max()
+    # After Hertz, and free before and after.
+    apart = one.closing * np.minimum(times[:, None], one.duration - times[:, None])
+    depth = np.where(apart < 0.0, apart, (one.pulse(times[:, None]) / one.peak_force) ** (2.0 / 3.0) * one.peak_overlap)
     return Flight(times, depth, one.force(depth), after, None if p["partner"] == "plane" else 0.0)
 
 

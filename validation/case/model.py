@@ -130,6 +130,7 @@ class Declared:
     why : the reason of the tolerance
     agreement : largest allowed difference of two engines where nothing is random, in the unit of the value or, with `agreement_of`, in that
     compared : whether engines are compared in it
+    control : wrong physics that fails it, as tests prove; a check without any is not counted
     """
 
     name: str
@@ -143,6 +144,7 @@ class Declared:
     detail: str = ""
     agreement: float | None = None
     compared: bool = True
+    control: str = ""
 
 
 @dataclass(frozen=True)
@@ -150,6 +152,7 @@ class Case:
     """A case folder: its parameters, profiles and variants (overrides of parameters by name), what a profile runs and what is measured.
 
     `derived`: numbers that follow from the parameters, by expressions; a setup.py beside the case file may add others, and the packing.
+    `controls`: wrong physics, in words, with the declared quantities whose checks it fails.
     """
 
     name: str
@@ -168,6 +171,7 @@ class Case:
     particles: Expression | None = None
     derived: Mapping[str, Expression] = field(default_factory=dict)
     quantities: Mapping[str, Declared] = field(default_factory=dict)
+    controls: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     references: tuple[str, ...] = ()
     picture: Mapping[str, Value] = field(default_factory=dict)
 

@@ -48,7 +48,7 @@ class CaseReader(TableReader):
     def case(self, data: Mapping[str, Any]) -> Case:
         """The whole case; `data` is the content of the file."""
         tables = {"case": dict, "parameters": dict, "profiles": dict, "variants": dict, "runs": dict, "constraints": dict, "studies": dict,
-                  "derived": dict, "quantities": dict, "picture": dict}
+                  "derived": dict, "quantities": dict, "controls": dict, "picture": dict}
         self.table(data, "top level", tables, ("case",))
         head = data["case"]
         keys = {"name": str, "title": str, "description": str, "source": list, "engines": list, "outputs": list, "particles": str,
@@ -73,6 +73,7 @@ class CaseReader(TableReader):
         constraints = {text: told for table in (*groups, data) for text, told in table.get("constraints", {}).items()}
         derived = self.derived(data.get("derived", {}), parameters)
         quantities = self.merged("quantities", data.get("quantities", {}), groups)
+        controls = self.controls([*groups, data], quantities)
         variants = self.changes("variants", data.get("variants", {"default": {}}), parameters)
         profiles = self.changes("profiles", {name: {} for name in PROFILES} | data.get("profiles", {}), parameters)
         return Case(
@@ -84,7 +85,9 @@ class CaseReader(TableReader):
             studies={name: self.study(name, entry, parameters, variants) for name, entry in data.get("studies", {}).items()},
             outputs=outputs, derived=derived,
             particles=self.expression("case", head["particles"], {**parameters, **derived}) if "particles" in head else None,
-            quantities={name: self.quantity(name, entry) for name, entry in quantities.items()},
+            quantities={name: self.quantity(name, entry, [wrong for wrong, seen in controls.items() if name in seen])
+                        for name, entry in quantities.items()},
+            controls=controls,
             references=tuple(head.get("references", ())), picture=data.get("picture", {}))
 
     def merged(self, table: str, own: Mapping[str, Any], groups: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -105,8 +108,17 @@ class CaseReader(TableReader):
             found[name] = self.expression("derived", text, {**parameters, **found})
         return found
 
-    def quantity(self, name: str, entry: Mapping[str, Any]) -> Declared:
-        """[quantities.NAME]: what a measured quantity is and how it is judged."""
+    def controls(self, tables: Sequence[Mapping[str, Any]], quantities: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+        """[controls] of the groups and of the case: wrong physics, and the quantities whose checks it fails."""
+        found: dict[str, tuple[str, ...]] = {}
+        for wrong, names in (entry for table in tables for entry in table.get("controls", {}).items()):
+            if not isinstance(names, list) or not names:
+                raise self.fail("controls", f"{wrong!r} = {names!r}", "a list of the quantities whose checks it fails")
+            found[wrong] = (*found.get(wrong, ()), *(self.pick(str(name), quantities, "quantity", "controls") for name in names))
+        return found
+
+    def quantity(self, name: str, entry: Mapping[str, Any], controls: Sequence[str]) -> Declared:
+        """[quantities.NAME]: what a measured quantity is, how it is judged, and the wrong physics that fails it."""
         table = f"quantities.{name}"
         keys: dict[str, Types] = {
             "label": str, "unit": str, "evidence": str, "tolerance": (int, float, str), "why": str, "absolute": bool, "source": str,
@@ -121,7 +133,7 @@ class CaseReader(TableReader):
             raise self.fail(table, "a tolerance without evidence", f"say what the reference is: {', '.join(EVIDENCE)}")
         if tolerance is not None and not (tolerance == "bound" or (isinstance(tolerance, int | float) and tolerance >= 0)):
             raise self.fail(table, f"tolerance = {tolerance!r}", 'a number >= 0, or "bound"')
-        return Declared(name=name, **entry)
+        return Declared(name=name, control="; ".join(controls), **entry)
 
     def parameter(self, name: str, entry: Mapping[str, Any]) -> Parameter:
         """[parameters.NAME], its own value checked."""

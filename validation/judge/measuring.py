@@ -108,7 +108,8 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
         deviation=_finite(deviation),
         deviation_kind="absolute" if one.absolute else "relative", tolerance=_finite(tolerance), verdict=verdict, reason=reason,
         detail=value.detail or one.detail or one.why, source=one.source, evidence=one.evidence, compared=one.compared and value.compared,
-        deviation_half_width=_finite(value.half), agreement=None if one.agreement is None else one.agreement * value.scale)
+        control=one.control, deviation_half_width=_finite(value.half),
+        agreement=None if one.agreement is None else one.agreement * value.scale)
 
 
 def _tolerance(one: Declared, value: Value, name: str) -> float | None:

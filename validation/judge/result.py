@@ -25,7 +25,8 @@ class QuantityRecord:
 
     `verdict` is pass, fail or info, with its `reason`; `tolerance` None means that nothing was due to be checked. `deviation` is value
     minus reference, over the reference when `deviation_kind` is "relative". `evidence`: what the reference is, one of EVIDENCE; "" is not
-    stated. `compared`: the engines are to agree in it, within `agreement` (in `unit`) where nothing is random.
+    stated. `compared`: the engines are to agree in it, within `agreement` (in `unit`) where nothing is random. `control`: wrong physics
+    that fails the check; a pass of a check that nothing is known to fail is not counted.
     """
 
     name: str
@@ -47,6 +48,7 @@ class QuantityRecord:
     compared: bool = True
     deviation_half_width: float | None = None
     agreement: float | None = None
+    control: str = ""
 
     def __post_init__(self) -> None:
         """RunError for a verdict or a kind of evidence that does not exist."""
@@ -67,9 +69,12 @@ class QuantityRecord:
 
     @property
     def standing(self) -> str:
-        """passed, failed, open (a check that could not be decided) or information (nothing was due)."""
-        if self.verdict != "info":
-            return "passed" if self.verdict == "pass" else "failed"
+        """passed, uncontrolled (passed, but no wrong physics is known to fail it), failed, open (a check that could not be decided) or
+        information (nothing was due)."""
+        if self.verdict == "pass":
+            return "passed" if self.control else "uncontrolled"
+        if self.verdict == "fail":
+            return "failed"
         return "open" if self.tolerance is not None else "information"
 
 
@@ -78,6 +83,7 @@ class ComparedRecord(QuantityRecord):
     """The same quantity in two engines: `value` of `engine` beside `reference`, the value of `reference_engine`."""
 
     evidence: str = "code"
+    control: str = "one engine a quarter off, or by twice the bound"
     engine: str = ""
     reference_engine: str = ""
     joint_half_width: float | None = None
@@ -192,6 +198,8 @@ def _value(content: Mapping[str, Any], kind: type[Kind], where: str, notes: dict
     notes |= {f"unknown {key!r} left out": None for key in content if key not in known}
     if issubclass(kind, QuantityRecord) and "evidence" not in content:
         notes |= {"no kind of evidence": None} if kind is QuantityRecord else {}
+    if kind is QuantityRecord and "control" not in content:
+        notes |= {"no negative controls": None}
     given: dict[str, Any] = {}
     for key in known.keys() & content.keys():
         item = content[key]

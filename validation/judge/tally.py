@@ -19,26 +19,28 @@ MEANING = {"experiment": "measured values", "theory": "laws and exact solutions"
 
 @dataclass(frozen=True)
 class Counts:
-    """Numbers of quantities: checks that passed, failed or could not be decided (open), and those that nothing was due of."""
+    """Numbers of quantities: checks that passed, failed or could not be decided (open), and those that nothing was due of; apart from
+    them checks that passed but are not counted, for no wrong physics is known to fail them (uncontrolled)."""
 
     passed: int = 0
     failed: int = 0
     open: int = 0
     information: int = 0
+    uncontrolled: int = 0
 
     @property
     def checks(self) -> int:
-        """Checks, with a verdict or open."""
+        """Checks that count, with a verdict or open."""
         return self.passed + self.failed + self.open
 
     @property
     def sentence(self) -> str:
         """`12 checks passed, 1 FAILED, 3 open`."""
-        if not self.checks:
-            return "no checks"
         plural = "s" if self.checks > 1 else ""
         failed = f"{self.failed} FAILED" if self.failed else "none failed"
-        return f"{self.passed} of {self.checks} check{plural} passed, {failed}" + (f", {self.open} open" if self.open else "")
+        told = f"{self.passed} of {self.checks} check{plural} passed, {failed}" if self.checks else "no checks"
+        return (told + (f", {self.open} open" if self.open else "")
+                + (f"; {self.uncontrolled} without a negative control not counted" if self.uncontrolled else ""))
 
 
 @dataclass(frozen=True)
@@ -66,8 +68,8 @@ def tally(quantities: Iterable[QuantityRecord]) -> Tally:
     return Tally(*_numbers(total), by_evidence=by_evidence)
 
 
-def _numbers(counts: Counter[str]) -> tuple[int, int, int, int]:
-    return counts["passed"], counts["failed"], counts["open"], counts["information"]
+def _numbers(counts: Counter[str]) -> tuple[int, int, int, int, int]:
+    return counts["passed"], counts["failed"], counts["open"], counts["information"], counts["uncontrolled"]
 
 
 def of_folder(folder: Path) -> Tally:

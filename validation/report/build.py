@@ -20,7 +20,7 @@ from dembark.validation.report.figures import colour, engine_name, subscripts
 from dembark.validation.report.gather import Gathered, gather
 
 _HERE = Path(__file__).parent
-_SIGNS = {"passed": "✓ pass", "failed": "✗ FAIL", "open": "○ open", "information": ""}
+_SIGNS = {"passed": "✓ pass", "failed": "✗ FAIL", "open": "○ open", "information": "", "uncontrolled": "not counted"}
 
 
 def build(folder: Path) -> Path:

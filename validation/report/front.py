@@ -22,7 +22,7 @@ _WEIGHT = ("experiment", "theory", "identity", "", "code")
 
 # Of a quantity in all tables, see `cells`.
 COLUMNS = ("quantity", "label", "unit", "value", "low", "high", "reference", "reference_low", "reference_high", "deviation",
-           "deviation_kind", "tolerance", "verdict", "evidence", "reason", "detail", "source")
+           "deviation_kind", "tolerance", "verdict", "evidence", "reason", "detail", "source", "control")
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def cells(one: QuantityRecord) -> list[Any]:
     """A quantity as part of the row of a table, see COLUMNS."""
     return [one.name, one.label, one.unit, one.value, *(one.interval or (None, None)), one.reference,
             *(one.reference_interval or (None, None)), one.deviation, one.deviation_kind, one.tolerance, one.verdict, one.evidence,
-            one.reason, one.detail, one.source]
+            one.reason, one.detail, one.source, one.control]
 
 
 def write_tables(folder: Path, rows: Sequence[Row], found: Sequence[scatter.Point]) -> None:

@@ -16,7 +16,7 @@ def measure(folder, wanted):
         raise ValueError("cannot be measured")
     first = json.loads(replicas[0].read_text())
     quantity = QuantityRecord("replicas", len(replicas), "fail" if first["variant"] == "wet" else "pass", interval=(0.5, 1.5),
-                              reference=1.0, deviation=0.0, tolerance=0.1)
+                              reference=1.0, deviation=0.0, tolerance=0.1, control="friction off")
     parameters = first["parameters"] | {"replicas": wanted}
     return Result(*(first[key] for key in ("case", "variant", "engine")), (quantity,), first["profile"], parameters=parameters)
 

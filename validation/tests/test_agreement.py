@@ -1,11 +1,13 @@
 """Numbers of runs in which nothing is random are compared by a stated bound, others by their intervals."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from dembark.postproc.measurement import Value
-from dembark.postproc.statistics import exact
+from dembark.postproc.statistics import Estimate, exact
+from dembark.validation.case.folders import discover
 from dembark.validation.case.model import Declared
 from dembark.validation.judge.compare import pair
 from dembark.validation.judge.measuring import judged
@@ -39,3 +41,16 @@ def test_numbers_without_a_bound_are_compared_by_their_intervals():
     assert pair(entry(1.0, None, 0.03), entry(1.04, None, 0.03), "liggghts", "yade").verdict == "pass"
     assert pair(entry(1.0, None, 0.06), entry(1.05, None, 0.06), "liggghts", "yade").verdict == "info"
     assert pair(entry(1.0, None), entry(1.05, None), "liggghts", "yade").verdict == "fail"
+
+
+@pytest.mark.parametrize("case", sorted(discover()))
+def test_one_engine_that_is_off_fails_each_comparison(case):
+    """The negative control of comparisons, of every quantity as it is declared."""
+    for one in discover()[case].quantities.values():
+        random = one.agreement is None
+        off, half, basis = (0.25, 0.01, "5 replicas") if random else (max(2.0 * one.agreement, 1e-12), 0.0, "")
+        first, same, wrong = (judged(replace(one, tolerance=None), Value(Estimate(value, half, basis))) for value in (1.0, 1.0, 1.0 + off))
+        if one.compared:
+            assert pair(first, same, "liggghts", "yade").verdict == "pass", one.name
+            assert pair(first, wrong, "liggghts", "yade").verdict == "fail", one.name
+            assert pair(first, wrong, "liggghts", "yade").control

@@ -176,6 +176,8 @@ variants = ["dry", "wet", "large"]
     ("[runs]", STUDY.replace('along = "grain_count"', 'along = "grain_cont"') + "[runs]", ["studies.size", "did you mean grain_count"]),
     ("[runs]", STUDY.replace('"wet"', '"wett"') + "[runs]", ["studies.size", "did you mean wet"]),
     ("[runs]", STUDY.replace(', "wet"', "") + "[runs]", ["studies.size", "at least three variants"]),
+    ("[runs]", '[controls]\n"gravity doubled" = ["weight"]\n[runs]', ["weight", "quantity", "[controls]"]),
+    ("[runs]", '[controls]\n"gravity doubled" = "weight"\n[runs]', ["gravity doubled", "a list of the quantities", "[controls]"]),
     ("[runs]", STUDY.replace("along", "alone") + "[runs]", ["studies.size", "alone"]),
 ])
 def test_mistakes_in_a_case_file_are_told(decks: Path, old: str, new: str, words: list[str]) -> None:

@@ -54,7 +54,7 @@ def balance() -> Item:
         "cell, t being the coarse-grained force of the base (Weinhart et al. 2012). The divergence is taken by central differences, which "
         "err with the square of the spacing over the width of the kernel; nothing else is left out.",
         [order("balance_order", "residual (rms, Lucy's kernel): exponent of the spacing", _SPACINGS[-2:], fall[-2:], 2.0,
-               "central differences", "the two finest grids")],
+               "central differences", "gravity doubled", "the two finest grids")],
         [Panel("Residual against the spacing", "spacing / width", "rms of |∇·σ − ρ g − t| / max ρ g", [
             *(Curve(kernel, _SPACINGS / _WIDTHS[kernel], found[:, 1]) for kernel, found in by_spacing.items()),
             Curve("slope 2", _SPACINGS / _WIDTHS["lucy"], fall[0] * (_SPACINGS / _SPACINGS[0]) ** 2, theory=True)]),
@@ -81,8 +81,9 @@ def wall_forces() -> Item:
         "The same heap: what the patches of the base carry, what the wall's part of the coarse-grained balance holds, and the sum over the "
         "base's contacts must be one force, and its vertical part the weight.",
         [exact("wall_force_patches", "normal stress of the patches, integrated, over the force of the contacts, − 1",
-               of_patches[0] / total[2] - 1.0, "Newton's third law"),
+               of_patches[0] / total[2] - 1.0, "Newton's third law", "a base with a hundredth too much force"),
          exact("wall_force_field", "wall's force density, integrated, − force of the contacts, over the weight",
-               float(np.abs(of_field - total).max()) / weight, "Weinhart et al. 2012"),
-         exact("wall_force_weight", "vertical force of the contacts over the weight, − 1", total[2] / weight - 1.0, "Newton's second law")],
+               float(np.abs(of_field - total).max()) / weight, "Weinhart et al. 2012", "a base with a hundredth too much force"),
+         exact("wall_force_weight", "vertical force of the contacts over the weight, − 1", total[2] / weight - 1.0, "Newton's second law",
+               "gravity doubled")],
     )

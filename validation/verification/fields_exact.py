@@ -34,9 +34,9 @@ def conservation() -> Item:
         "Conservation of mass, momentum and stress",
         f"What {len(frame.ids)} grains of unequal size and {len(network.links.ids)} contacts carry must be found in the cells, to "
         "round-off, whatever the kernel and however narrow or wide it is against the cells (0.15 of the system's size).",
-        [exact("mass_error", "mass: Σ ρ V / Σ m − 1, the worst kernel and width", worst[0], GOLDHIRSCH),
-         exact("momentum_error", "momentum: |Σ ρ v V − Σ m v|, over Σ m |v|", worst[1], GOLDHIRSCH),
-         exact("stress_error", "contact stress: |Σ σ V + Σ f l|, over Σ |f l|", worst[2], GOLDHIRSCH)],
+        [exact("mass_error", "mass: Σ ρ V / Σ m − 1, the worst kernel and width", worst[0], GOLDHIRSCH, "a grain without its mass"),
+         exact("momentum_error", "momentum: |Σ ρ v V − Σ m v|, over Σ m |v|", worst[1], GOLDHIRSCH, "a grain without its mass"),
+         exact("stress_error", "contact stress: |Σ σ V + Σ f l|, over Σ |f l|", worst[2], GOLDHIRSCH, "a lost contact")],
         [Panel(title, "width (system = 1)", "error / round-off of a double", [
             Curve(kernel, widths, np.maximum(found[:, column] / np.finfo(float).eps, 1e-1)) for kernel, found in errors.items()])
          for column, title in enumerate(("Mass", "Momentum", "Contact stress"))],
@@ -73,8 +73,9 @@ def threads() -> Item:
         "The compiled coarse graining on 1, 2, 3 and 7 threads, bit by bit, and beside the plain implementation in numpy, which shares no "
         "compiled code with it.",
         [exact("thread_differences", "sums that differ in any bit on 2, 3 or 7 threads from those on 1", different,
-               "same order of additions", tolerance=0.0),
-         exact("backend_difference", "compiled against plain, largest difference over the largest sum", gap, "two implementations")],
+               "same order of additions", "threads that skip a grain", tolerance=0.0),
+         exact("backend_difference", "compiled against plain, largest difference over the largest sum", gap, "two implementations",
+               "a plain implementation that skips a grain")],
     )
 
 
@@ -105,7 +106,7 @@ def lattice() -> Item:
         "pressure 2√2 f/d². The mean of the field must be that to round-off, isotropic and without shear. What remains of the single "
         "contacts is a ripple, which a Gaussian of width w damps by exp(−k² w²/2), k = 2π√3/a being the crystal's longest wave.",
         [exact("lattice_pressure", "mean stress over 2√2 f/d², − unit tensor, the worst component", mean_error,
-               "sum over the 12 neighbours")],
+               "sum over the 12 neighbours", "a lost contact")],
         [Panel("Ripple of the pressure against the width", "standard deviation of the kernel / d", "largest |p / p̄ − 1|", [
             *(Curve(kernel, widths[: len(found)], np.array(found)) for kernel, found in ripple.items()),
             Curve("∝ exp(−k² w²/2)", widths[seen], ripple["gaussian"][0] * (due / due[0])[seen], theory=True)], linear=True)],
@@ -141,13 +142,16 @@ def shear() -> Item:
         "temperature. A wave v = sin(2π y) is recovered up to what the kernel averages away, an error with the square of its width.",
         [exact("gradient_error", "uniform gradient: largest error of any component, over the largest",
                _worst(one.velocity_gradient - gradient),
-               "affine velocity field", tolerance=1e-9, detail="round-off, times what fitting a gradient to few grains magnifies it by"),
+               "affine velocity field", "grains that jitter", tolerance=1e-9,
+               detail="round-off, times what fitting a gradient to few grains magnifies it by"),
          exact("rotation_error", "rigid rotation: largest strain rate, and error of the vorticity, over the spin",
                max(_worst(turning.strain_rate), _worst(turning.vorticity - 2.0 * spin)) / float(np.linalg.norm(spin)), "rigid rotation",
-               tolerance=1e-9),
+               "grains that jitter", tolerance=1e-9),
          exact("shear_temperature", "uniform gradient: temperature, over that of the velocities in a kernel's width",
-               _worst(one.temperature) / (0.15**2 * float((gradient**2).sum())), "no fluctuations", tolerance=1e-9),
-         order("wave_order", "wave of shear: exponent of the width in the error", widths, errors, 2.0, "second moment of the kernel")],
+               _worst(one.temperature) / (0.15**2 * float((gradient**2).sum())), "no fluctuations", "grains that jitter",
+               tolerance=1e-9),
+         order("wave_order", "wave of shear: exponent of the width in the error", widths, errors, 2.0, "second moment of the kernel",
+               "velocities a hundredth too large")],
         [Panel("Wave of shear", "width / wavelength", "largest error of ∂v/∂y / 2π", [
             Curve("gaussian", widths, errors), Curve("slope 2", widths, errors[0] * (widths / widths[0]) ** 2, theory=True)])],
         "A row of 80 grains a wavelength; the error is the largest of all cells.",

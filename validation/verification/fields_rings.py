@@ -35,9 +35,10 @@ def rings() -> Item:
         "conserved, the vertical momentum that flows through the faces of each ring must balance weight and base of the heap at rest, and "
         "averages of the three-dimensional fields over the same shells must come to the same stresses as their cubes become small.",
         [exact("ring_mass", "mass in the rings over that of the grains, − 1", fields.mass.sum() / network.frame.masses.sum() - 1.0,
-               "closed form"),
+               "closed form", "a grain without its mass"),
          exact("ring_balance", "balance of vertical momentum, the worst ring, over max ρ g", float(unbalanced), "momentum balance",
-               tolerance=1e-3, detail="Gauss's rule along the lines, and the table of the kernel; the limit is that of the cases")],
+               "gravity doubled", tolerance=1e-3,
+               detail="Gauss's rule along the lines, and the table of the kernel; the limit is that of the cases")],
         [Panel("Rings against cubes", "spacing of the cubes / width", "largest difference / largest stress", [
             Curve("σ$_{zz}$, σ$_{rr}$, σ$_{rz}$", spacings / _WIDTH, errors),
             Curve("cut of the cubes' Gaussian", spacings / _WIDTH, np.full(len(spacings), cut), theory=True)])],

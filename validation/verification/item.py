@@ -59,15 +59,18 @@ class Item:
     caption: str = ""
 
 
-def exact(name: str, label: str, error: float, source: str, *, tolerance: float = ROUND_OFF, detail: str = "",
+def exact(name: str, label: str, error: float, source: str, control: str, *, tolerance: float = ROUND_OFF, detail: str = "",
           unit: str = "1") -> QuantityRecord:
-    """An error that is due to be zero to `tolerance`."""
-    declared = Declared(name, label, unit, "identity", tolerance, absolute=True, source=source, detail=detail, compared=False)
+    """An error that is due to be zero to `tolerance`; `control`: what fails it."""
+    declared = Declared(name, label, unit, "identity", tolerance, absolute=True, source=source, detail=detail, compared=False,
+                        control=control)
     return judged(declared, Value(Estimate(float(error), 0.0), Estimate(0.0, 0.0)))
 
 
-def order(name: str, label: str, steps: Array, errors: Array, due: float, source: str, detail: str = "") -> QuantityRecord:
-    """Observed order of convergence, the slope of ln(error) over ln(step), against the one of theory."""
+def order(name: str, label: str, steps: Array, errors: Array, due: float, source: str, control: str,
+          detail: str = "") -> QuantityRecord:
+    """Observed order of convergence, the slope of ln(error) over ln(step), against the one of theory; `control`: what fails it."""
     slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
-    declared = Declared(name, label, "1", "theory", ORDER_TOLERANCE, absolute=True, source=source, detail=detail, compared=False)
+    declared = Declared(name, label, "1", "theory", ORDER_TOLERANCE, absolute=True, source=source, detail=detail, compared=False,
+                        control=control)
     return judged(declared, Value(Estimate(slope, 0.0), Estimate(due, 0.0)))

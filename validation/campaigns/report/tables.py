@@ -48,7 +48,7 @@ def _cells(sweep: Sweep, values: Mapping[str, Any], engine: str, one: QuantityRe
     yield with_unit(with_interval(one.value, one.interval), one.unit)
     yield with_interval(one.reference, one.reference_interval) if one.reference is not None else ""
     yield "" if one.deviation is None else deviation(one)
-    yield "" if one.standing == "information" else "open" if one.standing == "open" else one.verdict
+    yield {"information": "", "open": "open", "uncontrolled": "not counted"}.get(one.standing, one.verdict)
 
 
 def _escape(text: str) -> str:

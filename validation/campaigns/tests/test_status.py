@@ -53,7 +53,7 @@ def test_without_a_submitter_nothing_runs(results: Path) -> None:
 
 
 def test_status_counts_checks_by_kind_of_evidence(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    checks = (QuantityRecord("a", 1.0, "pass", tolerance=0.1, evidence="identity"),
+    checks = (QuantityRecord("a", 1.0, "pass", tolerance=0.1, evidence="identity", control="friction off"),
               QuantityRecord("b", 1.0, "fail", tolerance=0.1, evidence="experiment"))
     write(results / "box/n=1/yade/metrics.json", Result("box", "n=1", "yade", checks))
     assert main(["status", str(results)]) == 0

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 def quantity(name: str, value: float | None, interval: list[float] | None = None) -> dict[str, Any]:
     return {"name": name, "label": name.upper(), "unit": "1", "value": value, "interval": interval, "reference": 2.0,
             "reference_interval": None, "deviation": None, "deviation_kind": "relative", "tolerance": 0.1, "verdict": "pass", "reason": "",
-            "detail": "", "source": "", "evidence": "theory", "basis": "replicas",
+            "detail": "", "source": "", "evidence": "theory", "control": "friction off", "basis": "replicas",
             "compared": True, "agreement": None, "deviation_half_width": None}
 
 

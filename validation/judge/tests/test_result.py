@@ -37,9 +37,10 @@ def test_a_comparison_comes_back_as_it_was_written(tmp_path: Path) -> None:
 def test_keys_of_another_version_are_told_in_one_remark() -> None:
     content = result.as_json(RESULT)
     content["colour"] = "red"
-    content["quantities"] = [{key: value for key, value in one.items() if key != "evidence"} for one in content["quantities"] * 2]
+    content["quantities"] = [{key: value for key, value in one.items() if key not in ("evidence", "control")}
+                             for one in content["quantities"] * 2]
     *kept, note = result.from_json(content, Result).remarks
-    assert kept == ["note"] and "'colour'" in note and note.count("no kind of evidence") == 1 and "\n" not in note
+    assert kept == ["note"] and "'colour'" in note and note.count("no kind of evidence, no negative controls") == 1 and "\n" not in note
 
 
 @pytest.mark.parametrize("key", ["case", "engine", "quantities"])

@@ -35,9 +35,9 @@ def fill(folder: Path, shift: float = 0.0, killed: str = "", broken: str = "") -
             value = values["wall_friction"] * values["cylinder_radius"] + shift
             verdict = "fail" if engine == "yade" and name == broken else "pass"
             quantities = (QuantityRecord("k", value, "pass", "K_ratio", "1", (value - 1e-3, value + 1e-3), "", value * 1.02, None, -0.02,
-                                         tolerance=0.1,
-                                         evidence="theory"),
-                          QuantityRecord("contacts", 2.0, verdict, "contacts of a log", compared=False, evidence="theory"))
+                                         tolerance=0.1, evidence="theory", control="friction off"),
+                          QuantityRecord("contacts", 2.0, verdict, "contacts of a log", compared=False, evidence="theory",
+                                         control="a lost contact"))
             if name != killed:
                 result.write(place / "metrics.json", Result("silo", name, engine, quantities, parameters=values, provenance={
                     "commit": "a" * 40, "replicas": 1, "steps": 1000, "time_step": 1e-5, "wall_time": 2.0, "versions": {engine: "1.0"}}))

@@ -1,0 +1,49 @@
+"""Negative controls: every check has wrong physics that fails it, and passes without it.
+
+case.toml names them, `[controls]`: wrong physics = the quantities that it fails. The module controls_<case>.py beside this file does it:
+`controls(folder)` yields a `Control` for each name.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from dembark.input_decks.tests.measuring import Control, names
+from dembark.validation.case.folders import find, load, package_root
+from dembark.validation.judge.measuring import declared
+
+CASES = [path.parent.name for path in sorted(package_root().glob("*/case.toml"))]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_check_names_what_fails_it(case: str) -> None:
+    without = [name for name, one in load(package_root() / case / "case.toml").quantities.items()
+               if one.tolerance is not None and not one.control]
+    assert not without, "these checks are not counted: [controls] names nothing that fails them"
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_wrong_physics_fails_what_passes_without_it(case: str, tmp_path: Path) -> None:
+    found = find(case)
+    passed, caught = set[str](), {name: set[str]() for name in found.controls}
+    for one in import_module(f"dembark.input_decks.tests.controls_{case}").controls(tmp_path) if found.controls else ():
+        right = names(one.right, "pass")
+        caught[one.name] |= {name for name in right & names(one.wrong, "fail") if declared(found, name)[0].name in found.controls[one.name]}
+        passed |= right
+    for name, quantities in found.controls.items():
+        silent = set(quantities) - {declared(found, one)[0].name for one in caught[name]}
+        assert not silent, f"{name}: these do not fail, or do not pass without it"
+    untouched = passed - set().union(*caught.values())
+    assert not untouched, "these passed, and no control that names them fails them"
+
+
+def test_a_control_that_fails_nothing_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The controls' own control: runs that are not spoilt at all."""
+    module = import_module("dembark.input_decks.tests.controls_log_cradle")
+    tame = [Control(one.name, one.right, one.right) for one in module.controls(tmp_path)]
+    monkeypatch.setattr(module, "controls", lambda _: tame)
+    with pytest.raises(AssertionError, match="do not fail"):
+        test_wrong_physics_fails_what_passes_without_it("log_cradle", tmp_path)
