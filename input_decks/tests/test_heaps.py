@@ -68,6 +68,46 @@ def heap(folder: Path, angle: float, count: int = 3, **changes: Any) -> Verdicts
     return judged("angle_of_repose", repose.measure(runs))
 
 
+def points(case: str, along: str, places: list[float], **laws: Callable[[float], float]) -> list[dict[str, Any]]:
+    """Results of variants along a parameter, whose quantities follow `laws` within 1 %."""
+    return [{"parameters": defaults(case) | {along: place}, "quantities": [
+        {"name": name, "value": law(place), "interval": [0.99 * law(place), 1.01 * law(place)], "basis": ""} for name, law in laws.items()]}
+        for place in places]
+
+
+def beads(aspect: float, run_out: float, height: float) -> Verdicts:
+    """What is measured of columns of three widths, carried on to the beads' `run_out` and `height`: narrower ones run out less far, in
+    proportion to d/W."""
+    given = points("granular_collapse", "column_width", WIDTHS, aspect_ratio_measured=lambda _: aspect, final_height=lambda _: height,
+                   run_out=lambda width: run_out * (1.0 - 2.0 * (D / width - 1.0 / 67.0)))
+    found = collapse.study("width", given, "column_width")
+    assert [len(curve["place"]) for curve in found.profiles] == [4, 4]
+    return judged("granular_collapse", found)
+
+
+def exponents(name: str, power: float) -> Verdicts:
+    """What the study `name` makes of run-out or height that grow with this power of the aspect ratio."""
+    law = (lambda a: 1.8 * a**power) if name == "low" else (lambda a: a**power)
+    given = points("granular_collapse", "aspect_ratio", [0.6, 1.0, 2.0] if name == "low" else [1.0, 2.0, 4.0],
+                   aspect_ratio_measured=lambda a: a, run_out=law, final_height=law)
+    found = collapse.study(name, given, "aspect_ratio")
+    assert len(found.profiles) == 2 and all(len(curve["reference_low"]) == 3 for curve in found.profiles)
+    return judged("granular_collapse", found)
+
+
+def factor(walls: float) -> Verdicts:
+    """What the study of thickness makes of angles that front and rear walls w = 4 d apart raise by `walls`."""
+    given = points("angle_of_repose", "confinement", [0.25, 0.125, 0.0],
+                   angle=lambda confinement: 18.4 * (1.0 + (walls - 1.0) * confinement / 0.25))
+    return judged("angle_of_repose", repose.study("thickness", given, "confinement"))
+
+
+def rolling(power: float) -> Verdicts:
+    """What the study of rolling resistance makes of angles that grow with this power of its coefficient."""
+    given = points("angle_of_repose", "rolling_friction", [0.2, 0.02, 0.1, 0.05], angle=lambda friction: 47.0 * (friction / 0.2) ** power)
+    return judged("angle_of_repose", repose.study("rolling", given, "rolling_friction"))
+
+
 def verdicts(found: Verdicts) -> dict[str, str]:
     return {name: one["verdict"] for name, one in found.items() if one["tolerance"] is not None}
 
@@ -91,15 +131,10 @@ def test_what_still_moves_is_told(tmp_path: Path) -> None:
     (0.6, 0.6, 0.59, {"run_out": "fail", "height": "pass"}), (2.0, 1.5, 1.7, {"run_out": "fail", "height": "fail"}),
 ])
 def test_columns_as_wide_as_the_measured_ones(aspect: float, run_out: float, height: float, verdict: dict[str, str]) -> None:
-    """Narrower columns run out less far, in proportion to d/W."""
-    given = points("granular_collapse", "column_width", WIDTHS, aspect_ratio_measured=lambda _: aspect, final_height=lambda _: height,
-                   run_out=lambda width: run_out * (1.0 - 2.0 * (D / width - 1.0 / 67.0)))
-    found = collapse.study("width", given, "column_width")
-    one = judged("granular_collapse", found)
+    one = beads(aspect, run_out, height)
     assert one["run_out_of_beads"]["value"] == pytest.approx(run_out) and one["height_of_beads"]["value"] == pytest.approx(height)
     assert {name: one[f"{name}_of_beads"]["verdict"] for name in verdict} == verdict
     assert all(word in one["run_out_of_beads"]["detail"] for word in ("U_val", "U_sim", "U_size", "U_input", "U_D"))
-    assert [len(curve["place"]) for curve in found.profiles] == [4, 4]
 
 
 def test_one_packing_decides_nothing() -> None:
@@ -110,24 +145,11 @@ def test_one_packing_decides_nothing() -> None:
     assert {one["verdict"] for one in judged("granular_collapse", collapse.study("width", given, "column_width")).values()} == {"info"}
 
 
-def points(case: str, along: str, places: list[float], **laws: Callable[[float], float]) -> list[dict[str, Any]]:
-    """Results of variants along a parameter, whose quantities follow `laws` within 1 %."""
-    return [{"parameters": defaults(case) | {along: place}, "quantities": [
-        {"name": name, "value": law(place), "interval": [0.99 * law(place), 1.01 * law(place)], "basis": ""} for name, law in laws.items()]}
-        for place in places]
-
-
-@pytest.mark.parametrize(("name", "places", "power", "verdict"), [
-    ("low", [0.6, 1.0, 2.0], 1.0, "pass"), ("low", [0.6, 1.0, 2.0], 0.5, "fail"), ("low", [0.6, 1.0, 2.0], 1.5, "fail"),
-    ("high", [1.0, 2.0, 4.0], 0.37, "pass"), ("high", [1.0, 2.0, 4.0], 0.0, "fail"), ("high", [1.0, 2.0, 4.0], 1.0, "fail"),
-])
-def test_exponents_in_the_aspect_ratio(name: str, places: list[float], power: float, verdict: str) -> None:
-    law = (lambda a: 1.8 * a**power) if name == "low" else (lambda a: a**power)
-    given = points("granular_collapse", "aspect_ratio", places, aspect_ratio_measured=lambda a: a, run_out=law, final_height=law)
-    found = collapse.study(name, given, "aspect_ratio")
-    (one,) = judged("granular_collapse", found).values()
+@pytest.mark.parametrize(("name", "power", "verdict"), [("low", 1.0, "pass"), ("low", 0.5, "fail"), ("low", 1.5, "fail"),
+                                                        ("high", 0.37, "pass"), ("high", 0.0, "fail"), ("high", 1.0, "fail")])
+def test_exponents_in_the_aspect_ratio(name: str, power: float, verdict: str) -> None:
+    (one,) = exponents(name, power).values()
     assert one["value"] == pytest.approx(power, abs=1e-9) and one["verdict"] == verdict, one
-    assert len(found.profiles) == 2 and all(len(curve["reference_low"]) == 3 for curve in found.profiles)
 
 
 def test_sensitivities_of_a_study_of_an_input() -> None:
@@ -165,19 +187,15 @@ def test_heaps_of_other_beads_stand_beside_the_other_code_alone(tmp_path: Path) 
     assert verdicts(heap(tmp_path / "b", 30.0, rolling_friction=0.1, beads="other")) == {"angle_of_code": "fail"}
 
 
-@pytest.mark.parametrize(("factor", "verdict"), [(1.49, "pass"), (1.0, "fail"), (2.0, "fail")])
-def test_the_wall_factor(factor: float, verdict: str) -> None:
-    given = points("angle_of_repose", "confinement", [0.25, 0.125, 0.0],
-                   angle=lambda confinement: 18.4 * (1.0 + (factor - 1.0) * confinement / 0.25))
-    found = repose.study("thickness", given, "confinement")
-    one = judged("angle_of_repose", found)["wall_factor"]
-    assert one["value"] == pytest.approx(factor) and one["reference"] == pytest.approx(1.487, abs=1e-3) and one["verdict"] == verdict
+@pytest.mark.parametrize(("walls", "verdict"), [(1.49, "pass"), (1.0, "fail"), (2.0, "fail")])
+def test_the_wall_factor(walls: float, verdict: str) -> None:
+    one = factor(walls)["wall_factor"]
+    assert one["value"] == pytest.approx(walls) and one["reference"] == pytest.approx(1.487, abs=1e-3) and one["verdict"] == verdict
 
 
 @pytest.mark.parametrize(("power", "verdict"), [(0.4, "pass"), (0.0, "fail"), (-0.2, "fail")])
 def test_rolling_resistance_raises_the_angle(power: float, verdict: str) -> None:
-    given = points("angle_of_repose", "rolling_friction", [0.2, 0.02, 0.1, 0.05], angle=lambda rolling: 47.0 * (rolling / 0.2) ** power)
-    one = judged("angle_of_repose", repose.study("rolling", given, "rolling_friction"))["rolling_exponent"]
+    one = rolling(power)["rolling_exponent"]
     assert one["value"] == pytest.approx(power, abs=1e-9) and one["reference"] == pytest.approx(0.4, abs=0.02) and one["verdict"] == verdict
 
 
