@@ -235,7 +235,9 @@ def run(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_column_collapses_and_stays(engine: str, run: Any) -> None:
-    found = collapse.deposit(run("granular_collapse", engine))
+    one = run("granular_collapse", engine)
+    assert set(one.grains()[0].wall_forces) == {"back", "base", "gate"} and len(one.grains()) == one.parameters["frames"]
+    found = collapse.deposit(one)
     assert found["aspect_ratio_measured"] == pytest.approx(1.0, abs=0.08) and found["rests"]
     assert 0.5 < found["run_out"] < 2.5 and 0.6 < found["final_height"] < 1.0
 
@@ -253,6 +255,9 @@ def test_a_heap_stays_on_the_plate(engine: str, confinement: float, run: Any) ->
     first, last = frames[0], frames[-1]
     # All are on the plate when the outlets open; a heap stays, and the rest lies in the pit, none of it in the plate.
     assert (first.positions[:, 2] > 0.0).all()
+    assert set(first.wall_forces) == {"container", "pit"} | ({"front", "rear"} if confinement else set())
+    weight = 9.81 * first.masses.sum()
+    assert first.wall_forces["container"][:, 2].sum() == pytest.approx(weight, rel=0.5 if confinement else 0.1)
     fallen = last.positions[:, 2] < 0.0
     assert 0.15 < fallen.mean() < 0.8
     assert (last.positions[fallen, 2] > one.derived["pit"]).all()
