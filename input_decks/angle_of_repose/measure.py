@@ -1,7 +1,7 @@
 """Angle of repose: the slope of both flanks of the heap, beside the measured law for glass beads and beside another code.
 
-V&V 20: the error E = S − D of a simulated value S against the datum D is known within U_val, U_val² = U_sim² + U_num² + U_input² + U_D². U_input
-follows from the exponents with which the angle grows with each coefficient (fit of Zhou et al. to their simulations).
+V&V 20: the error E = S − D of a simulated value S against the datum D is known within U_val, U_val² = U_sim² + U_num² + U_input² +
+U_D². U_input follows from the exponents with which the angle grows with each coefficient (fit of Zhou et al. to their simulations).
 """
 
 import csv
@@ -26,7 +26,7 @@ LOW, HIGH = 0.15, 0.85
 
 
 def law(diameter: float, confinement: float) -> float:
-    """Measured angle of repose (degrees) of glass beads of `diameter` (m), with front and rear walls at d/w = `confinement` > 0, or none."""
+    """Measured angle of repose (degrees) of glass beads of `diameter` (m), with front and rear walls at d/w = `confinement`; 0: none."""
     return GLASS * (1e3 * diameter) ** GLASS_EXPONENT * wall_factor(confinement)
 
 
@@ -70,7 +70,8 @@ def measure(replicas: Replicas) -> Measurement:
         values["angle"] = Value(simulated)
     other = [angle for walls, rolling, angle in code(p["confinement"]) if math.isclose(rolling, p["rolling_friction"])]
     if other and p["rolling_resistance"] == "elastic_plastic":
-        values["angle_of_code"] = Value(simulated, exact(other[0]), reason=reason)
+        half = math.hypot(simulated.half, p["numerical_uncertainty"])
+        values["angle_of_code"] = Value(simulated, exact(other[0]), half=half, reason=reason)
     return Measurement(values, [_surface(replicas)])
 
 
@@ -83,8 +84,8 @@ def study(name: str, results: Points, along: str) -> Measurement:
         _, rolling, other = np.array(code(0.25)).T
         return Measurement({"rolling_exponent": Value(propagated(lambda y: fitted_exponent(place, y), values, halves, "the angles"),
                                                       exact(fitted_exponent(rolling, other)))},
-                           [_curve("angle_rolling", "coefficient of rolling resistance", place, values, halves, np.interp(place, rolling, other),
-                                   None, "another code")])
+                           [_curve("angle_rolling", "coefficient of rolling resistance", place, values, halves,
+                                   np.interp(place, rolling, other), None, "another code")])
     # From no walls to the narrowest.
     factor = propagated(lambda y: y[-1] / y[0], values, halves, "the angles")
     datum = Estimate(wall_factor(place[-1]), 0.1, "error of the measured angles")

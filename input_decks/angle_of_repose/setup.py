@@ -25,7 +25,7 @@ def setup(p: Parameters) -> Setup:
     top, room = height + 2.0 * d_max, p.outlet_width + 2.0 * d_max
     beside = d_max if walled else 0.0
     box = [(-room, p.plate_width + room), (-beside, p.thickness + beside), (-pit - 2.0 * d_max, top)]
-    grains = packing.grains(p, sites + (0.0, margin, 0.0), box)
+    grains = packing.grains(p, sites + np.array([0.0, margin, 0.0]), box)
     numbers = {"first": first, "stride": stride, "every": every, "opened": first + math.ceil(p.outlet_width / (p.gate_speed * step)),
                "walled": int(walled), "thickness": p.thickness, "pit": -pit, "middle": 0.5 * p.plate_width}
     # The plate is as thick as a grain. Elements are no longer than the thickness, for LIGGGHTS cannot place those that are much larger

@@ -4,18 +4,14 @@ from yade import dembark
 
 p = dembark.parameters()
 weight = (0, 0, -p.gravity)
-materials, _ = dembark.begin(p, weight, along=[] if p.walled else [1])
+dembark.periodic([] if p.walled else [1], room=8 * p.grain_diameter)
+materials, _ = dembark.begin(p, weight)
 walls = dembark.planes(p, materials, pit=(2, p.pit, 1))
 sides = dembark.planes(p, materials, left=(0, 0.0, 1), right=(0, p.plate_width, -1))
 # As thick as a grain, and wider than the period.
 half = (p.middle, 1e6 * p.grain_diameter, 0.5 * p.grain_diameter)
 plate = O.bodies.append(utils.box((p.middle, 0, -0.5 * p.grain_diameter), half, fixed=True, material=materials[1]))
 walls = {"container": [plate, *sides.values()]} | walls
-if p.walled else [1])
-walls = dembark.planes(p, materials, pit=(2, p.pit, 1), left=(0, 0.0, 1), right=(0, p.plate_width, -1))
-# As thick as a grain, and wider than the period.
-half = (p.middle, 1e6 * p.grain_diameter, 0.5 * p.grain_diameter)
-walls = {"plate": O.bodies.append(utils.box((p.middle, 0, -0.5 * p.grain_diameter), half, fixed=True, material=materials[1]))} | walls
 if p.walled:
     walls |= dembark.planes(p, materials, front=(1, 0.0, 1), rear=(1, p.thickness, -1))
 record = dembark.Recorder(p, walls, boundary="ff ff ff" if p.walled else "ff pp ff", gravity=weight, report=p.stride)

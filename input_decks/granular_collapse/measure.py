@@ -3,9 +3,9 @@
 Columns of few grains run out less far: the deposit ends where it is half a layer thin, and that is a length in grains. So run-out and
 height of three widths of the column are carried on along d/W, in which they are linear, to columns as wide as those of the experiments.
 
-V&V 20: the error E = S − D of this value S against the datum D is known within U_val, U_val² = U_sim² + U_size² + U_input² + U_D²: the interval of
-S over packings, what the unknown width of the measured columns leaves open, `input_uncertainty` of case.toml, and the interval of the
-line through the measured points near a.
+V&V 20: the error E = S − D of this value S against the datum D is known within U_val, U_val² = U_sim² + U_size² + U_input² + U_D²: the
+interval of S over packings, what the unknown width of the measured columns leaves open, `input_uncertainty` of case.toml, and the
+interval of the line through the measured points near a.
 """
 
 import csv
@@ -44,8 +44,9 @@ def deposit(replica: Replica) -> dict[str, float]:
     first, last = (frame.select(frame.types == 1) for frame in (frames[0], frames[len(frames) - 1]))
     width, d = p["column_width"], p["grain_diameter"]
     end = front(last, p["column_depth"], d)
-    return {"aspect_ratio_measured": height(first) / width, "run_out": end / width - 1.0, "final_height": column_height(first, last, 2.0 * d) / width,
-            "rests": at_rest(last.select(last.positions[:, 0] < end), p["gravity"], d)}
+    rests = at_rest(last.select(last.positions[:, 0] < end), p["gravity"], d)
+    return {"aspect_ratio_measured": height(first) / width, "run_out": end / width - 1.0,
+            "final_height": column_height(first, last, 2.0 * d) / width, "rests": rests}
 
 
 def measure(replicas: Replicas) -> Measurement:
@@ -96,7 +97,7 @@ def _as_wide(results: Points) -> Measurement:
         def line(values: Array) -> Array:
             return np.polyfit(across, values, 1)
 
-        simulated = propagated(lambda values: float(np.polyval(line(values), there)), sizes, halves, "the widths")  # noqa: B023 (called here)
+        simulated = propagated(lambda values: float(np.polyval(line(values), there)), sizes, halves, "the widths")
         reference, slope = datum(quantity, aspect), float(line(sizes)[0])
         of_size, of_input = abs(slope) * there, p["input_uncertainty"] * reference.value
         joint = math.hypot(simulated.half, of_size, of_input, reference.half)

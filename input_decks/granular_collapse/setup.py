@@ -31,7 +31,8 @@ def setup(p: Parameters) -> Setup:
     foot = 0.15 * d
     panels = math.ceil((top - foot) / p.column_depth)
     rise = (top - foot) / panels
-    gate = np.vstack([rectangle((p.column_width, 0.0, foot + rise * k), (0.0, p.column_depth, 0.0), (0.0, 0.0, rise)) for k in range(panels)])
+    feet = [(p.column_width, 0.0, foot + rise * k) for k in range(panels)]
+    gate = np.vstack([rectangle(one, (0.0, p.column_depth, 0.0), (0.0, 0.0, rise)) for one in feet])
     numbers = {"first": first, "stride": stride, "every": every, "gate_speed": speed, "opened": first + opened, "base": -0.5 * d}
     return Setup(steps, step, bodies, {**numbers, **contacts(p, skin=0.2)}, {"gate": gate})
 

@@ -20,15 +20,17 @@ from dembark.postproc.tests.dumps import grains_text
 collapse, repose = module("granular_collapse"), module("angle_of_repose")
 ENGINES = ("liggghts", "yade")
 D = 0.005
+WIDTHS = [0.06, 0.085, 0.12]
 Verdicts = dict[str, dict[str, Any]]
 
 
-def block(length: float, high: Callable[[np.ndarray], np.ndarray], depth: float, d: float) -> np.ndarray:
-    """Places (n, 3) of grains that fill 0 < x < `length`, 0 < y < `depth`, 0 < z < high(x) to 0.6."""
-    cell = d * (np.pi / 6.0 / 0.6) ** (1.0 / 3.0)
-    counts = (int(length / cell), round(depth / cell), int(high(np.linspace(0.0, length, 50)).max() / cell) + 1)
+def block(length: float, top: float, foot: float, depth: float) -> np.ndarray:
+    """Places (n, 3) of grains that fill 0 < x < `length`, 0 < y < `depth` to 0.6, as high as `top` up to x = 4 D and then falling evenly to
+    `foot`."""
+    cell = D * (np.pi / 6.0 / 0.6) ** (1.0 / 3.0)
+    counts = (int(length / cell), round(depth / cell), int(top / cell) + 1)
     places = lattice(counts, (length / counts[0], depth / counts[1], cell))
-    return places[places[:, 2] < high(places[:, 0])]
+    return places[places[:, 2] < top + (foot - top) * np.maximum(places[:, 0] - 4 * D, 0.0) / (length - 4 * D)]
 
 
 def deposit(folder: Path, across: int, aspect: float, run_out: float, height: float, *, noise: float = 0.01, speed: float = 0.0,
@@ -42,9 +44,7 @@ def deposit(folder: Path, across: int, aspect: float, run_out: float, height: fl
         own.mkdir(parents=True)
         # The volume over the area at the front is EDGE.
         end, top = (1.0 + run_out * (1.0 + noise * (k - 1))) * width, height * (1.0 + noise * (k - 1)) * width
-        foot = EDGE / 0.6 * D
-        places = [block(width, lambda x: np.full_like(x, aspect * width), depth, D),
-                  block(end, lambda x, end=end, top=top: top + (foot - top) * np.maximum(x - 4 * D, 0.0) / (end - 4 * D), depth, D)]
+        places = [block(width, aspect * width, aspect * width, depth), block(end, top, EDGE / 0.6 * D, depth)]
         box = ((-D, 20 * width), (0.0, depth), (-D, 20 * width))
         (own / "grains.dump").write_text("".join(
             grains_text(step, where, np.full(len(where), 0.5 * D), box=box, velocities=np.full_like(where, speed))
@@ -66,6 +66,46 @@ def heap(folder: Path, angle: float, count: int = 3, **changes: Any) -> Verdicts
         (own / "grains.dump").write_text(grains_text(0, where, np.full(30, 0.5 * d)) + grains_text(1, where, np.full(30, 0.5 * d)))
         runs.append(Replica(own, {"parameters": p, "time_step": 1e-5, "engine": "liggghts"}))
     return judged("angle_of_repose", repose.measure(runs))
+
+
+def points(case: str, along: str, places: list[float], **laws: Callable[[float], float]) -> list[dict[str, Any]]:
+    """Results of variants along a parameter, whose quantities follow `laws` within 1 %."""
+    return [{"parameters": defaults(case) | {along: place}, "quantities": [
+        {"name": name, "value": law(place), "interval": [0.99 * law(place), 1.01 * law(place)], "basis": ""} for name, law in laws.items()]}
+        for place in places]
+
+
+def beads(aspect: float, run_out: float, height: float) -> Verdicts:
+    """What is measured of columns of three widths, carried on to the beads' `run_out` and `height`: narrower ones run out less far, in
+    proportion to d/W."""
+    given = points("granular_collapse", "column_width", WIDTHS, aspect_ratio_measured=lambda _: aspect, final_height=lambda _: height,
+                   run_out=lambda width: run_out * (1.0 - 2.0 * (D / width - 1.0 / 67.0)))
+    found = collapse.study("width", given, "column_width")
+    assert [len(curve["place"]) for curve in found.profiles] == [4, 4]
+    return judged("granular_collapse", found)
+
+
+def exponents(name: str, power: float) -> Verdicts:
+    """What the study `name` makes of run-out or height that grow with this power of the aspect ratio."""
+    law = (lambda a: 1.8 * a**power) if name == "low" else (lambda a: a**power)
+    given = points("granular_collapse", "aspect_ratio", [0.6, 1.0, 2.0] if name == "low" else [1.0, 2.0, 4.0],
+                   aspect_ratio_measured=lambda a: a, run_out=law, final_height=law)
+    found = collapse.study(name, given, "aspect_ratio")
+    assert len(found.profiles) == 2 and all(len(curve["reference_low"]) == 3 for curve in found.profiles)
+    return judged("granular_collapse", found)
+
+
+def factor(walls: float) -> Verdicts:
+    """What the study of thickness makes of angles that front and rear walls w = 4 d apart raise by `walls`."""
+    given = points("angle_of_repose", "confinement", [0.25, 0.125, 0.0],
+                   angle=lambda confinement: 18.4 * (1.0 + (walls - 1.0) * confinement / 0.25))
+    return judged("angle_of_repose", repose.study("thickness", given, "confinement"))
+
+
+def rolling(power: float) -> Verdicts:
+    """What the study of rolling resistance makes of angles that grow with this power of its coefficient."""
+    given = points("angle_of_repose", "rolling_friction", [0.2, 0.02, 0.1, 0.05], angle=lambda friction: 47.0 * (friction / 0.2) ** power)
+    return judged("angle_of_repose", repose.study("rolling", given, "rolling_friction"))
 
 
 def verdicts(found: Verdicts) -> dict[str, str]:
@@ -91,43 +131,25 @@ def test_what_still_moves_is_told(tmp_path: Path) -> None:
     (0.6, 0.6, 0.59, {"run_out": "fail", "height": "pass"}), (2.0, 1.5, 1.7, {"run_out": "fail", "height": "fail"}),
 ])
 def test_columns_as_wide_as_the_measured_ones(aspect: float, run_out: float, height: float, verdict: dict[str, str]) -> None:
-    """Narrower columns run out less far, in proportion to d/W."""
-    given = points("granular_collapse", "column_width", [0.06, 0.085, 0.12], aspect_ratio_measured=lambda _: aspect, final_height=lambda _: height,
-                   run_out=lambda width: run_out * (1.0 - 2.0 * (D / width - 1.0 / 67.0)))
-    found = collapse.study("width", given, "column_width")
-    one = judged("granular_collapse", found)
+    one = beads(aspect, run_out, height)
     assert one["run_out_of_beads"]["value"] == pytest.approx(run_out) and one["height_of_beads"]["value"] == pytest.approx(height)
     assert {name: one[f"{name}_of_beads"]["verdict"] for name in verdict} == verdict
     assert all(word in one["run_out_of_beads"]["detail"] for word in ("U_val", "U_sim", "U_size", "U_input", "U_D"))
-    assert [len(curve["place"]) for curve in found.profiles] == [4, 4]
 
 
 def test_one_packing_decides_nothing() -> None:
-    given = points("granular_collapse", "column_width", [0.06, 0.085, 0.12], aspect_ratio_measured=lambda _: 0.6, final_height=lambda _: 0.59, run_out=lambda _: 1.08)
-    for one in given:
-        for quantity in one["quantities"]:
-            quantity["interval"] = None
+    given = points("granular_collapse", "column_width", WIDTHS, aspect_ratio_measured=lambda _: 0.6, final_height=lambda _: 0.59,
+                   run_out=lambda _: 1.08)
+    for quantity in (quantity for one in given for quantity in one["quantities"]):
+        quantity["interval"] = None
     assert {one["verdict"] for one in judged("granular_collapse", collapse.study("width", given, "column_width")).values()} == {"info"}
 
 
-def points(case: str, along: str, places: list[float], **laws: Callable[[float], float]) -> list[dict[str, Any]]:
-    """Results of variants along a parameter, whose quantities follow `laws` within 1 %."""
-    return [{"parameters": defaults(case) | {along: place}, "quantities": [
-        {"name": name, "value": law(place), "interval": [0.99 * law(place), 1.01 * law(place)], "basis": ""} for name, law in laws.items()]}
-        for place in places]
-
-
-@pytest.mark.parametrize(("name", "places", "power", "verdict"), [
-    ("low", [0.6, 1.0, 2.0], 1.0, "pass"), ("low", [0.6, 1.0, 2.0], 0.5, "fail"), ("low", [0.6, 1.0, 2.0], 1.5, "fail"),
-    ("high", [1.0, 2.0, 4.0], 0.37, "pass"), ("high", [1.0, 2.0, 4.0], 0.0, "fail"), ("high", [1.0, 2.0, 4.0], 1.0, "fail"),
-])
-def test_exponents_in_the_aspect_ratio(name: str, places: list[float], power: float, verdict: str) -> None:
-    law = (lambda a: 1.8 * a**power) if name == "low" else (lambda a: a**power)
-    given = points("granular_collapse", "aspect_ratio", places, aspect_ratio_measured=lambda a: a, run_out=law, final_height=law)
-    found = collapse.study(name, given, "aspect_ratio")
-    (one,) = judged("granular_collapse", found).values()
+@pytest.mark.parametrize(("name", "power", "verdict"), [("low", 1.0, "pass"), ("low", 0.5, "fail"), ("low", 1.5, "fail"),
+                                                        ("high", 0.37, "pass"), ("high", 0.0, "fail"), ("high", 1.0, "fail")])
+def test_exponents_in_the_aspect_ratio(name: str, power: float, verdict: str) -> None:
+    (one,) = exponents(name, power).values()
     assert one["value"] == pytest.approx(power, abs=1e-9) and one["verdict"] == verdict, one
-    assert len(found.profiles) == 2 and all(len(curve["reference_low"]) == 3 for curve in found.profiles)
 
 
 def test_sensitivities_of_a_study_of_an_input() -> None:
@@ -165,23 +187,20 @@ def test_heaps_of_other_beads_stand_beside_the_other_code_alone(tmp_path: Path) 
     assert verdicts(heap(tmp_path / "b", 30.0, rolling_friction=0.1, beads="other")) == {"angle_of_code": "fail"}
 
 
-@pytest.mark.parametrize(("factor", "verdict"), [(1.49, "pass"), (1.0, "fail"), (2.0, "fail")])
-def test_the_wall_factor(factor: float, verdict: str) -> None:
-    given = points("angle_of_repose", "confinement", [0.25, 0.125, 0.0], angle=lambda confinement: 18.4 * (1.0 + (factor - 1.0) * confinement / 0.25))
-    found = repose.study("thickness", given, "confinement")
-    one = judged("angle_of_repose", found)["wall_factor"]
-    assert one["value"] == pytest.approx(factor) and one["reference"] == pytest.approx(1.487, abs=1e-3) and one["verdict"] == verdict
+@pytest.mark.parametrize(("walls", "verdict"), [(1.49, "pass"), (1.0, "fail"), (2.0, "fail")])
+def test_the_wall_factor(walls: float, verdict: str) -> None:
+    one = factor(walls)["wall_factor"]
+    assert one["value"] == pytest.approx(walls) and one["reference"] == pytest.approx(1.487, abs=1e-3) and one["verdict"] == verdict
 
 
 @pytest.mark.parametrize(("power", "verdict"), [(0.4, "pass"), (0.0, "fail"), (-0.2, "fail")])
 def test_rolling_resistance_raises_the_angle(power: float, verdict: str) -> None:
-    given = points("angle_of_repose", "rolling_friction", [0.2, 0.02, 0.1, 0.05], angle=lambda rolling: 47.0 * (rolling / 0.2) ** power)
-    one = judged("angle_of_repose", repose.study("rolling", given, "rolling_friction"))["rolling_exponent"]
+    one = rolling(power)["rolling_exponent"]
     assert one["value"] == pytest.approx(power, abs=1e-9) and one["reference"] == pytest.approx(0.4, abs=0.02) and one["verdict"] == verdict
 
 
 def test_single_grains_beyond_the_front_do_not_count(tmp_path: Path) -> None:
-    places = block(0.1, lambda x: np.full_like(x, 2 * D), 5 * D, D)
+    places = block(0.1, 2 * D, 2 * D, 5 * D)
     rolled = np.array([[0.15, 0.01, 0.0], [0.2, 0.02, 0.0]])
     where = np.vstack([places, rolled])
     (tmp_path / "grains.dump").write_text(grains_text(0, where, np.full(len(where), 0.5 * D)))
@@ -198,7 +217,7 @@ def test_flanks_have_a_sign() -> None:
 
 
 TINY: dict[str, dict[str, Any]] = {
-    "granular_collapse": {"column_width": 0.03, "aspect_ratio": 1.0, "column_depth": 0.02},
+    "granular_collapse": {"column_width": 0.03, "collapse_time": 10.0},
     "angle_of_repose": {"plate_width": 0.16, "fill_height": 0.06, "discharge_time": 0.8, "settle_time": 0.35},
 }
 
@@ -216,14 +235,17 @@ def run(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_column_collapses_and_stays(engine: str, run: Any) -> None:
-    found = collapse.deposit(run("granular_collapse", engine))
+    one = run("granular_collapse", engine)
+    assert set(one.grains()[0].wall_forces) == {"back", "base", "gate"} and len(one.grains()) == one.parameters["frames"]
+    found = collapse.deposit(one)
     assert found["aspect_ratio_measured"] == pytest.approx(1.0, abs=0.08) and found["rests"]
     assert 0.5 < found["run_out"] < 2.5 and 0.6 < found["final_height"] < 1.0
 
 
-def test_a_column_without_friction_does_not_stay(run: Any) -> None:
-    found = collapse.deposit(run("granular_collapse", "liggghts", static_friction=0.0))
-    assert found["run_out"] > 2.5 and found["final_height"] < 0.5
+def test_a_column_without_friction_runs_out_farther(run: Any) -> None:
+    """And leaves less at the wall, though the floor's grains hold some."""
+    rough, smooth = (collapse.deposit(run("granular_collapse", "liggghts", **friction)) for friction in ({}, {"static_friction": 0.0}))
+    assert smooth["run_out"] > 1.1 * rough["run_out"] and smooth["final_height"] < 0.8 * rough["final_height"], (rough, smooth)
 
 
 @pytest.mark.parametrize(("engine", "confinement"), [("liggghts", 0.25), ("yade", 0.25), ("yade", 0.0)])
@@ -233,11 +255,14 @@ def test_a_heap_stays_on_the_plate(engine: str, confinement: float, run: Any) ->
     first, last = frames[0], frames[-1]
     # All are on the plate when the outlets open; a heap stays, and the rest lies in the pit, none of it in the plate.
     assert (first.positions[:, 2] > 0.0).all()
+    assert set(first.wall_forces) == {"container", "pit"} | ({"front", "rear"} if confinement else set())
+    weight = 9.81 * first.masses.sum()
+    assert first.wall_forces["container"][:, 2].sum() == pytest.approx(weight, rel=0.5 if confinement else 0.1)
     fallen = last.positions[:, 2] < 0.0
     assert 0.15 < fallen.mean() < 0.8
     assert (last.positions[fallen, 2] > one.derived["pit"]).all()
     left, right, _ = repose.flanks(one)
-    assert 10.0 < min(left, right) and max(left, right) < 45.0
+    assert min(left, right) > 10.0 and max(left, right) < 45.0
 
 
 def test_without_friction_nothing_stays_on_the_plate(run: Any) -> None:

@@ -32,7 +32,7 @@ def flank(frame: GrainFrame, low: float, high: float, diameter: float) -> float:
 
     The highest grain of each cell counts, as in a silhouette.
     """
-    edges = diameter * np.arange(math.floor(low / diameter), math.ceil(high / diameter) + 1)
+    edges = diameter * np.arange(math.floor(low / diameter), math.ceil(high / diameter) + 1, dtype=np.float64)
     middles, tops = 0.5 * (edges[1:] + edges[:-1]), surface(frame, edges)
     chosen = (middles > low) & (middles < high)
     slope = np.polyfit(middles[chosen], tops[chosen], 1)[0]
