@@ -61,4 +61,5 @@ def test_scene_of_another_version_is_refused_with_one_line(yade):
     for number in ("0", "2"):
         found, line = lines[number]
         assert found == 1
-        assert "\n" not in line and "saved with another version" in line and f"LcpImpact has other attributes (format {number}, not 1)" in line
+        assert "\n" not in line
+        assert "saved with another version" in line and f"LcpImpact has other attributes (format {number}, not 1)" in line
