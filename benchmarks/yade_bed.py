@@ -1,4 +1,4 @@
-"""The settled bed in YADE under one contact law, timed. Runs inside YADE: `yade -n -j1 -x yade_bed.py bed=FILE law=stock|dembark|PRESLIDING ...`.
+"""The settled bed in YADE under one contact law, timed. In YADE: `yade -n -j1 -x yade_bed.py bed=FILE law=stock|dembark|PRESLIDING ...`.
 
 Prints one line of JSON a sample: processor time of the whole loop and of the interaction loop (its share of the loop by the engine's
 own timers), in seconds.

@@ -133,7 +133,7 @@ std::vector<double> rubbed() {
     SlipRings rings;
     double slip = 0.0;
     for (int step = 0; step < 60; ++step) {
-      const RingMotion<double> motion{uniform(1.0, 1.2), uniform(-2e-8, 2e-8), uniform(-1e-8, 1e-8),
+      const RingMotion<double> motion{uniform(1.0, 1.2), uniform(-4e-8, 4e-8), uniform(-2e-8, 2e-8),
                                       uniform(0.9, 1.0), uniform(0.0, 1.0),    5e3};
       RingSums sums;
       double limit = 4e-4;

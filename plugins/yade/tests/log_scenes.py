@@ -274,7 +274,7 @@ def other_format():
         O.run(10, True)
         O.save("other.xml")
         text = open("other.xml", encoding="utf-8").read()
-        text, found = re.subn(r'(class_name="LcpImpact" tracking_level="\d" version=)"\d+"', rf'\1"{number}"', text)
+        text, found = re.subn(r'(class_name="yade::LcpImpact" tracking_level="\d" version=)"\d+"', rf'\1"{number}"', text)
         open("other.xml", "w", encoding="utf-8").write(text)
         try:
             O.load("other.xml")
