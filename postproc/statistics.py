@@ -47,6 +47,12 @@ def student(degrees: float, confidence: float = CONFIDENCE) -> float:
     return float(special.stdtrit(degrees, 0.5 + 0.5 * confidence)) if degrees >= 1 else math.inf
 
 
+def beyond(limit: float, half: float, degrees: float) -> float:
+    """Probability that a value with the 95 % half-width `half` lies farther from its mean than `limit`; infinite `degrees`: normal."""
+    reach = student(degrees) * limit / half
+    return 2.0 * float(special.stdtr(degrees, -reach) if math.isfinite(degrees) else special.ndtr(-reach))
+
+
 def correlation_time(series: Array) -> float:
     """Integrated autocorrelation time 1 + 2 sum rho(k) in samples: 1 for independent ones, at most the length of the series.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
@@ -14,7 +15,7 @@ from dembark.common.choices import pick
 from dembark.common.errors import DembarkError, RunError
 from dembark.postproc import DumpError
 from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.statistics import Estimate
+from dembark.postproc.statistics import Estimate, beyond
 from dembark.validation.case import deck
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.model import Case, Declared, Study
@@ -108,7 +109,9 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
         deviation=_finite(deviation),
         deviation_kind="absolute" if one.absolute else "relative", tolerance=_finite(tolerance), verdict=verdict, reason=reason,
         detail=value.detail or one.detail or one.why, source=one.source, evidence=one.evidence, compared=one.compared and value.compared,
-        deviation_half_width=_finite(value.half), agreement=None if one.agreement is None else one.agreement * value.scale)
+        deviation_half_width=_finite(value.half), independent=one.independent and value.half is None,
+        chance=chance(verdict, half if value.half is None else value.half, tolerance, packings(value.estimate.basis)),
+        agreement=None if one.agreement is None else one.agreement * value.scale)
 
 
 def _tolerance(one: Declared, value: Value, name: str) -> float | None:
@@ -164,6 +167,21 @@ def judge(deviation: float, half: float, tolerance: float) -> tuple[str, str]:
     if abs(deviation) > tolerance:
         return "fail", ""
     return ("pass", "") if abs(deviation) + half <= tolerance else ("info", f"its interval (±{half:.2g}) reaches beyond what is allowed")
+
+
+def packings(basis: str) -> float:
+    """Over how many packings an interval was taken; 1 or 2 when it comes from within them, infinite when it rests on no packing."""
+    told = re.match(r"(?:within )?(\d+) replica", basis)
+    return int(told.group(1)) if told else math.inf
+
+
+def chance(verdict: str, half: float, tolerance: float | None, count: float) -> float | None:
+    """Probability that a check whose true deviation is zero fails by chance, from the half-width of the deviation's interval over `count`
+    packings; from within fewer than three it is taken as normal. 0 where the interval is too wide for a verdict, None where nothing is
+    random."""
+    if half == 0.0 or tolerance is None or verdict == "fail" and not math.isfinite(half):
+        return None
+    return beyond(tolerance, half, count - 1.0 if count >= 3 else math.inf) if half <= tolerance else 0.0
 
 
 def _finite(value: float | None) -> float | None:
