@@ -9,7 +9,6 @@ from operator import add
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from dembark.postproc.fields.rings import Fields, Rings, coarse_grain
 from dembark.postproc.instruments import janssen
@@ -78,6 +77,8 @@ def read(replica: Replica, rings: Rings, height: float) -> Silo:
     inside = np.nonzero((rings.heights > 0.0) & (rings.heights < height))[0]
     recorder = WallRecorder(side, cylinder_patches(side, 1, rings.vertical[inside[0] : inside[-1] + 2]), keep_series=False)
     total, rows = [], []
+    from threadpoolctl import threadpool_limits  # slow to import
+
     # Products of tall thin matrices gain nothing from more threads, and a second measurement may run beside this one.
     with threadpool_limits(1, "blas"):
         for grains, contacts in replica.paired_frames():
