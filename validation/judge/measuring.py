@@ -6,6 +6,7 @@ import math
 import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -31,6 +32,15 @@ _NUMBERS = ("scale", "radius", "drum_radius", "drum_speed", "speed")
 def measure(case: Case, replicas: Sequence[Replica]) -> Measurement:
     """What the measure.py of the case returns for `replicas`; DembarkError or RunError in one line for whatever goes wrong in it."""
     return _call(case, "measure", lambda function: function(replicas))
+
+
+def prepare(case: Case, replica: Replica) -> None:
+    """Let the function `prepare` of the case's measure.py, where it has one, read a finished `replica` while others still run.
+
+    What goes wrong in it goes wrong again, and is told, when `measure` asks for the same.
+    """
+    with suppress(Exception):
+        getattr(check(case), "prepare", lambda _: None)(replica)
 
 
 def study(case: Case, planned: Study, points: Sequence[Mapping[str, Any]]) -> Measurement:
