@@ -109,9 +109,11 @@ def once(read: Callable[[Source], Measured]) -> Callable[[Source], Measured]:
 
     @wraps(read)
     def kept(source: Source) -> Measured:
-        found: dict[Any, Measured] = source.__dict__.setdefault("_read", {})
-        if read not in found:
-            found[read] = read(source)
-        return found[read]
+        found: dict[str, Measured] = source.__dict__.setdefault("_read", {})
+        # By its name, for a measure.py may be loaded more than once.
+        name = f"{read.__module__}.{read.__qualname__}"
+        if name not in found:
+            found[name] = read(source)
+        return found[name]
 
     return kept

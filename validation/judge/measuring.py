@@ -120,7 +120,7 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
         deviation_kind="absolute" if one.absolute else "relative", tolerance=_finite(tolerance), verdict=verdict, reason=reason,
         detail=value.detail or one.detail or one.why, source=one.source, evidence=one.evidence, compared=one.compared and value.compared,
         deviation_half_width=_finite(value.half), independent=one.independent and value.half is None,
-        chance=chance(verdict, half if value.half is None else value.half, tolerance, packings(value.estimate.basis)),
+        chance=chance(half if value.half is None else value.half, tolerance, packings(value.estimate.basis)),
         agreement=None if one.agreement is None else one.agreement * value.scale)
 
 
@@ -185,13 +185,13 @@ def packings(basis: str) -> float:
     return int(told.group(1)) if told else math.inf
 
 
-def chance(verdict: str, half: float, tolerance: float | None, count: float) -> float | None:
+def chance(half: float, tolerance: float | None, count: float) -> float | None:
     """Probability that a check whose true deviation is zero fails by chance, from the half-width of the deviation's interval over `count`
     packings; from within fewer than three it is taken as normal. 0 where the interval is too wide for a verdict, None where nothing is
     random."""
-    if half == 0.0 or tolerance is None or verdict == "fail" and not math.isfinite(half):
+    if half == 0.0 or tolerance is None:
         return None
-    return beyond(tolerance, half, count - 1.0 if count >= 3 else math.inf) if half <= tolerance else 0.0
+    return beyond(tolerance, half, count - 1.0 if count >= 3 else math.inf) if half <= tolerance and math.isfinite(half) else 0.0
 
 
 def _finite(value: float | None) -> float | None:
