@@ -123,7 +123,9 @@ def perform_series(one: Series, out: Path, cancel: threading.Event, used: Resour
     cores = jobs * used.cores if jobs else max(used.cores, os.cpu_count() or 1)
     table, folders = Table(), {run.name: run.folder_name for run in one.runs}
     table.enter({run.folder_name: run for run in one.runs}, out, {})
-    with _Beside(out, cores > used.cores * len(one.runs)) as beside:
+    shown = one.runs[0].case.picture
+    rendered = bool(shown) and "cross_section" not in shown
+    with _Beside(out, rendered and cores > used.cores * len(one.runs)) as beside:
         # Why a run failed is told once, at the end.
         with Monitor(table.states, reasons=False) as monitor:
 
@@ -148,14 +150,13 @@ class _Beside:
     """What is done in threads while the engines run: the import of what measures and draws, the pictures, and what of each finished replica
     needs no other one. When the block ends by an error, nothing more of it begins and nothing is waited for."""
 
-    def __init__(self, out: Path, idle: bool) -> None:
-        """`idle`: a core has nothing else to do."""
+    def __init__(self, out: Path, warm: bool) -> None:
+        """`warm`: the process that renders is started at once, for it has something to do and a core to itself."""
         self._out, self._reading, self._drawing = out, ThreadPoolExecutor(1), ThreadPoolExecutor(1)
         self._loaded: Future[Early] = self._reading.submit(_load)
         self._read: list[Future[None]] = []
         self.drawn: Future[list[str]] | None = None
-        if idle:
-            self._drawing.submit(_warm)
+        self._drawing.submit(_load_drawing, warm)
 
     def __enter__(self) -> Self:
         return self
@@ -177,20 +178,22 @@ class _Beside:
 
 
 def _load() -> Early:
-    """Import what measures and draws."""
-    for name in ("dembark.postproc.pictures.packings", "dembark.postproc.pictures.sections", "dembark.postproc.output", "scipy.optimize",
-                 "scipy.interpolate"):
+    """Import what measures."""
+    for name in ("scipy.optimize", "scipy.interpolate"):
         import_module(name)
     from dembark.validation.metrics import Early
 
     return Early()
 
 
-def _warm() -> None:
-    """Start the process that renders, which takes a second or two."""
-    from dembark.postproc import render
+def _load_drawing(warm: bool) -> None:
+    """Import what draws and what writes fields; start the process that renders, which takes a second or two, if that is to be `warm`."""
+    if warm:
+        from dembark.postproc import render
 
-    render.warm()
+        render.warm()
+    for name in ("dembark.postproc.pictures.packings", "dembark.postproc.pictures.sections", "dembark.postproc.output"):
+        import_module(name)
 
 
 def refuse_foreign(one: Series, out: Path) -> None:

@@ -44,7 +44,7 @@ def prepare(replica):
     time.sleep(float(os.environ.get("REST", "0")))
 """
 QUANTITY = '\n[quantities]\nwarmth = { label = "warmth", evidence = "theory", tolerance = 0.1, why = "none" }\n'
-WORDS = ("run", "box", "--engine", "liggghts", "--profile", "standard", "--set", "pause=0.05", "--jobs", "1", "--out")
+WORDS = ("run", "box", "--engine", "liggghts", "--profile", "standard", "--jobs", "1", "--out")
 
 
 @pytest.fixture
@@ -95,7 +95,8 @@ def test_replicas_are_read_while_others_run_and_the_result_is_the_same(
         call: Callable[..., Any], measured: Callable[[bool], dict[str, str]], tmp_path: Path) -> None:
     found = []
     for early, out in ((False, "late"), (True, "early")):
-        done = call(SCRIPT, *WORDS, out, env=measured(early))
+        # The third run does not end before something was looked at.
+        done = call(SCRIPT, *WORDS, out, env=measured(early) | ({"GATE": str(tmp_path / "told")} if early else {}))
         assert done.returncode == 0, done.stderr
         content = read_json(tmp_path / out / "metrics.json")
         found.append({key: content[key] for key in ("quantities", "remarks", "parameters", "profiles")})
@@ -120,15 +121,15 @@ def test_what_goes_wrong_early_is_told_once_when_it_is_measured(
 def test_an_interruption_while_a_replica_is_read_waits_for_nothing_and_leaves_a_series_that_goes_on(
         call: Callable[..., Any], measured: Callable[[bool], dict[str, str]], wait_for: Callable[..., Any], tmp_path: Path) -> None:
     environment = measured(True)
-    process = subprocess.Popen([sys.executable, "-c", SCRIPT, *WORDS, "o", "--set", "pause=0.3"], cwd=tmp_path, text=True,
-                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment | {"REST": "600"})
+    process = subprocess.Popen([sys.executable, "-c", SCRIPT, *WORDS, "o"], cwd=tmp_path, text=True, stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, env=environment | {"REST": "600", "GATE": str(tmp_path / "never")})
     wait_for(lambda: told(tmp_path), 60)
     process.send_signal(signal.SIGINT)
     _, error = process.communicate(timeout=60)
     assert process.returncode == 130 and "Traceback" not in error
     assert (tmp_path / "o/replica-1/run.json").is_file() and not (tmp_path / "o/metrics.json").exists()
     before = (tmp_path / "o/replica-1/run.json").read_bytes()
-    done = call(SCRIPT, *WORDS, "o", "--set", "pause=0.3", env=environment)
+    done = call(SCRIPT, *WORDS, "o", env=environment)
     assert done.returncode == 0, done.stderr
     assert "box dry liggghts 1: already finished; reusing" in done.stderr
     assert (tmp_path / "o/replica-1/run.json").read_bytes() == before
