@@ -131,6 +131,7 @@ class Declared:
     agreement : largest allowed difference of two engines where nothing is random, in the unit of the value or, with `agreement_of`, in that
     compared : whether engines are compared in it
     control : wrong physics that fails it, as tests prove; a check without any is not counted
+    independent : whether the reference is something else than other measured numbers of the same run
     """
 
     name: str
@@ -145,6 +146,7 @@ class Declared:
     agreement: float | None = None
     compared: bool = True
     control: str = ""
+    independent: bool = True
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,8 @@ class QuantityRecord:
     `verdict` is pass, fail or info, with its `reason`; `tolerance` None means that nothing was due to be checked. `deviation` is value
     minus reference, over the reference when `deviation_kind` is "relative". `evidence`: what the reference is, one of EVIDENCE; "" is not
     stated. `compared`: the engines are to agree in it, within `agreement` (in `unit`) where nothing is random. `control`: wrong physics
-    that fails the check; a pass of a check that nothing is known to fail is not counted.
+    that fails the check; a pass of a check that nothing is known to fail is not counted. `independent`: the reference is not made of other
+    numbers of the same run. `chance`: probability that the check fails by chance alone, None where there is no chance.
     """
 
     name: str
@@ -49,6 +50,8 @@ class QuantityRecord:
     deviation_half_width: float | None = None
     agreement: float | None = None
     control: str = ""
+    independent: bool = True
+    chance: float | None = None
 
     def __post_init__(self) -> None:
         """RunError for a verdict or a kind of evidence that does not exist."""
@@ -147,7 +150,7 @@ def as_json(value: QuantityRecord | Result | Comparison) -> dict[str, Any]:
     return content
 
 
-_OPTIONAL = ("deviation_half_width", "agreement", "title", "description")
+_OPTIONAL = ("deviation_half_width", "agreement", "independent", "chance", "title", "description")
 
 
 def _default(one: dataclasses.Field[Any]) -> Any:

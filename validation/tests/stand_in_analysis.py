@@ -8,7 +8,12 @@ import sys
 import types
 
 
-def measure(folder, wanted):
+class Early:
+    def read(self, folder):
+        pass
+
+
+def measure(folder, wanted, early=None):
     from dembark.validation.judge.result import QuantityRecord, Result
 
     replicas = sorted(folder.glob("replica-*/run.json"))
@@ -49,7 +54,7 @@ def write(folder):
     pass
 
 
-for name, function in (("verification", write), ("metrics", measure), ("metrics", picture), ("metrics", study), ("judge.compare", compare),
+for name, function in (("verification", write), ("metrics", measure), ("metrics", picture), ("metrics", study), ("metrics", Early), ("judge.compare", compare),
                        ("report", build), ("campaigns.report.build", build)):
     module = sys.modules.setdefault(f"dembark.validation.{name}", types.ModuleType(f"dembark.validation.{name}"))
     setattr(module, function.__name__, function)
