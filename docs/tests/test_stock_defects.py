@@ -290,3 +290,27 @@ def test_edges_of_a_mesh_count_beside_their_faces(tmp_path: Path) -> None:
     assert pressed_over_edge(tmp_path, -2.0, -1e-3) == pytest.approx(flat, rel=1e-6)
     assert pressed_over_edge(tmp_path, -2.0, 8e-5, "curvature 3") == 0.0
     assert pressed_over_edge(tmp_path, 2.0, -1e-5) == pytest.approx(2.0 * flat, rel=0.1)
+
+
+@pytest.mark.parametrize("axis", "xyz")
+def test_a_cylinder_along_y_does_not_turn(axis: str, tmp_path: Path) -> None:
+    """A sphere pressed on the inside, of a wall with a shear across its axis."""
+    across = "y" if axis == "x" else "x"
+    place = " ".join("-0.0178" if one == across else "0" for one in "xyz")
+    body = scene(0.0025) + f"create_atoms 1 single {place} units box\nset group all density 2500 diameter 0.005\n" + MATERIAL + f"""
+pair_style gran model hertz tangential history
+pair_coeff * *
+timestep 1e-6
+fix drum all wall/gran model hertz tangential history primitive type 2 {axis}cylinder 0.02 0 0 shear {across} 3
+fix motion all nve/sphere
+compute spin all property/atom omega{axis}
+compute sum all reduce sum c_spin
+variable s equal c_sum
+thermo_style custom step c_sum
+run 50
+print 'spin ${{s}}'
+"""
+    result = run(tmp_path, body)
+    assert result.returncode == 0, result.stdout[-2000:] + result.stderr
+    spin = float(next(line.split()[1] for line in result.stdout.splitlines() if line.startswith("spin ")))
+    assert spin == 0.0 if axis == "y" else spin > 0.0

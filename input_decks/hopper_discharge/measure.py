@@ -34,7 +34,8 @@ LOW, HIGH, K = 0.1, 0.7, 1.4
 # 95 % limits of a digitised point: the largest difference of two digitisations.
 READ = 0.0035
 TITLES = ("Mass discharged", "time since 10 % have left (s)", "over the mass of all grains")
-ANAND = ("anand", "friction_low", "friction_high", "stiff", "stiffer")
+# What makes a run one of the published bin.
+ANAND = {"grain_count": 6790, "grain_diameter": 0.00224, "bin_width": 0.12544, "bin_depth": 0.0056, "outlet_width": 0.025088}
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,8 @@ def read(replica: Replica) -> Discharge:
 
 def measure(replicas: Replicas) -> Measurement:
     """Values and the curve of all replicas of a series."""
-    runs, given, known = [read(replica) for replica in replicas], replicas[0].parameters, replicas[0].record["variant"] in ANAND
+    runs, given = [read(replica) for replica in replicas], replicas[0].parameters
+    known = all(given[name] == value for name, value in ANAND.items())
     rate, last = over_replicas([run.rate() for run in runs]), over_replicas([_whole(float(run.share[-1]), run) for run in runs])
     rates = [Estimate(run.mass_rate(), run.rate().half / run.rate().value * run.mass_rate(), run.rate().basis) for run in runs]
     values = {"rate": Value(rate), "discharged": Value(last), "mass_rate": Value(over_replicas(rates)),

@@ -21,7 +21,8 @@ METHODS = {"surface_speed": "surface_speed", "zero_crossing": "turn", "layer_dep
            "surface_angle": "surface_angle", "flux_balance": "flux_balance", "solid_body": "solid_body"}
 # 95 % limits of a point of the tracked profile: reading of the figure, and scatter about a smooth curve.
 SPEED_READ, PLACE_READ = 0.01, 0.0005
-ALIZADEH = ("alizadeh", "friction_low", "friction_high", "stiff", "stiffer", "smooth")
+# What makes a run one of the tracked drum.
+ALIZADEH = {"drum_radius": 0.12, "drum_speed": 1.2147, "solid_filling": 0.1962, "grain_diameter": 0.003}
 
 
 def tracked() -> tuple[Array, Array]:
@@ -53,6 +54,7 @@ def other_code() -> dict[str, dict[str, float]]:
 def measure(replicas: Replicas) -> Measurement:
     """Values and profiles of all replicas of a series."""
     drums, given, variant = [read(replica) for replica in replicas], replicas[0].parameters, replicas[0].record["variant"]
+    tracked_drum = all(given[name] == value for name, value in ALIZADEH.items())
     found = [dict(zip([*METHODS, "overhead"], estimates(drum, list(METHODS.values())).values(), strict=True)) for drum in drums]
     over = {name: pooled(found, name) for name in found[0]}
     # Nothing flows back steadily where grains are carried over the top.
@@ -60,7 +62,7 @@ def measure(replicas: Replicas) -> Measurement:
     due = {"flux_balance": exact(0.0), "solid_body": exact(1.0)} if flows else {}
     values = {name: Value(over[name], due.get(name)) for name in METHODS if flows or name == "surface_angle"}
     values["froude"] = Value(exact(given["drum_speed"] ** 2 * given["drum_radius"] / given["gravity"]))
-    if variant in ALIZADEH:
+    if tracked_drum:
         for name, datum in data().items():
             values[name] = Value(over[name], datum, detail=error(over[name], datum, 0.0, 0.0))
     if row := other_code().get(variant):
@@ -71,7 +73,7 @@ def measure(replicas: Replicas) -> Measurement:
             values["repose_angle"] = Value(over["surface_angle"], datum, detail=error(over["surface_angle"], datum, 0.0, 0.0))
             values["layer_over_diameter"] = Value(Estimate(depth.value / d, depth.half / d, depth.basis), exact(row["layer"])
                                                   if math.isfinite(row["layer"]) else None)
-    return Measurement(values, [speeds(drums, variant in ALIZADEH), densities(drums)])
+    return Measurement(values, [speeds(drums, tracked_drum), densities(drums)])
 
 
 def error(value: Estimate, datum: Estimate, of_inputs: float, of_numerics: float) -> str:

@@ -16,11 +16,11 @@ drum = module("rotating_drum")
 JUDGED = {"surface_speed", "zero_crossing", "layer_depth"}
 
 
-def flow(angle: float = 27.0, surface: float = -0.03, turn: float = -0.066, speed: float = 0.345, carried: float = 1.0, shear: float = 1.0,
+def flow(angle: float = 27.0, surface: float = -0.03, turn: float = -0.066, speed: float = 0.345, carried: float = 1.0,
          variant: str = "alizadeh", ring: bool = False) -> Any:
-    """A run whose grains fill a segment, on a lattice that is shifted from frame to frame: they turn with the drum (times `carried`) below `turn`, and above it their speed falls
-    linearly to -`speed` at the `surface`; `shear`: exponent of another curve there. `ring`: all turn with the drum, at the wall."""
-    given = defaults("rotating_drum", frames=12)
+    """A run whose grains fill a segment, on a lattice that is shifted from frame to frame: they turn with the drum (times `carried`) below
+    `turn`, and above it their speed falls linearly to -`speed` at the `surface`. `ring`: all turn with the drum, at the wall."""
+    given = defaults("rotating_drum", frames=12) | ({} if variant == "alizadeh" else {"solid_filling": 0.2})
     random, radius, omega = np.random.default_rng(3), given["drum_radius"], given["drum_speed"]
     t = np.radians(angle)
     along, normal = np.array([np.cos(t), np.sin(t)]), np.array([-np.sin(t), np.cos(t)])
@@ -33,7 +33,7 @@ def flow(angle: float = 27.0, surface: float = -0.03, turn: float = -0.066, spee
         n, s = place @ normal, place @ along
         back = np.clip((n - turn) / (surface - turn), 0.0, 1.0)
         turning = ring | (n < turn)
-        velocity = np.where(turning, -carried * omega * n, -omega * turn * (1.0 - back) - speed * back**shear)[:, None] * along
+        velocity = np.where(turning, -carried * omega * n, -omega * turn * (1.0 - back) - speed * back)[:, None] * along
         velocity += np.where(turning, carried * omega * s, 0.0)[:, None] * normal
         zero, ones = np.zeros(len(place)), np.ones(len(place))
         one = SimpleNamespace(positions=np.column_stack([place, zero]), velocities=np.column_stack([velocity, zero]), radii=0.0015 * ones,
