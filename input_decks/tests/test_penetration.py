@@ -27,8 +27,9 @@ SMALL: dict[str, Any] = {
 WRONG: dict[str, dict[str, float]] = {
     "half the density of the ball": {"steel_density": 3600.0}, "no friction": {"friction": 0.0, "grain_steel_friction": 0.0},
     "twice the gravity": {"gravity": 19.6}}
+# Where three packings of the small bed decide; what scatters by more than the tolerance is open.
 SEEN = {"half the density of the ball": {"height_28"}, "no friction": {"height_24", "height_28", "deepest_point"},
-        "twice the gravity": {"height_24", "height_28"}}
+        "twice the gravity": {"height_24"}}
 FLIGHT = {"height_24", "height_28", "deepest_point", "deepest_time", "height_40", "rebound_speed"}
 
 
