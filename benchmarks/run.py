@@ -44,9 +44,9 @@ def liggghts_comparisons(bed: Path, cache: Path, wall_clock: bool, relax: int, s
         environment["LD_PRELOAD"] = str(clock_library(cache))
 
     def subject(name: str, program: Path, tangential: str, cohesion: str = "", settings: str = "limitForce off") -> Subject:
-        variables: dict[str, object] = {"tangential": tangential, "relax": relax, "steps": steps}
+        variables: dict[str, object] = {"tangential": tangential, "settings": settings, "relax": relax, "steps": steps}
         if cohesion:
-            variables |= {"wet": 1, "cohesion": cohesion, "settings": settings}
+            variables |= {"wet": 1, "cohesion": cohesion}
         return Subject(name, lambda: liggghts_sample(program, bed, variables, environment))
 
     law = ours.executable
@@ -54,7 +54,7 @@ def liggghts_comparisons(bed: Path, cache: Path, wall_clock: bool, relax: int, s
         Comparison("LIGGGHTS, dry", [
             subject("history (stock)", stock, "history"),
             subject("finnie_rabinowicz", law, "finnie_rabinowicz"),
-            subject("finnie_rabinowicz presliding partial_slip", law, "finnie_rabinowicz presliding partial_slip"),
+            subject("finnie_rabinowicz presliding partial_slip", law, "finnie_rabinowicz", settings="presliding partial_slip"),
         ], steps, {"finnie_rabinowicz": 0.67}),
         Comparison("LIGGGHTS, wet", [
             subject("history + washino (stock)", stock, "history", "washino/capillary/viscous"),
