@@ -130,6 +130,7 @@ class Declared:
     why : the reason of the tolerance
     agreement : largest allowed difference of two engines where nothing is random, in the unit of the value or, with `agreement_of`, in that
     compared : whether engines are compared in it
+    independent : whether the reference is something else than other measured numbers of the same run
     """
 
     name: str
@@ -143,6 +144,7 @@ class Declared:
     detail: str = ""
     agreement: float | None = None
     compared: bool = True
+    independent: bool = True
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,7 @@ class CaseReader(TableReader):
         table = f"quantities.{name}"
         keys: dict[str, Types] = {
             "label": str, "unit": str, "evidence": str, "tolerance": (int, float, str), "why": str, "absolute": bool, "source": str,
-            "detail": str, "agreement": (int, float), "compared": bool}
+            "detail": str, "agreement": (int, float), "compared": bool, "independent": bool}
         self.table(entry, table, keys, ("label",))
         if "evidence" in entry:
             self.pick(entry["evidence"], EVIDENCE, "kind of evidence", table)

@@ -1,20 +1,24 @@
-"""Whether two engines agree: each compared quantity's difference, with the joint interval, is within 10 %, and no larger than the interval;
-or, where nothing is random, the difference is within a bound that the quantity brings along.
+"""Whether two engines are equivalent, by two one-sided tests; or, where nothing is random, whether the difference is within a bound that
+the quantity brings along.
+
+Two one-sided tests (TOST, D. J. Schuirmann, J. Pharmacokinet. Biopharm. 15 (1987) 657) at 2.5 % each: the difference is shown to be above
+-10 % and below +10 %, which is so when its 95 % interval is within them. That engines do not differ significantly shows nothing: runs that
+are noisy enough never do.
 
 Packings differ by more than what varies within one, so a comparison of random runs is decided only by intervals over three packings or
-more in each engine. A page compares many quantities, of which one in twenty lies beyond its 95 % interval although nothing is wrong:
-what fails is beyond the interval that holds all differences of the page together with 99 %.
+more in each engine. Engines that solve the same equations are due to differ by chance alone: a difference beyond chance fails, though it
+may be within 10 %. A page compares many quantities, of which one in twenty lies beyond its 95 % interval although nothing is wrong, so
+what counts as beyond chance is what is outside of the interval that holds all differences of the page together with 99 %.
 """
 
 from __future__ import annotations
 
-import math
-import re
 from pathlib import Path
 
 from dembark.common.errors import RunError
 from dembark.postproc.statistics import joint_half, joint_limit
 from dembark.validation.judge import result
+from dembark.validation.judge.measuring import packings
 from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result
 
 CAP = 0.10
@@ -46,15 +50,15 @@ def _pairs(first: Result, second: Result) -> list[ComparedRecord]:
 def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str, engine: str, comparisons: int = 1) -> ComparedRecord:
     """One quantity of two engines with its verdict; `comparisons`: how many quantities are compared together with it.
 
-    pass: the difference is within the joint 95 % interval, and both together within 10 %. fail: it is beyond what chance does to one of
-    all `comparisons`. info: between the two; or the joint interval is unknown, too wide to tell 10 %, or from fewer than three
-    packings in either engine, which cannot hold what varies from one packing to the next.
+    pass: the joint 95 % interval of the difference is within 10 %. fail: the difference is beyond what chance does to one of all
+    `comparisons`. info: the joint interval reaches beyond 10 %, is unknown, or comes from fewer than three packings in either engine, which
+    cannot hold what varies from one packing to the next.
 
     A quantity of a deterministic run has an `agreement` instead, in its own unit: pass within it, fail beyond it.
     """
     both = (value, reference)
     deviation: float | None = None
-    kind, tolerance, half = "relative", CAP, None
+    kind, tolerance, half, chance = "relative", CAP, None, None
     bounds = [one.agreement for one in both if one.agreement is not None]
     if value.value is None or reference.value is None or not (bounds or reference.value):
         verdict, reason = "fail", "no number to compare"
@@ -70,35 +74,28 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
         else:
             halves, scale = (value.half or 0.0, reference.half or 0.0), abs(reference.value)
             half = joint_half(*halves)
-            verdict, reason = _judged(abs(deviation), (halves[0] / scale, halves[1] / scale), (_packings(value), _packings(reference)),
-                                      comparisons)
+            verdict, reason = _judged(abs(deviation), (halves[0] / scale, halves[1] / scale),
+                                      (packings(value.basis), packings(reference.basis)), comparisons)
+            chance = (1.0 - CONFIDENCE) / comparisons if verdict != "info" else 0.0
     return ComparedRecord(
         name=value.name, label=value.label, unit=value.unit, value=value.value, interval=value.interval, reference=reference.value,
         reference_interval=reference.interval, deviation=deviation, deviation_kind=kind, tolerance=tolerance, verdict=verdict,
-        reason=reason,
-        detail="agreement of the engines", source=reference_engine, engine=engine, reference_engine=reference_engine, joint_half_width=half)
+        reason=reason, chance=chance, detail="agreement of the engines", source=reference_engine, engine=engine,
+        reference_engine=reference_engine, joint_half_width=half)
 
 
-def _judged(difference: float, halves: tuple[float, float], packings: tuple[float, float], comparisons: int) -> tuple[str, str]:
-    """Verdict and reason from |difference| and half-widths over the reference, and the numbers of packings."""
+def _judged(difference: float, halves: tuple[float, float], counts: tuple[float, float], comparisons: int) -> tuple[str, str]:
+    """Verdict and reason from |difference| and half-widths over the reference, and the numbers `counts` of packings."""
     half = joint_half(*halves)
-    few = min(packings)
+    few = min(counts)
     if few < PACKINGS:
         return "info", (f"the joint interval (±{half:.1%}) comes from within {few:g} packing{'s' * (few > 1)}; "
                         f"{PACKINGS} in each engine are needed to judge it")
-    limit = max(half, joint_limit(*halves, *packings, 1.0 - (1.0 - CONFIDENCE) / comparisons))
+    limit = max(half, joint_limit(*halves, *counts, 1.0 - (1.0 - CONFIDENCE) / comparisons))
     if difference > limit:
-        return "fail", f"the joint interval is ±{half:.1%}, chance allows ±{limit:.1%}"
+        within = ", though within 10 %" if difference <= CAP else ""
+        return "fail", f"beyond chance{within}: the joint interval is ±{half:.1%}, chance allows ±{limit:.1%}"
     if difference + half > CAP:
         return "info", (f"the joint interval (±{half:.0%}) is wider than 10 %" if half > CAP else
                         f"the joint interval (±{half:.1%}) reaches beyond 10 %")
-    if difference > half:
-        return "info", (f"beyond the joint interval (±{half:.1%}), as one of {comparisons} may be by chance (±{limit:.1%}); "
-                        "more packings would decide")
     return "pass", ""
-
-
-def _packings(quantity: QuantityRecord) -> float:
-    """Over how many packings the interval was taken; 1 or 2 when it comes from within them, infinite when it rests on no packing."""
-    told = re.match(r"(?:within )?(\d+) replica", quantity.basis)
-    return int(told.group(1)) if told else math.inf

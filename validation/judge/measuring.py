@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -14,7 +16,7 @@ from dembark.common.choices import pick
 from dembark.common.errors import DembarkError, RunError
 from dembark.postproc import DumpError
 from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.statistics import Estimate
+from dembark.postproc.statistics import Estimate, beyond
 from dembark.validation.case import deck
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.model import Case, Declared, Study
@@ -32,6 +34,15 @@ def measure(case: Case, replicas: Sequence[Replica]) -> Measurement:
     return _call(case, "measure", lambda function: function(replicas))
 
 
+def prepare(case: Case, replica: Replica) -> None:
+    """Let the function `prepare` of the case's measure.py, where it has one, read a finished `replica` while others still run.
+
+    What goes wrong in it goes wrong again, and is told, when `measure` asks for the same.
+    """
+    with suppress(Exception):
+        getattr(check(case), "prepare", lambda _: None)(replica)
+
+
 def study(case: Case, planned: Study, points: Sequence[Mapping[str, Any]]) -> Measurement:
     """What the measure.py of the case returns for the study `planned`; `points` are the contents of the variants' metrics.json."""
     return _call(case, "study", lambda function: function(planned.name, points, planned.along))
@@ -41,12 +52,19 @@ def check(case: Case) -> ModuleType:
     """The measure.py of the case, loaded; DembarkError, with file and line, when it is missing or cannot be loaded."""
     deck.require_measure(case)
     path = case.folder / "measure.py"
-    module = deck.load_module(path, f"dembark_measure_{case.name}")
+    stat = path.stat()
+    module = _loaded(path, case.name, (stat.st_mtime_ns, stat.st_size))
     for name in ("measure", *(["study"] if case.studies else [])):
         if not callable(getattr(module, name, None)):
             raise DembarkError(f"{path} has no function {name}", "",
                                "it needs measure(replicas) and, with [studies], study(name, points, along)")
     return module
+
+
+@cache
+def _loaded(path: Path, name: str, _changed: tuple[int, int]) -> ModuleType:
+    """The module of a measure.py, loaded once until it changes, so that what `prepare` has read is found by `measure`."""
+    return deck.load_module(path, f"dembark_measure_{name}")
 
 
 def _call(case: Case, name: str, call: Callable[[Callable[..., Any]], Any]) -> Measurement:
@@ -108,7 +126,9 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
         deviation=_finite(deviation),
         deviation_kind="absolute" if one.absolute else "relative", tolerance=_finite(tolerance), verdict=verdict, reason=reason,
         detail=value.detail or one.detail or one.why, source=one.source, evidence=one.evidence, compared=one.compared and value.compared,
-        deviation_half_width=_finite(value.half), agreement=None if one.agreement is None else one.agreement * value.scale)
+        deviation_half_width=_finite(value.half), independent=one.independent and value.half is None,
+        chance=chance(half if value.half is None else value.half, tolerance, packings(value.estimate.basis)),
+        agreement=None if one.agreement is None else one.agreement * value.scale)
 
 
 def _tolerance(one: Declared, value: Value, name: str) -> float | None:
@@ -164,6 +184,21 @@ def judge(deviation: float, half: float, tolerance: float) -> tuple[str, str]:
     if abs(deviation) > tolerance:
         return "fail", ""
     return ("pass", "") if abs(deviation) + half <= tolerance else ("info", f"its interval (±{half:.2g}) reaches beyond what is allowed")
+
+
+def packings(basis: str) -> float:
+    """Over how many packings an interval was taken; 1 or 2 when it comes from within them, infinite when it rests on no packing."""
+    told = re.match(r"(?:within )?(\d+) replica", basis)
+    return int(told.group(1)) if told else math.inf
+
+
+def chance(half: float, tolerance: float | None, count: float) -> float | None:
+    """Probability that a check whose true deviation is zero fails by chance, from the half-width of the deviation's interval over `count`
+    packings; from within fewer than three it is taken as normal. 0 where the interval is too wide for a verdict, None where nothing is
+    random."""
+    if half == 0.0 or tolerance is None:
+        return None
+    return beyond(tolerance, half, count - 1.0 if count >= 3 else math.inf) if half <= tolerance and math.isfinite(half) else 0.0
 
 
 def _finite(value: float | None) -> float | None:

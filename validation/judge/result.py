@@ -25,7 +25,8 @@ class QuantityRecord:
 
     `verdict` is pass, fail or info, with its `reason`; `tolerance` None means that nothing was due to be checked. `deviation` is value
     minus reference, over the reference when `deviation_kind` is "relative". `evidence`: what the reference is, one of EVIDENCE; "" is not
-    stated. `compared`: the engines are to agree in it, within `agreement` (in `unit`) where nothing is random.
+    stated. `compared`: the engines are to agree in it, within `agreement` (in `unit`) where nothing is random. `independent`: the reference
+    is not made of other numbers of the same run. `chance`: probability that the check fails by chance alone, None where there is no chance.
     """
 
     name: str
@@ -47,6 +48,8 @@ class QuantityRecord:
     compared: bool = True
     deviation_half_width: float | None = None
     agreement: float | None = None
+    independent: bool = True
+    chance: float | None = None
 
     def __post_init__(self) -> None:
         """RunError for a verdict or a kind of evidence that does not exist."""
@@ -141,7 +144,7 @@ def as_json(value: QuantityRecord | Result | Comparison) -> dict[str, Any]:
     return content
 
 
-_OPTIONAL = ("deviation_half_width", "agreement", "title", "description")
+_OPTIONAL = ("deviation_half_width", "agreement", "independent", "chance", "title", "description")
 
 
 def _default(one: dataclasses.Field[Any]) -> Any:

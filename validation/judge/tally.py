@@ -44,26 +44,38 @@ class Counts:
 @dataclass(frozen=True)
 class Tally(Counts):
     """Counts of all quantities, and `by_evidence` of each kind that occurs among the checks, in the order of EVIDENCE; `unread`: a line
-    for each result that could not be read and is not counted."""
+    for each result that could not be read and is not counted. `random`: checks that rest on intervals, of which `by_chance` are expected
+    to fail if every model held exactly."""
 
     by_evidence: Mapping[str, Counts] = field(default_factory=dict)
+    random: int = 0
+    by_chance: float = 0.0
     unread: tuple[str, ...] = ()
 
     @property
     def sentences(self) -> list[str]:
         """A line for each kind of evidence, `theory (laws and exact solutions): 3 of 4 checks passed, 1 FAILED`, and each unread result."""
         lines = [f"{kind or 'evidence'} ({MEANING[kind]}): {counts.sentence}" for kind, counts in self.by_evidence.items()]
-        return [*lines, *(f"not counted: {line}" for line in self.unread)]
+        return [*lines, *([self.multiplicity] if self.random else []), *(f"not counted: {line}" for line in self.unread)]
+
+    @property
+    def multiplicity(self) -> str:
+        """How many checks rest on intervals, and how many of these would fail by chance."""
+        return (f"chance: {self.random} of the checks rest{'s' if self.random == 1 else ''} on intervals; if every model held exactly, "
+                f"{self.by_chance:.1g} of them would fail")
 
 
 def tally(quantities: Iterable[QuantityRecord]) -> Tally:
     """Count `quantities` by how they stand, and by kind of evidence."""
     kinds: dict[str, Counter[str]] = {kind: Counter() for kind in (*EVIDENCE, "")}
+    chances: list[float] = []
     for one in quantities:
         kinds[one.evidence][one.standing] += 1
+        if one.chance is not None and one.standing != "information":
+            chances.append(one.chance)
     total = sum(kinds.values(), Counter())
     by_evidence = {kind: Counts(*_numbers(counts)) for kind, counts in kinds.items() if counts.keys() - {"information"}}
-    return Tally(*_numbers(total), by_evidence=by_evidence)
+    return Tally(*_numbers(total), by_evidence=by_evidence, random=len(chances), by_chance=sum(chances))
 
 
 def _numbers(counts: Counter[str]) -> tuple[int, int, int, int]:

@@ -67,7 +67,8 @@ def context(rows: Sequence[Row], missing: Sequence[str]) -> Mapping[str, Any]:
     found = scatter.points(rows)
     failed = sorted((row for row in rows if row.record.standing == "failed"), key=lambda row: _WEIGHT.index(row.record.evidence))
     return {"tally": counted, "evidence": evidence(counted), "failed": failed,
-            "open": open_lines(rows), "missing": missing, "points": found, "scatter_lines": len(scatter.lines(found)), "most": MOST}
+            "open": open_lines(rows), "missing": missing, "points": found, "kinds": scatter.kinds(found),
+            "left_out": scatter.left_out(rows), "scatter_lines": len(scatter.lines(found)), "most": MOST}
 
 
 def cells(one: QuantityRecord) -> list[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +15,7 @@ from matplotlib.ticker import NullFormatter
 
 from dembark.postproc.statistics import Scatter, scatter
 from dembark.postproc.style import STYLE
+from dembark.validation.judge.result import QuantityRecord
 from dembark.validation.report.figures import INK, WIDE, look, symbols
 from dembark.validation.report.gather import Row
 
@@ -42,17 +44,27 @@ class Point:
 
 
 def points(rows: Iterable[Row]) -> list[Point]:
-    """The checks against experiment and theory that a ratio makes sense for: both numbers positive, the deviation a relative one."""
+    """The checks against experiment and theory that a ratio makes sense for: both numbers positive, the deviation a relative one; and
+    whose reference is independent, for numbers of one run have their errors in common."""
     found = []
     for row in rows:
         one = row.record
-        if (one.evidence in KINDS and one.standing != "information" and one.deviation_kind == "relative" and one.value and one.reference
-                and one.value > 0.0 and one.reference > 0.0):
+        if _has_ratio(one) and one.independent and one.value and one.reference:
             interval = one.reference_interval
             reference_half = 0.5 * (interval[1] - interval[0]) / one.reference if interval else 0.0
             found.append(Point((row.case.replace("_", " "), one.title), row.engine, one.evidence, one.value, one.reference,
                                (one.half or 0.0) / one.value, reference_half))
     return found
+
+
+def _has_ratio(one: QuantityRecord) -> bool:
+    return (one.evidence in KINDS and one.standing != "information" and one.deviation_kind == "relative"
+            and (one.value or 0.0) > 0.0 and (one.reference or 0.0) > 0.0)
+
+
+def left_out(rows: Iterable[Row]) -> int:
+    """How many checks are not among the points for nothing but their reference, which is made of other numbers of the same run."""
+    return sum(_has_ratio(row.record) and not row.record.independent for row in rows)
 
 
 def statistics(found: Sequence[Point]) -> Scatter | None:
@@ -111,6 +123,12 @@ def figure(found: Sequence[Point], tolerance: float = 0.10) -> Figure | None:
     return result
 
 
+def kinds(found: Iterable[Point]) -> str:
+    """`12 of experiment, 3 of theory`."""
+    counts = Counter(one.evidence for one in found)
+    return ", ".join(f"{counts[kind]} of {kind}" for kind in KINDS if counts[kind])
+
+
 def _label(number: int, line: tuple[str, str]) -> str:
     text = f"{line[0]}: {line[1]}"
     return symbols(f"{text if len(text) <= 62 else text[:60].rsplit(' ', 1)[0] + ' …'}  {number}")
@@ -122,7 +140,7 @@ def _engine(left: Any, right: Any, engine: str, place: int, found: Sequence[Poin
     for one in found:
         left.text(one.reference, one.value, str(number[one.line]), color=paint, fontsize=5.2, ha="center", va="center", clip_on=True)
     shift = 0.22 * (place - 0.5 * (engines - 1))
-    label = title if known is None else f"{title}: δ = {known.bias:.3f}, σ = {known.model:.3f}, {known.count} points"
+    label = title if known is None else f"{title}: δ = {known.bias:.3f}, σ = {known.model:.3f}, {kinds(found)}"
     right.errorbar([one.ratio for one in found], [number[one.line] + shift for one in found],
                    xerr=[one.ratio * math.hypot(one.half, one.reference_half) for one in found], fmt=mark, color=paint, markersize=2.8,
                    elinewidth=0.6, markeredgecolor="white", markeredgewidth=0.3, label=label)

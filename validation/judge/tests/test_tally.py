@@ -3,7 +3,14 @@
 import json
 from pathlib import Path
 
+import pytest
+
+from dembark.postproc.measurement import Value
+from dembark.postproc.statistics import Estimate
+from dembark.validation.case.model import Declared
 from dembark.validation.judge import result
+from dembark.validation.judge.compare import pair
+from dembark.validation.judge.measuring import judged
 from dembark.validation.judge.result import QuantityRecord, Result
 from dembark.validation.judge.tally import of_folder, tally
 
@@ -24,6 +31,24 @@ def test_each_quantity_is_counted_once() -> None:
         "theory": (0, 0, 1), "identity": (1, 1, 0), "": (0, 1, 0)}
     assert found.sentences[0] == "theory (laws and exact solutions): 0 of 1 check passed, none failed, 1 open"
     assert tally(()).sentence == "no checks"
+
+
+def test_checks_that_rest_on_intervals_are_counted_with_what_chance_does_to_them() -> None:
+    declared = Declared("q", "q", evidence="theory", tolerance=0.1)
+    halves = (0.0, 0.1, 0.05, 0.3)
+    found = [judged(declared, Value(Estimate(1.0, half, "5 replicas"), Estimate(1.0, 0.0))) for half in halves]
+    assert [one.verdict for one in found] == ["pass", "pass", "pass", "info"]
+    # Student's interval over five packings: one in twenty is beyond it, 0.5 % are beyond twice of it; too wide an interval fails never.
+    assert [one.chance for one in found] == [None, pytest.approx(0.05), pytest.approx(0.00516, rel=0.01), 0.0]
+    counted = tally([*found, QuantityRecord("d", 1.0, "info", chance=0.5)])
+    assert counted.random == 3 and counted.by_chance == pytest.approx(0.0552, rel=0.01)
+    assert counted.sentences[-1] == "chance: 3 of the checks rest on intervals; if every model held exactly, 0.06 of them would fail"
+    assert not any("chance" in line for line in tally(QUANTITIES).sentences)
+
+
+def test_the_comparisons_of_a_page_fail_by_chance_in_one_of_a_hundred_pages() -> None:
+    one = QuantityRecord("q", 1.0, "info", interval=(0.99, 1.01), basis="5 replicas")
+    assert sum(pair(one, one, "liggghts", "yade", 20).chance or 0.0 for _ in range(20)) == pytest.approx(0.01)
 
 
 def test_a_folder_with_what_cannot_be_read(tmp_path: Path) -> None:
