@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.tests.measuring import defaults, judged, logs, module, names
-from dembark.postproc.instruments.log_stack import beginning, impact_values, loads
+from dembark.postproc.instruments.log_stack import beginning, impact_values, loads, together
 from dembark.postproc.instruments.logs import LogRun, TouchFrame
+from dembark.postproc.measurement import Estimate, Value, number
 
 log_pair, log_cradle = (module(name) for name in ("log_pair", "log_cradle"))
 
@@ -242,12 +243,41 @@ def test_loads_are_the_sums_of_the_contacts():
     assert loads(replace(run, touches=sliding), (-1,)).mobilised == pytest.approx(0.3)
 
 
-def test_intervals_of_impacts_are_those_of_as_many_independent_ones():
+def cascades(rng, mean=20):
+    """Impacts of a pile: cascades of 30 that are all about as hard as the first one."""
+    peaks = np.repeat(rng.normal(2.0, 0.5, rng.poisson(mean)), 30)
+    peaks += rng.normal(0.0, 0.1, len(peaks))
+    return np.column_stack([np.ones((len(peaks), 4)), np.exp(peaks), np.exp(peaks), np.zeros((len(peaks), 5))])
+
+
+def test_intervals_of_impacts_are_those_over_piles_and_hold_what_they_say():
     run, rng = stack(), np.random.default_rng(3)
-    many = np.column_stack([np.ones((900, 4)), np.exp(rng.normal(2.0, 0.5, 900)), rng.uniform(0.0, 2.0, 900), np.zeros((900, 5))])
-    found = {name: one.estimate for name, one in impact_values(replace(run, impacts=many)).items()}
-    assert found["impact_count"].value == 900 and found["impact_count"].half == pytest.approx(1.96 * 30, rel=1e-3)
-    assert found["impact_peak"].half == pytest.approx(1.96 * 0.5 / 30 * np.exp(2.0), rel=0.1)
-    # The median of uniform numbers scatters by 1 / sqrt(n); of the two sides of its interval the wider one counts.
-    assert abs(found["impact_impulse"].value - 1.0) < found["impact_impulse"].half < 0.1 and found["impact_impulse"].half > 0.05
-    assert impact_values(replace(run, impacts=many[:1])) == {}
+    hits, naive = [], []
+    for _ in range(800):
+        piles = [cascades(rng) for _ in range(5)]
+        found = {name: one.estimate for name, one in impact_values([replace(run, impacts=impacts) for impacts in piles]).items()}
+        count, peak = found["impact_count"], found["impact_peak"]
+        assert count.basis == peak.basis == "5 replicas"
+        hits.append((abs(count.value - 600.0) <= count.half, abs(np.log(peak.value) - 2.0) <= peak.half / peak.value))
+        # The negative control: impacts as so many independent ones.
+        total = sum(map(len, piles))
+        naive.append((abs(count.value - 600.0) <= 1.96 * np.sqrt(total) / 5,
+                      abs(np.log(peak.value) - 2.0) <= 1.96 * 0.5 / np.sqrt(total)))
+    assert (np.abs(np.mean(hits, axis=0) - 0.95) <= 0.02).all() and (np.mean(naive, axis=0) < 0.6).all()
+
+
+def test_one_pile_does_not_tell_how_far_its_impacts_vary():
+    run, rng = stack(), np.random.default_rng(4)
+    alone = impact_values([replace(run, impacts=cascades(rng))])
+    assert {one.estimate.half for one in alone.values()} == {np.inf}
+    assert impact_values([run, replace(run, impacts=cascades(rng)[:1])]) == {}
+
+
+def test_of_checks_without_an_interval_the_worst_pile_counts():
+    sound, lossy = ({"energy_balance": number(error, 0.0), "push": Value(Estimate(0.2 + error, 0.01)),
+                     "contacts": Value(Estimate(2.0, 0.1), number(1.5).estimate, verdict=verdict)}
+                    for error, verdict in ((1e-9, "pass"), (-1e-3, "fail")))
+    found = together([sound, lossy, sound])
+    assert found["energy_balance"].estimate.value == -1e-3 and found["contacts"].verdict == "fail"
+    assert found["push"].estimate.basis == "3 replicas" and found["push"].estimate.value == pytest.approx(0.2, abs=1e-3)
+    assert together([sound]) == sound

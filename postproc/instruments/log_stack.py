@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dembark.postproc.instruments.logs import LogRun, over_time
-from dembark.postproc.measurement import CONFIDENCE, Array, Curve, Estimate, Value, block_mean, exact, number, profile
-from dembark.postproc.statistics import student
+from dembark.postproc.measurement import Array, Curve, Value, block_mean, exact, number, over_replicas, profile
+from dembark.postproc.statistics import replica_mean
 
 WALLS = (-1, -2, -3)  # ground, left and right stake
 FIRST = 10  # impacts from the beginning in which two engines have to be the same
@@ -56,21 +56,38 @@ def beginning(run: LogRun, count: int) -> tuple[int, NDArray[np.int64], Array]:
     return frame, ids[ids > 0] - 1, order[:count]
 
 
-def impact_values(run: LogRun) -> dict[str, Value]:
-    """How many impacts there were, the geometric mean of their peak forces and the median of their impulses, with the intervals of as many
-    independent ones; nothing of fewer than two."""
-    count, z = len(run.impacts), student(1e9, CONFIDENCE)
-    if count < 2:
+def impact_values(runs: Sequence[LogRun]) -> dict[str, Value]:
+    """How many impacts a pile had, the geometric mean of their peak forces and the median of their impulses, with Student's intervals over
+    the piles; nothing where one of them had fewer than two.
+
+    Impacts come in cascades, each the cause of the next ones: as independent ones they would have intervals that are far too narrow.
+    """
+    found = [run.impacts for run in runs]
+    if min(map(len, found)) < 2:
         return {}
-    basis, peak, impulse = f"{count} impacts as independent ones", np.log(run.impacts[:, 4]), np.sort(run.impacts[:, 5])
-    middle, mean, reach = float(np.median(impulse)), float(np.exp(peak.mean())), 0.5 * z * math.sqrt(count)
-    # The interval of a median is that of its order statistics.
-    low, high = impulse[max(0, math.floor(0.5 * count - reach))], impulse[min(count - 1, math.ceil(0.5 * count + reach))]
     return {
-        "impact_count": Value(Estimate(float(count), z * math.sqrt(count), "counting statistics")),
-        "impact_peak": Value(Estimate(mean, float(mean * z * peak.std() / math.sqrt(count)), basis)),
-        "impact_impulse": Value(Estimate(middle, float(max(high - middle, middle - low)), basis)),
+        "impact_count": Value(replica_mean([len(impacts) for impacts in found])),
+        "impact_peak": Value(replica_mean([float(np.exp(np.log(impacts[:, 4]).mean())) for impacts in found])),
+        "impact_impulse": Value(replica_mean([float(np.median(impacts[:, 5])) for impacts in found])),
     }
+
+
+def together(piles: Sequence[Mapping[str, Value]]) -> dict[str, Value]:
+    """The values of several piles as one: means over them; of numbers without an interval that have a reference, the farthest from it, and
+    a verdict of their own only when all have it."""
+    first, *others = piles
+    return {name: _together([value, *(one[name] for one in others if name in one)]) for name, value in first.items()}
+
+
+def _together(values: Sequence[Value]) -> Value:
+    first = values[0]
+    if len(values) == 1:
+        return first
+    if first.reference is not None and not first.verdict and all(one.estimate.half == 0.0 for one in values):
+        due = first.reference.value
+        return max(values, key=lambda one: abs(one.estimate.value - due))
+    verdict = next((one.verdict for one in values if one.verdict != "pass"), first.verdict)
+    return replace(first, estimate=over_replicas([one.estimate for one in values]), verdict=verdict)
 
 
 def at_rest(run: LogRun, stack: Loads, rest: slice) -> dict[str, Value]:

@@ -1,0 +1,54 @@
+"""Verdicts that depend on a packing rest on five packings or more in the profile `standard`, in each engine that runs them."""
+
+from __future__ import annotations
+
+import pytest
+
+from dembark.validation.case.folders import discover, load
+from dembark.validation.case.model import Case
+from dembark.validation.case.resolve import resolve
+
+LEAST = 5
+# Cases whose bodies begin at random places, or with random sizes, so that their numbers are those of one packing.
+RANDOM = ("column_collapse", "debarking_drum", "gravity_channel", "log_pile", "plane_silo", "plug_flow", "silo")
+# Runs that may have fewer, by case, variant and engine, with the reason.
+FEWER: dict[tuple[str, str, str], str] = {}
+
+
+def too_few(case: Case, least: int = LEAST) -> list[tuple[str, str, str]]:
+    """Runs of `standard` (case, variant, engine) with fewer packings than `least`."""
+    return [(case.name, run.variant, engine) for run in case.runs.get("standard", ()) for engine in run.engines
+            if resolve(case, "standard", run.variant, run.changes(engine))["replicas"] < least]
+
+
+def test_cases_with_a_seed_are_the_random_ones_and_have_replicas() -> None:
+    cases = discover()
+    seeded = {name for name, case in cases.items() if "seed" in case.parameters}
+    assert seeded >= set(RANDOM)
+    assert seeded == {name for name, case in cases.items() if "replicas" in case.parameters}
+
+
+@pytest.mark.parametrize("name", sorted(name for name, case in discover().items() if "replicas" in case.parameters))
+def test_standard_has_five_packings_in_each_engine(name: str) -> None:
+    assert [run for run in too_few(discover()[name]) if run not in FEWER] == []
+
+
+def test_fewer_are_found(tmp_path) -> None:
+    """The negative control."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "liggghts.in").write_text("# A deck.\n")
+    (folder / "yade.py").write_text("p = dembark.parameters()\n")
+    (folder / "case.toml").write_text("""
+[case]
+title = "Mine"
+groups = ["packings"]
+[variants]
+many = {}
+few = { replicas = 4 }
+[profiles]
+standard = { replicas = 5 }
+[runs]
+standard = [{variant = "many", replicas = {yade = 1}}, "few"]
+""")
+    assert too_few(load(folder / "case.toml")) == [("mine", "many", "yade"), ("mine", "few", "liggghts"), ("mine", "few", "yade")]
