@@ -1,4 +1,4 @@
-"""The process that renders scenes for `render.py`; it loads nothing but what it needs."""
+"""The process that renders scenes for `render.py`; it loads nothing but what it needs, and then waits for the name of their folder."""
 
 from __future__ import annotations
 
@@ -44,4 +44,6 @@ def draw(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    draw(Path(sys.argv[1]))
+    # Nothing comes where the process that wanted pictures has ended.
+    if wanted := sys.stdin.read():
+        draw(Path(wanted))

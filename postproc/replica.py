@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import wraps
+from functools import cached_property, wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,7 +14,11 @@ from numpy.typing import NDArray
 from dembark.postproc import ContactFrame, ContactsDump, DumpError, GrainFrame, GrainsDump, read_times
 
 Array = NDArray[np.float64]
+Source = TypeVar("Source")
 Measured = TypeVar("Measured")
+
+# Bytes of dumps that are kept as frames, for they are read several times.
+KEPT = 32 << 20
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,28 @@ class Replica:
         return table
 
     def paired_frames(self) -> Iterator[tuple[GrainFrame, ContactFrame]]:
-        """(grains, contacts) of every frame; DumpError when the two files do not hold the same steps."""
+        """(grains, contacts) of every frame, those of a small run from memory when they were read before; DumpError when the two files do
+        not hold the same steps."""
+        if "_frames" in self.__dict__:
+            yield from self.__dict__["_frames"]
+            return
+        kept = []
+        for pair in self._read_pairs():
+            if self._small:
+                kept.append(pair)
+            yield pair
+        if self._small:
+            self.__dict__["_frames"] = kept
+
+    def grain_frames(self) -> Iterator[GrainFrame]:
+        """The grains of every frame; those of a small run are read with their contacts, and but once."""
+        return (grains for grains, _ in self.paired_frames()) if self._small else iter(self.grains())
+
+    @cached_property
+    def _small(self) -> bool:
+        return sum(path.stat().st_size for path in self.folder.glob("*.dump")) <= KEPT
+
+    def _read_pairs(self) -> Iterator[tuple[GrainFrame, ContactFrame]]:
         grains, contacts = self.grains(), self.contacts()
         if len(grains) != len(contacts):
             raise DumpError(f"{self.folder}: grains.dump has {len(grains)} frames, contacts.dump {len(contacts)}")
@@ -79,14 +104,14 @@ class Replica:
             yield one, other
 
 
-def once(read: Callable[[Replica], Measured]) -> Callable[[Replica], Measured]:
-    """`read(replica)`, done once for each Replica object: the quantities of a case and its fields share what was read."""
+def once(read: Callable[[Source], Measured]) -> Callable[[Source], Measured]:
+    """`read(replica)`, done once for each Replica object, or for what was read of it: quantities of a case and its fields share that."""
 
     @wraps(read)
-    def kept(replica: Replica) -> Measured:
-        found = replica.__dict__.setdefault("_read", {})
+    def kept(source: Source) -> Measured:
+        found: dict[Any, Measured] = source.__dict__.setdefault("_read", {})
         if read not in found:
-            found[read] = read(replica)
+            found[read] = read(source)
         return found[read]
 
     return kept

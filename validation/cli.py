@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import sys
 from collections.abc import Callable
@@ -79,16 +80,8 @@ def run(
 ) -> None:
     """Run a case in one engine, measure it and show each quantity beside its reference."""
     from dembark.common.choices import pick
-    from dembark.validation import show
     from dembark.validation.case.folders import find
     from dembark.validation.case.resolve import resolve, settings
-    from dembark.validation.judge import measuring
-    from dembark.validation.judge.result import METRICS
-    from dembark.validation.judge.tally import tally
-    from dembark.validation.runs import restarts
-    from dembark.validation.runs.job import cancelled_by_signal
-    from dembark.validation.runs.perform import perform_series
-    from dembark.validation.runs.plan import Resources, series
 
     one = find(case)
     changes = settings(change or ())
@@ -101,8 +94,17 @@ def run(
     if out is None and changes:
         raise DembarkError("--out is missing", "with --set the run is not the one of the profile", "name a folder for its results")
     with ThreadPoolExecutor(1) as beside:
-        # To tell its version an engine starts, which takes as long as the imports of what measures.
+        # To tell its version an engine starts, which takes as long as the imports of what runs and measures.
         found = beside.submit(engines.find, engine)
+        from dembark.validation import show
+        from dembark.validation.judge import measuring
+        from dembark.validation.judge.result import METRICS
+        from dembark.validation.judge.tally import tally
+        from dembark.validation.runs import restarts
+        from dembark.validation.runs.job import cancelled_by_signal
+        from dembark.validation.runs.perform import perform_series
+        from dembark.validation.runs.plan import Resources, series
+
         measuring.check(one)
     planned = series(one, chosen, profile, found.result(), changes)
     if restart_interval is not None and not restarts.supported(planned.runs[0]):
@@ -242,6 +244,23 @@ def main(words: list[str] | None = None) -> int:
         print(f"dembark: {' '.join(message().split()).rstrip('.')}, see 'dembark --help'", file=sys.stderr)
         return 2
     return code if isinstance(code, int) else 0
+
+
+def script() -> None:
+    """The console script: `main`, and the end of the process without that of the interpreter, which takes 0.4 s to free one by one the
+    modules and arrays of a process that is over (mypy does the same).
+
+    What else belongs to an end is done: functions registered for it, and what is written is flushed. Where that fails, as into a pipe that
+    was closed, the interpreter ends in its own way and tells.
+    """
+    code = main()
+    try:
+        atexit._run_exitfuncs()
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except OSError:
+        sys.exit(code)
+    os._exit(code)
 
 
 if __name__ == "__main__":

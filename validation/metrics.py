@@ -22,6 +22,29 @@ if TYPE_CHECKING:
     import xarray
 
 
+class Early:
+    """Finished replicas that are read while others still run; `measure` goes on with what was read."""
+
+    def __init__(self) -> None:
+        self._read: dict[Path, Replica] = {}
+        # Numerical warnings on the way.
+        self.warnings: list[str] = []
+
+    def read(self, folder: Path) -> None:
+        """Read what of the finished replica in `folder` needs no other replica."""
+        record = read_json(folder / "run.json")
+        if record is not None:
+            self._read[folder] = one = Replica(folder, _whole(record))
+            with analysis.warnings_kept() as warnings:
+                measuring.prepare(find(record["case"]), one)
+            self.warnings += warnings
+
+    def chosen(self, one: Replica) -> Replica:
+        """The same replica as it was read; `one` itself when it was not."""
+        kept = self._read.get(one.folder)
+        return kept if kept == one else one
+
+
 def replicas(folder: Path) -> list[Replica]:
     """Finished replicas of `folder`, in the order of their numbers."""
     found = [Replica(path.parent, _whole(record)) for path in folder.glob("replica-*/run.json") if (record := read_json(path)) is not None]
@@ -34,12 +57,14 @@ def _whole(record: dict[str, Any]) -> dict[str, Any]:
     return {"impact_id_offset": engines.facts(record["engine"]).impact_id_offset, "derived": derived, **record}
 
 
-def measure(folder: Path, wanted: int | None = None) -> Result:
-    """Measure the replicas in `folder`, of which there are to be `wanted`, and write their `fields.nc`.
+def measure(folder: Path, wanted: int | None = None, early: Early | None = None) -> Result:
+    """Measure the replicas in `folder`, of which there are to be `wanted`, and write their `fields.nc`; what `early` has read is not read
+    again.
 
     RunError when there is no finished replica, or one of their files cannot be read: a result is whole or not there.
     """
-    runs = replicas(folder)
+    early = early or Early()
+    runs = [early.chosen(one) for one in replicas(folder)]
     if not runs:
         raise RunError(f"nothing to measure in {folder}", "it has no finished replica-*/run.json")
     first, case = runs[0].record, find(runs[0].record["case"])
@@ -55,7 +80,7 @@ def measure(folder: Path, wanted: int | None = None) -> Result:
     numbers = {int(one.record["replica"]) for one in runs}
     return Result(
         case.name, first["variant"], first["engine"], quantities, first["profile"], parameters=parameters, profiles=tuple(found.profiles),
-        remarks=(*_remarks(case, found), *warnings), picture=measuring.picture(case, first),
+        remarks=(*_remarks(case, found), *dict.fromkeys([*early.warnings, *warnings])), picture=measuring.picture(case, first),
         references=measuring.references(case), provenance=_provenance(runs), measured=provenance.measured(),
         inputs=tuple(one.record["inputs"] for one in runs if "inputs" in one.record),
         replicas_missing=tuple(number for number in range(1, (wanted or 0) + 1) if number not in numbers))

@@ -9,7 +9,12 @@ from dataclasses import replace
 from dembark.postproc.instruments import silo, silo_fields
 from dembark.postproc.instruments.column import read
 from dembark.postproc.instruments.liquid import liquid_values
-from dembark.postproc.measurement import Measurement, Points, Replicas
+from dembark.postproc.measurement import Measurement, Points, Replica, Replicas
+
+
+def prepare(replica: Replica) -> None:
+    """What needs no other replica: done while they still run."""
+    silo.scalars(read(replica))
 
 
 def measure(replicas: Replicas) -> Measurement:

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
 
 from dembark import _fields
 from dembark.common.errors import DembarkError
@@ -161,6 +160,8 @@ def _deposit(
         flat = (x[:, :, None, None] * grid.shape[1] + y[:, None, :, None]) * grid.shape[2] + z[:, None, None, :]
         share *= inside[0][:, :, None, None] & inside[1][:, None, :, None] & inside[2][:, None, None, :]
         pointers = np.arange(0, share.size + 1, share[0].size)
+        from scipy.sparse import csr_matrix  # slow to import, and not needed before something is measured
+
         spread = csr_matrix((share.ravel(), flat.ravel(), pointers), shape=(end - begin, grid.cells))
         out += (spread.T @ values[begin:end]).reshape(out.shape)
 

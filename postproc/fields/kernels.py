@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import erf
 
 from dembark.common.errors import DembarkError
 from dembark.postproc.fields.grid import Grid
@@ -26,6 +25,12 @@ Array = NDArray[np.float64]
 NAMES = ("gaussian", "lucy", "heaviside")
 CUTOFF = 3.0  # standard deviations at which the Gaussian is cut
 MAX_PANELS = 32
+
+
+def _erf(value: Array | float) -> Array:
+    from scipy.special import erf  # slow to import, and not needed before something is measured
+
+    return np.asarray(erf(value))
 
 
 @dataclass(frozen=True)
@@ -52,13 +57,13 @@ class Kernel:
         """Second moment along one axis (m2): the integral of x^2 phi."""
         if self.name == "gaussian":
             density = np.exp(-0.5 * CUTOFF**2) / np.sqrt(2.0 * np.pi)
-            return self.width**2 * (1.0 - 2.0 * CUTOFF * density / float(erf(CUTOFF / np.sqrt(2.0))))
+            return self.width**2 * (1.0 - 2.0 * CUTOFF * density / float(_erf(CUTOFF / np.sqrt(2.0))))
         return self.width**2 * (1.0 / 12.0 if self.name == "lucy" else 0.2)
 
     def __call__(self, distance: Array) -> Array:
         """phi (1/m3) at the vectors `distance` (..., 3) in m."""
         if self.name == "gaussian":
-            norm = np.sqrt(2.0 * np.pi) * self.width * float(erf(CUTOFF / np.sqrt(2.0)))
+            norm = np.sqrt(2.0 * np.pi) * self.width * float(_erf(CUTOFF / np.sqrt(2.0)))
             inside = (np.abs(distance) < self.reach).all(axis=-1)
             return np.where(inside, np.exp(-0.5 * (distance**2).sum(axis=-1) / self.width**2) / norm**3, 0.0)
         return self._radial(np.sqrt((distance**2).sum(axis=-1)))
@@ -105,7 +110,7 @@ def line_nodes(kernel: Kernel, length: float) -> tuple[Array, Array]:
 def cumulative(kernel: Kernel, distance: Array) -> Array:
     """Integral of the Gaussian's factor of one axis from minus infinity to `distance` (m); 0 ... 1."""
     scaled = np.clip(distance / kernel.width, -CUTOFF, CUTOFF)
-    return 0.5 + 0.5 * erf(scaled / np.sqrt(2.0)) / erf(CUTOFF / np.sqrt(2.0))
+    return 0.5 + 0.5 * _erf(scaled / np.sqrt(2.0)) / _erf(CUTOFF / np.sqrt(2.0))
 
 
 def ball_shares(kernel: Kernel, edges: tuple[Array, Array, Array], nodes: int) -> Array:

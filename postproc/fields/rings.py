@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ive, ndtr
 
 from dembark.postproc import ContactFrame, GrainFrame, spheres
 from dembark.postproc.fields.coarse_graining import WallContacts
@@ -93,6 +92,8 @@ class Rings:
         return CubicSpline(places, np.hstack([*shares, borders]))
 
     def _kernel(self, order: int, radius: Array, source: Array) -> Array:
+        from scipy.special import ive
+
         scaled = ive(order, radius * source / self.width**2) * np.exp(-0.5 * ((radius - source) / self.width) ** 2)
         return np.asarray(scaled / (2.0 * np.pi * self.width**2))
 
@@ -104,9 +105,14 @@ class Rings:
 
     def along(self, source: Array) -> tuple[Array, Array]:
         """For sources at the heights (m,): shares (m, l) in the layers, and values (m, l + 1) at their borders in 1/m."""
-        distance = (self.vertical - source[:, None]) / self.width
-        below = ndtr(distance)
-        density = np.exp(-0.5 * distance**2) / (np.sqrt(2.0 * np.pi) * self.width)
+        from scipy.special import ndtr
+
+        # In place, for asking the system for memory takes as long as the arithmetic.
+        density = self.vertical - source[:, None]
+        density /= self.width
+        below = ndtr(density)
+        np.exp(np.multiply(np.square(density, out=density), -0.5, out=density), out=density)
+        density /= np.sqrt(2.0 * np.pi) * self.width
         # The outermost layers hold what lies beyond them, so nothing flows through their outer borders.
         below[:, 0], below[:, -1] = 0.0, 1.0
         density[:, [0, -1]] = 0.0
@@ -115,6 +121,8 @@ class Rings:
     @cached_property
     def above(self) -> Array:
         """Part (l,) of the kernel that lies above the base: 1 far from it, ½ at it."""
+        from scipy.special import ndtr
+
         return np.asarray(ndtr(self.heights / self.width))
 
     @cached_property

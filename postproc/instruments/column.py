@@ -23,6 +23,7 @@ from dembark.postproc import ContactFrame, GrainFrame, profiles, stress
 from dembark.postproc.instruments import janssen
 from dembark.postproc.instruments.vessel import Vessel, vessel
 from dembark.postproc.measurement import Array, Estimate, Replica, block_mean
+from dembark.postproc.replica import once
 from dembark.postproc.spheres import slice_volumes
 
 Mask = NDArray[np.bool_]
@@ -174,12 +175,13 @@ class Column:
         return (self.field[:, chosen].sum(axis=1) - total) / total.mean()
 
 
+@once
 def read(replica: Replica) -> Column:
     """Measure one run folder."""
     values = replica.parameters
     silo, diameter, gravity = vessel(values), float(values["grain_diameter"]), float(values["gravity"])
     outlines = [(frame.step, profiles.surface_height(frame.positions[:, 2], frame.radii, silo.area), frame.masses.sum())
-                for frame in replica.grains()]
+                for frame in replica.grain_frames()]
     height, mass = float(np.mean([row[1] for row in outlines])), float(outlines[-1][2])
     edges = np.linspace(0.0, height, max(4, round(height / diameter)) + 1)
     sectors, bridges = silo.sectors(diameter), wall_bridges(values)

@@ -13,6 +13,7 @@ from dembark.postproc.instruments.column import Column, Mask
 from dembark.postproc.instruments.growth import Growth
 from dembark.postproc.instruments.vessel import overlap
 from dembark.postproc.measurement import Array, Measurement, Value
+from dembark.postproc.replica import once
 from dembark.postproc.resampling import pooled, profile, resampled
 from dembark.postproc.statistics import Estimate, block_mean, exact, time_blocks
 from dembark.postproc.studies import measured as of_point
@@ -35,7 +36,8 @@ def _kept(fit: Fit) -> Fit:
     return get
 
 
-def _scalars(one: Column) -> dict[str, Estimate]:
+@once
+def scalars(one: Column) -> dict[str, Estimate]:
     """Quantities of one replica by name, lengths over the vessel's size; names with _ are what references and intervals are made of."""
     frames, (_, whole), size = time_blocks(one.shear.sum(axis=(1, 2))), one.everything, one.vessel.size
     sectors, fitted, pair = np.arange(len(whole)), _kept(one.fitted_length), _kept(one.fitted_pair)
@@ -103,8 +105,8 @@ def measured(columns: Sequence[Column], size: str, across: str, friction: Mappin
     `size`: symbol of the length in Janssen's law; `across`: letter of the direction to the wall; `friction`: the wall's coefficients
     `wall_static` and `wall_kinetic`.
     """
-    scalars, wet = [_scalars(column) for column in columns], bool(columns[0].adhesion.any())
-    over = {name: pooled(scalars, name) for name in scalars[0]}
+    found, wet = [scalars(column) for column in columns], bool(columns[0].adhesion.any())
+    over = {name: pooled(found, name) for name in found[0]}
     references: dict[str, tuple[Estimate, float | None]] = {
         "janssen_profile_deviation": (ZERO, None),
         "janssen_length_predicted": (over["janssen_length_measured"], over["_length_error"].half),

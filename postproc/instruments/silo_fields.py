@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from operator import add
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from dembark.postproc.fields.rings import Fields, Rings, coarse_grain
 from dembark.postproc.instruments import janssen
@@ -78,20 +79,28 @@ def read(replica: Replica, rings: Rings, height: float) -> Silo:
     inside = np.nonzero((rings.heights > 0.0) & (rings.heights < height))[0]
     recorder = WallRecorder(side, cylinder_patches(side, 1, rings.vertical[inside[0] : inside[-1] + 2]), keep_series=False)
     total, rows = [], []
-    # Products of tall thin matrices gain nothing from more threads, and a second measurement may run beside this one.
-    with threadpool_limits(1, "blas"):
-        for grains, contacts in replica.paired_frames():
-            walls = [wall_contacts(grains, side), wall_contacts(grains, base)]
-            found, zone = coarse_grain(grains, contacts, walls, rings, layers, lambda place: vessel.wall_shares(place, sectors))
-            recorder.add(grains)
-            total.append(found)
-            rows.append((zone.stress, zone.column, grains.wall_forces["side"][:, 2].sum(), grains.step, grains.masses.sum()))
+    for grains, contacts in replica.paired_frames():
+        walls = [wall_contacts(grains, side), wall_contacts(grains, base)]
+        found, zone = coarse_grain(grains, contacts, walls, rings, layers, lambda place: vessel.wall_shares(place, sectors))
+        recorder.add(grains)
+        total.append(found)
+        rows.append((zone.stress, zone.column, grains.wall_forces["side"][:, 2].sum(), grains.step, grains.masses.sum()))
     stresses, column, lift, steps, masses = (np.array(part) for part in zip(*rows, strict=True))
     times, weight = replica.times(), float(masses[-1]) * float(given["gravity"])
     wall = np.full((len(rings.heights), 2), np.nan)
     wall[inside] = recorder.result().mean[:, :2]
     error = block_mean((lift - np.interp(steps, times["step"], times["side_fz"])) / weight)
     return Silo(rings, reduce(add, total), stresses, column, wall, error, weight)
+
+
+def _all(replicas: Sequence[Replica], rings: Rings, height: float) -> list[Silo]:
+    """`read` of all replicas, as many at a time as this process has cores: most of it is done in arrays, which leave the interpreter to
+    others."""
+    from threadpoolctl import threadpool_limits  # slow to import
+
+    # Products of tall thin matrices gain nothing from more threads.
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        return list(pool.map(lambda replica: read(replica, rings, height), replicas))
 
 
 class _Janssen:
@@ -129,7 +138,7 @@ def measured(replicas: Sequence[Replica], known: Mapping[str, Value]) -> Measure
     radius, diameter, gravity = (float(given[name]) for name in ("cylinder_radius", "grain_diameter", "gravity"))
     height = known["filling_height"].estimate.value * radius
     rings = Rings.around(radius, height, diameter, 0.5 * diameter)
-    silos = [read(replica, rings, height) for replica in replicas]
+    silos = _all(replicas, rings, height)
     specific = float(np.mean([one.weight for one in silos])) / (np.pi * radius**2 * height)
     law, zero = _Janssen(known, radius, height, specific), Estimate(0.0, 0.0)
     near = {"axis": rings.radii < 0.5 * radius, "wall": (rings.radii > radius - diameter) & (rings.radii < radius)}

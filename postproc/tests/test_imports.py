@@ -3,7 +3,7 @@
 import subprocess
 import sys
 
-SLOW = {"MDAnalysis", "matplotlib", "pandas", "pint", "pyvista", "scipy.interpolate", "scipy.optimize", "xarray"}
+SLOW = {"MDAnalysis", "matplotlib", "pandas", "pint", "pyvista", "scipy", "threadpoolctl", "xarray"}
 CODE = """
 import sys
 from dembark.validation import cli, show

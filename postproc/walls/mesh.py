@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from dembark.postproc.dumptext import DumpError
 
@@ -117,6 +116,8 @@ class TriangleTree:
 
     def __init__(self, triangles: Array) -> None:
         self._triangles = triangles
+        from scipy.spatial import cKDTree  # slow to import, and only meshes need it
+
         self._centroids = cKDTree(triangles.mean(axis=1))
         low, high, centre = triangles.min(axis=1), triangles.max(axis=1), triangles.mean(axis=1)
         self._boxes = low, high

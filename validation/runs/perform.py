@@ -6,10 +6,11 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING, Self
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json, write_json
@@ -22,6 +23,9 @@ from dembark.validation.runs.plan import Plan, Resources, Series, studies
 from dembark.validation.runs.progress import Monitor
 from dembark.validation.runs.steps import Step, draw, measure_series, steps
 from dembark.validation.runs.table import State, Table, summary
+
+if TYPE_CHECKING:
+    from dembark.validation.metrics import Early
 
 LOCK = ".lock"
 # Makes the place where a plan's runs work, once its table is there.
@@ -117,19 +121,18 @@ def perform_series(one: Series, out: Path, cancel: threading.Event, used: Resour
     except OSError as error:
         raise DembarkError(f"cannot make the folder {out}", error.strerror or str(error)) from None
     cores = jobs * used.cores if jobs else max(used.cores, os.cpu_count() or 1)
-    table = Table()
+    table, folders = Table(), {run.name: run.folder_name for run in one.runs}
     table.enter({run.folder_name: run for run in one.runs}, out, {})
-    drawn: list[Future[list[str]]] = []
-    with ThreadPoolExecutor(2) as beside:
-        beside.submit(_load)
+    shown = one.runs[0].case.picture
+    rendered = bool(shown) and "cross_section" not in shown
+    with _Beside(out, rendered and cores > used.cores * len(one.runs)) as beside:
         # Why a run failed is told once, at the end.
         with Monitor(table.states, reasons=False) as monitor:
 
             def event(state: State) -> None:
                 monitor.event(state)
-                # The pictures are of the first replica: they need not wait for the others.
-                if state.name == one.runs[0].name and state.state == "finished":
-                    drawn.append(beside.submit(draw, out))
+                if state.state == "finished":
+                    beside.finished(out / folders[state.name], state.name == one.runs[0].name)
 
             table.listener = event
             executor = Executor(table, Local(cores, None, cancel), cancel, retries=0)
@@ -140,13 +143,56 @@ def perform_series(one: Series, out: Path, cancel: threading.Event, used: Resour
                 if message != str(first):
                     print(f"dembark: {message}", file=sys.stderr)
             raise first
-        return measure_series(out, one.runs, drawn[0] if drawn else None)
+        return measure_series(out, one.runs, beside.drawn, beside.early())
 
 
-def _load() -> None:
-    """Import what measures and draws: meanwhile the engines run."""
-    for name in ("dembark.validation.metrics", "dembark.postproc.pictures.packings", "dembark.postproc.pictures.sections",
-                 "dembark.postproc.output", "scipy.optimize", "scipy.interpolate"):
+class _Beside:
+    """What is done in threads while the engines run: the import of what measures and draws, the pictures, and what of each finished replica
+    needs no other one. When the block ends by an error, nothing more of it begins and nothing is waited for."""
+
+    def __init__(self, out: Path, warm: bool) -> None:
+        """`warm`: the process that renders is started at once, for it has something to do and a core to itself."""
+        self._out, self._reading, self._drawing = out, ThreadPoolExecutor(1), ThreadPoolExecutor(1)
+        self._loaded: Future[Early] = self._reading.submit(_load)
+        self._read: list[Future[None]] = []
+        self.drawn: Future[list[str]] | None = None
+        self._drawing.submit(_load_drawing, warm)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        for pool in (self._reading, self._drawing):
+            pool.shutdown(wait=kind is None, cancel_futures=True)
+
+    def finished(self, folder: Path, first: bool) -> None:
+        """The replica in `folder` is finished; the pictures are of the `first` one and need not wait for the others."""
+        self._read.append(self._reading.submit(lambda: self._loaded.result().read(folder)))
+        if first:
+            self.drawn = self._drawing.submit(draw, self._out)
+
+    def early(self) -> Early:
+        """What was read, after the last of it."""
+        wait(self._read)
+        return self._loaded.result()
+
+
+def _load() -> Early:
+    """Import what measures."""
+    for name in ("scipy.optimize", "scipy.interpolate"):
+        import_module(name)
+    from dembark.validation.metrics import Early
+
+    return Early()
+
+
+def _load_drawing(warm: bool) -> None:
+    """Import what draws and what writes fields; start the process that renders, which takes a second or two, if that is to be `warm`."""
+    if warm:
+        from dembark.postproc import render
+
+        render.warm()
+    for name in ("dembark.postproc.pictures.packings", "dembark.postproc.pictures.sections", "dembark.postproc.output"):
         import_module(name)
 
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dembark import common, postproc, validation
 from dembark.common.errors import DembarkError, RunError
@@ -18,6 +18,9 @@ from dembark.postproc import pictures
 from dembark.validation import analysis, provenance
 from dembark.validation.judge.result import COMPARISON, METRICS, Result, write
 from dembark.validation.runs.plan import Plan, PlannedStudy, Run, finished, studies, variants
+
+if TYPE_CHECKING:
+    from dembark.validation.metrics import Early
 
 # A campaign's folder holds a copy of its file.
 CAMPAIGN_FILE = "campaign.toml"
@@ -109,11 +112,12 @@ def draw(folder: Path) -> list[str]:
     return pictures.draw(folder, picture(folder))
 
 
-def measure_series(folder: Path, runs: Iterable[Run], drawn: Future[list[str]] | None = None) -> Result:
+def measure_series(folder: Path, runs: Iterable[Run], drawn: Future[list[str]] | None = None,
+                   early: Early | None = None) -> Result:
     """Measure the finished ones of `runs` and write `folder/metrics.json`; results of other inputs are put aside first.
 
-    `drawn`: what `draw` returns, where the pictures are being drawn already. Raises RunError when none is finished or the measurement
-    fails; then there is no metrics.json, rather than an old one.
+    `drawn`: what `draw` returns, where the pictures are being drawn already; `early`: what was read already. Raises RunError when none is
+    finished or the measurement fails; then there is no metrics.json, rather than an old one.
     """
     wanted = {run.folder_name: run for run in runs}
     for path in folder.glob("replica-*"):
@@ -131,7 +135,7 @@ def measure_series(folder: Path, runs: Iterable[Run], drawn: Future[list[str]] |
         # A process of its own draws, which measuring need not wait for.
         with ThreadPoolExecutor(1) as beside:
             drawn = drawn or beside.submit(draw, folder)
-            found = measure(folder, len(wanted))
+            found = measure(folder, len(wanted), early)
         return write(target, replace(found, remarks=(*found.remarks, *drawn.result())))
 
 

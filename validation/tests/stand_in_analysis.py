@@ -8,7 +8,12 @@ import sys
 import types
 
 
-def measure(folder, wanted):
+class Early:
+    def read(self, folder):
+        pass
+
+
+def measure(folder, wanted, early=None):
     from dembark.validation.judge.result import QuantityRecord, Result
 
     replicas = sorted(folder.glob("replica-*/run.json"))
@@ -50,6 +55,6 @@ def write(folder):
 
 
 for name, function in (("verification", write), ("metrics", measure), ("metrics", picture), ("metrics", study), ("judge.compare", compare),
-                       ("report", build), ("campaigns.report.build", build)):
+                       ("report", build), ("campaigns.report.build", build), ("metrics", Early)):
     module = sys.modules.setdefault(f"dembark.validation.{name}", types.ModuleType(f"dembark.validation.{name}"))
     setattr(module, function.__name__, function)

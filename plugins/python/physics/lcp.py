@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 
 from dembark import _physics
 
-Matrix: TypeAlias = ArrayLike | sparse.sparray | sparse.spmatrix
+if TYPE_CHECKING:
+    # Scipy takes a third of a second to import, which those who solve nothing need not wait for.
+    from scipy import sparse
+
+Matrix: TypeAlias = "ArrayLike | sparse.sparray | sparse.spmatrix"
 LCP_METHODS = ("auto", "energy", "block", "murty", "pgs")
 
 
@@ -82,6 +85,8 @@ class LcpSolver:
               tolerance: float = 1e-12, max_iterations: int | None = None, check: bool = True) -> LcpResult:
         """As `solve_lcp`. `check=False` leaves out the tests of symmetry, definiteness and finite numbers: for matrices that have them
         by construction. What is not definite may then be answered or reported, as it turns out."""
+        from scipy import sparse
+
         right = _vector(q)
         n = len(right)
         limit = _limit(max_iterations)
@@ -158,6 +163,8 @@ def _dense(M: ArrayLike, n: int) -> NDArray[np.float64]:  # noqa: N803
 
 
 def _columns(M: sparse.sparray | sparse.spmatrix, n: int) -> sparse.csc_array:  # noqa: N803
+    from scipy import sparse
+
     _shape(M.shape, n)
     matrix = sparse.csc_array(M)
     if np.iscomplexobj(matrix.data):
