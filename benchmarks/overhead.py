@@ -1,7 +1,7 @@
 """What `dembark run silo` takes beside its engine: from the command to the table, less the time in which an engine ran.
 
-`python -m benchmarks.overhead` samples the programs in turn and prints and writes medians; `--program before=../other/.venv/bin/dembark` adds
-another one, as that of an older checkout. With `--replay` the engine is replaced by one that waits as long as a recorded run took and
+`python -m benchmarks.overhead` samples the programs in turn and prints and writes medians; `--program before=../other/.venv/bin/dembark`
+adds another, as that of an older checkout. With `--replay` the engine is replaced by one that waits as long as a recorded run took and
 then copies what that wrote: all processor time is dembark's then, and a machine that is busy otherwise disturbs it less.
 """
 

@@ -125,7 +125,7 @@ def render(scenes: Iterable[Scene], scale: tuple[float, float], pixels: int = _P
 
 
 def warm() -> None:
-    """Start the process that the next `render` will use, which takes a second or two: it waits for its scenes, or for this process's end."""
+    """Start the process that the next `render` will use, which takes a second or two: it waits for scenes, or for the end of this one."""
     _waiting.append(_start())
 
 

@@ -105,15 +105,13 @@ class Replica:
 
 
 def once(read: Callable[[Source], Measured]) -> Callable[[Source], Measured]:
-    """`read(replica)`, done once for each Replica object, or for what was read of it: the quantities of a case and its fields share that."""
+    """`read(replica)`, done once for each Replica object, or for what was read of it: quantities of a case and its fields share that."""
 
     @wraps(read)
     def kept(source: Source) -> Measured:
-        found: dict[str, Measured] = source.__dict__.setdefault("_read", {})
-        # By its name, for a measure.py may be loaded more than once.
-        name = f"{read.__module__}.{read.__qualname__}"
-        if name not in found:
-            found[name] = read(source)
-        return found[name]
+        found: dict[Any, Measured] = source.__dict__.setdefault("_read", {})
+        if read not in found:
+            found[read] = read(source)
+        return found[read]
 
     return kept

@@ -17,12 +17,8 @@ FEWER: dict[tuple[str, str, str], str] = {}
 
 def too_few(case: Case, least: int = LEAST) -> list[tuple[str, str, str]]:
     """Runs of `standard` (case, variant, engine) with fewer packings than `least`."""
-    found = []
-    for run in case.runs.get("standard", ()):
-        for engine in run.engines:
-            if resolve(case, "standard", run.variant, run.changes(engine))["replicas"] < least:
-                found.append((case.name, run.variant, engine))
-    return found
+    return [(case.name, run.variant, engine) for run in case.runs.get("standard", ()) for engine in run.engines
+            if resolve(case, "standard", run.variant, run.changes(engine))["replicas"] < least]
 
 
 def test_cases_with_a_seed_are_the_random_ones_and_have_replicas() -> None:

@@ -52,12 +52,19 @@ def check(case: Case) -> ModuleType:
     """The measure.py of the case, loaded; DembarkError, with file and line, when it is missing or cannot be loaded."""
     deck.require_measure(case)
     path = case.folder / "measure.py"
-    module = deck.load_module(path, f"dembark_measure_{case.name}")
+    stat = path.stat()
+    module = _loaded(path, case.name, (stat.st_mtime_ns, stat.st_size))
     for name in ("measure", *(["study"] if case.studies else [])):
         if not callable(getattr(module, name, None)):
             raise DembarkError(f"{path} has no function {name}", "",
                                "it needs measure(replicas) and, with [studies], study(name, points, along)")
     return module
+
+
+@cache
+def _loaded(path: Path, name: str, _changed: tuple[int, int]) -> ModuleType:
+    """The module of a measure.py, loaded once until it changes, so that what `prepare` has read is found by `measure`."""
+    return deck.load_module(path, f"dembark_measure_{name}")
 
 
 def _call(case: Case, name: str, call: Callable[[Callable[..., Any]], Any]) -> Measurement:

@@ -112,11 +112,12 @@ def draw(folder: Path) -> list[str]:
     return pictures.draw(folder, picture(folder))
 
 
-def measure_series(folder: Path, runs: Iterable[Run], drawn: Future[list[str]] | None = None, early: Early | None = None) -> Result:
+def measure_series(folder: Path, runs: Iterable[Run], drawn: Future[list[str]] | None = None,
+                   early: Early | None = None) -> Result:
     """Measure the finished ones of `runs` and write `folder/metrics.json`; results of other inputs are put aside first.
 
-    `drawn`: what `draw` returns, where the pictures are being drawn already; `early`: what was read already. Raises RunError when none is finished or the measurement
-    fails; then there is no metrics.json, rather than an old one.
+    `drawn`: what `draw` returns, where the pictures are being drawn already; `early`: what was read already. Raises RunError when none is
+    finished or the measurement fails; then there is no metrics.json, rather than an old one.
     """
     wanted = {run.folder_name: run for run in runs}
     for path in folder.glob("replica-*"):

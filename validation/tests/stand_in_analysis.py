@@ -54,7 +54,7 @@ def write(folder):
     pass
 
 
-for name, function in (("verification", write), ("metrics", measure), ("metrics", picture), ("metrics", study), ("metrics", Early), ("judge.compare", compare),
-                       ("report", build), ("campaigns.report.build", build)):
+for name, function in (("verification", write), ("metrics", measure), ("metrics", picture), ("metrics", study), ("judge.compare", compare),
+                       ("report", build), ("campaigns.report.build", build), ("metrics", Early)):
     module = sys.modules.setdefault(f"dembark.validation.{name}", types.ModuleType(f"dembark.validation.{name}"))
     setattr(module, function.__name__, function)

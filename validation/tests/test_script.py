@@ -69,7 +69,7 @@ def test_a_pipe_that_was_closed_and_a_full_disk_are_told_as_ever(call: Callable[
     for code in (SCRIPT, PLAIN):
         read, write = os.pipe()
         os.close(read)
-        with os.fdopen(write, "w") as closed, Path("/dev/full").open("w") as full:
+        with os.fdopen(write, "w") as closed, Path("/dev/full").open("w", encoding="utf-8") as full:
             codes.append([call(code, "cases", stdout=out).returncode for out in (closed, full)])
     assert codes[0] == codes[1] and all(codes[0])
 
