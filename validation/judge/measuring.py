@@ -173,11 +173,13 @@ def statements(case: Case) -> list[str]:
 def judge(deviation: float, half: float, tolerance: float) -> tuple[str, str]:
     """Verdict and reason of a deviation with interval half-width `half`.
 
-    pass: all of the interval is within the tolerance. fail: the deviation is beyond it. info, which is open: the interval reaches beyond
-    the tolerance, or is wider than it, so that neither verdict would mean anything.
+    pass: all of the interval is within the tolerance. fail: the deviation is beyond it or, where the interval is the wider of the two, all of
+    the interval is. info, which is open: the interval reaches beyond the tolerance, and neither verdict would mean anything.
     """
     if not math.isfinite(deviation):
         return "fail", "no finite number"
+    if abs(deviation) - half > tolerance:
+        return "fail", ""
     if not half <= tolerance:
         wide = f"±{half:.2g}" if math.isfinite(half) else "unknown"
         return "info", f"its interval ({wide}) is wider than what is allowed"
@@ -194,11 +196,12 @@ def packings(basis: str) -> float:
 
 def chance(half: float, tolerance: float | None, count: float) -> float | None:
     """Probability that a check whose true deviation is zero fails by chance, from the half-width of the deviation's interval over `count`
-    packings; from within fewer than three it is taken as normal. 0 where the interval is too wide for a verdict, None where nothing is
-    random."""
+    packings; from within fewer than three it is taken as normal. 0 where the interval is unknown, None where nothing is random."""
     if half == 0.0 or tolerance is None:
         return None
-    return beyond(tolerance, half, count - 1.0 if count >= 3 else math.inf) if half <= tolerance and math.isfinite(half) else 0.0
+    if not math.isfinite(half):
+        return 0.0
+    return beyond(tolerance if half <= tolerance else tolerance + half, half, count - 1.0 if count >= 3 else math.inf)
 
 
 def _finite(value: float | None) -> float | None:

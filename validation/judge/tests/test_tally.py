@@ -1,6 +1,7 @@
 """What is counted as passed, failed, open and information, and how that is said."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from dembark.postproc.statistics import Estimate
 from dembark.validation.case.model import Declared
 from dembark.validation.judge import result
 from dembark.validation.judge.compare import pair
-from dembark.validation.judge.measuring import judged
+from dembark.validation.judge.measuring import judge, judged
 from dembark.validation.judge.result import QuantityRecord, Result
 from dembark.validation.judge.tally import of_folder, tally
 
@@ -46,12 +47,20 @@ def test_checks_that_rest_on_intervals_are_counted_with_what_chance_does_to_them
     halves = (0.0, 0.1, 0.05, 0.3)
     found = [judged(declared, Value(Estimate(1.0, half, "5 replicas"), Estimate(1.0, 0.0))) for half in halves]
     assert [one.verdict for one in found] == ["pass", "pass", "pass", "info"]
-    # Student's interval over five packings: one in twenty is beyond it, 0.5 % are beyond twice of it; too wide an interval fails never.
-    assert [one.chance for one in found] == [None, pytest.approx(0.05), pytest.approx(0.00516, rel=0.01), 0.0]
+    # Student's interval over five packings: one in twenty is beyond it, 0.5 % are beyond twice of it. A wider one than is allowed fails when
+    # all of it is beyond that: 2 % are.
+    assert [one.chance for one in found] == [None, pytest.approx(0.05), pytest.approx(0.00516, rel=0.01), pytest.approx(0.0208, rel=0.01)]
     counted = tally([*found, QuantityRecord("d", 1.0, "info", chance=0.5)])
-    assert counted.random == 3 and counted.by_chance == pytest.approx(0.0552, rel=0.01)
-    assert counted.sentences[-1] == "chance: 3 of the checks rest on intervals; if every model held exactly, 0.06 of them would fail"
+    assert counted.random == 3 and counted.by_chance == pytest.approx(0.0759, rel=0.01)
+    assert counted.sentences[-1] == "chance: 3 of the checks rest on intervals; if every model held exactly, 0.08 of them would fail"
     assert not any("chance" in line for line in tally(QUANTITIES).sentences)
+
+
+@pytest.mark.parametrize(("deviation", "half", "verdict"), [
+    (0.05, 0.04, "pass"), (0.05, 0.06, "info"), (0.15, 0.06, "fail"), (0.15, 0.2, "info"), (0.05, 0.2, "info"), (-0.32, 0.2, "fail"),
+    (0.0, math.inf, "info"), (5.0, math.inf, "info"), (math.nan, 0.1, "fail")])
+def test_a_wide_interval_leaves_a_check_open_unless_all_of_it_is_beyond_what_is_allowed(deviation: float, half: float, verdict: str) -> None:
+    assert judge(deviation, half, 0.1)[0] == verdict
 
 
 def test_the_comparisons_of_a_page_fail_by_chance_in_one_of_a_hundred_pages() -> None:
