@@ -1,7 +1,7 @@
-"""Silo: stresses of a packing in a vertical cylinder whose wall creeps upward, against Janssen's law with nothing fitted.
+"""Silo: stresses of a packing in a vertical cylinder whose wall creeps upward, against Janssen's law.
 
-sigma_zz = rho_b g lambda (1 - exp(-h / lambda)), lambda = R / (2 K mu_mob), h the depth below the surface; K and mu_mob are measured, none
-is taken from the material's friction. The study is the classical experiment: the mass that the base feels against the mass filled in.
+sigma_zz = rho_b g lambda (1 - exp(-h / lambda)), lambda = R / (2 K mu), h the depth below the surface. The force on the base is predicted
+with K of the contact stress and the friction that the wall was given; in the studies, for other fillings and radii, with K and mu of one.
 """
 
 from dataclasses import replace
@@ -21,5 +21,5 @@ def measure(replicas: Replicas) -> Measurement:
 
 
 def study(_name: str, points: Points, _along: str) -> Measurement:
-    """The apparent mass of the fillings `points` against Janssen's law for the base."""
-    return silo.fillings(points, "R")
+    """The apparent masses of all `points` but `dry`, which they are predicted from."""
+    return silo.predicted(points)

@@ -44,7 +44,7 @@ class Written:
                       "particle_steps_per_second": 1e6}
         own = {"grain_diameter": DIAMETER, "gravity": GRAVITY, "grain_density": DENSITY, **parameters, "seed": seed}
         record = {**self.names, "parameters": own,
-                  "derived": {"wall_static": friction, "wall_kinetic": friction}, "steps": 10000, "time_step": 1e-5,
+                  "derived": {"wall_static": friction, "wall_kinetic": friction, "grain_kinetic": 1.0}, "steps": 10000, "time_step": 1e-5,
                   "frames": len(self.grains), "inputs": "", "provenance": provenance}
         (self.folder / "run.json").write_text(json.dumps(record))
         return self.folder.parent
@@ -59,14 +59,15 @@ def told(folder: Path, **changes: float) -> Path:
 
 
 def silo(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: str = "dry", k: float = 0.8, friction: float = 0.25,
-         noise: float = 0.0, seed: int = 0, lost_wall_force: float = 0.0, bridge_volume: float = 0.0, smooth: float = 1.0,
-         lost_contacts: int = 0) -> Path:
+         noise: float = 0.0, seed: int = 0, lost_wall_force: float = 0.0, bridge_volume: float = 0.0, stated: float | None = None,
+         inner: float = 1.0, heavier: float = 1.0, smooth: float = 1.0, lost_contacts: int = 0) -> Path:
     """Write a replica whose wall and base forces follow Janssen's law; returns the engine's folder.
 
     `noise`: relative scatter of the wall forces among grains and frames; `lost_wall_force`: share that is missing in time.csv;
-    `bridge_volume` (m3): every grain hangs on the wall by a liquid bridge too, whose pull is rubbed like the rest of the pressure;
-    `smooth`: friction of the wall's lower half over that of its upper one; `lost_contacts`: how many of the 24 between two layers are
-    missing.
+    `bridge_volume` (m3): every grain hangs on the wall by a liquid bridge too, whose pull is rubbed like the rest of the pressure.
+    Wrong physics: `stated` is the wall's friction that the run says it had, `inner` the stress across inside over that at the wall,
+    `heavier` the gravity that acts over the one it says, `smooth` the friction of the wall's lower half over that of its upper one,
+    `lost_contacts` how many of the 24 between two layers are missing.
     """
     random = np.random.default_rng(seed)
     radius, levels, ring = 0.025, 30, 24
@@ -78,30 +79,35 @@ def silo(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: 
     pull = float(capillary_force(0.5 * DIAMETER, np.inf, 0.0, bridge_volume, 0.072, 0.35)) if bridge_volume else 0.0
     mass = np.full(len(place), 0.6 * DENSITY * np.pi * radius**2 * DIAMETER / ring)
     length, top = radius / (2.0 * k * friction), levels * DIAMETER
-    weight = mass.sum() * GRAVITY / (np.pi * radius**2 * top)
+    gravity = heavier * GRAVITY
+    weight = mass.sum() * gravity / (np.pi * radius**2 * top)
     weight -= 2.0 * friction * (ring * pull / (2.0 * np.pi * radius * DIAMETER)) / radius
     stress = weight * length * -np.expm1(-(top - place[:, 2]) / length)
     push = k * stress * 2.0 * np.pi * radius * DIAMETER / ring
     outward = place[:, :2] / np.hypot(place[:, 0], place[:, 1])[:, None]
     run, lift, steps = Written(results, "silo", variant, engine, replica), [], 5000 + 100 * np.arange(FRAMES)
     below, above = np.arange(len(place) - ring), np.arange(ring, len(place))
+    # Opposite grains press on each other as the wall does on them.
+    here, there = np.split(np.arange(len(place)).reshape(levels, ring), 2, axis=1)
+    first, second = np.concatenate([above, here.ravel()]), np.concatenate([below, there.ravel()])
     for step in steps:
         own = push * (1.0 + noise * random.standard_normal(len(push)))
         side = np.column_stack([-own[:, None] * outward, np.where(place[:, 2] < 0.5 * top, smooth, 1.0) * friction * (own + pull)])
-        carried = np.cumsum((mass * GRAVITY - side[:, 2]).reshape(levels, ring)[::-1], axis=0)[::-1].ravel()
+        carried = np.cumsum((mass * gravity - side[:, 2]).reshape(levels, ring)[::-1], axis=0)[::-1].ravel()
         base = np.zeros_like(side)
         base[:ring, 2] = carried[:ring]
-        forces = np.column_stack([np.zeros((len(above), 2)), carried[above]])
-        held = above % ring >= lost_contacts
+        across = 0.5 * inner * (own[here] + own[there]).ravel()[:, None] * outward[here.ravel()]
+        forces = np.concatenate([np.column_stack([np.zeros((len(above), 2)), carried[above]]), np.pad(across, ((0, 0), (0, 1)))])
+        held = first % ring >= lost_contacts
         run.frame(step, place, np.full(len(place), 0.5 * DIAMETER),
-                  (place[above][held], place[below][held], (above[held], below[held]), forces[held]), masses=mass,
+                  (place[first][held], place[second][held], (first[held], second[held]), forces[held]), masses=mass,
                   walls={"side": side, "base": base})
         lift.append((side[:, 2].sum(), base[:, 2].sum()))
     side_fz, base_fz = np.array(lift).T
     return run.finish(
         {"step": steps, "time": steps * 1e-5, "kinetic_energy": 0 * side_fz, "side_fz": (1.0 - lost_wall_force) * side_fz,
          "base_fz": base_fz},
-        {"cylinder_radius": radius, "wall_friction": 0.5, "grain_count": len(place), **liquid})
+        {"cylinder_radius": radius, "wall_friction": friction if stated is None else stated, "grain_count": len(place), **liquid})
 
 
 def plug_flow(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: str = "smooth", slip: float = 0.4,

@@ -12,11 +12,12 @@ STEP = 1e-5
 
 
 def plane_silo(results: Path, *, replica: int = 1, k: float = 0.7, friction: float = 0.2, noise: float = 0.0, seed: int = 0,
-               tilt: float = 0.0, smooth: float = 1.0, lost_contacts: int = 0, lost_wall_force: float = 0.0) -> Path:
+               tilt: float = 0.0, stated: float | None = None, inner: float = 1.0, smooth: float = 1.0, lost_contacts: int = 0,
+               lost_wall_force: float = 0.0) -> Path:
     """Write a replica whose walls and base follow Janssen's law with lambda = W / (2 k friction); returns the engine's folder.
 
     `tilt`: the left wall carries 1 + tilt, the right one 1 - tilt of its share, which the mean over both does not show;
-    `smooth`, `lost_contacts`, `lost_wall_force`: as of the silo.
+    `stated`, `inner`, `smooth`, `lost_contacts` and `lost_wall_force` as of a silo.
     """
     random = np.random.default_rng(seed)
     across, along, levels = 10, 6, 40
@@ -30,6 +31,10 @@ def plane_silo(results: Path, *, replica: int = 1, k: float = 0.7, friction: flo
     side = {name: np.isclose(place[:, 0], where) for name, where in (("left", 0.5 * DIAMETER), ("right", width - 0.5 * DIAMETER))}
     run = Written(results, "plane_silo", "dry", "liggghts", replica, ((-1.0, 1.0), (0.0, depth), (-1.0, 10.0)), "ff pp ff")
     above, below = np.arange(layer, len(place)), np.arange(len(place) - layer)
+    # Rows of grains from wall to wall carry what the walls press with.
+    row = np.nonzero(place[:, 0] < width - DIAMETER)[0]
+    first, second = np.concatenate([above, row]), np.concatenate([below, row + along])
+    across_force = np.column_stack([-inner * k * stress[row] * DIAMETER**2, np.zeros((len(row), 2))])
     steps, lift = 5000 + 100 * np.arange(FRAMES), []
     for step in steps:
         walls = {}
@@ -43,16 +48,16 @@ def plane_silo(results: Path, *, replica: int = 1, k: float = 0.7, friction: flo
         carried = np.repeat(np.cumsum((mass * GRAVITY - held).reshape(levels, layer).sum(axis=1)[::-1])[::-1] / layer, layer)
         base = np.zeros_like(place)
         base[:layer, 2] = carried[:layer]
-        forces = np.column_stack([np.zeros((len(above), 2)), carried[above]])
-        kept = above % layer >= lost_contacts
+        forces = np.concatenate([np.column_stack([np.zeros((len(above), 2)), carried[above]]), across_force])
+        kept = first % layer >= lost_contacts
         run.frame(step, place, np.full(len(place), 0.5 * DIAMETER),
-                  (place[above][kept], place[below][kept], (above[kept], below[kept]), forces[kept]), masses=mass,
+                  (place[first][kept], place[second][kept], (first[kept], second[kept]), forces[kept]), masses=mass,
                   walls={**walls, "base": base})
         lift.append([wall[:, 2].sum() for wall in (walls["left"], walls["right"], base)])
     table = dict(zip(("left_fz", "right_fz", "base_fz"), np.array(lift).T, strict=True))
     table["left_fz"] = (1.0 - lost_wall_force) * table["left_fz"]
     return run.finish({"step": steps, "time": steps * STEP, "kinetic_energy": 0.0 * steps, **table},
-                      {"silo_width": width, "slab_depth": depth, "wall_friction": 0.3})
+                      {"silo_width": width, "slab_depth": depth, "wall_friction": friction if stated is None else stated})
 
 
 def gravity_channel(results: Path, *, cells: int = 20, variant: str = "w20", replica: int = 1, greatest: float = 3.0, slip: float = 2.0,

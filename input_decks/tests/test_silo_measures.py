@@ -7,7 +7,7 @@ import pytest
 import xarray
 
 from dembark.common.errors import RunError
-from dembark.input_decks.tests.measuring import compare, judged, measure, module, pair
+from dembark.input_decks.tests.measuring import compare, judged, measure, module, names, pair
 from dembark.input_decks.tests.synthetic import DIAMETER, silo
 from dembark.physics import capillary_force
 from dembark.postproc.instruments.janssen import two_parameter
@@ -27,6 +27,7 @@ def test_silo_that_follows_janssen_passes(tmp_path):
     assert found["wall_mobilisation"]["value"] == pytest.approx(0.25, rel=0.01)
     assert found["janssen_length_predicted"]["value"] == pytest.approx(2.5, rel=0.02)
     assert found["janssen_length_measured"]["value"] == pytest.approx(2.5, rel=0.03)
+    assert found["stress_ratio_k_contacts"]["value"] == pytest.approx(0.8, rel=0.02)
     assert found["two_parameter_gain"]["value"] < 1.0
     assert {
         found[name]["verdict"]
@@ -34,6 +35,7 @@ def test_silo_that_follows_janssen_passes(tmp_path):
             "janssen_profile_deviation",
             "janssen_length_predicted",
             "apparent_mass_ratio",
+            "wall_mobilisation",
             "force_balance_error",
             "field_balance_deviation",
         )
@@ -101,36 +103,76 @@ def test_height_of_one_packing_has_no_interval_and_decides_nothing(tmp_path):
     assert "other packings" in found["reason"]
 
 
-def filling_points(length, per_radius=0.07, radii=(1.0, 2.0, 4.0), hydrostatic=0.0, half=0.0):
-    saturation = length * per_radius
-    for height in radii:
-        mass = per_radius * height
-        apparent = float(two_parameter(np.array([mass]), saturation, hydrostatic)[0])
-        values = {"filled_mass": mass, "filling_height": height, "apparent_mass_ratio": apparent / mass, "janssen_length_predicted": length}
-        yield {"quantities": [{"name": name, "value": value, "interval": [value - half, value + half]} for name, value in values.items()]}
+@pytest.mark.parametrize(("wrong", "failed"), [
+    ({"friction": 0.005, "stated": 0.25}, {"apparent_mass_ratio", "wall_mobilisation"}),
+    ({"inner": 1.15}, {"apparent_mass_ratio"}),
+    ({"inner": 0.85}, {"apparent_mass_ratio"}),
+    ({"heavier": 2.0}, {"apparent_mass_ratio", "force_balance_error"}),
+], ids=["almost_liquid", "k_high", "k_low", "doubled_gravity"])
+def test_silo_with_wrong_physics_fails_what_is_predicted(tmp_path, wrong, failed):
+    found = by_name(measure(silo(tmp_path, noise=0.02, **wrong)))
+    assert failed <= names(found, "fail")
+    # What is calibrated in the column itself passes an almost-liquid too, and so is no evidence.
+    calibrated = [found[name] for name in ("janssen_length_predicted", "janssen_profile_deviation", "field_janssen_deviation")]
+    assert {one["evidence"] for one in calibrated} == {"identity"}
+    if "heavier" not in wrong:
+        assert "fail" not in {one["verdict"] for one in calibrated}
 
 
-def filling(length, **changes):
-    found = SILO.study("filling", list(filling_points(length, **changes)), "grain_count")
+def test_wall_as_rough_as_the_grains_has_no_reference(tmp_path):
+    """Spheres roll along it, and the kinetic friction is not mobilised."""
+    found = by_name(measure(silo(tmp_path, noise=0.02, stated=1.0)))
+    for name in ("apparent_mass_ratio", "wall_mobilisation"):
+        assert found[name]["verdict"] == "info" and found[name]["reference"] is None
+        assert "as rough as the grains" in found[name]["detail"]
+
+
+def points(k_mu=0.235, others=None, heavier=1.0, hydrostatic=0.0, half=0.002, silos=(("quarter", 1.3, 0.025), ("half", 2.6, 0.025),
+           ("dry", 5.2, 0.025), ("wide", 3.5, 0.035))):
+    """Results of silos by name, height over R and R that follow Janssen's law with `k_mu`; those besides `dry` with `others`."""
+    for variant, height, radius in silos:
+        own = k_mu if others is None or variant == "dry" else others
+        share = float(two_parameter(np.array([height]), 0.5 / own, hydrostatic)[0]) / height * (1.0 if variant == "dry" else heavier)
+        values = {"filled_mass": 4500.0 * height * radius**3, "filling_height": height, "apparent_mass_ratio": share, "k_mu_contacts": k_mu}
+        yield {"variant": variant, "parameters": {"cylinder_radius": radius},
+               "quantities": [{"name": name, "value": value, "interval": [value - half, value + half]} for name, value in values.items()]}
+
+
+def study(**changes):
+    found = SILO.study("filling", list(points(**changes)), "grain_count")
     return judged("silo", found), found.profiles
 
 
-def test_filling_curve_gives_back_its_length():
-    quantity, (curve,) = filling(2.1, half=0.01)
-    length = quantity["filling_length"]
-    assert length["value"] == pytest.approx(2.1, rel=1e-6)
-    assert 0.0 < length["interval"][1] - length["value"] < 0.2
-    assert length["verdict"] == quantity["largest_apparent_mass"]["verdict"] == "pass"
+def test_other_fillings_and_radii_are_predicted_from_one_silo():
+    quantity, (curve,) = study()
+    assert quantity["held_out_k_mu"]["value"] == pytest.approx(0.235, rel=1e-6)
+    assert 0.0 < quantity["held_out_k_mu"]["interval"][1] - 0.235 < 0.01
+    # The calibrated silo is none of those that are judged.
+    assert names(quantity, "pass") == {"held_out_k_mu", "held_out_mass_quarter", "held_out_mass_half", "held_out_mass_wide"}
     np.testing.assert_allclose(curve["value"], curve["reference"], rtol=1e-6)
 
 
-def test_filling_curve_with_another_length_than_the_walls_fails_and_a_hydrostatic_zone_is_found():
-    points = list(filling_points(2.1, half=0.001))
-    for point in points:
-        point["quantities"][-1] |= {"value": 3.0, "interval": [2.99, 3.01]}
-    assert judged("silo", SILO.study("filling", points, "grain_count"))["filling_length"]["verdict"] == "fail"
-    found, _ = filling(1.5, radii=(0.5, 1.0, 2.0, 3.0, 5.0), hydrostatic=0.07)
-    assert found["filling_two_parameter_gain"]["value"] > 0.95
+@pytest.mark.parametrize(("wrong", "failed"), [
+    ({"others": 1e-3}, {"held_out_k_mu", "held_out_mass_quarter", "held_out_mass_half", "held_out_mass_wide"}),
+    ({"others": 1.15 * 0.235}, {"held_out_k_mu", "held_out_mass_wide"}),
+    ({"others": 0.85 * 0.235}, {"held_out_k_mu", "held_out_mass_half", "held_out_mass_wide"}),
+    ({"heavier": 2.0}, {"held_out_k_mu", "held_out_mass_quarter", "held_out_mass_half", "held_out_mass_wide"}),
+], ids=["almost_liquid", "k_high", "k_low", "doubled_gravity"])
+def test_silos_of_other_physics_than_the_calibrated_one_fail(wrong, failed):
+    quantity, _ = study(**wrong)
+    assert failed <= names(quantity, "fail")
+
+
+def test_a_length_that_does_not_grow_with_the_radius_fails():
+    wide = ("wide", 3.5, 0.035)
+    same = list(points(silos=(("dry", 5.2, 0.025), ("half", 2.6, 0.025)))) + list(points(k_mu=1.4 * 0.235, silos=(wide,)))
+    assert judged("silo", SILO.study("radius", same, "cylinder_radius"))["held_out_mass_wide"]["verdict"] == "fail"
+
+
+def test_a_hydrostatic_zone_is_found():
+    shallow = tuple((f"filled_{height}", height, 0.025) for height in (0.5, 1.0, 2.0, 3.0))
+    quantity, _ = study(k_mu=1.0 / 3.0, hydrostatic=1.0, silos=(*shallow, ("dry", 5.0, 0.025)))
+    assert quantity["filling_two_parameter_gain"]["value"] > 0.95
 
 
 def test_compare_needs_two_engines(tmp_path):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dembark.input_decks.tests.measuring import judged, measure, module
+from dembark.input_decks.tests.measuring import judged, measure, module, names
 from dembark.input_decks.tests.synthetic_slabs import gravity_channel, plane_silo
 
 CHANNEL = module("gravity_channel")
@@ -20,13 +20,22 @@ def test_plane_silo_that_follows_janssen_passes(tmp_path):
     assert found["wall_mobilisation"]["value"] == pytest.approx(0.2, rel=0.01)
     assert found["janssen_length_predicted"]["value"] == pytest.approx(1.0 / (2 * 0.7 * 0.2), rel=0.02)
     assert found["janssen_length_measured"]["value"] == pytest.approx(1.0 / (2 * 0.7 * 0.2), rel=0.03)
+    assert found["stress_ratio_k_contacts"]["value"] == pytest.approx(0.7, rel=0.02)
     assert found["solid_fraction"]["value"] == pytest.approx(np.pi / 6.0, rel=2e-3)
-    for name in ("janssen_profile_deviation", "janssen_length_predicted", "apparent_mass_ratio"):
+    for name in ("janssen_profile_deviation", "janssen_length_predicted", "apparent_mass_ratio", "wall_mobilisation"):
         assert found[name]["verdict"] == "pass", name
     assert {found[name]["verdict"] for name in ("force_balance_error", "field_balance_deviation")} == {"pass"}
     assert abs(found["field_balance_deviation"]["value"]) < 1e-9
     assert found["janssen_length_predicted"]["unit"] == "W"
     assert "sigma_xx" in {one["name"] for one in content["profiles"]}
+
+
+@pytest.mark.parametrize(("wrong", "failed"), [({"friction": 0.004, "stated": 0.2}, {"apparent_mass_ratio", "wall_mobilisation"}),
+                                               ({"friction": 0.5, "inner": 1.15}, {"apparent_mass_ratio"}),
+                                               ({"friction": 0.5, "inner": 0.85}, {"apparent_mass_ratio"})],
+                         ids=["almost_liquid", "k_high", "k_low"])
+def test_plane_silo_with_wrong_physics_fails(tmp_path, wrong, failed):
+    assert failed <= names(by_name(measure(plane_silo(tmp_path, noise=0.02, **wrong))), "fail")
 
 
 def test_both_walls_of_the_plane_silo_count(tmp_path):

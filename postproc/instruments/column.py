@@ -2,7 +2,10 @@
 
 Everything is defined at the wall: the cross-section and the solid fraction count the volume up to it, although the grains' centres keep
 half a diameter off. K is the wall's normal stress over the mean sigma_zz of the cross-section, mu_mob the wall's shear over its normal
-stress, both measured in the lower half, without the lowest diameter, where the base orders the packing.
+stress, both measured in the lower half, without the lowest diameter, where the base orders the packing. Both together are the walls' shear
+over sigma_zz, which the balance of forces makes of the same shear: Janssen's law with them holds in a column whenever its shear is
+proportional to sigma_zz, in an almost frictionless one too. What can be predicted instead is the law with `contact_ratio`, K of the forces
+between grains, and the kinetic friction that the wall was given, or with the numbers of another column.
 
 Wet grains are also pulled to the wall by their liquid bridges, with a stress a that adds to the pressure in the contacts but not to the
 wall's net normal stress. Janssen's balance d sigma / dh = rho_b g - 2 tau / R with tau = mu_mob (K sigma + a) then gives the same law with
@@ -31,12 +34,14 @@ Bridges = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class Column:
-    """One replica: arrays over frames, height bands (or the levels between them) and sectors of the walls, in SI units.
+    """One replica: arrays over frames, height bands (or the levels between them) and sectors of the walls, in SI units; `friction` is the
+    kinetic coefficient of the walls.
 
     Sectors (with soft borders) are equivalent by symmetry, so they resample the disorder of the packing: what is measured on those that are
     kept is scaled up to the whole. (frames, bands, sectors): wall forces `normal`, `shear` and `adhesion`, the pull of liquid bridges to
     the wall (N); solid `volume` (m3). (frames, bands): the walls' `lift` and the grains' weight `weight_above`, and the upward force
-    `net_above` that accelerates the grains above (N); contact stress `field` (Pa). (frames, levels, ...): `level_lift`, by sectors too, and
+    `net_above` that accelerates the grains above (N); vertical contact stress `field` (Pa), and the one towards the walls `pressing` by
+    sectors (Pa), which sum up to it. (frames, levels, ...): `level_lift`, by sectors too, and
     `level_weight`. (frames,): force `base` on the base (N).
     """
 
@@ -45,6 +50,7 @@ class Column:
     vessel: Vessel
     diameter: float
     gravity: float
+    friction: float
     mass: float
     normal: Array
     shear: Array
@@ -55,6 +61,7 @@ class Column:
     level_weight: Array
     net_above: Array
     field: Array
+    pressing: Array
     volume: Array
     base: Array
     force_error: Estimate
@@ -102,6 +109,10 @@ class Column:
     def stress_ratio(self, frames: Mask, sectors: Mask) -> float:
         """K. The balance stress is that of the whole column: it is known, and no sector has one of its own."""
         return float(self.wall(self.normal, frames, sectors)[self.lower].sum() / self.balance(frames)[self.lower].sum())
+
+    def contact_ratio(self, frames: Mask, sectors: Mask) -> float:
+        """K of the contact stress alone, mean over the section: no force that a wall's shear has a part in."""
+        return float(self._whole(self.pressing, frames, sectors)[self.lower].sum() / self.field[frames].mean(axis=0)[self.lower].sum())
 
     def adhesive_stress(self, frames: Mask, sectors: Mask) -> float:
         """a: pull of the liquid bridges over the wall's area (Pa); 0 when dry."""
@@ -151,9 +162,11 @@ class Column:
         """Force on the base over the weight."""
         return float(self.base[frames].mean()) / (self.mass * self.gravity)
 
-    def predicted_base_share(self, frames: Mask, sectors: Mask) -> float:
-        """The same by Janssen's law with the predicted length."""
-        return float(self.predicted_stress(np.array([self.height]), frames, sectors)[0]) / (self.weight * self.height)
+    def coulomb_base_share(self, frames: Mask, sectors: Mask) -> float:
+        """The same by Janssen's law with K of the contact stress and the kinetic friction of the walls, which slide."""
+        k_mu = self.contact_ratio(frames, sectors) * self.friction
+        hanging = 1.0 - 2.0 * self.friction * self.adhesive_stress(frames, sectors) / (self.vessel.size * self.weight)
+        return hanging * float(janssen.base_share(2.0 * k_mu * self.height / self.vessel.size))
 
     def fractions(self, frames: Mask, sectors: Mask) -> Array:
         """Solid fraction (bands,)."""
@@ -186,7 +199,8 @@ def read(replica: Replica) -> Column:
     rows = [_frame_rows(grains, contacts, silo, gravity, edges, sectors, bridges) for grains, contacts in replica.paired_frames()]
     times = replica.times()
     lift = np.sum([times[f"{name}_fz"] for name in (*silo.names, "base")], axis=0)[times["step"] >= outlines[0][0]]
-    return Column(edges, height, silo, diameter, gravity, mass, force_error=block_mean(lift / (mass * gravity) - 1.0),
+    friction, error = float(replica.derived["wall_kinetic"]), block_mean(lift / (mass * gravity) - 1.0)
+    return Column(edges, height, silo, diameter, gravity, friction, mass, force_error=error,
                   **{name: np.array([row[name] for row in rows]) for name in rows[0]})
 
 
@@ -235,8 +249,11 @@ def _frame_rows(grains: GrainFrame, contacts: ContactFrame, silo: Vessel, gravit
         stress.wall_branches(place, side, place - inward * silo.distance(place)[:, None]),
         stress.wall_branches(place, base, stress.on_plane(place, 2, 0.0)),
     ]
-    field = sum(stress.pair_stress(*line, axis=2, edges=edges, area=area) for line in lines)
-    field = field + stress.kinetic_stress(place, grains.velocities, grains.masses, 2, edges, area)
+    first, branch, forces = (np.concatenate(parts) for parts in zip(*lines, strict=True))
+    inside = stress.overlap_fractions(first[:, 2], first[:, 2] + branch[:, 2], edges).T / (area * np.diff(edges))[:, None]
+    kinetic, diagonal = stress.kinetic_stress(place, grains.velocities, grains.masses, 2, edges, area), -forces * branch
+    # Half of a line belongs to where it begins, half to where it ends: one through the axis has no side.
+    halves = 0.5 * (silo.wall_shares(first, sectors) + silo.wall_shares(first + branch, sectors))
     return {
         "normal": in_bands(np.einsum("na,na->n", side, inward)),
         "shear": in_bands(side[:, 2]),
@@ -246,7 +263,8 @@ def _frame_rows(grains: GrainFrame, contacts: ContactFrame, silo: Vessel, gravit
         "weight_above": stress.mean_load_above(heights, weights, edges),
         "level_weight": stress.load_above(heights, weights, edges),
         "net_above": stress.mean_load_above(heights, grains.forces[:, 2], edges),
-        "field": field[:, 2, 2],
+        "field": inside @ diagonal[:, 2] + kinetic[:, 2, 2],
+        "pressing": inside @ (silo.pressing(diagonal)[:, None] * halves),
         "volume": slice_volumes(heights, grains.radii, edges).T @ silo.volume_shares(place, grains.radii, sectors),
         "base": base[:, 2].sum(),
     }

@@ -18,6 +18,22 @@ def stress(depth: Array, length: float, weight: float = 1.0) -> Array:
     return weight * length * -np.expm1(-depth / length)
 
 
+def base_share(depth: Array | float) -> Array:
+    """Force on the base over the weight, (1 - exp(-y)) / y at the `depth` y over lambda; more than 1 where walls push down, with y < 0."""
+    depth = np.asarray(depth, float)
+    return np.asarray(-np.expm1(-depth) / np.where(depth == 0.0, 1.0, depth) + (depth == 0.0))
+
+
+def fitted_friction(depth: Array, shares: Array) -> float:
+    """K mu that fits `base_share` best to `shares` (n,) of silos as deep as `depth` (n,) over their sizes, relative to each of them.
+
+    It is a number for every silo, 0 for a liquid, where lambda = size / (2 K mu) is not.
+    """
+    from scipy.optimize import least_squares  # slow to import, and not needed before something is measured
+
+    return float(least_squares(lambda p: base_share(2.0 * p[0] * depth) / shares - 1.0, [0.2]).x[0])
+
+
 def two_parameter(depth: Array, length: float, onset: float, weight: float = 1.0) -> Array:
     """The same with a hydrostatic zone down to the depth `onset` (m), exponential below it (Walker 1966, Vanel & Clement 1999)."""
     return np.where(depth < onset, weight * depth, weight * (length + (onset - length) * np.exp(-(depth - onset) / length)))

@@ -44,9 +44,11 @@ def _scalars(one: Column) -> dict[str, Estimate]:
         "janssen_length_predicted": lambda f, s: one.predicted_length(f, s) / size,
         "janssen_length_measured": lambda f, s: fitted(f, s) / size,
         "_length_error": lambda f, s: one.predicted_length(f, s) / fitted(f, whole) - 1.0,
-        "_base_predicted": one.predicted_base_share,
-        "_base_error": lambda f, s: one.base_share(f) / one.predicted_base_share(f, s) - 1.0,
+        "_base_predicted": one.coulomb_base_share,
+        "_base_error": lambda f, s: one.base_share(f) / one.coulomb_base_share(f, s) - 1.0,
         "stress_ratio_k": one.stress_ratio,
+        "stress_ratio_k_contacts": one.contact_ratio,
+        "k_mu_contacts": lambda f, s: one.contact_ratio(f, s) * one.mobilisation(f, s),
         "wall_mobilisation": one.mobilisation,
         "wall_adhesion": one.adhesive_stress,
         "_hanging_weight": one.hanging_weight,
@@ -66,53 +68,70 @@ def _scalars(one: Column) -> dict[str, Estimate]:
     }
 
 
-def fillings(points: Sequence[Mapping[str, Any]], size: str) -> Measurement:
-    """The classical experiment: the mass that the base feels of several fillings, M_app = M_sat (1 - exp(-M / M_sat)) with that of lambda.
+def predicted(points: Sequence[Mapping[str, Any]]) -> Measurement:
+    """The force on the base of cylinders of other fillings or radii, predicted from the one of the variant `dry`, and K mu fitted to them.
 
-    `points` are the results of silos that differ in the mass filled in; `size` is the symbol of the length in Janssen's law.
+    `points` are the results of the variants. Of `dry` come K of the contact stress, the mobilised friction and the bulk density; of the
+    others only what was filled in, and the radius.
     """
-    points = sorted(points, key=lambda point: of_point(point, "filled_mass").value)
-    mass = np.array([of_point(point, "filled_mass").value for point in points])
-    base = Growth.of(points, "apparent_mass_ratio", mass, mass)
-    # Mass of a piece of the column as high as `size`.
-    per_size = mass[-1] / of_point(points[-1], "filling_height").value
-    predicted, top = of_point(points[-1], "janssen_length_predicted"), float(base.values.max())
-    fitted = propagated(lambda values: janssen.fitted_length(mass, values, values.max()) / per_size, base.values, base.halves,
-                        "the apparent masses")
-    starts, limits = [(top, 0.02 * top), (top, 0.3 * top)], ((0.05 * top, 50.0 * top), (0.0, 0.95 * top))
-    pair = janssen.fitted_pair(mass, base.values, starts, limits, top)
-    law = janssen.stress(mass, predicted.value * per_size)
-    gain = Estimate(janssen.gain(mass, base.values, fitted.value * per_size, pair), 0.0)
-    deepest = Estimate(float(base.values[-1]), float(base.halves[-1]), of_point(points[-1], "apparent_mass_ratio").basis)
-    values = {
-        "filling_length": Value(fitted, predicted),
-        "largest_apparent_mass": Value(deepest, exact(law[-1])),
-        "filling_two_parameter_gain": Value(gain, detail=f"with it λ is {pair[0] / per_size:.2f} {size} and the zone holds {pair[1]:.3g} "
-                                                         f"kg; {len(points)} fillings"),
-    }
-    curve = profile("apparent_mass", "Apparent mass", "filled mass (kg)", "force on the base / g (kg)", mass, [base.values],
-                    half=base.halves, reference=law, reference_label="Janssen, nothing fitted")
-    remark = ("Each point is a packing of its own, filled by rain to that height, with the wall creeping upward, so that all have the same "
-              "history.")
+    known = next(point for point in points if point["variant"] == "dry")
+    held = [point for point in points if point is not known]
+    k_mu = of_point(known, "k_mu_contacts")
+
+    def height(point: Mapping[str, Any]) -> float:
+        """Of the filling over R, at the bulk density of `dry`."""
+        wider = float(point["parameters"]["cylinder_radius"]) / float(known["parameters"]["cylinder_radius"])
+        masses = [of_point(one, "filled_mass").value for one in (point, known)]
+        return of_point(known, "filling_height").value * masses[0] / masses[1] / wider**3
+
+    def law(depth: float) -> Estimate:
+        return propagated(lambda values: float(janssen.base_share(2.0 * depth * values[0])), np.array([k_mu.value]), np.array([k_mu.half]),
+                          "K and μ_mob of dry")
+
+    depth = np.array([height(point) for point in held])
+    base = Growth.of(held, "apparent_mass_ratio", depth)
+    fitted = propagated(lambda values: janssen.fitted_friction(depth, values), base.values, base.halves, "the apparent masses")
+    values = {"held_out_k_mu": Value(fitted, k_mu, detail=f"fitted to {len(held)} other silos; reference: K and μ_mob of dry alone")}
+    for point, y in zip(held, depth, strict=True):
+        values[f"held_out_mass_{point['variant']}"] = Value(of_point(point, "apparent_mass_ratio"), law(y),
+                                                            detail=f"filled {y:.2f} R high; reference: Janssen with K, μ_mob, ρ_b of dry")
+    points = sorted(points, key=height)
+    place = np.array([height(point) for point in points])
+    every = Growth.of(points, "apparent_mass_ratio", place, place)
+    if len({point["parameters"]["cylinder_radius"] for point in points}) == 1:
+        pair = janssen.fitted_pair(place, every.values, [(2.0, 0.02), (2.0, 0.5)], ((0.05, 100.0), (0.0, 0.9 * place[-1])), 1.0)
+        one = janssen.fitted_length(place, every.values, 2.0)
+        values["filling_two_parameter_gain"] = Value(exact(janssen.gain(place, every.values, one, pair)), detail=(
+            f"all {len(points)} silos; with it λ is {pair[0]:.2f} R, the zone {pair[1]:.2f} R deep"))
+    curve = profile("apparent_mass", "Apparent mass", "filled mass / (ρ_b π R³)", "force on the base / (g ρ_b π R³)", place, [every.values],
+                    half=every.halves, reference=place * janssen.base_share(2.0 * k_mu.value * place),
+                    reference_label="Janssen, K and μ_mob of dry alone")
+    remark = ("Calibrated in `dry` alone are K of the contact stress, μ_mob and ρ_b; every other point is a prediction. Each is a packing "
+              "of its own, filled by rain, with the wall creeping upward, so that all have the same history.")
     return Measurement(values, [curve], [remark])
 
 
 def measured(columns: Sequence[Column], size: str, across: str, friction: Mapping[str, float]) -> Measurement:
     """Values, profiles and remarks of all columns of a series.
 
-    `size`: symbol of the length in Janssen's law; `across`: letter of the direction to the wall; `friction`: the wall's coefficients
-    `wall_static` and `wall_kinetic`.
+    `size`: symbol of the length in Janssen's law; `across`: letter of the direction to the wall; `friction`: the coefficients
+    `wall_static`, `wall_kinetic` and `grain_kinetic`.
     """
     scalars, wet = [_scalars(column) for column in columns], bool(columns[0].adhesion.any())
     over = {name: pooled(scalars, name) for name in scalars[0]}
+    # Coulomb's law gives the shear of a wall that slides; along one as rough as the grains spheres roll.
+    slides = 0.0 < friction["wall_kinetic"] < friction["grain_kinetic"]
     references: dict[str, tuple[Estimate, float | None]] = {
         "janssen_profile_deviation": (ZERO, None),
         "janssen_length_predicted": (over["janssen_length_measured"], over["_length_error"].half),
-        "apparent_mass_ratio": (over["_base_predicted"], over["_base_error"].half),
+        **({"apparent_mass_ratio": (over["_base_predicted"], over["_base_error"].half),
+            "wall_mobilisation": (exact(friction["wall_kinetic"]), None)} if slides else {}),
         "force_balance_error": (ZERO, None),
         "field_balance_deviation": (ZERO, None),
     }
-    details = {"wall_mobilisation": f"lower half; the wall's static friction is {friction['wall_static']:g}",
+    rolls = "" if slides else "; no reference: the wall is as rough as the grains or has no friction"
+    details = {"wall_mobilisation": f"lower half; the wall's static friction is {friction['wall_static']:g}{rolls}",
+               "apparent_mass_ratio": f"reference: Janssen with K of the contact stress and the wall's kinetic friction{rolls}",
                "two_parameter_gain": f"with it λ is {over['_pair_length'].value:.2f} {size}"}
     values = {name: Value(one, reference, half, detail=details.get(name, ""))
               for name, one in over.items() for reference, half in [references.get(name, (None, None))]
@@ -130,9 +149,11 @@ def _remarks(columns: Sequence[Column], over: Mapping[str, Estimate], wet: bool,
         share = 1.0 - over["_hanging_weight"].value / float(np.mean([column.weight for column in columns]))
         manner += (f" Liquid bridges pull the grains to the wall with {over['wall_adhesion'].value:.3g} Pa; the friction of that pull "
                    f"alone carries {share:.0%} of the weight, and Janssen's law is taken with what is left of it.")
-    remarks = [(f"The wall carries {limits} friction (μ_mob = {mobilised:.3f}; static {static:g}, kinetic {kinetic:g}). {manner} Janssen's "
-               "law is therefore checked with the measured mobilisation; with the static coefficient in its place λ would come out shorter "
-               "by the first of these shares.")]
+    remarks = [(f"The wall carries {limits} friction (μ_mob = {mobilised:.3f}; static {static:g}, kinetic {kinetic:g}). {manner} With the "
+               "static coefficient in its place λ would come out shorter by the first of these shares."),
+               ("Calibrated in the column itself, and therefore counted as identities: λ = size / (2 K μ_mob), whose K μ_mob is the walls' "
+                "shear over σ_zz, and Janssen's profile with it. They hold for any shear that is proportional to σ_zz, and tell nothing of "
+                "its size. Predicted: the force on the base, from K of the contact stress and the kinetic friction given to the wall.")]
     if len(columns) < 3:
         remarks.append("With fewer than three packings the intervals come from time blocks and from sectors of the walls within the "
                        "packing; what varies from packing to packing as a whole is not in them.")
@@ -164,7 +185,7 @@ def _profiles(columns: Sequence[Column], over: Mapping[str, Estimate], across: s
     def shear(c: Column) -> Array:
         return moving_mean(c.wall(c.shear, *c.everything))
 
-    free = "Janssen, nothing fitted"
+    free = "Janssen, K and μ_mob of this column"
     return [
         entry("sigma_zz_balance", "Vertical stress, balance", "σ_zz (Pa)", lambda c: c.balance(c.everything[0]), law, free),
         entry("sigma_zz_field", "Vertical stress, contacts", "σ_zz (Pa)", lambda c: c.field.mean(axis=0), law, free),

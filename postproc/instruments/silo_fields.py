@@ -120,7 +120,7 @@ class _Janssen:
         half = combined([known.half, (1.0 + known.value) * measured.half / measured.value])
         found = Estimate(abs(known.value), half, f"propagated from K, μ_mob and σ_zz; {measured.basis}")
         return Value(found, Estimate(0.0, 0.0), detail="mean over the cross-section, at the worst height "
-                     f"(z = {heights[worst] / diameter:.1f} d); law with measured K, μ_mob, ρ_b, nothing fitted")
+                     f"(z = {heights[worst] / diameter:.1f} d); law with K, μ_mob, ρ_b of the same column")
 
 
 def measured(replicas: Sequence[Replica], known: Mapping[str, Value]) -> Measurement:
@@ -168,7 +168,7 @@ def _dataset(silos: Sequence[Silo], law: _Janssen, diameter: float, gravity: flo
                                "walls less weight less divergence of the vertical stresses"),
         "net_force": variable(both, fields.mean("net", rings), "N m-3", "upward force density that accelerates grains"),
         **with_interval("stress_zz_section", high, stress, "Pa", "vertical stress, mean over the cross-section"),
-        "janssen": variable(high, law(rings.heights), "Pa", "vertical stress by Janssen's law, nothing fitted"),
+        "janssen": variable(high, law(rings.heights), "Pa", "vertical stress by Janssen's law with K and friction of the same column"),
         "wall_normal": variable(high, wall[:, 0], "Pa", "normal stress of the wall"),
         "wall_shear": variable(high, wall[:, 1], "Pa", "upward shear stress of the wall"),
         **with_interval("k_profile", ("band", "radius"), ratio, "1", "sigma_rr over sigma_zz"),

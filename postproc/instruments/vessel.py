@@ -43,6 +43,11 @@ class Cylinder:
         """Unit vectors (n, 3) away from the wall."""
         return -place * [1.0, 1.0, 0.0] / np.maximum(np.hypot(place[:, 0], place[:, 1]), 1e-300)[:, None]
 
+    def pressing(self, lines: Array) -> Array:
+        """Part (n,) that presses on the wall of the diagonals (n, 3) of stresses: the mean of x and y, which over a section is the radial
+        stress at the wall by the virial theorem."""
+        return np.asarray(0.5 * (lines[:, 0] + lines[:, 1]))
+
     def distance(self, place: Array) -> Array:
         """Distance (n,) in m from the wall."""
         return self.size - np.hypot(place[:, 0], place[:, 1])
@@ -76,6 +81,10 @@ class Slab:
     def inward(self, place: Array) -> Array:
         """Unit vectors away from the nearer plane."""
         return np.where(place[:, :1] > 0.5 * self.size, -1.0, 1.0) * [1.0, 0.0, 0.0]
+
+    def pressing(self, lines: Array) -> Array:
+        """That of x."""
+        return lines[:, 0]
 
     def distance(self, place: Array) -> Array:
         """To the nearer plane."""

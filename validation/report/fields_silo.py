@@ -122,8 +122,8 @@ def _profiles(datasets: Mapping[str, Any]) -> FieldFigure:
         figure.legend([*handles, more[0][-1]], [*labels, more[1][-1]], loc="lower center", ncols=5, fontsize=6.8, handlelength=1.6,
                       columnspacing=1.2)
     caption = (
-        "Left: vertical stress of the coarse-grained field, mean over the cross-section, and Janssen's law with measured K, μ_mob and ρ_b, "
-        "nothing fitted. Right: ratio of radial to vertical stress from the axis to the wall, averaged over the heights given; stars: the "
+        "Left: vertical stress of the coarse-grained field, mean over the cross-section, and Janssen's law with K, μ_mob and ρ_b of the "
+        "same column. Right: ratio of radial to vertical stress from the axis to the wall, averaged over the heights given; stars: the "
         "normal stress that the wall itself feels there over σ_zz of the outermost ring. Bands: 95 % intervals, on the left of what varies "
         "in time only."
     )
