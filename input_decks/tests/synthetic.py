@@ -98,7 +98,7 @@ def silo(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: 
         base[:ring, 2] = carried[:ring]
         across = 1.5 * inner * (own[here] + own[there]).ravel()[:, None] * outward[here.ravel()]
         forces = np.concatenate([np.column_stack([np.zeros((len(above), 2)), carried[above]]), np.pad(across, ((0, 0), (0, 1)))])
-        held = np.concatenate([above % ring >= lost_contacts, np.ones(len(across), dtype=bool)])
+        held = first % ring >= lost_contacts
         run.frame(step, place, np.full(len(place), 0.5 * DIAMETER),
                   (place[first][held], place[second][held], (first[held], second[held]), forces[held]), masses=mass,
                   walls={"side": side, "base": base})

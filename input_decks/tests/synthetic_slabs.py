@@ -49,7 +49,7 @@ def plane_silo(results: Path, *, replica: int = 1, k: float = 0.7, friction: flo
         base = np.zeros_like(place)
         base[:layer, 2] = carried[:layer]
         forces = np.concatenate([np.column_stack([np.zeros((len(above), 2)), carried[above]]), across_force])
-        kept = np.concatenate([above % layer >= lost_contacts, np.ones(len(across_force), dtype=bool)])
+        kept = first % layer >= lost_contacts
         run.frame(step, place, np.full(len(place), 0.5 * DIAMETER),
                   (place[first][kept], place[second][kept], (first[kept], second[kept]), forces[kept]), masses=mass,
                   walls={**walls, "base": base})
