@@ -173,8 +173,8 @@ def statements(case: Case) -> list[str]:
 def judge(deviation: float, half: float, tolerance: float) -> tuple[str, str]:
     """Verdict and reason of a deviation with interval half-width `half`.
 
-    pass: all of the interval is within the tolerance. fail: the deviation is beyond it or, where the interval is the wider of the two, all of
-    the interval is. info, which is open: the interval reaches beyond the tolerance, and neither verdict would mean anything.
+    pass: all of the interval is within the tolerance. fail: the deviation is beyond it or, where the interval is the wider of the two, all
+    of the interval is. info, which is open: the interval reaches beyond the tolerance, and neither verdict would mean anything.
     """
     if not math.isfinite(deviation):
         return "fail", "no finite number"

@@ -47,7 +47,7 @@ def test_checks_that_rest_on_intervals_are_counted_with_what_chance_does_to_them
     halves = (0.0, 0.1, 0.05, 0.3)
     found = [judged(declared, Value(Estimate(1.0, half, "5 replicas"), Estimate(1.0, 0.0))) for half in halves]
     assert [one.verdict for one in found] == ["pass", "pass", "pass", "info"]
-    # Student's interval over five packings: one in twenty is beyond it, 0.5 % are beyond twice of it. A wider one than is allowed fails when
+    # Student's interval over five packings: one in twenty is beyond it, 0.5 % are beyond twice of it. One wider than allowed fails when
     # all of it is beyond that: 2 % are.
     assert [one.chance for one in found] == [None, pytest.approx(0.05), pytest.approx(0.00516, rel=0.01), pytest.approx(0.0208, rel=0.01)]
     counted = tally([*found, QuantityRecord("d", 1.0, "info", chance=0.5)])
@@ -59,7 +59,7 @@ def test_checks_that_rest_on_intervals_are_counted_with_what_chance_does_to_them
 @pytest.mark.parametrize(("deviation", "half", "verdict"), [
     (0.05, 0.04, "pass"), (0.05, 0.06, "info"), (0.15, 0.06, "fail"), (0.15, 0.2, "info"), (0.05, 0.2, "info"), (-0.32, 0.2, "fail"),
     (0.0, math.inf, "info"), (5.0, math.inf, "info"), (math.nan, 0.1, "fail")])
-def test_a_wide_interval_leaves_a_check_open_unless_all_of_it_is_beyond_what_is_allowed(deviation: float, half: float, verdict: str) -> None:
+def test_a_wide_interval_leaves_a_check_open_unless_all_of_it_is_beyond(deviation: float, half: float, verdict: str) -> None:
     assert judge(deviation, half, 0.1)[0] == verdict
 
 
