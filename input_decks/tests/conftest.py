@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from dembark.validation.case.resolve import portable, resolve
 class Deck:
     """The deck of `case` for an engine, written into `folder` with its defaults, the `variant` and the changed `values`."""
 
-    def __init__(self, case: str, engine: str, folder: Path, values: dict[str, Any], variant: str | None = None) -> None:
+    def __init__(self, case: str, engine: str, folder: Path, values: Mapping[str, Any], variant: str | None = None) -> None:
         try:
             self.engine = engines.find(engine)
         except DembarkError as error:
@@ -60,3 +61,14 @@ class Deck:
 @pytest.fixture(scope="session")
 def decks() -> type[Deck]:
     return Deck
+
+
+@pytest.fixture(scope="session")
+def simulate(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Replica]:
+    """Runs a case in an engine, with some parameters changed, in a folder of its own, and reads what came of it."""
+    def finished(case: str, engine: str, changes: Mapping[str, Any], variant: str | None = None) -> Replica:
+        one = Deck(case, engine, tmp_path_factory.mktemp(f"{case}-{variant}-{engine}"), changes, variant)
+        one.run()
+        return one.replica()
+
+    return finished

@@ -222,15 +222,10 @@ TINY: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.fixture(scope="module")
-def run(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+@pytest.fixture
+def run(simulate: Any) -> Any:
     """A small run of a case in an engine, with some parameters changed."""
-    def get(case: str, engine: str, **changes: Any) -> Replica:
-        one = decks(case, engine, tmp_path_factory.mktemp(f"{case}-{engine}"), TINY[case] | changes)
-        one.run()
-        return one.replica()
-
-    return get
+    return lambda case, engine, **changes: simulate(case, engine, TINY[case] | changes)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -61,15 +61,9 @@ def by_scheme(wrong: Any = lambda one: one, **changes: Any) -> dict[str, dict[st
 
 
 @pytest.fixture(scope="module")
-def finished(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+def finished(simulate: Any) -> Any:
     """Runs by (variant, engine), each done once."""
-    @cache
-    def get(variant: str, engine: str, **changes: Any) -> Any:
-        one = decks("oblique_impact", engine, tmp_path_factory.mktemp(f"{variant}-{engine}"), changes, variant)
-        one.run()
-        return one.replica()
-
-    return get
+    return cache(lambda variant, engine, **changes: simulate("oblique_impact", engine, changes, variant))
 
 
 @pytest.mark.parametrize("engine", ENGINES)
