@@ -6,6 +6,7 @@
 
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 
 #include "input.h"
 #include "lammps.h"
@@ -26,6 +27,16 @@ LAMMPS_NS::Fix* create_fix(LAMMPS_NS::LAMMPS* lammps, int narg, char** arg) {
   return new Style(lammps, narg, arg);
 }
 
+/// A process that no launcher started has nobody to talk to. Open MPI would start a daemon for it and open the networks, a third of a
+/// second in which nothing else happens. What the user has set stays as it is.
+void start_alone() {
+  for (const char* const launched : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"})
+    if (std::getenv(launched)) return;
+  setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
+  setenv("OMPI_MCA_pml", "ob1", 0);
+  setenv("OMPI_MCA_btl", "self", 0);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -39,6 +50,7 @@ int main(int argc, char** argv) {
 
   // An error of one process ends all at once: what it says must be out before, also into a pipe.
   std::setvbuf(stdout, nullptr, _IOLBF, BUFSIZ);
+  start_alone();
   MPI_Init(&argc, &argv);
   LAMMPS_NS::LAMMPS* lammps = new LAMMPS_NS::LAMMPS(argc, argv, MPI_COMM_WORLD);
   // The library enters its own combinations in this constructor; ours come after, where its fallback can be replaced.

@@ -143,3 +143,12 @@ def test_statistics_do_not_depend_on_the_ranks(tmp_path):
     interval = np.maximum(3.0 * np.abs(found["other"] - found["1"]), 0.03 * np.abs(found["1"]))
     for ranks in "24":
         assert (np.abs(found[ranks] - found["1"]) < interval).all(), found
+
+
+@pytest.mark.parametrize(("ranks", "given", "told"), [(1, None, ["self"]), (1, "self,tcp", ["self,tcp"]), (2, None, [])])
+def test_only_a_process_alone_leaves_out_the_networks(tmp_path, monkeypatch, ranks, given, told) -> None:
+    if given:
+        monkeypatch.setenv("OMPI_MCA_btl", given)
+    done = run_deck(tmp_path, 'shell "printenv OMPI_MCA_btl > told"\n', ranks=ranks)
+    assert done.code == 0, done.error
+    assert (tmp_path / "told").read_text().split() == told
