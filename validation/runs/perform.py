@@ -192,7 +192,8 @@ def _load_drawing(warm: bool) -> None:
         from dembark.postproc import render
 
         render.warm()
-    for name in ("dembark.postproc.pictures.packings", "dembark.postproc.pictures.sections", "dembark.postproc.output"):
+    # xarray imports the last two when it writes its first file.
+    for name in ("dembark.postproc.pictures.packings", "dembark.postproc.pictures.sections", "dembark.postproc.output", "pint", "h5netcdf"):
         import_module(name)
 
 
