@@ -110,7 +110,8 @@ class Adams {
     const double next = cut || h == left ? limit : time_ + h;
     if (events_.count) {
       events_(next, corrected_.data(), next_signs_.data());
-      if ((told.event = first_event(h)) >= 0) {
+      told.event = first_event(h);
+      if (told.event >= 0) {
         std::fill(error_.begin(), error_.end(), 0.0);
         restart();
         return told;
