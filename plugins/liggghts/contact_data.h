@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <string>
 
 #include "atom.h"
@@ -16,6 +15,7 @@
 #include "tri_mesh.h"
 
 #include "dembark/contact.hpp"
+#include "dembark/contact_history.hpp"
 
 namespace dembark_liggghts {
 
@@ -69,19 +69,13 @@ inline void add_force(const dembark::ContactForce& f, const LIGGGHTS::ContactMod
   add(on_j.delta_torque, 1.0, f.torque_2);
 }
 
-/// The friction of a contact among the numbers that the engine stores: five in a row.
-static_assert(sizeof(dembark::FrictionState<double>) == 5 * sizeof(double));
-inline dembark::FrictionState<double> load_friction(const double* history) {
-  dembark::FrictionState<double> state;
-  std::memcpy(&state, history, sizeof state);
-  return state;
-}
-inline void store_friction(double* history, const dembark::FrictionState<double>& state) { std::memcpy(history, &state, sizeof state); }
+using dembark::load_friction;
+using dembark::load_rings;
+using dembark::ring_numbers;
+using dembark::store_friction;
+using dembark::store_rings;
 
-/// The same of partial slip.
-constexpr int ring_numbers = sizeof(dembark::SlipRings) / sizeof(double);
-/// Adds the numbers of partial slip to a history; returns where they begin. When the engine swaps the two grains of a pair, displacements
-/// along the axis change their sign ("1"). Those across it do not: with the normal, the direction across turns over.
+/// Adds the numbers of partial slip to a history; returns where they begin. "1": the sign turns when the engine swaps the grains of a pair.
 inline int add_rings(LIGGGHTS::IContactHistorySetup& host) {
   int first = 0;
   for (int k = 0; k < ring_numbers; ++k) {
@@ -90,12 +84,6 @@ inline int add_rings(LIGGGHTS::IContactHistorySetup& host) {
   }
   return first;
 }
-inline dembark::SlipRings load_rings(const double* history) {
-  dembark::SlipRings rings;
-  std::memcpy(&rings, history, sizeof rings);
-  return rings;
-}
-inline void store_rings(double* history, const dembark::SlipRings& rings) { std::memcpy(history, &rings, sizeof rings); }
 
 /// The rolling spring: three numbers, its angle.
 inline void store(double* history, const Vec3& angle) {

@@ -1,7 +1,7 @@
 // The pair loop of liggghts-dembark's most used combinations: Hertz, Finnie-Rabinowicz, with or without capillary bridges.
 //
 // The engine's loop hands every number from model to model through memory and decides pair by pair whether there is a contact. Here
-// the contacts of many grains are picked first and computed in packs (pair_packs.h): the same laws and the same numbers to round-off, in
+// the contacts of many grains are picked first and computed in packs (dembark/pairs): the same laws and the same numbers to round-off, in
 // less time than the stock friction law takes. Whatever else the engine may ask of a pair style (energies, virial, stored forces, rigid
 // bodies, accounts of energy, ...) is left to its own loop, step by step.
 #ifndef DEMBARK_DIRECT_PAIR_LOOP_H
@@ -22,17 +22,21 @@
 #include "update.h"
 
 #include "dembark/contact.hpp"
+#include "dembark/pairs/pair_step.hpp"
 #include "bridge_reach.h"
 #include "contact_data.h"
 #include "fix_energy_account.h"
 #include "model_properties.h"
-#include "pair_packs.h"
+#include "pair_parameters.h"
 
 namespace dembark_liggghts {
 
 /// The engine's `Granular<...>` for the combination `Style`, with a loop of its own for the plain step.
 template <class Style>
-class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactModels::ContactModel<Style>>, ScalarLaws {
+class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactModels::ContactModel<Style>>,
+                       dembark::ScalarLaws,
+                       PairParameters {
+  typedef dembark::PairBlock PairBlock;
   typedef LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactModels::ContactModel<Style>> Stock;
   static constexpr bool wet = Style::COHESION == LIGGGHTS::ContactModels::COHESION_CAPILLARY;
 
@@ -49,9 +53,9 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   dembark::Presliding presliding_ = dembark::Presliding::linear;
   dembark::RollingModel rolling_model_ = dembark::RollingModel::off;
   dembark::capillary::Model model_ = dembark::capillary::Model::exact;
-  PairPacks* const packs_ = choose_pair_packs();
+  dembark::PairPacks* const packs_ = dembark::choose_pair_packs();
   const std::unique_ptr<PairBlock> block_ = std::make_unique<PairBlock>();
-  std::vector<PairLaw<double>> laws_;  // of this step
+  std::vector<dembark::PairLaw<double>> laws_;  // of this step
 
   bool plain_step(LAMMPS_NS::PairGran* pair, int eflag, int vflag, int addflag) const {
     const LAMMPS_NS::Atom* atom = lmp_->atom;
@@ -175,6 +179,20 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
       bridge_offset_ = Stock::get_history_offset(models::CohesionModel<models::COHESION_CAPILLARY>::history_name);
     }
     tallied_ = find_energy_tally(lmp_->modify);
+    known = plain_settings_ ? this : nullptr;
+  }
+
+  dembark::ContactParameters parameters(int i, int j) const override {
+    dembark::ContactParameters p;
+    p.elasticity.effective_youngs_modulus = youngs_modulus_[i][j];
+    p.elasticity.effective_shear_modulus = shear_modulus_[i][j];
+    p.elasticity.damping = damping_factor_[i][j];
+    p.tangential_damping = tangential_damping_;
+    p.limit_force = limit_force_;
+    p.friction = friction_(i, j);
+    if (rolling_model_ != dembark::RollingModel::off) p.rolling = rolling_(i, j);
+    if (wet) p.liquid = liquids_(i, j);
+    return p;
   }
 
   void compute_force(LAMMPS_NS::PairGran* pair, int eflag, int vflag, int addflag) override {
@@ -195,8 +213,42 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     // The rolling spring stands behind the rings.
     const int more = rings_offset_ >= 0 ? rings_offset_ : angle_offset_;
     const int numbers = (rings_offset_ >= 0 ? ring_numbers : 0) + (angle_offset_ >= 0 ? 3 : 0);
-    packs_({atom, *pair, *this, laws_.data(), friction_.types() + 1, owned, friction_offset_, rings_offset_, more, numbers, dt_, wet,
-            limit_force_, tangential_damping_, pack_friction, rolling_model_ != dembark::RollingModel::off},
+    namespace models = LIGGGHTS::ContactModels;
+    const LAMMPS_NS::NeighList &list = *pair->list, &histories = *list.listgranhistory;
+    packs_({*this,
+            laws_.data(),
+            friction_.types() + 1,
+            owned,
+            friction_offset_,
+            rings_offset_,
+            more,
+            numbers,
+            dt_,
+            wet,
+            limit_force_,
+            tangential_damping_,
+            pack_friction,
+            rolling_model_ != dembark::RollingModel::off,
+            atom.x[0],
+            atom.v[0],
+            atom.omega[0],
+            atom.radius,
+            atom.rmass,
+            atom.type,
+            atom.mask,
+            atom.f[0],
+            atom.torque[0],
+            pair->freeze_group_bit(),
+            list.inum,
+            pair->dnum(),
+            list.ilist,
+            list.numneigh,
+            list.firstneigh,
+            histories.firstneigh,
+            histories.firstdouble,
+            NEIGHMASK,
+            models::CONTACT_NORMAL_MODEL | models::CONTACT_TANGENTIAL_MODEL,
+            models::CONTACT_COHESION_MODEL},
            *block_);
   }
 };

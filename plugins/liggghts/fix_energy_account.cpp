@@ -16,6 +16,8 @@
 #include "pair_gran.h"
 #include "update.h"
 
+#include "fix_wall_motion.h"
+
 using namespace LAMMPS_NS;
 using namespace FixConst;
 using dembark::EnergyBody;
@@ -66,6 +68,9 @@ void FixEnergyAccount::init() {
   if (std::strcmp(update->integrate_style, "verlet") != 0) refuse("only run_style verlet is supported");
   check_models();
   check_motion();
+  tally.driven.clear();
+  for (int k = 0; k < modify->nfix; ++k)
+    if (auto *const wall = dynamic_cast<FixWallMotion *>(modify->fix[k])) tally.driven.emplace_back(wall->mesh(), &wall->acceleration());
 }
 
 void FixEnergyAccount::check_models() {
@@ -84,7 +89,7 @@ void FixEnergyAccount::check_models() {
 }
 
 void FixEnergyAccount::check_motion() {
-  moving_ = frozen_ = 0;
+  moving_ = turning_ = frozen_ = 0;
   gravities_.clear();
   std::vector<Fix *> movers;
   for (int k = 0; k < modify->nfix; ++k) {
@@ -95,14 +100,16 @@ void FixEnergyAccount::check_motion() {
     if (is(fix, "gravity")) gravities_.push_back(static_cast<FixGravity *>(fix));
     if (is(fix, "freeze")) frozen_ |= fix->groupbit;
     if (!fix->time_integrate) continue;
-    if (is(fix, "nve/sphere")) {
+    const bool turns = is(fix, "nve/sphere");
+    if (turns || is(fix, "nve")) {
       moving_ |= fix->groupbit;
+      if (turns) turning_ |= fix->groupbit;
       if (k > modify->my_index(this)) refuse("it must come after " + named + ", which changes the velocities");
     } else if (!is(fix, "move") && !is(fix, "nve/noforce"))
-      refuse(named + " moves atoms; only fix nve/sphere, fix move and fix nve/noforce are accounted for");
+      refuse(named + " moves atoms; only fix nve/sphere, fix nve, fix move and fix nve/noforce are accounted for");
     movers.push_back(fix);
   }
-  if (!moving_) refuse("no grain follows its forces: it needs fix nve/sphere");
+  if (!moving_) refuse("no grain follows its forces: it needs fix nve/sphere, or fix nve for grains that do not turn");
   for (std::size_t m = 0; m < movers.size(); ++m)
     for (std::size_t k = 0; k < m; ++k)
       for (int i = 0; i < atom->nlocal; ++i)
@@ -112,10 +119,11 @@ void FixEnergyAccount::check_motion() {
                                 .c_str());
 }
 
-/// Driven grains are to the others what walls are.
+/// Driven grains are to the others what walls are, and so is the spin of grains that do not turn.
 inline dembark::BodyMotion FixEnergyAccount::motion(int i) const {
   // Moment of inertia as in fix nve/sphere.
-  const double mass = atom->rmass[i], inertia = (domain->dimension == 2 ? 0.5 : 0.4) * mass * atom->radius[i] * atom->radius[i];
+  const double mass = atom->rmass[i];
+  const double inertia = atom->mask[i] & turning_ ? (domain->dimension == 2 ? 0.5 : 0.4) * mass * atom->radius[i] * atom->radius[i] : 0.0;
   dembark::BodyMotion grain;
   if ((atom->mask[i] & moving_) && !(atom->mask[i] & frozen_)) grain.mass = {mass, mass, mass, inertia, inertia, inertia};
   grain.velocity = dofs(atom->v[i], atom->omega[i]);
@@ -154,6 +162,8 @@ void FixEnergyAccount::measure_powers() {
   for (std::size_t part = 0; part < dembark::contact_part_count; ++part) {
     now_.now.power[part] -= tally.wall_power[part];
     now_.now.power[Powers::walls] += tally.wall_power[part];
+    now_.now.rate[part] -= tally.wall_rate[part];
+    now_.now.rate[Powers::walls] += tally.wall_rate[part];
   }
 }
 
@@ -181,7 +191,7 @@ EnergyLedger FixEnergyAccount::with_setup() const {
 }
 
 void FixEnergyAccount::setup_pre_force(int) {
-  tally.clear(atom->nlocal);
+  tally.clear(atom->nlocal, atom->x, update->dt);
   fresh_ = true;
 }
 
@@ -219,7 +229,7 @@ void FixEnergyAccount::pre_force(int) {
     const double kinetic_now = kinetic();
     impose(kinetic_now - kinetic_before_, kinetic_now + kinetic_before_, now_.imposed);
   }
-  tally.clear(atom->nlocal);
+  tally.clear(atom->nlocal, atom->x, update->dt);
 }
 
 /// The grains have got their velocities: init() has seen to the order.

@@ -14,6 +14,7 @@ FixStyle(energy/account,FixEnergyAccount)
 
 #include <array>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "contact_interface.h"
@@ -21,6 +22,7 @@ FixStyle(energy/account,FixEnergyAccount)
 #include "modify.h"
 
 #include "dembark/energy_ledger.hpp"
+#include "dembark/motion/wall_work.hpp"
 #include "contact_data.h"
 
 namespace dembark_liggghts {
@@ -30,13 +32,19 @@ namespace dembark_liggghts {
 /// part, from their computation to the end of the step. Each rank tallies for the grains that it owns.
 struct EnergyTally {
   std::vector<std::array<dembark::Dofs, dembark::contact_part_count>> loads;  ///< on each grain
-  std::array<double, dembark::contact_part_count> wall_power{};  ///< W, of each part on the grains, were they moved as the wall is
+  /// W and W/s, of each part on the grains, were they moved as the wall is: with its velocity and acceleration of the moment.
+  std::array<double, dembark::contact_part_count> wall_power{}, wall_rate{};
   double normal_stored = 0.0, tangential_stored = 0.0, rolling_stored = 0.0;  ///< J
 
-  /// Begins anew for the forces of a moment, with this many owned grains.
-  void clear(int grains) {
+  /// Meshes whose acceleration is known. Others have that of the step before: none.
+  std::vector<std::pair<const LAMMPS_NS::AbstractMesh *, const dembark::WallAcceleration *>> driven;
+
+  /// Begins anew for the forces of a moment: of this many owned grains, at these places (m), in a step of `dt` s.
+  void clear(int grains, double *const *positions, double dt) {
+    positions_ = positions;
+    half_step_ = 0.5 * dt;
     loads.assign(std::size_t(grains), {});
-    wall_power = {};
+    wall_power = wall_rate = {};
     normal_stored = tangential_stored = rolling_stored = 0.0;
   }
 
@@ -52,12 +60,26 @@ struct EnergyTally {
       const dembark::Vec3<double> load = scale * parts.load[p];
       dembark::add(loads[std::size_t(d.i)][p], levers.on_one(p, load));
       if (owned) dembark::add(loads[std::size_t(d.j)][p], levers.on_two(p, load));
-      if (d.is_wall) wall_power[p] += dot(load, p < dembark::force_part_count ? vector(d.v_j) : wall_spin(d));
+      if (d.is_wall) add_wall(d, p, load);
     }
     normal_stored += stored * parts.normal_stored;
     tangential_stored += stored * parts.tangential_stored;
     rolling_stored += stored * parts.rolling_stored;
   }
+
+ private:
+  /// The engine has the velocity of the half step before; that of the moment is half a step of acceleration on.
+  void add_wall(const LIGGGHTS::ContactModels::SurfacesCloseData &d, std::size_t part, const dembark::Vec3<double> &load) {
+    const bool is_force = part < dembark::force_part_count;
+    dembark::Vec3<double> change;
+    for (const auto &[mesh, acceleration] : driven)
+      if (mesh == d.mesh) change = is_force ? acceleration->at(vector(positions_[d.i]) - vector(d.delta)) : acceleration->angular;
+    wall_power[part] += dot(load, (is_force ? vector(d.v_j) : wall_spin(d)) + half_step_ * change);
+    wall_rate[part] += dot(load, change);
+  }
+
+  double *const *positions_ = nullptr;
+  double half_step_ = 0.0;
 };
 
 }  // namespace dembark_liggghts
@@ -101,6 +123,7 @@ class FixEnergyAccount : public Fix {
   bool resumed_ = false;               // powers come from a restart file, for its forces
   double kinetic_before_ = 0.0;        // J, with the atoms before they are exchanged
   int moving_ = 0, frozen_ = 0;        // bits of groups
+  int turning_ = 0;                    // of those of moving_ whose spin follows torques
   std::vector<class FixGravity *> gravities_;
   std::vector<std::array<double, 3>> accelerations_;  // of these
 };

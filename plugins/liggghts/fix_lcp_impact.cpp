@@ -37,18 +37,17 @@ void add(const Vec &v, double *to) {
 
 }  // namespace
 
-FixLcpImpact::FixLcpImpact(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg) {
+FixLcpImpact::FixLcpImpact(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg), ranks_(world) {
   if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag || !atom->torque_flag)
     refuse("atoms have no radius, mass, spin or torque of their own; use atom_style granular (or sphere)");
   if (!atom->tag_enable) refuse("atoms have no numbers; use atom_modify id yes");
   checked([&] {
     const std::vector<std::string> words(arg + std::min(3, narg), arg + narg);
-    options_ = dembark_liggghts::read_impact_options(words, atom->ntypes);
-    system_.reset(new System(options_.settings));
+    impacts_ = std::make_unique<Coupling>(read_command(words, atom->ntypes, "the ID of a fix mesh/surface"));
   });
   restart_global = 1;
   vector_flag = 1;
-  size_vector = int(to_numbers(report_).size());
+  size_vector = int(to_numbers(impacts_->report).size());
   extvector = 0;
   global_freq = 1;
   local_flag = 1;
@@ -76,25 +75,10 @@ void FixLcpImpact::checked(const std::function<void()> &work) {
   refuse(wrong);
 }
 
-/// Runs `work` on the rank that knows all bodies. What goes wrong there ends the run on all of them with one line, and its report is that
-/// of all. Collective.
+/// Runs `work` on the rank that knows all bodies; its report is that of all. What goes wrong there ends the run with its line. Collective.
 void FixLcpImpact::on_root(const std::function<void()> &work) {
-  if (comm->nprocs == 1) return checked(work);
-  std::string wrong;
-  try {
-    if (comm->me == 0) work();
-  } catch (const std::exception &e) {
-    wrong = e.what();
-  }
-  std::vector<double> shared = to_numbers(report_);
-  shared.push_back(double(wrong.size()));
-  MPI_Bcast(shared.data(), int(shared.size()), MPI_DOUBLE, 0, world);
-  wrong.resize(std::size_t(shared.back()));
-  shared.pop_back();
-  from_numbers(shared, report_);
-  if (wrong.empty()) return;
-  MPI_Bcast(&wrong[0], int(wrong.size()), MPI_CHAR, 0, world);
-  refuse(wrong);
+  const std::string wrong = ranks_.run(work, impacts_->report);
+  if (!wrong.empty()) refuse(wrong);
 }
 
 void FixLcpImpact::init() {
@@ -104,26 +88,11 @@ void FixLcpImpact::init() {
   check_order();
   find_meshes();
   reset_dt();
-  std::string about;
-  for (std::size_t w = 0; w < options_.walls.size(); ++w)
-    about += (w ? ", " : "") + std::to_string(-1 - static_cast<long>(w)) + " = " + options_.walls[w];
-  on_root([&] {
-    try {
-      file_.open(options_.impacts_file, about.empty() ? "there is none" : about);
-    } catch (const std::runtime_error &e) {
-      throw std::runtime_error(std::string("impacts: ") + e.what());
-    }
-  });
+  on_root([this] { impacts_->open_file(); });
 }
 
 void FixLcpImpact::reset_dt() {
-  checked([this] { system_->set_dt(update->dt); });
-  if (last_dt_ > 0.0 && last_dt_ != update->dt) {
-    last_step_ = -1;  // the forces of another time step are not those of this one
-    clock_time_ += double(update->ntimestep - clock_step_) * last_dt_;
-    clock_step_ = update->ntimestep;
-  }
-  last_dt_ = update->dt;
+  checked([this] { impacts_->set_dt(update->dt, update->ntimestep); });
 }
 
 /// The contact forces have to know all others, so fixes that add forces come first.
@@ -151,29 +120,14 @@ PeriodicBox FixLcpImpact::box() const {
 
 void FixLcpImpact::find_meshes() {
   mesh_fix_.clear();
-  mesh_.resize(options_.meshes.size());
-  for (std::size_t k = 0; k < options_.meshes.size(); ++k) {
-    const int found = modify->find_fix(options_.meshes[k].c_str());
+  mesh_.resize(impacts_->command.meshes.size());
+  for (std::size_t k = 0; k < impacts_->command.meshes.size(); ++k) {
+    const int found = modify->find_fix(impacts_->command.meshes[k].c_str());
     mesh_fix_.push_back(found < 0 ? nullptr : dynamic_cast<FixMeshSurface *>(modify->fix[found]));
     if (!mesh_fix_[k])
-      refuse("wall " + options_.walls[std::size_t(wall_number(options_.around.meshes[k].id))] +
-             ": there is no fix mesh/surface with the ID " + options_.meshes[k] + "; define it before the run");
+      refuse("wall " + impacts_->command.walls[std::size_t(wall_number(impacts_->command.around.meshes[k].id))] +
+             ": there is no fix mesh/surface with the ID " + impacts_->command.meshes[k] + "; define it before the run");
   }
-}
-
-/// Brings what all ranks have to the first. Collective.
-template <class T>
-void FixLcpImpact::gather(std::vector<T> &own, std::vector<T> &all) {
-  if (comm->nprocs == 1) return all.swap(own);
-  const int bytes = int(own.size() * sizeof(T));
-  counts_.resize(std::size_t(comm->nprocs));
-  offsets_.assign(std::size_t(comm->nprocs), 0);
-  MPI_Gather(&bytes, 1, MPI_INT, counts_.data(), 1, MPI_INT, 0, world);
-  if (comm->me == 0) {
-    std::partial_sum(counts_.begin(), counts_.end() - 1, offsets_.begin() + 1);
-    all.resize(std::size_t(offsets_.back() + counts_.back()) / sizeof(T));
-  }
-  MPI_Gatherv(own.data(), bytes, MPI_BYTE, all.data(), counts_.data(), offsets_.data(), MPI_BYTE, 0, world);
 }
 
 /// Sends the meshes that may have moved to the first rank. dt (s): time since the last call, or 0 if there is none. Collective.
@@ -188,7 +142,7 @@ void FixLcpImpact::gather_meshes(double dt) {
       Triangle &triangle = own.emplace_back(dembark_liggghts::triangle_of(mesh, i));
       for (int c = 0; velocity && c < 3; ++c) triangle.velocity[c] = vec((*velocity)(i)[c]);
     }
-    gather(own, mesh_[k]);
+    ranks_.gather(own, mesh_[k]);
   }
 }
 
@@ -200,7 +154,7 @@ void FixLcpImpact::take_meshes(double dt) {
     if (now.empty()) continue;
     std::sort(now.begin(), now.end(), [](const Triangle &a, const Triangle &b) { return a.id < b.id; });
     const bool moving = mesh_fix_[k]->triMesh()->isMoving();
-    Mesh &mesh = options_.around.meshes[k];
+    Mesh &mesh = impacts_->command.around.meshes[k];
     const std::vector<Triangle> &before = mesh.surface.triangles();
     for (std::size_t i = 0; moving && dt > 0.0 && now.size() == before.size() && i < now.size(); ++i)
       for (int c = 0; c < 3; ++c) {
@@ -220,65 +174,31 @@ void FixLcpImpact::take_meshes(double dt) {
 void FixLcpImpact::gather_atoms() {
   own_atom_.clear();
   own_body_.clear();
-  const double turn = options_.torque_scale(domain->dimension);
+  const Command &command = impacts_->command;
+  const double turn = torque_scale();
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!(atom->mask[i] & groupbit)) continue;
     own_atom_.push_back(i);
     const double mass = atom->rmass[i], radius = atom->radius[i];
-    own_body_.push_back({atom->tag[i], mass, options_.inertia(mass, radius), radius, atom->type[i] - 1, vec(atom->x[i]), vec(atom->v[i]),
+    own_body_.push_back({atom->tag[i], mass, command.inertia(mass, radius), radius, atom->type[i] - 1, vec(atom->x[i]), vec(atom->v[i]),
                          vec(atom->omega[i]), vec(atom->f[i]), turn * vec(atom->torque[i])});
   }
-  gather(own_body_, all_body_);
+  ranks_.gather(own_body_, all_body_);
 }
 
-/// Fills bodies_ with what was gathered, sorted by tag; on the first rank.
-void FixLcpImpact::take_bodies() {
-  const std::size_t n = all_body_.size();
-  const auto before = [this](std::size_t a, std::size_t b) { return all_body_[a].id < all_body_[b].id; };
-  // Atoms seldom change their places in the engine's arrays: the order of the last step is tried first.
-  if (order_.size() != n || !std::is_sorted(order_.begin(), order_.end(), before)) {
-    order_.resize(n);
-    std::iota(order_.begin(), order_.end(), std::size_t(0));
-    std::sort(order_.begin(), order_.end(), before);
-  }
-  bodies_.resize(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    bodies_[i] = all_body_[order_[i]];
-    if (i > 0 && bodies_[i - 1].id == bodies_[i].id) throw std::runtime_error("two atoms have the number " + std::to_string(bodies_[i].id));
-  }
-}
+/// The engine turns a torque into spin with its own inertia, that of spheres and in two dimensions that of cylinders.
+double FixLcpImpact::torque_scale() const { return impacts_->command.torque_scale(domain->dimension == 2 ? 0.5 : 0.4); }
 
 /// Hands the forces of the first rank out to the atoms. Collective.
 void FixLcpImpact::apply() {
-  all_push_.resize(bodies_.size());
-  const double turn = 1.0 / options_.torque_scale(domain->dimension);
-  for (std::size_t i = 0; i < bodies_.size(); ++i) all_push_[order_[i]] = {pushes_[i].force, turn * pushes_[i].torque};
+  if (ranks_.is_here()) impacts_->hand_out(all_push_);
   own_push_.resize(own_atom_.size());
-  if (comm->nprocs == 1) {
-    own_push_.swap(all_push_);
-  } else {
-    for (std::vector<int> *list : {&counts_, &offsets_})
-      for (int &n : *list) n = n / int(sizeof(Body)) * int(sizeof(Push));
-    MPI_Scatterv(all_push_.data(), counts_.data(), offsets_.data(), MPI_BYTE, own_push_.data(), int(own_push_.size() * sizeof(Push)),
-                 MPI_BYTE, 0, world);
-  }
+  ranks_.scatter(all_push_, own_push_);
+  const double turn = 1.0 / torque_scale();
   for (std::size_t k = 0; k < own_atom_.size(); ++k) {
     add(own_push_[k].force, atom->f[own_atom_[k]]);
-    add(own_push_[k].torque, atom->torque[own_atom_[k]]);
+    add(turn * own_push_[k].torque, atom->torque[own_atom_[k]]);
   }
-}
-
-/// The forces of the moment, on the first rank.
-void FixLcpImpact::solve(double kick) {
-  const double time = clock_time_ + double(update->ntimestep - clock_step_) * update->dt;
-  Surroundings &around = options_.around;
-  const auto search = [&](double reach, std::vector<Contact> &contacts) { around.find(bodies_, reach, contacts); };
-  report_ = system_->step(bodies_, search, around.wall_speed(), time, kick);
-  pushes_ = system_->pushes();
-  file_.append(system_->take_finished());
-  results_.clear();
-  last_step_ = update->ntimestep;
-  kept_ = false;
 }
 
 /// All ranks' atoms and meshes to the first; dt as for gather_meshes(). Then `work` there, and its forces to the atoms. Collective.
@@ -287,24 +207,19 @@ void FixLcpImpact::do_step(double dt, const std::function<void()> &work) {
   gather_atoms();  // the last to be gathered: apply() goes the way back
   on_root([&] {
     take_meshes(dt);
-    take_bodies();
-    options_.around.pairs.box = box();
+    impacts_->take(all_body_, box());
     work();
   });
   apply();
 }
 
 void FixLcpImpact::setup(int) {
-  do_step(0.0, [this] {
-    // A run that goes on where one has ended: the forces of this step are known.
-    if (last_step_ != update->ntimestep || !last_.hold(bodies_, box())) return solve(0.5);  // half a kick follows, from the full step
-    pushes_ = last_.pushes;
-  });
+  do_step(0.0, [this] { impacts_->set_up(update->ntimestep); });
   fill_local();
 }
 
 void FixLcpImpact::post_force(int) {
-  do_step(update->dt, [this] { solve(1.0); });
+  do_step(update->dt, [this] { impacts_->step(update->ntimestep); });
   if (local_is_read()) fill_local();
 }
 
@@ -316,13 +231,5 @@ void FixLcpImpact::post_run() {
 /// Collective.
 void FixLcpImpact::keep_end_of_step() {
   gather_atoms();
-  on_root([this] {
-    if (!kept_) {  // of the step that has just been done
-      last_.keep(bodies_);
-      last_.pushes = pushes_;
-      kept_ = true;
-    }
-    take_bodies();
-    last_.move(bodies_);
-  });
+  on_root([this] { impacts_->end_step(all_body_); });
 }

@@ -25,8 +25,8 @@
 #include "update.h"
 #include "write_restart.h"
 
+#include "dembark/restart/state_files.hpp"
 #include "engine_access.h"
-#include "state_files.h"
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
@@ -97,7 +97,7 @@ void visit(Stream stream, Atom *atom, Force *force, Modify *modify) {
   const int n = atom->nlocal;
   stream.integer(atom->nextsort);
   if (n) stream.numbers(atom->f[0], 3 * n);
-  if (n) stream.numbers(atom->torque[0], 3 * n);
+  if (n && atom->torque_flag) stream.numbers(atom->torque[0], 3 * n);
   for (FixPropertyAtom *property : fixes<FixPropertyAtom>(modify))
     for (int i = 0; i < n; ++i)
       stream.numbers(property->array_atom ? property->array_atom[i] : property->vector_atom + i, property->get_nvalues());
@@ -172,12 +172,12 @@ void FixResumeExact::init() {
 void FixResumeExact::refuse_other_states() {
   long long newest = -1;
   if (comm->me == 0) {
-    newest = dembark_liggghts::newest_state(base_).step;
-    if (newest < 0) dembark_liggghts::delete_states(base_, 0);
+    newest = dembark::restart::newest_state(base_).step;
+    if (newest < 0) dembark::restart::delete_states(base_, 0);
   }
   MPI_Bcast(&newest, 1, MPI_LONG_LONG, 0, world);
   if (newest < 0) return;
-  refuse("there is a state of an earlier run, " + dembark_liggghts::state_name(base_, newest) +
+  refuse("there is a state of an earlier run, " + dembark::restart::state_name(base_, newest) +
          "; go on from it by resume_state, move it away, or give the states another name than " + base_);
 }
 
@@ -233,11 +233,11 @@ void FixResumeExact::write_state() {
   const bool whole = append_parts(path);
   lengths_.assign(lengths_.size(), 0.0);
   if (comm->me != 0) return;
-  for (const std::string &output : outputs_) dembark_liggghts::sync_file(output);
+  for (const std::string &output : outputs_) dembark::restart::sync_file(output);
   try {
     if (!whole) throw std::runtime_error("file " + path + " could not be written whole. No space left on the disk?");
     const int *const grid = comm->procgrid;
-    dembark_liggghts::keep_state(path, base_, {update->ntimestep, {grid[0], grid[1], grid[2]}});
+    dembark::restart::keep_state(path, base_, {update->ntimestep, {grid[0], grid[1], grid[2]}});
   } catch (const std::exception &wrong) {
     refuse_alone(wrong);
   }
@@ -270,7 +270,7 @@ bool FixResumeExact::append_parts(const std::string &path) {
 
 /// This rank's part of the state whose parts have these lengths. Returns why there is none. Collective.
 std::string FixResumeExact::read_parts(const double *lengths) {
-  const std::string path = ResumeState::file.empty() ? dembark_liggghts::state_name(base_, update->ntimestep) : ResumeState::file;
+  const std::string path = ResumeState::file.empty() ? dembark::restart::state_name(base_, update->ntimestep) : ResumeState::file;
   int whole = 1;
   if (comm->me == 0) {
     const double all = std::accumulate(lengths, lengths + comm->nprocs, 0.0);
@@ -311,7 +311,7 @@ void FixResumeExact::restart(char *buffer) {
   else if (static_cast<bigint>(numbers[1]) == update->ntimestep && saved_ranks_ == comm->nprocs) lacking_ = read_parts(numbers + header);
   if (comm->me != 0) return;
   try {
-    for (const std::string &path : outputs_) dembark_liggghts::cut_output(path, update->ntimestep);
+    for (const std::string &path : outputs_) dembark::restart::cut_output(path, update->ntimestep);
   } catch (const std::exception &wrong) {
     refuse_alone(wrong);
   }
@@ -321,8 +321,8 @@ double FixResumeExact::memory_usage() { return double(part_.size() * sizeof(doub
 
 void ResumeState::command(int narg, char **arg) {
   if (narg != 1) error->all(FLERR, "resume_state: it must have the form resume_state BASE");
-  dembark_liggghts::State state;
-  if (comm->me == 0) state = dembark_liggghts::newest_state(arg[0]);
+  dembark::restart::State state;
+  if (comm->me == 0) state = dembark::restart::newest_state(arg[0]);
   MPI_Bcast(&state, sizeof state, MPI_BYTE, 0, world);
   if (state.step < 0) {
     const std::string line = "resume_state: there is no whole state " + std::string(arg[0]) +
@@ -332,7 +332,7 @@ void ResumeState::command(int narg, char **arg) {
   int *const wanted = comm->user_procgrid;
   if (state.grid[0] * state.grid[1] * state.grid[2] == comm->nprocs && !wanted[0] && !wanted[1] && !wanted[2])
     std::copy(state.grid, state.grid + 3, wanted);
-  file = dembark_liggghts::state_name(arg[0], state.step);
+  file = dembark::restart::state_name(arg[0], state.step);
   char *words[] = {&file[0]};
   ReadRestart(lmp).command(1, words);
 }

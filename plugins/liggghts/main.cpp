@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "force.h"
 #include "input.h"
 #include "lammps.h"
 #include "modify.h"
@@ -16,9 +17,14 @@
 #include "engine_access.h"
 #include "fix_capillary_liquid.h"
 #include "fix_energy_account.h"
+#include "fix_integration_monitor.h"
 #include "fix_lcp_impact.h"
+#include "fix_nve_sph_coupled.h"
 #include "fix_resume_exact.h"
+#include "fix_sph_body.h"
+#include "fix_wall_motion.h"
 #include "granular_combinations.h"
+#include "pair_sph_coupled.h"
 
 namespace {
 
@@ -35,6 +41,8 @@ void start_alone() {
   setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
   setenv("OMPI_MCA_pml", "ob1", 0);
   setenv("OMPI_MCA_btl", "self", 0);
+  // Its folder for such daemons is the same for all that are started alone: one that ends takes it away while another begins.
+  setenv("OMPI_MCA_orte_create_session_dirs", "0", 0);
 }
 
 }  // namespace
@@ -58,8 +66,15 @@ int main(int argc, char** argv) {
   auto& fixes = dembark_liggghts::fix_styles(*lammps->modify);
   fixes["capillary/liquid"] = &create_fix<LAMMPS_NS::FixCapillaryLiquid>;
   fixes["energy/account"] = &create_fix<LAMMPS_NS::FixEnergyAccount>;
+  fixes["integration/monitor"] = &create_fix<LAMMPS_NS::FixIntegrationMonitor>;
   fixes["lcp/impact"] = &create_fix<LAMMPS_NS::FixLcpImpact>;
+  fixes["nve/sph/coupled"] = &create_fix<LAMMPS_NS::FixNveSphCoupled>;
   fixes["resume/exact"] = &create_fix<LAMMPS_NS::FixResumeExact>;
+  fixes["sph/body"] = fixes["sph/wall"] = &create_fix<LAMMPS_NS::FixSphBody>;
+  fixes["wall/motion"] = &create_fix<LAMMPS_NS::FixWallMotion>;
+  (*lammps->force->pair_map)["sph/coupled"] = [](LAMMPS_NS::LAMMPS* host) -> LAMMPS_NS::Pair* {
+    return new LAMMPS_NS::PairSphCoupled(host);
+  };
   dembark_liggghts::commands(*lammps->input)["resume_state"] = [](LAMMPS_NS::LAMMPS* host, int narg, char** arg) {
     LAMMPS_NS::ResumeState(host).command(narg, arg);
   };

@@ -21,6 +21,8 @@
 #include "update.h"
 
 #include "dembark/surface/surface_contacts.hpp"
+#include "contact_data.h"
+#include "fix_wall_motion.h"
 #include "mesh_triangles.h"
 
 namespace dembark_liggghts {
@@ -37,16 +39,17 @@ class MeshWall : public LIGGGHTS::Walls::Granular<Models> {
     LAMMPS_NS::bigint when;
     std::vector<dembark::Triangle> triangles;
     dembark::SurfaceContacts contacts;
+    LAMMPS_NS::FixWallMotion* motion = nullptr;  // that moves it, or nullptr
   };
 
   LAMMPS_NS::LAMMPS* lmp_;
   std::vector<Surface> surfaces_;
 
   /// As the mesh is now: the engine numbers it anew with the neighbour lists, and moves it in any step.
-  const dembark::SurfaceContacts& surface_of(LAMMPS_NS::TriMesh& mesh) {
+  const Surface& surface_of(LAMMPS_NS::TriMesh& mesh) {
     auto found = std::find_if(surfaces_.begin(), surfaces_.end(), [&mesh](const Surface& s) { return s.mesh == &mesh; });
     // Planes that form an angle of less than 0.05 rad are one smooth surface.
-    if (found == surfaces_.end()) found = surfaces_.insert(found, {&mesh, -1, {}, dembark::SurfaceContacts(0.05, 1e-6)});
+    if (found == surfaces_.end()) found = surfaces_.insert(found, {&mesh, -1, {}, dembark::SurfaceContacts(0.05, 1e-6), nullptr});
     const bool moves = mesh.isMoving() || mesh.isDeforming();
     const LAMMPS_NS::bigint now = moves ? lmp_->update->ntimestep : lmp_->neighbor->lastcall;
     const std::size_t count = std::size_t(mesh.sizeLocal() + mesh.sizeGhost());
@@ -59,8 +62,9 @@ class MeshWall : public LIGGGHTS::Walls::Granular<Models> {
         lmp_->error->one(FLERR, (std::string("mesh ") + mesh.mesh_id() + ": " + e.what()).c_str());
       }
       found->when = now;
+      found->motion = moves ? find_wall_motion(lmp_->modify, &mesh) : nullptr;
     }
-    return found->contacts;
+    return *found;
   }
 
   /// Whether the engine computes a contact with triangle `other` in a step in which it does so with `triangle`: it leaves out edges that
@@ -98,7 +102,9 @@ class MeshWall : public LIGGGHTS::Walls::Granular<Models> {
   }
 
  public:
-  MeshWall(LAMMPS_NS::LAMMPS* lmp, LAMMPS_NS::FixWallGran* parent, std::int64_t hash) : Stock(lmp, parent, hash), lmp_(lmp) {}
+  MeshWall(LAMMPS_NS::LAMMPS* lmp, LAMMPS_NS::FixWallGran* parent, std::int64_t hash) : Stock(lmp, parent, hash), lmp_(lmp) {
+    LAMMPS_NS::FixWallMotion::walls_tell_loads = true;
+  }
 
   void compute_force(LAMMPS_NS::FixWallGran* wall, LIGGGHTS::ContactModels::SurfacesIntersectData& contact, bool touching, double* velocity,
                      LAMMPS_NS::FixMeshSurface* fix = nullptr, int number = 0, LAMMPS_NS::TriMesh* mesh = nullptr,
@@ -106,12 +112,21 @@ class MeshWall : public LIGGGHTS::Walls::Granular<Models> {
     if (mesh && !lmp_->atom->shapetype_flag && !lmp_->atom->superquadric_flag) {
       double* const x = lmp_->atom->x[contact.i];
       const dembark::Vec3<double> centre{x[0], x[1], x[2]};
-      const dembark::SurfaceContacts& surface = surface_of(*mesh);
+      const Surface& known = surface_of(*mesh);
+      const dembark::SurfaceContacts& surface = known.contacts;
       const int owner = surface.follow(triangle, centre, contact.radi);
       Histories* const histories = fix->contactHistory();
       if (owner != triangle && computed(*mesh, histories, contact.i, x, triangle, owner)) return;
       if (histories && contact.contact_history)
         inherit(surface, *histories, *mesh, contact.i, centre, contact.radi, triangle, owner, contact.contact_history);
+      if (known.motion) {
+        double* const force = lmp_->atom->f[contact.i];
+        double* const torque = lmp_->atom->torque[contact.i];
+        const dembark::Vec3<double> force_before = vector(force), torque_before = vector(torque);
+        Stock::compute_force(wall, contact, touching, velocity, fix, number, mesh, triangle);
+        known.motion->add_load(x, vector(force) - force_before, vector(torque) - torque_before);
+        return;
+      }
     }
     Stock::compute_force(wall, contact, touching, velocity, fix, number, mesh, triangle);
   }

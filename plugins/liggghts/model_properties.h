@@ -14,6 +14,7 @@
 #include "property_registry.h"
 
 #include "dembark/contact.hpp"
+#include "dembark/pair_table.hpp"
 #include "engine_access.h"
 
 namespace dembark_liggghts {
@@ -45,19 +46,7 @@ inline void register_choice(Settings& settings, const std::string& name, int& ta
   setting->setDefault(values[0]);
 }
 
-/// One value a pair of types. Types go from 1 to types().
-template <class Value>
-class PairTable {
-  int row_ = 1;
-  std::vector<Value> values_;
-
- public:
-  PairTable() = default;
-  explicit PairTable(int types) : row_(types + 1), values_(std::size_t(row_) * row_) {}
-  int types() const { return row_ - 1; }
-  Value& operator()(int i, int j) { return values_[std::size_t(i * row_ + j)]; }
-  const Value& operator()(int i, int j) const { return values_[std::size_t(i * row_ + j)]; }
-};
+using dembark::PairTable;
 
 /// Properties of the engine for one model. A missing one without default, a wrong shape or an asymmetric pair table ends the run with one
 /// line.

@@ -99,6 +99,21 @@ def test_driven_and_frozen_grains_are_walls(tmp_path):
     assert account.kinetic[0] < account.full[0]
 
 
+@pytest.mark.parametrize("spin", [0.0, 30.0])
+def test_grains_whose_spin_is_blocked(tmp_path, spin):
+    """fix nve moves them and does not turn them: a spin that they have is that of a driven body, and no kinetic energy of theirs."""
+    turned = f"variable spin atom {spin}\nset group all omegay v_spin\n" if spin else ""
+    words = bed("run 2500", fixes=turned).replace("nve/sphere", "nve")
+    account = account_bed(tmp_path, words)
+    account.assert_balanced()
+    assert abs(account.tangential_spring[-1]) > 0.01 * account.turnover
+    if spin:
+        assert abs(account.walls[-1]) > 1e-3 * account.turnover and account.kinetic[-1] < account.full[-1]
+    else:
+        assert abs(account.walls[-1]) < 1e-15 * account.turnover
+        np.testing.assert_allclose(account.kinetic, account.full, rtol=1e-13)
+
+
 def test_forces_that_are_no_part_are_other(tmp_path):
     roll = "fix roll all property/global coefficientRollingFriction peratomtypepair 2 0.1 0.1 0.1 0.1\n"
     words = models(DRY)
@@ -163,7 +178,7 @@ STOCK = "model hertz tangential history"
      ("tangential finnie_rabinowicz", "pair style")),
     (lambda t: t.replace("fix motion all nve/sphere", ""), ("no grain follows its forces", "nve/sphere")),
     (lambda t: t.replace(FIX, f"{FIX}\nfix late all nve/sphere"), ("must come after fix late",)),
-    (lambda t: t.replace("nve/sphere", "nve/limit radius_ratio 0.1"), ("fix motion (nve/limit)", "only fix nve/sphere")),
+    (lambda t: t.replace("nve/sphere", "nve/limit radius_ratio 0.1"), ("fix motion (nve/limit)", "only fix nve/sphere, fix nve")),
     (lambda t: t.replace(FIX, f"group one id 7\nfix push one move linear 0.1 0 0\n{FIX}"),
      ("atom 7", "fix motion and fix push", "disjoint")),
     (lambda t: t.replace("timestep", "run_style respa 2 2\ntimestep"), ("run_style verlet",)),

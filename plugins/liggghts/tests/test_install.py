@@ -41,7 +41,6 @@ def test_copies_once(tmp_path):
     assert install(source).returncode == 0
     assert {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in source.rglob("*") if path.is_file()} == before
     for name in ("tangential_model_finnie_rabinowicz.h", "cohesion_model_capillary.h", "fix_lcp_impact.cpp", "fix_resume_exact.cpp",
-                 "state_files.h",
                  "fix_energy_account.cpp", "fix_energy_account.h"):
         assert (source / name).read_bytes() == (ROOT / "plugins/liggghts" / name).read_bytes()
     assert (source / "dembark/capillary/bridge.hpp").exists() and not (source / "dembark/tests").exists()

@@ -7,8 +7,6 @@ import pytest
 from rig.impact_decks import Case, Log, run
 from rig.liggghts_driver import read_dump
 
-from dembark.physics import Drum, FinnieRabinowicz, ImpactSystem, Plane
-
 GAP = 1e-5
 
 
@@ -195,34 +193,3 @@ def test_a_stack_at_rest_carries_its_weight(tmp_path):
         assert carried[pair_of] == pytest.approx((10 - i) * mass * g, rel=1e-6)
     assert found.vector("active") == 10
     assert np.abs(found.velocity()).max() < 1e-9
-
-
-@pytest.mark.parametrize("theta", [1.0, 0.5])
-def test_the_engine_and_python_agree(tmp_path, theta):
-    """A small pile of unequal logs in a turning drum that a plane divides: friction, damping, more than ten impacts."""
-    rows = [(0.11 + 0.02 * math.sin(37.0 * i), -0.45 + 0.3 * (i % 4) + 0.01 * math.sin(91.0 * i), -0.55 + 0.32 * (i // 4))
-            for i in range(8)]
-    logs = [Log((x, y), (2.0 * math.sin(53.0 * i), -2.0), radius=r, mass=2500.0 * r * r, spin=2.0 * math.sin(17.0 * i))
-            for i, (r, x, y) in enumerate(rows)]
-    step, steps, every = 2e-5, 7500, 1250
-    case = Case(logs, f"stiffness 1e7 theta {theta!r} contact_damping 1500 friction 0.4 0.3 1e-4 impacts impacts.txt "
-                      "wall plane side x 0.75 hi stiffness 4e7 friction 0.2 "
-                      "wall cylinder drum z 0 0 0.95 stiffness 5e7 friction 0.5 omega 1.5",
-                step, f"run {steps}", gravity=9.81, every=every)
-    found = run(tmp_path, case)
-    law = FinnieRabinowicz(static_friction=0.4, kinetic_friction=0.3, critical_slip_distance=1e-4)
-    walls = [Plane(point=(0.75, 0.0), normal=(-1.0, 0.0), stiffness=4e7, friction=0.2),
-             Drum(radius=0.95, omega=1.5, stiffness=5e7, friction=0.5)]
-    system = ImpactSystem([log.mass for log in logs], [log.radius for log in logs], [log.position for log in logs],
-                          [log.velocity for log in logs], spin=[log.spin for log in logs], stiffness=1e7, gravity=(0.0, -9.81),
-                          friction=law,
-                          walls=walls, theta=theta, contact_damping=1500.0)
-    motion = system.run(steps * step, step, every=every)
-    assert len(motion.impacts) > 10
-    for k, frame in enumerate(found.frames):
-        assert frame[:, 1:3] == pytest.approx(motion.position[k], abs=1e-9)
-        assert frame[:, 4:6] == pytest.approx(motion.velocity[k], abs=1e-9 * np.abs(motion.velocity[k]).max())
-        assert frame[:, 9] == pytest.approx(motion.spin[k], abs=1e-9 * np.abs(motion.spin[k]).max())
-    assert len(found.impacts()) == len(motion.impacts)
-    assert found.vector("dissipated") == pytest.approx(motion.dissipated_energy[-1], rel=1e-9)
-    assert found.vector("impacts") == motion.report["impacts_begun"][-1]

@@ -1,0 +1,48 @@
+// fix ID group nve/sph/coupled: the group is the fluid of pair_style sph/coupled; moves it and keeps its energies.
+#ifdef FIX_CLASS
+
+FixStyle(nve/sph/coupled,FixNveSphCoupled)
+
+#else
+
+#ifndef LMP_FIX_NVE_SPH_COUPLED_H
+#define LMP_FIX_NVE_SPH_COUPLED_H
+
+#include <string>
+
+#include "fix.h"
+
+namespace LAMMPS_NS {
+
+class FixNveSphCoupled : public Fix {
+ public:
+  FixNveSphCoupled(class LAMMPS *, int, char **);
+
+  void post_create();
+  void pre_delete(bool);
+  int setmask();
+  void init();
+  double extend_cut_ghost();
+  void setup_pre_force(int);
+  void initial_integrate(int);
+  void pre_force(int);
+  void final_integrate();
+  double compute_vector(int);
+  void write_restart(FILE *);
+  void restart(char *);
+
+ private:
+  [[noreturn]] void refuse(const std::string &what);
+  void kick();
+
+  class PairSphCoupled *pair_ = nullptr;
+  class FixPropertyAtom *shifts_ = nullptr;
+  double saved_[3] = {};  // losses of all ranks before a restart
+  double totals_[9] = {};
+  bigint summed_ = -1;  // step of totals_
+};
+
+}  // namespace LAMMPS_NS
+
+#endif
+#endif

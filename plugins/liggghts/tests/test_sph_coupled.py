@@ -1,0 +1,133 @@
+"""pair_style sph/coupled with its fixes: the same fluid as the solver's, on any number of ranks, resumed exactly; what it refuses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rig.fluid import Scene, box, dam, deck, neutral, solved
+from rig.liggghts_driver import read_dump, run_deck
+
+from dembark.physics import SphFluid
+
+STEPS = 200
+POTENTIAL = {"contact_stiffness": 2e4, "contact_exponent": 4, "boundary": "dynamic", "kernel": "cubic_spline"}
+SCENES: dict[str, Scene] = {
+    "dam": dam(),
+    "no_slip": dam(no_slip=True, alpha=0.1, shifting=2.0),
+    "tension": dam(tension=True, delta=0.0, kernel="cubic_spline", smoothing=1.5),
+    "potential": dam(**POTENTIAL),
+    "box": box(),
+}
+
+
+def assert_close(found: Any, due: Any, tolerance: float = 1e-9) -> None:
+    scale = np.abs(due).max()
+    assert np.abs(np.asarray(found) - due).max() <= tolerance * scale
+
+
+def assert_same_fluid(table: Any, scene: Scene, steps: int, tolerance: float = 1e-9) -> None:
+    """Positions, velocities, densities and the places of bodies are those of the solver."""
+    fluid, bodies = neutral(scene, steps)
+    rows, d = table[table[:, 1] == 1], scene.dimension
+    assert len(rows) == len(scene.points)
+    assert_close(rows[:, 2 : 2 + d], fluid.positions, tolerance)
+    assert_close(rows[:, 5 : 5 + d], fluid.velocities, tolerance)
+    assert_close(rows[:, 8], fluid.densities, tolerance)
+    assert_close(rows[:, 9], fluid.pressures, 1e3 * tolerance)
+    for number, (body, block) in enumerate(zip(bodies, scene.blocks, strict=True), 3):
+        mine = table[table[:, 1] == number]
+        assert len(mine) == len(block.points)
+        assert_close(mine[:, 2 : 2 + d], body.particles[0], tolerance)
+
+
+# Ranks wait for each other three times a step, which on a busy machine takes long. Neighbours are searched about every 20 steps.
+@pytest.mark.parametrize(("name", "ranks", "steps"), [*((name, 1, STEPS) for name in SCENES), ("dam", 2, STEPS), ("no_slip", 2, 60),
+                                                      ("potential", 2, 60), ("box", 2, 40)])
+def test_is_the_fluid_of_the_solver(name: str, ranks: int, steps: int, tmp_path: Path) -> None:
+    scene = SCENES[name]
+    table, energies = solved(tmp_path, scene, steps, ranks=ranks)
+    assert_same_fluid(table, scene, steps)
+    fluid, _ = neutral(scene, steps)
+    due = np.array(fluid.energies())
+    assert np.abs(energies - due).max() <= 1e-8 * np.abs(due).max()
+
+
+def test_four_ranks_and_an_atom_style_without_grains(tmp_path: Path) -> None:
+    scene = SCENES["dam"]
+    one, _ = solved(tmp_path / "one", scene, 60, style="sph")
+    four, _ = solved(tmp_path / "four", scene, 60, ranks=4)
+    assert_same_fluid(one, scene, 60)
+    for columns in (slice(2, 5), slice(5, 8), slice(8, 9)):
+        assert_close(four[:, columns], one[:, columns])
+
+
+def test_a_wall_that_moves_does_work(tmp_path: Path) -> None:
+    scene = Scene(SCENES["dam"].points, SCENES["dam"].wall, 0.02, 30.0)
+    table, energies = solved(tmp_path, scene, STEPS, changes=(("fix wall g2 sph/wall", "fix wall g2 sph/wall velocity 0.05 0.02 0.0"),))
+    fluid = SphFluid(scene.points, spacing=0.02, sound_speed=30.0, gravity=[0, -9.81])
+    wall = fluid.add_wall(scene.wall)
+    wall.set_motion([0.05, 0.02])
+    fluid.run(STEPS * scene.step, scene.step)
+    assert_close(table[table[:, 1] == 1][:, 2:4], fluid.positions)
+    assert energies[8] == pytest.approx(fluid.energies().work, rel=1e-8) and abs(energies[8]) > 1e-3
+
+
+@pytest.mark.parametrize(("style", "ranks"), [("hybrid granular sph", 1), ("sph", 2)])
+def test_resumes_to_the_bit(style: str, ranks: int, tmp_path: Path) -> None:
+    scene = dam(shifting=2.0)
+
+    def text(run: str) -> str:
+        states = "fix state all resume/exact 30 state\n"
+        return deck(scene, 60, ranks=ranks, style=style, run=states + run)
+
+    whole = run_deck(tmp_path / "whole", text("run 60"), ranks=ranks)
+    assert whole.code == 0, whole.error or whole.output[-1500:]
+    run_deck(tmp_path / "parts", text("run 40"), ranks=ranks)
+    begin = text("run 60 upto")
+    first, last = begin.index("region domain"), begin.index("pair_style")
+    groups = "".join(f"group g{number} type {number}\n" for number in (1, 2, 3))
+    second = begin[:first] + "resume_state state\nneighbor 0.0052 bin\nneigh_modify delay 0 check yes\n" + groups + begin[last:]
+    resumed = run_deck(tmp_path / "parts", second, ranks=ranks, name="second.in")
+    assert resumed.code == 0, resumed.error or resumed.output[-1500:]
+    assert "resumed at step 30 exactly" in resumed.output, resumed.output[-3000:]
+    one, two = (read_dump(tmp_path / folder / "grains.dump")[1][-1] for folder in ("whole", "parts"))
+    assert (one == two).all()
+    lines = [next(line for line in run.output.splitlines() if line.startswith("energies ")) for run in (whole, resumed)]
+    a, b = (np.array(line.split()[1:], float) for line in lines)
+    assert_close(b, a, 1e-9)
+
+
+REFUSED = {
+    "step": ("timestep ", "timestep 1", "the time step must be at most 0.6 h/sound_speed"),
+    "mass": ("set group all mass 0.4", "set group all mass 0.5", "of the fluid has the mass 0.5 kg where density * spacing^2 is 0.4 kg"),
+    "density": ("meso_rho 1000", "meso_rho 0", "of the fluid has the density 0 kg/m^3"),
+    "ghosts": ("communicate single vel yes", "communicate single vel no", "communicate single vel yes"),
+    "newton": ("newton off", "newton on", "set newton off"),
+    "smoothing": ("sound_speed 30.0 ", "sound_speed 30.0 smoothing 0.7", "smoothing (h over the spacing) must be between 0.8 and 3"),
+    "keyword": ("sound_speed 30.0 ", "sound_speed 30.0 wavy 3", "'wavy' is no keyword; known are spacing"),
+    "spacing": ("spacing 0.02", "", "spacing (m) is missing"),
+    "sound": ("sound_speed 30.0", "", "sound_speed (m/s) is missing"),
+    "number": ("spacing 0.02", "spacing wide", "'wide' is no number; it wants dx (m)"),
+    "kernel": ("sound_speed 30.0 ", "sound_speed 30.0 kernel gauss", "the kernel is one of wendland_c2, cubic_spline, not 'gauss'"),
+    "empty body": ("fix body3 g3", "group none type 99\nfix body3 none", "its group has no atoms"),
+    "no mass": ("mass 6.4 ", "", "mass is missing"),
+    "no inertia": ("inertia 0.009 ", "", "inertia is missing"),
+    "no fluid": ("fix fluid g1 nve/sph/coupled", "group nobody type 99", "nothing moves the fluid"),
+    "two groups": ("fix body3 g3", "fix again g1 sph/wall\nfix body3 g3", "is in two groups"),
+    "weight": ("fix weight all", "fix weight g2", "the group of fix gravity must hold the whole fluid"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_says_what_is_wrong(name: str, tmp_path: Path) -> None:
+    old, new, message = REFUSED[name]
+    done = run_deck(tmp_path, deck(SCENES["dam"], 2, changes=((old, new),)))
+    assert done.code != 0 and message in done.error, done.error or done.output[-800:]
+
+
+def test_a_fluid_that_blows_up_is_told(tmp_path: Path) -> None:
+    done = run_deck(tmp_path, deck(SCENES["dam"], 2, extra="set atom 5 vx 31.0 vy 0.0"))
+    assert done.code != 0 and "the fluid blew up: at step 1 atom 5 moves at 3" in done.error, done.error
