@@ -10,14 +10,14 @@
 
 #include <core/Body.hpp>
 #include <core/GlobalEngine.hpp>
-#include <core/InteractionLoop.hpp>
 #include <core/Omega.hpp>
 #include <core/Scene.hpp>
-#include <pkg/dem/NewtonIntegrator.hpp>
 
 #include "ContactView.hpp"
 #include "FinnieRabinowicz.hpp"
+#include "WallMotion.hpp"
 #include "dembark/energy_ledger.hpp"
+#include "engine_order.hpp"
 #include "report.hpp"
 
 namespace yade {
@@ -109,23 +109,12 @@ std::string bodyName(Body::id_t id) { return "EnergyAccount: body " + std::to_st
 
 /// The scene's integrator, if its account can be kept.
 const NewtonIntegrator& EnergyAccount::integrator() const {
-	const NewtonIntegrator* found  = nullptr;
-	bool                    passed = false;
-	for (const auto& engine : scene->engines) {
-		passed = passed || engine.get() == this;
-		if (engine->dead) continue;
-		const auto* newton = dynamic_cast<const NewtonIntegrator*>(engine.get());
-		if ((newton && !passed) || (passed && dynamic_cast<const InteractionLoop*>(engine.get())))
-			fail("EnergyAccount must stand in O.engines after InteractionLoop and before NewtonIntegrator");
-		if (newton && found) fail("EnergyAccount: there is more than one NewtonIntegrator in O.engines; it needs exactly one");
-		if (newton) found = newton;
-	}
-	if (!found) fail("EnergyAccount: there is no NewtonIntegrator in O.engines; it needs exactly one after it");
-	if (found->densityScaling)
+	const NewtonIntegrator& found = dembark_yade::integratorAfter(*this, *scene);
+	if (found.densityScaling)
 		fail("EnergyAccount: NewtonIntegrator.densityScaling moves bodies with other masses than theirs; set it to False");
 	if (scene->isPeriodic && !(scene->cell->velGrad.isZero(0) && scene->cell->nextVelGrad.isZero(0)))
 		fail("EnergyAccount: the periodic cell deforms, and its work cannot be tallied; O.cell.velGrad must be zero");
-	return *found;
+	return found;
 }
 
 void EnergyAccount::action() {
@@ -328,11 +317,23 @@ void EnergyAccount::tally(const Scene& after) {
 	const auto& all = *after.bodies;
 	ledger.kinetic  = 0.0;
 	ledger.now      = {};
+	// A driven wall that turns has got its velocity for its next place.
+	std::vector<const ::dembark::Dofs*> driven;
+	for (const auto& engine : after.engines) {
+		const auto* const motion = dynamic_cast<const WallMotion*>(engine.get());
+		if (!motion || motion->lastStep != recorded) continue;
+		driven.resize(bodies.size(), nullptr);
+		for (std::size_t k = 0; k < motion->ids.size(); ++k)
+			if (std::size_t(motion->ids[k]) < driven.size()) driven[std::size_t(motion->ids[k])] = &motion->after(k);
+	}
 	for (std::size_t k = 0; k < bodies.size(); ++k) {
 		if (!present[k]) continue;
-		const Body* const now  = k < all.size() ? all[k].get() : nullptr;
-		EnergyBody&       body = bodies[k];
-		known[k] = ledger.arrive(body, length, now == present[k] ? dofs(now->state->vel, now->state->angVel) : body.kicked(length));
+		const Body* const now      = k < all.size() ? all[k].get() : nullptr;
+		EnergyBody&       body     = bodies[k];
+		const auto        velocity = !driven.empty() && driven[k] ? *driven[k]
+		                             : now == present[k]          ? dofs(now->state->vel, now->state->angVel)
+		                                                          : body.kicked(length);
+		known[k]                   = ledger.arrive(body, length, velocity);
 		ledger.now.add_body(body);
 	}
 	for (Contact& c : contacts)

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 
 #include <core/InteractionLoop.hpp>
 #include <core/Scene.hpp>
@@ -14,6 +12,7 @@
 #include <pkg/common/Wall.hpp>
 
 #include "CylinderWall.hpp"
+#include "SavedNumbers.hpp"
 #include "report.hpp"
 
 namespace yade {
@@ -30,21 +29,6 @@ namespace lcp_impact {
 Vector3r                eigen(const ::dembark::Vec3<double>& v) { return Vector3r(v.x, v.y, v.z); }
 constexpr int           unknown = -2;  // plane of the logs
 std::string             logName(Body::id_t id) { return "LcpImpact: log " + std::to_string(id) + " "; }
-
-/// Numbers in hexadecimal: every archive of YADE keeps them, XML too.
-std::string encode(const std::vector<double>& numbers) {
-	std::string text;
-	char        number[40];
-	for (const double x : numbers) text.append(number, std::snprintf(number, sizeof number, "%a ", x));
-	return text;
-}
-
-std::vector<double> decode(const std::string& text) {
-	std::vector<double> numbers;
-	char*               next = nullptr;
-	for (const char* at = text.c_str(); *at; at = next + 1) numbers.push_back(std::strtod(at, &next));
-	return numbers;
-}
 
 /// Axis of the blocked translation of a log that moves in a plane, -1 of one that moves freely; the rest is refused.
 int blockedAxis(const State& state, Body::id_t id) {
@@ -249,7 +233,7 @@ void LcpImpact::prepare() {
 	system                           = std::make_unique<impact::System>(now);
 	if (!begins) return system->restore(state);
 	if (savedState.empty()) return;
-	impact::Archive saved(lcp_impact::decode(savedState));
+	impact::Archive saved(dembark_yade::decode(savedState));
 	archive(saved);
 }
 
@@ -322,7 +306,7 @@ void LcpImpact::preSave(LcpImpact&) {
 	if (!system) return;
 	impact::Archive out;
 	archive(out);
-	savedState = lcp_impact::encode(out.numbers());
+	savedState = dembark_yade::encode(out.numbers());
 }
 
 void LcpImpact::writeImpacts() {

@@ -12,9 +12,11 @@ namespace yade {
 class DembarkSnapshot : public Serializable {
 public:
 	virtual ~DembarkSnapshot() = default;
-	std::string grainRows() const;
-	std::string contactRows() const;
-	Real        kineticEnergy() const;
+	std::string         grainRows() const;
+	std::string         contactRows() const;
+	Real                kineticEnergy() const;
+	Vector3r            momentum() const;
+	boost::python::list wallForces() const;
 	// clang-format off
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(DembarkSnapshot,Serializable,"Rows for dump files, and sums, of the present scene. To be used between :yref:`InteractionLoop` and :yref:`NewtonIntegrator`: positions and forces are then of one time, and velocities, which YADE keeps half a step earlier, are moved on by v + dt/2 a to the same.",
 		((vector<int>,types,,,"For each body its type in the dump, 1 = moving grain, 0 = not in the dump"))
@@ -29,6 +31,8 @@ public:
 		.def("grainRows",&DembarkSnapshot::grainRows,"Lines 'id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass' and three forces for each wall.")
 		.def("contactRows",&DembarkSnapshot::contactRows,"Lines 'x1 y1 z1 x2 y2 z2 id1 id2 periodic fx fy fz' of all contacts and bridges between bodies of the dump.")
 		.def("kineticEnergy",&DembarkSnapshot::kineticEnergy,"Translational kinetic energy [J] of the grains (type 1).")
+		.def("momentum",&DembarkSnapshot::momentum,"Momentum [N s] of the grains (type 1).")
+		.def("wallForces",&DembarkSnapshot::wallForces,"Force [N] of each wall on the grains, the bodies of its number in columns together.")
 	);
 	// clang-format on
 private:
@@ -133,6 +137,26 @@ std::string DembarkSnapshot::contactRows() const {
 		text.back() = '\n';
 	}
 	return text;
+}
+
+Vector3r DembarkSnapshot::momentum() const {
+	Scene& scene = *Omega::instance().getScene();
+	scene.forces.sync();
+	Vector3r sum = Vector3r::Zero();
+	for (const auto& body : *scene.bodies)
+		if (body && at(types, body->getId(), 0) == 1) sum += body->state->mass * motion(*body, scene, gravity).velocity;
+	return sum;
+}
+
+boost::python::list DembarkSnapshot::wallForces() const {
+	Scene& scene = *Omega::instance().getScene();
+	scene.forces.sync();
+	std::vector<Vector3r> sums(wallCount, Vector3r::Zero());
+	for (std::size_t id = 0; id < columns.size(); ++id)
+		if (columns[id] >= 0) sums[columns[id]] -= scene.forces.getForce(Body::id_t(id));
+	boost::python::list all;
+	for (const Vector3r& sum : sums) all.append(sum);
+	return all;
 }
 
 Real DembarkSnapshot::kineticEnergy() const {

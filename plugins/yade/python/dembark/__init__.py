@@ -3,8 +3,12 @@
 The files have the schema of the LIGGGHTS decks. Standard library only; SI units.
 """
 
+from yade.dembark.balance import Balance
+from yade.dembark.fluids import FluidWriter, fluid_engine, lattice, tank_walls
 from yade.dembark.frames import FrameWriter, StepMeans
 from yade.dembark.logs import LogWriter, drum, log, log_loop, log_wall, logs
+from yade.dembark.machines import TouchWriter, account_history
+from yade.dembark.moving import mesh, motion, motion_columns, motion_values
 from yade.dembark.report import fail, finish
 from yade.dembark.scene import (
     Recorder,
@@ -14,6 +18,7 @@ from yade.dembark.scene import (
     engine_loop,
     grains,
     materials,
+    mesh_loop,
     packing,
     pairs,
     parameters,
@@ -26,7 +31,8 @@ from yade.dembark.states import options, run, table
 from yade.dembark.writers import DumpWriter, EnergyWriter, HistoryWriter, energies
 
 __all__ = [
-    "DumpWriter", "EnergyWriter", "FrameWriter", "HistoryWriter", "LogWriter", "Recorder", "StepMeans", "begin", "box", "contact_loop",
-    "drum", "energies", "engine_loop", "fail", "finish", "grains", "log", "log_loop", "log_wall", "logs", "materials", "options",
-    "packing", "pairs", "parameters", "periodic", "plane", "planes", "run", "slab_loop", "table",
+    "Balance", "DumpWriter", "EnergyWriter", "FluidWriter", "FrameWriter", "HistoryWriter", "LogWriter", "Recorder", "StepMeans",
+    "TouchWriter", "account_history", "begin", "box", "contact_loop", "drum", "energies", "engine_loop", "fail", "finish", "fluid_engine",
+    "grains", "lattice", "log", "log_loop", "log_wall", "logs", "materials", "mesh", "mesh_loop", "motion", "motion_columns",
+    "motion_values", "options", "packing", "pairs", "parameters", "periodic", "plane", "planes", "run", "slab_loop", "table", "tank_walls",
 ]

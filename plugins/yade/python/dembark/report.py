@@ -3,7 +3,7 @@
 import sys
 import threading
 
-from yade import Omega
+from yade import IntegrationMonitor, Omega
 
 O = Omega()
 
@@ -35,6 +35,16 @@ def announce(steps):
     print(f"dembark: steps {steps} time_step {O.dt:.17g}", flush=True)
 
 
+def monitor():
+    """The scene's IntegrationMonitor, or None."""
+    return next((one for one in O.engines if isinstance(one, IntegrationMonitor)), None)
+
+
 def finish():
-    """Last line of a run that came to its end."""
+    """Last lines of a run that came to its end."""
+    watch = monitor()
+    if watch is not None:
+        found = watch.figures()
+        print("dembark: integration", *(f"{name} {found[name]:.15g}" for name in ("position", "velocity", "spin", "contact_steps")),
+              flush=True)
     print("dembark: finished", flush=True)

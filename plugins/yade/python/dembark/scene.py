@@ -2,10 +2,13 @@
 
 from yade import (
     Bo1_Box_Aabb,
+    Bo1_Facet_Aabb,
     Bo1_Sphere_Aabb,
+    FacetSurface,
     ForceResetter,
     FrictMat,
     Ig2_Box_Sphere_ScGeom,
+    Ig2_FacetSurface_Sphere_ScGeom,
     Ig2_Sphere_Sphere_ScGeom,
     InsertionSortCollider,
     InteractionLoop,
@@ -152,19 +155,22 @@ def contact_loop(p, materials, walls, static=None, kinetic=None):
             capillaryModel=p.capillary_model if p.wet else "none", carriedLiquid=bool(p.carried), **law)])
 
 
-def engine_loop(p, loop, bounds, verlet, gravity, liquid=None, account=None, periodic=False, record="record()"):  # noqa: ARG001 (every deck gives its numbers)
+def engine_loop(p, loop, bounds, verlet, gravity, liquid=None, account=None, periodic=False, record="record()", moving=(), surface=None):  # noqa: ARG001 (every deck gives its numbers)
     """All engines of a scene: `loop` from `contact_loop`, `bounds`: Bo1 functors, `verlet` (m): Verlet distance of the collider.
 
-    `record`, called in every step between forces and motion, where positions and forces belong to the same time, writes what is due.
+    `record`, called in every step between forces and motion, where positions and forces belong to the same time, writes what is due;
+    `moving`: engines of `motion`; `surface`: the FacetSurface that the functor of facets in `loop` asks.
     """
     sorting = {"allowBiggerThanPeriod": True} if periodic else {}
     return [
         ForceResetter(),
         InsertionSortCollider(bounds, verletDist=verlet, **sorting),
+        *([surface] if surface is not None else []),
         loop,
         *([liquid] if liquid is not None else []),
         PyRunner(command=record, iterPeriod=1),
         *([account] if account is not None else []),
+        *moving,
         NewtonIntegrator(damping=0, gravity=gravity),
     ]
 
@@ -175,16 +181,27 @@ def slab_loop(p, materials, gravity, verlet=0.1, static=None, kinetic=None, **mo
     return engine_loop(p, loop, [Bo1_Sphere_Aabb(), Bo1_Box_Aabb()], verlet * p.grain_diameter, gravity, periodic=True, **more)
 
 
+def mesh_loop(p, materials, gravity, verlet=0.1, static=None, kinetic=None, **more):
+    """All engines of a scene with walls of facets (`mesh`) and, if there are any, `planes`; arguments as of `slab_loop`."""
+    surface = FacetSurface()
+    loop = contact_loop(p, materials, [Ig2_Box_Sphere_ScGeom(), Ig2_FacetSurface_Sphere_ScGeom(surface=surface)], static, kinetic)
+    bounds = [Bo1_Sphere_Aabb(), Bo1_Box_Aabb(), Bo1_Facet_Aabb()]
+    return engine_loop(p, loop, bounds, verlet * p.grain_diameter, gravity, surface=surface, **more)
+
+
 class Recorder:
     """Writes what is due at a step: a row of time.csv every p.every steps, a frame of the dumps every p.stride from p.first on.
 
-    `history`: writer of time.csv other than HistoryWriter; `report`: steps between two lines of progress, by default each row.
+    `history`: writer of time.csv other than HistoryWriter; `report`: steps between two lines of progress, by default each row;
+    `moving`: engines of `motion`, whose numbers the history has then.
     """
 
-    def __init__(self, p, walls, bounds=None, boundary="ff ff ff", gravity=(0, 0, 0), glued=None, liquid=None, history=None, report=None):
+    def __init__(self, p, walls, bounds=None, boundary="ff ff ff", gravity=(0, 0, 0), glued=None, liquid=None, history=None, report=None,
+                 moving=()):
         self.p, self.report = p, report
         self.dump = DumpWriter(walls=walls, bounds=bounds or box(), boundary=boundary, gravity=gravity)
-        self.history = history or HistoryWriter(walls=walls, glued=glued, gravity=gravity, liquid=liquid, progress=report is None)
+        self.history = history or HistoryWriter(walls=walls, glued=glued, gravity=gravity, liquid=liquid, progress=report is None,
+                                                moving=moving)
 
     def __call__(self):
         """Once in every step."""

@@ -10,8 +10,8 @@ import sys
 import zlib
 from functools import cache
 
-from yade import Omega
-from yade.dembark.report import announce, fail, finish
+from yade import IntegrationMonitor, NewtonIntegrator, Omega
+from yade.dembark.report import announce, fail, finish, monitor
 
 O = Omega()
 _KEPT_STATES = 2
@@ -138,8 +138,10 @@ def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.c
     `restart_every` and `resume` are what the words behind the script say unless they are given. Every `restart_every` steps (0: never)
     the scene is saved as `base`.<step>.yade.gz. With `resume` the newest of these that is whole takes the scene's place, and what
     `outputs` (tables that begin with the step, and dumps) got after it is cut off, for it comes again. Call it when the scene is
-    complete. A scene goes on from the saved copy of itself, so that a run that was killed and resumed is the same to the bit as one
-    that was not, on one thread. `saving()` is called before the scene is saved, `loaded()` after it was resumed.
+    complete. It gets an IntegrationMonitor before its NewtonIntegrator if it has none
+    and no clumps. A scene goes on from the saved copy of itself, so
+    that a run that was killed and resumed is the same to the bit as one that was not, on one thread. `saving()` is called before the scene
+    is saved, `loaded()` after it was resumed.
     """
     announce(steps)
     given = options()
@@ -162,6 +164,7 @@ def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.c
         if whole:
             fail(f"there is a state of an earlier run, {whole[0]}; go on from it by resume=yes, move it away, or use another folder")
         _forget(found)
+    watch()
     # The last row and frame are written in the step that starts from their state.
     end = steps + 1
     while O.iter < end:
@@ -172,6 +175,19 @@ def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.c
             _save(base, outputs)
             O.load(f"{base}.{O.iter}.yade.gz", quiet=True)
     finish()
+
+
+def watch():
+    """Add an IntegrationMonitor that only counts, with errors of velocities over 1 m/s, to a scene without one.
+
+    Not where there are clumps, whose motion it cannot judge.
+    """
+    if any(body.isClump for body in O.bodies):
+        return
+    engines = O.engines
+    places = [k for k, one in enumerate(engines) if isinstance(one, NewtonIntegrator)]
+    if monitor() is None and len(places) == 1:
+        O.engines = [*engines[: places[0]], IntegrationMonitor(speed=1.0, reaction="report"), *engines[places[0] :]]
 
 
 def table(path, header):

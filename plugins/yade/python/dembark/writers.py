@@ -4,6 +4,7 @@ A writer must run between InteractionLoop and NewtonIntegrator, where positions 
 """
 
 from yade import CapillaryLiquid, DembarkSnapshot, EnergyAccount, Omega, Sphere
+from yade.dembark.moving import motion_columns, motion_values
 from yade.dembark.report import fail
 from yade.dembark.states import options, table
 from yade.minieigenHP import Vector3, Vector3i
@@ -54,6 +55,7 @@ class DumpWriter:
         be the period, and counted by image flags
     types : id -> type of a row; 0 leaves a body out. By default 1 for spheres that move and 2 for those that are held.
     glued : wall -> ids of held spheres whose force on a grain counts to that wall's
+    grains, contacts : paths; contacts = None writes none
     """
 
     def __init__(self, walls, bounds, boundary="ff ff ff", gravity=(0.0, 0.0, -9.81), types=None, glued=None, grains="grains.dump",
@@ -64,8 +66,12 @@ class DumpWriter:
             fail(f"DumpWriter: boundary '{boundary}': it must be three words ff or pp")
         self._snapshot = _Snapshot(walls, glued, gravity, types)
         self._paths = grains, contacts
-        for path in self._paths:
+        for path in filter(None, self._paths):
             open(path, "a" if options()[1] else "w").close()
+
+    def _chosen(self, rows):
+        """The rows of grains that are written: all."""
+        return rows
 
     def _frame(self, path, kind, rows, count, columns):
         box = "".join(f"{low:.10g} {high:.10g}\n" for low, high in self.bounds)
@@ -88,23 +94,29 @@ class DumpWriter:
                          "they must be equal")
         walls = "".join(f" f_force_{name}[{i}]" for name in self._snapshot.names for i in (1, 2, 3))
         columns = "id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass" + walls
-        rows = shot.grainRows()
+        rows = self._chosen(shot.grainRows())
         self._frame(self._paths[0], "ATOMS", rows, rows.count("\n"), columns)
+        if self._paths[1] is None:
+            return
         rows = shot.contactRows()
         self._frame(self._paths[1], "ENTRIES", rows, rows.count("\n"), " ".join(f"c_contacts[{i}]" for i in range(1, 13)))
 
 
 class HistoryWriter:
     """Appends lines to time.csv: step, time, kinetic energy of the grains, force of each wall (with its glued grains) on the grains; with
-    `liquid`, the CapillaryLiquid that the scene has or will have, also where its liquid is (m^3) and the number of bridges."""
+    `liquid`, the CapillaryLiquid that the scene has or will have, also where its liquid is (m^3) and the number of bridges; with the
+    engines `moving` of `motion` also what `motion_values` tells."""
 
     LIQUID = {"liquid_grains": "inGrains", "liquid_bridges": "inBridges", "liquid_walls": "onWalls"}
 
-    def __init__(self, walls, glued=None, gravity=(0.0, 0.0, -9.81), path="time.csv", progress=True, types=None, liquid=None):
+    def __init__(self, walls, glued=None, gravity=(0.0, 0.0, -9.81), path="time.csv", progress=True, types=None, liquid=None,
+                 moving=()):
         self._snapshot = _Snapshot(walls, glued, gravity, types)
+        self._moving = moving
         self._liquid = liquid is not None
         columns = [*self.LIQUID, "liquid_lost", "bridge_count"] if self._liquid else []
-        header = ",".join(["step", "time", "kinetic_energy", *(f"{name}_f{axis}" for name in walls for axis in "xyz"), *columns])
+        header = ",".join(["step", "time", "kinetic_energy", *(f"{name}_f{axis}" for name in walls for axis in "xyz"), *columns,
+                           *motion_columns(moving, walls)])
         self._file = table(path, header)
         self.progress = progress
 
@@ -119,7 +131,8 @@ class HistoryWriter:
             carried = next(one for one in O.engines if isinstance(one, CapillaryLiquid))
             volumes = [*(getattr(carried, name)() for name in self.LIQUID.values()), carried.lost]
             where = [*(f"{volume:.17g}" for volume in volumes), str(carried.bridgeCount())]
-        self._file.write(",".join([str(O.iter), f"{O.time:.9g}", f"{energy:.9g}", *forces, *where]) + "\n")
+        self._file.write(",".join([str(O.iter), f"{O.time:.9g}", f"{energy:.9g}", *forces, *where,
+                                   *(f"{x:.17g}" for x in motion_values(self._moving, self._snapshot.walls))]) + "\n")
         self._file.flush()
         if self.progress:
             print(O.iter, f"{O.time:.6g}", f"{energy:.6g}", flush=True)

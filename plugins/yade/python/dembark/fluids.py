@@ -1,0 +1,91 @@
+"""Fluids of SphFluid: lattices of their particles, and what they write."""
+
+from yade import Omega, SphFluid
+from yade.dembark.frames import FrameWriter
+from yade.dembark.report import fail
+from yade.dembark.states import table
+
+O = Omega()
+
+
+def lattice(low, high, spacing):
+    """Points (m) of a square or cubic lattice that fills the box from `low` to `high`, each in the middle of its cell, as tuples of three.
+
+    The sides must be whole numbers of `spacing`, to a thousandth of it. Two components: the plane z = 0. The last axis changes first.
+    """
+    if len(low) != len(high) or len(low) not in (2, 3):
+        fail("lattice: low and high must both have two or three components")
+    if not spacing > 0.0:
+        fail(f"lattice: spacing {spacing:g}: it must be > 0 m")
+    axes = []
+    for a, b in zip(low, high, strict=True):
+        count = round((b - a) / spacing)
+        if count < 1 or abs(count * spacing - (b - a)) > 1e-3 * spacing:
+            fail(f"lattice: a side of {b - a:g} m: it must be a whole number of the spacing, {spacing:g} m")
+        axes.append([a + spacing * (k + 0.5) for k in range(count)])
+    if len(axes) == 2:
+        axes.append([0.0])
+    return [(x, y, z) for x in axes[0] for y in axes[1] for z in axes[2]]
+
+
+def tank_walls(low, high, spacing, layers=3, open_top=True):
+    """Points (m) of walls around the box from `low` to `high`, `layers` of them, of the lattice that fills the box. Up is the last axis.
+
+    Three layers fill the support of h = 1.3 spacings.
+    """
+    if layers < 1:
+        fail(f"tank_walls: layers {layers}: there must be 1 or more")
+    thick = layers * spacing
+    high = [a + spacing * round((b - a) / spacing) for a, b in zip(low, high, strict=True)]
+    top = [b + thick for b in high]
+    if open_top:
+        top[-1] = high[-1]
+    around = lattice([a - thick for a in low], top, spacing)
+    return [p for p in around if any(not a < x < b for a, b, x in zip(low, high, p, strict=False))]
+
+
+def fluid_engine():
+    """The scene's SphFluid: a scene that was loaded has engines of its own."""
+    found = next((one for one in O.engines if isinstance(one, SphFluid)), None)
+    if found is None:
+        fail("there is no SphFluid in O.engines; put one before NewtonIntegrator")
+    return found
+
+
+class FluidWriter(FrameWriter):
+    """Appends frames of the fluid to fluid.dump, and rows of poses of bodies and energies of the fluid to fluid.csv.
+
+    bodies : name -> id of a body of YADE, in the fluid or not
+    bounds : ((xlo, xhi), (ylo, yhi), (zlo, zhi)), m, of the dump's box
+    """
+
+    ENERGIES = ("kinetic", "potential", "compression", "contact", "viscous", "diffusive", "boundary", "work")
+    POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
+    COLUMNS = "id type x y z vx vy vz radius mass density pressure"
+
+    def __init__(self, bounds, bodies=None, dump="fluid.dump", history="fluid.csv"):
+        self._bodies, self._dump = dict(bodies or {}), dump
+        self._box = "".join(f"{low:.17g} {high:.17g}\n" for low, high in bounds)
+        poses = [f"{name}_{what}" for name in self._bodies for what in self.POSE]
+        self._history = table(history, ",".join(["step", "time", *poses, *self.ENERGIES]))
+        if dump:
+            self._begin(dump)
+
+    def frame(self):
+        """Append a frame of the fluid."""
+        rows = fluid_engine().particleRows()
+        with open(self._dump, "a", encoding="ascii") as file:
+            file.write(f"ITEM: TIMESTEP\n{O.iter}\nITEM: NUMBER OF ATOMS\n{rows.count(chr(10))}\nITEM: BOX BOUNDS ff ff ff\n{self._box}")
+            file.write(f"ITEM: ATOMS {self.COLUMNS}\n{rows}")
+
+    def row(self):
+        """Append a row; print step, time and kinetic energy of the fluid for whoever watches."""
+        energies = fluid_engine().energies()
+        numbers = [O.time]
+        for body in self._bodies.values():
+            state = O.bodies[body].state
+            numbers += [*state.pos, state.ori[3], state.ori[0], state.ori[1], state.ori[2]]
+        numbers += [energies[name] for name in self.ENERGIES]
+        self._history.write(",".join([str(O.iter), *(f"{x:.17g}" for x in numbers)]) + "\n")
+        self._history.flush()
+        print(O.iter, f"{O.time:.6g}", f"{energies['kinetic']:.6g}", flush=True)
