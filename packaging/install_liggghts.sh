@@ -49,12 +49,17 @@ done
 for file in "$here"/plugins/liggghts/fix_capillary_liquid*; do
   copy "$file" "$src/$(basename "$file")"
 done
-# Accounts of energy.
-for file in "$here"/plugins/liggghts/fix_energy_account*; do
+# Accounts of energy, and walls whose acceleration they know.
+for file in "$here"/plugins/liggghts/fix_{energy_account,wall_motion}*; do
   copy "$file" "$src/$(basename "$file")"
 done
+# Fluids, walls and bodies.
+for file in "$here"/plugins/liggghts/{pair_sph_coupled,pair_sph_options,fix_nve_sph_coupled,fix_sph_body,sph_rows,sph_loops_avx2}*; do
+  copy "$file" "$src/$(basename "$file")"
+done
+copy "$here/plugins/liggghts/keyword_reader.h" "$src/keyword_reader.h"
 # States to resume from.
-for file in "$here"/plugins/liggghts/{fix_resume_exact*,state_files.h}; do
+for file in "$here"/plugins/liggghts/fix_resume_exact*; do
   copy "$file" "$src/$(basename "$file")"
 done
 # The fix for impacts of logs solves its equations with Eigen, a library of headers; without it LIGGGHTS would not compile any more.

@@ -1,0 +1,75 @@
+// What pair_style and pair_coeff say, as the parameters of dembark/contact.hpp for each pair of atom types.
+#ifndef DEMBARK_CONTACT_COEFFICIENTS_H
+#define DEMBARK_CONTACT_COEFFICIENTS_H
+
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "pointers.h"
+
+#include "dembark/contact_history.hpp"
+#include "dembark/pair_table.hpp"
+
+namespace dembark_lammps {
+
+class ContactCoefficients : protected LAMMPS_NS::Pointers {
+  /// Given by pair_coeff; NAN: not yet.
+  struct Given {
+    double youngs_modulus = NAN, poissons_ratio = NAN;  // of a type: of pairs of equal types
+    double restitution = NAN, static_friction = NAN, kinetic_friction = NAN, critical_slip_distance = NAN;
+    double interface_shear_strength = dembark::unlimited_strength;
+    double rolling_friction = NAN, rolling_damping_ratio = 0.0;
+    double bridge_volume = NAN, contact_angle = NAN;
+  };
+  struct Keyword {
+    const char* name;
+    double Given::* value;
+  };
+  static const std::array<Keyword, 11> keywords;
+
+  /// Given by pair_style.
+  struct Settings {
+    dembark::NormalLaw normal_law = dembark::NormalLaw::hertz;
+    double characteristic_velocity = NAN, healing_time = 0.0, surface_tension = NAN;
+    dembark::Presliding presliding = dembark::Presliding::linear;
+    dembark::RollingModel rolling_model = dembark::RollingModel::off;
+    bool wet = false, carried = false, tangential_damping = true, limit_force = false;
+    dembark::capillary::Model capillary_model = dembark::capillary::Model::exact;
+    dembark::capillary::ViscousLiquid viscous{};
+  } settings_;
+  dembark::PairTable<Given> given_;
+  dembark::PairTable<dembark::ContactParameters> parameters_;
+
+  double number(const std::string& keyword, const char* text) const;
+  template <class Option>
+  void choose(const std::string& keyword, const std::string& word, const std::vector<std::string>& names, Option& option) const;
+  double needed(int i, int j, double Given::* value) const;
+  dembark::ContactParameters combine(int i, int j) const;
+
+ public:
+  static constexpr const char* style_name = "dembark/granular";
+
+  explicit ContactCoefficients(LAMMPS_NS::LAMMPS* lmp) : Pointers(lmp) {}
+
+  [[noreturn]] void fail(const std::string& what) const;
+
+  /// The words after `pair_style dembark/granular`.
+  void settings(int narg, char** arg);
+  /// The words after `pair_coeff`; returns the pairs of types (i <= j) that they are about.
+  std::vector<std::array<int, 2>> coeff(int narg, char** arg);
+  /// After the last pair_coeff: the parameters of all pairs. What is missing or wrong ends the run with one line.
+  void complete();
+
+  const dembark::ContactParameters& operator()(int i, int j) const { return parameters_(i, j); }
+  bool wet() const { return settings_.wet; }
+  dembark::HistoryLayout layout() const {
+    return {settings_.wet, settings_.presliding == dembark::Presliding::partial_slip,
+            settings_.rolling_model == dembark::RollingModel::elastic_plastic, settings_.carried};
+  }
+};
+
+}  // namespace dembark_lammps
+
+#endif

@@ -1,0 +1,282 @@
+#include "fix_wall_dembark.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+
+#include "atom.h"
+#include "comm.h"
+#include "error.h"
+#include "force.h"
+#include "memory.h"
+#include "modify.h"
+#include "neighbor.h"
+#include "region.h"
+#include "update.h"
+#include "utils.h"
+
+#include "contact_call.h"
+#include "fix_capillary_liquid.h"
+#include "pair_dembark_granular.h"
+
+using namespace LAMMPS_NS;
+using dembark_lammps::add;
+using dembark_lammps::Vec3;
+using dembark_lammps::vector;
+
+namespace {
+
+/// Global vector of a wall with a motion, behind the totals: displacement, angle, velocity, rate, acceleration, angular acceleration;
+/// power, work, impulse.
+constexpr int motion_numbers = 17;
+
+}  // namespace
+
+FixWallDembark::FixWallDembark(LAMMPS* lmp, int narg, char** arg) : Fix(lmp, narg, arg) {
+  const auto word = [&](int k) { return k < narg ? std::string(arg[k]) : std::string(); };
+  const std::string kind = word(3);
+  if (narg < 7 || (kind != "region" && kind != "stl") || word(5) != "type" || (narg > 7 && word(7) != "motion"))
+    fail("it is written 'wall/dembark region ID type T' or 'wall/dembark stl FILE type T', and 'motion TERM ...' behind them");
+  wall_type_ = utils::is_integer(word(6)) ? utils::inumeric(FLERR, word(6), false, lmp) : 0;
+  if (wall_type_ < 1 || wall_type_ > atom->ntypes) fail("there is no atom type " + word(6));
+  find_pair();
+  try {
+    if (kind == "region") surface_ = std::make_unique<dembark_lammps::RegionSurface>(lmp, word(4));
+    else surface_ = std::make_unique<dembark_lammps::TriangleSurface>(lmp, word(4));
+    if (narg > 7) motion_ = std::make_unique<dembark::PrescribedMotion>(std::vector<std::string>(arg + 8, arg + narg));
+  } catch (const std::invalid_argument& wrong) {
+    fail(wrong.what());
+  }
+  layout_ = pair_->coefficients().layout();
+  slots_ = surface_->slots();
+  before_.resize(std::size_t(row_size()));
+  maxexchange = row_size();
+  create_attribute = restart_peratom = restart_global = 1;
+  vector_flag = peratom_flag = 1;
+  size_vector = int(totals_.size()) + (motion_ ? motion_numbers : 0);
+  size_peratom_cols = 3;
+  nevery = global_freq = peratom_freq = 1;
+  extvector = 1;
+  time_depend = motion_ ? 1 : 0;
+
+  FixWallDembark::grow_arrays(atom->nmax);
+  atom->add_callback(Atom::GROW);
+  atom->add_callback(Atom::RESTART);
+  for (int i = 0; i < atom->nlocal; ++i) FixWallDembark::set_arrays(i);
+}
+
+FixWallDembark::~FixWallDembark() {
+  atom->delete_callback(id, Atom::GROW);
+  atom->delete_callback(id, Atom::RESTART);
+  memory->destroy(rows_);
+  memory->destroy(force_);
+}
+
+void FixWallDembark::fail(const std::string& what) const { error->all(FLERR, std::string("fix ") + id + " wall/dembark: " + what); }
+
+void FixWallDembark::find_pair() {
+  pair_ = dynamic_cast<PairDembarkGranular*>(force->pair_match(dembark_lammps::ContactCoefficients::style_name, 1));
+  if (!pair_) fail("its coefficients are those of pair_style dembark/granular, which must come first");
+}
+
+int FixWallDembark::setmask() { return FixConst::POST_FORCE | (motion_ ? FixConst::END_OF_STEP : 0); }
+
+void FixWallDembark::init() {
+  find_pair();
+  liquid_ = layout_.imbalance ? dembark_lammps::find_liquid(modify) : nullptr;
+  tally_ = dembark_lammps::find_energy_tally(modify);
+  try {
+    surface_->prepare(pair_->largest_radius() + (layout_.bridge ? neighbor->skin : 0.0), motion_.get());
+  } catch (const std::invalid_argument& wrong) {
+    fail(wrong.what());
+  }
+  if (pair_->coefficients().layout().size() != layout_.size() || surface_->slots() != slots_)
+    fail("pair_style or region have changed; define the fix again");
+  if (!motion_) return;
+  if (const std::string wrong = motion_->step_error(update->dt); !wrong.empty()) fail(wrong);
+  clock_.time(update->ntimestep, update->dt);
+}
+
+/// Takes up where the wall is now.
+void FixWallDembark::move() {
+  const double dt = update->dt, now = clock_.time(update->ntimestep, dt);
+  state_ = motion_->at(now);
+  step_ = motion_->step(clock_.time(update->ntimestep - 1, dt), dt);
+  frame_ = dembark::WallFrame(*motion_, state_);
+  if (tally_) acceleration_ = wall_acceleration(*motion_, now, dt);
+}
+
+void FixWallDembark::setup(int vflag) {
+  post_force(vflag);
+  if (motion_ && !resumed_) sums_.begin(wall_power(load(), state_, motion_->axis()), load().force);
+  resumed_ = false;
+}
+
+/// The history that a contact goes on with, or nullptr.
+const double* FixWallDembark::history_of(const dembark_lammps::WallContact& contact, const Vec3& centre, double radius) const {
+  const double* const end = before_.data() + row_size();
+  for (const double* row = before_.data(); row < end; row += slot_size())
+    if (row[0] == contact.surface + 1) return row + 1;
+  for (const double* row = before_.data(); row < end; row += slot_size())
+    if (row[0] != 0.0 && surface_->goes_on(int(row[0]) - 1, contact, centre, radius)) return row + 1;
+  return nullptr;
+}
+
+Vec3 FixWallDembark::origin() const { return motion_ ? motion_->centre(state_) : surface_->origin(); }
+
+void FixWallDembark::post_force(int) {
+  surface_->begin_step();
+  if (motion_) move();
+  totals_ = {};
+  summed_ = -1;
+  // The forces of the set-up are those of the present state, which stays.
+  const bool advance = !update->setupflag;
+  for (int i = 0; i < atom->nlocal; ++i) {
+    std::fill_n(force_[i], 3, 0.0);
+    if (atom->mask[i] & groupbit) act_on(i, advance);
+  }
+}
+
+void FixWallDembark::act_on(int i, bool advance) {
+  double *const rows = rows_[i], *const end = rows + row_size();
+  double reach = 0.0;  // of its longest bridge
+  for (const double* row = rows; layout_.bridge && row < end; row += slot_size()) reach = std::max(reach, row[1 + layout_.bridge_at() + 1]);
+  const Vec3 x = vector(atom->x[i]), centre = frame_.inside(x);
+  const std::vector<dembark_lammps::WallContact>& contacts = surface_->contacts(centre, atom->radius[i], reach);
+  std::copy(rows, end, before_.begin());
+  if (advance) std::fill(rows, end, 0.0);
+  double* next = rows;
+  for (const dembark_lammps::WallContact& contact : contacts) {
+    const dembark::ContactParameters& p = pair_->coefficients()(atom->type[i], wall_type_);
+    dembark::ContactBodies b;
+    b.separation = frame_.outside(contact.separation);
+    b.velocity_1 = vector(atom->v[i]);
+    b.angular_velocity_1 = vector(atom->omega[i]);
+    b.radius_1 = atom->radius[i];
+    b.mass_1 = pair_->mass(i);
+    b.velocity_2 = contact.velocity;
+    b.wall_spin = surface_->spin();
+    if (motion_) {
+      b.wall_spin = step_.rate * motion_->axis();
+      b.velocity_2 = step_.velocity + cross(b.wall_spin, x - b.separation - motion_->centre(state_));
+    }
+    dembark::ContactState state;
+    const double* const history = history_of(contact, centre, atom->radius[i]);
+    if (history) layout_.load(history, state);
+    const double volume = state.bridge_volume;
+    const dembark::ContactForce out = contact_step(p, b, update->dt, state, advance);
+    const bool touching = out.overlap > 0.0;
+    if (advance && !(volume > 0.0) && (state.bridge_volume > 0.0 || (liquid_ && touching)))
+      dembark_lammps::check_time_step(error, p.liquid, b, update->dt);
+    if (!out.interacting && !(volume > 0.0)) continue;
+    if (next == end) error->one(FLERR, "fix wall/dembark: a grain touches more than {} parts of a wall", slots_);
+    if (tally_ && out.interacting)
+      tally_->add_wall(p, b, out, state, advance, i, update->dt, acceleration_.at(x - b.separation), acceleration_.angular);
+    if (advance) {
+      next[0] = contact.surface + 1;
+      layout_.store(next + 1, state);
+      if (liquid_) {
+        double* const imbalance = next + 1 + layout_.imbalance_at();
+        *imbalance = history ? history[layout_.imbalance_at()] : 0.0;
+        liquid_->report({i, liquid_->wall_number(this), true}, atom->radius[i], INFINITY, p.liquid, touching, volume,
+                        next + 1 + layout_.bridge_at(), imbalance);
+      }
+      next += slot_size();
+    }
+    add(atom->f[i], out.force);
+    add(atom->torque[i], out.torque_1);
+    add(force_[i], out.force);
+    add(totals_.data(), out.force);
+    add(totals_.data() + 3, cross(x - origin(), out.force) + out.torque_1);
+    totals_[6] += touching;
+    totals_[7] += state.bridge_volume > 0.0;
+  }
+}
+
+/// Collective.
+const std::array<double, 8>& FixWallDembark::totals() {
+  if (summed_ != update->ntimestep) MPI_Allreduce(totals_.data(), all_totals_.data(), int(totals_.size()), MPI_DOUBLE, MPI_SUM, world);
+  summed_ = update->ntimestep;
+  return all_totals_;
+}
+
+dembark::WallLoad FixWallDembark::load() { return {vector(totals().data()), vector(totals().data() + 3)}; }
+
+void FixWallDembark::end_of_step() {
+  const dembark::WallLoad now = load();
+  sums_.step(update->dt, wall_power(now, state_, motion_->axis()), now.force);
+}
+
+double FixWallDembark::compute_vector(int k) {
+  if (k < int(totals_.size())) return totals()[std::size_t(k)];
+  const auto& s = state_;
+  const double numbers[motion_numbers] = {s.displacement.x, s.displacement.y,       s.displacement.z, s.angle,          s.velocity.x,
+                                          s.velocity.y,     s.velocity.z,           s.rate,           s.acceleration.x, s.acceleration.y,
+                                          s.acceleration.z, s.angular_acceleration, sums_.power,      sums_.work,       sums_.impulse.x,
+                                          sums_.impulse.y,  sums_.impulse.z};
+  return numbers[k - int(totals_.size())];
+}
+
+double FixWallDembark::memory_usage() { return double(atom->nmax) * (row_size() + 3) * sizeof(double); }
+
+void FixWallDembark::grow_arrays(int count) {
+  memory->grow(rows_, count, row_size(), "wall/dembark:rows");
+  memory->grow(force_, count, 3, "wall/dembark:force");
+  array_atom = force_;
+}
+
+void FixWallDembark::copy_arrays(int from, int to, int) {
+  std::copy_n(rows_[from], row_size(), rows_[to]);
+  std::copy_n(force_[from], 3, force_[to]);
+}
+
+void FixWallDembark::set_arrays(int i) {
+  std::fill_n(rows_[i], row_size(), 0.0);
+  std::fill_n(force_[i], 3, 0.0);
+}
+
+int FixWallDembark::pack_exchange(int i, double* buffer) {
+  std::copy_n(rows_[i], row_size(), buffer);
+  return row_size();
+}
+
+int FixWallDembark::unpack_exchange(int i, double* buffer) {
+  std::copy_n(buffer, row_size(), rows_[i]);
+  return row_size();
+}
+
+int FixWallDembark::pack_restart(int i, double* buffer) {
+  buffer[0] = row_size() + 1;
+  std::copy_n(rows_[i], row_size(), buffer + 1);
+  return row_size() + 1;
+}
+
+void FixWallDembark::unpack_restart(int i, int nth) {
+  const double* values = atom->extra[i];
+  for (int k = 0; k < nth; ++k) values += int(values[0]);
+  if (int(values[0]) != row_size() + 1)
+    error->one(FLERR, "fix wall/dembark: the restart file was written with other options of pair_style or region");
+  std::copy_n(values + 1, row_size(), rows_[i]);
+}
+
+void FixWallDembark::write_restart(FILE* file) {
+  if (comm->me != 0) return;
+  Region* const region = surface_->region();
+  int length = 0;
+  if (region) region->length_restart_string(length);
+  length += int(sizeof clock_ + sizeof sums_);
+  fwrite(&length, sizeof(int), 1, file);
+  fwrite(&clock_, sizeof clock_, 1, file);
+  fwrite(&sums_, sizeof sums_, 1, file);
+  if (region) region->write_restart(file);
+}
+
+void FixWallDembark::restart(char* buffer) {
+  std::memcpy(static_cast<void*>(&clock_), buffer, sizeof clock_);
+  std::memcpy(static_cast<void*>(&sums_), buffer + sizeof clock_, sizeof sums_);
+  resumed_ = sums_.begun > 0.0;
+  int read = int(sizeof clock_ + sizeof sums_);
+  if (Region* const region = surface_->region(); region && !region->restart(buffer, read))
+    fail("the restart file was written with another region");
+}

@@ -1,0 +1,96 @@
+// LAMMPS adapter of whole contacts between grains and a wall: the law of pair_style dembark/granular, whose coefficients for an atom type
+// the wall has. The wall is the surface of a region or the triangles of an STL file, and can move as
+// dembark/motion/prescribed_motion.hpp says.
+//
+//   fix ID group wall/dembark region REGION|stl FILE type T [motion TERM ...]
+//
+// Forces of step n are computed from the grains' velocities v(n-1/2). A wall has its own of that time, [x(n) - x(n-1)] / dt.
+#ifndef DEMBARK_FIX_WALL_DEMBARK_H
+#define DEMBARK_FIX_WALL_DEMBARK_H
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fix.h"
+
+#include "dembark/contact_history.hpp"
+#include "dembark/motion/prescribed_motion.hpp"
+#include "dembark/motion/wall_frame.hpp"
+#include "dembark/motion/wall_work.hpp"
+#include "energy_tally.h"
+#include "wall_surface.h"
+
+namespace LAMMPS_NS {
+
+class FixWallDembark : public Fix {
+ public:
+  FixWallDembark(LAMMPS* lmp, int narg, char** arg);
+  ~FixWallDembark() override;
+  int setmask() override;
+  void init() override;
+  void setup(int vflag) override;
+  void post_force(int vflag) override;
+  void end_of_step() override;
+  double compute_vector(int k) override;
+  double memory_usage() override;
+
+  void grow_arrays(int count) override;
+  void copy_arrays(int from, int to, int) override;
+  void set_arrays(int i) override;
+  int pack_exchange(int i, double* buffer) override;
+  int unpack_exchange(int i, double* buffer) override;
+  int pack_restart(int i, double* buffer) override;
+  void unpack_restart(int i, int nth) override;
+  int size_restart(int) override { return 1 + row_size(); }
+  int maxsize_restart() override { return 1 + row_size(); }
+  // How a moving region moved in the last step; time and work of a motion.
+  void write_restart(FILE* file) override;
+  void restart(char* buffer) override;
+
+  /// Calls visit(volume, imbalance) for each bridge of grain i, which may change them.
+  template <class Visit>
+  void each_bridge(int i, Visit visit) {
+    for (double* row = rows_[i]; row < rows_[i] + row_size(); row += slot_size())
+      if (row[0] != 0.0 && row[1 + layout_.bridge_at()] > 0.0) visit(row[1 + layout_.bridge_at()], row[1 + layout_.imbalance_at()]);
+  }
+
+ private:
+  int wall_type_ = 0;
+  std::unique_ptr<dembark_lammps::WallSurface> surface_;
+  std::unique_ptr<dembark::PrescribedMotion> motion_;
+  class PairDembarkGranular* pair_ = nullptr;
+  class FixCapillaryLiquid* liquid_ = nullptr;
+  dembark::HistoryLayout layout_;
+  int slots_ = 0;               // contacts that a grain can have with the wall
+  double** rows_ = nullptr;     // of each grain and slot: the number of the part of the surface plus one (0: free), and the history
+  double** force_ = nullptr;    // of each grain: of the wall on it, N
+  std::vector<double> before_;  // the rows of the grain in work before this step
+  std::array<double, 8> totals_{}, all_totals_{};  // on this process, and on all at the step `summed_`
+  bigint summed_ = -1;
+
+  dembark::MotionClock clock_;
+  dembark::WallState state_;  // now
+  dembark::WallStep step_;    // that led to it
+  dembark::WallFrame frame_;
+  dembark::WallSums sums_;
+  dembark_lammps::EnergyTally* tally_ = nullptr;
+  dembark::WallAcceleration acceleration_;  // for the tally; of regions that move by themselves it is not known
+  bool resumed_ = false;                    // the last step of `sums_` is that of a restart file
+
+  [[noreturn]] void fail(const std::string& what) const;
+  int slot_size() const { return 1 + layout_.size(); }
+  int row_size() const { return slots_ * slot_size(); }
+  void find_pair();
+  void move();
+  void act_on(int i, bool advance);
+  const double* history_of(const dembark_lammps::WallContact& contact, const dembark::Vec3<double>& centre, double radius) const;
+  dembark::Vec3<double> origin() const;
+  const std::array<double, 8>& totals();
+  dembark::WallLoad load();
+};
+
+}  // namespace LAMMPS_NS
+
+#endif

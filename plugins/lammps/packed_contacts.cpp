@@ -1,0 +1,150 @@
+#include "packed_contacts.h"
+
+#include <cstring>
+
+#include "atom.h"
+#include "force.h"
+#include "neigh_list.h"
+#include "neighbor.h"
+#include "update.h"
+
+#include "contact_call.h"
+#include "fix_capillary_liquid.h"
+
+namespace dembark_lammps {
+
+using dembark::ContactParameters;
+
+bool PackedContacts::prepare(int freeze_bit, LAMMPS_NS::FixCapillaryLiquid* liquid) {
+  freeze_bit_ = freeze_bit;
+  liquid_ = liquid;
+  layout_ = coefficients_.layout();
+  const ContactParameters& any = coefficients_(1, 1);
+  return any.normal_law == dembark::NormalLaw::hertz && !any.liquid.viscous.on();
+}
+
+void PackedContacts::collect_laws() {
+  const int types = atom->ntypes;
+  laws_.assign(std::size_t(types + 1) * std::size_t(types + 1), {});
+  for (int i = 1; i <= types; ++i)
+    for (int j = 1; j <= types; ++j) {
+      const ContactParameters& p = coefficients_(i, j);
+      laws_[std::size_t(i * (types + 1) + j)] = {p.elasticity.effective_youngs_modulus,
+                                                 p.elasticity.effective_shear_modulus,
+                                                 p.elasticity.damping,
+                                                 p.friction.static_friction,
+                                                 p.friction.kinetic_friction,
+                                                 p.friction.interface_shear_strength,
+                                                 dembark::kept_slip(p.friction, update->dt),
+                                                 0.0};
+    }
+}
+
+void PackedContacts::step(const LAMMPS_NS::NeighList& list, const NeighborHistory& history) {
+  if (list.inum == 0) return;
+  collect_laws();
+  const ContactParameters& any = coefficients_(1, 1);
+  // The rolling spring stands behind the rings.
+  const int rings = layout_.rings ? layout_.rings_at() : -1;
+  const int more = layout_.rings || layout_.rolling ? layout_.rings_at() : -1;
+  packs_({*this,
+          laws_.data(),
+          atom->ntypes + 1,
+          force->newton_pair ? atom->nlocal + atom->nghost : atom->nlocal,
+          0,
+          rings,
+          more,
+          layout_.imbalance_at() - layout_.rings_at(),
+          update->dt,
+          layout_.bridge,
+          any.limit_force,
+          any.tangential_damping,
+          any.friction.presliding != dembark::Presliding::exponential,  // the scalar law knows that curve
+          any.rolling.model != dembark::RollingModel::off,
+          atom->x[0],
+          atom->v[0],
+          atom->omega[0],
+          atom->radius,
+          atom->rmass,
+          atom->type,
+          atom->mask,
+          atom->f[0],
+          atom->torque[0],
+          freeze_bit_,
+          list.inum,
+          layout_.size(),
+          list.ilist,
+          list.numneigh,
+          list.firstneigh,
+          history.firstflag,
+          history.firstvalue,
+          NEIGHMASK,
+          1,
+          1},
+         *block_);
+}
+
+const ContactParameters& PackedContacts::law(const PairBlock& block, int k) const {
+  return coefficients_(atom->type[block.grain[k]], atom->type[block.partner[k]]);
+}
+
+Vec3 PackedContacts::friction(const PairBlock& block, int k, const Vec3& normal, double twist,
+                              const dembark::NormalResponse<double>& response, const Vec3& velocity) {
+  // What is no number never sticks in a pack: pairs without a normal end up here.
+  if (!(normal.x == normal.x))
+    error->one(FLERR, "pair_style dembark/granular: grains {} and {} are at the same place", atom->tag[block.grain[k]],
+               atom->tag[block.partner[k]]);
+  double* const history = block.history[k];
+  dembark::FrictionState<double> state = dembark::load_friction(history);
+  dembark::SlipRings rings;
+  if (layout_.rings) rings = dembark::load_rings(history + layout_.rings_at());
+  const Vec3 out = contact_friction(law(block, k).friction, normal, twist, response, velocity, update->dt, state, &rings);
+  dembark::store_friction(history, state);
+  if (layout_.rings) dembark::store_rings(history + layout_.rings_at(), rings);
+  return out;
+}
+
+Vec3 PackedContacts::rolling(const PairBlock& block, int k, const Vec3& normal, double twist, double normal_force,
+                             double tangential_stiffness, const Vec3& spin) {
+  const int i = block.grain[k], j = block.partner[k];
+  const auto mass = [&](int grain) { return atom->mask[grain] & freeze_bit_ ? INFINITY : atom->rmass[grain]; };
+  double* const history = block.history[k] + layout_.rolling_at();
+  Vec3 angle = layout_.rolling ? vector(history) : Vec3{};
+  const dembark::RollingContact contact{normal,
+                                        twist,
+                                        dembark::reduced(atom->radius[i], atom->radius[j]),
+                                        dembark::relative_inertia(mass(i), atom->radius[i], mass(j), atom->radius[j]),
+                                        normal_force,
+                                        tangential_stiffness,
+                                        spin};
+  const Vec3 couple = rolling_step(law(block, k).rolling, contact, update->dt, angle);
+  if (layout_.rolling) std::memcpy(history, &angle, sizeof angle);
+  return couple;
+}
+
+double PackedContacts::limit(const PairBlock& block, int k, double normal_force, double contact_area, double slip) {
+  const dembark::FinnieRabinowicz& friction = law(block, k).friction;
+  return shear_limit(friction, friction_coefficient(friction, slip), normal_force, contact_area);
+}
+
+double PackedContacts::sliding_limit(const PairBlock& block, int k, const dembark::RingMotion<double>& motion, const double* rings,
+                                     double normal_force, double contact_area, double& slip) {
+  return dembark::sliding_limit(law(block, k).friction, motion, rings, rings + dembark::SlipRings::count, normal_force, contact_area, slip);
+}
+
+void PackedContacts::bridges(const PairBlock& block, int first, int count, const double* gap, double* pull) {
+  for (int n = 0; n < count; ++n) {
+    const int k = first + n, i = block.grain[k], j = block.partner[k];
+    const bool touching = block.pick[k] & 1;
+    double* const bridge = block.history[k] + layout_.bridge_at();
+    const double before = bridge[0];
+    pull[n] = bridge_step(law(block, k).liquid, atom->radius[i], atom->radius[j], gap[n], touching, bridge[0], bridge[1]);
+    if (bridge[0] > 0.0) *block.flags[k] = 1;
+    if (bridge[0] > 0.0 && !(before > 0.0)) check_reach(error, bridge[1], neighbor->skin);
+    if (liquid_)
+      liquid_->report({i, j, false}, atom->radius[i], atom->radius[j], law(block, k).liquid, touching, before, bridge,
+                      block.history[k] + layout_.imbalance_at());
+  }
+}
+
+}  // namespace dembark_lammps

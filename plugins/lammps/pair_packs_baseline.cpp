@@ -1,0 +1,3 @@
+#include "dembark/pairs/pair_packs.hpp"
+
+template void dembark::pair_packs<dembark::Pack<2>>(const PairStep&, PairBlock&);

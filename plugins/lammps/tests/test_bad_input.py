@@ -1,0 +1,82 @@
+"""A user's mistake ends the run with one line that says what is wrong, where, and what would be right."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from rig import lammps_driver
+from rig.scenarios import Grain, Material, Scenario
+
+WET = Material(bridge_volume=2e-10)
+WALL = "fix floor all wall/dembark region floor type 2"
+FIND = Path(__file__).resolve().parents[3] / "packaging/lammps.sh"
+
+
+@pytest.fixture(scope="module")
+def deck():
+    case = Scenario(name="", material=WET, steps=10, wall=True, grains=(Grain(position=(0.0, 0.0, 4.99e-3)),))
+    return lammps_driver.deck(case)
+
+
+def assert_one_line(done, *words):
+    assert done.code != 0
+    errors = [line for line in done.output.splitlines() if line.startswith("ERROR")]
+    assert len(errors) == 1, done.output[-2000:]
+    for word in words:
+        assert word in errors[0], errors[0]
+
+
+def test_the_deck_runs_as_it_is(tmp_path, deck):
+    done = lammps_driver.run_deck(tmp_path, deck)
+    assert done.code == 0 and not done.error, done.output
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("normal hertz", "normal linear", ("pair_style dembark/granular", "normal 'linear'", "hertz or hooke")),
+    ("normal hertz", "normal hooke -1", ("characteristic velocity > 0",)),
+    ("normal hertz", "normals hertz", ("'normals' is unknown", "presliding, rolling_resistance, capillary_model")),
+    ("presliding linear", "presliding bent", ("presliding 'bent'", "linear, exponential or partial_slip")),
+    ("healing_time 0.0", "healing_time soon", ("healing_time needs a number, not 'soon'",)),
+    ("surface_tension 0.072", "surface_tension -1", ("surface_tension", ">= 0 and finite")),
+    ("surface_tension 0.072", "", ("capillary_model needs surface_tension",)),
+    ("capillary_model exact", "capillary_model magic", ("magic", "exact, willett, willett_full, rabinovich, bagheri or constant")),
+    ("capillary_model exact", "", ("surface_tension and viscous_liquid need a capillary_model",)),
+    ("rolling_resistance off", "rolling_resistance constant_torque viscous_liquid 0.1",
+     ("viscous_liquid needs a number, not 'healing_time'",)),
+    ("restitution 0.8", "bounce 0.8", ("knows no 'bounce'", "restitution")),
+    ("restitution 0.8", "", ("types 1-1 have no restitution", "pair_coeff 1 1 restitution VALUE")),
+    ("restitution 0.8", "restitution 0", ("restitution must be > 0 and <= 1", "types 1-1")),
+    ("restitution 0.8", "restitution", ("restitution needs a number, not 'static_friction'",)),
+    ("youngs_modulus 10000000.0", "youngs_modulus -1", ("youngs_modulus (Pa) must be > 0",)),
+    ("poissons_ratio 0.3", "poissons_ratio 0.6", ("poissons_ratio must be > -1 and <= 0.5",)),
+    ("kinetic_friction 0.3", "kinetic_friction 0.9", ("kinetic friction must not exceed static friction", "types 1-1")),
+    ("critical_slip_distance 1e-05", "critical_slip_distance -1", ("critical slip distance (m) must be >= 0",)),
+    ("bridge_volume 2e-10", "bridge_volume -1", ("bridge_volume (m^3) must be >= 0",)),
+    ("contact_angle 0.35", "contact_angle 20", ("contact_angle is in radians",)),
+    ("pair_coeff * *", "pair_coeff 1 1", ("All pair coeffs are not set",)),
+    ("pair_coeff * *", "pair_coeff 1 2", ("youngs_modulus belongs to one type", "pair_coeff 1 1")),
+    ("comm_modify vel yes", "", ("comm_modify vel yes",)),
+    ("type 2", "type 3", ("fix floor wall/dembark", "no atom type 3")),
+    ("type 2", "kind 2", ("'wall/dembark region ID type T'",)),
+    ("region floor type", "region flour type", ("no region flour",)),
+    ("neighbor 0.001 bin", "neighbor 0.0001 bin\ncreate_atoms 1 single 0 0 0.01495\nset atom 2 diameter 0.01 density 2500",
+     ("a bridge reaches", "neighbor skin is 0.0001 m", "use neighbor")),
+])
+def test_one_line_says_what_is_wrong(tmp_path, deck, old, new, words):
+    assert old in deck
+    assert_one_line(lammps_driver.run_deck(tmp_path, deck.replace(old, new, 1)), *words)
+
+
+def test_a_wall_needs_the_pair_style(tmp_path, deck):
+    lines = [line for line in deck.splitlines() if not line.startswith(("pair_style", "pair_coeff"))]
+    assert_one_line(lammps_driver.run_deck(tmp_path, "\n".join(lines) + "\n"), "fix floor wall/dembark", "pair_style dembark/granular")
+
+
+def test_another_version_is_refused(tmp_path):
+    (tmp_path / "src").mkdir()
+    (tmp_path / "src/version.h").write_text('#define LAMMPS_VERSION "4 Feb 2025"\n')
+    own = os.environ | {"LAMMPS_SOURCE_DIR": str(tmp_path), "LAMMPS_EXECUTABLE": "/bin/true"}
+    done = subprocess.run([FIND], env=own, capture_output=True, text=True, check=False)
+    assert done.returncode != 0 and len(done.stderr.splitlines()) == 1
+    assert "LAMMPS 4 Feb 2025" in done.stderr and "22 Jul 2025" in done.stderr

@@ -1,0 +1,87 @@
+"""fix lcp/impact in LAMMPS: what is LAMMPS's own, and mistakes; the rest is in plugins/tests."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from rig import impact_decks
+from rig.impact_decks import Case, Log, assert_same, pile
+from rig.lammps_driver import run_deck
+
+run = partial(impact_decks.run, engine="lammps")
+FLAT = {"dimension": 2, "boundary": "f f p", "after": "fix flat all enforce2d"}
+
+
+@pytest.mark.parametrize(("factor", "words", "settings"), [
+    (0.5, "", {}), (0.4, "inertia sphere", {}), (0.5, "", FLAT), (0.5, "", {**FLAT, "motion": "nve/sphere disc"}),
+    (0.4, "inertia sphere", {**FLAT, "motion": "nve/sphere disc"})])
+def test_sliding_becomes_rolling(tmp_path, factor, words, settings):
+    """Whatever inertia LAMMPS turns its atoms with: v0 / (1 + I / m r^2) is left, and the angular momentum about the floor is kept."""
+    mass, s = 50.0, 1e6
+    static = mass * 9.81 * 2.0 / s  # deformation of log and floor under the weight
+    case = Case([Log((-1.0, 0.1 - static), (1.0, 0.0), mass=mass)],
+                f"stiffness {s!r} {words} wall plane floor y 0 lo stiffness {s!r} friction 0.3", 1e-4, "run 4000", gravity=9.81, every=20,
+                **settings)
+    found = run(tmp_path, case)
+    speed, spin = np.array([(frame[0, 4], frame[0, 9]) for frame in found.frames]).T
+    arm = 0.1 - 0.5 * static
+    assert mass * arm * (speed - 1.0) == pytest.approx(factor * mass * 0.1**2 * spin, rel=1e-6, abs=1e-9)
+    assert speed[50:].mean() == pytest.approx(1.0 / (1.0 + factor), rel=1e-2)
+
+
+def test_beside_pair_forces(tmp_path):
+    """A pair style for other atoms: excluded from each other's neighbour lists, the logs feel nothing of it."""
+    pair = """pair_style dembark/granular
+pair_coeff * * youngs_modulus 5e6 poissons_ratio 0.3 restitution 0.5 static_friction 0.5 kinetic_friction 0.4 critical_slip_distance 1e-5
+neigh_modify exclude group all all"""
+    alone, beside = run(tmp_path / "alone", pile()), run(tmp_path / "beside", pile(before=pair))
+    assert_same(alone.last, beside.last, 0.0)
+
+
+def refused(folder, words="stiffness 1e7", **settings):
+    done = impact_decks.start(folder, Case([Log((0.0, 0.0)), Log((0.5, 0.0))], words, 1e-5, "run 1", **settings), engine="lammps")
+    return one_line(done)
+
+
+def one_line(done):
+    assert done.code != 0, done.output[-2000:]
+    errors = [line for line in done.output.splitlines() if line.startswith("ERROR")]
+    assert len(errors) == 1, done.output[-2000:]
+    return errors[0]
+
+
+@pytest.mark.parametrize(("words", "says"), [
+    ("", "stiffness is missing: one value (N/m) for each atom type"),
+    ("stiffness 1e7 frction 0.3", "'frction' is no keyword; there is stiffness, damping"),
+    ("stiffness 1e7 wall mesh floor stl stiffness 1e7", "wall: the shape is one of plane, cylinder, not 'mesh'"),
+    ("stiffness 1e7 impacts no/such/folder/file.txt", "impacts: file no/such/folder/file.txt cannot be written"),
+])
+def test_bad_words(tmp_path, words, says):
+    line = refused(tmp_path, words)
+    assert says in line and "fix hits lcp/impact" in line
+
+
+def test_forces_after_the_contact_forces_are_refused(tmp_path):
+    line = refused(tmp_path, after="fix push all addforce 1.0 0.0 0.0")
+    assert "fix push (addforce) may add forces after the contact forces are known; define it before this fix" in line
+
+
+def test_other_run_styles_are_refused(tmp_path):
+    assert "run_style respa is not supported; use run_style verlet" in refused(tmp_path, after="run_style respa 1")
+
+
+def test_restart_files_that_do_not_fit(tmp_path):
+    run(tmp_path, pile(steps=200), run="run 200\nwrite_restart here.restart")
+    case = pile(steps=200)
+    case.words = case.words.replace("wall plane ground", "wall plane floor")
+    line = one_line(impact_decks.start(tmp_path, case, engine="lammps", head="read_restart here.restart"))
+    assert "wall 1 is ground in the restart file and floor in the command" in line
+    (tmp_path / "impacts.txt").write_text("# short\n")
+    line = one_line(impact_decks.start(tmp_path, pile(steps=200), engine="lammps", head="read_restart here.restart"))
+    assert "impacts.txt has 8 bytes, the saved run goes on after" in line
+
+
+def test_other_atom_styles_are_refused(tmp_path):
+    text = pile(count=2, steps=1).text("lammps").replace("atom_style sphere", "atom_style atomic")
+    text = "\n".join(line for line in text.splitlines() if not line.startswith(("set atom", "fix weight")))
+    assert "use atom_style sphere" in one_line(run_deck(tmp_path, text))

@@ -1,0 +1,201 @@
+"""fix wall/dembark stl ... motion ...: walls are where they are prescribed to be, contacts see their velocity, forces balance."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rig import vessel
+from rig.lammps_driver import coefficients, head, run_deck, settings
+from rig.liggghts_driver import Run, read_dump
+from rig.meshes import patch
+from rig.scenarios import Material
+from rig.vessel import STEP
+from rig.walls import stl
+
+from dembark.physics import WallMotion, effective_youngs_modulus
+
+DRY = Material(static_friction=0.5, kinetic_friction=0.4, restitution=0.6, youngs_modulus=vessel.MODULUS)
+SMOOTH = replace(DRY, static_friction=0.0, kinetic_friction=0.0)
+SHAKE = "harmonic amplitude 1e-3 0 2e-3 frequency 50 ramp 2"
+
+
+def deck(folder: Path, motion: str, run: str, *, grains=None, material=DRY, gravity=(0.0, 0.0, -9.81), step=STEP, triangles=None,
+         every=10, held=False, create=None, boundary="f f f", start="", half=vessel.MARGIN):
+    """Grains in the box, which moves; `held`: the grains do not."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "vessel.stl").write_text(stl(vessel.box() if triangles is None else triangles))
+    lines = []
+    for n, (place, radius, speed) in enumerate(vessel.grains() if grains is None else grains, start=1):
+        lines.append("create_atoms 1 single " + " ".join(map(repr, place)) + " units box")
+        lines.append(f"set atom {n} diameter {2 * radius!r} density {vessel.DENSITY!r} vx {speed[0]!r} vy {speed[1]!r} vz {speed[2]!r}")
+    strength = math.sqrt(sum(g * g for g in gravity))
+    low, high = -half, half + vessel.WIDTH
+    box = f"region domain block {low} {high} {low} {high} {low} {high} units box\ncreate_box 2 domain\n"
+    weight = f"fix weight all gravity {strength!r} vector " + " ".join(repr(g / strength) for g in gravity) if strength else ""
+    return f"""\
+{head(boundary=boundary)}
+{start}
+{box if create is None else create}
+neighbor 0.002 bin
+neigh_modify delay 0
+timestep {step!r}
+pair_style dembark/granular {settings(material)}
+pair_coeff * * {coefficients(material)}
+{chr(10).join(lines) if create is None else ""}
+fix move all wall/dembark stl vessel.stl type 2 {"motion " + motion if motion else ""}
+{weight}
+{"" if held else "fix motion all nve/sphere"}
+dump grains all custom {every} grains.dump id x y z vx vy vz fx fy fz radius
+dump_modify grains sort id format float %.17g
+{run}
+"""
+
+
+def rows(every: int) -> str:
+    """A table of the fix's vector."""
+    columns = " ".join(f"f_move[{k}]" for k in range(1, 26))
+    return f'fix out all ave/time {every} 1 {every} {columns} file wall.txt format " %.17g"\nthermo 1000\n'
+
+
+def history(done: Run) -> np.ndarray:
+    """Rows of step and the global vector of the fix."""
+    assert done.code == 0, done.error or done.output[-2000:]
+    return np.loadtxt(done.folder / "wall.txt")
+
+
+def frames(folder: Path) -> np.ndarray:
+    """(frame, grain, column) of the dump."""
+    return np.array(read_dump(folder / "grains.dump")[1])
+
+
+def test_wall_is_where_it_is_prescribed_to_be(tmp_path):
+    """The place of the surface, from the elastic force on a held grain, after 100 periods."""
+    amplitude, frequency, step, radius, height = 1e-3, 50.0, 1e-4, 0.004, 0.0005
+    elastic = replace(SMOOTH, restitution=1.0)
+    done = run_deck(tmp_path, deck(tmp_path, f"harmonic amplitude 0 0 {amplitude} frequency {frequency}", "thermo 10000\nrun 21000",
+                                   grains=[((0.01, 0.01, height), radius, (0, 0, 0))], material=elastic, step=step, held=True, every=1000,
+                                   gravity=(0, 0, 0)))
+    assert done.code == 0, done.error or done.output[-2000:]
+    late = [(n * step, table[0]) for n, table in zip(*read_dump(tmp_path / "grains.dump"), strict=True) if n * step >= 10 / frequency]
+    assert len(late) >= 20 and late[-1][0] * frequency > 100.0
+    modulus = effective_youngs_modulus(elastic.youngs_modulus, elastic.poisson_ratio, elastic.youngs_modulus, elastic.poisson_ratio)
+    for t, row in late:
+        overlap = (abs(row[9]) / (4.0 / 3.0 * modulus * math.sqrt(radius))) ** (2.0 / 3.0)
+        place = height - math.copysign(radius - overlap, row[9])
+        assert abs(place - amplitude * math.sin(2 * math.pi * frequency * t)) < 1e-9 * amplitude
+
+
+@pytest.mark.parametrize("name", ["constant speed", "constant acceleration"])
+def test_moving_vessel_is_one_at_rest_in_its_frame(tmp_path, name):
+    """At constant speed nothing changes, at constant acceleration gravity is tilted: the same forces over 1000 steps."""
+    gravity, speed, push = (0.0, 0.0, -9.81), (0.4, -0.3, 0.2), (3.0, -2.0, 1.5)
+    if name == "constant speed":
+        motion, tilted = "uniform velocity 0.4 -0.3 0.2", gravity
+        grains = [(x, r, tuple(np.add(v, speed).tolist())) for x, r, v in vessel.grains()]
+    else:
+        motion, tilted = "uniform velocity 0 0 0 acceleration 3 -2 1.5", tuple(np.subtract(gravity, push).tolist())
+        grains = vessel.grains()
+    contacts = []
+    for folder, words, its, weight in ((tmp_path / "moves", motion, grains, gravity), (tmp_path / "rests", "", vessel.grains(), tilted)):
+        done = run_deck(folder, deck(folder, words, "run 1000", grains=its, gravity=weight))
+        assert done.code == 0, done.error or done.output[-2000:]
+        table = frames(folder)
+        mass = vessel.DENSITY * 4.0 / 3.0 * math.pi * table[..., 10] ** 3
+        contacts.append(table[..., 7:10] - mass[..., np.newaxis] * np.array(weight))
+    found, expected = contacts
+    assert np.abs(expected).max() > 0.05
+    assert np.abs(found - expected).max() < 1e-8 * np.abs(expected).max()
+
+
+def test_forces_of_the_walls_are_what_moves_the_grains(tmp_path):
+    """Impulse of the walls = change of momentum and of what gravity gave, 1e-9 of the weight; and power is force times velocity."""
+    table = history(run_deck(tmp_path, deck(tmp_path, SHAKE, rows(50) + "run 4000", every=50)))[1:]
+    grains = frames(tmp_path)
+    mass = vessel.DENSITY * 4.0 / 3.0 * math.pi * grains[0, :, 10] ** 3
+    momentum = np.einsum("g,fgk->fk", mass, grains[:, :, 4:7])
+    t = STEP * table[:, 0]
+    assert (table[:, 0] == 50 * np.arange(1, 81)).all()
+    expected = momentum[1:] - momentum[0] + np.outer(t, [0, 0, 9.81 * mass.sum()])
+    assert np.abs(table[:, 23:26] - expected).max() < 1e-9 * mass.sum() * 9.81 * t[-1]
+    wall = WallMotion(SHAKE)
+    np.testing.assert_allclose(table[:, 13:16], wall.velocity(t), atol=1e-12)
+    np.testing.assert_allclose(table[:, 21], np.einsum("nk,nk->n", table[:, 1:4], wall.velocity(t)), rtol=1e-12, atol=1e-15)
+    forces = grains[1:, :, 7:10].sum(axis=1) + np.outer(np.ones(len(t)), [0, 0, 9.81 * mass.sum()])
+    assert np.abs(table[:, 1:4] - forces).max() < 1e-12 * np.abs(forces).max()
+
+
+def test_grain_on_a_shaken_plate_lands_when_it_must(tmp_path):
+    """Five landings, e = 0.5, within the time of a contact of an event-driven solution."""
+    material = replace(SMOOTH, restitution=vessel.BOUNCE_RESTITUTION, youngs_modulus=vessel.BOUNCE_MODULUS)
+    step, expected, radius = vessel.BOUNCE_STEP, vessel.landings(5), vessel.RADIUS
+    steps = math.ceil((expected[-1] + 0.01) / step)
+    motion = f"harmonic amplitude 0 0 {vessel.BOUNCE_AMPLITUDE} frequency {vessel.BOUNCE_FREQUENCY} ramp 0"
+    table = history(run_deck(tmp_path, deck(tmp_path, motion, f"{rows(5)}run {steps}", step=step, every=steps, material=material,
+                                            grains=[((0.01, 0.01, radius + vessel.BOUNCE_GAP), radius, (0, 0, 0))])))
+    touches = table[:, 3] > 0.0
+    begun = step * table[1:, 0][touches[1:] & ~touches[:-1]]
+    assert len(begun) >= 5
+    assert np.abs(begun[:5] - expected).max() < vessel.contact_time(0.3), (begun[:5], expected)
+
+
+def test_a_floor_of_triangles_is_the_plane_also_across_periods(tmp_path):
+    """Grains roll over its edges and through a periodic boundary, and on two ranks: forces as on a region."""
+    grains = [((-0.0085 + 0.006 * k, -0.002 * k, 0.00248), 0.0025, (0.4, 0.25, 0.0)) for k in range(3)]
+    half = 0.0093
+    strips = [((x, y, 0.0), (x + 0.0062, y, 0.0), (x + 0.0062, y + 0.0186, 0.0), (x, y + 0.0186, 0.0))
+              for x, y in ((-half, -half), (-half + 0.0062, -half), (-half + 0.0124, -half))]
+    tiles = [three for a, b, c, d in strips for three in ((a, b, c), (a, c, d))]
+    found = {}
+    for name, triangles, ranks in (("plane", tiles, 1), ("tiles", tiles, 1), ("ranks", tiles, 2)):
+        folder = tmp_path / name
+        text = deck(folder, "", "thermo 1000\nrun 2500", grains=grains, triangles=triangles, boundary="p p f", every=25,
+                    start="processors 2 1 1" if ranks == 2 else "")
+        text = text.replace(f"block {-vessel.MARGIN} {vessel.MARGIN + vessel.WIDTH} {-vessel.MARGIN} {vessel.MARGIN + vessel.WIDTH}",
+                            f"block {-half} {half} {-half} {half}")
+        if name == "plane":
+            text = text.replace("fix move all wall/dembark stl vessel.stl",
+                                "region floor plane 0 0 0 0 0 1 units box\nfix move all wall/dembark region floor")
+        done = run_deck(folder, text, ranks=ranks)
+        assert done.code == 0, done.error or done.output[-1500:]
+        found[name] = frames(folder)
+    assert np.abs(found["plane"][-1, :, 1:3] - found["plane"][0, :, 1:3]).max() > 0.005
+    for name in ("tiles", "ranks"):
+        assert np.abs(found[name][..., 7:10] - found["plane"][..., 7:10]).max() < 1e-9 * np.abs(found["plane"][..., 7:10]).max(), name
+
+
+def test_a_history_goes_over_edges(tmp_path):
+    """A grain that slides and rolls over triangles of all shapes has the forces that it has on two large ones."""
+    large = [((-0.04, -0.04, 0.0), (0.04, -0.04, 0.0), (0.04, 0.04, 0.0)), ((-0.04, -0.04, 0.0), (0.04, 0.04, 0.0), (-0.04, 0.04, 0.0))]
+    motions = []
+    for name, triangles in (("large", large), ("patch", patch())):
+        folder = tmp_path / name
+        done = run_deck(folder, deck(folder, "", "run 3000", grains=[((-0.004, -0.003, 0.00248), 0.0025, (0.3, 0.2, 0.0))],
+                                     triangles=triangles, every=10))
+        assert done.code == 0, done.error or done.output[-1500:]
+        motions.append(frames(folder))
+    one, many = motions
+    assert many[-1, 0, 1] > 0.001
+    assert np.abs(many[..., 7:10] - one[..., 7:10]).max() < 1e-9 * np.abs(one[..., 7:10]).max()
+
+
+@pytest.mark.parametrize(("motion", "line"), [
+    ("harmonic amplitude 0 0 1e-3 frequency 20000", "below ten time steps"),
+    ("harmonic amplitude 0 0 1e-3 frequency 0", "frequency 0 must be > 0"),
+    ("table file vessel.stl", "line 1: it must have four numbers"),
+    ("shake amplitude 1", "there is no motion 'shake'")])
+def test_wrong_motions_are_told_in_one_line(tmp_path, motion, line):
+    done = run_deck(tmp_path, deck(tmp_path, motion, "run 10"))
+    assert done.code != 0
+    assert line in done.error, done.error or done.output[-500:]
+
+
+@pytest.mark.parametrize(("old", "new", "line"), [
+    ("stl vessel.stl", "stl vessel.obj", "file 'vessel.obj' cannot be read"),
+    ("stl vessel.stl", "stl case.in", "holds no triangles"),
+    ("type 2", "type 2 moves", "'motion TERM ...'")])
+def test_wrong_surfaces_are_told_in_one_line(tmp_path, old, new, line):
+    done = run_deck(tmp_path, deck(tmp_path, "", "run 10").replace(old, new))
+    assert done.code != 0
+    assert "fix move wall/dembark" in done.error and line in done.error, done.error or done.output[-500:]

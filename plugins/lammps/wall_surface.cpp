@@ -1,0 +1,124 @@
+#include "wall_surface.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "domain.h"
+#include "region.h"
+
+#include "contact_call.h"
+#include "dembark/surface/stl.hpp"
+
+using namespace LAMMPS_NS;
+using dembark::Triangle;
+
+namespace dembark_lammps {
+namespace {
+
+double Vec3::* const axes[3] = {&Vec3::x, &Vec3::y, &Vec3::z};
+
+}  // namespace
+
+RegionSurface::RegionSurface(LAMMPS* lmp, const std::string& id) : WallSurface(lmp), id_(id) {
+  find();
+  region_->reset_vel();
+}
+
+void RegionSurface::find() {
+  region_ = domain->get_region_by_id(id_);
+  if (!region_) throw std::invalid_argument("there is no region " + id_);
+}
+
+int RegionSurface::slots() const { return region_->tmax; }
+
+void RegionSurface::prepare(double, const dembark::PrescribedMotion* motion) {
+  find();
+  if (region_->dynamic_check() && motion)
+    throw std::invalid_argument("region " + id_ + " moves by itself; take 'move' and 'rotate' from it, or 'motion' from the fix");
+}
+
+void RegionSurface::begin_step() {
+  moves_ = region_->dynamic_check();
+  region_->prematch();
+  if (moves_) region_->set_velocity();
+}
+
+Vec3 RegionSurface::spin() const { return moves_ && region_->rotateflag ? vector(region_->omega) : Vec3{}; }
+
+Vec3 RegionSurface::origin() const { return region_->rotateflag ? vector(region_->rpoint) : Vec3{}; }
+
+const std::vector<WallContact>& RegionSurface::contacts(const Vec3& centre, double radius, double reach) {
+  found_.clear();
+  if (!region_->match(centre.x, centre.y, centre.z)) return found_;
+  const int count = region_->surface(centre.x, centre.y, centre.z, radius + reach);
+  for (int c = 0; c < count; ++c) {
+    const Region::Contact& contact = region_->contact[c];
+    WallContact one{contact.iwall, {contact.delx, contact.dely, contact.delz}};
+    if (moves_) {
+      double velocity[3], place[3] = {centre.x, centre.y, centre.z};
+      region_->velocity_contact(velocity, place, c);
+      one.velocity = vector(velocity);
+    }
+    found_.push_back(one);
+  }
+  return found_;
+}
+
+TriangleSurface::TriangleSurface(LAMMPS* lmp, const std::string& file) : WallSurface(lmp), own_(dembark::read_stl(file)) {
+  // What is wrong with a triangle is told where the file is named.
+  surface_.update(own_);
+}
+
+void TriangleSurface::prepare(double reach, const dembark::PrescribedMotion* motion) {
+  if (domain->triclinic) throw std::invalid_argument("an STL surface needs a box with right angles");
+  std::vector<Triangle> all = own_;
+  for (int k = 0; k < 3; ++k) {
+    if (!domain->periodicity[k]) continue;
+    const std::string direction = std::string("direction ") + "xyz"[k];
+    if (motion && motion->turns() && std::abs(std::abs(motion->axis().*axes[k]) - 1.0) > 1e-12)
+      throw std::invalid_argument("its motion turns the surface out of the periodic " + direction);
+    if (domain->box_change_size || domain->box_change_shape)
+      throw std::invalid_argument("the box changes its size, and its surface is periodic along " + direction);
+    const std::size_t count = all.size();
+    for (const int sign : {-1, 1})
+      for (std::size_t i = 0; i < count; ++i) {
+        Triangle copy = all[i];
+        for (Vec3& node : copy.node) node.*axes[k] += sign * domain->prd[k];
+        const auto [from, to] = box(copy, reach);
+        if (to.*axes[k] > domain->boxlo[k] && from.*axes[k] < domain->boxhi[k]) all.push_back(copy);
+      }
+  }
+  copies_.assign(own_.size(), {});
+  for (std::size_t i = 0; i < all.size(); ++i) copies_[std::size_t(all[i].id)].push_back(int(i));
+  cells_.build(all, reach);
+  surface_.update(std::move(all));
+}
+
+/// With a periodic wall, or a grain that is about to be, beyond the box.
+Vec3 TriangleSurface::wrapped(Vec3 place) const {
+  for (int k = 0; k < 3; ++k)
+    if (domain->periodicity[k]) place.*axes[k] -= domain->prd[k] * std::floor((place.*axes[k] - domain->boxlo[k]) / domain->prd[k]);
+  return place;
+}
+
+const std::vector<WallContact>& TriangleSurface::contacts(const Vec3& centre, double radius, double reach) {
+  found_.clear();
+  const Vec3 place = wrapped(centre);
+  cells_.near(place, [&](int t) {
+    const Triangle& triangle = surface_.triangles()[std::size_t(t)];
+    const dembark::ClosestPoint here = closest_point(triangle, place);
+    if (here.distance < radius + reach && surface_.owner(t, here, place, radius) == t)
+      found_.push_back({int(triangle.id), here.arm, {}, t});
+  });
+  return found_;
+}
+
+bool TriangleSurface::goes_on(int before, const WallContact& now, const Vec3& centre, double radius) const {
+  if (before == now.surface) return true;
+  const Vec3 place = wrapped(centre);
+  for (const int t : copies_[std::size_t(before)])
+    if (surface_.follow(t, place, radius) == now.triangle) return true;
+  return false;
+}
+
+}  // namespace dembark_lammps

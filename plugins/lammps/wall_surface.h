@@ -1,0 +1,93 @@
+// The surfaces that fix wall/dembark knows: that of a region of LAMMPS, and the triangles of an STL file.
+#ifndef DEMBARK_WALL_SURFACE_H
+#define DEMBARK_WALL_SURFACE_H
+
+#include <string>
+#include <vector>
+
+#include "pointers.h"
+
+#include "dembark/motion/prescribed_motion.hpp"
+#include "dembark/surface/surface_contacts.hpp"
+#include "dembark/surface/triangle_cells.hpp"
+#include "dembark/vec3.hpp"
+
+namespace LAMMPS_NS {
+class Region;
+}
+
+namespace dembark_lammps {
+
+/// Where a sphere is near a surface.
+struct WallContact {
+  int surface;                       ///< number of a part of it; histories are kept by that
+  dembark::Vec3<double> separation;  ///< m, from the surface to the sphere's centre
+  dembark::Vec3<double> velocity{};  ///< m/s, of the surface there
+  int triangle = 0;                  ///< or the copy of one
+};
+
+/// What is wrong is thrown as std::invalid_argument.
+class WallSurface : protected LAMMPS_NS::Pointers {
+ public:
+  explicit WallSurface(LAMMPS_NS::LAMMPS* lmp) : Pointers(lmp) {}
+
+  /// The most contacts that a sphere can have.
+  virtual int slots() const = 0;
+  /// Before a run; `reach`: m, from a sphere's centre to whatever can act on it; `motion`: of the whole surface, or nullptr.
+  virtual void prepare(double reach, const dembark::PrescribedMotion* motion) = 0;
+  virtual void begin_step() {}
+  /// Of the centre of a sphere, in the surface's own frame, with all of the surface within `reach` (m). Until the next call.
+  virtual const std::vector<WallContact>& contacts(const dembark::Vec3<double>& centre, double radius, double reach) = 0;
+  /// Whether a contact that was on part `before` is `now`.
+  virtual bool goes_on(int before, const WallContact& now, const dembark::Vec3<double>& /*centre*/, double /*radius*/) const {
+    return before == now.surface;
+  }
+  virtual dembark::Vec3<double> spin() const { return {}; }    ///< rad/s, of its own motion
+  virtual dembark::Vec3<double> origin() const { return {}; }  ///< m, of moments
+  virtual LAMMPS_NS::Region* region() const { return nullptr; }
+
+ protected:
+  std::vector<WallContact> found_;
+};
+
+class RegionSurface : public WallSurface {
+ public:
+  RegionSurface(LAMMPS_NS::LAMMPS* lmp, const std::string& id);
+  int slots() const override;
+  void prepare(double reach, const dembark::PrescribedMotion* motion) override;
+  void begin_step() override;
+  const std::vector<WallContact>& contacts(const dembark::Vec3<double>& centre, double radius, double reach) override;
+  dembark::Vec3<double> spin() const override;
+  dembark::Vec3<double> origin() const override;
+  LAMMPS_NS::Region* region() const override { return region_; }
+
+ private:
+  const std::string id_;
+  LAMMPS_NS::Region* region_ = nullptr;
+  bool moves_ = false;
+
+  void find();
+};
+
+/// The triangles and, where the box is periodic, their copies.
+class TriangleSurface : public WallSurface {
+ public:
+  TriangleSurface(LAMMPS_NS::LAMMPS* lmp, const std::string& file);
+  int slots() const override { return 8; }
+  void prepare(double reach, const dembark::PrescribedMotion* motion) override;
+  const std::vector<WallContact>& contacts(const dembark::Vec3<double>& centre, double radius, double reach) override;
+  bool goes_on(int before, const WallContact& now, const dembark::Vec3<double>& centre, double radius) const override;
+
+ private:
+  const std::vector<dembark::Triangle> own_;
+  // Planes that form an angle of less than 0.05 rad are one smooth surface, as in LIGGGHTS.
+  dembark::SurfaceContacts surface_{0.05, 1e-6};
+  dembark::TriangleCells cells_;
+  std::vector<std::vector<int>> copies_;  // of each own triangle: its places in `surface_`
+
+  dembark::Vec3<double> wrapped(dembark::Vec3<double> place) const;
+};
+
+}  // namespace dembark_lammps
+
+#endif
