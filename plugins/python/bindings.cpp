@@ -67,12 +67,16 @@ void bind_integration(nb::module_& m);
 void bind_lcp(nb::module_& m);
 void bind_impact(nb::module_& m);
 void bind_liquid(nb::module_& m);
+void bind_sph(nb::module_& m);
+void bind_motion(nb::module_& m);
 
 NB_MODULE(_physics, m) {
   bind_integration(m);
   bind_lcp(m);
   bind_impact(m);
   bind_liquid(m);
+  bind_sph(m);
+  bind_motion(m);
   nb::set_leak_warnings(false);  // cached laws live until the interpreter is gone, which is no leak
   m.attr("unlimited_strength") = unlimited_strength;
   m.def("capillary_models", &capillary::model_names);

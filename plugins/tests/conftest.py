@@ -9,7 +9,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from rig import liggghts_driver, python_driver, yade_driver
+from rig import lammps_driver, liggghts_driver, python_driver, yade_driver
 from rig.motion import Motion
 from rig.scenarios import SCENARIOS
 
@@ -36,12 +36,15 @@ class Motions:
             if driver == "python":
                 self.done[driver, name] = python_driver.run(SCENARIOS[name])
                 return self.done[driver, name]
-            skip_without({"liggghts": liggghts_driver, "yade": yade_driver}[driver])
+            skip_without({"liggghts": liggghts_driver, "yade": yade_driver, "lammps": lammps_driver}[driver])
             if driver == "liggghts":
                 # A run takes longer to start than to compute.
                 with ThreadPoolExecutor(4) as pool:
                     folders = [self.folder / f"liggghts-{k}" for k in range(len(SCENARIOS))]
                     found = dict(zip(SCENARIOS, pool.map(liggghts_driver.run, SCENARIOS.values(), folders), strict=True))
+            elif driver == "lammps":
+                decks = {each: lammps_driver.deck(case) for each, case in SCENARIOS.items()}
+                found = lammps_driver.motions(self.folder / "lammps", decks, SCENARIOS)
             else:
                 found = yade_driver.run_all(SCENARIOS.values(), self.folder / "yade")
             self.done |= {(driver, each): motion for each, motion in found.items()}
@@ -61,3 +64,8 @@ def liggghts_is_there() -> None:
 @pytest.fixture(scope="session")
 def yade_is_there() -> None:
     skip_without(yade_driver)
+
+
+@pytest.fixture(scope="session")
+def lammps_is_there() -> None:
+    skip_without(lammps_driver)

@@ -1,4 +1,4 @@
-"""The same contact in Python, LIGGGHTS and YADE."""
+"""The same contact in Python, LIGGGHTS, YADE and LAMMPS."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from rig.scenarios import SCENARIOS, evaluate
 TOLERANCE = 1e-9
 
 
-@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_engine_agrees_with_python(motions, engine, name, record_property):
     found = deviation(motions("python", name), motions(engine, name))
@@ -20,9 +20,10 @@ def test_engine_agrees_with_python(motions, engine, name, record_property):
     assert max(found.values()) < TOLERANCE, found
 
 
+@pytest.mark.parametrize("other", ["yade", "lammps"])
 @pytest.mark.parametrize("name", SCENARIOS)
-def test_engines_agree_with_each_other(motions, name):
-    found = deviation(motions("liggghts", name), motions("yade", name))
+def test_engines_agree_with_each_other(motions, name, other):
+    found = deviation(motions("liggghts", name), motions(other, name))
     assert max(found.values()) < TOLERANCE, found
 
 

@@ -5,7 +5,7 @@ from math import inf, pi
 
 import numpy as np
 import pytest
-from rig import liggghts_driver, python_driver, walls, yade_driver
+from rig import lammps_driver, liggghts_driver, python_driver, walls, yade_driver
 from rig.motion import QUANTITIES, deviation
 from rig.scenarios import ALL_OF_IT, STILL, Grain, Material, Path, Scenario
 
@@ -91,6 +91,13 @@ def yade(yade_is_there, tmp_path_factory):
     return yade_driver.run_all(CASES.values(), tmp_path_factory.mktemp("hostile"))
 
 
+@pytest.fixture(scope="module")
+def lammps(lammps_is_there, tmp_path_factory):
+    # Its bridges must not be longer than the skin.
+    decks = {name: lammps_driver.deck(case).replace("neighbor 0.001 bin", "neighbor 0.03 bin") for name, case in CASES.items()}
+    return lammps_driver.motions(tmp_path_factory.mktemp("hostile"), decks, CASES)
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_python_gives_numbers(expected, name):
     assert finite(expected[name])
@@ -107,6 +114,12 @@ def test_liggghts_gives_the_same(expected, liggghts, name):
 @pytest.mark.parametrize("name", CASES)
 def test_yade_gives_the_same(expected, yade, name):
     found = worst(expected[name], yade[name])
+    assert max(found.values()) < 1e-9, found
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_lammps_gives_the_same(expected, lammps, name):
+    found = worst(expected[name], lammps[name])
     assert max(found.values()) < 1e-9, found
 
 

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 from dembark.physics import capillary_force, rupture_distance, viscous_resistance
 
-DRIVERS = ["python", "liggghts", "yade"]
+DRIVERS = ["python", "liggghts", "yade", "lammps"]
 BRIDGES = [name for name in SCENARIOS if name.startswith("approach, bridge")]
 drivers = pytest.mark.parametrize("driver", DRIVERS)
 

@@ -1,11 +1,11 @@
-"""Every kind of wall of both engines carries the same contact: impact, slip with reversals, drag, and a bridge, against Python."""
+"""Every kind of wall of the engines carries the same contact: impact, slip with reversals, drag, and a bridge, against Python."""
 
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from rig import liggghts_driver, walls, yade_driver
+from rig import lammps_driver, liggghts_driver, walls, yade_driver
 from rig.motion import deviation
 from rig.scenarios import ALL_OF_IT, CONSTANT, SCENARIOS, SPRING, Grain, Path, Scenario
 from rig.walls import CYLINDER, FLOOR, Surface
@@ -45,6 +45,21 @@ SURFACES = {
     "turning box": (Surface(spin=TURN), None, {"kind": "box", "spin": TURN}),
     "cylinder": (Surface(shape="cylinder"), "cylinder", {"kind": "cylinder", "radius": CYLINDER}),
     "rolling cylinder": (Surface(shape="cylinder", spin=ROLL), None, {"kind": "cylinder", "radius": CYLINDER, "spin": ROLL}),
+}
+# Walls of LAMMPS. Regions that move by themselves: ux, uy, uz are the drift and angle the turn at a time.
+REGIONS = {
+    "plane": "plane 0 0 0 0 0 1",
+    "drifting": "plane 0 0 0 0 0 1 side in move v_ux v_uy v_uz",
+    "turning": "plane 0 0 0 0 0 1 side in rotate v_angle 0 0 0 0 0 1",
+    "cylinder": f"cylinder x 0 {CYLINDER} {CYLINDER} INF INF side in",
+    "rolling cylinder": f"cylinder x 0 {CYLINDER} {CYLINDER} INF INF side in rotate v_angle 0 0 {CYLINDER} 1 0 0",
+}
+# STL surfaces, and a region, that the fix moves.
+MOTIONS = {
+    "mesh": "stl floor.stl type 2",
+    "drifting wall": "stl floor.stl type 2 motion uniform velocity {} {} {}".format(*DRIFT),
+    "turning box": f"stl floor.stl type 2 motion rotation point 0 0 0 axis 0 0 1 rate {TURN[2]}",
+    "rolling cylinder, moved": f"region floor type 2 motion rotation point 0 0 {CYLINDER} axis 1 0 0 rate {ROLL[0]}",
 }
 
 
@@ -86,6 +101,26 @@ def yade(yade_is_there, tmp_path_factory):
     return {key: found[case.name] for key, case in cases.items()}
 
 
+@pytest.fixture(scope="module")
+def lammps(lammps_is_there, tmp_path_factory):
+    decks, cases = {}, {}
+    folder = tmp_path_factory.mktemp("walls")
+    (folder / "floor.stl").write_text(walls.stl(FLOOR))
+    for kind, name, case in parts():
+        deck = lammps_driver.deck(case)
+        for moved in (key for key in MOTIONS if key.partition(",")[0] == kind):
+            text = deck.replace("region floor type 2", MOTIONS[moved])
+            decks[moved, name] = text.replace("region floor plane 0 0 0 0 0 1", f"region floor {REGIONS['cylinder']}")
+            cases[moved, name] = case
+        if kind in REGIONS:
+            rate = max(SURFACES[kind][0].spin)
+            rates = zip(("ux", "uy", "uz", "angle"), (*DRIFT, rate), strict=True)
+            lines = [f'variable {word} equal "{speed!r}*v_t"' for word, speed in rates] + [f"region floor {REGIONS[kind]}"]
+            decks[kind, name] = deck.replace("region floor plane 0 0 0 0 0 1", "\n".join(lines))
+            cases[kind, name] = case
+    return lammps_driver.motions(folder, decks, cases)
+
+
 PARTS = {(kind, name): case for kind, name, case in parts()}
 
 
@@ -105,6 +140,18 @@ def test_wall_of_liggghts_is_that_of_python(liggghts, kind, name):
 @pytest.mark.parametrize(("kind", "name"), PARTS)
 def test_wall_of_yade_is_that_of_python(yade, kind, name):
     found = deviation(python(kind, name), yade[kind, name])
+    assert max(found.values()) < TOLERANCE, found
+
+
+@pytest.mark.parametrize(("kind", "name"), [key for key in PARTS if key[0] in REGIONS])
+def test_region_of_lammps_is_the_wall_of_python(lammps, kind, name):
+    found = deviation(python(kind, name), lammps[kind, name])
+    assert max(found.values()) < TOLERANCE, found
+
+
+@pytest.mark.parametrize(("kind", "name"), [(moved, name) for moved in MOTIONS for kind, name in PARTS if kind == moved.partition(",")[0]])
+def test_surface_that_lammps_moves_is_the_wall_of_python(lammps, kind, name):
+    found = deviation(python(kind.partition(",")[0], name), lammps[kind, name])
     assert max(found.values()) < TOLERANCE, found
 
 

@@ -84,7 +84,6 @@ class Adams {
   const std::vector<double>& state() const { return state_; }
   /// Milne's estimate of the local error of the last step, exact minus computed, in the units of the state; 0 in a Runge-Kutta step.
   const std::vector<double>& error_estimate() const { return error_; }
-  System& system() { return system_; }
 
   /// Forget the steps before: the system has changed.
   void restart() {

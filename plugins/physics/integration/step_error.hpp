@@ -22,18 +22,18 @@ struct LocalError {
   Dofs velocity{};
 };
 
-/// Accelerations (m/s^2, then rad/s^2) of a body in its last steps.
+/// Accelerations (m/s^2, then rad/s^2) of a body in its last steps: nineteen numbers, which an engine may keep beside the body.
 class AccelerationHistory {
  public:
   /// Takes the accelerations at the end of a step of h (s). False as long as there are too few, or after forget().
   bool step(const Dofs& newest, double h, LocalError& error) {
-    const bool enough = known_ == kept_.size();
+    const bool enough = known_ == double(kept_.size());
     if (enough) {
       for (std::size_t k = 0; k < newest.size(); ++k)
         error.velocity[k] = h / 24.0 * (-3.0 * newest[k] + 7.0 * kept_[0][k] - 5.0 * kept_[1][k] + kept_[2][k]);
       for (std::size_t k = 0; k < error.position.size(); ++k) error.position[k] = h * h / 6.0 * (newest[k] - kept_[0][k]);
     } else {
-      ++known_;
+      known_ += 1.0;
     }
     kept_[2] = kept_[1];
     kept_[1] = kept_[0];
@@ -41,11 +41,11 @@ class AccelerationHistory {
     return enough;
   }
   /// The body was moved by other means, or the step was changed.
-  void forget() { known_ = 0; }
+  void forget() { known_ = 0.0; }
 
  private:
   std::array<Dofs, 3> kept_{};  ///< newest first
-  std::size_t known_ = 0;
+  double known_ = 0.0;          ///< how many of them are right
 };
 
 /// What errors are measured by, and how large they may be over it.

@@ -10,7 +10,9 @@ from dembark.physics.impact import Drum, Impact, ImpactChain, ImpactMotion, Impa
 from dembark.physics.integration import AdamsEvent, AdamsSolution, LocalErrors, integrate_adams, local_errors
 from dembark.physics.lcp import LCP_METHODS, LcpCertificate, LcpResult, LcpSolver, solve_lcp
 from dembark.physics.liquid import LIQUID_RETURNS, LIQUID_SHARES, LiquidBridge, liquid_bridge, liquid_grant, liquid_share
+from dembark.physics.motion import WallMotion
 from dembark.physics.normal import effective_shear_modulus, effective_youngs_modulus
+from dembark.physics.sph import SPH_BOUNDARIES, SPH_KERNELS, SphBody, SphEnergies, SphFluid, sph_kernel, tait_pressure
 from dembark.physics.viscous import ViscousResistance, viscous_resistance
 
 __all__ = [
@@ -18,6 +20,8 @@ __all__ = [
     "LCP_METHODS",
     "LIQUID_RETURNS",
     "LIQUID_SHARES",
+    "SPH_BOUNDARIES",
+    "SPH_KERNELS",
     "AdamsEvent",
     "AdamsSolution",
     "Body",
@@ -37,8 +41,12 @@ __all__ = [
     "LocalErrors",
     "Plane",
     "RollingResistance",
+    "SphBody",
+    "SphEnergies",
+    "SphFluid",
     "Trajectory",
     "ViscousResistance",
+    "WallMotion",
     "capillary_force",
     "collide",
     "drop",
@@ -51,5 +59,7 @@ __all__ = [
     "local_errors",
     "rupture_distance",
     "solve_lcp",
+    "sph_kernel",
+    "tait_pressure",
     "viscous_resistance",
 ]

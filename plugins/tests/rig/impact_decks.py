@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig import liggghts_driver
+from rig import lammps_driver, liggghts_driver
 from rig.liggghts_driver import Run, read_dump
+
+# What engines with input scripts in LAMMPS's manner call differently: style of the atoms, velocities of ghosts, format of dumps, spin.
+DRIVERS = {"liggghts": liggghts_driver, "lammps": lammps_driver}
+ATOMS = {"liggghts": "granular", "lammps": "sphere"}
+GHOSTS = {"liggghts": "communicate single vel yes", "lammps": "comm_modify vel yes"}
+FORMAT = {"liggghts": "format", "lammps": "format line"}
+SPIN = {"liggghts": "omegaz {!r}", "lammps": "omega 0 0 {!r}"}
 
 # Names of what the fix returns as a vector, in its order.
 VECTOR = ("contacts", "active", "impacts", "peak", "impulse", "dissipated", "elastic", "pivots", "block_steps", "pivots_total",
           "certificate", "worst_certificate", "peak_so_far")
 STATE = "id x y z vx vy vz omegax omegay omegaz fx fy fz tqx tqy tqz"
+GROUND = ("wall plane ground y 0 lo stiffness 5e7 friction 0.3 wall plane left x -0.9 lo stiffness 5e7 "
+          "wall plane right x 0.9 hi stiffness 5e7")
 LOCAL = ("id_a", "id_b", "nx", "ny", "nz", "gap", "normal_force", "tx", "ty", "tz", "x", "y", "z")
 
 
@@ -48,8 +59,10 @@ class Case:
     after: str = ""
     every: int = 1000
     extra: list[str] = field(default_factory=list)
+    local: str = ""  # a dump of the contacts with a force, each time that the logs are dumped
+    motion: str = "nve/sphere"
 
-    def head(self) -> str:
+    def head(self, engine: str = "liggghts") -> str:
         """The part of the deck that a run from a restart file does not need."""
         lines = [f"region domain block {' '.join(repr(b) for b in self.box)} units box", f"create_box {self.types} domain"]
         lines += [f"create_atoms {log.type} single {log.position[0]!r} {log.position[1]!r} {log.z!r} units box" for log in self.logs]
@@ -57,28 +70,32 @@ class Case:
             lines.append(f"set atom {number} diameter {2.0 * log.radius!r} vx {log.velocity[0]!r} vy {log.velocity[1]!r}")
             lines.append(f"set atom {number} mass {log.mass!r}")
             if log.spin:
-                lines.append(f"set atom {number} omegaz {log.spin!r}")
+                lines.append(f"set atom {number} {SPIN[engine].format(log.spin)}")
         return "\n".join(lines)
 
-    def text(self, *, head: str | None = None, run: str | None = None, ranks: int = 1, dump: str = "logs.dump") -> str:
+    def text(self, engine: str = "liggghts", *, head: str | None = None, run: str | None = None, ranks: int = 1,
+             dump: str = "logs.dump") -> str:
         gravity = f"fix weight all gravity {self.gravity!r} vector 0 -1 0" if self.gravity else ""
+        local = f"dump local all local {self.every} {self.local} " + " ".join(f"f_hits[{i}]" for i in range(1, 14))
+        line = FORMAT[engine]
         return "\n".join([
-            f"log {log_name(dump)}", "units si", f"dimension {self.dimension}", "atom_style granular", "atom_modify map array sort 0 0.0",
-            f"boundary {self.boundary}", "newton off",
-            "communicate single vel yes", f"processors {ranks} 1 1", self.head() if head is None else head, "neighbor 0.05 bin",
-            "neigh_modify delay 0", self.before, gravity, f"fix hits all lcp/impact {self.words}", self.after, "fix motion all nve/sphere",
-            f"timestep {self.time_step!r}", *self.extra,
-            f"dump logs all custom {self.every} {dump} {STATE}", f'dump_modify logs sort id format "%d{" %.17g" * 15}"',
+            f"log {log_name(dump)}", "units si", f"dimension {self.dimension}", f"atom_style {ATOMS[engine]}",
+            "atom_modify map array sort 0 0.0", f"boundary {self.boundary}", "newton off", GHOSTS[engine], f"processors {ranks} 1 1",
+            self.head(engine) if head is None else head, "neighbor 0.05 bin", "neigh_modify delay 0", self.before, gravity,
+            f"fix hits all lcp/impact {self.words}", self.after, f"fix motion all {self.motion}", f"timestep {self.time_step!r}",
+            *self.extra,
+            f"dump logs all custom {self.every} {dump} {STATE}", f'dump_modify logs sort id {line} "%d{" %.17g" * 15}"',
+            *([local, f'dump_modify local {line} "{" ".join(["%.17g"] * 13)}"'] if self.local else []),
             "thermo_style custom step atoms " + " ".join(f"f_hits[{i}]" for i in range(1, 14)),
             'thermo_modify norm no lost error format float "%.17g"', f"thermo {self.every}", self.run if run is None else run, ""])
 
 
-def start(folder: Path, case: Case, *, ranks: int = 1, **words: str | None) -> Run:
-    return liggghts_driver.run_deck(folder, case.text(ranks=ranks, **words), ranks=ranks)
+def start(folder: Path, case: Case, *, engine: str = "liggghts", ranks: int = 1, **words: str | None) -> Run:
+    return DRIVERS[engine].run_deck(folder, case.text(engine, ranks=ranks, **words), ranks=ranks)
 
 
-def run(folder: Path, case: Case, *, ranks: int = 1, **words: str | None) -> Result:
-    done = start(folder, case, ranks=ranks, **words)
+def run(folder: Path, case: Case, *, engine: str = "liggghts", ranks: int = 1, **words: str | None) -> Result:
+    done = start(folder, case, engine=engine, ranks=ranks, **words)
     assert done.code == 0, done.output[-3000:]
     return Result(case, done, words.get("dump") or "logs.dump")
 
@@ -134,3 +151,22 @@ def thermo(output: str) -> NDArray[np.float64]:
         else:
             reading = False
     return np.array(rows)
+
+
+def pile(count: int = 30, *, steps: int = 2000, **settings: Any) -> Case:
+    """Logs of unequal diameter that fall between two walls, on both sides of x = 0."""
+    logs = []
+    for i in range(count):
+        radius = 0.1 * (1.0 + 0.2 * math.sin(37.0 * i))
+        logs.append(Log((-0.72 + 0.25 * (i % 6) + 0.02 * math.sin(91.0 * i), 0.15 + 0.26 * (i // 6)),
+                        (0.5 * math.sin(53.0 * i), -1.0 + 0.5 * math.sin(17.0 * i)), radius=radius, mass=2500.0 * radius**2))
+    return Case(logs, f"stiffness 1e7 contact_damping 20000 friction 0.4 0.3 1e-4 impacts impacts.txt {GROUND}", 2e-5, f"run {steps}",
+                gravity=9.81, box=(-1.0, 1.0, -0.5, 2.5, -0.5, 0.5), **{"every": steps, **settings})
+
+
+def assert_same(a: NDArray[np.float64], b: NDArray[np.float64], tolerance: float) -> None:
+    """Two frames: each quantity, three columns, relative to its largest value."""
+    assert (a[:, 0] == b[:, 0]).all()
+    found = {name: np.abs(a[:, k : k + 3] - b[:, k : k + 3]).max() / max(np.abs(a[:, k : k + 3]).max(), 1e-300)
+             for k, name in ((1, "position"), (4, "velocity"), (7, "spin"), (10, "force"), (13, "torque"))}
+    assert max(found.values()) <= tolerance, found

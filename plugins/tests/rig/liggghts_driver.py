@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark.validation.engines import Engine, call, find
+from rig import input_script
 from rig.motion import Motion
-from rig.scenarios import Material, Scenario, in_liggghts
+from rig.scenarios import Grain, Material, Scenario
 
 COLUMNS = "id x y z vx vy vz omegax omegay omegaz fx fy fz tqx tqy tqz"
 
@@ -99,49 +100,21 @@ def models(m: Material, tangential: str = "finnie_rabinowicz", wall: str = "") -
 
 def head(newton: str = "off", boundary: str = "f f f") -> str:
     """The first lines of a deck."""
-    return f"""\
-units si
-atom_style granular
-atom_modify map array
-boundary {boundary}
-newton {newton}
-communicate single vel yes"""
+    return input_script.head("granular", "communicate single vel yes", newton, boundary)
 
 
 def deck(case: Scenario, *, tangential: str = "finnie_rabinowicz", newton: str = "off", material_lines: str | None = None,
          finish: str = "", start: str = "") -> str:
+    def spin(g: Grain) -> str:
+        return " ".join(f"omega{axis} {w!r}" for axis, w in zip("xyz", g.angular_velocity, strict=True))
+
     m = case.material
-    prefix = f"""\
-{head(newton)}
-region domain block -0.05 0.05 -0.05 0.05 -0.05 0.05 units box
-create_box 2 domain
-neighbor 0.001 bin
-neigh_modify delay 0
-timestep {case.time_step!r}
-variable t equal step*{case.time_step!r}
-{properties(m) if material_lines is None else material_lines}
-pair_style gran {models(m, tangential)}
-pair_coeff * *
-"""
-    lines = [prefix]
-    for i, g in enumerate(case.grains, start=1):
-        x, y, z = g.position
-        lines.append(f"create_atoms 1 single {x!r} {y!r} {z!r} units box")
-        lines.append(f"group g{i} id {i}")
-        motion_words = [f"{key}{axis} {value!r}" for key, three in (("v", g.velocity), ("omega", g.angular_velocity))
-                        for axis, value in zip("xyz", three, strict=True)]
-        lines.append(f"set atom {i} diameter {2.0 * g.radius!r} density {g.density!r} {' '.join(motion_words)}")
-        if g.path:
-            for kind, parts in (("d", g.path.displacement), ("v", g.path.velocity)):
-                lines += [f'variable {kind}{axis}{i} equal "{in_liggghts(part)}"' for axis, part in zip("xyz", parts, strict=True)]
-            lines.append(f"fix move{i} g{i} move variable v_dx{i} v_dy{i} v_dz{i} v_vx{i} v_vy{i} v_vz{i} units box")
+    lines = [head(newton), input_script.domain(case), properties(m) if material_lines is None else material_lines,
+             f"pair_style gran {models(m, tangential)}", "pair_coeff * *\n",
+             *input_script.grains(case, spin)]
     if case.wall:
         lines.append(f"fix floor all wall/gran {models(m, tangential, 'primitive type 2 zplane 0')}")
-    strength = float(np.linalg.norm(case.gravity))
-    if strength > 0.0:
-        lines.append(f"fix weight all gravity {strength!r} vector " + " ".join(repr(c / strength) for c in case.gravity))
-    if not case.prescribed:
-        lines.append("fix motion all nve/sphere")
+    lines += input_script.motion(case)
     lines.append(f"dump grains all custom {case.stride} grains.dump {COLUMNS}\n"
                  f'dump_modify grains sort id format "%d{" %.17g" * 15}"\n'
                  f"{start}\nthermo {case.steps}\nrun {case.steps}\n{finish}\n")

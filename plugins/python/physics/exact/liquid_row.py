@@ -85,7 +85,7 @@ class Books:
 def books(row: Row, rule: Rule, time_step: float, steps: Sequence[int] | Array) -> Books:
     """Books after each of `steps`, counted from 1, of `time_step` (s)."""
     # Contact k is between the bodies k and k + 1; body 0 is the left wall, the last one the right wall.
-    sides = np.arange(len(row.radii) + 1)[:, None] + [0, 1]
+    sides = np.arange(len(row.radii) + 1)[:, None] + np.array([0, 1])
     radii = np.array([np.inf, *row.radii, np.inf])
     own, other = radii[sides].T
     ask, part = _shares(rule, radii[sides])

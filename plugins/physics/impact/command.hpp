@@ -1,0 +1,259 @@
+// The words of `fix ID group lcp/impact ...`, read into numbers: the same in all engines that have this command.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <iterator>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "geometry.hpp"
+#include "types.hpp"
+
+namespace dembark {
+namespace impact {
+
+struct Command {
+  Settings settings;                ///< a material for each atom type, then one for each wall; without the time step
+  Surroundings around;              ///< the walls, numbered in the order in which the words name them
+  std::vector<std::string> walls;   ///< their names, for messages and the file of impacts
+  std::vector<std::string> meshes;  ///< what the engine calls the meshes in `around`
+  std::size_t types = 0;
+  bool solid_cylinder = true;  ///< moment of inertia m r^2 / 2, else 2/5 m r^2
+  std::string impacts_file;    ///< empty: none
+
+  double inertia(double mass, double radius) const {
+    return solid_cylinder ? cylinder_inertia(mass, radius) : sphere_inertia(mass, radius);
+  }
+  /// An engine that turns bodies with an inertia of `own` m r^2 does with a torque times this number what the torque does to a log.
+  double torque_scale(double own) const { return inertia(1.0, 1.0) / own; }
+};
+
+namespace detail {
+
+[[noreturn]] inline void refuse(const std::string& line) { throw std::invalid_argument(line); }
+
+inline std::string text(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.15g", value);
+  return buffer;
+}
+
+/// The words, one after the other. `of`: the keyword that they belong to; `what`: what is wanted, for messages.
+class CommandWords {
+ public:
+  explicit CommandWords(const std::vector<std::string>& words) : words_(words) {}
+
+  bool left() const { return at_ < words_.size(); }
+  bool next_is(const char* word) const { return left() && words_[at_] == word; }
+  bool next_is_number() const {
+    double ignored;
+    return left() && is_number(words_[at_], ignored);
+  }
+
+  std::string word(const std::string& of, const std::string& what) {
+    if (!left()) refuse(of + ": " + what + " is missing");
+    return words_[at_++];
+  }
+  double number(const std::string& of, const std::string& what) {
+    const std::string found = word(of, what);
+    double value;
+    if (!is_number(found, value)) refuse(of + ": '" + found + "' is no number; it wants " + what);
+    return value;
+  }
+  double at_least(double lowest, const std::string& of, const std::string& what) {
+    const double value = number(of, what);
+    if (!(value >= lowest)) refuse(of + ": " + what + " must be >= " + text(lowest) + ", not " + text(value));
+    return value;
+  }
+  double positive(const std::string& of, const std::string& what) {
+    const double value = number(of, what);
+    if (!(value > 0.0)) refuse(of + ": " + what + " must be > 0, not " + text(value));
+    return value;
+  }
+  int choice(const std::string& of, const std::string& what, const std::vector<std::string>& all) {
+    const std::string found = word(of, what);
+    std::string list;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (found == all[i]) return int(i);
+      list += (i ? ", " : "") + all[i];
+    }
+    refuse(of + ": " + what + " is one of " + list + ", not '" + found + "'");
+  }
+
+ private:
+  static bool is_number(const std::string& word, double& value) {
+    char* end = nullptr;
+    value = std::strtod(word.c_str(), &end);
+    return !word.empty() && *end == '\0' && std::isfinite(value);
+  }
+
+  const std::vector<std::string>& words_;
+  std::size_t at_ = 0;
+};
+
+/// Everything that one command says; pair laws come together when all words are read.
+class CommandReader : CommandWords {
+ public:
+  CommandReader(const std::vector<std::string>& words, int types, const char* mesh) : CommandWords(words), types_(types), mesh_(mesh) {}
+
+  Command read() {
+    while (left()) keyword(word("lcp/impact", "a keyword"));
+    if (stiffness_.empty()) refuse("stiffness is missing: one value (N/m) for each atom type");
+    damping_.resize(stiffness_.size());
+    Settings& s = command_.settings;
+    s.materials.clear();
+    s.pairs.clear();
+    for (std::size_t i = 0; i < stiffness_.size(); ++i) s.add({stiffness_[i], damping_[i]}, law(friction_));
+    for (const auto& [stiffness, friction] : wall_laws_) s.add({stiffness, 0.0}, law(friction.value_or(friction_)));
+    command_.types = stiffness_.size();
+    return std::move(command_);
+  }
+
+ private:
+  using Friction = FinnieRabinowicz;
+
+  void keyword(const std::string& of) {
+    Settings& settings = command_.settings;
+    if (of == "stiffness") stiffness_ = per_type(of, "N/m", false);
+    else if (of == "damping") damping_ = per_type(of, "N s/m", true);
+    else if (of == "contact_damping") law_.contact_damping = at_least(0.0, of, "the value (N s/m)");
+    else if (of == "theta") {
+      settings.theta = number(of, "the value");
+      if (!(settings.theta >= 0.5 && settings.theta <= 1.0)) refuse("theta: the value lies in 0.5...1, not " + text(settings.theta));
+    } else if (of == "friction") friction_ = friction(of);
+    else if (of == "shear_strength") {
+      strength_ = positive(of, "the strength (Pa)");
+      if (next_is_number()) law_.contact_area = positive(of, "the contact area (m^2)");
+    } else if (of == "tangential_ratio") law_.tangential_stiffness_ratio = positive(of, "the value");
+    else if (of == "wall") wall();
+    else if (of == "inertia") command_.solid_cylinder = choice(of, "the shape", {"cylinder", "sphere"}) == 0;
+    else if (of == "impacts") command_.impacts_file = word(of, "the name of the file");
+    else if (of == "method") {
+      const std::vector<std::string> methods(std::begin(lcp_method_names), std::end(lcp_method_names));
+      settings.lcp.method = lcp_method(methods[std::size_t(choice(of, "the solver", methods))]);
+    } else if (of == "sweeps") {
+      const double value = at_least(1.0, of, "the number");
+      if (value != std::floor(value) || value > 100.0) refuse("sweeps: a whole number from 1 to 100, not " + text(value));
+      settings.friction_sweeps = int(value);
+    } else
+      refuse("'" + of +
+             "' is no keyword; there is stiffness, damping, contact_damping, theta, friction, shear_strength, tangential_ratio, wall, "
+             "inertia, impacts, method, sweeps");
+  }
+
+  PairLaw law(const Friction& friction) const {
+    PairLaw law = law_;
+    law.friction = friction;
+    law.friction.interface_shear_strength = strength_;
+    return law;
+  }
+
+  std::vector<double> per_type(const std::string& of, const std::string& unit, bool may_be_zero) {
+    std::vector<double> values;
+    while (next_is_number()) {
+      const std::string what = "the value (" + unit + ") of type " + std::to_string(values.size() + 1);
+      values.push_back(may_be_zero ? at_least(0.0, of, what) : positive(of, what));
+    }
+    if (int(values.size()) != types_)
+      refuse(of + ": one value (" + unit + ") for each of the " + std::to_string(types_) + " atom types, not " +
+             std::to_string(values.size()));
+    return values;
+  }
+
+  Friction friction(const std::string& of) {
+    Friction f = no_friction();
+    f.static_friction = f.kinetic_friction = at_least(0.0, of, "the friction coefficient");
+    if (!next_is_number()) return f;
+    f.kinetic_friction = at_least(0.0, of, "the kinetic friction coefficient");
+    f.critical_slip_distance = at_least(0.0, of, "the critical slip distance (m), after the static and the kinetic coefficient,");
+    if (f.kinetic_friction > f.static_friction)
+      refuse(of + ": kinetic friction " + text(f.kinetic_friction) + " must not exceed static friction " + text(f.static_friction));
+    return f;
+  }
+  static Friction no_friction() {
+    Friction f = PairLaw::frictionless();
+    f.critical_slip_distance = 0.0;
+    return f;
+  }
+
+  int axis(const std::string& of) { return choice(of, "the axis", {"x", "y", "z"}); }
+
+  void wall() {
+    static double Vec3<double>::* const axes[3] = {&Vec3<double>::x, &Vec3<double>::y, &Vec3<double>::z};
+    std::vector<std::string> shapes = {"plane", "cylinder"};
+    if (mesh_) shapes.emplace_back("mesh");
+    const int shape = choice("wall", "the shape", shapes);
+    const std::string name = word("wall", "the name"), of = "wall " + name;
+    std::vector<std::string>& walls = command_.walls;
+    if (std::find(walls.begin(), walls.end(), name) != walls.end())
+      refuse(of + ": there is a wall of this name already; give each wall its own");
+    Surroundings& around = command_.around;
+    Wall* wall = nullptr;
+    if (shape == 0) {
+      Plane& plane = around.planes.emplace_back();
+      const int k = axis(of);
+      plane.point.*axes[k] = number(of, "the position (m) along the axis");
+      plane.normal = {};
+      plane.normal.*axes[k] = choice(of, "the side", {"lo", "hi"}) == 0 ? 1.0 : -1.0;
+      wall = &plane;
+    } else if (shape == 1) {
+      Drum& drum = around.drums.emplace_back();
+      const int k = axis(of);
+      drum.axis = {};
+      drum.axis.*axes[k] = 1.0;
+      drum.point.*axes[k == 0 ? 1 : 0] = number(of, "the first coordinate (m) of the axis");
+      drum.point.*axes[k == 2 ? 1 : 2] = number(of, "the second coordinate (m) of the axis");
+      drum.radius = positive(of, "the radius (m)");
+      wall = &drum;
+    } else {
+      command_.meshes.push_back(word(of, mesh_));
+      wall = &around.meshes.emplace_back();
+    }
+    wall->id = wall_key(std::int64_t(walls.size()));
+    wall->material = types_ + int(walls.size());
+    wall->stiffness = 0.0;
+    std::optional<Friction> own;
+    for (; next_is("stiffness") || next_is("friction") || next_is("omega");) {
+      const std::string key = word(of, "a keyword");
+      if (key == "stiffness") {
+        if (wall->stiffness > 0.0) refuse(of + ": stiffness stands twice; the keywords of the fix itself come before the first wall");
+        wall->stiffness = positive(of, "stiffness (N/m)");
+      } else if (key == "friction") {
+        own = friction(of + ": friction");
+      } else {
+        if (shape != 1) refuse(of + ": omega is for cylinders");
+        around.drums.back().omega = number(of, "omega (rad/s)");
+      }
+    }
+    if (!(wall->stiffness > 0.0)) refuse(of + ": stiffness (N/m) is missing");
+    wall_laws_.emplace_back(wall->stiffness, own);
+    walls.push_back(name);
+  }
+
+  const int types_;
+  const char* const mesh_;  ///< what names a mesh; nullptr: the engine has none
+  Command command_;
+  std::vector<double> stiffness_, damping_;
+  PairLaw law_;  ///< but for its friction
+  Friction friction_ = no_friction();
+  double strength_ = unlimited_strength;                               ///< Pa
+  std::vector<std::pair<double, std::optional<Friction>>> wall_laws_;  ///< stiffness, N/m, and friction; none: that of the fix
+};
+
+}  // namespace detail
+
+/// Reads the words after the style. mesh: what the word after the name of a wall that is a mesh is, for messages; nullptr where there are
+/// none. Throws std::invalid_argument with one line: what, where, what would be right.
+inline Command read_command(const std::vector<std::string>& words, int atom_types, const char* mesh = nullptr) {
+  return detail::CommandReader(words, atom_types, mesh).read();
+}
+
+}  // namespace impact
+}  // namespace dembark

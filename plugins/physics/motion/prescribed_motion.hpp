@@ -1,0 +1,228 @@
+// Prescribed motion of a wall: a sum of terms (terms.hpp), whose position, velocity and acceleration are known at any time. A wall has
+// infinite mass: nothing that touches it changes its motion.
+//
+// The words of a motion, which LIGGGHTS, YADE and Python read alike (SI units, rad):
+//   harmonic amplitude X Y Z frequency F [phase P]                    circular first X Y Z second X Y Z frequency F [phase P]
+//   rocking point X Y Z axis X Y Z angle A frequency F [phase P]      rotation point X Y Z axis X Y Z rate W [acceleration B]
+//   uniform velocity X Y Z [acceleration X Y Z]                       table file NAME
+//   jolts shape half_sine|constant|rising acceleration X Y Z duration D [interval I] [count N] [signs +--+]
+// each with [start T], all but jolts and table with [until T], the first three with [ramp N], in periods, 10 unless given.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "terms.hpp"
+#include "words.hpp"
+
+namespace dembark {
+
+/// What an engine sets for a step: the mean velocities over it.
+struct WallStep {
+  Vec3<double> velocity{};  ///< m/s, of the point on the axis
+  double rate = 0.0;        ///< rad/s
+};
+
+class PrescribedMotion {
+ public:
+  /// At rest.
+  PrescribedMotion() = default;
+  /// From its words. Throws std::invalid_argument with one line about what is wrong.
+  explicit PrescribedMotion(const std::vector<std::string>& words) {
+    std::size_t at = 0;
+    do read(words, at);
+    while (at < words.size());
+  }
+  explicit PrescribedMotion(const std::string& line) : PrescribedMotion(motion::split(line)) {}
+
+  WallState at(double t) const {
+    WallState state;
+    for (const auto& term : oscillations_) term.add(t, state);
+    for (const auto& term : uniform_) term.add(t, state);
+    for (const auto& term : jolts_) term.add(t, state);
+    for (const auto& term : tables_) term.add(t, state);
+    return state;
+  }
+  /// Over the step of `h` s from `t` (s) on: [x(t + h) - x(t)] / h.
+  WallStep step(double t, double h) const {
+    const WallState from = at(t), to = at(t + h);
+    return {(1.0 / h) * (to.displacement - from.displacement), (to.angle - from.angle) / h};
+  }
+  bool turns() const { return norm(axis_) > 0.0; }
+  const Vec3<double>& axis() const { return axis_; }  ///< a unit vector, or zero
+  /// m: of the point on the axis that the translation moves.
+  Vec3<double> centre(const WallState& state) const { return point_ + state.displacement; }
+
+  /// s: of the fastest oscillation, twice the duration of the shortest pulse; infinite without any.
+  double shortest_period() const {
+    double shortest = motion::never;
+    for (const auto& term : oscillations_) shortest = std::min(shortest, 1.0 / term.frequency);
+    for (const auto& term : jolts_) shortest = std::min(shortest, 2.0 * term.duration);
+    return shortest;
+  }
+  /// The one clear line about a time step (s) that is too long for the motion, or nothing.
+  std::string step_error(double h) const {
+    if (!(shortest_period() < 10.0 * h)) return "";
+    return "its shortest period, " + motion::text(shortest_period()) + " s, is below ten time steps of " + motion::text(h) +
+           " s: take a shorter step";
+  }
+  /// Bounds (m) of the displacement from `from` to `to` (s); of oscillations at any time.
+  void reach(double from, double to, Vec3<double>& low, Vec3<double>& high) const {
+    constexpr int samples = 1000;
+    PrescribedMotion rest = *this;
+    rest.oscillations_.clear();
+    low = high = rest.at(from).displacement;
+    for (int k = 1; k <= samples; ++k) {
+      const Vec3<double> x = rest.at(from + (to - from) * k / samples).displacement;
+      low = {std::min(low.x, x.x), std::min(low.y, x.y), std::min(low.z, x.z)};
+      high = {std::max(high.x, x.x), std::max(high.y, x.y), std::max(high.z, x.z)};
+    }
+    for (const auto& term : oscillations_) {
+      // Without a ramp the middle of the oscillation may be an amplitude away.
+      const double scale = term.ramp > 0.0 ? 1.0 : 2.0;
+      const Vec3<double>&s = term.sine.along, &c = term.cosine.along;
+      const Vec3<double> by{scale * std::hypot(s.x, c.x), scale * std::hypot(s.y, c.y), scale * std::hypot(s.z, c.z)};
+      low -= by;
+      high += by;
+    }
+  }
+
+ private:
+  void read(const std::vector<std::string>& words, std::size_t& at) {
+    using motion::Keyword;
+    static const Keyword start{"start", 1, false}, until{"until", 1, false}, frequency{"frequency", 1, true}, phase{"phase", 1, false},
+        ramp{"ramp", 1, false}, point{"point", 3, true}, axis{"axis", 3, true};
+    static const std::vector<motion::Grammar> grammars{
+        {"harmonic", {{"amplitude", 3, true}, frequency, phase, ramp, start, until}},
+        {"circular", {{"first", 3, true}, {"second", 3, true}, frequency, phase, ramp, start, until}},
+        {"rocking", {point, axis, {"angle", 1, true}, frequency, phase, ramp, start, until}},
+        {"rotation", {point, axis, {"rate", 1, true}, {"acceleration", 1, false}, start, until}},
+        {"uniform", {{"velocity", 3, true}, {"acceleration", 3, false}, start, until}},
+        {"jolts",
+         {{"shape", 1, true},
+          {"acceleration", 3, true},
+          {"duration", 1, true},
+          {"interval", 1, false},
+          {"count", 1, false},
+          {"signs", 1, false},
+          start}},
+        {"table", {{"file", 1, true}, start}}};
+    const auto grammar_of = [](const std::string& word) {
+      return std::find_if(grammars.begin(), grammars.end(), [&word](const motion::Grammar& g) { return g.kind == word; });
+    };
+    const std::string kind = at < words.size() ? words[at] : "";
+    const auto grammar = grammar_of(kind);
+    if (grammar == grammars.end())
+      throw std::invalid_argument("there is no motion '" + kind +
+                                  "'; it is harmonic, circular, rocking, rotation, uniform, jolts or table");
+    const motion::Given given(*grammar, words, ++at, [&](const std::string& word) { return grammar_of(word) != grammars.end(); });
+    if (kind == "harmonic") add_oscillation(given, {given.vector("amplitude"), 0.0}, {});
+    else if (kind == "circular") add_oscillation(given, {given.vector("first"), 0.0}, {given.vector("second"), 0.0});
+    else if (kind == "rocking") add_oscillation(given, {{}, given.number("angle")}, {});
+    else if (kind == "rotation") add_uniform(given, {{}, given.number("rate")}, {{}, given.number_or("acceleration", 0.0)});
+    else if (kind == "uniform") add_uniform(given, {given.vector("velocity"), 0.0}, {given.vector("acceleration"), 0.0});
+    else if (kind == "jolts") add_jolts(given);
+    else add_table(given);
+    if (given.has("axis")) set_axis(given);
+  }
+
+  void add_oscillation(const motion::Given& given, const motion::Direction& sine, const motion::Direction& cosine) {
+    motion::Oscillation term{sine,
+                             cosine,
+                             given.positive("frequency"),
+                             given.number_or("phase", 0.0),
+                             0.0,
+                             given.number_or("start", 0.0),
+                             given.number_or("until", motion::never)};
+    const double periods = given.number_or("ramp", 10.0);
+    if (!(periods >= 0.0)) given.refuse("ramp " + motion::text(periods) + " must be >= 0 periods");
+    term.ramp = periods / term.frequency;
+    if (term.until < term.start + 2.0 * term.ramp || !(term.until > term.start))
+      given.refuse("until " + motion::text(term.until) + " s must be later than start " + motion::text(term.start) + " s by both ramps, " +
+                   motion::text(2.0 * term.ramp) + " s");
+    if (norm(sine.along) + norm(cosine.along) + std::abs(sine.about) == 0.0) given.refuse("its amplitude is zero");
+    oscillations_.push_back(term);
+  }
+
+  void add_uniform(const motion::Given& given, const motion::Direction& velocity, const motion::Direction& acceleration) {
+    const motion::Uniform term{velocity, acceleration, given.number_or("start", -motion::never), given.number_or("until", motion::never)};
+    if (!(term.until > term.start))
+      given.refuse("until " + motion::text(term.until) + " s must be later than start " + motion::text(term.start) + " s");
+    uniform_.push_back(term);
+  }
+
+  void add_jolts(const motion::Given& given) {
+    const std::string& shape = given.word("shape");
+    motion::Jolts term;
+    if (shape == "half_sine") term.shape = motion::PulseShape::half_sine;
+    else if (shape == "constant") term.shape = motion::PulseShape::constant;
+    else if (shape == "rising") term.shape = motion::PulseShape::rising;
+    else given.refuse("there is no shape '" + shape + "'; it is half_sine, constant or rising");
+    term.acceleration.along = given.vector("acceleration");
+    term.duration = given.positive("duration");
+    term.interval = given.number_or("interval", term.duration);
+    term.start = given.number_or("start", 0.0);
+    if (term.interval < term.duration)
+      given.refuse("interval " + motion::text(term.interval) + " s must be at least the duration, " + motion::text(term.duration) + " s");
+    const std::string signs = given.has("signs") ? given.word("signs") : "+";
+    if (signs.find_first_not_of("+-") != std::string::npos) given.refuse("signs '" + signs + "' must be of + and -, such as +--+");
+    const double count = given.number_or("count", double(signs.size()));
+    if (!(count >= 1.0 && count <= 1e6) || count != std::floor(count))
+      given.refuse("count " + motion::text(count) + " must be a whole number of 1 ... 1000000");
+    for (std::size_t k = 0; k < std::size_t(count); ++k) term.signs.push_back(signs[k % signs.size()] == '+' ? 1.0 : -1.0);
+    term.prepare();
+    jolts_.push_back(term);
+  }
+
+  /// Rows of time (s) and displacement (m), four numbers separated by blanks or commas; lines that begin with # are comments.
+  void add_table(const motion::Given& given) {
+    const std::string& name = given.word("file");
+    const double start = given.number_or("start", 0.0);
+    std::ifstream file(name);
+    if (!file) given.refuse("file '" + name + "' cannot be read");
+    std::vector<motion::TableRow> rows;
+    int number = 0;
+    for (std::string line; std::getline(file, line);) {
+      const std::string where = "file '" + name + "', line " + std::to_string(++number) + ": ";
+      std::replace(line.begin(), line.end(), ',', ' ');
+      const std::vector<std::string> words = motion::split(line);
+      if (words.empty() || words[0][0] == '#') continue;
+      double row[4];
+      bool good = words.size() == 4;
+      for (std::size_t k = 0; k < 4 && good; ++k) {
+        char* end = nullptr;
+        row[k] = std::strtod(words[k].c_str(), &end);
+        good = !*end && std::isfinite(row[k]);
+      }
+      if (!good) given.refuse(where + "it must have four numbers, time (s) and displacement x y z (m)");
+      if (!rows.empty() && !(row[0] + start > rows.back().time)) given.refuse(where + "the times do not ascend");
+      rows.push_back({row[0] + start, {row[1], row[2], row[3]}});
+    }
+    if (rows.size() < 2) given.refuse("file '" + name + "' has fewer than two rows");
+    tables_.emplace_back(std::move(rows));
+  }
+
+  void set_axis(const motion::Given& given) {
+    const Vec3<double> direction = given.vector("axis"), point = given.vector("point");
+    const double length = norm(direction);
+    if (!(length > 0.0)) given.refuse("axis must be a vector that is not zero");
+    const Vec3<double> unit = (1.0 / length) * direction;
+    if (turns() && (norm(unit - axis_) > 1e-12 || norm(cross(point - point_, axis_)) > 1e-12 * (1.0 + norm(point))))
+      given.refuse("all rotations of a motion must have the same point and axis");
+    axis_ = unit;
+    point_ = point;
+  }
+
+  std::vector<motion::Oscillation> oscillations_;
+  std::vector<motion::Uniform> uniform_;
+  std::vector<motion::Jolts> jolts_;
+  std::vector<motion::Table> tables_;
+  Vec3<double> axis_{}, point_{};
+};
+
+}  // namespace dembark

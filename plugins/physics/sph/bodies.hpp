@@ -1,0 +1,88 @@
+// Rigid bodies in the fluid: pose, motion under given or computed forces, and the velocity and acceleration of their points.
+//
+// Steps are those of the fluid, kick - drift - kick: v += dt/2 a, x += dt v, forces at x, v += dt/2 a; the orientation turns by the
+// rotation vector omega dt. Euler's equations I dw/dt + w x (I w) = T stand in the frame of the principal axes. Units SI; in the plane
+// masses and forces are those of a metre of depth, and bodies turn about z.
+//
+// Driven bodies belong to an engine that moves them under the forces they get here. Before the step from t to t + dt they are given their
+// places at t + dt, their mean velocities on the way there and their accelerations at t: those that kick - drift - kick itself has.
+#pragma once
+
+#include <cmath>
+
+#include "vector.hpp"
+
+namespace dembark::sph {
+
+/// Unit quaternion of a rotation from a body's frame into space.
+struct Rotation {
+  double w = 1.0, x = 0.0, y = 0.0, z = 0.0;
+
+  Vector operator()(const Vector& v) const {
+    const Vector axis{x, y, z}, t = 2.0 * cross(axis, v);
+    return v + w * t + cross(axis, t);
+  }
+  Rotation inverse() const { return {w, -x, -y, -z}; }
+  /// This rotation followed by one about `angle` (rad), in space.
+  Rotation turned(const Vector& angle) const {
+    const double size = norm(angle), s = size > 1e-8 ? std::sin(0.5 * size) / size : 0.5 - size * size / 48.0, c = std::cos(0.5 * size);
+    const Vector a = s * angle;
+    Rotation r{c * w - a.x * x - a.y * y - a.z * z, c * x + a.x * w + a.y * z - a.z * y, c * y + a.y * w + a.z * x - a.x * z,
+               c * z + a.z * w + a.x * y - a.y * x};
+    const double scale = 1.0 / std::sqrt(r.w * r.w + r.x * r.x + r.y * r.y + r.z * r.z);
+    r.w *= scale, r.x *= scale, r.y *= scale, r.z *= scale;
+    return r;
+  }
+};
+
+struct Body {
+  bool free = false;                           ///< moves under its forces; else as its velocities and accelerations say
+  bool driven = false;                         ///< not free, and placed before each step by others, who move it under its forces
+  double mass = 0.0;                           ///< kg, of free ones > 0
+  Vector inertia{};                            ///< kg m^2, principal moments; inf = does not turn about that axis
+  Vector position{};                           ///< m, of its centre of mass
+  Vector velocity{}, spin{};                   ///< m/s, rad/s
+  Rotation orientation{};                      ///< its frame is that of the principal axes
+  Vector force{}, torque{};                    ///< N, N m about the centre: of the fluid
+  Vector film{}, film_torque{};                ///< of these, what films in slits give
+  Vector load{}, load_torque{};                ///< N, N m: of anything else but gravity
+  Vector acceleration{}, spin_acceleration{};  ///< m/s^2, rad/s^2
+
+  /// Of a point at `arm` from the centre.
+  Vector velocity_at(const Vector& arm) const { return velocity + cross(spin, arm); }
+  Vector acceleration_at(const Vector& arm) const { return acceleration + cross(spin_acceleration, arm) + cross(spin, cross(spin, arm)); }
+
+  void kick(double dt) {
+    if (driven) return;
+    velocity += dt * acceleration;
+    spin += dt * spin_acceleration;
+  }
+  void drift(double dt) {
+    if (driven) return;
+    position += dt * velocity;
+    if (spin.x != 0.0 || spin.y != 0.0 || spin.z != 0.0) orientation = orientation.turned(dt * spin);
+  }
+  /// Accelerations of a free body from its forces.
+  void accelerate(const Vector& gravity) {
+    if (!free) return;
+    acceleration = gravity + (1.0 / mass) * (force + load);
+    const Rotation back = orientation.inverse();
+    const Vector t = back(torque + load_torque), s = back(spin);
+    const auto about = [](double moment, double inertia_, double gyroscopic) {
+      return std::isinf(inertia_) ? 0.0 : (moment + gyroscopic) / inertia_;
+    };
+    // An axis that does not turn has no spin: the others lose nothing to it.
+    const auto product = [](double inertia_, double spin_) { return std::isinf(inertia_) ? 0.0 : inertia_ * spin_; };
+    const Vector l{product(inertia.x, s.x), product(inertia.y, s.y), product(inertia.z, s.z)}, gyro = cross(l, s);
+    spin_acceleration = orientation({about(t.x, inertia.x, gyro.x), about(t.y, inertia.y, gyro.y), about(t.z, inertia.z, gyro.z)});
+  }
+  /// J, of translation and rotation.
+  double kinetic_energy() const {
+    if (!free) return 0.0;
+    const Vector s = orientation.inverse()(spin);
+    const auto part = [](double inertia_, double spin_) { return spin_ == 0.0 ? 0.0 : 0.5 * inertia_ * spin_ * spin_; };
+    return 0.5 * mass * dot(velocity, velocity) + part(inertia.x, s.x) + part(inertia.y, s.y) + part(inertia.z, s.z);
+  }
+};
+
+}  // namespace dembark::sph

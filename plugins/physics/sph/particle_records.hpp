@@ -1,0 +1,69 @@
+// Particles as the loops read them, and what becomes of the loops' sums: the same for every adapter and for the solver.
+#pragma once
+
+#include <algorithm>
+
+#include "loops.hpp"
+#include "settings.hpp"
+
+namespace dembark::sph {
+
+/// Of a fluid particle for the rates of density: diffusion acts on what the weight of still water does not explain (pair_terms.hpp).
+inline Record density_record(const Settings& s, const Vector& x, const Vector& v, double rho, double p) {
+  const Vector stratified = (s.state.density / (s.state.sound_speed * s.state.sound_speed)) * s.gravity;
+  return {x.x, x.y, x.z, rho - s.state.density - dot(stratified, x), v.x, v.y, v.z, p / (rho * rho)};
+}
+
+/// Of a solid particle for the rates of density.
+inline Record solid_record(const Vector& x, const Vector& v) { return {x.x, x.y, x.z, 0.0, v.x, v.y, v.z, 0.0}; }
+
+/// For forces and for the sums at walls; v: of a solid particle the velocity that viscosity meets.
+inline Record force_record(const Vector& x, const Vector& v, double rho, double p) {
+  return {x.x, x.y, x.z, p / (rho * rho), v.x, v.y, v.z, rho};
+}
+
+/// Fills up rows: beyond the reach of all.
+inline Record far_record(const Vector& far) { return {far.x, far.y, far.z, 0.0, 0.0, 0.0, 0.0, 1.0}; }
+
+/// What the fluid meets at a solid particle.
+struct WallState {
+  double pressure = 0.0, density = 0.0;  ///< Pa, kg/m^3
+  Vector velocity{};                     ///< m/s, of viscosity
+};
+
+/// Density of the solid at the pressure p (Pa). Deep under tension no density has this pressure: the wall's is that of the fluid at rest.
+inline double wall_density(const Tait& state, double p) { return p > -0.5 * state.stiffness() ? state.density_at(p) : state.density; }
+
+/// Of a particle with the velocity and the acceleration of its body there.
+inline WallState wall_state(const Settings& s, const WallSums& sums, const Vector& velocity, const Vector& acceleration) {
+  const double p = wall_pressure(sums, s.gravity - acceleration, s.state.tension);
+  return {p, wall_density(s.state, p), wall_velocity(sums, velocity)};
+}
+
+/// Density of a dynamic boundary particle after dt (s) at the rate (kg/m^3/s). Walls do not pull.
+inline double boundary_density(const Settings& s, double rho, double rate, double dt) {
+  return std::max(rho + dt * rate, s.state.tension ? 0.0 : s.state.density);
+}
+
+/// Numbers of the kernel and the particles that all loops use.
+struct LoopNumbers {
+  PairCoefficients pair{};
+  double at_spacing = 1.0;  ///< W(dx)
+};
+
+/// Calls work(kernel) with the kernel of the settings.
+template <class Work>
+auto with_kernel(const Settings& s, const Work& work) {
+  if (s.kernel == KernelName::wendland_c2) return work(WendlandC2(s.dimension, s.h()));
+  return work(CubicSpline(s.dimension, s.h()));
+}
+
+inline LoopNumbers loop_numbers(const Settings& s) {
+  return with_kernel(s, [&](const auto& kernel) {
+    const double moment = lattice_moment(kernel, s.dimension, s.h(), s.spacing);
+    return LoopNumbers{PairCoefficients::of(s.mass(), moment, s.h(), s.state.sound_speed, s.state.density, s.alpha, s.delta),
+                       kernel.value(s.spacing)};
+  });
+}
+
+}  // namespace dembark::sph
