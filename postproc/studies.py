@@ -1,9 +1,11 @@
-"""What studies share: the measured quantities of their points, intervals of what is computed from these, and exponents."""
+"""What studies share: the measured quantities of their points, intervals of what is computed from these, exponents, and the error
+beside a datum."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,6 +32,30 @@ def propagated(measure: Callable[[Array], float], values: Array, halves: Array, 
         return Estimate(middle, math.inf, f"one of {source} has no interval")
     parts = [measure(values + np.where(np.arange(len(values)) == index, half, 0.0)) - middle for index, half in enumerate(halves)]
     return Estimate(middle, combined(parts), f"propagated from {source}")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """ASME V&V 20: the `error` E = S - D of a simulated value S against the datum D, and U_val, the `uncertainty` that it is known within,
+    the root of the sum of squares of its parts; `text` tells all of them."""
+
+    error: float
+    uncertainty: float
+    text: str
+
+    @property
+    def seen(self) -> bool:
+        """|E| exceeds U_val: an error of the model is seen."""
+        return abs(self.error) > self.uncertainty
+
+
+def compared(value: float, datum: Estimate, **parts: float) -> Comparison:
+    """S = `value` beside the `datum`, whose half-width is U_D; the other `parts` of U_val by what U is an index of, as num=0.1 for
+    U_num."""
+    error, every = value - datum.value, {**parts, "D": datum.half}
+    joint = math.hypot(*every.values())
+    listed = ", ".join(f"U_{name} = {part:.2g}" for name, part in every.items())
+    return Comparison(error, joint, f"E = {error:.3g} {'exceeds' if abs(error) > joint else 'is within'} U_val = {joint:.2g}; {listed}")
 
 
 def fitted_exponent(x: Array, y: Array) -> float:

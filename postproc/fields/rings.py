@@ -14,9 +14,9 @@ the momentum that flows through the faces of a ring is balanced by its weight an
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,6 +160,11 @@ class Fields:
     def __add__(self, other: Fields) -> Fields:
         return Fields(**{one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)})
 
+    def padded(self, more: tuple[tuple[int, int], tuple[int, int]]) -> Fields:
+        """The same with empty rings and layers before and after, `more` as in numpy.pad."""
+        sums: dict[str, Any] = {one.name: np.pad(getattr(self, one.name), more) for one in fields(self) if one.name != "frames"}
+        return replace(self, **sums)
+
     def mean(self, name: str, rings: Rings) -> Array:
         """Mean over frames and volume of the rings (k, l): kg/m3, 1, N/m3 or Pa."""
         return np.asarray(getattr(self, name) / (self.frames * rings.volumes))
@@ -231,11 +236,17 @@ def coarse_grain(
 
 def _points(first: Array, branch: Array, forces: Array, width: float) -> tuple[Array, Array]:
     """Places (m, 3) of Gauss's rule on all lines, and there the lines' -f l (m, 3, 3) in J by the weights of the rule."""
-    longest = float(np.sqrt((branch**2).sum(axis=1).max(initial=0.0)))
-    node, weight = np.polynomial.legendre.leggauss(max(_POINTS, round(_POINTS * longest / width)))
-    places = first[:, None, :] + 0.5 * (node + 1.0)[:, None] * branch[:, None, :]
-    lines = -forces[:, :, None] * branch[:, None, :]
-    return places.reshape(-1, 3), (0.5 * weight[:, None, None] * lines[:, None]).reshape(-1, 3, 3)
+    # Each line as finely as its own length asks for: one long line must not make many points of all.
+    counts = np.maximum(_POINTS, np.rint(_POINTS * np.sqrt((branch**2).sum(axis=1)) / width).astype(int))
+    places, tensors = [np.empty((0, 3))], [np.empty((0, 3, 3))]
+    for count in np.unique(counts):
+        here = counts == count
+        node, weight = np.polynomial.legendre.leggauss(count)
+        along = first[here, None, :] + 0.5 * (node + 1.0)[:, None] * branch[here, None, :]
+        lines = -forces[here, :, None] * branch[here, None, :]
+        places.append(along.reshape(-1, 3))
+        tensors.append((0.5 * weight[:, None, None] * lines[:, None]).reshape(-1, 3, 3))
+    return np.concatenate(places), np.concatenate(tensors)
 
 
 def _turned(tensor: Array, place: Array) -> Array:

@@ -265,7 +265,7 @@ def _grid(frames: Sequence[GrainFrame], words: Words, diameter: float, margin: f
     elif words.cells:
         size = float(cell_grid(frames[0]).spacing.max())
     around = [Grid.around(frame, size, margin) for frame in frames if len(frame.radii)]
-    low, high = np.min([one.low for one in around], axis=0), np.max([one.high for one in around], axis=0)
+    low, high = np.array([one.low for one in around]).min(axis=0), np.array([one.high for one in around]).max(axis=0)
     periodic = around[0].periodic
     if words.box is not None:
         parts = words.box.split(",")

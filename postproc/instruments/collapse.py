@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from dembark.postproc import DumpError, GrainFrame
+from dembark.postproc.instruments import momentum
 from dembark.postproc.instruments.heaps import height, surface
 from dembark.postproc.measurement import Array, Replica, profile
 
@@ -53,10 +54,7 @@ class Collapse:
 
         What the account found besides, `other` and `imposed`, counts as unexplained: this case has neither.
         """
-        rows = self.rows
-        works = rows["gravity"] + rows["walls"] + sum(rows[name] for name in PARTS)
-        left = np.maximum(np.abs(rows["kinetic_energy"] - rows["first_kinetic"] - works), np.abs(rows["balance"]))
-        return float((left / rows["scale"]).max())
+        return momentum.imbalance(self.rows, PARTS)
 
     def potential_error(self, column: str = "potential_energy") -> float:
         """Largest difference between gravity's work since the first row and the potential energy lost, over the largest such work."""

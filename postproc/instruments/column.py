@@ -198,7 +198,11 @@ def read(replica: Replica) -> Column:
     height, mass = float(np.mean([row[1] for row in outlines])), float(outlines[-1][2])
     edges = np.linspace(0.0, height, max(4, round(height / diameter)) + 1)
     sectors, bridges = silo.sectors(diameter), wall_bridges(values)
-    rows = [_frame_rows(grains, contacts, silo, gravity, edges, sectors, bridges) for grains, contacts in replica.paired_frames()]
+
+    def of_frame(grains: GrainFrame, contacts: ContactFrame) -> dict[str, Any]:
+        return _frame_rows(grains, contacts, silo, gravity, edges, sectors, bridges)
+
+    rows = [row for _, row in replica.mapped(of_frame)]
     times = replica.times()
     lift = np.sum([times[f"{name}_fz"] for name in (*silo.names, "base")], axis=0)[times["step"] >= outlines[0][0]]
     friction, error = float(replica.derived["wall_kinetic"]), block_mean(lift / (mass * gravity) - 1.0)

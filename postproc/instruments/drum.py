@@ -13,7 +13,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dembark.postproc import DumpError
 from dembark.postproc.labelled import labelled, variable, with_interval
@@ -82,9 +82,9 @@ class Drum:
         """W, of the energies `rows` over each of `pieces` parts of a revolution."""
         return self.pieces(rows, pieces * self.revolutions) / (self.period / pieces)
 
-    def per_log(self, number: Array) -> Array:
+    def per_log(self, number: ArrayLike) -> Array:
         """A `number` of impacts per log and revolution."""
-        return np.asarray(number / (self.logs * self.revolutions))
+        return np.asarray(number, np.float64) / (self.logs * self.revolutions)
 
     def exceeding(self, forces: Array) -> Array:
         """Impacts per log and revolution whose peak is above each of `forces` (N); NaN where there is none."""

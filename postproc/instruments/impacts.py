@@ -98,7 +98,7 @@ class Solutions:
 
     def bound(self, name: str, due: Array) -> Array:
         """What is allowed beside `due` (n,): twice what the scheme loses at this step, the worst of four phases of the touch within it."""
-        return 2.0 * np.max([np.abs(each[name] - due) for each in self.scheme], axis=0)
+        return np.asarray(2.0 * np.max([np.abs(each[name] - due) for each in self.scheme], axis=0), np.float64)
 
 
 def materials(count: int) -> dict[str, slice]:

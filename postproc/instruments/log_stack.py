@@ -160,5 +160,6 @@ def curves(run: LogRun, stack: Loads) -> list[Curve]:
         over_time("active", "Contacts that carry, per log", "contacts / log", times, stack.contacts / len(run.masses), least,
                   label="least number at rest", seconds=True),
         over_time("impacts", "Impacts begun", "number", times[1:], run.history["impacts"], seconds=True),
-        profile("peaks", "Impacts by peak force", "log₁₀ peak force (N)", "impacts", 0.5 * (edges[1:] + edges[:-1]), [1.0 * counts]),
+        profile("peaks", "Impacts by peak force", "log₁₀ peak force (N)", "impacts", 0.5 * (edges[1:] + edges[:-1]),
+                [counts.astype(np.float64)]),
     ]

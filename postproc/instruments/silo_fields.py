@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from operator import add
 from typing import Any
 
 import numpy as np
 
-from dembark.postproc.fields.rings import Fields, Rings, coarse_grain
-from dembark.postproc.instruments import janssen
+from dembark.postproc import ContactFrame, GrainFrame
+from dembark.postproc.fields.rings import Fields, Rings, Zones, coarse_grain
+from dembark.postproc.instruments import column, janssen
 from dembark.postproc.instruments.vessel import Cylinder, overlap
 from dembark.postproc.labelled import labelled, variable, with_interval
 from dembark.postproc.measurement import Array, Measurement, Replica, Value
+from dembark.postproc.replica import once
 from dembark.postproc.resampling import resampled
 from dembark.postproc.statistics import Estimate, TimeBlocks, block_mean, combined, over_replicas, time_blocks
 from dembark.postproc.studies import propagated
@@ -56,6 +60,12 @@ class Silo:
         rings = self.rings
         return np.asarray(self.column / (np.pi * rings.radius**2 * np.diff(rings.vertical) * rings.above))
 
+    def up_to(self, tallest: Rings) -> Silo:
+        """The same with empty layers above, as many as `tallest` has more."""
+        more = ((0, 0), (0, len(tallest.heights) - len(self.rings.heights)))
+        return replace(self, rings=tallest, fields=self.fields.padded(more), column=np.pad(self.column, more),
+                       wall=np.pad(self.wall, more[::-1], constant_values=np.nan))
+
     def k(self, zone: int, rings: Any) -> Estimate:
         """sigma_rr over sigma_zz in a zone, for the chosen `rings`."""
         sectors = np.arange(self.zones.shape[2])
@@ -67,40 +77,52 @@ class Silo:
         return resampled(ratio, self.blocks, sectors, overlap(len(sectors)))
 
 
-def read(replica: Replica, rings: Rings, height: float) -> Silo:
-    """Measure one run folder; `height` (m) of the filling."""
-    given, radius = replica.parameters, rings.radius
-    vessel, side, base, diameter = Cylinder(radius), CylinderWall("side", radius), PlaneWall("base"), float(given["grain_diameter"])
+@once
+def read(replica: Replica) -> Silo:
+    """Measure one run folder; zones are shares of its own filling height."""
+    given, height = replica.parameters, column.read(replica).height
+    radius, diameter = float(given["cylinder_radius"]), float(given["grain_diameter"])
+    # The same layers for all replicas, as many as this one needs.
+    cells = Rings.around(radius, math.ceil(2.0 * height / diameter) * 0.5 * diameter, diameter, 0.5 * diameter)
+    vessel, side, base = Cylinder(radius), CylinderWall("side", radius), PlaneWall("base")
     sectors = min(_MOST_SECTORS, vessel.sectors(diameter))
     zones = [(diameter, 0.5 * height), *((low * height, high * height) for low, high in BANDS)]
-    low, high = rings.vertical[:-1, None], rings.vertical[1:, None]
+    low, high = cells.vertical[:-1, None], cells.vertical[1:, None]
     # Part of each layer that lies in each zone.
     layers = np.clip(np.minimum(high, [top for _, top in zones]) - np.maximum(low, [foot for foot, _ in zones]), 0.0, None) / (high - low)
-    inside = np.nonzero((rings.heights > 0.0) & (rings.heights < height))[0]
-    recorder = WallRecorder(side, cylinder_patches(side, 1, rings.vertical[inside[0] : inside[-1] + 2]), keep_series=False)
-    total, rows = [], []
-    for grains, contacts in replica.paired_frames():
+    inside = np.nonzero((cells.heights > 0.0) & (cells.heights < height))[0]
+    recorder = WallRecorder(side, cylinder_patches(side, 1, cells.vertical[inside[0] : inside[-1] + 2]), keep_series=False)
+
+    def of_frame(grains: GrainFrame, contacts: ContactFrame) -> tuple[Fields, Zones]:
         walls = [wall_contacts(grains, side), wall_contacts(grains, base)]
-        found, zone = coarse_grain(grains, contacts, walls, rings, layers, lambda place: vessel.wall_shares(place, sectors))
-        recorder.add(grains)
-        total.append(found)
-        rows.append((zone.stress, zone.column, grains.wall_forces["side"][:, 2].sum(), grains.step, grains.masses.sum()))
-    stresses, column, lift, steps, masses = (np.array(part) for part in zip(*rows, strict=True))
+        return coarse_grain(grains, contacts, walls, cells, layers, lambda place: vessel.wall_shares(place, sectors))
+
+    total, rows = [], []
+    with _one_thread():
+        for grains, (found, zone) in replica.mapped(of_frame):
+            recorder.add(grains)
+            total.append(found)
+            rows.append((zone.stress, zone.column, grains.wall_forces["side"][:, 2].sum(), grains.step, grains.masses.sum()))
+    stresses, section, lift, steps, masses = (np.array(part) for part in zip(*rows, strict=True))
     times, weight = replica.times(), float(masses[-1]) * float(given["gravity"])
-    wall = np.full((len(rings.heights), 2), np.nan)
+    wall = np.full((len(cells.heights), 2), np.nan)
     wall[inside] = recorder.result().mean[:, :2]
     error = block_mean((lift - np.interp(steps, times["step"], times["side_fz"])) / weight)
-    return Silo(rings, reduce(add, total), stresses, column, wall, error, weight)
+    return Silo(cells, reduce(add, total), stresses, section, wall, error, weight)
 
 
-def _all(replicas: Sequence[Replica], rings: Rings, height: float) -> list[Silo]:
-    """`read` of all replicas, as many at a time as this process has cores: most of it is done in arrays, which leave the interpreter to
-    others."""
+def _one_thread() -> AbstractContextManager[Any]:
+    """Products of tall thin matrices gain nothing from more threads, which wait for each other on a busy machine."""
     from threadpoolctl import threadpool_limits  # slow to import
 
-    # Products of tall thin matrices gain nothing from more threads.
-    with threadpool_limits(1, "blas"), ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        return list(pool.map(lambda replica: read(replica, rings, height), replicas))
+    return threadpool_limits(1, "blas")
+
+
+def _all(replicas: Sequence[Replica]) -> list[Silo]:
+    """`read` of all replicas, as many at a time as this process has cores: most of it is done in arrays, which leave the interpreter to
+    others."""
+    with _one_thread(), ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        return list(pool.map(read, replicas))
 
 
 class _Janssen:
@@ -137,14 +159,15 @@ def measured(replicas: Sequence[Replica], known: Mapping[str, Value]) -> Measure
     given = replicas[0].parameters
     radius, diameter, gravity = (float(given[name]) for name in ("cylinder_radius", "grain_diameter", "gravity"))
     height = known["filling_height"].estimate.value * radius
-    rings = Rings.around(radius, height, diameter, 0.5 * diameter)
-    silos = _all(replicas, rings, height)
+    found = _all(replicas)
+    cells = max((one.rings for one in found), key=lambda one: len(one.heights))
+    silos = [one.up_to(cells) for one in found]
     specific = float(np.mean([one.weight for one in silos])) / (np.pi * radius**2 * height)
     law, zero = _Janssen(known, radius, height, specific), Estimate(0.0, 0.0)
-    near = {"axis": rings.radii < 0.5 * radius, "wall": (rings.radii > radius - diameter) & (rings.radii < radius)}
+    near = {"axis": cells.radii < 0.5 * radius, "wall": (cells.radii > radius - diameter) & (cells.radii < radius)}
 
     def worst(one: Silo, accelerated: bool) -> Estimate:
-        rest = one.fields.unbalanced(rings, gravity) - (one.fields.mean("net", rings) if accelerated else 0.0)
+        rest = one.fields.unbalanced(cells, gravity) - (one.fields.mean("net", cells) if accelerated else 0.0)
         return Estimate(float(np.abs(rest).max()) / specific, 0.0, "every ring of the mean over all frames")
 
     values = {
@@ -160,33 +183,34 @@ def measured(replicas: Sequence[Replica], known: Mapping[str, Value]) -> Measure
 
 
 def _dataset(silos: Sequence[Silo], law: _Janssen, diameter: float, gravity: float) -> Any:
-    rings, (both, high), fields = silos[0].rings, (("radius", "height"), ("height",)), reduce(add, (one.fields for one in silos))
+    cells, (both, high), fields = silos[0].rings, (("radius", "height"), ("height",)), reduce(add, (one.fields for one in silos))
     stress = [over_replicas([block_mean(layer) for layer in layers]) for layers in zip(*(one.section.T for one in silos), strict=True)]
-    ratio = [[over_replicas([one.k(1 + band, slice(ring, ring + 1)) for one in silos]) for ring in range(len(rings.radii))]
+    ratio = [[over_replicas([one.k(1 + band, slice(ring, ring + 1)) for one in silos]) for ring in range(len(cells.radii))]
              for band in range(len(BANDS))]
     wall = np.mean([one.wall for one in silos], axis=0)
-    borders = {"radius": rings.radial, "height": rings.vertical}
-    variables = {f"stress_{part}": variable(both, fields.mean(part, rings), "Pa", f"{name}, compression positive")
+    borders = {"radius": cells.radial, "height": cells.vertical}
+    variables = {f"stress_{part}": variable(both, fields.mean(part, cells), "Pa", f"{name}, compression positive")
                  for part, name in _STRESSES.items()}
     variables |= {
-        "density": variable(both, fields.mean("mass", rings), "kg m-3", "bulk density"),
-        "solid_fraction": variable(both, fields.mean("volume", rings), "1", "volume of grains per volume"),
-        "coverage": variable(both, rings.coverage, "1", "part of the kernel that lies inside the vessel"),
-        "wall_force": variable(both, fields.mean("wall", rings), "N m-3", "upward force density of walls on grains"),
-        "unbalanced": variable(both, fields.unbalanced(rings, gravity), "N m-3",
+        "density": variable(both, fields.mean("mass", cells), "kg m-3", "bulk density"),
+        "solid_fraction": variable(both, fields.mean("volume", cells), "1", "volume of grains per volume"),
+        "coverage": variable(both, cells.coverage, "1", "part of the kernel that lies inside the vessel"),
+        "wall_force": variable(both, fields.mean("wall", cells), "N m-3", "upward force density of walls on grains"),
+        "unbalanced": variable(both, fields.unbalanced(cells, gravity), "N m-3",
                                "walls less weight less divergence of the vertical stresses"),
-        "net_force": variable(both, fields.mean("net", rings), "N m-3", "upward force density that accelerates grains"),
+        "net_force": variable(both, fields.mean("net", cells), "N m-3", "upward force density that accelerates grains"),
         **with_interval("stress_zz_section", high, stress, "Pa", "vertical stress, mean over the cross-section"),
-        "janssen": variable(high, law(rings.heights), "Pa", "vertical stress by Janssen's law with K and friction of the same column"),
+        "janssen": variable(high, law(cells.heights), "Pa", "vertical stress by Janssen's law with K and friction of the same column"),
         "wall_normal": variable(high, wall[:, 0], "Pa", "normal stress of the wall"),
         "wall_shear": variable(high, wall[:, 1], "Pa", "upward shear stress of the wall"),
         **with_interval("k_profile", ("band", "radius"), ratio, "1", "sigma_rr over sigma_zz"),
-        "band_bounds": variable(("band", "bounds"), np.array(BANDS) * law.height, "m", "heights between which k_profile is averaged"),
+        "band_bounds": variable(("band", "bounds"), np.array(BANDS) * law.height, "m",
+                                "heights between which k_profile is averaged, mean over packings"),
         **{f"{name}_bounds": variable((name, "bounds"), np.stack([edges[:-1], edges[1:]], axis=1), "m",
                                       f"borders of the {'rings' if name == 'radius' else 'layers'}") for name, edges in borders.items()},
     }
-    coordinates = {"radius": variable(["radius"], rings.radii, "m", "distance from the axis"),
-                   "height": variable(high, rings.heights, "m", "height above the base")}
-    return labelled(variables, coordinates, kind="silo", kernel="gaussian", width=rings.width, averaged="around the axis and over frames",
-                    frames=fields.frames, replicas=len(silos), vessel_radius=rings.radius, filling_height=law.height,
+    coordinates = {"radius": variable(["radius"], cells.radii, "m", "distance from the axis"),
+                   "height": variable(high, cells.heights, "m", "height above the base")}
+    return labelled(variables, coordinates, kind="silo", kernel="gaussian", width=cells.width, averaged="around the axis and over frames",
+                    frames=fields.frames, replicas=len(silos), vessel_radius=cells.radius, filling_height=law.height,
                     grain_diameter=diameter)

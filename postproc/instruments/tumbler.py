@@ -123,7 +123,7 @@ def layer_slope(place: Array, speed: Array, turn: float, surface: float) -> Esti
     if inside.sum() < 4:
         return Estimate(float("nan"), float("inf"), "fewer than four places in the layer")
     (slope, _), covariance = np.polyfit(place[inside], speed[inside], 1, cov=True)
-    return Estimate(float(slope), student(inside.sum() - 2) * float(np.sqrt(covariance[0, 0])), "scatter about a line")
+    return Estimate(float(slope), student(float(inside.sum()) - 2.0) * float(np.sqrt(covariance[0, 0])), "scatter about a line")
 
 
 def surface_line(plane: Array, cell: float, radius: float, diameter: float) -> float:

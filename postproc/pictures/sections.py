@@ -1,4 +1,4 @@
-"""Logs in cross-section: the last frame as a figure, and all frames as an animation beside the report."""
+"""Logs and layers of grains in cross-section: the last frame as a figure, and frames as an animation beside the report."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ from PIL import Image, ImageDraw
 from dembark.common.files import read_json
 from dembark.postproc import GrainFrame, GrainsDump
 from dembark.postproc.dumptext import TextDump
+from dembark.postproc.history import read_times
 from dembark.postproc.pictures import saved
 from dembark.postproc.pictures.packings import HEIGHT
 from dembark.postproc.style import STYLE
+from dembark.postproc.walls.mesh import cut, read_stl
 
 _MAP = "cividis"
-_PIXELS = 300
 _OVERSAMPLING = 3
 _SHELL = "#4a4f57"
 _CHAIN = "#d55e00"
@@ -34,11 +35,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Section:
-    """Frames of logs in a plane, in m and s: `places` (frames, n, 2), `radii` (n,), `speeds` (frames, n) over `rim_speed`, `times`
-    (frames,).
+    """Frames of logs or grains in a plane, in m and s: `places` (frames, n, 2), `radii` (n,), `speeds` (frames, n) over `rim_speed`,
+    `times` (frames,).
 
     `links` (m, 2, 2) are contacts of the last frame with `forces` (m,) in N. `drum_radius` 0: there is no drum. The drum turns by
-    `drum_speed` (rad/s) about the axis across the plane, clockwise when positive.
+    `drum_speed` (rad/s) about the axis across the plane, clockwise when positive. `walls` (frames, k, 2, 2): lines in which meshes meet the
+    plane. The longer side of an animation has so many `pixels`.
     """
 
     places: Array
@@ -50,6 +52,8 @@ class Section:
     label: str
     links: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
     forces: Array = field(default_factory=lambda: np.zeros(0))
+    walls: Array = field(default_factory=lambda: np.zeros((0, 0, 2, 2)))
+    pixels: int = 300
 
     @property
     def view(self) -> tuple[float, float, float, float]:
@@ -70,25 +74,45 @@ class Section:
 
 
 def scene(folder: Path, cross_section: str, drum_radius: float = 0.0, drum_speed: float = 0.0, speed: float = 0.0, frames: int = 0,
-          chains: bool = False) -> Section:
+          chains: bool = False, last: int = 0, pixels: int = 300) -> Section:
     """The frames of the run in `folder`, seen along the axis that `cross_section` ("xz" or "xy") leaves out.
 
     Speeds are over `speed` (m/s), or else over that of the drum's rim. `frames` > 1: only so many of them, evenly spaced, the last
-    included. `chains`: the contact forces of the last one, from contacts.dump. DumpError when a file cannot be read.
+    included; or the `last` ones alone, which show a vibration. `chains`: the contact forces of the last one, from contacts.dump. `pixels`
+    of the longer side of an animation. Meshes that move without turning are drawn where they are. DumpError when a file cannot be read.
     """
     axes = ["xyz".index(letter) for letter in cross_section]
     dump = GrainsDump(folder / "grains.dump")
-    shown = np.unique(np.linspace(0, len(dump) - 1, frames if 1 < frames < len(dump) else len(dump)).round().astype(int))
+    first = max(0, len(dump) - last) if last else 0
+    count = len(dump) - first
+    shown = np.unique(np.linspace(first, len(dump) - 1, frames if 1 < frames < count else count).round().astype(int))
     frames_shown = [dump[int(number)] for number in shown]
     record = read_json(folder / "run.json") or {}
     scale = speed or abs(drum_speed) * drum_radius or 1.0
     label = "speed / speed of the rim" if not speed and drum_radius else "speed / (m/s)" if scale == 1.0 else f"speed / ({scale:g} m/s)"
     links, forces = _chains(folder, frames_shown[-1], axes) if chains else (np.zeros((0, 2, 2)), np.zeros(0))
     return Section(
-        np.array([frame.positions[:, axes] for frame in frames_shown]), frames_shown[0].radii,
+        np.array([frame.wrapped[:, axes] for frame in frames_shown]), frames_shown[0].radii,
         np.array([np.linalg.norm(frame.velocities, axis=1) / scale for frame in frames_shown]),
         np.array([frame.step for frame in frames_shown]) * float(record.get("time_step", 1.0)), drum_radius, drum_speed, label, links,
-        forces)
+        forces, _walls(folder, [frame.step for frame in frames_shown]) if axes == [0, 2] else np.zeros((0, 0, 2, 2)), pixels)
+
+
+def _walls(folder: Path, steps: list[int]) -> Array:
+    """Lines (frames, k, 2, 2) in m of x and z in which the meshes of a run meet the plane in the middle of them, at these `steps`, by the
+    columns motion_x, motion_z of its history, or at rest without them; none where they turn."""
+    none = np.zeros((0, 0, 2, 2))
+    meshes = sorted(folder.glob("*.stl"))
+    if not meshes or not (folder / "time.csv").is_file():
+        return none
+    rows = read_times(folder / "time.csv")
+    moves = "motion_x" in rows
+    if moves and np.abs(rows["motion_angle"]).max() > 0.0:
+        return none
+    triangles = np.concatenate([np.asarray(read_stl(path).triangles) for path in meshes])
+    lines = cut(triangles, 0.5 * float(triangles[..., 1].min() + triangles[..., 1].max()))
+    way = np.column_stack([np.interp(steps, rows["step"], rows[f"motion_{axis}"] if moves else 0.0 * rows["step"]) for axis in "xz"])
+    return np.asarray(lines[None] + way[:, None, None, :])
 
 
 def _chains(folder: Path, frame: GrainFrame, axes: list[int]) -> tuple[Array, Array]:
@@ -119,6 +143,8 @@ def draw(axes: Axes, section: Section, top: float) -> None:
     if section.drum_radius > 0.0:
         axes.add_patch(Circle((0.0, 0.0), section.drum_radius, fill=False, edgecolor=_SHELL, linewidth=1.6))
         _arrow(axes, section)
+    if len(section.walls):
+        axes.add_collection(LineCollection(list(section.walls[-1]), colors=_SHELL, linewidths=1.2))
     size = 2.0 * section.radii
     axes.add_collection(EllipseCollection(
         size, size, np.zeros_like(size), units="x", offsets=section.places[-1], offset_transform=axes.transData, array=section.speeds[-1],
@@ -148,7 +174,7 @@ def _arrow(axes: Axes, section: Section) -> None:
 def animate(section: Section, path: Path, *, duration: int = 60) -> Path:
     """All frames as a GIF at `path`, each for `duration` ms; marks on the shell turn with the drum. Returns `path`."""
     left, right, bottom, upper = section.view
-    scale = _OVERSAMPLING * _PIXELS / max(right - left, upper - bottom)
+    scale = _OVERSAMPLING * section.pixels / max(right - left, upper - bottom)
     width, height = round((right - left) * scale), round((upper - bottom) * scale)
     paint = matplotlib.colormaps[_MAP]
     top = limit(section)
@@ -157,7 +183,7 @@ def animate(section: Section, path: Path, *, duration: int = 60) -> Path:
         return (place[0] - left) * scale, (upper - place[1]) * scale
 
     images = []
-    for places, speeds, time in zip(section.places, section.speeds, section.times, strict=True):
+    for number, (places, speeds, time) in enumerate(zip(section.places, section.speeds, section.times, strict=True)):
         image = Image.new("RGB", (width, height), "white")
         draw = ImageDraw.Draw(image)
         if section.drum_radius > 0.0:
@@ -168,6 +194,8 @@ def animate(section: Section, path: Path, *, duration: int = 60) -> Path:
                 angle = 2.0 * math.pi * mark / 12.0 - section.drum_speed * time
                 way = np.array([math.cos(angle), math.sin(angle)])
                 draw.line([at(section.drum_radius * way), at(1.035 * section.drum_radius * way)], fill=_SHELL, width=2 * _OVERSAMPLING)
+        for start, end in section.walls[number] if len(section.walls) else ():
+            draw.line([at(start), at(end)], fill=_SHELL, width=_OVERSAMPLING)
         for place, size, speed in zip(places, section.radii * scale, speeds, strict=True):
             x, y = at(place)
             colour = tuple(int(255 * part) for part in paint(min(1.0, speed / top))[:3])

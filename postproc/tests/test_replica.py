@@ -30,3 +30,23 @@ def test_bodies_are_counted_from_one_in_every_engine(tmp_path):
     (tmp_path / "impacts.txt").write_text("# a\n0 3 0\n")
     with pytest.raises(DumpError, match="11 numbers"):
         Replica(tmp_path, {}).impacts()
+
+
+def test_frames_are_mapped_in_order_and_few_at_a_time(monkeypatch, tmp_path):
+    ahead = []
+
+    def frames(_):
+        for number in range(200):
+            ahead.append(number)
+            yield number, -number
+
+    monkeypatch.setattr(Replica, "paired_frames", frames)
+    mapped = Replica(tmp_path, {}).mapped(lambda grains, contacts: grains - contacts)
+    assert next(mapped) == (0, 0) and len(ahead) < 200
+    assert list(mapped) == [(number, 2 * number) for number in range(1, 200)]
+
+
+def test_what_fails_in_a_frame_is_raised(monkeypatch, tmp_path):
+    monkeypatch.setattr(Replica, "paired_frames", lambda _: iter([(1, 1), (2, 0), (3, 1)]))
+    with pytest.raises(ZeroDivisionError):
+        list(Replica(tmp_path, {}).mapped(lambda grains, contacts: grains / contacts))

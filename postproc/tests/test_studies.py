@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from dembark.postproc.studies import fitted_exponent, measured, propagated
+from dembark.postproc.statistics import Estimate
+from dembark.postproc.studies import compared, fitted_exponent, measured, propagated
 
 
 def point(value, interval):
@@ -27,3 +28,11 @@ def test_propagated_is_exact_for_a_sum():
 def test_fitted_exponent():
     x = np.array([1.0, 2.0, 5.0])
     assert fitted_exponent(x, 3.0 * x**-1.5) == pytest.approx(-1.5)
+
+
+def test_compared_tells_error_and_every_part():
+    error = compared(3.0, Estimate(1.0, 0.3), num=0.4, input=1.2)
+    assert (error.error, error.uncertainty, error.seen) == (2.0, pytest.approx(1.3), True)
+    assert error.text == "E = 2 exceeds U_val = 1.3; U_num = 0.4, U_input = 1.2, U_D = 0.3"
+    near = compared(0.0, Estimate(1.0, 1.0), sim=math.inf)
+    assert not near.seen and near.text.startswith("E = -1 is within U_val = inf")

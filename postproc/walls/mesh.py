@@ -74,6 +74,18 @@ def _text(path: Path, data: bytes) -> Surface:
     return Surface(np.concatenate(triangles), np.concatenate(solids), tuple(names))
 
 
+def cut(triangles: Array, place: float = 0.0) -> Array:
+    """Segments (k, 2, 2), of x and z, in which `triangles` (n, 3, 3) meet the plane y = `place`; those that only touch it count not."""
+    found = []
+    for corners in triangles - np.array([0.0, place, 0.0]):
+        above = corners[:, 1] > 0.0
+        if above.all() or not above.any():
+            continue
+        found.append([(a + a[1] / (a[1] - b[1]) * (b - a))[[0, 2]] for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)
+                      if (a[1] > 0.0) != (b[1] > 0.0)])
+    return np.array(found, float).reshape(-1, 2, 2)
+
+
 def _areas(triangles: Array) -> Array:
     area = 0.5 * np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
     longest = np.max(np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2), axis=1, initial=0.0)

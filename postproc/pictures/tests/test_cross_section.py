@@ -68,3 +68,19 @@ def test_animation(folder, tmp_path):
         assert (pixel(0.0, 0.0) < 255).any()
         image.seek(3)
         assert (pixel(0.3, 0.0) < 255).any() and (pixel(0.0, 0.0) == 255).all()
+
+
+def test_moving_meshes_are_drawn_where_they_are(folder, tmp_path):
+    """A strip that stands at x = 0.9 and moves by 0.1 m from frame to frame; the last two frames alone."""
+    corners = [[(0.9, -1, -0.5), (0.9, 1, -0.5), (0.9, 1, 0.5)], [(0.9, -1, -0.5), (0.9, 1, 0.5), (0.9, -1, 0.5)]]
+    facets = "".join("facet normal 1 0 0\nouter loop\n" + "".join("vertex {} {} {}\n".format(*one) for one in three) + "endloop\nendfacet\n"
+                     for three in corners)
+    (folder / "side.stl").write_text(f"solid side\n{facets}endsolid side\n")
+    rows = "".join(f"{100 * k},{0.1 * k},0,{0.1 * k},0,0,0\n" for k in range(4))
+    (folder / "time.csv").write_text("step,time,kinetic_energy,motion_x,motion_y,motion_z,motion_angle\n" + rows)
+    one = cross_section.scene(folder, "xz", speed=1.0, last=2, pixels=200)
+    assert one.times.tolist() == pytest.approx([0.2, 0.3])
+    np.testing.assert_allclose(one.walls[..., 0], [[[1.1, 1.1]] * 2, [[1.2, 1.2]] * 2])
+    assert sorted({round(z, 9) for z in one.walls[0, ..., 1].ravel()}) == [-0.5, 0.0, 0.5]
+    with Image.open(cross_section.animate(one, tmp_path / "side.gif")) as image:
+        assert image.n_frames == 2 and max(image.size) == 200

@@ -1,0 +1,90 @@
+"""A layer on a plate that shakes up and down, as a run wrote it: the waves on its surface at each level of the acceleration."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dembark.postproc import DumpError
+from dembark.postproc.instruments.phases import PHASES, acceleration, read_phases
+from dembark.postproc.instruments.standing_waves import Waves, amplitude, onset, surface_levels
+from dembark.postproc.measurement import Array, Estimate, Numbers, Replica, block_mean
+from dembark.postproc.replica import once
+
+# Power at f/2 over that of noise from which a level counts as one with waves.
+SEEN = 4.0
+
+
+@dataclass(frozen=True)
+class Level:
+    """A level of the drive: its acceleration `gamma` in g, and the period `start` of the motion with which its measuring window begins."""
+
+    gamma: float
+    start: int
+
+
+def levels(p: Numbers) -> list[Level]:
+    """The levels of a run with the parameters `p`: from motion_gamma to last_gamma, and back where there is a descent."""
+    first = acceleration(p)
+    rising = [first] if p["levels"] == 1 else list(np.linspace(first, p["last_gamma"], p["levels"]))
+    every = rising + (rising[-2::-1] if p["descent"] == "yes" else [])
+    length = p["level_ramp"] + p["run_in"] + p["periods"]
+    return [Level(float(one), math.ceil(p["motion_ramp"]) + p["run_in"] + k * length) for k, one in enumerate(every)]
+
+
+def unexplained(rows: Mapping[str, Array]) -> float:
+    """Largest energy in a row of time.csv that no known force gave, over the energy turned over so far."""
+    left = np.max([np.abs(rows[name]) for name in ("balance", "other", "imposed")], axis=0)
+    return float((left / rows["scale"]).max())
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One run: `levels` and the `waves` of each, `rows`: the columns of time.csv, `diameter` and `height` of the layer at rest in m."""
+
+    levels: Sequence[Level]
+    waves: Sequence[Waves]
+    rows: Mapping[str, Array]
+    diameter: float
+    height: float
+    rising: int
+
+    def onset(self, down: bool = False) -> Estimate:
+        """Acceleration (g) at which waves begin, of the levels up to the highest, or from it on."""
+        chosen = slice(self.rising - 1, None) if down else slice(0, self.rising)
+        drive = np.array([one.gamma for one in self.levels[chosen]])
+        power = [mean_power(one) for one in self.waves[chosen]]
+        seen = [one.value > (SEEN - 1.0) * float(waves.noise().sum()) for one, waves in zip(power, self.waves[chosen], strict=True)]
+        return onset(drive, np.array([one.value for one in power]), np.array([one.half for one in power]), np.array(seen))
+
+
+def mean_power(waves: Waves) -> Estimate:
+    """Power at f/2 above the noise with its interval over the windows."""
+    return block_mean(np.array([waves.subharmonic(slice(k, k + 1)) for k in range(len(waves.power))]))
+
+
+def wave_amplitude(waves: Waves) -> Estimate:
+    """Amplitude (d) of one standing wave of that power."""
+    power = mean_power(waves)
+    size = amplitude(power.value)
+    return Estimate(size, 2.0 * power.half / size if size > 0.0 else math.inf, power.basis)
+
+
+@once
+def read(replica: Replica) -> Layer:
+    """What was written; DumpError when frames of a level are missing."""
+    p, derived = replica.parameters, replica.derived
+    run = read_phases((frame.select(frame.types == 1) for frame in replica.grains()), derived["period_steps"], replica.time_step)
+    d, planned = p["grain_diameter"], levels(p)
+    surface = np.array([surface_levels(frame, p["layer_length"], p["layer_depth"], d) for frame in run.frames])
+    waves = []
+    for level in planned:
+        numbers = (derived["rest_periods"] + level.start) * PHASES + np.arange(p["periods"] * PHASES)
+        chosen = np.searchsorted(run.numbers, numbers)
+        if chosen[-1] >= len(surface) or (run.numbers[chosen] != numbers).any():
+            raise DumpError(f"{replica.folder}: grains.dump does not hold the {p['periods']} periods at the level of {level.gamma:g} g")
+        waves.append(Waves(surface[chosen], p["layer_length"], d))
+    return Layer(planned, waves, replica.times(), d, p["layer_height"] * d, p["levels"])

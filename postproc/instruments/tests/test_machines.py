@@ -1,0 +1,93 @@
+"""Beds in a vibrated trough with known motions: circulation, a part that rides in them, and the spectrum of the force on the walls."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dembark.postproc import GrainsDump
+from dembark.postproc.instruments.machines import Trough, circulation, drifts, spectra, spectrum
+from dembark.postproc.instruments.phases import PHASES, read_phases
+from dembark.postproc.tests.dumps import grains_text
+
+D, STEPS, STEP, PERIODS = 0.005, 800, 1e-4, 12
+PERIOD = STEPS * STEP
+
+
+def trough(folder: Path, *, turning: float = 0.5, noise: float = 0.0, part: bool = True, still: bool = False) -> Trough:
+    """A disc of grains that turns as a body about a centre which shakes; its last body is the part, `still` or carried along."""
+    random = np.random.default_rng(4)
+    side = np.arange(-8, 9) * D
+    x, z = (axis.ravel() for axis in np.meshgrid(side, side))
+    inside = np.hypot(x, z) < 8.0 * D
+    start = np.column_stack([x[inside], np.zeros(inside.sum()), z[inside]])
+    if part:
+        start = np.vstack([start, [3.3 * D, 0.0, 0.0]])
+    text, wander = [], np.zeros_like(start)
+    for k in range(PHASES * PERIODS + 1):
+        angle = turning * k / PHASES * PERIOD
+        turned = np.column_stack([start[:, 0] * np.cos(angle) + start[:, 2] * np.sin(angle), start[:, 1],
+                                  start[:, 2] * np.cos(angle) - start[:, 0] * np.sin(angle)])
+        wander += noise * random.standard_normal(wander.shape) * [1, 0, 1]
+        place = turned + wander + 0.002 * np.array([np.sin(2 * np.pi * k / PHASES), 0.0, np.cos(2 * np.pi * k / PHASES)])
+        if still:
+            place[-1] = start[-1]
+        text.append(grains_text(k * STEPS // PHASES, place, np.full(len(place), 0.5 * D)))
+    (folder / "grains.dump").write_text("".join(text))
+    run = read_phases(GrainsDump(folder / "grains.dump"), STEPS, STEP)
+    time = np.arange(PERIODS * 128 + 1) * PERIOD / 128
+    weight = 9.81 * float(run.frames[0].masses.sum())
+    rows: dict[str, Any] = {"time": time, "trough_work": 0.3 * weight * 0.25 * time, "trough_jx": 0.0 * time, "trough_jy": 0.0 * time}
+    rows["trough_jz"] = weight * (time + 0.5 * PERIOD / (2 * np.pi) * np.sin(2 * np.pi * time / PERIOD))
+    return Trough(run, len(start) - 1 if part else -1, rows, weight, 0.25, D)
+
+
+@pytest.mark.parametrize("turning", [0.5, -0.3, 0.0])
+def test_a_bed_that_turns_as_a_body(tmp_path: Path, turning: float) -> None:
+    one = trough(tmp_path, turning=turning)
+    # Of a chord and its radius to the middle: tan of half the angle.
+    expected = 2.0 * np.tan(0.5 * turning * PERIOD) / PERIOD
+    assert one.turning().value == pytest.approx(expected, abs=1e-4)
+    assert one.revolution().value == pytest.approx(turning, rel=0.01, abs=1e-4)
+    curve = drifts([one])
+    known = [(r * D, v) for r, v in zip(curve["place"], curve["value"], strict=True) if v is not None]
+    np.testing.assert_allclose([v for _, v in known], [turning * r for r, _ in known], atol=abs(turning) * 0.7 * D + 1e-6)
+
+
+def test_circulation_leaves_out_what_all_do_together() -> None:
+    random = np.random.default_rng(1)
+    places, masses = random.uniform(-1.0, 1.0, (50, 3)), random.uniform(1.0, 2.0, 50)
+    ways = 1e-4 * np.column_stack([places[:, 2], 0.0 * masses, -places[:, 0]])
+    assert circulation(places, ways, masses) == pytest.approx(1e-4, rel=1e-6)
+    assert circulation(places + np.array([5.0, 0.0, -3.0]), ways + np.array([0.01, 0.0, 0.02]), masses) == pytest.approx(1e-4, rel=1e-4)
+
+
+def test_a_part_like_a_grain_and_one_that_stays(tmp_path: Path) -> None:
+    assert abs(trough(tmp_path, noise=1e-4).likeness()) < 2.6
+    assert trough(tmp_path, noise=1e-4, still=True).likeness() < -2.6
+
+
+def test_stirring_grows_with_what_is_random(tmp_path: Path) -> None:
+    low, high = (trough(tmp_path, noise=noise).stirring().value for noise in (2e-5, 2e-4))
+    assert low < 0.5 * high
+
+
+def test_power_and_force_of_the_drive(tmp_path: Path) -> None:
+    one = trough(tmp_path)
+    assert one.power("trough").value == pytest.approx(0.3)
+    harmonics, power = one.spectrum("trough")
+    # F / (M g) = 1 + 0.5 cos(wt), averaged over a row of 1/128 period.
+    assert harmonics[np.argmax(power)] == pytest.approx(1.0) and power.max() == pytest.approx(0.125, rel=1e-3)
+    assert one.noise("trough") < 1e-6
+    curve = spectra([one], "trough")
+    assert curve["place"][0] == 0.0 and 10.0 ** curve["value"][0] == pytest.approx(np.sqrt(0.125), rel=1e-3)
+
+
+@pytest.mark.parametrize("count", [240, 241])
+def test_the_spectrum_sums_up_to_the_variance(count: int) -> None:
+    forces = np.random.default_rng(2).standard_normal((count, 3))
+    _, power = spectrum(forces, 10)
+    assert power.sum() == pytest.approx(forces.var(axis=0).sum())
