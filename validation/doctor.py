@@ -59,7 +59,7 @@ def examine() -> list[Finding]:
         Finding("Python", platform.python_version() if sys.version_info >= (3, 11) else None, advice="Python 3.11 or newer is needed"),
         Finding("Python packages", None if absent else ", ".join(f"{name} {version}" for name, version in packages.items()),
                 advice=f"{', '.join(absent)} missing: run 'make'"),
-        *(_asked(engines.facts(name).program, partial(_engine, name)) for name in engines.names()),
+        *(_asked(facts.program, partial(_engine, facts.name), not facts.optional) for facts in map(engines.facts, engines.names())),
         _asked("cases", _decks),
         Finding("mpirun", mpirun, False, "install openmpi-bin to use --ranks"),
         Finding("Slurm", shutil.which("sbatch"), False, "only a cluster has it; campaigns run here without it"),

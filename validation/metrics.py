@@ -98,9 +98,9 @@ def _remarks(case: Case, found: Measurement) -> tuple[str, ...]:
 
 def _write_fields(folder: Path, fields: xarray.Dataset) -> None:
     # Labelled arrays take a second to import, which commands that measure nothing need not wait for.
-    from dembark.postproc import labelled
+    from dembark.postproc import figures, labelled
 
-    labelled.write(folder / "fields.nc", fields)
+    labelled.write(folder / figures.FILE, fields)
 
 
 def study(planned: Study, folders: Sequence[Path]) -> Result:
@@ -120,10 +120,22 @@ def study(planned: Study, folders: Sequence[Path]) -> Result:
         provenance={"variants": list(planned.variants)}, measured=provenance.measured())
 
 
+def worst(found: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """The largest errors and the fewest steps of a contact among what the integration monitors of some runs found.
+
+    A run without contacts says 0 steps and does not count there.
+    """
+    errors = {name: max(one[name] for one in found if name in one) for name in ("position", "velocity", "spin")
+              if any(name in one for one in found)}
+    steps = [one["contact_steps"] for one in found if one.get("contact_steps")]
+    return errors | ({"contact_steps": min(steps)} if steps else {})
+
+
 def _provenance(runs: list[Replica]) -> dict[str, Any]:
-    """That of the first replica, with what concerns all: seeds, wall time, mean speed."""
+    """That of the first replica, with what concerns all: seeds, wall time, mean speed, the worst of the steps."""
     record, every = runs[0].record, [one.record.get("provenance", {}) for one in runs]
     wall, speed = ([float(facts[key]) for facts in every if facts.get(key)] for key in ("wall_time", "particle_steps_per_second"))
     return {**{key: value for key, value in every[0].items() if key != "seed"},
             "seeds": [one.record.get("seed") for one in runs], "replicas": len(runs), "wall_time": sum(wall) if wall else None,
+            "integration": worst([one.record.get("integration", {}) for one in runs]),
             "particle_steps_per_second": fmean(speed) if speed else None, "steps": record["steps"], "time_step": record["time_step"]}

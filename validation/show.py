@@ -121,6 +121,8 @@ def show_outcome(outcome: Outcome, what: str, advice: str) -> None:
     here = console()
     for line in outcome.unfinished:
         here.print(f"not finished: {line}", markup=False, style="red", soft_wrap=True)
+    for line in outcome.left_out:
+        here.print(f"left out: {line}", markup=False, soft_wrap=True)
     for line in outcome.problems:
         here.print(f"problem: {line}", markup=False, style="red", soft_wrap=True)
     print_tally(here, outcome.tally, f"{outcome.runs - len(outcome.unfinished)} of {outcome.runs} runs finished; ")

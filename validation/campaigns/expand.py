@@ -17,7 +17,7 @@ from dembark.validation import engines
 from dembark.validation.campaigns.spec import CampaignSpec, SweepSpec, read
 from dembark.validation.case.model import checked
 from dembark.validation.case.resolve import merged, resolve
-from dembark.validation.runs.plan import Plan, Resources, Series, of_profile, series
+from dembark.validation.runs.plan import Plan, Resources, Series, left_out, of_profile, series
 
 LONGEST_NAME = 100
 MOST_RUNS = 20000
@@ -174,5 +174,6 @@ def plan(profile: str | None = None, file: Path | None = None, cases: Sequence[s
         return campaign(read(file), cases, engines)
     if profile is None or file is not None:
         raise DembarkError("neither a profile nor a campaign is given, or both", "", "give --profile or --campaign")
-    return Plan(profile, tuple(of_profile(profile, cases, engines)), {"profile": profile}, ("--profile", profile),
-                whole=not (cases or engines))
+    runs, gone = tuple(of_profile(profile, cases, engines)), left_out(profile, cases, engines)
+    return Plan(profile, runs, {"profile": profile} | ({"left_out": gone} if gone else {}),
+                ("--profile", profile), whole=not (cases or engines or gone))

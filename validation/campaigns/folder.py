@@ -87,7 +87,8 @@ def options(folder: Path) -> Options:
 
 def _variables() -> list[str]:
     """What else says which engines and cases are meant; `resume` takes it over where the shell says nothing."""
-    return [*(variable for name in engines.names() for variable in engines.facts(name).variables), "DEMBARK_DECKS", "DEMBARK_MPIRUN"]
+    return [*(variable for name in engines.names() for variable in engines.facts(name).variables), "DEMBARK_DECKS",
+            *dict.fromkeys(engines.facts(name).launcher for name in engines.names())]
 
 
 def restore(folder: Path) -> None:

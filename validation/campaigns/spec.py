@@ -15,6 +15,7 @@ from dembark.validation import engines
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.folders import discover, files, find
 from dembark.validation.case.model import Case
+from dembark.validation.case.resolve import merged
 from dembark.validation.case.tables import ORDER, TableReader, Types, load_toml
 from dembark.validation.runs.plan import RETRIES, Resources
 
@@ -194,9 +195,13 @@ class _Reader(TableReader):
         if rows == [{}] and not variants:
             raise self.fail(table, "nothing varies", "give grid, list or variants")
         variants = variants or (next(iter(case.variants)),)
-        # Its own engines, else those of the campaign that the case has, else all of the case.
+        # Its own engines, else those of the campaign that the case has, else all of the case that can do all points; optional ones have to
+        # be named, so that a campaign is the same on every machine.
+        needed = [merged(case, profile, one, {**fixed, **row}) for one in variants for row in rows]
         chosen = (self.names(table, entry, "engines", case.engines, "engine")
-                  or tuple(name for name in case.engines if name in head.get("engines", case.engines)))
+                  or tuple(name for name in case.engines if (name in head["engines"] if "engines" in head else
+                                                             not engines.facts(name).optional
+                                                             and not any(case.lacks(name, values) for values in needed))))
         if not chosen:
             raise self.fail(table, f"case {case.name} runs in none of the campaign's engines", f"it runs in {', '.join(case.engines)}")
         return SweepSpec(

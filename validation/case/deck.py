@@ -79,6 +79,7 @@ def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
 
 def write(case: Case, engine: str, values: Mapping[str, Value], folder: Path) -> Setup:
     """Write everything that `engine` needs for a run with the parameters `values` into `folder`; returns what was derived."""
+    require_capable(case, engine, values)
     setup = prepare(case, values)
     for name, path in _companions(case).items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -97,6 +98,14 @@ def require_measure(case: Case) -> None:
     """DembarkError when `case` has no measure.py: its runs could not be measured. Nothing is imported."""
     if not (case.folder / "measure.py").is_file():
         raise DembarkError(f"case {case.name} has no measure.py", str(case.folder), "add one with measure(replicas), see docs/cases.md")
+
+
+def require_capable(case: Case, engine: str, values: Mapping[str, Value]) -> None:
+    """DembarkError when `engine` cannot do what a run of `case` with the parameters `values` needs."""
+    if lacking := case.lacks(engine, values):
+        others = [name for name in case.engines if not case.lacks(name, values)]
+        raise DembarkError(f"{engines.facts(engine).title} has no {' and no '.join(lacking)}",
+                           f"which these parameters of case {case.name} need", f"take {' or '.join(others)}" if others else "")
 
 
 def derived(setup: Setup) -> dict[str, Value]:

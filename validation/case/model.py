@@ -154,7 +154,8 @@ class Case:
     """A case folder: its parameters, profiles and variants (overrides of parameters by name), what a profile runs and what is measured.
 
     `derived`: numbers that follow from the parameters, by expressions; a setup.py beside the case file may add others, and the packing.
-    `controls`: wrong physics, in words, with the declared quantities whose checks it fails.
+    `controls`: wrong physics, in words, with the declared quantities whose checks it fails. `needs`: capabilities that an engine has to
+    have where a condition between the parameters holds.
     """
 
     name: str
@@ -176,6 +177,12 @@ class Case:
     controls: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     references: tuple[str, ...] = ()
     picture: Mapping[str, Value] = field(default_factory=dict)
+    needs: Mapping[str, Expression] = field(default_factory=dict)
+
+    def lacks(self, engine: str, values: Mapping[str, Value]) -> list[str]:
+        """What `engine` has not of what a run with the parameters `values` needs, in words."""
+        where = f"[needs] of case {self.name}"
+        return engines.facts(engine).lacks(name for name, condition in self.needs.items() if condition.evaluated(values, where=where))
 
     def deck(self, engine: str) -> Path:
         """Deck of `engine` in this folder."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -48,7 +49,7 @@ class CaseReader(TableReader):
     def case(self, data: Mapping[str, Any]) -> Case:
         """The whole case; `data` is the content of the file."""
         tables = {"case": dict, "parameters": dict, "profiles": dict, "variants": dict, "runs": dict, "constraints": dict, "studies": dict,
-                  "derived": dict, "quantities": dict, "controls": dict, "picture": dict}
+                  "derived": dict, "quantities": dict, "controls": dict, "picture": dict, "needs": dict}
         self.table(data, "top level", tables, ("case",))
         head = data["case"]
         keys = {"name": str, "title": str, "description": str, "source": list, "engines": list, "outputs": list, "particles": str,
@@ -71,16 +72,18 @@ class CaseReader(TableReader):
         entries = self.merged("parameters", data.get("parameters", {}), groups)
         parameters = {name: self.parameter(name, entry) for name, entry in entries.items()}
         constraints = {text: told for table in (*groups, data) for text, told in table.get("constraints", {}).items()}
+        needs = {self.pick(name, engines.CAPABILITIES, "capability", "needs"): self.expression("needs", text, parameters)
+                 for table in (*groups, data) for name, text in table.get("needs", {}).items()}
         derived = self.derived(data.get("derived", {}), parameters)
         quantities = self.merged("quantities", data.get("quantities", {}), groups)
         controls = self.controls([*groups, data], quantities)
         variants = self.changes("variants", data.get("variants", {"default": {}}), parameters)
         profiles = self.changes("profiles", {name: {} for name in PROFILES} | data.get("profiles", {}), parameters)
-        return Case(
+        one = Case(
             name=self.path.parent.name, title=head["title"], description=head.get("description", "").strip(),
             source=tuple(head.get("source", ())), engines=own_engines, folder=self.path.parent,
             parameters=parameters, profiles=profiles, variants=variants,
-            runs=self.runs(data.get("runs", {}), profiles, variants, own_engines, parameters),
+            runs={},
             constraints=tuple(self.constraint(*entry, parameters) for entry in constraints.items()),
             studies={name: self.study(name, entry, parameters, variants) for name, entry in data.get("studies", {}).items()},
             outputs=outputs, derived=derived,
@@ -88,7 +91,8 @@ class CaseReader(TableReader):
             quantities={name: self.quantity(name, entry, [wrong for wrong, seen in controls.items() if name in seen])
                         for name, entry in quantities.items()},
             controls=controls,
-            references=tuple(head.get("references", ())), picture=data.get("picture", {}))
+            references=tuple(head.get("references", ())), picture=data.get("picture", {}), needs=needs)
+        return replace(one, runs=self.runs(data.get("runs", {}), one))
 
     def merged(self, table: str, own: Mapping[str, Any], groups: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         """The entries of all `groups`, then those of the case; where both have one, the case's keys replace single keys of the group's."""
@@ -166,12 +170,11 @@ class CaseReader(TableReader):
             raise self.fail(table, "overrides are a table of key = value")
         return {self.pick(key, parameters, "parameter", table): self.value(table, parameters[key], value) for key, value in entry.items()}
 
-    def runs(self, data: Mapping[str, Any], profiles: Mapping[str, Any], variants: Mapping[str, Any],
-             engines: tuple[str, ...], parameters: Mapping[str, Parameter]) -> dict[str, tuple[PlannedRun, ...]]:
-        """[runs]: what each profile runs."""
+    def runs(self, data: Mapping[str, Any], case: Case) -> dict[str, tuple[PlannedRun, ...]]:
+        """[runs]: what each profile of `case` runs; where an entry names no engines, in all that are capable of it."""
         result: dict[str, tuple[PlannedRun, ...]] = {}
         for profile, entries in data.items():
-            self.pick(profile, profiles, "profile", "runs")
+            self.pick(profile, case.profiles, "profile", "runs")
             if isinstance(entries, str):
                 result[profile] = result[self.pick(entries, result, "profile above", "runs")]
                 continue
@@ -182,22 +185,33 @@ class CaseReader(TableReader):
                 named = entry.get("variants", [entry["variant"]] if "variant" in entry else [])
                 if not named or ("variant" in entry and "variants" in entry):
                     raise self.fail("runs", f"{entry!r} in {profile}", "give variant or variants")
-                chosen = tuple(entry.get("engines", engines))
+                chosen = tuple(entry.get("engines", case.engines))
                 for engine in chosen:
-                    self.pick(engine, engines, "engine", "runs")
-                counts = self.replicas(entry, chosen, parameters)
-                planned += [PlannedRun(self.pick(str(name), variants, "variant", "runs"), chosen, counts) for name in named]
+                    self.pick(engine, case.engines, "engine", "runs")
+                counts = self.replicas(entry, chosen, case.parameters)
+                for name in named:
+                    variant = self.pick(str(name), case.variants, "variant", "runs")
+                    able = self.able(case, profile, variant, chosen, told="engines" in entry)
+                    planned.append(PlannedRun(variant, able, {engine: counts[engine] for engine in able if engine in counts}))
             pairs = [(run.variant, engine) for run in planned for engine in run.engines]
             if len(set(pairs)) < len(pairs):
                 raise self.fail("runs", f"{profile} names a variant twice for the same engine")
             result[profile] = tuple(planned)
         return result
 
-    def replicas(self, entry: Mapping[str, Any], engines: tuple[str, ...], parameters: Mapping[str, Parameter]) -> dict[str, int]:
+    def able(self, case: Case, profile: str, variant: str, chosen: Sequence[str], told: bool) -> tuple[str, ...]:
+        """Those of the engines `chosen` that have all that the variant needs in that profile; a mistake where the case has `told` them."""
+        values = {name: one.value for name, one in case.parameters.items()} | {**case.profiles[profile], **case.variants[variant]}
+        lacks = {engine: found for engine in chosen if (found := case.lacks(engine, values))}
+        for engine, found in lacks.items() if told else ():
+            raise self.fail("runs", f"{variant} in {engine}, which has no {' and no '.join(found)}", "take it from engines")
+        return tuple(engine for engine in chosen if engine not in lacks)
+
+    def replicas(self, entry: Mapping[str, Any], chosen: Sequence[str], parameters: Mapping[str, Parameter]) -> dict[str, int]:
         """`replicas` of an entry of [runs]: how many, by engine."""
         counts = entry.get("replicas", {})
         for engine, count in counts.items():
-            self.pick(engine, engines, "engine of replicas", "runs")
+            self.pick(engine, chosen, "engine of replicas", "runs")
             if "replicas" not in parameters:
                 raise self.fail("runs", "replicas are given, but nothing in this case is random", "leave them out")
             self.value("runs", parameters["replicas"], count)

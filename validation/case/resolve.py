@@ -60,7 +60,7 @@ def resolve(case: Case, profile: str | None = None, variant: str | None = None,
 
 
 def portable(values: Mapping[str, Value]) -> dict[str, Value]:
-    """The same with infinities as +-1e300, which JSON files and both engines' inputs can carry."""
+    """The same with infinities as +-1e300, which JSON files and the engines' inputs can carry."""
     return {key: math.copysign(UNLIMITED, value) if isinstance(value, float) and math.isinf(value) else value
             for key, value in values.items()}
 

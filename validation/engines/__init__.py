@@ -2,25 +2,27 @@
 
 To add an engine:
 1. write `validation/engines/<name>.py` with a class that derives from Engine (base.py) and says its program and command, and what is known
-   of it into facts.toml;
+   of it into facts.toml, with what it is capable of;
 2. add the class to ENGINES below, where it shall stand in lists and tables;
 3. add its deck, with the file name from its facts, to the cases that it shall run, and its name to `engines` in their case.toml.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 
 from dembark.common.choices import pick
-from dembark.validation.engines.base import DeckNumber, Engine, EngineFacts, call, end_with_parent, mpi_launcher
+from dembark.common.errors import DembarkError
+from dembark.validation.engines.base import CAPABILITIES, DeckNumber, Engine, EngineFacts, call, end_with_parent, mpi_launcher
+from dembark.validation.engines.lammps import Lammps
 from dembark.validation.engines.liggghts import Liggghts
 from dembark.validation.engines.yade import Yade
 
-__all__ = ["ENGINES", "DeckNumber", "Engine", "EngineFacts", "call", "end_with_parent", "facts", "find", "mpi_launcher", "names",
-           "registered", "titles"]
+__all__ = ["CAPABILITIES", "ENGINES", "DeckNumber", "Engine", "EngineFacts", "absent", "call", "end_with_parent", "facts", "find",
+           "mpi_launcher", "names", "registered", "titles"]
 
-ENGINES: tuple[type[Engine], ...] = (Liggghts, Yade)
+ENGINES: tuple[type[Engine], ...] = (Liggghts, Yade, Lammps)
 
 
 def names() -> tuple[str, ...]:
@@ -37,6 +39,18 @@ def facts(name: str) -> EngineFacts:
 def find(name: str) -> Engine:
     """The engine called `name`, asked for its version; DembarkError when it is unknown, or telling what to do if it is not installed."""
     return registered(name).find()
+
+
+def absent(wanted: Iterable[str]) -> dict[str, str]:
+    """The optional ones of the engines `wanted` that are not on this machine, and why each cannot be used."""
+    found: dict[str, str] = {}
+    for name in dict.fromkeys(wanted):
+        if facts(name).optional:
+            try:
+                find(name)
+            except DembarkError as error:
+                found[name] = str(error)
+    return found
 
 
 def titles(joint: str, which: Callable[[EngineFacts], bool] = lambda _: True) -> str:

@@ -22,6 +22,10 @@ from dembark.common.errors import DembarkError
 
 # An environment variable for each engine: which program it was that told its version, and the version.
 _TOLD = "DEMBARK_TOLD_BY_"
+# Where the start of MPI programs is named, for engines without a launcher of their own.
+LAUNCHER = "DEMBARK_MPIRUN"
+# What a case may need of an engine beside a deck, by the names that `[needs]` of case.toml and the facts of engines use.
+CAPABILITIES = {"bridges": "liquid bridges", "carried_liquid": "liquid that grains own", "rolling_resistance": "couples against rolling"}
 DECK_NOTE = ("Written by dembark; SI units. The numbers without a comment follow from the others: to change a parameter, write the deck "
              "anew with 'dembark deck'.")
 
@@ -33,7 +37,8 @@ class EngineFacts:
     `name` stands in commands, files and folders, `title` in text and figures; `program` is what has to be installed. Rates are in
     particle-steps per second and core. `restart_rate` turns the wall time between restart files into steps: a fixed number, because a
     measured one would make a run differ from host to host. `rates` are those measured for each case, `typical_rate` is for all others,
-    and `measured_on` says where and when. `relative_cost` is that of a particle-step.
+    and `measured_on` says where and when. `relative_cost` is that of a particle-step. `capabilities` are names of CAPABILITIES. An
+    `optional` engine is left out of profiles where it is not installed, and they say so; campaigns run it where they name it.
     """
 
     name: str
@@ -50,6 +55,8 @@ class EngineFacts:
     typical_rate: float = 1e5
     measured_on: str = ""
     rates: Mapping[str, float] = field(default_factory=dict)
+    capabilities: tuple[str, ...] = ()
+    optional: bool = False
     # Environment variables that say which program is meant, its name, where it is built below `build` and by what command, and whether one
     # that is found on PATH will do.
     variables: tuple[str, ...] = ()
@@ -67,8 +74,10 @@ class EngineFacts:
     stop_message: str | None = None
     # How a deck is run in its folder.
     by_hand: str = ""
-    # MPI processes, threads, and whether it can be started by hand, as 'dembark <name>'.
+    # MPI processes, the environment variable that says how they are started, threads, and whether it can be started by hand, as
+    # 'dembark <name>'.
     ranks: bool = False
+    launcher: str = LAUNCHER
     threads: bool = False
     interactive: bool = False
 
@@ -83,6 +92,10 @@ class EngineFacts:
         """DembarkError when a run shall have several MPI processes and the engine has none."""
         if ranks > 1 and not self.ranks:
             raise DembarkError(f"--ranks {ranks} with {self.title}", "", f"use --threads: {self.one_process}")
+
+    def lacks(self, needed: Iterable[str]) -> list[str]:
+        """What of `needed`, names of CAPABILITIES, it has not, in words."""
+        return [CAPABILITIES[name] for name in needed if name not in self.capabilities]
 
     @property
     def one_process(self) -> str:
@@ -154,10 +167,14 @@ class Engine(ABC):
         """Folders where the CMake cache of the build of dembark's part may lie, the most likely first."""
         return self.executable.resolve().parents
 
+    def launcher(self, ranks: int) -> list[str]:
+        """Words that start `ranks` processes: those of the variable that the facts name, and -n, else Open MPI's mpirun."""
+        return mpi_launcher(ranks, self.facts.launcher)
+
     def environment(self, threads: int = 1) -> dict[str, str]:
         """Environment for the engine: one thread unless asked for more, nothing of this Python's virtual environment or of a job step."""
         hidden = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "DISPLAY")
-        result = {key: value for key, value in os.environ.items() if key not in hidden and not _of_job_step(key)}
+        result = {key: value for key, value in os.environ.items() if key not in hidden and not _of_job_step(key, self.launcher(1))}
         # Ranks that wait for each other without yielding would halt a run with more ranks than free cores.
         result |= {"OMP_NUM_THREADS": str(threads), "PYTHONUNBUFFERED": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
         if os.geteuid() == 0:
@@ -190,9 +207,10 @@ def end_with_parent(signal: str) -> list[str]:
     return ["setpriv", "--pdeathsig", signal, "--"] if shutil.which("setpriv") else []
 
 
-def mpi_launcher(ranks: int) -> list[str]:
-    """Words that start `ranks` processes: those of DEMBARK_MPIRUN (`srun --mpi=pmix`, `mpiexec`, ...) and -n, else Open MPI's mpirun."""
-    named = shlex.split(os.environ.get("DEMBARK_MPIRUN", ""))
+def mpi_launcher(ranks: int, variable: str = LAUNCHER) -> list[str]:
+    """Words that start `ranks` processes: those of the environment's `variable` (`srun --mpi=pmix`, `mpiexec`, ...) and -n, else Open MPI's
+    mpirun."""
+    named = shlex.split(os.environ.get(variable, ""))
     # Without binding, two runs that go on at the same time do not end up on the same core.
     return [*named, "-n", str(ranks)] if named else ["mpirun", "-np", str(ranks), "--bind-to", "none", "--oversubscribe"]
 
@@ -213,10 +231,10 @@ def digest(files: Iterable[Path]) -> str:
     return total.hexdigest()
 
 
-def _of_job_step(variable: str) -> bool:
+def _of_job_step(variable: str, launcher: Sequence[str]) -> bool:
     # An MPI program that finds the variables of the job step it runs in takes itself for one of the step's ranks and ends when Slurm
     # started no PMI for it; mpirun would start its daemons through srun. Only srun has to know the job, for its own step.
-    kept = {"SLURM_CONF"} | ({"SLURM_JOB_ID"} if Path(mpi_launcher(1)[0]).name == "srun" else set())
+    kept = {"SLURM_CONF"} | ({"SLURM_JOB_ID"} if Path(launcher[0]).name == "srun" else set())
     return variable.startswith(("SLURM_", "PMI_", "PMIX_")) and variable not in kept
 
 

@@ -2,43 +2,11 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-
-from dembark.common.choices import Value
-from dembark.validation.engines.base import DECK_NOTE, DeckNumber, Engine, EngineFacts, end_with_parent, mpi_launcher, texts
+from dembark.validation.engines.base import EngineFacts
+from dembark.validation.engines.input_script import InputScript
 
 
-class Liggghts(Engine):
-    """LIGGGHTS's input script with `-var key value`; MPI ranks, no threads."""
+class Liggghts(InputScript):
+    """LIGGGHTS's input script; MPI ranks of Open MPI."""
 
     facts = EngineFacts.read("liggghts")
-
-    @classmethod
-    def deck_text(cls, source: str, numbers: Mapping[str, DeckNumber], folders: Sequence[Path]) -> str:
-        """See Engine. The source is a Jinja template with << >> around expressions, for ${ } and { } have a meaning in decks."""
-        import jinja2  # commands that write no deck need not wait for it
-
-        environment = jinja2.Environment(loader=jinja2.FileSystemLoader([str(folder) for folder in folders]),
-                                         undefined=jinja2.StrictUndefined,
-                                         variable_start_string="<<", variable_end_string=">>",
-                                         comment_start_string="{*", comment_end_string="*}", trim_blocks=True, lstrip_blocks=True,
-                                         keep_trailing_newline=True, autoescape=False)
-        # Tables are for the template; a variable holds one number.
-        given = texts({name: number.value for name, number in numbers.items() if not isinstance(number.value, tuple)})
-        width = max((len(name) for name in given), default=0)
-        lines = [f"variable {name:{width}} index {text}" + (f" # {numbers[name].meaning}" if numbers[name].meaning else "")
-                 for name, text in given.items()]
-        body = environment.from_string(source).render({name: number.value for name, number in numbers.items()})
-        # The opening comment of the source stays on top.
-        top = re.match(r"(?:#.*\n)*", source)
-        head = top.group() if top else ""
-        return head + "\n".join([f"# {DECK_NOTE}", *lines]) + "\n\n" + body[len(head):].lstrip("\n")
-
-    def command(self, deck: Path, values: Mapping[str, Value], ranks: int = 1, threads: int = 1) -> list[str]:
-        """See Engine; one process is started without the MPI launcher."""
-        # Ranks would outlive a launcher that is killed, and go on writing.
-        launcher = [*mpi_launcher(ranks), *end_with_parent("KILL")] if ranks > 1 else []
-        variables = (word for key, value in texts(values).items() for word in ("-var", key, value))
-        return [*launcher, str(self.executable), "-in", str(deck), "-log", "none", *variables]

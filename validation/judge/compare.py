@@ -1,5 +1,5 @@
-"""Whether two engines are equivalent, by two one-sided tests; or, where nothing is random, whether the difference is within a bound that
-the quantity brings along.
+"""Whether engines are equivalent, pair by pair, by two one-sided tests; or, where nothing is random, whether the difference is within a
+bound that the quantity brings along.
 
 Two one-sided tests (TOST, D. J. Schuirmann, J. Pharmacokinet. Biopharm. 15 (1987) 657) at 2.5 % each: the difference is shown to be above
 -10 % and below +10 %, which is so when its 95 % interval is within them. That engines do not differ significantly shows nothing: runs that
@@ -13,6 +13,7 @@ what counts as beyond chance is what is outside of the interval that holds all d
 
 from __future__ import annotations
 
+from itertools import combinations
 from pathlib import Path
 
 from dembark.common.errors import RunError
@@ -30,25 +31,26 @@ CONFIDENCE = 0.99
 def compare(folder: Path) -> Comparison:
     """The engines that have a `metrics.json` below the folder of a case and variant, beside each other. RunError for fewer than two.
 
-    Of each pair of engines the first in alphabetical order is the reference.
+    Of each pair of engines the first in alphabetical order is the reference. What chance may do is shared by all pairs of the page.
     """
     measured = sorted((result.read(path) for path in folder.glob(f"*/{result.METRICS}")), key=lambda one: one.engine)
     if len(measured) < 2:
         raise RunError(f"nothing to compare in {folder}",
                        f"there is a measurement of {measured[0].engine if measured else 'no engine'} only")
     first = measured[0]
-    pairs = [pair for index, one in enumerate(measured) for other in measured[index + 1 :] for pair in _pairs(one, other)]
+    both = [(one, other, *two) for one, other in combinations(measured, 2) for two in _shared(one, other)]
+    pairs = [pair(reference, value, one.engine, other.engine, len(both)) for one, other, reference, value in both]
     return Comparison(first.case, first.variant, tuple(one.engine for one in measured), tuple(pairs), first.profile, CAP)
 
 
-def _pairs(first: Result, second: Result) -> list[ComparedRecord]:
+def _shared(first: Result, second: Result) -> list[tuple[QuantityRecord, QuantityRecord]]:
+    """The quantities in which two engines are compared."""
     by_name = {one.name: one for one in first.quantities if one.compared}
-    both = [(by_name[one.name], one) for one in second.quantities if one.compared and one.name in by_name]
-    return [pair(*two, first.engine, second.engine, len(both)) for two in both]
+    return [(by_name[one.name], one) for one in second.quantities if one.compared and one.name in by_name]
 
 
 def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str, engine: str, comparisons: int = 1) -> ComparedRecord:
-    """One quantity of two engines with its verdict; `comparisons`: how many quantities are compared together with it.
+    """One quantity of two engines with its verdict; `comparisons`: how many are made on its page, of all pairs of engines.
 
     pass: the joint 95 % interval of the difference is within 10 %. fail: the difference is beyond what chance does to one of all
     `comparisons`. info: the joint interval reaches beyond 10 %, is unknown, or comes from fewer than three packings in either engine, which

@@ -55,7 +55,8 @@ def write(gathered: Gathered, chapters: Any) -> Path:
         measured = [one for page in gathered.pages if not page.is_study for _, one in sorted(page.results.items())]
         cited = {one["short"]: one for page in gathered.pages for found in page.results.values() for one in found.references}
         context = {**_EMPTY, **own, **first, "style": Markup((_HERE / "style.css").read_text(encoding="utf-8")),
-                   "scatter": ratio, "measured": measured, "references": list(cited.values()), "machine": machine(measured),
+                   "scatter": ratio, "measured": measured, "references": list(cited.values()),
+                   "machine": machine(measured), "left_out_engines": gathered.left_out,
                    "description": gathered.summary.get("description", "")}
         template = _environment().get_template("report.html.j2")
         write_pdf(template.render(context, full=False), folder / "report.pdf")

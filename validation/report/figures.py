@@ -35,8 +35,10 @@ def look(engine: str) -> EngineFacts:
     """Title, colour and marker of `engine` in all figures, among its facts; one that is not known gets a spare colour."""
     if engine in engines.names():
         return engines.facts(engine)
-    spare = 2 + sum(engine.encode()) % (len(PALETTE) - 2)
-    return EngineFacts(engine, engine, colour=PALETTE[spare], marker=MARKS[spare])
+    taken = {engines.facts(name).colour for name in engines.names()}
+    spare = [(paint, mark) for paint, mark in zip(PALETTE, MARKS, strict=True) if paint not in taken] or [(INK, "x")]
+    paint, mark = spare[sum(engine.encode()) % len(spare)]
+    return EngineFacts(engine, engine, colour=paint, marker=mark)
 
 
 def engine_name(engine: str) -> str:
@@ -99,7 +101,9 @@ def profile_figure(profiles: Curves, names: Sequence[str], columns: int = 2) -> 
         for number, name in enumerate(names):
             axes = figure.add_subplot(rows, columns, number + 1)
             _panel(axes, [(engine, one) for engine, of_engine in profiles.items() for one in of_engine if one["name"] == name], handles)
-        figure.legend(handles.values(), handles.keys(), loc="lower center", ncols=4, fontsize=7.5)
+        # In one row, however many engines there are: a second one would lie over the panels.
+        count = len(handles)
+        figure.legend(handles.values(), handles.keys(), loc="lower center", ncols=max(4, count), fontsize=min(7.5, 34.0 / max(1, count)))
     return figure
 
 
@@ -125,9 +129,10 @@ def _panel(axes: Any, entries: Sequence[tuple[str, Mapping[str, Any]]], handles:
         if one.get("low") is not None:
             fill = axes.fill_betweenx if upward else axes.fill_between
             fill(place, _numbers(one["low"]), _numbers(one["high"]), color=paint, alpha=0.18, linewidth=0)
-        # Where engines agree to the last digit the line below must still be seen.
+        # Where engines agree to the last digit the lines below must still be seen.
+        below = 1.0 - number / max(1, len(entries) - 1)
         handles.setdefault(engine_name(engine),
-                           line(_numbers(one["value"]), color=paint, linewidth=0.9 if number else 2.4, alpha=1.0 if number else 0.6))
+                           line(_numbers(one["value"]), color=paint, linewidth=0.9 + 1.5 * below, alpha=0.6 if below else 1.0))
     across, along = symbols(first["across"]), symbols(first["along"])
     axes.set(**({"xlabel": across, "ylabel": along} if upward else {"xlabel": along, "ylabel": across}))
     labels = sorted({one["reference_label"] for _, one in entries if one.get("reference_label")})

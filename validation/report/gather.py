@@ -32,7 +32,7 @@ class Row:
 
     @property
     def who(self) -> str:
-        """The engine, or both of a comparison, for people."""
+        """The engine, or the pair of a comparison, for people."""
         if isinstance(self.record, ComparedRecord):
             return f"{engine_name(self.record.engine)} / {engine_name(self.record.reference_engine)}"
         return engine_name(self.engine) if self.engine else "dembark"
@@ -98,6 +98,12 @@ class Gathered:
         return [*(row for page in self.pages for row in page.rows()), *verified]
 
     @property
+    def left_out(self) -> str:
+        """Which optional engines were left out, for they are not installed, in a sentence; empty when none was."""
+        names = [engine_name(engine) for engine in self.summary.get("left_out", {})]
+        return f"Left out, for this machine does not have it: {', '.join(names)}." if names else ""
+
+    @property
     def missing(self) -> list[str]:
         """A line for each run that is missing and each result that cannot be read."""
         return [*(f"{page.name}: {line}" for page in self.pages for line in page.missing), *self.unread]
@@ -120,8 +126,8 @@ def gather(folder: Path) -> Gathered:
         one = page(found.case, found.variant)
         one.results[found.engine] = found
         one.title, one.description = found.title, found.description
-    for both in compared:
-        page(both.case, both.variant).comparison = both
+    for comparison in compared:
+        page(comparison.case, comparison.variant).comparison = comparison
     failed = {run[:3] for run in expected if run[3]}
     for case, variant, engine in sorted({run[:3] for run in expected} - failed):
         if engine not in pages[case, variant].results:

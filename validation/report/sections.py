@@ -11,16 +11,18 @@ from typing import Any
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from dembark.postproc import figures as field_figures
 from dembark.postproc import pictures
+from dembark.postproc.figures.panels import Look
 from dembark.validation.judge.result import ComparedRecord
 from dembark.validation.judge.tally import Counts, tally
-from dembark.validation.report import fields, figures, front
+from dembark.validation.report import figures, front
 from dembark.validation.report.figures import engine_name
 from dembark.validation.report.gather import Gathered, Page, Row, beside
 
-# Of a case in the PDF: variants with figures (of the first all main ones, of the others one), panels of a figure, and rows of one quantity
-# before only the worst is shown.
-VARIANTS, PANELS, ROWS = 2, 4, 4
+# Of a case in the PDF: variants with figures, panels of a figure, and rows of one quantity before only the worst is shown. Of the first
+# variant all main figures are printed, of others and of studies one.
+VARIANTS, PANELS, ROWS = 1, 2, 4
 
 
 @dataclass(frozen=True)
@@ -192,10 +194,16 @@ def _profiles(page: Page, folder: Path) -> list[Shown]:
     return found
 
 
+def _look(engine: str) -> Look:
+    facts = figures.look(engine)
+    return Look(facts.title, facts.colour, facts.marker)
+
+
 def _fields(page: Page, folder: Path) -> list[Shown]:
     """The page's figures of fields; their data are written beside the report, and why there are none is told."""
     try:
-        drawn = fields.figures(fields.read(page.folder, sorted(page.results)))
+        shown = sorted(page.results)
+        drawn = field_figures.draw(field_figures.read(page.folder, shown), {engine: _look(engine) for engine in shown})
     except (OSError, ValueError, KeyError, AttributeError) as error:
         page.missing.append(f"fields.nc cannot be drawn: {error}")
         return []

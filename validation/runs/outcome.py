@@ -44,7 +44,7 @@ def _tail(log: Path, size: int = 20000) -> list[str]:
 
 def reason(lines: list[str]) -> str:
     """The engine's own word about what went wrong: the last line that looks like an error, else its last line."""
-    told = re.compile(r"^\s*(?:dembark: (?!steps|finished|resumed)|ERROR|\w*(?:Error|Exception)\b.*|.*[Nn]o space left)")
+    told = re.compile(r"^\s*(?:dembark: (?!steps|finished|resumed|integration)|ERROR|\w*(?:Error|Exception)\b.*|.*[Nn]o space left)")
     spoken = [line.strip() for line in lines if line.strip()]
     return next((line for line in reversed(spoken) if told.match(line)), spoken[-1] if spoken else "it said nothing")
 
@@ -70,6 +70,12 @@ def judge(run: Run, code: int, parser: OutputParser, work: Path) -> None:
         raise RunError(f"the engine ended without 'dembark: finished' {where}", reason(lines))
     if not parser.steps:
         raise RunError("the engine never said 'dembark: steps <N> time_step <dt>'", "the deck must print this line")
+
+
+def integration(work: Path) -> dict[str, float]:
+    """What the run's integration monitor found (largest errors of one step, fewest steps of a contact); empty where it had none."""
+    told = next((line for line in reversed(_tail(work / "engine.log")) if line.startswith("dembark: integration ")), "").split()[2:]
+    return {name: float(value) for name, value in zip(told[::2], told[1::2], strict=True)}
 
 
 def check_output(work: Path, outputs: Sequence[str], wanted: Value) -> int:

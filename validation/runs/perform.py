@@ -34,13 +34,15 @@ Place = Callable[[Table], Backend]
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came out: runs that are not finished (with reasons), further problems, the tally of all checks, and the report if built."""
+    """What came out: runs that are not finished (with reasons), further problems, the tally of all checks, the report if built, and engines
+    that were left out, with reasons."""
 
     runs: int
     unfinished: tuple[str, ...]
     problems: tuple[str, ...]
     tally: Tally
     report: Path | None
+    left_out: tuple[str, ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -104,7 +106,8 @@ def perform(plan: Plan, results: Path, place: Place, cancel: threading.Event, co
     problems += [str(error) for name, error in executor.errors.items() if name in made]
     problems += [table.problem] if table.problem else []
     report = results / "report.html"
-    return Outcome(len(tasks), tuple(unfinished), tuple(dict.fromkeys(problems)), of_folder(results), report if report.is_file() else None)
+    return Outcome(len(tasks), tuple(unfinished), tuple(dict.fromkeys(problems)), of_folder(results), report if report.is_file() else None,
+                   tuple(f"{name}: {why}" for name, why in plan.facts.get("left_out", {}).items()))
 
 
 def perform_series(one: Series, out: Path, cancel: threading.Event, used: Resources, jobs: int | None = None,
@@ -131,6 +134,8 @@ def perform_series(one: Series, out: Path, cancel: threading.Event, used: Resour
 
             def event(state: State) -> None:
                 monitor.event(state)
+                if state.state == "running":
+                    beside.begin()
                 if state.state == "finished":
                     beside.finished(out / folders[state.name], state.name == one.runs[0].name)
 
@@ -151,12 +156,11 @@ class _Beside:
     needs no other one. When the block ends by an error, nothing more of it begins and nothing is waited for."""
 
     def __init__(self, out: Path, warm: bool) -> None:
-        """`warm`: the process that renders is started at once, for it has something to do and a core to itself."""
-        self._out, self._reading, self._drawing = out, ThreadPoolExecutor(1), ThreadPoolExecutor(1)
-        self._loaded: Future[Early] = self._reading.submit(_load)
+        """`warm`: the process that renders is started early, for it has something to do and a core to itself."""
+        self._out, self._warm, self._reading, self._drawing = out, warm, ThreadPoolExecutor(1), ThreadPoolExecutor(1)
+        self._loaded: Future[Early] | None = None
         self._read: list[Future[None]] = []
         self.drawn: Future[list[str]] | None = None
-        self._drawing.submit(_load_drawing, warm)
 
     def __enter__(self) -> Self:
         return self
@@ -165,16 +169,24 @@ class _Beside:
         for pool in (self._reading, self._drawing):
             pool.shutdown(wait=kind is None, cancel_futures=True)
 
+    def begin(self) -> Future[Early]:
+        """Import, once an engine runs: before that, imports would only hold it up."""
+        if self._loaded is None:
+            self._loaded = self._reading.submit(_load)
+            self._drawing.submit(_load_drawing, self._warm)
+        return self._loaded
+
     def finished(self, folder: Path, first: bool) -> None:
         """The replica in `folder` is finished; the pictures are of the `first` one and need not wait for the others."""
-        self._read.append(self._reading.submit(lambda: self._loaded.result().read(folder)))
+        loaded = self.begin()
+        self._read.append(self._reading.submit(lambda: loaded.result().read(folder)))
         if first:
             self.drawn = self._drawing.submit(draw, self._out)
 
     def early(self) -> Early:
         """What was read, after the last of it."""
         wait(self._read)
-        return self._loaded.result()
+        return self.begin().result()
 
 
 def _load() -> Early:
@@ -192,7 +204,7 @@ def _load_drawing(warm: bool) -> None:
         from dembark.postproc import render
 
         render.warm()
-    # xarray imports the last two when it writes its first file.
+    # xarray, which labels fields, imports the last two when it writes its first file.
     for name in ("dembark.postproc.pictures.packings", "dembark.postproc.pictures.sections", "dembark.postproc.output", "pint", "h5netcdf"):
         import_module(name)
 

@@ -14,7 +14,7 @@ from dembark.common.choices import Value, pick
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
 from dembark.validation import engines
-from dembark.validation.case.deck import require_measure, sources
+from dembark.validation.case.deck import require_capable, require_measure, sources
 from dembark.validation.case.folders import discover
 from dembark.validation.case.model import Case, Study
 from dembark.validation.case.resolve import for_replica, portable, resolve
@@ -159,26 +159,38 @@ def series(case: Case, variant: str, profile: str | None, engine: Engine, change
         raise DembarkError(f"{case.deck(engine.name)} is missing", "", f"remove {engine.name} from engines in case.toml or add the deck")
     require_measure(case)
     values = portable(resolve(case, profile, variant, changes))
+    require_capable(case, engine.name, values)
     count = values.get("replicas")
     numbers = range(1, (count if isinstance(count, int) else 1) + 1)
     return Series(tuple(Run(case, name or variant, profile or "default", engine, k, for_replica(values, k)) for k in numbers))
 
 
 def of_profile(profile: str, only_cases: Sequence[str] = (), only_engines: Sequence[str] = ()) -> list[Series]:
-    """All series that the cases list for `profile`, longest first; only the engines that are needed have to be there."""
+    """All series that the cases list for `profile`, longest first; only the engines that are needed have to be there, and of the optional
+    ones only those that are named in `only_engines`."""
     cases = discover()
     for name in only_cases:
         pick(name, cases, "case", "in --case")
     for name in only_engines:
         pick(name, engines.names(), "engine", "in --engine")
     pick(profile, {name for case in cases.values() for name in case.profiles}, "profile", "in the cases")
+    gone = left_out(profile, only_cases, only_engines)
     result = [series(case, planned.variant, profile, engines.find(engine), planned.changes(engine))
-              for case in cases.values() if not only_cases or case.name in only_cases
-              for planned in case.runs.get(profile, ())
-              for engine in planned.engines if not only_engines or engine in only_engines]
+              for case in _chosen(only_cases) for planned in case.runs.get(profile, ())
+              for engine in planned.engines if engine not in gone and (not only_engines or engine in only_engines)]
     if not result:
         raise DembarkError(f"profile {profile} has no runs", "for the chosen cases and engines", "see 'dembark cases'")
     return sorted(result, key=lambda one: -one.cost)
+
+
+def _chosen(only_cases: Sequence[str]) -> list[Case]:
+    return [case for case in discover().values() if not only_cases or case.name in only_cases]
+
+
+def left_out(profile: str, only_cases: Sequence[str] = (), only_engines: Sequence[str] = ()) -> dict[str, str]:
+    """The optional engines of a profile's runs that are not on this machine, and why; none where engines are named: those have to be."""
+    planned = [run for case in _chosen(only_cases) for run in case.runs.get(profile, ())]
+    return {} if only_engines else engines.absent(engine for run in planned for engine in run.engines)
 
 
 def finished(folder: Path, run: Run) -> bool:

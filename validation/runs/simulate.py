@@ -217,6 +217,7 @@ def _execute(run: Run, work: Path, step: int | None, progress: Progress, ended: 
         "steps": parser.steps, "time_step": parser.time_step, "impact_id_offset": run.engine.facts.impact_id_offset, "frames": frames,
         "inputs": run.inputs, "deck": deck.sources(run.case, run.engine.name), "command": command,
         "attempts": done.attempts, "resumed_at": list(done.resumed_at), "resume": done.resume, "restart_every": every,
+        "integration": outcome.integration(work),
         "provenance": {**provenance.collect(run.engine), "ranks": used.ranks, "threads": used.threads, "seed": run.values.get("seed"),
                        "started": began.isoformat(timespec="seconds"), "wall_time": done.wall_time, "particle_steps_per_second": speed},
     }

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 # A campaign's folder holds a copy of its file.
 CAMPAIGN_FILE = "campaign.toml"
-_REPORTING = {"report", "verification"}
+_REPORTING = {"report", "verification", "figures"}
 _ELSEWHERE = {"runs", "campaigns", "tests"}
 
 
@@ -151,10 +151,10 @@ def measure_study(results: Path, planned: PlannedStudy) -> None:
 
 
 def compare_engines(folder: Path, metrics: Sequence[Path]) -> None:
-    """Write `folder/comparison.json` (folder = results/<profile>/<case>/<variant>) when all of `metrics` are there; an old one goes aside
-    otherwise. RunError when the comparison fails."""
+    """Write `folder/comparison.json` (folder = results/<profile>/<case>/<variant>) when two of `metrics` or more are there; an old one goes
+    aside otherwise. RunError when the comparison fails."""
     target = folder / COMPARISON
-    if not all(path.is_file() for path in metrics):
+    if sum(path.is_file() for path in metrics) < 2:
         retire(target)
         return
     target.unlink(missing_ok=True)

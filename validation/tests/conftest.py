@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,6 +14,8 @@ import pytest
 
 from dembark.validation import engines
 from dembark.validation.case import folders
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 CASE = """
 [case]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dembark.common.errors import DembarkError
-from dembark.validation import analysis, show
+from dembark.validation import analysis, metrics, show
 from dembark.validation.judge import measuring
 from dembark.validation.judge.result import QuantityRecord, Result
 
@@ -62,3 +62,9 @@ def test_open_verdicts_are_told_with_their_reason() -> None:
     quantities = tuple(QuantityRecord(name, 1.0, verdict, tolerance=0.1, reason=reason) for name, verdict, reason in (
         ("a", "info", "the run is too short"), ("b", "pass", ""), ("c", "info", "the run is too short"), ("d", "info", "")))
     assert show.open_lines(Result("box", "dry", "yade", quantities)) == ["open: a, c: the run is too short"]
+
+
+def test_the_worst_steps_of_some_runs():
+    found = [{"position": 1e-7, "velocity": 2e-3, "contact_steps": 31.0}, {}, {"position": 3e-7, "velocity": 1e-3, "contact_steps": 0.0}]
+    assert metrics.worst(found) == {"position": 3e-7, "velocity": 2e-3, "contact_steps": 31.0}
+    assert metrics.worst([{}]) == {}

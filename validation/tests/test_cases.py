@@ -42,7 +42,7 @@ def test_what_the_folder_says_need_not_be_written(decks: Path) -> None:
     assert resolve(case, "full") == resolve(case, "quick") == resolve(case)
     (decks / "box" / "liggghts.in").unlink()
     folders.load.cache_clear()
-    with pytest.raises(DembarkError, match=r"there is no deck, \[case\] of .*, one of liggghts.in, yade.py"):
+    with pytest.raises(DembarkError, match=r"there is no deck, \[case\] of .*, one of liggghts.in, yade.py, lammps.in"):
         load(path)
 
 

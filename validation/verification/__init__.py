@@ -1,4 +1,4 @@
-"""Verification: instruments of the harness on problems whose answer is known exactly, apart from any engine.
+"""Verification: instruments of the harness, and solvers, on problems whose answer is known exactly, apart from any engine.
 
 Each item is a function without arguments that computes an `Item` in a second or two; a new one is added to `ITEMS`. The workflow writes
 them all to `verification.json`, which the report includes.
@@ -14,7 +14,7 @@ from typing import Any
 from dembark.common.files import read_json, write_json
 from dembark.validation.judge.result import QuantityRecord, from_json
 from dembark.validation.judge.tally import VERIFICATION as FILE
-from dembark.validation.verification import fields_balance, fields_exact, fields_rings
+from dembark.validation.verification import fields_balance, fields_exact, fields_rings, sph_flows
 from dembark.validation.verification.item import Curve, Item, Panel
 
 ITEMS: tuple[Callable[[], Item], ...] = (
@@ -25,6 +25,9 @@ ITEMS: tuple[Callable[[], Item], ...] = (
     fields_exact.lattice,
     fields_exact.shear,
     fields_rings.rings,
+    sph_flows.still_water,
+    sph_flows.added_mass,
+    sph_flows.floating,
 )
 
 

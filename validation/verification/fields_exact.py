@@ -44,7 +44,7 @@ def conservation() -> Item:
     )
 
 
-def _totals(frame: GrainFrame, network: scenes.Network, kernel: str, width: float, due: tuple[Array, ...],
+def _totals(frame: GrainFrame, network: scenes.Network, kernel: str, width: float, due: tuple[Array | float, ...],
             scales: tuple[float, ...]) -> list[float]:
     margin = Kernel(kernel, width).reach
     count = int(np.ceil((1.0 + 2.0 * margin) / 0.15))

@@ -28,7 +28,7 @@ def _panels(count: int, height: float = 1.95) -> tuple[Figure, list[Any]]:
 
 
 def study_figure(sweep: Sweep, quantities: Sequence[QuantityRecord]) -> Figure | None:
-    """Each quantity along the sweep's main axis with 95 % intervals, a line for each combination of the others, both engines; its
+    """Each quantity along the sweep's main axis with 95 % intervals, a line for each combination of the others and engine; its
     reference dashed in grey. None for a sweep without a numeric axis."""
     along = sweep.along
     if along is None or not quantities:

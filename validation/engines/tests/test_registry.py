@@ -88,7 +88,6 @@ def test_a_registered_engine_fulfils_the_protocol(engine: type[Engine], tmp_path
     assert re.fullmatch("#[0-9A-F]{6}", facts.colour) and re.compile(facts.version_pattern).groups == 1
     assert min(facts.relative_cost, facts.restart_rate, facts.typical_rate, *facts.rates.values()) > 0.0
     assert all(re.fullmatch("DEMBARK_[A-Z_]+", variable) for variable in facts.variables)
-    monkeypatch.delenv("DEMBARK_MPIRUN", raising=False)
     program = tmp_path / "overlay/bin/program"
     program.parent.mkdir(parents=True)
     program.write_text("#!/bin/sh\n")
@@ -97,8 +96,13 @@ def test_a_registered_engine_fulfils_the_protocol(engine: type[Engine], tmp_path
     words = found.command(Path(facts.deck), {"size": 0.1, "count": 2, "unset": None}, threads=2)
     assert words[0] == str(program) and facts.deck in words and not any("unset" in word for word in words)
     assert any("0.1" in word for word in words) and found.environment(2)["OMP_NUM_THREADS"] == "2"
+    assert set(facts.capabilities) <= set(engines.CAPABILITIES)
+    assert facts.lacks(engines.CAPABILITIES) == [what for name, what in engines.CAPABILITIES.items() if name not in facts.capabilities]
+    monkeypatch.delenv(facts.launcher, raising=False)
     if facts.ranks:
-        assert found.command(Path(facts.deck), {}, ranks=2)[1:3] == ["-np", "2"]
+        assert found.command(Path(facts.deck), {}, ranks=2)[2] == "2"
+        monkeypatch.setenv(facts.launcher, "starter --quiet")
+        assert found.command(Path(facts.deck), {}, ranks=2)[:4] == ["starter", "--quiet", "-n", "2"]
     else:
         with pytest.raises(DembarkError, match=f"--ranks 2 with {facts.title}"):
             found.command(Path(facts.deck), {}, ranks=2)
@@ -112,23 +116,23 @@ def test_a_registered_engine_fulfils_the_protocol(engine: type[Engine], tmp_path
 
 
 def test_engines_are_told_apart() -> None:
-    for what in ("name", "title", "deck", "restart_suffix", "colour", "marker"):
+    for what in ("name", "title", "deck", "colour", "marker"):
         assert len({getattr(engine.facts, what) for engine in engines.ENGINES}) == len(engines.ENGINES)
 
 
 @pytest.mark.parametrize("ask", [engines.find, engines.facts])
 def test_an_unknown_engine_is_refused_with_near_matches(ask: object) -> None:
-    for name, expected in (("ligghts", "did you mean liggghts?"), ("esys", "known are liggghts, yade")):
+    for name, expected in (("ligghts", "did you mean liggghts?"), ("esys", "known are lammps, liggghts, yade")):
         with pytest.raises(DembarkError) as caught:
             ask(name)  # type: ignore[operator]
         assert str(caught.value) == f"unknown engine '{name}', {expected}"
 
 
 def test_titles_for_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert engines.titles("and") == "LIGGGHTS and YADE" and engines.titles("or", lambda one: one.ranks) == "LIGGGHTS"
+    assert engines.titles("and") == "LIGGGHTS, YADE and LAMMPS" and engines.titles("or", lambda one: one.threads) == "YADE"
     assert engines.titles("and", lambda one: False) == ""
     monkeypatch.setattr(engines, "ENGINES", (*engines.ENGINES, Stub))
-    assert engines.titles("or") == "LIGGGHTS, YADE or The Stub"
+    assert engines.titles("or") == "LIGGGHTS, YADE, LAMMPS or The Stub"
 
 
 class Stub(Engine):

@@ -4,4 +4,4 @@ import sys
 from pathlib import Path
 
 _HERE = Path(__file__).resolve()
-sys.path[:0] = [str(_HERE.parent), str(_HERE.parents[3] / "input_decks" / "tests"), str(_HERE.parents[3] / "postproc" / "tests")]
+sys.path[:0] = [str(_HERE.parent), *(str(_HERE.parents[3] / folder / "tests") for folder in ("input_decks", "postproc", "validation"))]

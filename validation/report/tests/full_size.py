@@ -1,4 +1,4 @@
-"""Writes a results folder as large as a profile's, without running anything: verdicts, curves and pictures of many cases in two engines."""
+"""Writes a results folder as large as a profile's, without running anything: verdicts, curves, pictures of many cases in its engines."""
 
 from __future__ import annotations
 
@@ -49,7 +49,8 @@ def profile(number: int, seed: int) -> dict[str, object]:
             **({"reference": (1.0 - np.exp(-place / (2.0 + number))).tolist(), "reference_label": "Janssen"} if number % 2 else {})}
 
 
-def write(folder: Path, cases: tuple[str, ...] = CASES, variants: int = 3, quantities: int = 18, profiles: int = 6) -> Path:
+def write(folder: Path, cases: tuple[str, ...] = CASES, variants: int = 3, quantities: int = 18, profiles: int = 6,
+          engines: tuple[str, ...] = ("liggghts", "yade")) -> Path:
     """A results folder with all runs finished; returns it."""
     figure = Figure(figsize=(3.0, 3.0))
     figure.subplots().plot([0.0, 1.0])
@@ -57,7 +58,7 @@ def write(folder: Path, cases: tuple[str, ...] = CASES, variants: int = 3, quant
     runs = []
     for case in cases:
         for variant in [f"variant_{number}" for number in range(variants)]:
-            for seed, engine in enumerate(("liggghts", "yade")):
+            for seed, engine in enumerate(engines):
                 place = folder / case / variant / engine
                 place.mkdir(parents=True)
                 found = tuple(quantity(number, seed + 2 * len(runs)) for number in range(quantities))

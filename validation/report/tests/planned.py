@@ -13,6 +13,7 @@ import xarray
 from matplotlib.figure import Figure
 
 from dembark.postproc import pictures
+from dembark.postproc.figures import FILE
 from dembark.postproc.measurement import Value
 from dembark.postproc.pictures import saved
 from dembark.postproc.statistics import Estimate
@@ -22,7 +23,6 @@ from dembark.validation.case.model import Case, Declared
 from dembark.validation.judge import measuring, result
 from dembark.validation.judge.compare import compare
 from dembark.validation.judge.result import QuantityRecord, Result
-from dembark.validation.report.fields import FILE
 from dembark.validation.verification.item import Item
 
 # Cases whose measurement leaves fields, and of which kind.

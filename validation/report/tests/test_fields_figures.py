@@ -8,8 +8,10 @@ import xarray
 from measuring import measure
 from synthetic import plug_flow, silo
 
+from dembark.postproc.figures import draw
+from dembark.postproc.figures.panels import Look
 from dembark.validation import report
-from dembark.validation.report import fields, figures, sections
+from dembark.validation.report import figures, sections
 from dembark.validation.report.gather import gather
 
 
@@ -50,6 +52,6 @@ def test_drum_is_drawn_without_a_single_impact_on_the_shell():
                  **{name: (("log",), np.array([0.1])) for name in ("log_x", "log_z", "log_radius")}}
     attributes = {"kind": "drum", "drum_radius": 1.0, "impact_speed": 0.1, "revolutions": 3, "replicas": 1, "impacts": 2, "log_length": 1.0}
     one = xarray.Dataset(variables, {"x": place, "z": place, "angle": angle, "force": force}, attributes)
-    found, unrolled = fields.figures({"yade": one})
+    found, unrolled = draw({"yade": one}, {"yade": Look("YADE", "#0072B2", "o")})
     assert len(found.tables["power"][1]) == 4 and len(unrolled.tables["shell_power"][1]) == len(angle)
     assert figures.svg(found.figure).startswith(b"<?xml") and figures.svg(unrolled.figure).startswith(b"<?xml")

@@ -57,7 +57,7 @@ def test_a_whole_profile_is_short_and_begins_with_two_pages_of_verdicts(profile,
 
 def test_a_report_that_is_too_long_is_told(laid_out, tmp_path):
     """The negative control: more cases than pages."""
-    cases = tuple(f"case_{number}" for number in range(LIMITS["quick"] + 1))
+    cases = tuple(f"case_{number}" for number in range(8 * LIMITS["quick"]))
     pages = laid_out(full_size.write(tmp_path / "quick", cases, variants=1, quantities=1, profiles=0))
     with pytest.raises(AssertionError, match=r"the report of profile quick has \d+ pages, allowed are 40"):
         check_length("quick", len(pages))

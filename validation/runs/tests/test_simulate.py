@@ -240,3 +240,13 @@ def test_the_numbers_of_a_run_are_made_once(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr(deck, "prepare", lambda case, values: made.append(case.name) or prepare(case, values))
     folder, _ = run(tmp_path)
     assert made == ["box"] and read_json(folder / "run.json")["derived"] == {"steps": 100, "time_step": 1e-5}
+
+
+def test_what_the_integration_monitor_found_is_read_from_the_log(tmp_path):
+    log = tmp_path / "engine.log"
+    log.write_text("dembark: steps 10 time_step 1e-5\ndembark: integration position 1e-7 velocity 0.002 contact_steps 31.5\n"
+                   "dembark: finished\n")
+    assert outcome.integration(tmp_path) == {"position": 1e-7, "velocity": 0.002, "contact_steps": 31.5}
+    log.write_text("dembark: finished\n")
+    assert outcome.integration(tmp_path) == {}
+    assert outcome.reason(["ERROR: no", "dembark: integration position 1"]) == "ERROR: no"

@@ -8,7 +8,7 @@ import pytest
 
 from dembark.validation import verification
 from dembark.validation.judge.tally import of_folder
-from dembark.validation.verification import fields_balance, fields_exact, fields_rings, scenes
+from dembark.validation.verification import fields_balance, fields_exact, fields_rings, scenes, sph_flows
 from dembark.validation.verification.item import Curve, Item, Panel, order
 
 
@@ -56,6 +56,10 @@ SPOILT = {
     "a plain implementation that skips a grain": only(massless, lambda options: options.get("backend") == "numpy")}
 
 
+# What another fluid is made with.
+OTHER_FLUID = {"gravity a fiftieth too strong": {"gravity": [0, -1.02 * sph_flows.GRAVITY]}, "water a tenth too light": {"density": 900.0}}
+
+
 def given(wrong, graining):
     """`graining` of what `wrong` makes of a system."""
     return lambda frame, links, *more, **options: graining(*wrong(frame, links, **options), *more, **options)
@@ -75,12 +79,15 @@ def spoil(monkeypatch, control):
         monkeypatch.setattr(scenes, "with_wall", lambda network: with_wall(replace(network, base=stronger(network.base))))
         monkeypatch.setattr(fields_balance, "coarse_grain",
                             lambda *given, walls, **more: graining(*given, walls=[stronger(one) for one in walls], **more))
+    elif control in OTHER_FLUID:
+        fluid = sph_flows.SphFluid
+        monkeypatch.setattr(sph_flows, "SphFluid", lambda points, **more: fluid(points, **more | OTHER_FLUID[control]))
     else:
         for module, name in ((fields_exact, "coarse_grain"), (fields_balance, "coarse_grain"), (fields_rings, "ring_fields")):
             monkeypatch.setattr(module, name, given(SPOILT[control], getattr(module, name)))
 
 
-CONTROLS = [*SPOILT, "gravity doubled", "a base with a hundredth too much force"]
+CONTROLS = [*SPOILT, *OTHER_FLUID, "gravity doubled", "a base with a hundredth too much force"]
 
 
 @pytest.mark.parametrize("compute", verification.ITEMS, ids=lambda compute: compute.__name__)

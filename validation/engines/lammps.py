@@ -1,0 +1,31 @@
+"""LAMMPS, in the program lammps-dembark: stock LAMMPS with dembark's styles, and an MPI of its own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from dembark.validation.engines.base import EngineFacts
+from dembark.validation.engines.input_script import InputScript
+
+
+class Lammps(InputScript):
+    """LAMMPS's input script; MPI ranks of the MPICH that LAMMPS was built with."""
+
+    facts = EngineFacts.read("lammps")
+
+    def launcher(self, ranks: int) -> list[str]:
+        """Words that start `ranks` processes: those that DEMBARK_LAMMPS_MPIRUN names, else the `lammps-mpiexec` beside the program."""
+        # Another MPI's launcher would start as many runs of one process each.
+        if os.environ.get(self.facts.launcher):
+            return super().launcher(ranks)
+        return [str(self.executable.with_name("lammps-mpiexec")), "-n", str(ranks)]
+
+    def own_files(self) -> Iterable[Path]:
+        """The launcher of LAMMPS and the plugin that it loads."""
+        return [self.executable, *self.executable.parent.parent.glob("lammps/plugin/*.so")]
+
+    def build_folders(self) -> Iterable[Path]:
+        """The plugin is built in `lammps` beside the folder of the program."""
+        return [self.executable.parent.parent / "lammps"]
