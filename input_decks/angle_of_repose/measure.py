@@ -14,7 +14,7 @@ import numpy as np
 from dembark.postproc.instruments.growth import ordered
 from dembark.postproc.instruments.heaps import at_rest, flank, surface
 from dembark.postproc.measurement import Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas, profile
-from dembark.postproc.studies import fitted_exponent, measured, propagated
+from dembark.postproc.studies import compared, fitted_exponent, measured, propagated
 
 CODE = Path(__file__).with_name("reference") / "moose_dem.csv"
 # Zhou et al.: angle of glass beads (degrees), d in mm; their error of a measured angle (degrees); exponents of the angle in friction
@@ -62,10 +62,8 @@ def measure(replicas: Replicas) -> Measurement:
     values = {"flank_difference": Value(exact(max(abs(left - right) for left, right, _ in found)))}
     if p["beads"] == "glass":
         datum = Estimate(law(p["grain_diameter"], p["confinement"]), MEASURED, "error of the measured angles")
-        joint = math.hypot(simulated.half, p["numerical_uncertainty"], of_input, datum.half)
-        values["angle"] = Value(simulated, datum, half=joint, reason=reason, detail=(
-            f"E = {simulated.value - datum.value:.3g}, U_val = {joint:.2g}; U_sim = {simulated.half:.2g}, "
-            f"U_num = {p['numerical_uncertainty']:.2g}, U_input = {of_input:.2g}, U_D = {datum.half:.2g}"))
+        error = compared(simulated.value, datum, sim=simulated.half, num=p["numerical_uncertainty"], input=of_input)
+        values["angle"] = Value(simulated, datum, half=error.uncertainty, reason=reason, detail=error.text)
     else:
         values["angle"] = Value(simulated)
     other = [angle for walls, rolling, angle in code(p["confinement"]) if math.isclose(rolling, p["rolling_friction"])]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Array, Parameters, Setup, contacts, rectangle, time_step
+from dembark.input_decks.common.setup import Parameters, Setup, contacts, strip, time_step
 
 
 def setup(p: Parameters) -> Setup:
@@ -28,16 +28,9 @@ def setup(p: Parameters) -> Setup:
     grains = packing.grains(p, sites + np.array([0.0, margin, 0.0]), box)
     numbers = {"first": first, "stride": stride, "every": every, "opened": first + math.ceil(p.outlet_width / (p.gate_speed * step)),
                "walled": int(walled), "thickness": p.thickness, "pit": -pit, "middle": 0.5 * p.plate_width}
-    # The plate is as thick as a grain. Elements are no longer than the thickness, for LIGGGHTS cannot place those that are much larger
-    # than a period.
-    plate = np.vstack([strip(p, (0.0, 0.0, 0.0), (p.plate_width, 0.0, 0.0)),
-                       *(strip(p, (x, 0.0, -d), (0.0, 0.0, d)) for x in (0.0, p.plate_width))])
-    sides = {name: strip(p, (x, 0.0, -pit - d), (0.0, 0.0, top + pit + d)) for name, x in (("left", 0.0), ("right", p.plate_width))}
+    # The plate is as thick as a grain.
+    plate = np.vstack([strip((0.0, 0.0, 0.0), (p.plate_width, 0.0, 0.0), p.thickness),
+                       *(strip((x, 0.0, -d), (0.0, 0.0, d), p.thickness) for x in (0.0, p.plate_width))])
+    sides = {name: strip((x, 0.0, -pit - d), (0.0, 0.0, top + pit + d), p.thickness)
+             for name, x in (("left", 0.0), ("right", p.plate_width))}
     return Setup(steps, step, grains, {**numbers, **contacts(p, skin=0.2)}, {"plate": plate, **sides})
-
-
-def strip(p: Parameters, corner: tuple[float, float, float], along: tuple[float, float, float]) -> Array:
-    """Triangles (n, 3, 3) in m of a rectangle from `corner` `along` one side and all through the thickness."""
-    side = np.asarray(along)
-    panels = math.ceil(float(np.linalg.norm(side)) / p.thickness)
-    return np.vstack([rectangle(np.asarray(corner) + side * k / panels, (0.0, p.thickness, 0.0), side / panels) for k in range(panels)])

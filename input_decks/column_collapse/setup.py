@@ -2,10 +2,8 @@
 
 import math
 
-import numpy as np
-
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Parameters, Setup, contacts, rectangle, time_step
+from dembark.input_decks.common.setup import Parameters, Setup, contacts, strip, time_step
 
 
 def setup(p: Parameters) -> Setup:
@@ -19,11 +17,7 @@ def setup(p: Parameters) -> Setup:
     # The box reaches as far as the gate gets.
     far, top = p.column_width + p.gate_speed * step * (steps - first) + 2.0 * d_max, height + 2.0 * d_max
     grains = packing.grains(p, sites, [(-d_max, far), (0.0, p.column_depth), (-2.0 * d_max, top)])
-    # Panels about as high as the period is deep, for LIGGGHTS cannot place elements that are much larger than the period.
-    panels = math.ceil((top + d_max) / p.column_depth)
-    rise = (top + d_max) / panels
-    feet = [(p.column_width, 0.0, rise * k - d_max) for k in range(panels)]
-    gate = np.vstack([rectangle(foot, (0.0, p.column_depth, 0.0), (0.0, 0.0, rise)) for foot in feet])
+    gate = strip((p.column_width, 0.0, -d_max), (0.0, 0.0, top + d_max), p.column_depth)
     # Steps until the gate has its speed.
     numbers = {"first": first, "stride": stride, "every": every, "ramp": math.ceil(p.gate_speed / (p.gate_acceleration * step))}
     # A thicker skin than the bridges need pays while the gate moves.

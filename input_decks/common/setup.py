@@ -91,3 +91,14 @@ def rectangle(corner: Sequence[float], first: Sequence[float], second: Sequence[
     """Two triangles (2, 3, 3) in m of the parallelogram at `corner` with the sides `first` and `second`; their normal is first x second."""
     a, u, v = (np.asarray(x, float) for x in (corner, first, second))
     return np.array([[a, a + u, a + u + v], [a, a + u + v, a + v]])
+
+
+def strip(corner: Sequence[float], along: Sequence[float], depth: float) -> Array:
+    """Triangles (n, 3, 3) in m of the rectangle at `corner` with the side `along` and the `depth` of a period along y.
+
+    In panels no longer than the period is deep, for LIGGGHTS cannot place elements that are much larger than the period.
+    """
+    panels = max(1, math.ceil(float(np.linalg.norm(along)) / depth))
+    side = [length / panels for length in along]
+    corners = ([x + length * k for x, length in zip(corner, side, strict=True)] for k in range(panels))
+    return np.vstack([rectangle(start, (0.0, depth, 0.0), side) for start in corners])

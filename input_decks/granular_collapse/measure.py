@@ -18,7 +18,7 @@ import numpy as np
 from dembark.postproc.instruments.growth import Growth, ordered
 from dembark.postproc.instruments.heaps import at_rest, column_height, front, height, power_law, surface
 from dembark.postproc.measurement import Array, Estimate, Measurement, Points, Replica, Replicas, Value, over_replicas, profile
-from dembark.postproc.studies import measured, propagated
+from dembark.postproc.studies import compared, measured, propagated
 
 MEASURED = Path(__file__).with_name("reference") / "lajeunesse_2005.csv"
 # Where the exponents of low and of high columns meet.
@@ -100,10 +100,9 @@ def _as_wide(results: Points) -> Measurement:
         simulated = propagated(lambda values: float(np.polyval(line(values), there)), sizes, halves, "the widths")
         reference, slope = datum(quantity, aspect), float(line(sizes)[0])
         of_size, of_input = abs(slope) * there, p["input_uncertainty"] * reference.value
-        joint = math.hypot(simulated.half, of_size, of_input, reference.half)
-        values[f"{quantity.removeprefix('final_')}_of_beads"] = Value(simulated, reference, half=joint / reference.value, detail=(
-            f"at a = {aspect:.3g}: E = {simulated.value - reference.value:.3g}, U_val = {joint:.2g}; U_sim = {simulated.half:.2g}, "
-            f"U_size = {of_size:.2g}, U_input = {of_input:.2g}, U_D = {reference.half:.2g}"))
+        error = compared(simulated.value, reference, sim=simulated.half, size=of_size, input=of_input)
+        values[f"{quantity.removeprefix('final_')}_of_beads"] = Value(
+            simulated, reference, half=error.uncertainty / reference.value, detail=f"at a = {aspect:.3g}: {error.text}")
         place = np.append(across, there)
         order = np.argsort(place)
         curves.append(profile(f"{quantity}_width", title, "d/W", "over W", place[order], [np.append(sizes, simulated.value)[order]],

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Parameters, Setup, contacts, rectangle, time_step
+from dembark.input_decks.common.setup import Parameters, Setup, contacts, strip, time_step
 
 
 def setup(p: Parameters) -> Setup:
@@ -26,13 +26,9 @@ def setup(p: Parameters) -> Setup:
     top = height + 2.0 * d_max
     bodies = packing.grains(p, sites, [(-d_max, floor + 4.0 * d), (0.0, p.column_depth), (-2.0 * d, top)])
     bodies = bodies.joined(glued(p, floor), d, p.grain_density, 2)
-    # Panels about as high as the period is deep, for LIGGGHTS cannot place elements that are much larger than the period. The lowest ends
-    # above the glued grains, which it would push; the gap lets no grain through.
+    # The gate ends above the glued grains, which it would push; the gap lets no grain through.
     foot = 0.15 * d
-    panels = math.ceil((top - foot) / p.column_depth)
-    rise = (top - foot) / panels
-    feet = [(p.column_width, 0.0, foot + rise * k) for k in range(panels)]
-    gate = np.vstack([rectangle(one, (0.0, p.column_depth, 0.0), (0.0, 0.0, rise)) for one in feet])
+    gate = strip((p.column_width, 0.0, foot), (0.0, 0.0, top - foot), p.column_depth)
     numbers = {"first": first, "stride": stride, "every": every, "gate_speed": speed, "opened": first + opened, "base": -0.5 * d}
     return Setup(steps, step, bodies, {**numbers, **contacts(p, skin=0.2)}, {"gate": gate})
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dembark.postproc.history import reached
 from dembark.postproc.instruments.growth import ordered
 from dembark.postproc.measurement import (
     Array,
@@ -26,7 +27,7 @@ from dembark.postproc.measurement import (
     over_replicas,
     profile,
 )
-from dembark.postproc.studies import fitted_exponent, measured, propagated
+from dembark.postproc.studies import compared, fitted_exponent, measured, propagated
 
 PUBLISHED = Path(__file__).with_name("reference") / "anand_2008.csv"
 # Part of all mass between which the rate is taken, and Beverloo's constant for spheres.
@@ -61,14 +62,6 @@ class Discharge:
     def mass_rate(self) -> float:
         """kg/m/s, from LOW of all mass to HIGH of what leaves."""
         return slope(self.times, self.share, HIGH * float(self.share[-1])).value * self.mass / self.period
-
-
-def reached(times: Array, share: Array, level: float) -> float:
-    """When `share`, which rises, reaches `level`; NaN when it never does."""
-    k = int(np.searchsorted(share, level))
-    if k in (0, len(share)):
-        return math.nan
-    return float(times[k - 1] + (times[k] - times[k - 1]) * (level - share[k - 1]) / (share[k] - share[k - 1]))
 
 
 def slope(times: Array, share: Array, high: float) -> Estimate:
@@ -127,8 +120,8 @@ def measure(replicas: Replicas) -> Measurement:
         return Measurement(values, [_plain(runs)])
     due = datum()
     worst = max((_difference(runs, name) for name in published()), key=lambda one: one.value)
-    values |= {"rate": Value(rate, due["rate"], detail=_error(rate, due["rate"], 0.0, 0.0)), "discharged": Value(last, due["discharged"]),
-               "curve": Value(worst, exact(0.0))}
+    values |= {"rate": Value(rate, due["rate"], detail=compared(rate.value, due["rate"], sim=rate.half, num=0.0, input=0.0).text),
+               "discharged": Value(last, due["discharged"]), "curve": Value(worst, exact(0.0))}
     return Measurement(values, [_beside(runs, name) for name in published()])
 
 
@@ -161,12 +154,6 @@ def _plain(runs: Sequence[Discharge]) -> Curve:
     return profile("discharge", *TITLES, runs[0].shifted(), _mean(runs, runs[0].shifted()))
 
 
-def _error(value: Estimate, due: Estimate, of_inputs: float, of_numerics: float) -> str:
-    e, joint = value.value - due.value, math.hypot(value.half, due.half, of_inputs, of_numerics)
-    return (f"E = {e:.3g} {'exceeds' if abs(e) > joint else 'is within'} U_val = {joint:.2g}; U_D = {due.half:.2g}, "
-            f"scatter {value.half:.2g}, U_input = {of_inputs:.2g}, U_num = {of_numerics:.2g}")
-
-
 def study(name: str, points: Points, along: str) -> Measurement:
     """The law of Beverloo in the width of the slot; or what the parameter that is varied makes of the rate."""
     points, places = ordered(points, along)
@@ -174,9 +161,9 @@ def study(name: str, points: Points, along: str) -> Measurement:
         one = next(point for point in points if point["variant"] == "anand")
         found = np.array([measured(point, "rate").value for point in points])
         half, rate, due = float(np.ptp(found)), measured(one, "rate"), datum()["rate"]
-        parts = (0.5 * half, 0.0) if name == "friction" else (0.0, half)
-        joint = Estimate(rate.value, math.hypot(rate.half, *parts), "scatter and what is varied")
-        return Measurement({"rate": Value(joint, due, detail=_error(rate, due, *parts))},
+        varied = {"input": 0.5 * half, "num": 0.0} if name == "friction" else {"input": 0.0, "num": half}
+        joint = Estimate(rate.value, math.hypot(rate.half, *varied.values()), "scatter and what is varied")
+        return Measurement({"rate": Value(joint, due, detail=compared(rate.value, due, sim=rate.half, **varied).text)},
                            [profile("rate", "Discharge rate", along, "1/s", places, [found])])
     every = [measured(point, "mass_rate") for point in points]
     rates, halves = (np.array([getattr(one, part) for one in every]) for part in ("value", "half"))

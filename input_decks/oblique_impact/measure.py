@@ -17,6 +17,7 @@ from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.replica import Array, Replica
 from dembark.postproc.resampling import profile
 from dembark.postproc.statistics import Estimate
+from dembark.postproc.studies import compared
 
 MEASURED = Path(__file__).with_name("reference") / "kharaz_2001.csv"
 TITLES = {"tangential_restitution": ("Tangential restitution", "e_t"), "spin": ("Rebound spin", "ω (rad/s)"),
@@ -62,11 +63,9 @@ def study(_name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measur
         of_steps = _of_steps(steps, [run[row["name"]]["value"] for run in runs])
         simulated = Estimate(one["value"], math.hypot(of_inputs, of_steps), "inputs and time step")
         datum = Estimate(row["value"], math.hypot(row["value_digitised"], row["value_measured"]), "measurement and its reading")
-        error, joint = simulated.value - datum.value, math.hypot(simulated.half, datum.half)
-        known += abs(error) > joint
-        values[row["name"]] = Value(simulated, datum, detail=(
-            f"E = {error:.3g} {'exceeds' if abs(error) > joint else 'is within'} U_val = {joint:.2g}; "
-            f"U_num = {of_steps:.1g}, U_input = {of_inputs:.2g}, U_D = {datum.half:.2g}"))
+        error = compared(simulated.value, datum, num=of_steps, input=of_inputs)
+        known += error.seen
+        values[row["name"]] = Value(simulated, datum, detail=error.text)
     return Measurement(values, [_curve(quantity, [(row["angle"], values[row["name"]]) for row in rows if row["quantity"] == quantity])
                                 for quantity in TITLES], [
         f"At {known} of {len(rows)} points |E| exceeds U_val: an error of the model is seen there, whether or not the tolerance allows it.",

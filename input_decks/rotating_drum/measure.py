@@ -13,7 +13,7 @@ import numpy as np
 from dembark.postproc.instruments.growth import ordered
 from dembark.postproc.instruments.tumbler import Tumbler, estimates, layer_slope, read
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, pooled, profile
-from dembark.postproc.studies import measured
+from dembark.postproc.studies import compared, measured
 
 HERE = Path(__file__).with_name("reference")
 FLOW = ("surface_speed", "layer_depth", "layer_shear", "zero_crossing")
@@ -64,23 +64,16 @@ def measure(replicas: Replicas) -> Measurement:
     values["froude"] = Value(exact(given["drum_speed"] ** 2 * given["drum_radius"] / given["gravity"]))
     if tracked_drum:
         for name, datum in data().items():
-            values[name] = Value(over[name], datum, detail=error(over[name], datum, 0.0, 0.0))
+            values[name] = Value(over[name], datum, detail=compared(over[name].value, datum, sim=over[name].half).text)
     if row := other_code().get(variant):
         values["centrifuging"] = Value(over["overhead"], exact(row["centrifuging"]))
         if flows:
-            depth, d = over["layer_depth"], given["grain_diameter"]
+            depth, angle, d = over["layer_depth"], over["surface_angle"], given["grain_diameter"]
             datum = Estimate(row["angle"], row["angle_limit"], "scatter of the other code")
-            values["repose_angle"] = Value(over["surface_angle"], datum, detail=error(over["surface_angle"], datum, 0.0, 0.0))
+            values["repose_angle"] = Value(angle, datum, detail=compared(angle.value, datum, sim=angle.half).text)
             values["layer_over_diameter"] = Value(Estimate(depth.value / d, depth.half / d, depth.basis), exact(row["layer"])
                                                   if math.isfinite(row["layer"]) else None)
     return Measurement(values, [speeds(drums, tracked_drum), densities(drums)])
-
-
-def error(value: Estimate, datum: Estimate, of_inputs: float, of_numerics: float) -> str:
-    """E and the parts of U_val in words."""
-    e, joint = value.value - datum.value, math.hypot(value.half, datum.half, of_inputs, of_numerics)
-    return (f"E = {e:.3g} {'exceeds' if abs(e) > joint else 'is within'} U_val = {joint:.2g}; U_D = {datum.half:.2g}, "
-            f"scatter in time {value.half:.2g}, U_input = {of_inputs:.2g}, U_num = {of_numerics:.2g}")
 
 
 def speeds(drums: list[Tumbler], beside: bool) -> Curve:
@@ -117,9 +110,9 @@ def study(name: str, points: Points, along: str) -> Measurement:
         found = [measured(point, quantity) for point in points]
         half = (0.5 if name == "friction" else 1.0) * float(np.ptp([one.value for one in found]))
         one = measured(middle, quantity)
-        parts = (half, 0.0) if name == "friction" else (0.0, half)
+        varied = {"input": half, "num": 0.0} if name == "friction" else {"input": 0.0, "num": half}
         values[quantity] = Value(Estimate(one.value, math.hypot(one.half, half), "scatter in time and what is varied"), datum[quantity],
-                                 detail=error(one, datum[quantity], *parts))
+                                 detail=compared(one.value, datum[quantity], sim=one.half, **varied).text)
     curves = [profile(quantity, quantity.replace("_", " "), along, quantity, places,
                       [np.array([measured(point, quantity).value for point in points])]) for quantity in FLOW]
     return Measurement(values, curves)

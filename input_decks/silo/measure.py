@@ -15,6 +15,7 @@ from dembark.postproc.measurement import Measurement, Points, Replica, Replicas
 def prepare(replica: Replica) -> None:
     """What needs no other replica: done while they still run."""
     silo.scalars(read(replica))
+    silo_fields.read(replica)
 
 
 def measure(replicas: Replicas) -> Measurement:

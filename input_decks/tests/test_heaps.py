@@ -1,4 +1,4 @@
-"""granular_collapse and angle_of_repose: both engines form a deposit and a heap, and wrong physics is seen beside the measurements."""
+"""granular_collapse and angle_of_repose: engines form a deposit and a heap, and wrong physics is seen beside the measurements."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from dembark.postproc.instruments.heaps import EDGE, at_rest, flank, front, powe
 from dembark.postproc.measurement import Measurement
 from dembark.postproc.replica import Replica
 from dembark.postproc.tests.dumps import grains_text
+from dembark.validation.case.folders import find
 
 collapse, repose = module("granular_collapse"), module("angle_of_repose")
-ENGINES = ("liggghts", "yade")
+ENGINES = find("granular_collapse").engines
 D = 0.005
 WIDTHS = [0.06, 0.085, 0.12]
 Verdicts = dict[str, dict[str, Any]]
@@ -243,7 +244,7 @@ def test_a_column_without_friction_runs_out_farther(run: Any) -> None:
     assert smooth["run_out"] > 1.1 * rough["run_out"] and smooth["final_height"] < 0.8 * rough["final_height"], (rough, smooth)
 
 
-@pytest.mark.parametrize(("engine", "confinement"), [("liggghts", 0.25), ("yade", 0.25), ("yade", 0.0)])
+@pytest.mark.parametrize(("engine", "confinement"), [("liggghts", 0.25), ("yade", 0.25), ("yade", 0.0), ("lammps", 0.0)])
 def test_a_heap_stays_on_the_plate(engine: str, confinement: float, run: Any) -> None:
     one = run("angle_of_repose", engine, confinement=confinement)
     frames = one.grains()

@@ -1,4 +1,4 @@
-"""hopper_discharge: a known discharge is measured as it is, wrong ones fail, and both engines empty a small bin alike."""
+"""hopper_discharge: a known discharge is measured as it is, wrong ones fail, and engines empty a small bin alike."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.validation.case.folders import find
 
 hopper = module("hopper_discharge")
 
@@ -96,7 +97,7 @@ SMALL = {"grain_count": 150, "bin_width": 0.03, "outlet_width": 0.0134, "settle_
          "fall": 0.1}
 
 
-@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+@pytest.mark.parametrize("engine", find("hopper_discharge").engines)
 def test_a_small_bin_stays_shut_and_then_empties_to_its_slopes(engine: str, decks: Any, tmp_path: Path) -> None:
     one = decks("hopper_discharge", engine, tmp_path, SMALL)
     one.run()

@@ -1,4 +1,4 @@
-"""The decks of liquid_exchange: books that are the reference's in both engines, also after a restart."""
+"""The decks of liquid_exchange: books that are the reference's in all engines, also after a restart."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ import pytest
 from dembark.common.errors import DembarkError
 from dembark.input_decks.tests.measuring import judged, module, names
 from dembark.postproc import read_times
+from dembark.validation.case.folders import find
 
 ENGINES = ("liggghts", "yade")
 SHORT = {"duration": 0.2, "rows": 200}
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", find("liquid_exchange").engines)
 @pytest.mark.parametrize("variant", ["cap", "limited"])
 def test_books_are_those_of_the_rule(tmp_path: Path, engine: str, variant: str, decks: Any) -> None:
     one = decks("liquid_exchange", engine, tmp_path, SHORT, variant)

@@ -18,7 +18,7 @@ from dembark.validation.case.folders import find
 
 CASE = find("oblique_impact")
 oblique = module("oblique_impact")
-ENGINES = ("liggghts", "yade")
+ENGINES = CASE.engines
 # What the law cannot, for it has no partial slip; the first three by far.
 LACKING = {"tangential_restitution_2", "tangential_restitution_4", "spin_6", "tangential_restitution_10"}
 FAR_OFF = LACKING - {"tangential_restitution_10"}

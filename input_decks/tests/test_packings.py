@@ -15,6 +15,8 @@ RANDOM = ("column_collapse", "debarking_drum", "gravity_channel", "log_pile", "p
 FEWER = {
     "rotating_drum": "a drum that turns steadily forgets its packing: intervals come from blocks of its time; `full` has three packings",
     "hopper_discharge": "the rate is a mean over thousands of grains of one long run; `full` has three packings",
+    "avalanche": "single grains have no packing, and chutes flow steadily; the avalanches themselves have five",
+    "vibrated_layer": "waves forget the packing within tens of periods: intervals come from windows of time",
 }
 
 

@@ -119,12 +119,14 @@ def test_no_grain_falls_through_the_base_after_a_restart(case: str, values: dict
     ("silo", "liggghts", 1, SILO), ("silo", "yade", 1, SILO), ("plug_flow", "liggghts", 2, PLUG),
     ("gravity_channel", "liggghts", 2, CHANNEL), ("gravity_channel", "yade", 1, CHANNEL), ("log_pile", "liggghts", 1, PILE),
     ("log_pile", "yade", 1, PILE), ("column_collapse", "liggghts", 2, COLUMN), ("column_collapse", "yade", 1, COLUMN),
-    ("angle_of_repose", "liggghts", 1, BED), ("angle_of_repose", "yade", 1, BED)])
+    ("angle_of_repose", "liggghts", 1, BED), ("angle_of_repose", "yade", 1, BED),
+    ("silo", "lammps", 2, SILO), ("plug_flow", "lammps", 1, PLUG), ("gravity_channel", "lammps", 1, CHANNEL),
+    ("log_pile", "lammps", 1, PILE), ("column_collapse", "lammps", 1, COLUMN)])
 def test_killed_run_goes_on_to_the_same_bytes(case: str, engine: str, ranks: int, values: dict[str, Any], both: Any) -> None:
     whole, broken, step = both(case, engine, values, ranks)
     if case == "log_pile":
         # A state that was cut is passed over.
-        state = broken.folder / f"state.{step}.{'restart' if engine == 'liggghts' else 'yade.gz'}"
+        state = broken.folder / f"state.{step}.{'yade.gz' if engine == 'yade' else 'restart'}"
         state.write_bytes(state.read_bytes()[:-100])
         step -= values["restart_every"]
     assert f"dembark: resumed at step {step} exactly" in broken.go(resume="yes")
@@ -136,7 +138,7 @@ def test_killed_run_goes_on_to_the_same_bytes(case: str, engine: str, ranks: int
     assert [name for name in one if one[name] != other[name]] == []
 
 
-@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
 def test_resuming_without_a_state_says_so(engine: str, prepared: Any) -> None:
     deck = prepared("silo", engine, SILO).deck
     assert deck.start(resume="yes").wait(60) != 0
@@ -178,10 +180,10 @@ def planned(engine: str) -> plan.Run:
         pytest.skip(str(error))
 
 
-@pytest.mark.parametrize(("engine", "number"), [("liggghts", signal.SIGTERM), ("yade", signal.SIGKILL)])
+@pytest.mark.parametrize(("engine", "number"), [("liggghts", signal.SIGTERM), ("yade", signal.SIGKILL), ("lammps", signal.SIGKILL)])
 def test_harness_resumes_what_was_ended_from_outside(engine: str, number: int, tmp_path: Path) -> None:
     one = planned(engine)
-    used = Resources(restart_interval={"liggghts": 0.05, "yade": 0.5}[engine])
+    used = Resources(restart_interval={"liggghts": 0.05, "yade": 0.5, "lammps": 0.05}[engine])
     caught: list[Exception] = []
 
     def attempt() -> None:

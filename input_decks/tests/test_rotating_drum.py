@@ -1,4 +1,4 @@
-"""rotating_drum: flows that are known are measured as they are, wrong ones fail, and both engines turn the drum alike."""
+"""rotating_drum: flows that are known are measured as they are, wrong ones fail, and engines turn the drum alike."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import pytest
 
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.postproc.instruments.tumbler import read
+from dembark.validation.case.folders import find
 
 drum = module("rotating_drum")
 JUDGED = {"surface_speed", "zero_crossing", "layer_depth"}
@@ -96,7 +97,7 @@ def test_the_study_adds_what_friction_makes_of_it() -> None:
 SMALL = {"drum_radius": 0.03, "drum_speed": 4.0, "solid_filling": 0.15, "run_in": 0.25, "measure_time": 0.05, "frames": 10}
 
 
-@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+@pytest.mark.parametrize("engine", find("rotating_drum").engines)
 def test_grains_go_up_with_the_lining_and_back_along_the_surface(engine: str, decks: Any, tmp_path: Path) -> None:
     one = decks("rotating_drum", engine, tmp_path, SMALL)
     one.run()
@@ -109,7 +110,7 @@ def test_grains_go_up_with_the_lining_and_back_along_the_surface(engine: str, de
     np.testing.assert_allclose(glued.velocities, np.cross([0.0, 0.0, 4.0], glued.positions), atol=2e-3 * 4.0 * 0.0315)
 
 
-@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+@pytest.mark.parametrize("engine", find("rotating_drum").engines)
 def test_a_smooth_wall_holds_the_grains_and_drags_them_the_same_way(engine: str, decks: Any, tmp_path: Path) -> None:
     one = decks("rotating_drum", engine, tmp_path, SMALL | {"wall_lining": "smooth", "run_in": 0.1})
     one.run()
@@ -123,7 +124,6 @@ def test_a_smooth_wall_holds_the_grains_and_drags_them_the_same_way(engine: str,
 def test_the_lattice_leaves_no_two_grains_in_touch() -> None:
     """Nor one of them and the lining."""
     from dembark.validation.case import deck
-    from dembark.validation.case.folders import find
     values = defaults("rotating_drum", **SMALL | {"wall_lining": "grains"})
     packed = deck.prepare(find("rotating_drum"), values).packing
     assert packed is not None

@@ -1,0 +1,65 @@
+"""Bead chain: when the wave passes two contacts, and with which force."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from dembark.postproc.instruments.growth import Growth, ordered
+from dembark.postproc.measurement import Array, Measurement, Points, Replica, Replicas, Value, exact, profile
+from dembark.postproc.studies import fitted_exponent, measured
+
+# Of a solitary wave in Hertz's chain: V = 0.9055157 d k^(1/3) F^(1/6) / sqrt(m), from integration of 60 spheres to 1e-6.
+SPEED = 0.9055157
+# Contacts that are compared, as parts of the row.
+NEAR, FAR = 0.4, 0.8
+
+
+def forces(run: Replica) -> tuple[Array, Array]:
+    """Times (frames,) in s, and forces (frames, contacts) in N from the overlaps."""
+    frames = list(run.grains())
+    overlap = run.parameters["grain_diameter"] - np.diff([frame.positions[:, 0] for frame in frames], axis=1)
+    return run.time_step * np.array([frame.step for frame in frames]), run.derived["stiffness"] * np.maximum(overlap, 0.0) ** 1.5
+
+
+def peak(times: Array, force: Array) -> tuple[float, float]:
+    """Time (s) and height (N) of the largest `force` (n,) at evenly spaced `times`, by the parabola through it and its neighbours; NaN at
+    an end of the record."""
+    k = int(force.argmax())
+    if k in (0, len(force) - 1):
+        return math.nan, math.nan
+    left, middle, right = force[k - 1 : k + 2]
+    shift = 0.5 * (left - right) / (left - 2.0 * middle + right)
+    return float(times[k] + shift * (times[1] - times[0])), float(middle - 0.25 * (left - right) * shift)
+
+
+def measure(replicas: Replicas) -> Measurement:
+    """Speed and force of the wave of the one run: nothing is random."""
+    run = replicas[0]
+    times, force = forces(run)
+    near, far = (round(part * force.shape[1]) for part in (NEAR, FAR))
+    (begun, first), (ended, last) = peak(times, force[:, near]), peak(times, force[:, far])
+    diameter = run.parameters["grain_diameter"]
+    speed, high = (far - near) * diameter / (ended - begun), math.sqrt(first * last)
+    due = SPEED * diameter * run.derived["stiffness"] ** (1.0 / 3.0) * high ** (1.0 / 6.0) / math.sqrt(run.derived["mass"])
+    values = {"wave_speed": Value(exact(speed / due), exact(1.0)), "wave_decay": Value(exact(last / first), exact(1.0)),
+              "velocity": Value(exact(speed)), "peak_force": Value(exact(high))}
+    middle = int(np.argmin(np.abs(times - 0.5 * (begun + ended))))
+    return Measurement(values, [
+        profile("wave", "Force along the row, when the wave is between both places", "contact", "N", np.arange(1.0, force.shape[1] + 1.0),
+                [force[middle]])])
+
+
+def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001 (there is one study)
+    """Power of the force with which the speed grows."""
+    points, _ = ordered(points, along)
+    force = np.array([_value(point, "peak_force") for point in points])
+    speed = np.array([_value(point, "velocity") for point in points])
+    growth = Growth(force, speed, 0.0 * speed)
+    return Measurement({"force_exponent": Value(exact(fitted_exponent(force, speed)), exact(1.0 / 6.0))},
+                       [growth.curve("speed", "Speed of the wave", "largest force (N)", "m/s", 1.0 / 6.0, "∝ F^(1/6)")])
+
+
+def _value(point: Mapping[str, Any], name: str) -> float:
+    return measured(point, name).value

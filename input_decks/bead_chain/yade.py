@@ -1,0 +1,17 @@
+"""Bead chain: spheres that touch in a row; the first has a speed."""
+
+from yade import dembark
+
+p = dembark.parameters()
+materials, ids = dembark.begin(p)
+writer = dembark.FrameWriter()
+
+
+def record():
+    """Write what is due at this step."""
+    if O.iter % p.stride == 0:
+        writer.write()
+
+
+O.engines = dembark.engine_loop(p, dembark.contact_loop(p, materials, []), [Bo1_Sphere_Aabb()], 0.1 * p.grain_diameter, (0, 0, 0))
+dembark.run(p.steps, outputs=("time.csv", "grains.dump"))

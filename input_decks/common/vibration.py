@@ -1,0 +1,54 @@
+"""What the set-ups of vibrated runs share: a step that suits the impacts, and output at fixed phases of the drive."""
+
+import math
+
+from dembark.common.errors import DembarkError
+from dembark.input_decks.common.motion import amplitude
+from dembark.input_decks.common.setup import Number, Parameters, time_step
+
+# Frames a period, as `dembark.postproc.instruments.phases` has them.
+PHASES = 8
+# How far grains may give way in an impact at the highest speed of the wall, over d; steps that such an impact has to last.
+DEEPEST, SHORTEST = 0.02, 25
+
+
+def highest_speed(p: Parameters) -> float:
+    """A omega (m/s) of a harmonic or circular motion."""
+    return 2.0 * math.pi * p.motion_frequency * amplitude(p)
+
+
+def impact(p: Parameters, speed: float) -> tuple[float, float]:
+    """Overlap (m) and duration (s) of the impact of two mean grains at `speed` (m/s): Hertz, without damping.
+
+    delta^(5/2) = 15 m* v^2 / (16 E* sqrt(R*)), T = 2.9433 delta / v; K. L. Johnson, Contact Mechanics (1985) section 11.4.
+    """
+    radius = 0.5 * p.grain_diameter
+    mass = 0.5 * p.grain_density * 4.0 / 3.0 * math.pi * radius**3
+    modulus = 0.5 * p.youngs_modulus / (1.0 - p.poisson_ratio**2)
+    depth = (15.0 * mass * speed**2 / (16.0 * modulus * math.sqrt(0.5 * radius))) ** 0.4
+    return depth, 2.9433 * depth / speed
+
+
+def suitable_step(p: Parameters, speed: float) -> float:
+    """Time step (s) by `time_step_fraction`; DembarkError when grains are too soft, or it is too long, for impacts at `speed` (m/s)."""
+    depth, lasts = impact(p, speed)
+    if depth > DEEPEST * p.grain_diameter:
+        raise DembarkError(f"grains that meet at {speed:.3g} m/s overlap by {depth / p.grain_diameter:.3g} d",
+                           "the highest speed of the wall", f"raise youngs_modulus until it is below {DEEPEST} d")
+    if lasts < SHORTEST * time_step(p):
+        raise DembarkError(f"an impact at {speed:.3g} m/s lasts {lasts / time_step(p):.3g} steps", "the highest speed of the wall",
+                           f"lower time_step_fraction until it lasts {SHORTEST}")
+    return time_step(p)
+
+
+def fixed_phases(frequency: float, time_step: float, start: float, periods: int, rows: int = 16) -> tuple[float, dict[str, Number]]:
+    """Time step (s), at most `time_step`, of which a whole number makes a period of the drive with `frequency` (Hz); and output steps.
+
+    Frames from the end of period `start` (made up to a whole one) on to the end of `periods` more, eight a period and the first one;
+    `rows` rows of time.csv from one frame to the next, over the whole run. `period_steps` are the steps of a period.
+    """
+    every = math.ceil(1.0 / (frequency * time_step * PHASES * rows))
+    stride = every * rows
+    period, begun = stride * PHASES, math.ceil(start)
+    return 1.0 / (frequency * period), {"period_steps": period, "first": begun * period, "stride": stride,
+                                        "steps": (begun + periods) * period, "every": every}

@@ -1,0 +1,72 @@
+"""Drive power: what a shaken bed takes from the plate, beside a block that sticks where it lands, and how it rises when shaken hard."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from dembark.postproc.instruments.drive import PARTS, Drive, phases, read, sticking_block, transients
+from dembark.postproc.instruments.growth import Growth, ordered
+from dembark.postproc.instruments.momentum import imbalance
+from dembark.postproc.instruments.phases import acceleration
+from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas, Value, exact, over_replicas
+from dembark.postproc.studies import measured
+
+# Up to this coefficient of restitution the bed counts as one that sticks.
+STICKS = 0.3
+ONE = "one run of a chaotic motion says nothing about its spread"
+# Middle of the published range of the exponent, by the number of dimensions in which grains move.
+RISE = {2: 1.4, 3: 1.0}
+
+
+def measure(replicas: Replicas) -> Measurement:
+    """Values, curves and remarks from all replicas of a series."""
+    runs, p = [read(replica) for replica in replicas], replicas[0].parameters
+    block = sticking_block(acceleration(p)) if p["restitution"] <= STICKS else None
+    diameter = p["grain_diameter"]
+
+    def over(number: Callable[[Drive], Estimate], scale: float = 1.0) -> Estimate:
+        found = over_replicas([number(one) for one in runs])
+        return Estimate(found.value / scale, found.half / scale, found.basis)
+
+    def worst(number: Callable[[Drive], float]) -> Value:
+        return Value(exact(max((number(one) for one in runs), key=lambda gap: np.inf if np.isnan(gap) else abs(gap))), exact(0.0))
+
+    def once(number: Callable[[Drive], float]) -> Value:
+        return Value(over(lambda one: Estimate(number(one), math.inf, ONE)))
+
+    values = {
+        "energy_balance": worst(lambda one: imbalance(one.rows, PARTS)),
+        "power_gap": worst(Drive.power_gap),
+        "dissipation_gap": worst(Drive.dissipation_gap),
+        "power": Value(over(Drive.power), exact(block.power) if block else None),
+        "force_power": Value(over(lambda one: one.power("plate_work"))),
+        "flight": Value(over(Drive.flight), exact(block.flight) if block else None),
+        "rise": Value(over(Drive.rise, diameter)),
+        "kinetic_energy": Value(over(Drive.kinetic, runs[0].weight * diameter)),
+        "power_time": once(Drive.power_time),
+        "rise_time": once(Drive.rise_time),
+        "acceleration": Value(exact(acceleration(p))),
+        "speed": Value(exact(runs[0].speed / math.sqrt(p["gravity"] * diameter))),
+    }
+    if p["rest_periods"]:
+        values["compaction"] = once(lambda one: one.compaction() or 0.0)
+    return Measurement(values, [*transients(runs), phases(runs, block)])
+
+
+def study(name: str, points: Points, along: str) -> Measurement:
+    """How the gap between both powers grows with the step; how the rise and the kinetic energy of a bed shaken hard grow with the speed of
+    the plate, at one frequency."""
+    points, place = ordered(points, along)
+    if name == "step":
+        gaps = Growth(place, np.array([abs(measured(point, "power_gap").value) for point in points]), np.zeros(len(points)))
+        told = ", ".join(f"{gap:.2e} at {step:g}" for step, gap in zip(place, gaps.values, strict=True))
+        return Measurement({"power_gap_order": Value(gaps.exponent, exact(2.0), detail=f"gaps {told} of the Rayleigh time")},
+                           [gaps.convergence("power_gap", "Gap between both powers", "time step over the Rayleigh time", 2.0)])
+    dimensions = int(points[0]["parameters"]["dimensions"])
+    speeds = np.array([measured(point, "speed").value for point in points])
+    rise, energy = (Growth.of(points, quantity, speeds) for quantity in ("rise", "kinetic_energy"))
+    return Measurement(
+        {f"rise_exponent_{dimensions}d": Value(rise.exponent, exact(RISE[dimensions])), "energy_exponent": Value(energy.exponent)},
+        [rise.curve("rise", "Rise of the centre of mass", "V / √(g d)", "Δz / d", RISE[dimensions], f"∝ V^{RISE[dimensions]:g}"),
+         energy.curve("kinetic_energy", "Kinetic energy", "V / √(g d)", "E / (M g d)", 2.0, "∝ V²")])

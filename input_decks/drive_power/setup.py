@@ -1,0 +1,40 @@
+"""Drive power: a dilute bed above a plate in a periodic box, and the steps of output at fixed phases of the drive."""
+
+import math
+from dataclasses import replace
+
+from dembark.input_decks.common import packing
+from dembark.input_decks.common.motion import amplitude, motion
+from dembark.input_decks.common.setup import Parameters, Setup, contacts, strip
+from dembark.input_decks.common.vibration import fixed_phases, highest_speed, suitable_step
+
+
+def setup(p: Parameters) -> Setup:
+    """The bed falls on the plate at rest, for whole periods; then the amplitude grows, stays, and falls again where that is asked for."""
+    frequency, d_max = p.motion_frequency, packing.largest(p)
+    still = math.ceil(p.settle_time * frequency)
+    start = still + p.motion_ramp + p.run_in
+    stop = (math.ceil(start) + p.periods) / frequency if p.rest_periods else None
+    moving = motion(p, start=still / frequency, until=stop)
+    step, numbers = fixed_phases(frequency, suitable_step(p, highest_speed(p)), start, p.periods)
+    period, held = numbers["period_steps"], numbers["steps"]
+    if p.rest_periods:
+        numbers["steps"] = held + (math.ceil(p.motion_ramp) + p.rest_periods) * period
+    sites, height = bed(p, d_max)
+    box = [(0.0, p.cell_width), (0.0, p.cell_depth), (-amplitude(p) - 2.0 * d_max, height + p.headroom)]
+    grains = packing.grains(p, sites, box)
+    if p.dimensions == 2:
+        # Nothing pushes them out of their common plane.
+        grains = replace(grains, positions=grains.positions * [1, 0, 1] + [0, 0.5 * p.cell_depth, 0])
+    plate = strip((0.0, 0.0, 0.0), (p.cell_width, 0.0, 0.0), p.cell_depth)
+    more = {"begin": still * period, "held": held}
+    return Setup(numbers["steps"], step, grains, {**numbers, **more, **contacts(p, skin=0.2)}, {"plate": plate},
+                 {"motion_words": moving.words})
+
+
+def bed(p: Parameters, d_max: float) -> tuple[packing.Array, float]:
+    """Sites (n, 3) in m of a dilute bed above z = 0, and its height (m); those of a plane have one row."""
+    least = 1.15 * d_max
+    n_x, n_y = int(p.cell_width / least), int(p.cell_depth / least) if p.dimensions == 3 else 1
+    layers = math.ceil(1.3 * p.grain_count / (n_x * n_y))
+    return packing.lattice((n_x, n_y, layers), (p.cell_width / n_x, p.cell_depth / n_y, least), (0.0, 0.0, 0.15 * d_max)), layers * least

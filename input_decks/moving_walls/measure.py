@@ -1,0 +1,104 @@
+"""Moving walls: forces on held grains beside the contact law, on a bed beside one at rest, landings of a grain, impulse of the walls."""
+
+import math
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from dembark.input_decks.common.motion import amplitude, motion
+from dembark.physics import effective_youngs_modulus
+from dembark.postproc.instruments.moving_plate import Contact, landings, touched, turned
+from dembark.postproc.measurement import Array, Curve, Measurement, Points, Replica, Replicas, Value, exact, profile
+
+# Landings that are compared; speed (m/s) of the impact whose duration they are compared by.
+LANDINGS, USUAL = 5, 0.3
+
+
+def measure(replicas: Replicas) -> Measurement:
+    """Values and curves of the one run: nothing is random."""
+    run = replicas[0]
+    scene = {"held": _held, "bed": _bed, "bounce": _bounce}[run.parameters["scene"]]
+    values, curves = scene(run)
+    return Measurement({name: Value(exact(value), exact(0.0)) for name, value in values.items()}, curves)
+
+
+def contact(run: Replica) -> Contact:
+    """Of a grain on the plate, which is of the same material."""
+    p = run.parameters
+    radius = 0.5 * p["grain_diameter"]
+    modulus = effective_youngs_modulus(p["youngs_modulus"], p["poisson_ratio"], p["youngs_modulus"], p["poisson_ratio"])
+    return Contact(radius, p["grain_density"] * 4.0 / 3.0 * math.pi * radius**3, modulus, p["restitution"])
+
+
+def _frames(run: Replica) -> tuple[Array, Array, Array]:
+    """Times (frames,) in s, positions and forces (frames, grains, 3) in m and N."""
+    frames = list(run.grains())
+    return (run.time_step * np.array([frame.step for frame in frames]), np.array([frame.positions for frame in frames]),
+            np.array([frame.forces for frame in frames]))
+
+
+def _held(run: Replica) -> tuple[dict[str, float], list[Curve]]:
+    p, law, (times, places, forces) = run.parameters, contact(run), _frames(run)
+    if p["turning"]:
+        along = np.array([run.derived[f"along_{axis}"] for axis in "xyz"])
+        height, speed = turned(places[0], times, p["turning"], along)
+        due = law.force(law.radius - height, speed)
+        found = np.linalg.norm(forces, axis=2)
+        error = float(np.abs(found - due).max() / due.max())
+        return {"contact_error": error}, [_curve("force", "Force of the plate on the first grain", times, found[:, 0], due[:, 0], "N")]
+    way = motion(SimpleNamespace(**p)).displacement(times)[:, 2]
+    plate = places[:, 0, 2] - law.radius + law.overlap(forces[:, 0, 2])
+    late = times > p["motion_ramp"] / p["motion_frequency"]
+    size = amplitude(SimpleNamespace(**p))
+    last = times > times[-1] - 2.0 / p["motion_frequency"]
+    return {"place_error": float(np.abs(plate - way)[late].max() / size)}, [
+        _curve("place", "Place of the plate, by the force on a held grain", times[last], plate[last], way[last], "m")]
+
+
+def _bed(run: Replica) -> tuple[dict[str, float], list[Curve]]:
+    times, _, forces = _frames(run)
+    frames, rows = list(run.grains()), run.times()
+    masses = frames[0].masses
+    gravity = np.array([run.derived[f"gravity_{axis}"] for axis in "xyz"])
+    momentum = [np.einsum("n,na->a", masses, frame.velocities) for frame in (frames[0], frames[-1])]
+    begun = int(np.flatnonzero(rows["step"] == frames[0].step)[0])
+    impulse = np.array([rows[f"plate_j{axis}"][-1] - rows[f"plate_j{axis}"][begun] for axis in "xyz"])
+    weight, lasts = masses.sum() * np.linalg.norm(gravity), times[-1] - times[0]
+    missing = impulse + masses.sum() * gravity * lasts - (momentum[1] - momentum[0])
+    push = (forces - masses[:, None] * gravity).ravel()
+    label = "frame by frame, grain by grain, x, y, z"
+    return {"impulse_error": float(np.linalg.norm(missing) / (weight * lasts))}, [
+        profile("forces", "Forces of contacts on all grains", label, "N", np.arange(len(push), dtype=float), [push])]
+
+
+def _bounce(run: Replica) -> tuple[dict[str, float], list[Curve]]:
+    p, law, rows = run.parameters, contact(run), run.times()
+    way = motion(SimpleNamespace(**p))
+    due = landings(LANDINGS, lambda t: float(way.displacement(t)[2]), lambda t: float(way.velocity(t)[2]), run.derived["gap"],
+                   p["gravity"], law)
+    found = touched(np.append(0.0, rows["time"]), np.append(0.0, rows["plate_fz"]))
+    expected = np.array([time for time, _ in due])
+    if len(found) < LANDINGS:
+        return {}, []
+    number = np.arange(1.0, LANDINGS + 1.0)
+    return {"landing_error": float(np.abs(found[:LANDINGS] - expected).max() / law.duration(USUAL))}, [
+        profile("landings", "Landings", "number", "time (s)", number, [found[:LANDINGS]], reference=expected,
+                reference_label="event-driven")]
+
+
+def _curve(name: str, title: str, times: Array, found: Array, due: Array, unit: str) -> Curve:
+    return profile(name, title, "time (s)", unit, times, [found], reference=due, reference_label="as prescribed")
+
+
+def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001 (there is one study)
+    """Forces in vessels that move beside those in vessels at rest."""
+    forces = {point["parameters"][along]: _forces(point) for point in points}
+    pairs = {"speed_error": ("speed", "rest"), "push_error": ("push", "tilt")}
+    return Measurement({found: Value(exact(float(np.abs(forces[one] - forces[other]).max() / np.abs(forces[other]).max())), exact(0.0))
+                        for found, (one, other) in pairs.items()})
+
+
+def _forces(point: Mapping[str, Any]) -> Array:
+    return np.array(next(one["value"] for one in point["profiles"] if one["name"] == "forces"))

@@ -1,0 +1,174 @@
+"""drive_power: a block that sticks to the plate is measured as it moves, wrong energies fail, and both engines shake the bed."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import cumulative_trapezoid
+
+from dembark.common.errors import DembarkError
+from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.postproc import DumpError
+from dembark.postproc.instruments.drive import LONGEST, sticking_block
+
+drive = module("drive_power")
+ROWS, STILL, RAMP, STEADY = 128, 2, 10, 10
+CHECKS = {"energy_balance", "power_gap", "dissipation_gap", "power", "flight"}
+
+
+def shaken(real: float = 2.0, told: float | None = None, **changes: Any) -> Any:
+    """A block of 1 kg on a plate with the acceleration `real` g, of which the run says that it was `told`; 10 fine steps a row."""
+    fine = 10 * ROWS
+    p = defaults("drive_power", periods=STEADY, **changes)
+    omega, g = 2.0 * math.pi * p["motion_frequency"], p["gravity"]
+    top = real * g / omega**2
+    step = 1.0 / (p["motion_frequency"] * fine)
+    time = np.arange((STILL + RAMP + STEADY) * fine + 1) * step
+    moving = np.maximum(time - STILL / p["motion_frequency"], 0.0)
+    ramp = np.clip(moving * p["motion_frequency"] / RAMP, 0.0, 1.0)
+    grown = top * ramp**3 * (10.0 - 15.0 * ramp + 6.0 * ramp**2)
+    plate = grown * np.sin(omega * moving)
+    speed = np.gradient(plate, step)
+    z, v, force, height, motion = 0.0, 0.0, np.zeros(len(time)), np.zeros(len(time)), np.zeros(len(time))
+    for k in range(1, len(time)):
+        free = v - g * step
+        meets = z + free * step <= plate[k]
+        new = (plate[k] - z) / step if meets else free
+        force[k] = (new - v) / step + g if meets else 0.0
+        v, z = new, z + new * step
+        height[k], motion[k] = z, v
+    work = cumulative_trapezoid(force * speed, time, initial=0.0)
+    kinetic, fallen = 0.5 * motion**2, -g * height
+    table: dict[str, Any] = {"step": np.arange(len(time)), "time": time, "kinetic_energy": kinetic, "gravity": fallen, "walls": work,
+                             "normal_viscous": kinetic - fallen - work, "plate_fz": force, "plate_work": work, "weight_height": g * height}
+    zero = ["first_kinetic", "normal_elastic", "tangential_elastic", "tangential_viscous", "normal_stored", "tangential_stored", "balance"]
+    table |= {name: np.zeros(len(time)) for name in zero} | {"scale": np.full(len(time), 2.0 * work[-1])}
+    rows = {name: np.asarray(values[10::10]) for name, values in table.items()}
+    grain = SimpleNamespace(step=(STILL + RAMP) * fine, masses=np.ones(1))
+    p["motion_gamma"] = real if told is None else told
+    derived = {"begin": STILL * fine, "period_steps": fine, "held": (STILL + RAMP + STEADY) * fine}
+    return SimpleNamespace(parameters=p, derived=derived, times=lambda: rows, grains=lambda: [grain], time_step=step, folder=Path("run"))
+
+
+def verdicts(run: Any | None = None, **changes: Any) -> dict[str, Any]:
+    return judged("drive_power", drive.measure([run or shaken(**changes)]))
+
+
+def spoiled(**factors: float) -> Any:
+    """A right run with some columns of time.csv multiplied."""
+    run = shaken()
+    rows = run.times()
+    for name, factor in factors.items():
+        rows[name] = factor * rows[name]
+    return run
+
+
+@pytest.mark.parametrize(("acceleration", "flight", "power"), [
+    (1.5, 0.568, 0.180), (2.0, 0.742, 0.584), (2.5, 0.857, 0.897), (3.0, 0.950, 0.999)])
+def test_the_sticking_block(acceleration: float, flight: float, power: float) -> None:
+    block = sticking_block(acceleration)
+    assert block is not None
+    assert block.flight == pytest.approx(flight, abs=6e-4) and block.power == pytest.approx(power, abs=6e-4)
+
+
+def test_a_block_leaves_above_g_and_flies_for_a_whole_period_at_most() -> None:
+    assert sticking_block(1.0) is None and sticking_block(LONGEST) is None
+    low, high = sticking_block(1.0001), sticking_block(LONGEST - 1e-9)
+    assert low and low.flight < 0.01 and low.power < 1e-6
+    assert high and high.flight == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("acceleration", [1.5, 2.0, 3.0])
+def test_a_known_motion_is_measured_as_it_is(acceleration: float) -> None:
+    found = verdicts(real=acceleration)
+    assert names(found, "pass") == CHECKS
+    assert found["power"]["deviation"] == pytest.approx(0.0, abs=0.03) and found["flight"]["deviation"] == pytest.approx(0.0, abs=0.03)
+    assert found["acceleration"]["value"] == pytest.approx(acceleration)
+    assert 3.0 < found["power_time"]["value"] < RAMP
+
+
+@pytest.mark.parametrize(("run", "failed"), [
+    (lambda: shaken(told=2.6), {"power", "flight"}), (lambda: spoiled(plate_work=0.98), {"power_gap"}),
+    (lambda: spoiled(normal_viscous=0.97), {"dissipation_gap", "energy_balance"}), (lambda: spoiled(plate_fz=np.nan), set()),
+    (lambda: spoiled(kinetic_energy=1.001), {"energy_balance"}), (lambda: spoiled(walls=np.nan), {"energy_balance"}),
+])
+def test_wrong_runs_fail(run: Any, failed: set[str]) -> None:
+    assert failed <= names(verdicts(run()), "fail")
+
+
+def test_a_bed_that_bounces_is_not_compared_with_a_block_that_sticks() -> None:
+    assert not {"power", "flight"} & names(verdicts(restitution=0.9), "pass")
+
+
+def test_rows_that_make_no_periods_are_refused() -> None:
+    run = shaken()
+    run.derived["period_steps"] += 1
+    with pytest.raises(DumpError, match="no rows at whole periods"):
+        verdicts(run)
+
+
+def step_study(order: float) -> dict[str, Any]:
+    points = [{"parameters": {"time_step_fraction": step},
+               "quantities": [{"name": "power_gap", "value": -0.01 * step**order, "interval": None}]}
+              for step in (0.12, 0.03, 0.06)]
+    return judged("drive_power", drive.study("step", points, "time_step_fraction"))
+
+
+def rise_study(dimensions: int, power: float, spread: float = 0.01) -> dict[str, Any]:
+    points = []
+    for amplitude in (0.002, 0.004, 0.008):
+        found = {"speed": amplitude, "rise": amplitude**power, "kinetic_energy": amplitude**2}
+        points.append({"parameters": {"amplitude": amplitude, "dimensions": dimensions}, "quantities": [
+            {"name": name, "value": value, "interval": [value * (1.0 - spread), value * (1.0 + spread)]} for name, value in found.items()]})
+    return judged("drive_power", drive.study("rise", points, "amplitude"))
+
+
+@pytest.mark.parametrize(("order", "verdict"), [(2.0, "pass"), (2.15, "pass"), (1.0, "fail"), (3.0, "fail")])
+def test_the_gap_between_both_powers_is_of_second_order(order: float, verdict: str) -> None:
+    found = step_study(order)["power_gap_order"]
+    assert found["value"] == pytest.approx(order) and found["verdict"] == verdict
+
+
+@pytest.mark.parametrize(("dimensions", "power", "verdict"), [(2, 1.4, "pass"), (2, 2.0, "fail"), (3, 1.0, "pass"), (3, 1.5, "fail")])
+def test_the_exponent_of_the_rise(dimensions: int, power: float, verdict: str) -> None:
+    found = rise_study(dimensions, power)
+    assert found[f"rise_exponent_{dimensions}d"]["value"] == pytest.approx(power)
+    assert found[f"rise_exponent_{dimensions}d"]["verdict"] == verdict and found["energy_exponent"]["value"] == pytest.approx(2.0)
+
+
+SMALL = {"grain_count": 32, "youngs_modulus": 5e6, "motion_frequency": 25.0, "motion_ramp": 1, "settle_time": 0.06, "periods": 8}
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
+def test_the_power_of_the_plate_is_what_the_account_has(engine: str, simulate: Any) -> None:
+    run = simulate("drive_power", engine, SMALL)
+    measured = drive.measure([run])
+    found = judged("drive_power", measured)
+    assert {"energy_balance", "power_gap"} <= names(found, "pass"), found
+    assert abs(found["power_gap"]["value"]) < 1e-3 and 0.05 < found["power"]["value"] < 1.5
+    assert 0.1 < found["flight"]["value"] < 0.95
+    assert found["force_power"]["value"] == pytest.approx(found["power"]["value"], rel=1e-3)
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
+def test_spheres_in_a_plane_stay_in_it_and_rest_after_the_stop(engine: str, simulate: Any) -> None:
+    run = simulate("drive_power", engine, SMALL | {"dimensions": 2, "grain_count": 12, "rest_periods": 6})
+    frames = list(run.grains())
+    assert all((frame.positions[:, 1] == frames[0].positions[:, 1]).all() for frame in frames)
+    assert "compaction" in judged("drive_power", drive.measure([run]))
+    rows = run.times()
+    assert rows["kinetic_energy"][-1] < 0.01 * rows["kinetic_energy"][rows["step"] <= run.derived["held"]].max()
+
+
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"youngs_modulus": 5e6, "motion_gamma": 3.0}, "raise youngs_modulus"), ({"time_step_fraction": 0.3}, "lower time_step_fraction"),
+    ({"cell_width": 0.015}, "must be at least 4 grain_diameter"), ({"motion": "circular"}, "shakes up and down"),
+])
+def test_decks_that_do_not_suit_the_impacts_are_refused(changes: dict[str, Any], message: str, decks: Any, tmp_path: Path) -> None:
+    with pytest.raises(DembarkError, match=message):
+        decks("drive_power", "liggghts", tmp_path, changes)

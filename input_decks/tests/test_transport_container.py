@@ -1,0 +1,155 @@
+"""transport_container: known forces are measured as they are, wrong ones fail, and a small container keeps its momentum."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.postproc.instruments.container import ring_period, slid, tops
+from dembark.postproc.instruments.momentum import PARTS
+from dembark.postproc.tests.scenes import frame_of
+
+container = module("transport_container")
+D, G, DT, EVERY, ROWS, FIRST = 0.005, 9.81, 1e-4, 10, 600, 100
+Verdicts = dict[str, dict[str, Any]]
+
+
+def history(factor: float, duration: float, acceleration: float, mass: float, missed: float, lost: float) -> dict[str, np.ndarray]:
+    """Rows of a bed that takes `factor` times the force of a rigid one, of which the left wall has 0.7, and then rings with a period of
+    20 ms; the part `missed` of the left wall's impulse is not counted, the part `lost` of the damping not tallied."""
+    step = EVERY * np.arange(1.0, ROWS + 1.0)
+    time = DT * (step - EVERY * FIRST)
+    pulse = np.where((time > 0.0) & (time < duration), np.sin(math.pi * time / duration), 0.0) * acceleration * mass
+    ring = np.where(time >= duration, 0.05 * acceleration * mass * np.sin(2.0 * math.pi * (time - duration) / 0.02), 0.0)
+    force = factor * pulse + ring
+    rise = np.arange(ROWS) / (ROWS - 1.0)
+    table = {"step": step, "time": DT * step, "first_kinetic": np.zeros(ROWS), "gravity": rise, "walls": 0.01 * rise}
+    table |= dict.fromkeys(PARTS, -0.05 * rise) | {"normal_viscous": -0.3 * rise}
+    table["kinetic_energy"] = table["gravity"] + table["walls"] + sum(table[name] for name in PARTS)
+    table |= {name: np.zeros(ROWS) for name in ("other", "imposed", "balance")} | {"scale": 1e-3 + 2.0 * rise}
+    table["normal_viscous"] = (1.0 - lost) * table["normal_viscous"]
+    impulse = np.concatenate([[0.0], np.cumsum(0.5 * DT * EVERY * (force[1:] + force[:-1]))])
+    mean = np.concatenate([[0.0], 0.5 * (force[1:] + force[:-1])])
+    # The mean over a row's steps such that the impulse is that of the trapezoidal rule.
+    mean[1:] += 0.5 * np.diff(force) / EVERY
+    table |= {"momentum_x": impulse, "vessel_fx": force, "vessel_mx": mean}
+    for name, share in (("left", 0.7 * (1.0 - missed)), ("right", 0.1), ("base", 0.2)):
+        table[f"{name}_jx"] = share * impulse
+    return table
+
+
+def run(factor: float = 1.1, *, missed: float = 0.0, lost: float = 0.0, slides_at: float = 0.0, **changes: Any) -> Any:
+    """A run of 200 grains; on a ramp, and where it is tilted, the surface slides from the slope `slides_at` of effective gravity on."""
+    p = defaults("transport_container", settle_time=FIRST * EVERY * DT, **changes)
+    places = np.array([(D * (i + 0.5), 0.0, D * (k + 0.5)) for i in range(40) for k in range(5)])
+    length, first, mass = 40.0 * D, FIRST * EVERY, 200.0
+    derived = {"first": first, "length": length}
+    given = SimpleNamespace(parameters=p, derived=derived, time_step=DT)
+    way = container.moving(given)
+
+    def frames() -> list[Any]:
+        made = []
+        for k in range(51):
+            step = first + 100 * k
+            time = DT * step
+            turn, moved = float(np.asarray(way.angle(time))), np.asarray(way.displacement(time))
+            slope = abs(math.tan(turn)) if p["motion"] == "rotation" else abs(float(np.asarray(way.acceleration(time))[0])) / G
+            own = places - np.array([0.5 * length, 0.0, 0.0])
+            own[:, 0] += np.where(own[:, 2] > 4.0 * D, 5.0 * D * max(0.0, slope - slides_at) / 0.1, 0.0) * (slides_at > 0.0)
+            sine, cosine = math.sin(turn), math.cos(turn)
+            there = np.column_stack([own[:, 0] * cosine + own[:, 2] * sine, own[:, 1], own[:, 2] * cosine - own[:, 0] * sine])
+            push = np.zeros((200, 3))
+            push[:5, 0] = 1.0
+            made.append(frame_of(there + moved + np.array([0.5 * length, 0.0, 0.0]), 0.5 * D, {"vessel": push}, step=step))
+        return made
+
+    rows = history(factor, p["motion_duration"], p["motion_acceleration"], mass, missed, lost)
+    return SimpleNamespace(parameters=p, derived=derived, time_step=DT, times=lambda: rows, grains=frames)
+
+
+def verdicts(**changes: Any) -> Verdicts:
+    return judged("transport_container", container.measure([run(**changes)]))
+
+
+def study(name: str, along: str, places: list[float], quantities: dict[str, list[float]]) -> Verdicts:
+    """What the study makes of quantities known within 1 %."""
+    given = [{"parameters": defaults("transport_container") | {along: place}, "quantities": [
+        {"name": key, "value": values[k], "interval": [0.99 * values[k], 1.01 * values[k]], "basis": ""}
+        for key, values in quantities.items()]} for k, place in enumerate(places)]
+    return judged("transport_container", container.study(name, given, along))
+
+
+def pulses(slow: float) -> Verdicts:
+    """Pulses of 5 ms to 1 s of a bed that rings with 1 √(d/g), the longest of which takes `slow` times the rigid force."""
+    return study("pulse", "motion_duration", [0.005, 0.02, 0.08, 1.0],
+                 {"amplification": [0.4, 1.3, 1.5, slow], "ring_period": [1.0, 1.0, 1.0, 1.0]})
+
+
+def onset(ramp: float) -> Verdicts:
+    """A bed that slides at the slope `ramp` when it is accelerated, and at 0.4 when it is tilted."""
+    return study("onset", "motion_rate", [0.0, 0.275, 0.55], {"slide_slope": [ramp, 0.4, 0.4]})
+
+
+def test_known_forces_are_measured_as_they_are() -> None:
+    found = verdicts(factor=1.25)
+    assert names(found, "pass") == {"energy_balance", "impulse_error"}
+    value = {name: one["value"] for name, one in found.items()}
+    assert value["amplification"] == pytest.approx(1.25, rel=2e-3) and value["rear_share"] == pytest.approx(0.7 * 1.25, rel=2e-3)
+    assert value["ring_period"] * math.sqrt(D / G) == pytest.approx(0.02, rel=0.01)
+
+
+def test_what_is_not_counted_is_seen() -> None:
+    assert names(verdicts(missed=1e-6), "fail") == {"impulse_error"}
+    assert names(verdicts(lost=1e-8), "fail") == {"energy_balance"}
+
+
+@pytest.mark.parametrize("motion", [{"motion_shape": "rising", "motion_acceleration": 7.848, "motion_duration": 0.5},
+                                    {"motion": "rotation", "motion_direction": "y", "motion_rate": 1.2}])
+def test_the_slope_at_which_the_surface_slides(motion: dict[str, Any]) -> None:
+    # Half a diameter after the slope has grown by 0.01.
+    assert verdicts(slides_at=0.3, **motion)["slide_slope"]["value"] == pytest.approx(0.31, abs=0.004)
+    assert verdicts(slides_at=5.0, **motion)["slide_slope"]["value"] is None
+
+
+def test_a_slow_pulse_pushes_a_rigid_body() -> None:
+    assert pulses(1.01)["slow_amplification"]["verdict"] in ("pass", "info") and pulses(1.2)["slow_amplification"]["verdict"] == "fail"
+
+
+@pytest.mark.parametrize(("ramp", "verdict"), [(0.4, "pass"), (0.2, "fail"), (0.6, "fail")])
+def test_a_ramp_is_a_tilt(ramp: float, verdict: str) -> None:
+    one = onset(ramp)["sliding_onset"]
+    assert one["value"] == pytest.approx(ramp / 0.4) and one["verdict"] == verdict
+
+
+def test_the_period_of_a_ring_that_dies() -> None:
+    t = 1e-3 * np.arange(300)
+    assert ring_period(t, np.exp(-5.0 * t) * np.sin(2.0 * np.pi * t / 0.021) + 0.3) == pytest.approx(0.021, rel=0.01)
+
+
+def test_the_surface_and_how_far_it_slides() -> None:
+    places = np.array([(i + 0.5, k + 0.5) for i in range(4) for k in range(3)])
+    surface = tops(places, 1.0, 1.0, 4.0)
+    assert surface.tolist() == [5, 8, 11]
+    assert slid([places, places + np.array([0.25, 0.0])], surface).tolist() == [0.0, 0.25]
+
+
+SMALL = {"container_length": 12.0, "bed_height": 4.0, "settle_time": 0.2, "run_time": 0.15, "frames": 11}
+
+
+@pytest.mark.parametrize(("engine", "variant"), [
+    ("liggghts", "pulse_20"), ("liggghts", "repeated"), ("liggghts", "ramp"), ("liggghts", "tilt"), ("yade", "repeated"), ("yade", "tilt")])
+def test_a_small_container(engine: str, variant: str, simulate: Any) -> None:
+    one = simulate("transport_container", engine, SMALL, variant)
+    found = judged("transport_container", container.measure([one]))
+    assert names(found, "pass") == {"energy_balance", "impulse_error"} and not names(found, "fail"), found
+    frame, way = one.grains()[-1], container.moving(one)
+    time = one.time_step * frame.step
+    # The grains stay in the container, in one plane.
+    assert np.abs(frame.positions[:, 1]).max() < 1e-12 * D
+    assert np.abs(frame.positions[:, 0].mean() - float(np.asarray(way.displacement(time))[0]) - 6.0 * D) < 2.0 * D
+    assert frame.positions[:, 2].min() > -8.0 * D

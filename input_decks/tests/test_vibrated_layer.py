@@ -1,0 +1,194 @@
+"""vibrated_layer: waves that are known are measured as they are, wrong ones fail; both engines move the plate from level to level."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.postproc.instruments.layer import levels, read, unexplained
+from dembark.postproc.instruments.phases import PHASES
+
+layer = module("vibrated_layer")
+D, STRIDE, STILL = 0.005, 10, 4
+
+
+def shaken(height: Callable[[float], float] = lambda _: 0.5, *, part: float = 0.5, waves: int = 4, noise: float = 0.05, lost: float = 0.0,
+           **changes: Any) -> Any:
+    """A run with a standing wave of the amplitude `height(gamma)` (d), `waves` on the length, at `part` of the frequency of the drive; two
+    layers of grains are enough for its surface. `lost`: share of all works that no force explains."""
+    given = defaults("vibrated_layer", **{"periods": 16, "level_ramp": 2, "run_in": 0, "motion_ramp": 2} | changes)
+    random, length = np.random.default_rng(7), given["layer_length"]
+    place = np.array([((i + 0.5) * D, (j + 0.5) * D) for i in range(round(length / D)) for j in range(round(given["layer_depth"] / D))])
+    ones, ids = np.ones(2 * len(place)), np.arange(1, 2 * len(place) + 1)
+    planned = levels(given)
+
+    def frame(number: int) -> Any:
+        past = number / PHASES - STILL
+        gamma = next((one.gamma for one in reversed(planned) if past >= one.start), planned[0].gamma)
+        wave = np.cos(2.0 * np.pi * waves * place[:, 0] / length) * math.cos(2.0 * np.pi * part * past)
+        cell = np.floor(place[:, 0] / (2.0 * D)).astype(int)
+        top = D * (4.0 + height(gamma) * wave + noise * random.standard_normal(cell.max() + 1)[cell])
+        positions = np.column_stack([np.tile(place, (2, 1)), np.concatenate([top, top - D])])
+        one = SimpleNamespace(step=STRIDE * number, positions=positions, radii=0.5 * D * ones, masses=ones, types=ones, ids=ids, where="")
+        one.select = lambda _: one
+        return one
+
+    frames = [frame(k) for k in range((STILL + planned[0].start) * PHASES, (STILL + planned[-1].start + given["periods"]) * PHASES + 1)]
+    rows = {name: np.zeros(300) for name in ("other", "imposed")} | {"balance": np.full(300, lost), "scale": np.ones(300)}
+    derived = {"period_steps": STRIDE * PHASES, "rest_periods": STILL, "plate_speed": 0.3}
+    return SimpleNamespace(folder="run", parameters=given, derived=derived, time_step=1e-4, grains=lambda: frames, times=lambda: rows)
+
+
+def verdicts(*args: Any, **changes: Any) -> dict[str, Any]:
+    return judged("vibrated_layer", layer.measure([shaken(*args, **changes)]))
+
+
+def test_waves_are_measured_as_they_are() -> None:
+    found = verdicts(noise=0.0)
+    assert {"strongest_frequency", "energy_balance"} == names(found, "pass") and not names(found, "fail")
+    assert found["wave_amplitude"]["value"] == pytest.approx(0.5, rel=0.05)
+    assert found["wavelength"]["value"] == pytest.approx(12.5) and found["wavelength_over_height"]["value"] == pytest.approx(2.5)
+    assert found["wavelength_over_height"]["verdict"] == "info"
+    assert "flat_peak" not in found
+
+
+def test_a_flat_layer_has_noise_alone() -> None:
+    found = verdicts(lambda _: 0.0, noise=0.1, motion_gamma=1.5)
+    assert {"flat_peak", "energy_balance"} == names(found, "pass") and "wavelength" not in found
+    assert found["flat_peak"]["value"] == pytest.approx(1.0, abs=0.5)
+
+
+@pytest.mark.parametrize(("changes", "name"), [
+    ({"motion_gamma": 1.5, "noise": 0.1}, "flat_peak"), ({"part": 1.0}, "strongest_frequency"), ({"part": 0.25}, "strongest_frequency"),
+    ({"lost": 1e-9}, "energy_balance"),
+], ids=["waves below the onset", "at f", "at f/4", "lost energy"])
+def test_wrong_layers_fail(changes: dict[str, Any], name: str) -> None:
+    assert name in names(verdicts(lambda _: 0.3, **changes), "fail")
+
+
+def sweep(critical: float, **changes: Any) -> dict[str, Any]:
+    """Levels of the acceleration beyond `critical` g with waves whose square grows with what is beyond."""
+    return verdicts(lambda gamma: 0.6 * math.sqrt(max(gamma - critical, 0.0)),
+                    **{"motion_gamma": 1.8, "last_gamma": 3.2, "levels": 8, "noise": 0.05} | changes)
+
+
+def test_the_onset_is_where_the_power_comes_from_zero() -> None:
+    found = sweep(2.5)
+    assert found["onset"]["value"] == pytest.approx(2.5, abs=0.05) and found["onset"]["reference"] == 2.5
+    assert "onset_down" not in found and "wavelength" not in found
+
+
+def test_a_sweep_without_waves_is_open() -> None:
+    found = sweep(5.0, periods=8)
+    assert found["onset"]["verdict"] == "info" and "too few" in found["onset"]["reason"]
+
+
+def test_up_and_down_have_onsets_of_their_own() -> None:
+    found = sweep(2.45, descent="yes", periods=8)
+    assert found["onset_down"]["value"] == pytest.approx(2.45, abs=0.1)
+
+
+@pytest.mark.parametrize("change", [{"spins": "blocked"}, {"floor": "strips"}, {"bridge_volume": 8e-11}, {"grain_friction": 0.0}])
+def test_of_changed_layers_the_onset_is_not_judged(change: dict[str, Any]) -> None:
+    found = sweep(2.5, periods=8, **change)
+    assert found["onset"]["reference"] is None
+
+
+def study(name: str, along: str, **found: tuple[float, dict[str, Any]]) -> dict[str, Any]:
+    """The study `name` of results by variant: (value of its quantity, parameters)."""
+    quantity = "onset" if name == "changes" else "wavelength"
+    points = [{"variant": variant, "parameters": defaults("vibrated_layer", **changes),
+               "quantities": [{"name": one, "value": None if math.isnan(value) else value, "interval": [value - 0.05, value + 0.05]}
+                              for one in (quantity, "mean_wavelength")]}
+              for variant, (value, changes) in found.items()]
+    return judged("vibrated_layer", layer.study(name, points, along))
+
+
+def dispersion(*found: float) -> dict[str, Any]:
+    return study("frequency", "motion_frequency", **{f"f{k}": (one, {"motion_frequency": 9.0 + 3.0 * k}) for k, one in enumerate(found)})
+
+
+def test_wavelengths_fall_with_the_frequency() -> None:
+    assert names(dispersion(20.0, 16.7, 14.3, 11.1, 11.1), "pass") == {"wavelength_trend"}
+    assert names(dispersion(16.7, 20.0, 14.3, 11.1, 10.0), "pass") == {"wavelength_trend"}
+    assert names(dispersion(14.3, 16.7, 14.3, 16.7, 14.3), "fail") == {"wavelength_trend"}
+
+
+def lengths(*found: float) -> dict[str, Any]:
+    return study("length", "layer_length", **{f"l{k}": (one, {"layer_length": 0.25 + 0.125 * k}) for k, one in enumerate(found)})
+
+
+def test_waves_have_a_length_of_their_own() -> None:
+    assert names(lengths(12.5, 12.5, 14.3), "pass") == {"wavelength_ratio"}
+    assert names(lengths(12.5, 15.0, 16.7), "fail") == {"wavelength_ratio"}
+
+
+def shifts(**shift: float) -> dict[str, Any]:
+    variants = ("sweep", *layer.CHANGES)
+    return study("changes", "spins", **{one: (2.5 + shift.get(one, 0.0), {}) for one in variants})
+
+
+def test_shifts_beyond_their_interval_are_seen() -> None:
+    found = shifts(sweep_smooth=-0.2, sweep_wet=0.06)
+    assert found["shifts_seen"]["value"] == 1 and found["shifts_seen"]["verdict"] == "pass"
+    assert found["onset_shift_no_friction"]["value"] == pytest.approx(-0.2) and "no friction" in found["shifts_seen"]["detail"]
+    assert shifts()["shifts_seen"]["verdict"] == "fail"
+
+
+def test_layers_without_an_onset_are_left_out() -> None:
+    found = shifts(sweep_smooth=-0.2, sweep_wet=math.nan)
+    assert "onset_shift_wet" not in found and found["shifts_seen"]["value"] == 1
+    assert not shifts(sweep=math.nan)
+
+
+def test_the_levels_of_a_run() -> None:
+    p = defaults("vibrated_layer", motion_gamma=2.0, last_gamma=3.0, levels=3, descent="yes", motion_ramp=9.5, level_ramp=4, run_in=6,
+                 periods=16)
+    assert [(one.gamma, one.start) for one in levels(p)] == [(2.0, 16), (2.5, 42), (3.0, 68), (2.5, 94), (2.0, 120)]
+
+
+def test_a_window_that_is_not_whole_is_refused() -> None:
+    from dembark.postproc import DumpError
+    one = shaken()
+    frames = one.grains()
+    one.grains = lambda: frames[:-20]
+    with pytest.raises(DumpError, match="does not hold the 16 periods"):
+        read(one)
+
+
+SMALL = {"layer_length": 0.06, "layer_depth": 0.015, "layer_height": 3.0, "motion_frequency": 25.0, "settle_time": 0.06, "motion_ramp": 2,
+         "run_in": 0, "level_ramp": 2, "periods": 8, "last_gamma": 2.0, "levels": 2, "motion_gamma": 1.5}
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
+def test_the_plate_goes_from_level_to_level(engine: str, simulate: Any) -> None:
+    """Its amplitude is that of each level, no grain falls through it, and all work is accounted for."""
+    run = simulate("vibrated_layer", engine, SMALL)
+    rows, found = run.times(), read(run)
+    for level in found.levels:
+        begin, end = ((run.derived["rest_periods"] + level.start + past) / 25.0 for past in (0, 8))
+        inside = (rows["time"] > begin) & (rows["time"] < end)
+        expected = level.gamma * 9.81 / (2.0 * math.pi * 25.0) ** 2
+        assert rows["motion_z"][inside].max() == pytest.approx(expected, rel=1e-3), level
+    assert unexplained(rows) < 1e-10 and rows["walls"][-1] > 0.0
+    last = list(run.grains())[-1]
+    assert len(last.ids) > 50
+    assert last.positions[:, 2].min() > rows["motion_z"][-1]
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
+def test_blocked_grains_do_not_turn(engine: str, simulate: Any) -> None:
+    run = simulate("vibrated_layer", engine, SMALL | {"spins": "blocked", "levels": 1, "last_gamma": None})
+    assert all((frame.omegas == 0.0).all() for frame in run.grains()) and unexplained(run.times()) < 1e-10
+
+
+def test_a_floor_of_strips_is_refused_where_facets_have_no_periods(decks: Any, tmp_path: Path) -> None:
+    refused = decks("vibrated_layer", "yade", tmp_path / "strips", SMALL | {"floor": "strips"})
+    assert refused.start().wait(60) != 0 and "floor 'strips': facets have no periods here" in refused.said()

@@ -1,0 +1,132 @@
+"""vibro_finishing: known motions of bed and part are measured as they are, wrong ones fail, and both engines shake the trough."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from dembark.input_decks.common.trough import sites_within
+from dembark.input_decks.common.trough import trough as trough_mesh
+from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.postproc.instruments.drive import PARTS
+from dembark.postproc.instruments.machines import Trough, read
+from dembark.postproc.instruments.tests.test_machines import trough
+from dembark.postproc.replica import Replica
+from dembark.postproc.walls.mesh import cut
+
+finishing = module("vibro_finishing")
+GRAIN = {"part_diameter": 0.005, "part_density": 2500.0}
+
+
+def account(rows: dict[str, Any], booked: float = 1.0) -> dict[str, Any]:
+    """Energies whose works balance, but for the part of the damping that is not `booked`."""
+    time = rows["time"]
+    table = dict.fromkeys(("first_kinetic", "gravity", *PARTS, "balance"), 0.0 * time)
+    table |= {"walls": 2.0 * time, "normal_viscous": -1.5 * booked * time, "kinetic_energy": 0.5 * time, "scale": 4.0 * time + 1.0}
+    return rows | table
+
+
+def measured(run: Trough, booked: float = 1.0, **parameters: Any) -> dict[str, Any]:
+    replica = Replica(Path(), {"parameters": defaults("vibro_finishing", motion_frequency=12.5, **parameters)})
+    replica.__dict__["_read"] = {read.__wrapped__: replace(run, rows=account(dict(run.rows), booked))}
+    return judged("vibro_finishing", finishing.measure([replica]))
+
+
+def sense_study(back: float = -0.01, none: float = 0.0, fore: float = 0.01) -> dict[str, Any]:
+    return judged("vibro_finishing", finishing.study("sense", points("drive_sense", (-1, back), (0, none), (1, fore)), "drive_sense"))
+
+
+def step_study(*values: float) -> dict[str, Any]:
+    steps = [(0.11 / 2**k, value) for k, value in enumerate(values)]
+    return judged("vibro_finishing", finishing.study("step", points("time_step_fraction", *steps), "time_step_fraction"))
+
+
+def points(along: str, *pairs: tuple[float, float]) -> list[dict[str, Any]]:
+    return [{"parameters": {along: place}, "quantities": [
+        {"name": name, "value": value, "interval": [value - 2e-4, value + 2e-4]} for name in ("circulation", "spin", "revolution")]}
+        for place, value in pairs]
+
+
+def test_a_bed_that_turns_as_a_body(tmp_path: Path) -> None:
+    found = measured(trough(tmp_path, noise=5e-5), **GRAIN)
+    assert names(found, "pass") == {"energy_balance", "likeness"}
+    omega = 2.0 * np.pi * 12.5
+    assert found["circulation"]["value"] == pytest.approx(0.5 / omega, rel=0.05)
+    assert found["revolution"]["value"] == pytest.approx(0.5 / omega, rel=0.1)
+    assert found["power"]["value"] == pytest.approx(0.3)
+
+
+def test_a_large_part_is_not_taken_for_a_grain(tmp_path: Path) -> None:
+    assert "likeness" not in measured(trough(tmp_path, noise=5e-5))
+
+
+def test_wrong_runs_fail(tmp_path: Path) -> None:
+    assert "energy_balance" in names(measured(trough(tmp_path), 0.99), "fail")
+    assert "likeness" in names(measured(trough(tmp_path, noise=5e-5, still=True), **GRAIN), "fail")
+
+
+@pytest.mark.parametrize(("values", "failed"), [
+    ({}, set()), ({"back": 0.01}, {"reversal"}), ({"back": -0.006}, {"reversal"}), ({"none": 0.004}, {"vertical"}),
+])
+def test_the_bed_follows_the_drive(values: dict[str, float], failed: set[str]) -> None:
+    found = sense_study(**values)
+    assert names(found, "fail") == failed and names(found, "pass") == {"reversal", "vertical"} - failed
+
+
+def test_what_the_numerics_may_change() -> None:
+    assert len(names(step_study(0.01, 0.0101, 0.0102), "pass")) == 3
+    assert len(names(step_study(0.01, 0.012, 0.014), "fail")) == 3
+
+
+SMALL = {"grain_count": 60, "trough_width": 0.08, "part_diameter": 0.02, "strips": 12, "motion_ramp": 1, "settle_time": 0.1, "periods": 8}
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
+def test_the_trough_shakes_bed_and_part_in_their_plane(engine: str, simulate: Any) -> None:
+    run = simulate("vibro_finishing", engine, SMALL)
+    found = judged("vibro_finishing", finishing.measure([run]))
+    assert "energy_balance" in names(found, "pass"), found
+    frames = list(run.grains())
+    assert all((frame.positions[:, 1] == 0.0).all() and np.hypot(*frame.positions[:, [0, 2]].T).max() < 0.05 for frame in frames)
+    assert frames[0].radii[-1] == pytest.approx(0.01) and len(frames[0].ids) == 61
+    assert 0.001 < found["power"]["value"] < 1.5 and found["noise"]["value"] > 0.0
+
+
+RECORDED = {"grain_count": 60, "part_diameter": 0.02, "motion_ramp": 1, "settle_time": 0.1}
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
+def test_a_machine_as_it_was_recorded(engine: str, simulate: Any) -> None:
+    """The trough is that of the file, and is where the table has it."""
+    run = simulate("vibro_finishing", engine, RECORDED, "recorded")
+    found = judged("vibro_finishing", finishing.measure([run]))
+    assert "energy_balance" in names(found, "pass"), found
+    rows, table = run.times(), np.loadtxt(run.folder / "motion.csv", delimiter=",")
+    begun = run.time_step * run.derived["begin"]
+    due = CubicSpline(table[:, 0], table[:, 1:], bc_type="clamped")(np.maximum(rows["time"] - begun, 0.0))
+    for k, axis in enumerate("xyz"):
+        assert np.abs(rows[f"motion_{axis}"] - due[:, k]).max() < 1e-8
+    assert np.abs(rows["motion_x"]).max() > 1e-3
+    places = np.array([frame.positions for frame in run.grains()])
+    assert np.abs(places[..., 0]).max() < 0.09 and places[..., 2].min() > -0.075 and found["power"]["value"] > 0.001
+
+
+def test_sites_lie_within_a_trough_of_any_shape() -> None:
+    p = SimpleNamespace(grain_diameter=0.005, grain_diameter_spread=0.1, grain_count=10000)
+    mesh = trough_mesh(0.2, 0.05, 24, 0.02)
+    lines = cut(mesh + np.array([0.3, 0.0, -0.1]))
+    # Two triangles a strip.
+    assert lines.shape == (52, 2, 2)
+    places = sites_within(p, lines, (0.3, -0.14, 0.02)) - np.array([0.3, 0.0, -0.1])
+    x, z = places[:, 0], places[:, 2]
+    assert (np.hypot(x, np.minimum(z, 0.0)) < 0.1 - 0.64 * 0.0055).all() and (z < 0.05).all()
+    assert (np.hypot(x, z + 0.04) > 0.02 + 0.64 * 0.0055).all()
+    # They fill it.
+    area = 0.5 * np.pi * 0.1**2 + 0.2 * 0.05 - np.pi * 0.02**2
+    assert len(places) * (1.15 * 0.0055) ** 2 == pytest.approx(area, rel=0.15)

@@ -1,0 +1,112 @@
+"""vibro_mixing: mixtures that are known are measured as they are, wrong ones fail; the set-up makes the large grains it is asked for."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.postproc.instruments.layer import unexplained
+from dembark.postproc.instruments.phases import PHASES
+from dembark.validation.case import deck
+from dembark.validation.case.folders import find
+from dembark.validation.case.resolve import resolve
+
+mixing = module("vibro_mixing")
+D, STRIDE = 0.005, 10
+SITES = np.array([((i + 0.5) * D, 0.0, (k + 0.5) * D) for i in range(20) for k in range(12)])
+
+
+def shaken(*, swaps: int = 10, rising: float = 0.0, drift: float = 0.0, lost: float = 0.0, **changes: Any) -> Any:
+    """A run in which `swaps` pairs of grains change places in each period. `rising`: way (d) of the large grains in a period; `drift`:
+    vertical way of the grains beside the walls in a period."""
+    given = defaults("vibro_mixing", **{"periods": 20, "grain_count": len(SITES)} | changes)
+    random, count = np.random.default_rng(3), len(SITES)
+    large = np.zeros(count, bool)
+    if given["mixture"] == "two_sizes":
+        large[random.permutation(count)[:40]] = True
+    elif given["mixture"] == "intruder":
+        large[9 * 12] = True
+    radii = 0.5 * D * np.where(large, given["size_ratio"], 1.0)
+    place, near = np.arange(count), np.minimum(SITES[:, 0], 0.1 - SITES[:, 0]) < 2.0 * D
+    frames = []
+    for number in range(given["periods"] * PHASES + 1):
+        if number % PHASES == 1:
+            pairs = random.permutation(count)[: 2 * swaps].reshape(2, -1)
+            place[pairs] = place[pairs[::-1]]
+        at = SITES[place] + [0.0, 0.0, 0.5 * D * math.sin(2.0 * math.pi * number / PHASES)]
+        at[:, 2] += D * (number / PHASES) * (rising * large + drift * near)
+        one = SimpleNamespace(step=STRIDE * number, positions=at, radii=radii, types=np.ones(count), ids=np.arange(count), where="")
+        one.select = lambda _, same=one: same
+        frames.append(one)
+    rows = {name: np.zeros(300) for name in ("other", "imposed")} | {"balance": np.full(300, lost), "scale": np.ones(300)}
+    return SimpleNamespace(folder="run", parameters=given, derived={"period_steps": STRIDE * PHASES}, time_step=1e-4, grains=lambda: frames,
+                           times=lambda: rows)
+
+
+def verdicts(**changes: Any) -> dict[str, Any]:
+    return judged("vibro_mixing", mixing.measure([shaken(**changes)]))
+
+
+def test_equal_grains_mix() -> None:
+    found = verdicts()
+    assert {"energy_balance", "index_separated", "index_random", "segregation_labels"} == names(found, "pass")
+    assert not names(found, "fail") and found["index_sides"]["value"] > 0.5
+    # A grain changes its place in one of twelve periods; then it is anywhere.
+    assert found["mixing_rate_sides"]["value"] == pytest.approx(2.0 * -math.log1p(-1.0 / 12.0), rel=0.5)
+
+
+def test_grains_that_stay_do_not_mix() -> None:
+    found = verdicts(swaps=0)
+    assert found["index_sides"]["value"] < 0.1 and found["index_layers"]["value"] < 0.1
+    assert "wall_drift_smooth" not in found
+
+
+def test_a_large_grain_rises_at_its_speed() -> None:
+    found = verdicts(swaps=0, mixture="intruder", rising=0.2)
+    assert found["rise_rate"]["value"] == pytest.approx(0.2, rel=0.05) and found["rise"]["value"] == pytest.approx(4.0, rel=0.05)
+
+
+def test_large_grains_that_rise_segregate() -> None:
+    found = verdicts(swaps=0, mixture="two_sizes", rising=0.1)
+    assert found["segregation_rate"]["value"] > 0.003 and found["segregation_end"]["value"] > found["segregation_start"]["value"] + 0.05
+    assert "segregation_change" not in found
+
+
+def test_a_vessel_that_never_throws_changes_nothing() -> None:
+    assert names(verdicts(swaps=0, mixture="two_sizes", motion_gamma=0.8), "pass") == {"energy_balance", "segregation_change"}
+    assert "segregation_change" in names(verdicts(swaps=0, mixture="two_sizes", motion_gamma=0.8, rising=0.02), "fail")
+
+
+def test_walls_without_friction_drive_no_drift() -> None:
+    assert "wall_drift_smooth" in names(verdicts(swaps=0, wall_friction=0.0), "pass")
+    assert "wall_drift_smooth" in names(verdicts(swaps=0, wall_friction=0.0, drift=-0.1), "fail")
+
+
+@pytest.mark.parametrize(("variant", "large"), [("halves", 0), ("sizes", 40), ("intruder", 1)])
+def test_the_large_grains_of_a_set_up(variant: str, large: int) -> None:
+    case = find("vibro_mixing")
+    packed = deck.prepare(case, resolve(case, "quick", variant)).packing
+    assert packed is not None
+    assert (packed.diameters > 1.5 * D).sum() == large
+    assert np.ptp(packed.positions[:, 1]) == 0.0
+    apart = np.linalg.norm(packed.positions[:, None] - packed.positions, axis=2) - 0.5 * (packed.diameters[:, None] + packed.diameters)
+    assert (apart[~np.eye(len(apart), dtype=bool)] > 0.0).all()
+    if variant == "intruder":
+        assert packed.positions[np.argmax(packed.diameters), 2] < 3.0 * D
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
+def test_the_vessel_moves_as_a_whole_and_keeps_its_grains(engine: str, simulate: Any) -> None:
+    """Monolayers stay in their plane, and all work is accounted for."""
+    run = simulate("vibro_mixing", engine, {"grain_count": 60, "vessel_width": 0.05, "settle_time": 0.1, "motion_ramp": 2, "periods": 10,
+                                            "mixture": "intruder", "motion_frequency": 20.0})
+    assert unexplained(run.times()) < 1e-10
+    for frame in run.grains():
+        assert len(frame.ids) == 60 and np.ptp(frame.positions[:, 1]) < 1e-12
+        assert (frame.positions[:, 0] > 0.9 * frame.radii).all() and (frame.positions[:, 0] < 0.05 - 0.9 * frame.radii).all()
+    assert judged("vibro_mixing", mixing.measure([run]))["energy_balance"]["verdict"] == "pass"

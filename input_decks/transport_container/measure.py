@@ -1,0 +1,163 @@
+"""Transport container: force, torque and pressure of its walls, the period with which the bed rings, and the onset of sliding."""
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from dembark.input_decks.common.motion import motion
+from dembark.postproc.instruments.container import ring_period, slid, tops
+from dembark.postproc.instruments.growth import ordered
+from dembark.postproc.instruments.momentum import imbalance, impulses
+from dembark.postproc.measurement import (
+    Array,
+    Curve,
+    Estimate,
+    Measurement,
+    Points,
+    Replica,
+    Replicas,
+    Value,
+    exact,
+    over_replicas,
+    profile,
+)
+from dembark.postproc.studies import measured
+
+ALONE = "one run of a chaotic packing says nothing about its spread"
+WALLS = ("left", "right", "base")
+# Slow pulses are at least so many ring periods long.
+SLOW = 20.0
+
+
+def opening(replica: Replica) -> int:
+    """Row of time.csv in which the container begins to move, at the first frame."""
+    return int(np.flatnonzero(replica.times()["step"] == replica.grains()[0].step)[0])
+
+
+def moving(replica: Replica) -> Any:
+    """The motion of a run."""
+    start = replica.time_step * replica.derived["first"]
+    return motion(SimpleNamespace(**replica.parameters), start=start, point=(0.5 * replica.derived["length"], 0.0, 0.0))
+
+
+def forces(replica: Replica, wall: str = "", axis: str = "x") -> Array:
+    """N, (rows - 1,): mean force on the grains in each row but the first, of a wall or of all."""
+    rows = replica.times()
+    impulse = np.diff(rows[f"{wall}_j{axis}"]) if wall else impulses(rows, "vessel", axis, replica.time_step)
+    return impulse / (replica.time_step * np.diff(rows["step"]))
+
+
+def read(replica: Replica) -> dict[str, float]:
+    """Measure one run."""
+    p, rows, first = replica.parameters, replica.times(), opening(replica)
+    frames = [frame.select(frame.types == 1) for frame in replica.grains()]
+    mass, g, d = float(frames[0].masses.sum()), float(p["gravity"]), float(p["grain_diameter"])
+    times = rows["time"]
+    # Each wall's own sum over all steps, which the engine made, beside the momentum of the grains.
+    all_walls = [np.diff(rows[f"{name}_jx"])[first:] for name in WALLS]
+    gained = float(rows["momentum_x"][-1] - rows["momentum_x"][first])
+    size = float(sum(np.abs(one).sum() for one in all_walls))
+    found = {"impulse_error": abs(float(np.sum(all_walls)) - gained) / size}
+    if p["motion"] == "rotation" or p["motion_shape"] == "rising":
+        return found | {"slide_slope": _onset(replica)}
+    way = moving(replica)
+    peak = p["motion_acceleration"] * mass
+    force = forces(replica)[first:]
+    found |= {"amplification": float(np.abs(force).max()) / peak, "rear_share": float(np.abs(forces(replica, "left")[first:]).max()) / peak}
+    moved = np.asarray(way.acceleration(times))[:, 0]
+    after = np.flatnonzero(moved != 0.0)[-1] + 1 if (moved != 0.0).any() else first
+    if after + 40 < len(times):
+        found["ring_period"] = ring_period(times[after + 1 :], forces(replica)[after:]) / math.sqrt(d / g)
+    return found
+
+
+def _onset(replica: Replica) -> float:
+    """Slope of effective gravity to the base's normal when the surface has slid by half a diameter; NaN when it has not."""
+    p, way, d = replica.parameters, moving(replica), float(replica.parameters["grain_diameter"])
+    frames = [frame.select(frame.types == 1) for frame in replica.grains()]
+    times = replica.time_step * np.array([frame.step for frame in frames])
+    middle, length = 0.5 * replica.derived["length"], replica.derived["length"]
+    places = []
+    for frame, time in zip(frames, times, strict=True):
+        turn = float(np.asarray(way.angle(time)))
+        own = frame.positions - np.asarray(way.displacement(time)) - np.array([middle, 0.0, 0.0])
+        sine, cosine = math.sin(turn), math.cos(turn)
+        places.append(np.column_stack([own[:, 0] * cosine - own[:, 2] * sine + middle, own[:, 2] * cosine + own[:, 0] * sine]))
+    surface = tops(places[0], d, 0.25 * length, 0.75 * length)
+    way_of_surface = slid(places, surface)
+    there = np.flatnonzero(np.abs(way_of_surface) > 0.5 * d)
+    if not len(there):
+        return math.nan
+    k = int(there[0])
+    share = (0.5 * d - abs(way_of_surface[k - 1])) / (abs(way_of_surface[k]) - abs(way_of_surface[k - 1]))
+    time = times[k - 1] + share * (times[k] - times[k - 1])
+    if p["motion"] == "rotation":
+        return abs(math.tan(float(np.asarray(way.angle(time)))))
+    return abs(float(np.asarray(way.acceleration(time))[0])) / float(p["gravity"])
+
+
+def measure(replicas: Replicas) -> Measurement:
+    """Values and curves of all replicas of a series."""
+    runs = [read(replica) for replica in replicas]
+    values = {"energy_balance": Value(exact(max(imbalance(replica.times()) for replica in replicas)), exact(0.0)),
+              "impulse_error": Value(exact(max(run["impulse_error"] for run in runs)), exact(0.0))}
+    values |= {name: Value(over_replicas([Estimate(run[name], math.inf, ALONE) for run in runs])) for name in runs[0]
+               if name != "impulse_error"}
+    return Measurement(values, [_history(replicas, wall) for wall in ("", "left", "right", "base")] + [_pressure(replicas, "left")])
+
+
+def _history(replicas: Replicas, wall: str) -> Curve:
+    """Force along x over M g against time."""
+    found = []
+    for replica in replicas:
+        first, rows = opening(replica), replica.times()
+        weight = replica.parameters["gravity"] * float(replica.grains()[0].masses.sum())
+        found.append((rows["time"][first + 1 :] - rows["time"][first], forces(replica, wall)[first:] / weight))
+    place = np.linspace(0.0, found[0][0][-1], 401)
+    title = f"Force of {wall} along x" if wall else "Total force along x"
+    return profile(f"force_{wall or 'total'}", title, "time since the container moves (s)", "over the weight of the bed", place,
+                   [np.interp(place, *one) for one in found])
+
+
+def _pressure(replicas: Replicas, wall: str) -> Curve:
+    """Mean pressure on a side wall over height, while the container moves, beside that at rest."""
+    d = float(replicas[0].parameters["grain_diameter"])
+    edges = d * np.arange(0.0, replicas[0].parameters["bed_height"] + 1.0)
+
+    def pressure(frame: Any) -> Array:
+        near = frame.positions[:, 0] < np.median(frame.positions[:, 0])
+        push, _ = np.histogram(frame.positions[near, 2], edges, weights=np.maximum(frame.wall_forces["vessel"][near, 0], 0.0))
+        return push / (d * np.diff(edges))
+
+    found = []
+    for replica in replicas:
+        frames = [frame.select(frame.types == 1) for frame in replica.grains()]
+        found.append((np.mean([pressure(frame) for frame in frames[1:]], axis=0), pressure(frames[0])))
+    return profile(f"pressure_{wall}", f"Force on the {wall} wall over d²", "Pa", "z / d", 0.5 * (edges[1:] + edges[:-1]) / d,
+                   [one for one, _ in found], vertical=True, reference=np.mean([one for _, one in found], axis=0),
+                   reference_label="at rest")
+
+
+def study(name: str, results: Points, along: str) -> Measurement:
+    """D of the longest pulse beside one, if it is slow; or the onset on a ramp beside that of tilting."""
+    results, place = ordered(results, along)
+    quantity = "amplification" if name == "pulse" else "slide_slope"
+    found = [measured(one, quantity) for one in results]
+    values, halves = (np.array([getattr(one, part) for one in found]) for part in ("value", "half"))
+    if name != "pulse":
+        tilted = float(values[1:].mean())
+        ratio = values / tilted
+        half = float(np.hypot(halves[0], np.hypot(*halves[1:]) / 2.0)) / tilted if np.isfinite(halves).all() else math.inf
+        return Measurement({"sliding_onset": Value(Estimate(float(ratio[0]), half, "the three variants"), exact(1.0))}, [
+            profile("onset", "Onset of sliding", "rate of tilting (rad/s); 0: ramp", "slope of effective gravity", place, [values],
+                    half=halves)])
+    given = results[-1]["parameters"]
+    unit = math.sqrt(given["grain_diameter"] / given["gravity"])
+    period = unit * measured(results[0], "ring_period").value
+    slow = place[-1] >= SLOW * period
+    reason = "" if slow else f"the longest pulse has {place[-1] / period:.3g} periods, fewer than {SLOW:g}"
+    curve = profile("amplification", "Force of a pulse", "log₁₀ of its length over the ring period", "D", np.log10(place / period),
+                    [values], half=halves, reference=np.ones(len(values)), reference_label="rigid")
+    return Measurement({"slow_amplification": Value(found[-1], exact(1.0), reason=reason)}, [curve])

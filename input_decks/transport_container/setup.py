@@ -1,0 +1,47 @@
+"""Transport container: a dilute bed between two walls on a base that will move, and the steps of its output."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from dembark.input_decks.common import packing
+from dembark.input_decks.common.motion import motion
+from dembark.input_decks.common.setup import Parameters, Setup, contacts, rectangle, time_step
+
+
+def setup(p: Parameters) -> Setup:
+    """The container is 0 < x < L, z > 0, with all centres at y = 0; it begins to move at the first frame. 20 rows of time.csv between
+    two frames."""
+    step, d, d_max = time_step(p), p.grain_diameter, packing.largest(p)
+    every = math.ceil(p.run_time / step / (20 * (p.frames - 1)))
+    first, stride = every * max(1, math.ceil(p.settle_time / step / every)), 20 * every
+    steps = first + stride * (p.frames - 1)
+    length = p.container_length * d
+    moving = motion(p, start=first * step, point=(0.5 * length, 0.0, 0.0))
+    cell = 1.15 * d_max
+    count = int((length - 0.3 * d_max) / cell)
+    layers = math.ceil(1.3 * p.grain_count / count)
+    places = packing.lattice((count, 1, layers), ((length - 0.3 * d_max) / count, cell, cell), (0.15 * d_max, -0.5 * cell, 0.15 * d_max))
+    top, half = layers * cell + 2.0 * d_max, 2.0 * d
+    # Panels of about 10 d; side walls twice as high as the bed lies in the beginning.
+    long, wide, high = (length / 4.0, 0.0, 0.0), (0.0, 2.0 * half, 0.0), (0.0, 0.0, top / 4.0)
+    meshes = {"base": np.vstack([rectangle((length * k / 4.0, -half, 0.0), long, wide) for k in range(4)])}
+    for name, x in (("left", 0.0), ("right", length)):
+        meshes[name] = np.vstack([rectangle((x, -half, top * k / 4.0), wide, high) for k in range(4)])
+    corners = np.array([(x, 0.0, z) for x in (0.0, length) for z in (0.0, top)])
+    reach = [_moved(moving, corners, t) for t in np.linspace(0.0, steps * step, 400)]
+    least, most = np.min(reach, axis=(0, 1)) - 2.0 * d, np.max(reach, axis=(0, 1)) + 2.0 * d
+    bodies = packing.grains(p, places, [(least[0], most[0]), (-half - d, half + d), (least[2], most[2])])
+    bodies = replace(bodies, positions=bodies.positions * np.array([1.0, 0.0, 1.0]))
+    numbers = {"grain_count": p.grain_count, "first": first, "stride": stride, "every": every, "length": length}
+    return Setup(steps, step, bodies, {**numbers, **contacts(p, skin=0.3)}, meshes, {"motion_words": moving.words})
+
+
+def _moved(moving: object, corners: packing.Array, time: float) -> packing.Array:
+    """Where the corners (n, 3) of the container are at a time (s)."""
+    middle = np.array([0.5 * corners[:, 0].max(), 0.0, 0.0])
+    turn = float(np.asarray(moving.angle(time)))  # type: ignore[attr-defined]
+    sine, cosine = math.sin(turn), math.cos(turn)
+    about_y = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+    return middle + (corners - middle) @ about_y.T + np.asarray(moving.displacement(time))  # type: ignore[attr-defined]

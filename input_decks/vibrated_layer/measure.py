@@ -1,0 +1,169 @@
+"""Vibrated layer: waves at half the frequency of the drive, where they begin, and how long they are."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import xarray as xr
+
+from dembark.postproc.instruments.growth import ordered
+from dembark.postproc.instruments.layer import Layer, mean_power, read, unexplained, wave_amplitude
+from dembark.postproc.instruments.phases import PHASES
+from dembark.postproc.instruments.standing_waves import Waves, amplitude, rank_correlation
+from dembark.postproc.measurement import Curve, Estimate, Measurement, Numbers, Points, Replicas, Value, exact, over_replicas, profile
+from dembark.postproc.studies import measured
+
+# Accelerations (g) up to which a layer is flat, and those at which it has waves at f/2 and no others; not at the onset.
+FLAT, WAVY = 2.0, (2.75, 4.0)
+ONSET = 2.5
+# The variant that the others of the study `changes` are compared with, and what these change.
+PLAIN = "sweep"
+CHANGES = {"sweep_blocked": "spins_blocked", "sweep_smooth": "no_friction", "sweep_wet": "wet", "sweep_strips": "floor_of_strips",
+           "sweep_two": "two_frequencies"}
+
+
+def quoted_length(number: float) -> float:
+    """Length of the waves over H by the law that is quoted from memory, for f sqrt(H/g) = `number`."""
+    return 1.0 + 1.1 * number**-1.32
+
+
+def plain(p: Numbers) -> bool:
+    """Whether the layer is one of dry spheres that rub and turn, on a flat floor that shakes with one frequency."""
+    return (p["spins"] == "free" and p["floor"] == "flat" and p["bridge_volume"] == 0.0 and p["motion_second_amplitude"] == 0.0
+            and p["grain_friction"] > 0.0 and p["static_friction"] is None)
+
+
+def measure(replicas: Replicas) -> Measurement:
+    """Of one level its waves, of several the onset; profiles and the diagram of space and time of the first replica."""
+    runs, p = [read(replica) for replica in replicas], replicas[0].parameters
+    gammas = [one.gamma for one in runs[0].levels]
+    values = {"energy_balance": Value(exact(max(unexplained(one.rows) for one in runs)), exact(0.0)),
+              "acceleration": Value(exact(max(gammas))),
+              "plate_speed": Value(exact(replicas[0].derived["plate_speed"] / math.sqrt(p["gravity"] * p["grain_diameter"])))}
+    values |= of_level(runs, gammas[0], p) if len(gammas) == 1 else of_sweep(runs, p)
+    curves = [*spectra(runs), *crests(runs[0])] if len(gammas) == 1 else [powers(runs)]
+    return Measurement(values, curves, fields=diagram(runs[0]))
+
+
+def of_level(runs: list[Layer], gamma: float, p: Numbers) -> dict[str, Value]:
+    """What is measured at one level."""
+    d, height = runs[0].diameter, runs[0].height
+
+    def over(number: Callable[[Waves], float]) -> Estimate:
+        return over_replicas([Estimate(number(one.waves[0]), math.inf, "a mode has no interval") for one in runs])
+
+    def mean(number: Callable[[Waves], float]) -> float:
+        return float(np.mean([number(one.waves[0]) for one in runs]))
+
+    values = {
+        "wave_amplitude": Value(over_replicas([wave_amplitude(one.waves[0]) for one in runs])),
+        "harmonic_amplitude": Value(over(lambda waves: amplitude(waves.harmonic()))),
+        "noise_amplitude": Value(over(lambda waves: amplitude(float(waves.noise().sum())))),
+        "doubling_amplitude": Value(over(lambda waves: amplitude(waves.doubling()))),
+    }
+    if gamma <= FLAT:
+        return values | {"flat_peak": Value(exact(mean(Waves.peak)), exact(1.0))}
+    lengths = over(Waves.wavelength)
+    law = quoted_length(p["motion_frequency"] * math.sqrt(height / p["gravity"]))
+    values |= {"wavelength": Value(Estimate(lengths.value / d, lengths.half / d, lengths.basis)),
+               "mean_wavelength": Value(over(lambda waves: waves.mean_wavelength() / d)),
+               "wavelength_over_height": Value(Estimate(lengths.value / height, math.inf, lengths.basis), exact(law))}
+    if WAVY[0] <= gamma <= WAVY[1]:
+        # The run that is farthest off counts.
+        found = max((one.waves[0].strongest() for one in runs), key=lambda value: abs(value - 0.5))
+        values["strongest_frequency"] = Value(exact(found), exact(0.5))
+    return values
+
+
+def of_sweep(runs: list[Layer], p: Numbers) -> dict[str, Value]:
+    """Where the waves begin, and where they end when there is a descent."""
+    begin = over_replicas([one.onset() for one in runs])
+    # A sweep that shows no onset decides nothing.
+    unknown = "" if math.isfinite(begin.value) else begin.basis
+    values = {"onset": Value(begin, exact(ONSET) if plain(p) else None, reason=unknown)}
+    if p["descent"] == "yes":
+        values["onset_down"] = Value(over_replicas([one.onset(down=True) for one in runs]))
+    return values
+
+
+def spectra(runs: list[Layer]) -> list[Curve]:
+    """Power over the wave number at f/2 beside that of noise, and at f."""
+    first = runs[0].waves[0]
+    place = runs[0].diameter / first.lengths()
+    along, across = "d/λ", "power (d²)"
+    noise = np.mean([one.waves[0].noise() for one in runs], axis=0)
+    return [profile("power_half", "Power of the surface at f/2", along, across, place, [one.waves[0].line(0.5) for one in runs],
+                    reference=noise, reference_label="noise beside f/2"),
+            profile("power_full", "Power of the surface at f", along, across, place, [one.waves[0].line(1.0) for one in runs])]
+
+
+def crests(run: Layer) -> list[Curve]:
+    """The surface at the phase at which it differs most from that a period later, at the end of the window, beside that."""
+    waves, d = run.waves[0], run.diameter
+    now, later = waves.heights[-2 * PHASES : -PHASES], waves.heights[-PHASES:]
+    phase = int(np.nanargmax(np.nanstd(now - later, axis=1)))
+    x = (np.arange(now.shape[1]) + 0.5) * waves.length / now.shape[1] / d
+    return [profile("surface", "Surface", "x / d", "z / d", x, [now[phase] / d], reference=later[phase] / d,
+                    reference_label="a period later")]
+
+
+def powers(runs: list[Layer]) -> Curve:
+    """Power of the waves over the acceleration, of the levels upwards."""
+    up = slice(0, runs[0].rising)
+    half = np.array([mean_power(one).half for one in runs[0].waves[up]]) if len(runs) == 1 else None
+    place = np.array([one.gamma for one in runs[0].levels[up]])
+    return profile("power_over_acceleration", "Power of the waves at f/2", "Γ", "power (d²)", place,
+                   [np.array([mean_power(waves).value for waves in one.waves[up]]) for one in runs], half=half)
+
+
+def diagram(run: Layer) -> xr.Dataset:
+    """The surface over place and time, in all levels: height (level, frame, x) in m."""
+    heights = np.array([one.heights for one in run.waves])
+    x = (np.arange(heights.shape[2]) + 0.5) * run.waves[0].length / heights.shape[2]
+    return xr.Dataset(
+        {"height": (("level", "frame", "x"), heights, {"units": "m", "long_name": "height of the surface"})},
+        coords={"acceleration": ("level", [one.gamma for one in run.levels], {"units": "1", "long_name": "of the plate, over g"}),
+                "periods": ("frame", np.arange(heights.shape[1]) / PHASES, {"units": "1", "long_name": "time over the drive's period"}),
+                "x": ("x", x, {"units": "m", "long_name": "place along the layer"})})
+
+
+def study(name: str, points: Points, along: str) -> Measurement:
+    """Length of the waves along the frequency or the length of the layer; or what shifts their onset."""
+    if name == "changes":
+        return shifts(points)
+    points, place = ordered(points, along)
+    lengths = np.array([measured(one, "wavelength").value for one in points])
+    if name == "length":
+        shortest = points[0]["parameters"]
+        count = shortest["layer_length"] / (lengths[0] * shortest["grain_diameter"])
+        return Measurement({"wavelength_ratio": Value(exact(lengths[-1] / lengths[0]), exact(1.0), bound=1.0 / round(count))},
+                           [profile("wavelength", "Length of the waves", "length of the layer (m)", "λ / d", place, [lengths])])
+    p = [one["parameters"] for one in points]
+    law = [quoted_length(one["motion_frequency"] * math.sqrt(one["layer_height"] * one["grain_diameter"] / one["gravity"]))
+           * one["layer_height"] for one in p]
+    means = np.array([measured(one, "mean_wavelength").value for one in points])
+    return Measurement(
+        {"wavelength_trend": Value(exact(rank_correlation(place, lengths)), exact(-1.0))},
+        [profile("wavelength", "Length of the waves", "frequency (Hz)", "λ / d", place, [lengths], reference=np.array(law),
+                 reference_label="law quoted from memory"),
+         profile("mean_wavelength", "Length of the waves by their mean wave number", "frequency (Hz)", "λ / d", place, [means])])
+
+
+def shifts(points: Points) -> Measurement:
+    """Onset of each changed layer less that of the plain one."""
+    by_name = {one["variant"]: measured(one, "onset") for one in points
+               if any(quantity["name"] == "onset" and quantity["value"] is not None for quantity in one["quantities"])}
+    if PLAIN not in by_name:
+        return Measurement({}, remarks=["The plain layer shows no onset: nothing can be said of shifts."])
+    values, seen = {}, []
+    for variant, label in CHANGES.items():
+        if variant not in by_name:
+            continue
+        one, other = by_name[variant], by_name[PLAIN]
+        value = Estimate(one.value - other.value, math.hypot(one.half, other.half), "those of both onsets")
+        values[f"onset_shift_{label}"] = Value(value)
+        if abs(value.value) > value.half:
+            seen.append(label.replace("_", " "))
+    told = f"seen: {', '.join(seen)}" if seen else "none is seen"
+    values["shifts_seen"] = Value(exact(len(seen)), verdict="pass" if seen else "fail", detail=f"{told}; passes with one")
+    return Measurement(values)

@@ -1,0 +1,58 @@
+"""Vibratory finishing: circulation of the bed, spin and revolutions of a free part, power and noise; what reverses with the drive."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from dembark.postproc.instruments.drive import PARTS
+from dembark.postproc.instruments.growth import ordered
+from dembark.postproc.instruments.machines import Trough, drifts, read, spectra, spread
+from dembark.postproc.instruments.momentum import imbalance
+from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas, Value, exact, over_replicas
+from dembark.postproc.statistics import combined
+from dembark.postproc.studies import measured
+
+ONE = "one run of a chaotic motion says nothing about its spread"
+# What must not depend on the numerics.
+STEADY = ("circulation", "spin", "revolution")
+
+
+def measure(replicas: Replicas) -> Measurement:
+    """Values and curves of all replicas of a series."""
+    runs, p = [read(replica) for replica in replicas], replicas[0].parameters
+    drive, diameter = 2.0 * math.pi * p["motion_frequency"], p["grain_diameter"]
+
+    def over(number: Callable[[Trough], Estimate], scale: float = 1.0) -> Value:
+        found = over_replicas([number(one) for one in runs])
+        return Value(Estimate(found.value / scale, found.half / scale, found.basis))
+
+    def once(number: Callable[[Trough], float]) -> Value:
+        return over(lambda one: Estimate(number(one), math.inf, ONE))
+
+    values = {
+        "energy_balance": Value(exact(np.max([imbalance(one.rows, PARTS) for one in runs])), exact(0.0)),
+        "circulation": over(Trough.turning, drive), "spin": over(Trough.spin, drive), "revolution": over(Trough.revolution, drive),
+        "part_height": over(Trough.height, diameter), "power": over(lambda one: one.power("trough")),
+        "noise": once(lambda one: one.noise("trough")), "stirring": over(Trough.stirring),
+    }
+    if p["part_diameter"] == diameter and p["part_density"] == p["grain_density"]:
+        worst = max((one.likeness() for one in runs), key=abs)
+        values["likeness"] = Value(exact(worst), exact(0.0))
+    return Measurement(values, [drifts(runs), spectra(runs, "trough")])
+
+
+def study(name: str, points: Points, along: str) -> Measurement:
+    """The circulation beside that of the reversed drive and of one up and down; or how far the steady motion depends on the numerics."""
+    points, _ = ordered(points, along)
+    if name == "sense":
+        back, none, fore = (measured(point, "circulation") for point in points)
+        return Measurement({"reversal": Value(over(back, fore), exact(-1.0)), "vertical": Value(over(none, fore), exact(0.0))})
+    return Measurement({f"{quantity}_change": Value(spread([measured(point, quantity) for point in points]), exact(0.0))
+                        for quantity in STEADY})
+
+
+def over(one: Estimate, other: Estimate) -> Estimate:
+    """The ratio of two independent estimates."""
+    ratio = one.value / other.value
+    return Estimate(ratio, combined([one.half / other.value, ratio * other.half / other.value]), "propagated from both runs")

@@ -1,0 +1,65 @@
+"""Vibratory finishing: grains and a part above the bottom of a trough, and the steps of output at fixed phases of the drive."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from dembark.input_decks.common import packing
+from dembark.input_decks.common.motion import TABLE, amplitude, motion
+from dembark.input_decks.common.setup import Parameters, Setup, contacts
+from dembark.input_decks.common.trough import sites, sites_within, trough
+from dembark.input_decks.common.vibration import fixed_phases, highest_speed, suitable_step
+from dembark.physics import WallMotion
+from dembark.postproc.walls.mesh import cut, read_stl
+
+FOLDER = Path(__file__).parent
+
+
+def setup(p: Parameters) -> Setup:
+    """The part, the last body, lies amid the grains at the start."""
+    still = math.ceil(p.settle_time * p.motion_frequency)
+    moving = motion(drive(p), start=still / p.motion_frequency, folder=FOLDER)
+    speed, amplitude_reached = driven(p, moving)
+    step, numbers = fixed_phases(p.motion_frequency, suitable_step(p, speed), still + p.motion_ramp + p.run_in, p.periods)
+    depth = max(p.part_diameter, 2.0 * p.grain_diameter)
+    reach = amplitude_reached + 2.0 * p.grain_diameter
+    if p.trough == "file":
+        mesh = np.asarray(read_stl(FOLDER / "trough.stl").triangles)
+        low, high = mesh.min(axis=(0, 1)), mesh.max(axis=(0, 1))
+        depth = max(depth, -low[1], high[1])
+        lowest = mesh.reshape(-1, 3)[mesh[..., 2].argmin()]
+        centre = (float(0.5 * (low[0] + high[0])), float(lowest[2] + 0.5 * p.part_diameter + 2.0 * p.grain_diameter))
+        places = sites_within(p, cut(mesh), (*centre, 0.5 * p.part_diameter))
+        box = [(low[0] - reach, high[0] + reach), (-depth, depth), (low[2] - reach, high[2] + reach + depth)]
+    else:
+        mesh, centre = trough(p.trough_width, p.trough_side, p.strips, 2.0 * p.grain_diameter), (0.0, -0.2 * p.trough_width)
+        places, top = sites(p, (*centre, 0.5 * p.part_diameter))
+        wide = 0.5 * p.trough_width + reach
+        box = [(-wide, wide), (-depth, depth), (-wide, max(p.trough_side, top) + depth)]
+    bodies = packing.grains(p, places, box)
+    # All centres in one plane.
+    bodies = replace(bodies, positions=bodies.positions * [1, 0, 1])
+    bodies = bodies.joined(np.array([[centre[0], 0.0, centre[1]]]), p.part_diameter, p.part_density, 1)
+    more = {"free_part": 1, "drive_speed": speed, "begin": still * numbers["period_steps"]}
+    return Setup(numbers["steps"], step, bodies, {**numbers, **more, **contacts(p, skin=0.2)}, {"trough": mesh},
+                 {"motion_words": moving.words})
+
+
+def driven(p: Parameters, moving: WallMotion) -> tuple[float, float]:
+    """Highest speed (m/s) of the trough, and how far (m) it gets from its place."""
+    if p.motion != "table":
+        return highest_speed(p), amplitude(p)
+    times = np.arange(0.0, float(np.loadtxt(FOLDER / TABLE, delimiter=",")[-1, 0]) + 1.0, 0.01 / p.motion_frequency)
+    speed, reach = (float(np.linalg.norm(found, axis=1).max()) for found in (moving.velocity(times), moving.displacement(times)))
+    return speed, reach
+
+
+def drive(p: Parameters) -> Parameters:
+    """The parameters of the motion that `drive_sense` asks for; a table has its own."""
+    if p.motion == "table":
+        return p
+    own = {"motion": "circular", "motion_sense": p.drive_sense} if p.drive_sense else {"motion": "harmonic", "motion_direction": "z"}
+    return SimpleNamespace(**{**vars(p), **own})

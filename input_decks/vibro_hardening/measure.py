@@ -1,0 +1,81 @@
+"""Vibratory hardening: impacts on a clamped part, power and noise; what the amplitude makes of circulation and fluctuation."""
+
+import math
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import numpy as np
+
+from dembark.input_decks.common.motion import motion
+from dembark.input_decks.common.trough import polygon
+from dembark.postproc.instruments import machines
+from dembark.postproc.instruments.drive import PARTS
+from dembark.postproc.instruments.growth import Growth, ordered
+from dembark.postproc.instruments.momentum import imbalance
+from dembark.postproc.instruments.touches import Touches, histogram, read_touches
+from dembark.postproc.measurement import Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas
+from dembark.postproc.replica import once
+from dembark.postproc.statistics import combined
+from dembark.postproc.studies import measured
+
+ONE = "one run of a chaotic motion says nothing about its spread"
+WALLS = ("trough", "part")
+# What must not depend on the numerics.
+STEADY = ("circulation", "impact_energy")
+
+
+@once
+def touches(replica: Replica) -> Touches:
+    """The record of the grains on the part."""
+    p, derived = replica.parameters, replica.derived
+    period = int(derived["period_steps"])
+    moving = motion(SimpleNamespace(**p), start=int(derived["begin"]) * replica.time_step)
+    corners = polygon(p["part_diameter"], p["part_corners"], (0.0, -0.2 * p["trough_width"]))
+    return read_touches(replica.folder / "touches.dump", moving, corners, stride=int(derived["sample"]), time_step=replica.time_step,
+                        first=int(derived["first"]), periods=p["periods"], period=period * replica.time_step, depth=p["grain_diameter"])
+
+
+def measure(replicas: Replicas) -> Measurement:
+    """Values and curves of all replicas of a series."""
+    runs, records, p = [machines.read(one) for one in replicas], [touches(one) for one in replicas], replicas[0].parameters
+    drive = 2.0 * math.pi * p["motion_frequency"]
+    mass = p["grain_density"] * math.pi / 6.0 * p["grain_diameter"] ** 3
+    unit = 0.5 * mass * runs[0].speed**2
+
+    def over(found: list[Estimate], scale: float = 1.0) -> Value:
+        one = over_replicas(found)
+        return Value(Estimate(one.value / scale, one.half / scale, one.basis))
+
+    def of_run(number: Callable[[machines.Trough], float]) -> Value:
+        return over([Estimate(number(one), math.inf, ONE) for one in runs])
+
+    values = {
+        "energy_balance": Value(exact(np.max([imbalance(one.rows, PARTS) for one in runs])), exact(0.0)),
+        "touch_balance": Value(exact(max(missed(*pair) for pair in zip(runs, records, strict=True))), exact(0.0)),
+        "impact_rate": over([one.rate() for one in records]), "impact_energy": over([one.energy() for one in records], unit),
+        "friction_power": over([one.friction() for one in records]), "circulation": over([one.turning() for one in runs], drive),
+        "power": over([one.power(*WALLS) for one in runs]), "noise": of_run(lambda one: one.noise("trough")),
+        "stirring": over([one.stirring() for one in runs]),
+    }
+    return Measurement(values, [machines.drifts(runs), machines.spectra(runs, "trough"), histogram(records, unit)])
+
+
+def missed(run: machines.Trough, record: Touches) -> float:
+    """Size of the difference between the impulse of the record and that of the force on the part, over the weight times the window."""
+    whole = np.array([run.rows[f"part_j{axis}"][-1] - run.rows[f"part_j{axis}"][0] for axis in "xyz"])
+    return float(np.linalg.norm(record.impulse() - whole) / (run.weight * run.periods * run.run.period))
+
+
+def study(name: str, points: Points, along: str) -> Measurement:
+    """The fluctuation at the largest amplitude over that at the smallest; or how far the steady motion depends on the numerics."""
+    points, place = ordered(points, along)
+    if name == "amplitude":
+        found = [measured(point, "stirring") for point in points]
+        ratio = found[-1].value / found[0].value
+        gain = Estimate(ratio, ratio * combined([one.half / one.value for one in (found[0], found[-1])]), "propagated from both runs")
+        verdict = "pass" if gain.interval[0] > 1.0 else "fail" if gain.interval[1] <= 1.0 else "info"
+        curve = Growth.of(points, "stirring", place).curve("stirring", "Fluctuation over mean speed", "amplitude (m)", "")
+        told = "passes when the whole interval is above 1"
+        return Measurement({"stirring_gain": Value(gain, exact(1.0), verdict=verdict, detail=told)}, [curve])
+    return Measurement({f"{quantity}_change": Value(machines.spread([measured(point, quantity) for point in points]), exact(0.0))
+                        for quantity in STEADY})

@@ -1,0 +1,37 @@
+"""Vibratory hardening: grains in a trough that moves on a circle, and a part that is clamped in it; all energies are booked."""
+
+import math
+
+from yade import dembark
+
+p = dembark.parameters()
+weight = (0, 0, -p.gravity)
+materials, ids = dembark.begin(p, weight)
+for k in ids[1]:
+    # One layer of spheres stays one: round-off across it would grow as a column buckles.
+    O.bodies[k].state.blockedDOFs = "yXZ"
+walls = {name: dembark.mesh(f"{name}.stl", materials[1]) for name in ("trough", "part")}
+moving = dembark.motion(p, walls, ["trough", "part"])
+
+
+def more():
+    """Weight times height of the centre of mass (J), and what belongs to the motion of the walls."""
+    height = math.fsum(O.bodies[k].state.mass * O.bodies[k].state.pos[2] for k in ids[1])
+    return (p.gravity * height, *dembark.motion_values(moving))
+
+
+history = dembark.account_history(("weight_height", *dembark.motion_columns(moving)), more)
+vessel = {"vessel": [*walls["trough"], *walls["part"]]}
+frames = dembark.Recorder(p, vessel, boundary="ff ff ff", gravity=weight, history=history, report=p.stride)
+touches = dembark.TouchWriter("vessel", walls["part"], dembark.box(), boundary="ff ff ff", gravity=weight)
+
+
+def record():
+    """Write what is due at this step, and several times in each impact the grains on the part."""
+    frames()
+    if O.iter >= p.first and (O.iter - p.first) % p.sample == 0:
+        touches.write()
+
+
+O.engines = dembark.mesh_loop(p, materials, weight, account=EnergyAccount(), moving=moving)
+dembark.run(p.steps, outputs=("time.csv", "grains.dump", "contacts.dump", "touches.dump"))

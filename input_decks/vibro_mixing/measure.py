@@ -1,0 +1,141 @@
+"""Mixing and segregation in a vibrated vessel, at one phase of each period, at which the bed lies on the floor."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dembark.postproc.instruments.layer import unexplained
+from dembark.postproc.instruments.mixing import (
+    Kinds,
+    cells,
+    lacey_index,
+    lower_half,
+    mixing_rate,
+    rate,
+    samples,
+    segregation,
+    wall_drift,
+)
+from dembark.postproc.instruments.phases import Phases, acceleration, read_phases
+from dembark.postproc.measurement import (
+    Array,
+    Curve,
+    Estimate,
+    Measurement,
+    Numbers,
+    Replica,
+    Replicas,
+    Value,
+    exact,
+    over_replicas,
+    profile,
+)
+from dembark.postproc.replica import once
+
+# Width of a sample in mean diameters; labellings at random; phase at which the bed lies on the floor.
+SAMPLE, LABELLINGS, PHASE = 3.0, 16, 0
+ALONE = "one run of a chaotic motion says nothing about its spread"
+
+
+@once
+def read(replica: Replica) -> Phases:
+    """The frames by their phase."""
+    return read_phases((frame.select(frame.types == 1) for frame in replica.grains()), replica.derived["period_steps"], replica.time_step)
+
+
+def places(run: Phases) -> Array:
+    """(periods, grains, 2) in m: x and z at the phase at which the bed lies on the floor."""
+    return np.array([frame.positions[:, [0, 2]] for frame in run.at(PHASE)])
+
+
+def measure(replicas: Replicas) -> Measurement:
+    """What the mixture of the run has to show."""
+    runs, p = [read(replica) for replica in replicas], replicas[0].parameters
+    drift = over_replicas([wall_drift(one, 0.0, p["vessel_width"], p["grain_diameter"]) for one in runs])
+    values = {"energy_balance": Value(exact(max(unexplained(replica.times()) for replica in replicas)), exact(0.0)),
+              "acceleration": Value(exact(acceleration(p))),
+              "wall_drift": Value(drift)}
+    if p["wall_friction"] == 0.0 and p["static_friction"] is None:
+        values["wall_drift_smooth"] = Value(drift, exact(0.0))
+    tracks = [places(one) for one in runs]
+    if p["mixture"] == "equal":
+        found, curves = equal(tracks, p["grain_diameter"])
+    else:
+        between = 0.25 * p["grain_diameter"] * (1.0 + p["size_ratio"])
+        large = [one.frames[0].radii > between for one in runs]
+        found, curves = unequal(tracks, large, p)
+    return Measurement(values | found, curves)
+
+
+def equal(tracks: list[Array], diameter: float) -> tuple[dict[str, Value], list[Curve]]:
+    """Mixing of the halves, and what labels make of the same places."""
+    random = np.random.default_rng(0)
+    indices = {name: [index_of(track, lower_half(track[0, :, axis]), diameter) for track in tracks]
+               for axis, name in enumerate(("sides", "layers"))}
+    separated = [max(abs(lacey_index(lower_half(frame[:, axis]), sampled(frame, diameter))) for axis in (0, 1))
+                 for track in tracks for frame in track]
+    labels = [lacey_index(shuffled(random, lower_half(frame[:, 0])), sampled(frame, diameter))
+              for track in tracks for frame in track for _ in range(20)]
+    told = [segregation(kinds, frame[:, 1]) for track in tracks
+            for kinds in (shuffled(random, lower_half(track[0, :, 1])) for _ in range(LABELLINGS)) for frame in track]
+    values = {"index_separated": Value(exact(float(np.mean(separated))), exact(0.0)),
+              "index_random": Value(exact(float(np.mean(labels))), exact(1.0)),
+              "segregation_labels": Value(exact(float(np.mean(told))), exact(0.0))}
+    for name, found in indices.items():
+        values[f"index_{name}"] = Value(over_replicas([Estimate(float(one[-1]), math.inf, ALONE) for one in found]))
+        values[f"mixing_rate_{name}"] = Value(over_replicas([mixing_rate(one) for one in found]))
+    return values, [curve(f"index_{name}", f"Mixing of the {name}", "Lacey's index", found) for name, found in indices.items()]
+
+
+def shuffled(random: np.random.Generator, kinds: Kinds) -> Kinds:
+    """As many labels of each kind, at random."""
+    return random.permutation(kinds)
+
+
+def sampled(frame: Array, diameter: float) -> NDArray[np.int64]:
+    """Number of the sample (n,) of each of the places `frame` (n, 2): an even number of columns and rows, each with as many grains as the
+    others, so that no sample lies in both halves."""
+    return samples(frame, tuple(np.quantile(place, np.linspace(0.0, 1.0, 2 * max(1, round((len(edge) - 1) / 2)) + 1))
+                                for place, edge in zip(frame.T, cells(frame, SAMPLE * diameter), strict=True)))
+
+
+def index_of(track: Array, kinds: Kinds, diameter: float) -> Array:
+    """Lacey's index (periods,) of grains of two kinds on their `track` (periods, n, 2)."""
+    return np.array([lacey_index(kinds, sampled(frame, diameter)) for frame in track])
+
+
+def unequal(tracks: list[Array], large: list[Kinds], p: Numbers) -> tuple[dict[str, Value], list[Curve]]:
+    """How large and small grains part, or how the single large one rises."""
+    if p["mixture"] == "intruder":
+        heights = [(track[:, kinds, 1].mean(axis=1) - track[:, :, 1].min(axis=1)) / p["grain_diameter"]
+                   for track, kinds in zip(tracks, large, strict=True)]
+        tops = [(track[:, :, 1].max(axis=1) - track[:, :, 1].min(axis=1)) / p["grain_diameter"] for track in tracks]
+        values = {"rise": Value(over(heights, lambda one: float(one[-1] - one[0]))),
+                  "rise_rate": Value(over_replicas([rate(until_top(*one, p["size_ratio"])) for one in zip(heights, tops, strict=True)]))}
+        return values, [curve("rise", "Height of the large grain", "height over the lowest grain (d)", heights)]
+    parted = [np.array([segregation(kinds, frame[:, 1]) for frame in track]) for track, kinds in zip(tracks, large, strict=True)]
+    values = {"segregation_start": Value(over(parted, lambda one: float(one[0]))),
+              "segregation_end": Value(over(parted, lambda one: float(one[-1]))),
+              "segregation_rate": Value(over_replicas([rate(one) for one in parted]))}
+    if acceleration(p) < 1.0:
+        change = max((float(one[-1] - one[0]) for one in parted), key=abs)
+        values["segregation_change"] = Value(exact(change), exact(0.0))
+    return values, [curve("segregation", "Segregation", "(z̄ large − z̄ small)/H", parted)]
+
+
+def until_top(heights: Array, tops: Array, ratio: float) -> Array:
+    """The part of `heights` (periods,) before the large grain is within two of its diameters of the `tops`."""
+    there = np.flatnonzero(heights > tops - 2.0 * ratio)
+    return heights[: int(there[0])] if len(there) else heights
+
+
+def over(series: list[Array], number: Callable[[Array], float]) -> Estimate:
+    """A number of each run's series, over the runs."""
+    return over_replicas([Estimate(number(one), math.inf, ALONE) for one in series])
+
+
+def curve(name: str, title: str, across: str, series: list[Array]) -> Curve:
+    """Series of all runs over the periods."""
+    return profile(name, title, "periods", across, np.arange(len(series[0]), dtype=float), series)

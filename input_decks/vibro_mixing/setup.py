@@ -1,0 +1,70 @@
+"""Mixing and segregation: a dilute bed in a vessel, large grains among it, the vessel's walls, and the steps of output."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dembark.input_decks.common import packing
+from dembark.input_decks.common.motion import amplitude, motion
+from dembark.input_decks.common.setup import Parameters, Setup, contacts, rectangle
+from dembark.input_decks.common.vibration import fixed_phases, suitable_step
+
+
+def setup(p: Parameters) -> Setup:
+    """The bed falls into the vessel at rest; then the amplitude grows, and the frames begin."""
+    frequency = p.motion_frequency
+    still = math.ceil(p.settle_time * frequency)
+    moving = motion(p, start=still / frequency)
+    speed = 2.0 * math.pi * frequency * amplitude(p)
+    step, numbers = fixed_phases(frequency, suitable_step(p, speed), still + math.ceil(p.motion_ramp), p.periods, rows=2)
+    biggest = packing.largest(p) * (1.0 if p.mixture == "equal" else p.size_ratio)
+    reach = amplitude(p)
+    sites, height = bed(p, biggest)
+    # Grains thrown off the surface fly no higher than this.
+    top = height + 4.0 * reach + 0.5 * (2.0 * speed) ** 2 / p.gravity
+    box = [(-biggest, p.vessel_width + biggest), (0.0, p.vessel_depth), (-reach - 2.0 * biggest, top + 2.0 * biggest + reach)]
+    grains = packing.grains(p, sites, box)
+    if p.dimensions == 2:
+        # Nothing pushes them out of their common plane.
+        grains = replace(grains, positions=grains.positions * [1, 0, 1] + [0, 0.5 * p.vessel_depth, 0])
+    large = large_grains(p, grains)
+    grains = replace(grains, diameters=np.where(large, p.size_ratio, 1.0) * grains.diameters)
+    walls = {"vessel": vessel(p, reach, top)}
+    return Setup(numbers["steps"], step, grains, {**numbers, **contacts(p, skin=0.2)}, walls, {"motion_words": moving.words})
+
+
+def bed(p: Parameters, biggest: float) -> tuple[packing.Array, float]:
+    """Sites (n, 3) in m of a dilute bed in the vessel, in which grains of the diameter `biggest` (m) have room, and its height (m)."""
+    least, margin = 1.15 * biggest, 0.15 * biggest
+    n_x, n_y = int((p.vessel_width - 2.0 * margin) / least), int(p.vessel_depth / least) if p.dimensions == 3 else 1
+    rows = math.ceil(1.3 * p.grain_count / (n_x * n_y))
+    cell = ((p.vessel_width - 2.0 * margin) / n_x, p.vessel_depth / n_y, least)
+    return packing.lattice((n_x, n_y, rows), cell, (margin, 0.0, margin)), rows * least + margin
+
+
+def large_grains(p: Parameters, grains: packing.Packing) -> NDArray[np.bool_]:
+    """Which grains (n,) are large: none, some by the seed, or the lowest one nearest to the middle."""
+    count = len(grains.diameters)
+    if p.mixture == "two_sizes":
+        return packing.rank(count, p.seed) < round(p.large_part * count)
+    found = np.zeros(count, bool)
+    if p.mixture == "intruder":
+        off = np.abs(grains.positions[:, 0] - 0.5 * p.vessel_width)
+        found[np.lexsort((off, np.round(grains.positions[:, 2] / p.grain_diameter)))[0]] = True
+    return found
+
+
+def vessel(p: Parameters, reach: float, top: float) -> packing.Array:
+    """Floor and side walls as triangles (n, 3, 3) in m, in panels about as long as the period is deep, for LIGGGHTS cannot place elements
+    that are much larger than the period."""
+    def panels(length: float) -> tuple[int, float]:
+        count = max(1, round(length / p.vessel_depth))
+        return count, length / count
+
+    across, along = (0.0, p.vessel_depth, 0.0), panels(p.vessel_width)
+    count, rise = panels(top - reach)
+    floor = [rectangle((along[1] * k, 0.0, 0.0), (along[1], 0.0, 0.0), across) for k in range(along[0])]
+    sides = [rectangle((x, 0.0, rise * k), across, (0.0, 0.0, rise)) for x in (0.0, p.vessel_width) for k in range(count)]
+    return np.vstack(floor + sides)
