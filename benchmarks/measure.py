@@ -88,6 +88,16 @@ def read_log(text: str) -> Sample:
     return Sample(float(loops[-1]), float(pairs[-1]))
 
 
+def read_lammps(text: str, wall_clock: bool) -> Sample:
+    """The last run of LAMMPS with `timer full`, elapsed or processor time; RunError when there is none."""
+    loops = re.findall(r"^Loop time of (\S+) on .*\n\n(?:Performance.*\n)?(\S+)% CPU use", text, re.MULTILINE)
+    pairs = re.findall(r"^Pair +\| \S+ +\| (\S+) +\| \S+ +\| +\S+ \| +(\S+) \|", text, re.MULTILINE)
+    if not loops or len(loops) != len(pairs):
+        errors = re.findall(r"^ERROR.*$", text, re.MULTILINE)
+        raise RunError("LAMMPS did not finish a timed run", errors[-1] if errors else "its output holds no timings")
+    return Sample(*(float(time) * (1.0 if wall_clock else 0.01 * float(part)) for time, part in (loops[-1], pairs[-1])))
+
+
 def stock_liggghts() -> Path:
     """The stock engine; DembarkError when there is none."""
     found = os.environ.get("STOCK_LIGGGHTS") or shutil.which("liggghts")
@@ -122,6 +132,16 @@ def liggghts_sample(program: Path, bed: Path, variables: dict[str, object], envi
         if done.returncode:
             text = re.sub(r"^Loop time.*$", "", text, flags=re.MULTILINE)
         return read_log(text)
+
+
+def lammps_sample(engine: Engine, bed: Path, variables: dict[str, object], wall_clock: bool) -> Sample:
+    """Run replay_lammps.in with `variables`; the stock style is one of the same program."""
+    given = [word for key, value in {"bed": bed, **variables}.items() for word in ("-var", key, str(value))]
+    with tempfile.TemporaryDirectory(prefix="dembark-bench-") as name:
+        words = [str(engine.executable), "-in", str(HERE / "replay_lammps.in"), "-log", "none", *given]
+        done = _call(words, Path(name), engine.environment())
+    text = done.stdout + done.stderr
+    return read_lammps(re.sub(r"^Loop time.*$", "", text, flags=re.MULTILINE) if done.returncode else text, wall_clock)
 
 
 def yade_sample(engine: Engine, bed: Path, law: str, relax: int, steps: int) -> Sample:

@@ -18,6 +18,7 @@ from benchmarks.measure import (
     Comparison,
     Subject,
     clock_library,
+    lammps_sample,
     liggghts_sample,
     settled_bed,
     stock_liggghts,
@@ -25,7 +26,7 @@ from benchmarks.measure import (
 )
 from dembark.common.errors import DembarkError
 from dembark.common.files import write_json
-from dembark.validation.engines import find
+from dembark.validation.engines import absent, find
 from dembark.validation.provenance import collect
 
 ROOT = HERE.parent
@@ -63,6 +64,20 @@ def liggghts_comparisons(bed: Path, cache: Path, wall_clock: bool, relax: int, s
             subject("finnie_rabinowicz + capillary exact", law, "finnie_rabinowicz", "capillary"),
         ], steps, {"history + capillary exact": 1.0, "history + capillary willett": 1.0}),
     ]
+
+
+def lammps_comparison(bed: Path, wall_clock: bool, relax: int, steps: int) -> Comparison:
+    """The pair style beside LAMMPS's own with Mindlin's history."""
+    engine = find("lammps")
+
+    def subject(name: str, **variables: object) -> Subject:
+        return Subject(name, lambda: lammps_sample(engine, bed, {**variables, "relax": relax, "steps": steps}, wall_clock))
+
+    return Comparison("LAMMPS, dry", [
+        subject("granular, tangential mindlin (stock)", style="stock"),
+        subject("dembark/granular", style="dembark"),
+        subject("dembark/granular presliding partial_slip", style="dembark", settings="presliding partial_slip"),
+    ], steps, {"dembark/granular": 0.6})
 
 
 def yade_comparison(bed: Path, relax: int, steps: int) -> Comparison:
@@ -109,7 +124,7 @@ def parsed(words: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--steps", type=int, default=400,
                         help="steps of a timed run of LIGGGHTS; a quarter of it in YADE (default %(default)s)")
     parser.add_argument("--relax", type=int, default=1000, help="steps before it, in which histories build up (default %(default)s)")
-    parser.add_argument("--only", choices=["dry", "wet", "yade", "lcp"], action="append", help="leave the other comparisons out")
+    parser.add_argument("--only", choices=["dry", "wet", "yade", "lammps", "lcp"], action="append", help="leave the other comparisons out")
     parser.add_argument("--redraw", action="store_true", help="with --only lcp: measure nothing, draw docs/figures/lcp_scaling from --out")
     parser.add_argument("--wall-clock", action="store_true", help="LIGGGHTS's timers as they are; default: processor time")
     parser.add_argument("--out", type=Path, default=ROOT / "results/bench", help="folder of bench.json and bench.md")
@@ -132,7 +147,7 @@ def main(words: list[str] | None = None) -> int:
             return lcp.report(lcp.measure(given.out, given.rounds, given.wall_clock, say))
         cache = ROOT / "build/bench"
         cache.mkdir(parents=True, exist_ok=True)
-        wanted = given.only or ["dry", "wet", "yade", "lcp"]
+        wanted = given.only or ["dry", "wet", "yade", "lcp", *([] if absent(["lammps"]) else ["lammps"])]
         facts = {**collect(find("liggghts")), "date": datetime.now(UTC).isoformat(timespec="seconds"), "load": os.getloadavg()[0],
                  "grains": given.count, "diameter": 0.005, "rounds": given.rounds, "relax": given.relax,
                  "clock": "elapsed time" if given.wall_clock else "processor time"}
@@ -142,6 +157,9 @@ def main(words: list[str] | None = None) -> int:
         if "yade" in wanted:
             comparisons.append(yade_comparison(bed, max(1, given.relax // 5), max(1, given.steps // 4)))
             facts["versions"] = {**facts["versions"], "yade": find("yade").version}
+        if "lammps" in wanted:
+            comparisons.append(lammps_comparison(bed, given.wall_clock, given.relax, given.steps))
+            facts["versions"] = {**facts["versions"], "lammps": find("lammps").version}
         for comparison in comparisons:
             comparison.run(given.rounds, say)
         rows = [row for comparison in comparisons for row in comparison.rows()]

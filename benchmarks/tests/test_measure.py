@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.measure import HERE, Comparison, Sample, Subject, read_log, spread
+from benchmarks.measure import HERE, Comparison, Sample, Subject, read_lammps, read_log, spread
 from benchmarks.run import main, markdown
 from dembark.common.errors import RunError
 
@@ -23,6 +23,26 @@ def test_last_run_of_a_log():
 def test_log_without_timings(text, what):
     with pytest.raises(RunError, match=what):
         read_log(text)
+
+
+LAMMPS = """Loop time of 2 on 1 procs for 400 steps with 20 atoms
+
+50.0% CPU use with 1 MPI tasks x no OpenMP threads
+
+MPI task timing breakdown:
+Section |  min time  |  avg time  |  max time  |%varavg|  %CPU | %total
+-----------------------------------------------------------------------
+Pair    | 1.5        | 1.6        | 1.7        |   0.0 |  25.0 | 80.00
+Neigh   | 0          | 0          | 0          |   0.0 | 100.0 |  0.00
+"""
+
+
+def test_last_run_of_lammps():
+    text = LAMMPS.replace("of 2", "of 9") + LAMMPS
+    assert read_lammps(text, wall_clock=False) == Sample(loop=1.0, pair=0.4)
+    assert read_lammps(text, wall_clock=True) == Sample(loop=2.0, pair=1.6)
+    with pytest.raises(RunError, match="lost atoms"):
+        read_lammps("ERROR: lost atoms", wall_clock=False)
 
 
 def test_spread():

@@ -1,0 +1,15 @@
+"""The benchmark of the SPH solver, on a cube of a few particles."""
+
+import shutil
+
+import pytest
+
+from benchmarks import sph
+
+
+@pytest.mark.skipif(shutil.which("liggghts") is None, reason="no stock LIGGGHTS")
+def test_every_subject_is_measured(tmp_path):
+    rows = sph.measure(8, 3, 1, tmp_path, lambda line: None)
+    assert len(rows) == 5
+    assert rows[0]["ratio"] == 1.0
+    assert all(row["rate"] > 0.0 for row in rows)
