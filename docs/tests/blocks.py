@@ -8,7 +8,7 @@ from __future__ import annotations
 import ast
 import re
 import shlex
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -38,7 +38,14 @@ class Block:
 
 def blocks(*kinds: str) -> list[Block]:
     """All blocks of these kinds (all kinds when none is named), in the order of the pages."""
-    return [block for page in PAGES for block in _of_page(page) if not kinds or block.kind in kinds]
+    return [block for page in PAGES for block in map(_of_engine, _of_page(page)) if not kinds or block.kind in kinds]
+
+
+def _of_engine(block: Block) -> Block:
+    """LAMMPS and LIGGGHTS have one language; the styles tell which of them is meant."""
+    kinds = {"deck": "LAMMPS deck", "syntax": "LAMMPS syntax", "LIGGGHTS fragment": "LAMMPS fragment"}
+    lammps = block.page.startswith("docs/lammps_") or re.search("dembark/granular|wall/dembark", block.text)
+    return replace(block, kind=kinds.get(block.kind, block.kind)) if lammps else block
 
 
 def _of_page(page: Path) -> list[Block]:
@@ -126,6 +133,7 @@ NOT_RUN = (
     (r"module load .*|sinfo .*|sacctmgr .*|srun .*", "programs of a cluster"),
     (r"export (?!DEMBARK_DECKS).*", "one's own engines and modules; test_names.py looks the variables up in the code"),
     (r"dembark validate .*|python docs/impact_table\.py .*", "a case in both engines takes minutes; input_decks/tests run it"),
+    (r"cmake .*", "compiles LAMMPS or the plugin; plugins/lammps/tests/test_own_build.py configures it"),
     (r".*pytest .*--slow.*", "starts a Slurm as root and takes minutes; the folder exists"),
 )
 

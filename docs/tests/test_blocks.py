@@ -40,6 +40,7 @@ RUNNERS = {
     "python": "test_docs.py", "cpp": "test_docs.py", "deck": "test_docs.py", "sql": "validation/campaigns/tests/test_docs.py",
     "py": "validation/campaigns/tests/test_docs.py", "python yade": "test_yade_blocks.py", "YADE fragment": "test_yade_blocks.py",
     "LIGGGHTS fragment": "test_liggghts_blocks.py", "syntax": "test_liggghts_blocks.py", "python grains.bin": "test_liggghts_blocks.py",
+    "LAMMPS deck": "test_lammps_blocks.py", "LAMMPS fragment": "test_lammps_blocks.py", "LAMMPS syntax": "test_lammps_blocks.py",
     "output": "test_liggghts_blocks.py, test_docs.py", "toml": "test_toml", "shell": "test_shell", "file": "test_shell",
     "listing": "test_listing", "picture": "test_architecture.py",
 }

@@ -81,9 +81,9 @@ def alternatives(lines: list[str]) -> Iterator[list[str]]:
 
 def deck(lines: list[str]) -> str:
     """A complete deck with these lines of a fragment in their places."""
-    if "lcp/impact" in lines[0]:
-        types = len(re.search(r"stiffness((?: [\d.e+-]+)+)", lines[0]).group(1).split())
-        mesh = MESH.format(scale=1) if "wall mesh" in lines[0] else ""
+    if hits := next((line for line in lines if "lcp/impact" in line), ""):
+        types = len(re.search(r"stiffness((?: [\d.e+-]+)+)", hits).group(1).split())
+        mesh = MESH.format(scale=1) if "wall mesh" in hits else ""
         return LOGS.format(types=types) + mesh + "\n".join(lines) + "\nfix motion all nve/sphere\nrun 20\n"
     given = {match.group(1) for line in lines if (match := re.match(r"fix \S+ all property/global (\w+)", line))}
     head = [line for line in lines if "property/global" in line]

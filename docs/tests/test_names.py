@@ -153,10 +153,11 @@ def test_readme_names_every_style() -> None:
     headers = code("plugins/liggghts")
     styles = {f"fix {name}" for name in re.findall(r'fixes\["([\w/]+)"\]', main)}
     styles |= set(re.findall(r'commands\(\*lammps->input\)\["(\w+)"\]', main))
+    styles |= {f"pair_style {name}" for name in re.findall(r'pair_map\)\["([\w/]+)"\]', main)}
     styles |= {f"tangential {name}" for name in re.findall(r"^TANGENTIAL_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
     styles |= {f"cohesion {name}" for name in re.findall(r"^COHESION_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
     table = {name for cell in rows(TEXTS["README.md"], "style") for name in re.findall(r"`([^`]+)`", cell)}
-    assert len(styles) == 7 and table == styles
+    assert len(styles) == 13 and table == styles
 
 
 def test_readme_and_pages_name_every_class_of_yade() -> None:

@@ -252,6 +252,13 @@ def test_two_runs_are_not_one(tmp_path: Path) -> None:
     assert np.abs(whole - parts).max() > 1e-9
 
 
+def printed(folder: Path, body: str, name: str) -> float:
+    """The number that the deck `body` prints after `name`."""
+    result = run(folder, body)
+    assert result.returncode == 0, result.stdout[-2000:] + result.stderr
+    return float(next(line.split()[1] for line in result.stdout.splitlines() if line.startswith(f"{name} ")))
+
+
 def pressed_over_edge(folder: Path, angle: float, place: float, curvature: str = "") -> float:
     """Force (N) along z on a grain 0.03 mm deep in the first of two strips; the second one beyond x = 0 rises by `angle` (degrees)."""
     c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
@@ -277,9 +284,7 @@ thermo_style custom step c_f
 run 1
 print 'force ${{f}}'
 """
-    result = run(folder, body)
-    assert result.returncode == 0, result.stdout[-2000:] + result.stderr
-    return float(next(line.split()[1] for line in result.stdout.splitlines() if line.startswith("force ")))
+    return printed(folder, body, "force")
 
 
 def test_edges_of_a_mesh_count_beside_their_faces(tmp_path: Path) -> None:
@@ -310,7 +315,5 @@ thermo_style custom step c_sum
 run 50
 print 'spin ${{s}}'
 """
-    result = run(tmp_path, body)
-    assert result.returncode == 0, result.stdout[-2000:] + result.stderr
-    spin = float(next(line.split()[1] for line in result.stdout.splitlines() if line.startswith("spin ")))
+    spin = printed(tmp_path, body, "spin")
     assert spin == 0.0 if axis == "y" else spin > 0.0

@@ -66,10 +66,12 @@ O.run(10, True)
 CASE = '[parameters.grain_count]\nvalue = 10\ntype = "int"\n'
 # What complete scripts print, by the class that they show.
 SAID = {"LcpImpact": "impacts: ", "CapillaryLiquid": "all liquid: 1e-09", "EnergyAccount": "balance: True",
+        "IntegrationMonitor": "velocity 0.", "SphFluid": "front: 0.",
         "Ig2_Wall_Sphere_ScGeom": "stopped after 0.0071",
         "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz": "bridges: 1"}
 # Headings of the pages of YADE below which a table of attributes or methods stands, and pages about one class.
-CLASSES = {"docs/yade_lcp_impact.md": "LcpImpact", "docs/yade_energy_account.md": "EnergyAccount"}
+CLASSES = {"docs/yade_lcp_impact.md": "LcpImpact", "docs/yade_energy_account.md": "EnergyAccount",
+           "docs/yade_sph_fluid.md": "SphFluid"}
 # Words in the first column of other tables: of the dict for friction, and of a body's blocked degrees of freedom.
 NO_ATTRIBUTES = {"static", "kinetic", "slip", "strength", "area", "healing", "xyzXYZ", "XYZ", "zXY", "zXYZ"}
 
@@ -89,6 +91,9 @@ def fragment(text: str) -> str:
     if "FacetSurface" in text:
         touching = "assert sum(one.isReal for one in O.interactions) == 1  # on the border of two facets"
         return BEFORE + PLATE + text + f"O.dt = 1e-6\nO.run(10, True)\n{touching}"
+    if "LcpImpact(" in text and "O.engines" in text:
+        log = "O.bodies.append(sphere((0, 0, 0), 0.1, material=grain))\n"
+        return BEFORE + text + log + "O.dt = 1e-6\nO.run(10, True)\nassert hits.steps == 10"
     return BEFORE + text
 
 
