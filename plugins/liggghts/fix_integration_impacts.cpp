@@ -1,7 +1,7 @@
 // Impacts of fix integration/monitor that are integrated anew (dembark/integration/shadow_impact.hpp).
 //
-// All ranks have all of them; the one that owns the grain with the lower number follows it. Before the forces of a step, positions are of
-// the step and velocities of half a step before, of owned atoms as of their images on other ranks.
+// Before the forces of a step, positions are of the step and velocities of half a step before, of owned atoms as of their images on other
+// ranks.
 #include "fix_integration_monitor.h"
 
 #include <utility>
@@ -32,9 +32,16 @@ void FixIntegrationMonitor::setup_pre_force(int) {
 
 void FixIntegrationMonitor::pre_force(int) {
   const long n = long(update->ntimestep);
-  follow_impacts();
+  run_.shadows.follow(update->dt, monitor_, [this](const ShadowImpact &shadow) {
+    const int i = atom->map(int(shadow.one)), j = atom->map(int(shadow.two));
+    dembark::ShadowImpacts::Meeting now;
+    now.here = i >= 0 && i < atom->nlocal;
+    now.judged = now.here && j >= 0 && weight(i, j, now.gravity);
+    if (now.judged) now.bodies = bodies(i, j);
+    return now;
+  });
   // Atoms have changed their ranks.
-  if (neighbor->ago == 0 || monitor_.settings.samples(n)) drop_impacts();
+  if (neighbor->ago == 0 || monitor_.settings.samples(n)) run_.shadows.drop();
   if (monitor_.settings.samples(n)) begin_impacts(n);
 }
 
@@ -81,50 +88,12 @@ void FixIntegrationMonitor::begin_impacts(long n) {
       const double reach = atom->radius[i] + atom->radius[j];
       dembark::Vec3<double> gravity;
       if (a * a + b * b + c * c >= reach * reach || !(atom->mask[i] & atom->mask[j] & groupbit) || !weight(i, j, gravity) ||
-          !dembark::picked(atom->tag[i], atom->tag[j], n, impacts_))
+          !dembark::picked(atom->tag[i], atom->tag[j], n, run_.impacts))
         continue;
       ShadowImpact shadow;
       if (shadow.begin(dembark_liggghts::PairParameters::known->parameters(atom->type[i], atom->type[j]), bodies(i, j), atom->tag[i],
                        atom->tag[j], update->dt))
         mine.push_back(shadow);
     }
-  const int own = int(mine.size() * sizeof(ShadowImpact));
-  std::vector<int> counts(std::size_t(comm->nprocs)), offsets(std::size_t(comm -> nprocs), 0);
-  MPI_Allgather(&own, 1, MPI_INT, counts.data(), 1, MPI_INT, world);
-  for (std::size_t r = 1; r < counts.size(); ++r) offsets[r] = offsets[r - 1] + counts[r - 1];
-  std::vector<ShadowImpact> all(std::size_t(offsets.back() + counts.back()) / sizeof(ShadowImpact));
-  if (all.empty()) return;
-  MPI_Allgatherv(mine.data(), own, MPI_BYTE, all.data(), counts.data(), offsets.data(), MPI_BYTE, world);
-  shadows_.insert(shadows_.end(), all.begin(), all.end());
-  over_.resize(shadows_.size(), 0);
-}
-
-void FixIntegrationMonitor::follow_impacts() {
-  for (std::size_t k = 0; k < shadows_.size(); ++k) {
-    if (over_[k]) continue;
-    ShadowImpact &shadow = shadows_[k];
-    const int i = atom->map(int(shadow.one)), j = atom->map(int(shadow.two));
-    dembark::Vec3<double> gravity;
-    if (i < 0 || i >= atom->nlocal) {
-      shadow.wait(update->dt);
-      over_[k] = shadow.lasts_too_long(update->dt);
-      continue;
-    }
-    double found = 0.0;
-    const auto stage =
-        j >= 0 && weight(i, j, gravity) ? shadow.follow(bodies(i, j), gravity, update->dt, found) : ShadowImpact::Stage::dropped;
-    over_[k] = stage != ShadowImpact::Stage::going_on;
-    if (stage == ShadowImpact::Stage::compared) monitor_.take_impact(found, shadow.one);
-  }
-}
-
-/// Those that have ended. Collective.
-void FixIntegrationMonitor::drop_impacts() {
-  if (shadows_.empty()) return;
-  MPI_Allreduce(MPI_IN_PLACE, over_.data(), int(over_.size()), MPI_INT, MPI_MAX, world);
-  std::size_t kept = 0;
-  for (std::size_t k = 0; k < shadows_.size(); ++k)
-    if (!over_[k]) shadows_[kept++] = shadows_[k];
-  shadows_.resize(kept);
-  over_.assign(kept, 0);
+  run_.shadows.add(mine);
 }

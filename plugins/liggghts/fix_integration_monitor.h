@@ -16,8 +16,7 @@ FixStyle(integration/monitor,FixIntegrationMonitor)
 
 #include "fix.h"
 
-#include "dembark/integration/monitor.hpp"
-#include "dembark/integration/shadow_impact.hpp"
+#include "dembark/integration/monitor_run.hpp"
 #include "model_properties.h"
 
 namespace LAMMPS_NS {
@@ -38,18 +37,8 @@ class FixIntegrationMonitor : public Fix {
   void restart(char *);
 
  private:
-  /// What goes on over runs and restarts, the same on all ranks but for the tallies.
-  struct State {
-    dembark::MonitorTally run{}, row{};
-    double step = 0.0;     // s, of the deck
-    double next_row = -1;  // its step
-    int level = 0;         // the step in use is that of the deck over 2^level
-    int said = 0;          // bits of the kinds of findings that were told
-  };
-
   [[noreturn]] void refuse(const std::string &what);
-  double number(int &k, int narg, char **arg);
-  long whole(int &k, int narg, char **arg);
+  dembark::MonitorRun read(const std::vector<std::string> &words);
   void check_motion();
   void read_models();
   double mass(int i) const;
@@ -58,20 +47,15 @@ class FixIntegrationMonitor : public Fix {
   void take_walls();
   void take_wall(class FixWallGran &wall, int i, double distance);
   void take_contact(int i, int j, double radius_j, int type_j, double overlap);
-  dembark::MonitorTally merged(bool whole_run) const;
   bool weight(int i, int j, dembark::Vec3<double> &acceleration) const;
   dembark::ContactBodies bodies(int i, int j) const;
   void begin_impacts(long n);
-  void follow_impacts();
-  void drop_impacts();
-  void act();
-  void end_row();
-  void set_step(int level);
+  void tell();
+  void take_step();
 
-  dembark::StepMonitor monitor_;
-  bool mean_length_ = true, contacts_ = true;
-  long rows_ = 0, impacts_ = 0;
-  State state_;
+  dembark::MonitorRun run_;
+  dembark::StepMonitor &monitor_;
+  bool contacts_ = true;
   char *property_ = nullptr;  // id of the fix that keeps the accelerations
   class FixPropertyAtom *histories_ = nullptr;
   int moving_ = 0, frozen_ = 0;  // bits of groups
@@ -81,10 +65,6 @@ class FixIntegrationMonitor : public Fix {
   std::vector<class FixWallGran *> walls_;
   class FixEnergyAccount *account_ = nullptr;
   std::vector<class FixGravity *> gravities_;
-  std::vector<dembark::ShadowImpact> shadows_;  // the same on all ranks
-  std::vector<int> over_;                       // which of them have ended, as far as this rank knows
-  bigint merged_at_ = -1;
-  dembark::MonitorTally merged_;
 };
 
 }  // namespace LAMMPS_NS

@@ -5,50 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rig.chains import DENSITY, MATERIAL, RADIUS, CompressedChain, solitary_wave
-from rig.liggghts_driver import head, models, properties, read_dump, run_deck
+from rig import liggghts_driver
+from rig.chains import MATERIAL, RADIUS, CompressedChain, solitary_wave
+from rig.liggghts_driver import read_dump, run_deck
+from rig.monitor import MONITOR, POSITION, SPIN, THERMO, VELOCITY, figures, line_of_grains
 from rig.packing import CREATE, STATE, packing
 from rig.scenarios import Material
 
-COUNT = 24
-MONITOR = "fix watch all integration/monitor "
-THERMO = (f"thermo_style custom step {' '.join(f'f_watch[{k}]' for k in range(1, COUNT + 1))}\n"
-          "thermo_modify lost error norm no format float %.17g\n")
 BED = Material(static_friction=0.5, kinetic_friction=0.4, restitution=0.7, youngs_modulus=5e6)
-POSITION, VELOCITY, SPIN = slice(0, 4), slice(4, 8), slice(8, 12)
-
-
-def figures(done):
-    """The rows of the thermo output, without the step."""
-    assert done.code == 0, done.error or done.output[-2000:]
-    lines = re.findall(rf"^ *(\d+(?: +[-+.\de]+){{{COUNT}}}) *$", done.output, re.MULTILINE)
-    return np.array([line.split() for line in lines], dtype=float)
-
-
-def line_of_grains(places, velocities, material, step, rest):
-    """Spheres along x; `rest`: what follows the pair style."""
-    grains = "\n".join(f"create_atoms 1 single {x!r} 0 0 units box\nset atom {i} vx {v!r}"
-                       for i, (x, v) in enumerate(zip(map(float, places), map(float, velocities), strict=True), start=1))
-    return f"""\
-{head()}
-region domain block -0.02 {float(places[-1]) + 0.02!r} -0.02 0.02 -0.02 0.02 units box
-create_box 2 domain
-neighbor 0.0005 bin
-neigh_modify delay 0
-timestep {step!r}
-{properties(material)}
-pair_style gran {models(material)}
-pair_coeff * *
-{grains}
-set group all diameter {2 * RADIUS!r} density {DENSITY!r}
-{rest}
-"""
 
 
 def compressed(folder, chain, steps, words="speed 1 limit 1e9 every 1"):
     places = chain.places.copy()
     places[1:-1] = chain.positions(0)
-    return run_deck(folder, line_of_grains(places, 0 * places, MATERIAL, chain.step, f"""\
+    return run_deck(folder, line_of_grains(liggghts_driver, places, 0 * places, MATERIAL, chain.step, f"""\
 group free id 2:{chain.count + 1}
 fix motion free nve/sphere
 {MONITOR}{words} length 1
@@ -87,7 +57,7 @@ def test_a_struck_chain_has_the_speed_of_the_solitary_wave(tmp_path):
     material = replace(MATERIAL, normal_law="hertz")
     speeds = np.zeros(count)
     speeds[0] = 0.5
-    done = run_deck(tmp_path, line_of_grains(2 * RADIUS * np.arange(count), speeds, material, step, f"""\
+    done = run_deck(tmp_path, line_of_grains(liggghts_driver, 2 * RADIUS * np.arange(count), speeds, material, step, f"""\
 fix motion all nve/sphere
 {MONITOR}speed 0.5
 dump grains all custom {stride} grains.dump id x
@@ -138,7 +108,7 @@ def test_the_step_is_adapted_at_rows_whose_times_stay(tmp_path):
     speeds = {}
     for name, words in (("adapt", "speed 1 action adapt rows 4 every 1"), ("long", "speed 1 action report")):
         rows = "variable next equal f_watch[20]\ndump_modify grains every v_next first yes\n" if name == "adapt" else ""
-        done = run_deck(tmp_path / name, line_of_grains(places, np.array([0.0, 1.0, -1.0, 0.0]), material, 1e-4, f"""\
+        done = run_deck(tmp_path / name, line_of_grains(liggghts_driver, places, np.array([0.0, 1.0, -1.0, 0.0]), material, 1e-4, f"""\
 group free id 2 3
 fix motion free nve/sphere
 {MONITOR}{words}
@@ -201,7 +171,7 @@ def test_impacts_show_the_lag_of_damping(tmp_path):
     for step in (2.4e-5, 1.5e-6):
         gaps = 1e-5 + 0.6 * step * (np.arange(pairs) + 0.5) / pairs
         places = (8 * RADIUS * np.arange(pairs)[:, None] + np.array([0.0, 1.0]) * (2 * RADIUS + gaps)[:, None]).ravel()
-        text = line_of_grains(places, np.tile([0.3, -0.3], pairs), material, step, f"""\
+        text = line_of_grains(liggghts_driver, places, np.tile([0.3, -0.3], pairs), material, step, f"""\
 fix motion all nve/sphere
 {MONITOR}speed 1 every 1 impacts 1
 {THERMO}thermo 100
