@@ -80,6 +80,10 @@ def test_complete_deck(block: Block, tmp_path: Path) -> None:
         # Impacts, a force that was the largest, and solutions to rounding.
         _, logs, _, begun, largest, certificate = map(float, rows[-1])
         assert len(rows) == 5 and logs == 12 and begun > 20 and largest > 100.0 and certificate < 1e-12
+    elif "integration/monitor" in block.text:
+        # Errors of positions and velocities, too few steps a contact, one impact.
+        _, along, speed, steps, impacts = map(float, rows[-1])
+        assert along > 0.0 and speed > 0.005 and 0.0 < steps < 10.0 and impacts == 1
     else:
         # The wall touches grains, and holds more by bridges.
         assert len(rows) == 4 and float(rows[-1][1]) != 0.0 and 5 < float(rows[-1][2]) <= float(rows[-1][3])

@@ -194,6 +194,13 @@ void FixWallDembark::act_on(int i, bool advance) {
   }
 }
 
+const std::vector<double>& FixWallDembark::overlaps(int i) {
+  overlaps_.clear();
+  for (const dembark_lammps::WallContact& contact : surface_->contacts(frame_.inside(vector(atom->x[i])), atom->radius[i], 0.0))
+    if (const double overlap = atom->radius[i] - norm(contact.separation); overlap > 0.0) overlaps_.push_back(overlap);
+  return overlaps_;
+}
+
 /// Collective.
 const std::array<double, 8>& FixWallDembark::totals() {
   if (summed_ != update->ntimestep) MPI_Allreduce(totals_.data(), all_totals_.data(), int(totals_.size()), MPI_DOUBLE, MPI_SUM, world);

@@ -49,6 +49,10 @@ class FixWallDembark : public Fix {
   void write_restart(FILE* file) override;
   void restart(char* buffer) override;
 
+  int type() const { return wall_type_; }
+  /// m, of grain i and the parts of the wall that it touched when the last forces were computed.
+  const std::vector<double>& overlaps(int i);
+
   /// Calls visit(volume, imbalance) for each bridge of grain i, which may change them.
   template <class Visit>
   void each_bridge(int i, Visit visit) {
@@ -67,6 +71,7 @@ class FixWallDembark : public Fix {
   double** rows_ = nullptr;     // of each grain and slot: the number of the part of the surface plus one (0: free), and the history
   double** force_ = nullptr;    // of each grain: of the wall on it, N
   std::vector<double> before_;  // the rows of the grain in work before this step
+  std::vector<double> overlaps_;
   std::array<double, 8> totals_{}, all_totals_{};  // on this process, and on all at the step `summed_`
   bigint summed_ = -1;
 

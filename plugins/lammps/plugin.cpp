@@ -9,6 +9,7 @@
 
 #include "fix_capillary_liquid.h"
 #include "fix_energy_account.h"
+#include "fix_integration_monitor.h"
 #include "fix_lcp_impact.h"
 #include "fix_resume_exact.h"
 #include "fix_wall_dembark.h"
@@ -59,6 +60,8 @@ void lammpsplugin_init(void* host, void* handle, void* register_style) {
   add("fix", "capillary/liquid", "liquid that grains and walls own and lend to bridges");
   style.creator.fix = &create_fix<LAMMPS_NS::FixEnergyAccount>;
   add("fix", "energy/account", "energies and works that balance");
+  style.creator.fix = &create_fix<LAMMPS_NS::FixIntegrationMonitor>;
+  add("fix", "integration/monitor", "how wrong the steps of a run are");
   style.creator.fix = &create_fix<LAMMPS_NS::FixResumeExact>;
   add("fix", "resume/exact", "states from which a run goes on to the bit");
   style.creator.command = &create_command<LAMMPS_NS::ResumeState>;
