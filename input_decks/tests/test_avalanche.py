@@ -208,7 +208,7 @@ SMALL = {"grain_released": 40, "slope_length": 40.0, "flat_length": 60.0, "gate_
          "settle_time": 0.15, "flow_time": 0.4, "frames": 11}
 
 
-@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
 @pytest.mark.parametrize("spin", ["free", "blocked"])
 def test_a_small_avalanche(engine: str, spin: str, simulate: Any) -> None:
     # Grains that do not turn stay on a rough slope: they slide on strips.
@@ -226,14 +226,14 @@ def test_a_small_avalanche(engine: str, spin: str, simulate: Any) -> None:
     assert found["obstacle_impulse"]["value"] < 0.0 and 0.15 < found["floor_friction"]["value"] < 0.7
 
 
-@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
 @pytest.mark.parametrize("kind", ["slides", "rolls", "stops"])
 def test_single_grains_in_the_engines(engine: str, kind: str, simulate: Any) -> None:
     found = judged("avalanche", avalanche.measure([simulate("avalanche", engine, {}, kind)]))
     assert len(names(found, "pass")) == 2 and not names(found, "fail"), found
 
 
-@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
 def test_a_slab_on_a_chute_flows_where_it_is_steep(engine: str, simulate: Any) -> None:
     small = {"bed_height": 4.0, "chute_length": 6.0, "slab_depth": 4.0, "settle_time": 0.05, "flow_time": 0.1, "frames": 11,
              "slope_angle": 0.6}

@@ -110,7 +110,7 @@ def test_a_contact_that_hits_elastically() -> None:
     assert force[1:].tolist() == [0.0, 0.0] and law.overlap(force[:1])[0] == pytest.approx(1e-4)
 
 
-@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
 @pytest.mark.parametrize(("variant", "changes"), [
     ("strip", {}), ("joints", {}), ("bounce", {}), ("shaken", {"run_time": 0.3, "frames": 30})])
 def test_engines_move_walls_as_prescribed(engine: str, variant: str, changes: dict[str, Any], simulate: Any) -> None:
@@ -118,7 +118,7 @@ def test_engines_move_walls_as_prescribed(engine: str, variant: str, changes: di
     assert len(found) == 1 and names(found, "pass") == set(found), found
 
 
-@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
 def test_a_vessel_that_moves_is_one_at_rest(engine: str, simulate: Any) -> None:
     points = []
     for variant in ("rest", "speed", "push", "tilt"):

@@ -142,7 +142,8 @@ SMALL = {"container_length": 12.0, "bed_height": 4.0, "settle_time": 0.2, "run_t
 
 
 @pytest.mark.parametrize(("engine", "variant"), [
-    ("liggghts", "pulse_20"), ("liggghts", "repeated"), ("liggghts", "ramp"), ("liggghts", "tilt"), ("yade", "repeated"), ("yade", "tilt")])
+    ("liggghts", "pulse_20"), ("liggghts", "repeated"), ("liggghts", "ramp"), ("liggghts", "tilt"), ("yade", "repeated"), ("yade", "tilt"),
+    ("lammps", "pulse_20"), ("lammps", "tilt")])
 def test_a_small_container(engine: str, variant: str, simulate: Any) -> None:
     one = simulate("transport_container", engine, SMALL, variant)
     found = judged("transport_container", container.measure([one]))

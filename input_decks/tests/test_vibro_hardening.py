@@ -121,7 +121,7 @@ SMALL = {"grain_count": 60, "grain_diameter": 0.01, "trough_width": 0.12, "strip
          "motion_amplitude": 0.005, "motion_ramp": 1, "settle_time": 0.05, "periods": 8}
 
 
-@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
 def test_grains_hammer_the_part_and_nothing_is_missed(engine: str, simulate: Any) -> None:
     run = simulate("vibro_hardening", engine, SMALL)
     found = judged("vibro_hardening", hardening.measure([run]))

@@ -153,7 +153,7 @@ def _files(case: Case, engine: str, values: Mapping[str, Value], setup: Setup) -
     numbers = {name: engines.DeckNumber(value, _meaning(case, name)) for name, value in known.items()}
     numbers |= {name: engines.DeckNumber(tuple(map(_plain, row))) for name, row in setup.tables.items()}
     try:
-        deck = kind.deck_text(text, numbers, [source.parent, package_root() / "common" / engine])
+        deck = kind.deck_text(text, numbers, [source.parent, package_root() / "common" / engine, package_root() / "common"])
     except jinja2.TemplateError as error:
         line = f", line {error.lineno}" if isinstance(error, jinja2.TemplateSyntaxError) else ""
         raise DembarkError(f"{source}{line}", str(error)) from None
