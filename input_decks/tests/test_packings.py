@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from dembark.validation.case.deck import prepare
 from dembark.validation.case.folders import discover, load
 from dembark.validation.case.model import Case
-from dembark.validation.case.resolve import resolve
+from dembark.validation.case.resolve import for_replica, resolve
 
 LEAST = 5
 # Cases whose bodies begin at random places, or with random sizes, so that their numbers are those of one packing.
@@ -57,3 +58,14 @@ standard = { replicas = 5 }
 standard = [{variant = "many", replicas = {yade = 1}}, "few"]
 """)
     assert too_few(load(folder / "case.toml")) == [("mine", "many", "yade"), ("mine", "few", "liggghts"), ("mine", "few", "yade")]
+
+
+@pytest.mark.parametrize("name", sorted(name for name, case in discover().items() if "motion" in case.parameters))
+def test_runs_of_every_profile_have_grains_and_steps(name: str) -> None:
+    """Grains that are too soft for the fastest level of a drive are refused when the run begins, which may be hours from now."""
+    case = discover()[name]
+    for profile, runs in case.runs.items():
+        for run in runs:
+            for engine in run.engines:
+                made = prepare(case, for_replica(resolve(case, profile, run.variant, run.changes(engine)), 0))
+                assert made.steps > 0, (profile, run.variant)

@@ -13,7 +13,7 @@ for k in ids[1]:
 # The last body is the part, whose density is not that of the grains' material.
 part = O.bodies[ids[1][-1]]
 part.state.mass = 4.0 / 3.0 * math.pi * part.shape.radius**3 * p.part_density
-part.state.inertia = Vector3(1, 1, 1) * (0.4 * part.state.mass * part.shape.radius**2)
+part.state.inertia = Vector3(1, 1, 1) * (p.part_inertia * part.state.mass * part.shape.radius**2)
 walls = {"trough": dembark.mesh("trough.stl", materials[1])}
 moving = dembark.motion(p, walls, ["trough"])
 
