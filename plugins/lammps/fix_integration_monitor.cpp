@@ -105,7 +105,8 @@ void FixIntegrationMonitor::check_motion() {
   gravities_.clear();
   for (int k = 0; k < modify->nfix; ++k) {
     Fix* const fix = modify->fix[k];
-    if (fix->rigid_flag) fail(std::string("it judges single grains, and fix ") + fix->id + " (" + fix->style + ") moves bodies made of several");
+    if (fix->rigid_flag)
+      fail(std::string("it judges single grains, and fix ") + fix->id + " (" + fix->style + ") moves bodies made of several");
     if (is(fix, "gravity")) {
       int dimension = 0;
       const void* const acceleration = fix->extract("gvec", dimension);
@@ -123,7 +124,8 @@ void FixIntegrationMonitor::check_motion() {
 /// Without a pair style, or with one that only makes lists, there are no contacts to judge.
 void FixIntegrationMonitor::check_contacts() {
   pair_ = dynamic_cast<PairDembarkGranular*>(force->pair);
-  if (force->pair && !pair_ && std::strcmp(force->pair_style, "zero") != 0) fail("it knows the stiffness of pair_style dembark/granular only");
+  if (force->pair && !pair_ && std::strcmp(force->pair_style, "zero") != 0)
+    fail("it knows the stiffness of pair_style dembark/granular only");
   walls_.clear();
   for (Fix* const wall : modify->get_fix_by_style("^wall/dembark$")) walls_.push_back(static_cast<FixWallDembark*>(wall));
   for (const Fix* const wall : modify->get_fix_by_style("^wall/gran"))
