@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,13 @@ def _names(group: Sequence[Row]) -> str:
     return first + (f" and {len(names) - 1} more" if len(names) > 1 else "")
 
 
+def badness(row: Row) -> float:
+    """Deviation over tolerance; what failed counts as worse than everything else."""
+    one = row.record
+    size = abs(one.deviation) / one.tolerance if one.deviation is not None and one.tolerance else abs(one.deviation or 0.0)
+    return size + (1e9 if one.standing == "failed" else 0.0)
+
+
 def evidence(counted: Tally) -> list[dict[str, Any]]:
     """Rows of the table of verdicts: each kind of evidence with its counts, and all together."""
     # That nothing is compared with experiments is worth a row, too.
@@ -66,7 +74,9 @@ def context(rows: Sequence[Row], missing: Sequence[str]) -> Mapping[str, Any]:
     counted = tally(row.record for row in rows)
     found = scatter.points(rows)
     failed = sorted((row for row in rows if row.record.standing == "failed"), key=lambda row: _WEIGHT.index(row.record.evidence))
-    return {"tally": counted, "evidence": evidence(counted), "failed": failed,
+    alike = (list(group) for _, group in groupby(failed, lambda row: (row.record.evidence, row.case)))
+    groups = [(sorted(group, key=badness, reverse=True), _names(group)) for group in alike]
+    return {"tally": counted, "evidence": evidence(counted), "failed": failed, "failed_groups": groups,
             "open": open_lines(rows), "missing": missing, "points": found, "kinds": scatter.kinds(found),
             "left_out": scatter.left_out(rows), "scatter_lines": len(scatter.lines(found)), "most": MOST}
 

@@ -86,13 +86,6 @@ def _image(data: bytes, kind: str, alt: str) -> Markup:
     return Markup('<img alt="{}" src="data:image/{};base64,{}">').format(alt, kind, base64.b64encode(data).decode())
 
 
-def badness(row: Row) -> float:
-    """Deviation over tolerance; what failed counts as worse than everything else."""
-    one = row.record
-    size = abs(one.deviation) / one.tolerance if one.deviation is not None and one.tolerance else abs(one.deviation or 0.0)
-    return size + (1e9 if one.standing == "failed" else 0.0)
-
-
 def decided(rows: Iterable[Row]) -> list[Decided]:
     """Checks against experiment and theory, and those that do not state their evidence, by quantity; of many only what failed and the
     worst."""
@@ -103,7 +96,7 @@ def decided(rows: Iterable[Row]) -> list[Decided]:
     found = []
     for group in by_name.values():
         few = len(group) <= ROWS
-        shown = group if few else sorted(group, key=badness, reverse=True)
+        shown = group if few else sorted(group, key=front.badness, reverse=True)
         failed = sum(row.record.standing == "failed" for row in group)
         found.append(Decided(shown if few else shown[: min(ROWS, max(1, failed))], 0 if few else len(group),
                              tally(row.record for row in group)))
@@ -123,9 +116,9 @@ def line(rows: Sequence[Row], what: str) -> str:
         return f"{text}, {counts.failed} FAILED: {'; '.join(bad[:3])}" + (f" and {len(bad) - 3} more" if len(bad) > 3 else "") + "."
     if not closed:
         return f"{text}."
-    worst = max(closed, key=badness)
+    worst = max(closed, key=front.badness)
     return (f"{text}; nearest to its limit: {worst.record.title} ({worst.place}, {worst.who}), "
-            f"at {100.0 * badness(worst):.2g} % of what is allowed.")
+            f"at {100.0 * front.badness(worst):.2g} % of what is allowed.")
 
 
 def sections(gathered: Gathered, folder: Path) -> list[Section]:

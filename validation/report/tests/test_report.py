@@ -38,8 +38,10 @@ def results(tmp_path_factory):
     """Two cases in both engines with a failed identity, a failure without tolerance, a run that failed, a result that cannot be read, and
     trajectories that nobody may open."""
     folder = full_size.write(tmp_path_factory.mktemp("results") / "quick", ("silo", "log_pile"), variants=2)
-    full_size.change(folder / "silo/variant_0/yade/metrics.json", "quantity_0", verdict="fail", value=0.3, deviation=0.3,
+    full_size.change(folder / "silo/variant_0/yade/metrics.json", "quantity_0", verdict="fail", value=0.3, deviation=0.3, tolerance=0.1,
                      label="lost momentum")
+    full_size.change(folder / "silo/variant_0/liggghts/metrics.json", "quantity_0", verdict="fail", value=0.2, deviation=0.2, tolerance=0.1,
+                     label="lost energy")
     full_size.change(folder / "log_pile/variant_1/liggghts/metrics.json", "quantity_6", verdict="fail", tolerance=None,
                      label="too few contacts")
     runs = json.loads((folder / "runs.json").read_text())
@@ -71,16 +73,19 @@ def test_no_trajectory_is_opened_and_no_result_is_written(results):
 
 def test_the_first_page_says_what_failed_and_what_is_missing(results):
     first = pdf.pages(results[1])[0]
-    assert "2 FAILED" in first and "lost momentum" in first and "too few contacts" in first
+    assert "3 FAILED" in first and "lost momentum" in first and "too few contacts" in first
+    # Of a case and a kind of evidence the worst stands for all.
+    assert "worst of 2 (" in first and "and 1 more); silo, variant 0; identity" in first
+    assert "lost energy" not in first.replace("lost energy and 1 more", "")
     assert first.index("lost momentum") < first.index("too few contacts")
     assert "the engine was killed by SIGKILL <at> step 7" in first
     assert re.search(r"silo/variant_1/yade/metrics.json has no .*variant", first.replace(" ", " "))
-    assert re.search(r"identity conservation laws, the scheme against itself \d+ 1 \d+", first)
+    assert re.search(r"identity conservation laws, the scheme against itself \d+ 2 \d+", first)
 
 
 def test_a_case_names_its_failed_identity_and_the_page_of_a_missing_case(results):
     text = " ".join(pdf.pages(results[1]))
-    assert re.search(r"Identities: \d+ of \d+ within tolerance, \d+ open, 1 FAILED: lost momentum \(silo, variant 0, YADE\)", text)
+    assert re.search(r"Identities: \d+ of \d+ within tolerance, \d+ open, 2 FAILED: .*lost momentum \(silo, variant 0, YADE\)", text)
     assert "smooth: YADE, replica 1: the engine was killed" in text
 
 
