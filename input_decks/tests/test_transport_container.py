@@ -154,3 +154,12 @@ def test_a_small_container(engine: str, variant: str, simulate: Any) -> None:
     assert np.abs(frame.positions[:, 1]).max() < 1e-12 * D
     assert np.abs(frame.positions[:, 0].mean() - float(np.asarray(way.displacement(time))[0]) - 6.0 * D) < 2.0 * D
     assert frame.positions[:, 2].min() > -8.0 * D
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "lammps"])
+def test_a_deep_bed_does_not_buckle_out_of_its_plane(engine: str, simulate: Any) -> None:
+    """Round-off across the layer would grow from contact to contact, until grains leave the box."""
+    one = simulate("transport_container", engine, {"container_length": 12.0, "bed_height": 15.0, "settle_time": 0.5, "run_time": 0.1,
+                                                   "frames": 11}, "tilt")
+    frame = one.grains()[-1]
+    assert len(frame.ids) == one.derived["grain_count"] and np.abs(frame.positions[:, 1]).max() < 1e-12 * D
