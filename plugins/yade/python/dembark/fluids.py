@@ -1,6 +1,8 @@
 """Fluids of SphFluid: lattices of their particles, and what they write."""
 
-from yade import Omega, SphFluid
+import os
+
+from yade import ForceResetter, NewtonIntegrator, Omega, PyRunner, SphFluid
 from yade.dembark.frames import FrameWriter
 from yade.dembark.report import fail
 from yade.dembark.states import table
@@ -52,6 +54,27 @@ def fluid_engine():
     return found
 
 
+def fluid(p, points, depth=None):
+    """A fluid in the plane with the parameters of the group `fluid`, `spacing` and `sound_speed`, and particles at `points` (m), below the
+    level `depth` (m) with the pressure of rest."""
+    water = SphFluid(spacing=p.spacing, soundSpeed=p.sound_speed, dimension=2, density=p.fluid_density, smoothing=p.smoothing,
+                     alpha=p.alpha, delta=p.delta, noSlip=p.no_slip == "yes", tension=p.tension == "yes",
+                     threads=int(os.environ.get("OMP_NUM_THREADS", "1")))
+    level = depth or 0.0
+    water.addParticles(points, pressures=[p.fluid_density * p.gravity * max(level - y, 0.0) for _, y, _ in points])
+    return water
+
+
+def fluid_loop(p, water, push=None):
+    """Engines of a fluid in the plane and free bodies without contacts; the deck has `record`, a FluidRecorder.
+
+    push: Python that is run in each step, to add forces to bodies
+    """
+    O.dt = p.time_step
+    return [ForceResetter(), *([PyRunner(command=push, iterPeriod=1)] if push else []), water, PyRunner(command="record()", iterPeriod=1),
+            NewtonIntegrator(damping=0, gravity=(0, -p.gravity, 0))]
+
+
 class FluidWriter(FrameWriter):
     """Appends frames of the fluid to fluid.dump, and rows of poses of bodies and energies of the fluid to fluid.csv.
 
@@ -67,7 +90,7 @@ class FluidWriter(FrameWriter):
         self._bodies, self._dump = dict(bodies or {}), dump
         self._box = "".join(f"{low:.17g} {high:.17g}\n" for low, high in bounds)
         poses = [f"{name}_{what}" for name in self._bodies for what in self.POSE]
-        self._history = table(history, ",".join(["step", "time", *poses, *self.ENERGIES]))
+        self._history = table(history, ",".join(["step", "time", *poses, *self.ENERGIES])) if history else None
         if dump:
             self._begin(dump)
 
@@ -87,5 +110,39 @@ class FluidWriter(FrameWriter):
             numbers += [*state.pos, state.ori[3], state.ori[0], state.ori[1], state.ori[2]]
         numbers += [energies[name] for name in self.ENERGIES]
         self._history.write(",".join([str(O.iter), *(f"{x:.17g}" for x in numbers)]) + "\n")
+        self._history.flush()
+        print(O.iter, f"{O.time:.6g}", f"{energies['kinetic']:.6g}", flush=True)
+
+
+class FluidRecorder:
+    """Writes time.csv and grains.dump of a fluid in the plane when they are due.
+
+    tank: number of the wall whose force is written; bodies : name -> id of a free body
+    """
+
+    ENERGIES = ("kinetic", "potential", "compression")
+
+    def __init__(self, p, tank, bodies=None):
+        self._p, self._tank, self._bodies = p, tank, dict(bodies or {})
+        self._frames = FluidWriter(((p.low_x, p.high_x), (p.low_y, p.high_y), (-p.spacing, p.spacing)), dump="grains.dump", history="")
+        poses = [f"{name}_{what}" for name in self._bodies for what in ("x", "y", "vx")]
+        energies = [f"{name}_energy" for name in self.ENERGIES]
+        self._history = table("time.csv", ",".join(["step", "time", *energies, "tank_fx", "tank_fy", *poses]))
+
+    def __call__(self):
+        """Write what is due at this step."""
+        if O.iter and O.iter % self._p.every == 0:
+            self._row()
+        if O.iter and O.iter % self._p.stride == 0:
+            self._frames.frame()
+
+    def _row(self):
+        water = fluid_engine()
+        energies, force = water.energies(), water.wallForce(self._tank)
+        row = [O.time, *(energies[name] for name in self.ENERGIES), force[0], force[1]]
+        for number in self._bodies.values():
+            state = O.bodies[number].state
+            row += [state.pos[0], state.pos[1], state.vel[0]]
+        self._history.write(",".join([str(O.iter), *(f"{x:.15g}" for x in row)]) + "\n")
         self._history.flush()
         print(O.iter, f"{O.time:.6g}", f"{energies['kinetic']:.6g}", flush=True)

@@ -10,7 +10,7 @@ import sys
 import zlib
 from functools import cache
 
-from yade import IntegrationMonitor, NewtonIntegrator, Omega
+from yade import IntegrationMonitor, NewtonIntegrator, Omega, Sphere
 from yade.dembark.report import announce, fail, finish, monitor
 
 O = Omega()
@@ -180,9 +180,9 @@ def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.c
 def watch():
     """Add an IntegrationMonitor that only counts, with errors of velocities over 1 m/s, to a scene without one.
 
-    Not where there are clumps, whose motion it cannot judge.
+    Not where there are clumps, whose motion it cannot judge, or no spheres at all.
     """
-    if any(body.isClump for body in O.bodies):
+    if any(body.isClump for body in O.bodies) or not any(isinstance(body.shape, Sphere) for body in O.bodies):
         return
     engines = O.engines
     places = [k for k, one in enumerate(engines) if isinstance(one, NewtonIntegrator)]

@@ -1,0 +1,17 @@
+"""Wrong fronts, and a fluid that makes energy or leaks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from dembark.input_decks.tests.measuring import Control
+from dembark.input_decks.tests.test_dam_break import study, verdicts
+
+
+def controls(_folder: Path) -> Iterator[Control]:
+    right = verdicts()
+    yield Control("water that is a seventh faster", right, verdicts(faster=8.0 / 7.0))
+    yield Control("a scheme that makes energy", right, verdicts(made=0.05))
+    yield Control("a particle that leaks out", right, verdicts(leaked=1))
+    yield Control("a front that spacing decides", study(0.01), study(0.2))
