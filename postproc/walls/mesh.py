@@ -18,8 +18,6 @@ _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute
 _HEADER = 84
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _VERTEX = re.compile(rf"\bvertex\s+({_NUMBER})\s+({_NUMBER})\s+({_NUMBER})")
-_LEAF = 8
-_CHUNK = 20_000
 
 
 @dataclass(frozen=True)
@@ -93,95 +91,33 @@ def _areas(triangles: Array) -> Array:
     return np.where(area > 1e-7 * longest**2, area, 0.0)
 
 
-def nearest_on_triangles(points: Array, triangles: Array) -> Array:
-    """For each of k `points` (k, 3) the nearest point (k, 3) of the triangle in the same row of `triangles` (k, 3, 3).
-
-    It is the foot of the perpendicular where that lies inside, else the nearest of the nearest points of the three edges.
-    """
-    origin, first, second = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    normal = np.cross(first, second)
-    square = np.einsum("ka,ka->k", normal, normal)
-    offset = points - origin
-    share_second = np.einsum("ka,ka->k", np.cross(first, offset), normal) / square
-    share_first = np.einsum("ka,ka->k", np.cross(offset, second), normal) / square
-    inside = (share_first >= 0.0) & (share_second >= 0.0) & (share_first + share_second <= 1.0)
-    found = np.where(inside[:, None], origin + share_first[:, None] * first + share_second[:, None] * second, 0.0)
-    best = np.where(inside, 0.0, np.inf)
-    for corner in range(3):
-        start, edge = triangles[:, corner], triangles[:, (corner + 1) % 3] - triangles[:, corner]
-        along = np.einsum("ka,ka->k", points - start, edge) / np.einsum("ka,ka->k", edge, edge)
-        candidate = start + np.clip(along, 0.0, 1.0)[:, None] * edge
-        distance = np.linalg.norm(points - candidate, axis=1)
-        nearer = distance < best
-        found[nearer], best[nearer] = candidate[nearer], distance[nearer]
-    return found
-
-
-def _gap(points: Array, low: Array, high: Array) -> Array:
-    """Distances (p,) of points from boxes, 0 inside."""
-    gap = np.maximum(np.maximum(low - points, points - high), 0.0)
-    return np.sqrt(np.einsum("pa,pa->p", gap, gap))
-
-
 class TriangleTree:
-    """Finds the nearest point of t triangles (t, 3, 3): a binary tree of boxes, searched for many points at once; exact."""
+    """Finds the nearest point of t triangles (t, 3, 3), by VTK's cell locator."""
 
     def __init__(self, triangles: Array) -> None:
-        self._triangles = triangles
-        from scipy.spatial import cKDTree  # slow to import, and only meshes need it
+        # Slow to import, and only meshes need it.
+        from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+        from vtkmodules.vtkCommonCore import vtkPoints
+        from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData, vtkStaticCellLocator
 
-        self._centroids = cKDTree(triangles.mean(axis=1))
-        low, high, centre = triangles.min(axis=1), triangles.max(axis=1), triangles.mean(axis=1)
-        self._boxes = low, high
-        # Nodes in the order in which they are made; children of an inner node are two that follow each other.
-        order = np.arange(len(triangles))
-        spans, child, boxes = [(0, len(triangles))], [], []
-        node = 0
-        while node < len(spans):
-            begin, end = spans[node]
-            members = order[begin:end]
-            boxes.append((low[members].min(axis=0), high[members].max(axis=0)))
-            if end - begin <= _LEAF:
-                child.append(-1)
-            else:
-                axis = int(np.argmax(np.ptp(centre[members], axis=0)))
-                middle = (end - begin) // 2
-                order[begin:end] = members[np.argpartition(centre[members, axis], middle)]
-                child.append(len(spans))
-                spans += [(begin, begin + middle), (begin + middle, end)]
-            node += 1
-        self._order, self._spans, self._child = order, np.array(spans), np.array(child)
-        self._low, self._high = (np.array(corner) for corner in zip(*boxes, strict=True))
+        corners, cells, mesh = vtkPoints(), vtkCellArray(), vtkPolyData()
+        corners.SetData(numpy_to_vtk(np.ascontiguousarray(triangles.reshape(-1, 3), float), deep=True))
+        count = 3 * len(triangles)
+        cells.SetData(numpy_to_vtkIdTypeArray(np.arange(0, count + 1, 3), deep=True), numpy_to_vtkIdTypeArray(np.arange(count), deep=True))
+        mesh.SetPoints(corners)
+        mesh.SetPolys(cells)
+        self._locator = vtkStaticCellLocator()
+        self._locator.SetDataSet(mesh)
+        self._locator.BuildLocator()
 
     def nearest(self, points: Array) -> tuple[Array, Integers]:
-        """Nearest points (k, 3) of the mesh and their triangles (k,) for `points` (k, 3); of equally near ones the first triangle."""
-        parts = [self._search(points[start : start + _CHUNK]) for start in range(0, len(points), _CHUNK)]
-        if not parts:
-            return np.zeros((0, 3)), np.zeros(0, np.int64)
-        return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
+        """Nearest points (k, 3) of the mesh and their triangles (k,) for `points` (k, 3); of equally near triangles any one."""
+        from vtkmodules.vtkCommonCore import reference
+        from vtkmodules.vtkCommonDataModel import vtkGenericCell
 
-    def _search(self, points: Array) -> tuple[Array, Integers]:
-        # A triangle's centroid belongs to it, so this bounds the distance from above; a hair more, for round-off.
-        bound = self._centroids.query(points)[0] * (1.0 + 1e-6)
-        which, node = np.arange(len(points)), np.zeros(len(points), np.int64)
-        pairs: list[tuple[Integers, Integers]] = []
-        while len(which):
-            near = _gap(points[which], self._low[node], self._high[node]) <= bound[which]
-            which, node = which[near], node[near]
-            leaf = self._child[node] < 0
-            pairs.append(self._members(which[leaf], node[leaf]))
-            which, node = np.repeat(which[~leaf], 2), (self._child[node[~leaf]][:, None] + [0, 1]).ravel()
-        which, triangle = (np.concatenate(column) for column in zip(*pairs, strict=True))
-        near = _gap(points[which], self._boxes[0][triangle], self._boxes[1][triangle]) <= bound[which]
-        which, triangle = which[near], triangle[near]
-        place = nearest_on_triangles(points[which], self._triangles[triangle])
-        distance = np.linalg.norm(points[which] - place, axis=1)
-        ranking = np.lexsort((triangle, distance, which))
-        first = ranking[np.r_[True, np.diff(which[ranking]) > 0]] if len(ranking) else ranking
-        return place[first], triangle[first]
-
-    def _members(self, which: Integers, node: Integers) -> tuple[Integers, Integers]:
-        begin, end = self._spans[node].T
-        count = end - begin
-        within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        return np.repeat(which, count), self._order[np.repeat(begin, count) + within]
+        found, which = np.empty((len(points), 3)), np.empty(len(points), np.int64)
+        cell, triangle, part, distance, place = vtkGenericCell(), reference(0), reference(0), reference(0.0), [0.0, 0.0, 0.0]
+        for number, point in enumerate(points.tolist()):
+            self._locator.FindClosestPoint(point, place, cell, triangle, part, distance)
+            found[number], which[number] = place, triangle
+        return found, which
