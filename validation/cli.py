@@ -20,19 +20,18 @@ from dembark.validation.case import folders
 
 _ABOUT = f"""Granular contact laws and their validation, in {engines.titles("and")}.
 
-Your own cases: 'dembark new-case NAME' writes one, '--cases FOLDER' (before the command) or DEMBARK_CASES finds them beside those \
-that ship."""
+Cases of your own: 'dembark new-case NAME' writes one; '--cases FOLDER' (before the command) or DEMBARK_CASES adds a folder of them."""
 
 app = typer.Typer(name="dembark", help=_ABOUT,
                   pretty_exceptions_enable=False, rich_markup_mode=None, context_settings={"help_option_names": ["-h", "--help"]})
 
-_SET = 'Change a key; repeat for more. A unit may follow: --set "grain_diameter=4 mm".'
-_OUT = "Folder for the results; default: results/<profile>/<case>/<variant>/<engine>; needed with --set."
-_INTERVAL = "Wall time between the states that an interrupted run goes on from: '10 min', or none; default: 10 min."
+_SET = 'Set a parameter; repeat for more. Units are allowed: --set "grain_diameter=4 mm".'
+_OUT = "Folder for the results; default: results/<profile>/<case>/<variant>/<engine>; required with --set."
+_INTERVAL = "Wall time between restart files, from which an interrupted run continues: '10 min', or none; default: 10 min."
 
 Profile = Annotated[str, typer.Option(help="Size of the runs: quick, standard, full, ...")]
-Strict = Annotated[bool, typer.Option("--strict", help="End with exit code 1 when a check failed.")]
-Results = Annotated[Path, typer.Option(help="Folder of all results; a profile's own are in a folder below it.")]
+Strict = Annotated[bool, typer.Option("--strict", help="Exit with code 1 when a check failed.")]
+Results = Annotated[Path, typer.Option(help="Folder of all results; each profile has a subfolder.")]
 
 
 def _show_version(wanted: bool) -> None:
@@ -66,19 +65,19 @@ def _strictly(failed: int, strict: bool) -> None:
 @app.command()
 def run(
     case: Annotated[str, typer.Argument(help="Name of a case, see 'dembark cases'.")],
-    engine: Annotated[str, typer.Option(help=f"{' or '.join(engines.names())}.")],
+    engine: Annotated[str, typer.Option(help=f"One of {', '.join(engines.names())}.")],
     profile: Profile = "quick",
     variant: Annotated[str | None, typer.Option(help="Variant of the case; default: the first one.")] = None,
     change: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=_SET)] = None,
     out: Annotated[Path | None, typer.Option(help=_OUT)] = None,
     ranks: Annotated[int, typer.Option(min=1, help=f"MPI processes for each run ({engines.titles('and', lambda one: one.ranks)}).")] = 1,
     threads: Annotated[int, typer.Option(min=1, help="Threads for each run.")] = 1,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Replicas at a time; default: as many as fit the cores.")] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Replicas run at the same time; default: as many as fit the cores.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace results of other inputs once the new ones are finished.")] = False,
     restart_interval: Annotated[str | None, typer.Option(metavar="TIME", help=_INTERVAL)] = None,
     strict: Strict = False,
 ) -> None:
-    """Run a case in one engine, measure it and show each quantity beside its reference."""
+    """Run a case in one engine and measure it. Each quantity is shown with its reference and its verdict."""
     from dembark.common.choices import pick
     from dembark.validation.case.folders import find
     from dembark.validation.case.resolve import resolve, settings
@@ -138,13 +137,13 @@ def _interval(text: str | None) -> float | None:
 @app.command()
 def validate(
     profile: Profile = "quick",
-    cores: Annotated[int | None, typer.Option(min=1, help="Runs at a time; default: all cores.")] = None,
+    cores: Annotated[int | None, typer.Option(min=1, help="Number of cores to use; default: all.")] = None,
     results: Results = Path("results"),
     case: Annotated[list[str] | None, typer.Option(help="Only this case; repeat for more.")] = None,
     engine: Annotated[list[str] | None, typer.Option(help="Only this engine.")] = None,
     strict: Strict = False,
 ) -> None:
-    """Run all cases of a profile in their engines and build the report; finished runs are kept."""
+    """Run all cases of a profile and build the report. Finished runs are kept."""
     from dembark.validation.runs import perform
     from dembark.validation.runs.job import cancelled_by_signal
     from dembark.validation.show import show_outcome
@@ -156,11 +155,11 @@ def validate(
 
 @app.command("report")
 def make_report(
-    directory: Annotated[Path | None, typer.Argument(metavar="[FOLDER]", help="Folder of a campaign, in the place of a profile.")] = None,
+    directory: Annotated[Path | None, typer.Argument(metavar="[FOLDER]", help="Folder of a campaign, instead of a profile.")] = None,
     profile: Profile = "quick",
     results: Results = Path("results"),
 ) -> None:
-    """Build the report of a profile or a campaign again from the results that are there."""
+    """Build the report again from existing results. They are those of a profile, or of a campaign's folder."""
     from dembark.validation import show
     from dembark.validation.runs.steps import build_report
 
@@ -178,7 +177,7 @@ app.add_typer(campaigns.app)
 
 @app.command()
 def doctor() -> None:
-    """Say what is installed, what is missing and what to do; exit code 1 when something required is missing."""
+    """Show what is installed and what is missing. The exit code is 1 when something required is missing."""
     from dembark.validation import show
     from dembark.validation.doctor import examine
 
@@ -201,8 +200,8 @@ def _on_dumps(name: str) -> Callable[[typer.Context], None]:
     return work
 
 
-for _name, _help in (("fields", "Stress, velocity and more on a grid, from dumps of any engine."),
-                     ("walls", "Stress on walls and inclusions, from dumps of any engine.")):
+for _name, _help in (("fields", "Coarse-grain trajectories to fields."),
+                     ("walls", "Measure stresses on walls and inclusions.")):
     app.command(_name, add_help_option=False, context_settings=_PASSED_ON, help=_help)(_on_dumps(_name))
 
 
@@ -222,7 +221,7 @@ def _start(name: str) -> Callable[[typer.Context], None]:
 for _facts in map(engines.facts, engines.names()):
     if _facts.interactive:
         app.command(_facts.name, add_help_option=False, context_settings=_PASSED_ON,
-                    help=f"Start {_facts.program}; all that follows is passed on to it.")(_start(_facts.name))
+                    help=f"Start {_facts.program}. All further arguments are passed to it.")(_start(_facts.name))
 
 
 def main(words: list[str] | None = None) -> int:

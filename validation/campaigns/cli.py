@@ -16,9 +16,9 @@ File = Annotated[str, typer.Argument(metavar="CAMPAIGN", help="File of a campaig
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of a campaign.")]
 Executor = Annotated[str | None, typer.Option(help="local, slurm, or the TOML file of a site.")]
 Cores = Annotated[int | None, typer.Option(min=1, help="Cores of this machine to use; default: all.")]
-Jobs = Annotated[int | None, typer.Option(min=1, help="Jobs of a cluster at a time; default: what the site's file says.")]
+Jobs = Annotated[int | None, typer.Option(min=1, help="Cluster jobs at the same time; default: the value in the site's file.")]
 Out = Annotated[Path | None, typer.Option(help="Folder of the campaign; default: results/campaigns/<name>.")]
-Dry = Annotated[bool, typer.Option("--dry-run", help="Only show the runs, what they cost and whether the file is right.")]
+Dry = Annotated[bool, typer.Option("--dry-run", help="Check the file and show the runs and their cost, without running them.")]
 
 app = typer.Typer()
 
@@ -41,7 +41,7 @@ def show_campaigns() -> None:
 @app.command()
 def submit(campaign: File, dry_run: Dry = False, executor: Executor = None, out: Out = None, cores: Cores = None,
            jobs: Jobs = None) -> None:
-    """Run a campaign, here or on a cluster: all its runs, their measurements and the report. What is finished is kept."""
+    """Run a campaign here or on a cluster. It makes all runs, their measurements and the report; what is finished is kept."""
     from dembark.validation.campaigns import estimate, expand, folder
     from dembark.validation.campaigns import submit as work
     from dembark.validation.campaigns.spec import locate
@@ -64,7 +64,7 @@ def submit(campaign: File, dry_run: Dry = False, executor: Executor = None, out:
 
 @app.command()
 def resume(directory: Folder, executor: Executor = None, cores: Cores = None, jobs: Jobs = None) -> None:
-    """Go on with a campaign where it was ended, in the way it was submitted unless told otherwise."""
+    """Continue a campaign that was stopped. It uses the options of the submission unless others are given."""
     from dembark.validation.campaigns import expand, folder
     from dembark.validation.campaigns import submit as work
     from dembark.validation.runs.job import cancelled_by_signal
@@ -91,7 +91,7 @@ def _conclude(outcome: Outcome, results: Path) -> None:
 
 @app.command()
 def status(directory: Folder) -> None:
-    """Show how far a campaign is: each run with its simulated time, and the time left."""
+    """Show the progress of a campaign. Each run is listed with its simulated time and the time left."""
     from dembark.common.units import duration
     from dembark.validation import show
     from dembark.validation.campaigns.folder import look
@@ -118,9 +118,9 @@ def status(directory: Folder) -> None:
 def export(
     directory: Folder,
     table: Annotated[str, typer.Option(help="runs, steps, quantities, comparisons or points.")] = "quantities",
-    out: Annotated[Path | None, typer.Option(help="File to write; default: to the screen.")] = None,
+    out: Annotated[Path | None, typer.Option(help="File to write; default: standard output.")] = None,
 ) -> None:
-    """Write a table of a store as CSV."""
+    """Write a table of a campaign's results as CSV."""
     from dembark.validation.campaigns import store
     from dembark.validation.show import console
 

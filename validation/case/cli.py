@@ -15,7 +15,7 @@ app = typer.Typer()
 
 @app.command("cases")
 def show_cases(case: Annotated[str | None, typer.Argument(help="Show the keys, profiles and variants of this case.")] = None) -> None:
-    """List the cases, or everything about one."""
+    """List the cases, or show one in detail."""
     from dembark.validation import show
     from dembark.validation.case.folders import discover, find
 
@@ -39,9 +39,9 @@ def deck(
     profile: Annotated[str, typer.Option(help="Size of the run: quick, standard, full, ...")] = "quick",
     variant: Annotated[str | None, typer.Option(help="Variant of the case; default: the first one.")] = None,
     change: Annotated[list[str] | None,
-                      typer.Option("--set", metavar="KEY=VALUE", help='Change a key: --set "grain_diameter=4 mm".')] = None,
+                      typer.Option("--set", metavar="KEY=VALUE", help='Set a parameter: --set "grain_diameter=4 mm".')] = None,
 ) -> None:
-    """Write a deck with all its numbers, packing and meshes: a folder that runs with the plain engine command."""
+    """Write a deck that runs without dembark. The folder holds the input script with all numbers, the packing and the meshes."""
     from dembark.common.choices import pick
     from dembark.validation import engines
     from dembark.validation.case.deck import write
@@ -72,7 +72,7 @@ def new_case(
     name: Annotated[str, typer.Argument(help="Name of the case: letters, digits and underscores.")],
     folder: Annotated[Path, typer.Option("--in", help="Folder of your cases; the case gets a folder of its name in it.")] = Path(),
 ) -> None:
-    """Write a small case that runs, to start your own from."""
+    """Write a template of a case that runs."""
     from dembark.validation import engines
     from dembark.validation.case.folders import package_root, shipped_root
 
