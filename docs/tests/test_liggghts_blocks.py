@@ -165,7 +165,7 @@ def test_binary_dump(liggghts: engines.Engine, tmp_path: Path, monkeypatch: pyte
 
 def test_compute_after_the_first_run_is_refused(liggghts: engines.Engine, tmp_path: Path) -> None:
     page = (ROOT / "docs/trajectories.md").read_text(encoding="utf-8")
-    told = re.search(r"After it the engine stops: `([^`]*)`", page).group(1)
+    told = re.search(r"Otherwise the engine stops: `([^`]*)`", page).group(1)
     compute = next(line for line in shown() if "pair/gran/local" in line)
     (tmp_path / "deck.in").write_text(deck(["run 1", compute, "run 1"]))
     done = engines.call(liggghts.command(Path("deck.in"), {}), tmp_path, liggghts.environment(), timeout=120)
