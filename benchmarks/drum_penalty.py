@@ -298,7 +298,7 @@ def cells(entry: dict[str, Any] | None, decimals: int = 0) -> list[str]:
 
 def markdown(found: dict[str, Any]) -> str:
     """The first table of the guide."""
-    lines = [("| ωτ | law | energy error of 1 s, nothing lost | moment (N m) | kinetic energy (J) | largest force (N) | µs per step "
+    lines = [("| ωτ | law | energy error of 1 s, nothing lost | torque (N m) | kinetic energy (J) | largest force (N) | µs per step "
               "| s per simulated second |"), "|---|---|---|---|---|---|---|---|"]
     for turn in sorted({*STEPS, *LARGE_STEPS}):
         for law, label in LAWS.items():
@@ -311,7 +311,7 @@ def markdown(found: dict[str, Any]) -> str:
 
 def markdown_many(found: dict[str, Any]) -> str:
     """The second: 1000 logs."""
-    lines = ["| stiffness | ωτ | law | moment (kN m) | kinetic energy (kJ) | largest force (kN) | µs per step | s per simulated second |",
+    lines = ["| stiffness | ωτ | law | torque (kN m) | kinetic energy (kJ) | largest force (kN) | µs per step | s per simulated second |",
              "|---|---|---|---|---|---|---|---|"]
     for one in found["many"]:
         means = {name: [1e-3 * value for value in one[name]] for name in ("moment", "kinetic", "force") if name in one}
