@@ -74,7 +74,8 @@ def lammps_comparison(bed: Path, wall_clock: bool, relax: int, steps: int) -> Co
         return Subject(name, lambda: lammps_sample(engine, bed, {**variables, "relax": relax, "steps": steps}, wall_clock))
 
     # Bridges of V/R^3 = 1e-3, of grains that have touched; granular has no such bridges, and stands dry beside them.
-    wet = {"style": "dembark", "settings": "capillary_model exact surface_tension 0.072", "more": "bridge_volume 1.5625e-11 contact_angle 0"}
+    wet = {"style": "dembark", "settings": "capillary_model exact surface_tension 0.072",
+           "more": "bridge_volume 1.5625e-11 contact_angle 0"}
     return Comparison("LAMMPS", [
         subject("granular, tangential mindlin (stock)", style="stock"),
         subject("dembark/granular", style="dembark"),
