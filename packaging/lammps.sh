@@ -5,24 +5,30 @@
 #   packaging/lammps.sh --where   the same without installing; fails when there is none
 #
 # A group's own LAMMPS is named by LAMMPS_EXECUTABLE (a program with the package PLUGIN) and LAMMPS_SOURCE_DIR (the source it was built
-# from, for its headers); its MPI is that of mpicxx on PATH. Its version must be the pinned one: the virtual functions of others differ.
+# from, for its headers); its MPI is that of mpicxx on PATH. Its version must be the pinned one, or that of 4 Feb 2025: the virtual functions
+# of others differ. LAMMPS_INSTALLED=ON stands for an installed package without PLUGIN, such as Debian 13's liblammps-dev.
 set -euo pipefail
 
 here=$(cd "$(dirname "$0")" && pwd)
 version="22 Jul 2025"
 die() { printf 'dembark: %s\n' "$*" >&2; exit 1; }
 answer() {
-  printf 'LAMMPS_EXECUTABLE=%q\nLAMMPS_INCLUDE_DIR=%q\nMPI_INCLUDE_DIR=%q\nMPI_LIBRARY_DIR=%q\nMPI_EXEC=%q\n' "$@"
+  printf 'LAMMPS_EXECUTABLE=%q\nLAMMPS_INCLUDE_DIR=%q\nMPI_INCLUDE_DIR=%q\nMPI_LIBRARY_DIR=%q\nMPI_EXEC=%q\nLAMMPS_INSTALLED=%q\n' "$@" "${LAMMPS_INSTALLED:-OFF}"
   exit 0
 }
 
+if [ "${LAMMPS_INSTALLED:-OFF}" != OFF ]; then
+  [ -z "${LAMMPS_SOURCE_DIR:-}${LAMMPS_EXECUTABLE:-}" ] || die "set LAMMPS_INSTALLED, or LAMMPS_SOURCE_DIR and LAMMPS_EXECUTABLE, not both"
+  answer "" "" "" "" ""
+fi
 if [ -n "${LAMMPS_SOURCE_DIR:-}${LAMMPS_EXECUTABLE:-}" ]; then
   [ -n "${LAMMPS_SOURCE_DIR:-}" ] && [ -n "${LAMMPS_EXECUTABLE:-}" ] ||
     die "set both LAMMPS_EXECUTABLE, the program, and LAMMPS_SOURCE_DIR, the source it was built from"
   [ -x "$LAMMPS_EXECUTABLE" ] || die "LAMMPS_EXECUTABLE=$LAMMPS_EXECUTABLE is no program; set it to LAMMPS's, often called lmp"
   found=$(sed -nE 's/^#define LAMMPS_VERSION "(.*)"$/\1/p' "$LAMMPS_SOURCE_DIR/src/version.h" 2>/dev/null || true)
   [ -n "$found" ] || die "LAMMPS_SOURCE_DIR=$LAMMPS_SOURCE_DIR has no src/version.h; set it to the top of LAMMPS's source tree"
-  [ "$found" = "$version" ] || die "LAMMPS_SOURCE_DIR is LAMMPS $found; dembark's styles are made for the stable release of $version"
+  [[ $found = "$version" || $found = "4 Feb 2025" ]] ||
+    die "LAMMPS_SOURCE_DIR is LAMMPS $found; dembark's styles are made for the releases of $version and, as in Debian 13, of 4 Feb 2025"
   show=$(mpicxx -show 2>/dev/null) || die "no mpicxx on PATH; put that of the MPI in front with which LAMMPS was built"
   for folder in $(grep -oE -- '-I[^ ]+' <<<"$show" | cut -c3-) /usr/include; do
     [ ! -e "$folder/mpi.h" ] || answer "$LAMMPS_EXECUTABLE" "$LAMMPS_SOURCE_DIR/src" "$folder" "" "$(command -v mpiexec || true)"

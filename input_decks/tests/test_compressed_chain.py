@@ -63,7 +63,7 @@ def test_commensurate_steps_would_hide_the_error_of_an_impact(monkeypatch: pytes
     assert chain.reference()["impact_order_hooke"] > 3.5
 
 
-@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
 def test_the_engines_follow_the_exact_solution_of_their_scheme(engine: str, simulate: Any) -> None:
     run = simulate("compressed_chain", engine, {"run_steps": 4000}, "fine")
     found = judged("compressed_chain", chain.measure([run]))

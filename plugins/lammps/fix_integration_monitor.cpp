@@ -7,7 +7,6 @@
 
 #include "atom.h"
 #include "comm.h"
-#include "domain.h"
 #include "error.h"
 #include "force.h"
 #include "memory.h"
@@ -20,6 +19,7 @@
 #include "contact_call.h"
 #include "fix_energy_account.h"
 #include "fix_wall_dembark.h"
+#include "lammps_release.h"
 #include "nve_sphere.h"
 #include "pair_dembark_granular.h"
 
@@ -236,7 +236,7 @@ dembark::ContactBodies FixIntegrationMonitor::bodies(int i, int j) const {
   dembark::ContactBodies b;
   double apart[3];
   for (int k = 0; k < 3; ++k) apart[k] = atom->x[i][k] - atom->x[j][k];
-  domain->minimum_image(FLERR, apart);
+  dembark_lammps::nearest_image(domain, apart);
   b.separation = vector(apart);
   b.velocity_1 = vector(atom->v[i]);
   b.velocity_2 = vector(atom->v[j]);

@@ -133,62 +133,82 @@ ContactBodies PairDembarkGranular::bodies(int i, int j) const {
   return b;
 }
 
-void PairDembarkGranular::compute(int eflag, int vflag) {
-  ev_init(eflag, vflag);
-  if (history_->nlocal_neigh != atom->nlocal) error->one(FLERR, "dembark: LAMMPS's fix NEIGH_HISTORY is not what it was");
-  double **const x = atom->x, **const f = atom->f, **const torque = atom->torque;
+/// Calls visit(i, j, touches, row) for each listed pair that may act: grains whose surfaces meet, or that have a history.
+template <class Visit>
+void PairDembarkGranular::each_contact(Visit visit) {
+  double** const x = atom->x;
   const double* const radius = atom->radius;
-  const int *const type = atom->type, *const mask = atom->mask;
-  const int nlocal = atom->nlocal, newton = force->newton_pair, size = layout_.size();
-  // The forces of the set-up are those of the present state, which stays.
-  const bool advance = !update->setupflag;
-  if (advance && packed_ && !evflag && !tally_) {
-    packs_.step(*list, *history_);
-    return;
-  }
+  const int *const mask = atom->mask, size = layout_.size();
   for (int ii = 0; ii < list->inum; ++ii) {
     const int i = list->ilist[ii];
     int* const touches = history_->firstflag[i];
     for (int jj = 0; jj < list->numneigh[i]; ++jj) {
       const int listed = list->firstneigh[i][jj], j = listed & NEIGHMASK;
       const double dx = x[i][0] - x[j][0], dy = x[i][1] - x[j][1], dz = x[i][2] - x[j][2], sum = radius[i] + radius[j];
-      const bool touched = touches[jj];
-      if (dx * dx + dy * dy + dz * dz >= sum * sum && !touched) continue;
+      if (dx * dx + dy * dy + dz * dz >= sum * sum && !touches[jj]) continue;
       if (force->special_lj[sbmask(listed)] == 0.0 || (mask[i] & mask[j] & freeze_bit_)) continue;
-
-      double* const row = history_->firstvalue[i] + size * jj;
-      const dembark::ContactParameters& p = coefficients_(type[i], type[j]);
-      const ContactBodies b = bodies(i, j);
-      ContactState state;
-      if (touched) layout_.load(row, state);
-      const bool was_bridged = state.bridge_volume > 0.0;
-      const ContactForce out = contact_step(p, b, update->dt, state, advance);
-      if (advance) {
-        if (state.bridge_volume > 0.0 && !was_bridged) {
-          dembark_lammps::check_time_step(error, p.liquid, b, update->dt);
-          dembark_lammps::check_reach(error, state.rupture_distance, neighbor->skin);
-        }
-        touches[jj] = out.interacting;
-        const double before = was_bridged ? row[layout_.bridge_at()] : 0.0;
-        layout_.store(row, state);
-        if (liquid_) {
-          if (!touched) row[layout_.imbalance_at()] = 0.0;
-          if (out.overlap > 0.0 && !was_bridged) dembark_lammps::check_time_step(error, p.liquid, b, update->dt);
-          liquid_->report({i, j, false}, radius[i], radius[j], p.liquid, out.overlap > 0.0, before, row + layout_.bridge_at(),
-                          row + layout_.imbalance_at());
-        }
-      }
-      if (!out.interacting) continue;
-      if (tally_) tally_->add_pair(p, b, out, state, advance, i, j);
-      add(f[i], out.force);
-      add(torque[i], out.torque_1);
-      if (newton || j < nlocal) {
-        add(f[j], out.force, -1.0);
-        add(torque[j], out.torque_2);
-      }
-      if (evflag) ev_tally_xyz(i, j, nlocal, newton, 0.0, 0.0, out.force.x, out.force.y, out.force.z, dx, dy, dz);
+      visit(i, j, touches[jj], history_->firstvalue[i] + size * jj);
     }
   }
+}
+
+void PairDembarkGranular::tally(int i, int j, const ContactBodies& b, const ContactForce& out) {
+  const auto &d = b.separation, &f = out.force;
+  ev_tally_xyz(i, j, atom->nlocal, force->newton_pair, 0.0, 0.0, f.x, f.y, f.z, d.x, d.y, d.z);
+}
+
+void PairDembarkGranular::compute(int eflag, int vflag) {
+  ev_init(eflag, vflag);
+  if (history_->nlocal_neigh != atom->nlocal) error->one(FLERR, "dembark: LAMMPS's fix NEIGH_HISTORY is not what it was");
+  // The forces of the set-up are those of the present state, which stays.
+  const bool advance = !update->setupflag;
+  if (advance && packed_ && !tally_) {
+    // Whether the virial is asked for must not change the run by round-off: contacts advance in packs in any case.
+    if (vflag_either)
+      each_contact([&](int i, int j, int touched, const double* row) {
+        ContactState state;
+        if (touched) layout_.load(row, state);
+        const ContactBodies b = bodies(i, j);
+        const ContactForce out = contact_step(coefficients_(atom->type[i], atom->type[j]), b, update->dt, state, true);
+        if (out.interacting) tally(i, j, b, out);
+      });
+    packs_.step(*list, *history_);
+    return;
+  }
+  double **const f = atom->f, **const torque = atom->torque;
+  each_contact([&](int i, int j, int& touches, double* row) {
+    const bool touched = touches;
+    const dembark::ContactParameters& p = coefficients_(atom->type[i], atom->type[j]);
+    const ContactBodies b = bodies(i, j);
+    ContactState state;
+    if (touched) layout_.load(row, state);
+    const bool was_bridged = state.bridge_volume > 0.0;
+    const ContactForce out = contact_step(p, b, update->dt, state, advance);
+    if (advance) {
+      if (state.bridge_volume > 0.0 && !was_bridged) {
+        dembark_lammps::check_time_step(error, p.liquid, b, update->dt);
+        dembark_lammps::check_reach(error, state.rupture_distance, neighbor->skin);
+      }
+      touches = out.interacting;
+      const double before = was_bridged ? row[layout_.bridge_at()] : 0.0;
+      layout_.store(row, state);
+      if (liquid_) {
+        if (!touched) row[layout_.imbalance_at()] = 0.0;
+        if (out.overlap > 0.0 && !was_bridged) dembark_lammps::check_time_step(error, p.liquid, b, update->dt);
+        liquid_->report({i, j, false}, atom->radius[i], atom->radius[j], p.liquid, out.overlap > 0.0, before, row + layout_.bridge_at(),
+                        row + layout_.imbalance_at());
+      }
+    }
+    if (!out.interacting) return;
+    if (tally_) tally_->add_pair(p, b, out, state, advance, i, j);
+    add(f[i], out.force);
+    add(torque[i], out.torque_1);
+    if (force->newton_pair || j < atom->nlocal) {
+      add(f[j], out.force, -1.0);
+      add(torque[j], out.torque_2);
+    }
+    if (evflag) tally(i, j, b, out);
+  });
 }
 
 double PairDembarkGranular::single(int i, int j, int itype, int jtype, double rsq, double, double, double& fforce) {

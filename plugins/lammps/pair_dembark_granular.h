@@ -50,6 +50,9 @@ class PairDembarkGranular : public Pair {
 
   std::string history_id() const;
   dembark::ContactBodies bodies(int i, int j) const;
+  template <class Visit>
+  void each_contact(Visit visit);
+  void tally(int i, int j, const dembark::ContactBodies& bodies, const dembark::ContactForce& out);
   void find_radii();
 };
 

@@ -75,8 +75,8 @@ def test_a_wall_needs_the_pair_style(tmp_path, deck):
 
 def test_another_version_is_refused(tmp_path):
     (tmp_path / "src").mkdir()
-    (tmp_path / "src/version.h").write_text('#define LAMMPS_VERSION "4 Feb 2025"\n')
+    (tmp_path / "src/version.h").write_text('#define LAMMPS_VERSION "29 Aug 2024"\n')
     own = os.environ | {"LAMMPS_SOURCE_DIR": str(tmp_path), "LAMMPS_EXECUTABLE": "/bin/true"}
     done = subprocess.run([FIND], env=own, capture_output=True, text=True, check=False)
     assert done.returncode != 0 and len(done.stderr.splitlines()) == 1
-    assert "LAMMPS 4 Feb 2025" in done.stderr and "22 Jul 2025" in done.stderr
+    assert "LAMMPS 29 Aug 2024" in done.stderr and "22 Jul 2025" in done.stderr

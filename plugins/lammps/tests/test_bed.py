@@ -1,5 +1,6 @@
 """Ranks, newton's third law over borders, restarts and the forces of single pairs, on a wet packing with all histories."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -38,6 +39,33 @@ def test_parallel_runs_give_the_same(serial, tmp_path, ranks, newton, head):
     # Sums in another order: chaos has 1000 steps to grow round-off.
     found = run(tmp_path, bed("run 1000", newton=newton, head=head), ranks)
     assert_same(serial[2], found[2], 1e-8)
+
+
+@pytest.mark.parametrize("presliding", ["partial_slip", "exponential"])
+def test_what_is_asked_of_a_step_does_not_change_it(tmp_path, presliding):
+    """The virial needs the forces of single pairs, and runs that ask for it at other steps are the same to the bit."""
+    text = bed("run 1000", material=replace(WET, presliding=presliding))
+    run(tmp_path / "asked", text.replace("thermo 1000", "thermo 7"))
+    run(tmp_path / "left", text)
+    assert (tmp_path / "asked/grains.dump").read_bytes() == (tmp_path / "left/grains.dump").read_bytes()
+
+
+def test_the_virial_is_that_of_the_pairs(tmp_path):
+    """Sum of F.r over the pairs, which compute pair/local tells, over three volumes, without damping, so that forces know no velocity."""
+    ask = " ".join(f"p{k}" for k in (1, 2, 3, 13, 14, 15, 16, 17, 18))
+    text = bed(f"""\
+compute forces all pair/local {ask}
+compute virial all pressure NULL virial
+dump pairs all local 500 pairs.dump index {" ".join(f"c_forces[{k}]" for k in range(1, 10))}
+dump_modify pairs format float %.17g
+thermo_style custom step c_virial
+thermo_modify format float %.17g
+run 1000""", newton="on", material=replace(WET, restitution=1.0, rolling_damping_ratio=0.0))
+    done = run_deck(tmp_path, text)
+    told = float(re.findall(r"^ +1000 +(\S+)", done.output, re.MULTILINE)[-1])
+    rows = read_dump(tmp_path / "pairs.dump")[1][2][:, 1:]
+    due = np.einsum("ij,ij->", rows[:, :3], rows[:, 3:6] - rows[:, 6:9]) / (3.0 * 0.024 * 0.024 * 0.051)
+    assert len(rows) > 10 and told == pytest.approx(due, rel=1e-9)
 
 
 def test_a_restart_keeps_histories(serial, tmp_path):

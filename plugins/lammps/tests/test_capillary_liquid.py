@@ -42,8 +42,8 @@ def test_books_do_not_depend_on_ranks_and_order(serial, tmp_path, ranks, head):
 
 
 def test_packs_keep_the_same_books(serial, tmp_path):
-    """Where the virial is asked for in each step, contacts are computed one by one."""
-    found = books(tmp_path, deck("thermo_style custom step press\nthermo 1\nrun 1000"))
+    """With an energy account contacts are computed one by one."""
+    found = books(tmp_path, deck("fix account all energy/account\nrun 1000"))
     np.testing.assert_allclose(found[:, 1:6], serial[: len(found), 1:6], rtol=1e-6)
 
 

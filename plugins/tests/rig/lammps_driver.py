@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
 
 from dembark.common.errors import DembarkError
@@ -18,7 +17,6 @@ from rig.walls import Key, motion_of
 BIN = Path(__file__).resolve().parents[3] / "build/bin"
 
 
-@cache
 def engine() -> Path:
     """The launcher."""
     if not (BIN / "lammps-dembark").exists():
