@@ -51,9 +51,10 @@ def test_copies_once(tmp_path):
 def test_every_included_header_is_there(tmp_path):
     source = stand_in(tmp_path / "src")
     install(source)
-    for path in [*source.glob("*_model_*.h"), *source.glob("fix_*"), *source.glob("*state*"), *(source / "dembark").rglob("*.hpp")]:
+    for path in [*source.glob("*_model_*.h"), *source.glob("fix_*"), *source.glob("*_fix.*"), *(source / "dembark").rglob("*.hpp")]:
         for name in re.findall(r'^#include "([^"]+)"', path.read_text(), re.MULTILINE):
-            ours = name.startswith("dembark/") or path.suffix == ".hpp" or (ROOT / "plugins/liggghts" / name).exists()
+            ours = name.startswith("dembark/") or path.suffix == ".hpp" or any(
+                (ROOT / "plugins" / folder / name).exists() for folder in ("liggghts", "lammps_family"))
             assert not ours or (path.parent / name).exists() or (source / name).exists(), f"{path.name}: {name}"
 
 

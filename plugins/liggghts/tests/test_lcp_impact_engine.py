@@ -60,6 +60,20 @@ def test_a_moving_mesh_carries_its_logs(tmp_path):
     assert found.velocity()[0, 0] == pytest.approx(0.6 / 3.0, rel=1e-2)
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_moving_mesh_crosses_a_periodic_boundary(tmp_path, ranks):
+    """The engine takes triangles that leave the box to its other end; a log at rest on the floor goes on with it."""
+    floor(tmp_path, squares=8)
+    static = 50.0 * 9.81 * (1e-7 + 1.0 / 4e7)
+    log = Log((1.2, 0.1 - static), (5.0, 0.0))
+    case = Case([log], "stiffness 1e7 wall mesh floor stl stiffness 4e7 friction 0.5", 2e-5, "run 10000", gravity=9.81, every=2000,
+                box=(-2.0, 2.0, -1.0, 1.0, -0.5, 0.5), boundary="p f f",
+                before="fix stl all mesh/surface file floor.stl type 1\nfix move all move/mesh mesh stl linear 5.0 0.0 0.0")
+    found = run(tmp_path, case, ranks=ranks)
+    assert found.velocity()[0] == pytest.approx([5.0, 0.0, 0.0], abs=2e-3)
+    assert found.last[0, 1] == pytest.approx(1.2 + 1.0 - 4.0, abs=1e-3)
+
+
 def test_a_drum_of_triangles(tmp_path):
     """A polygon of many sides that turns with fix move/mesh is nearly the cylinder."""
     sides, radius = 180, 1.0
