@@ -16,6 +16,7 @@ class RowsFix : public Base {
  public:
   using Base::Base;
   ~RowsFix() override {
+    if (!rows_) return;  // a constructor did not come to its end
     this->atom->delete_callback(this->id, Base::on_growth);
     this->atom->delete_callback(this->id, Base::on_restart);
     this->memory->destroy(rows_);
