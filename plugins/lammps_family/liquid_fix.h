@@ -27,7 +27,8 @@ class LiquidFix : public SharedFix {
   LiquidFix(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg, const char* wall_style, const char* walls_with, bool keeps_grains);
   ~LiquidFix() override;
 
-  int setmask() override { return LAMMPS_NS::FixConst::PRE_FORCE | LAMMPS_NS::FixConst::END_OF_STEP; }  // contacts work between these stages
+  // Contacts work between these stages.
+  int setmask() override { return LAMMPS_NS::FixConst::PRE_FORCE | LAMMPS_NS::FixConst::END_OF_STEP; }
   void init() override;
   void setup_pre_force(int) override;
   void pre_force(int) override;

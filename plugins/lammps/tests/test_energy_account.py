@@ -37,9 +37,6 @@ def test_account_of_an_oblique_impact_is_that_of_liggghts(tmp_path: Path, materi
 @pytest.mark.parametrize("shape", ["", "disc"])
 def test_the_account_knows_with_which_inertia_grains_turn(tmp_path: Path, shape: str) -> None:
     """In the plane fix nve/sphere turns spheres, or with `disc` solid cylinders."""
-    grains = "\n".join([
-        "create_atoms 1 single 0.0 0.0 0.0 units box", "create_atoms 1 single 0.004 0.003 0.0 units box",
-        "set group all diameter 0.006 density 2500", "set atom 1 vx 0.4 vy 0.1", "set atom 2 vx -0.3 vy -0.2", "set atom 2 omega 0 0 500"])
     text = f"""\
 {lammps_driver.head("off", "f f p")}
 dimension 2
@@ -49,7 +46,11 @@ neighbor 0.001 bin
 timestep 2e-6
 pair_style dembark/granular {lammps_driver.settings(DRY)}
 pair_coeff * * {lammps_driver.coefficients(DRY)}
-{grains}
+create_atoms 1 single 0.0 0.0 0.0 units box
+create_atoms 1 single 0.004 0.003 0.0 units box
+set group all diameter 0.006 density 2500
+set atom 1 vx 0.4 vy 0.1
+set atom 2 vx -0.3 vy -0.2 omega 0 0 500
 fix motion all nve/sphere {shape}
 {FIX}
 {THERMO}thermo 100
