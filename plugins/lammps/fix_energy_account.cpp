@@ -5,7 +5,7 @@
 #include "force.h"
 #include "modify.h"
 
-#include "fix_order.h"
+#include "engine_access.h"
 #include "pair_dembark_granular.h"
 
 using namespace LAMMPS_NS;

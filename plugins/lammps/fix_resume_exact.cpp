@@ -13,7 +13,7 @@
 #include "update.h"
 #include "utils.h"
 
-#include "fix_order.h"
+#include "engine_access.h"
 #include "restart_commands.h"
 
 using namespace LAMMPS_NS;

@@ -56,6 +56,7 @@ void EnergyAccountFix::check_motion() {
       fail(named + " moves atoms; only fix nve/sphere, fix nve, fix move and fix nve/noforce are accounted for");
     movers.push_back(fix);
   }
+  want_movers();
   for (std::size_t m = 0; m < movers.size(); ++m)
     for (std::size_t k = 0; k < m; ++k)
       for (int i = 0; i < atom->nlocal; ++i)

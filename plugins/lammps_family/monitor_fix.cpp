@@ -31,6 +31,7 @@ void MonitorFix::init() {
   if (!has_coherent_units()) fail("units must be si or cgs");
   if (!has_spheres()) fail(std::string("it judges spheres only: ") + sphere_style);
   find_movers("it judges");
+  want_movers();
   find_contacts();
   account_ = fix_of_style("energy/account");
   if (run_.mean_length) {

@@ -54,6 +54,9 @@ void GrainFix::find_movers(const std::string& does) {
     if (is(*fix, "nve")) movers_.emplace_back(fix->groupbit, 0.0);
   }
   for (const auto& [group, its] : movers_) moving_ |= group;
+}
+
+void GrainFix::want_movers() const {
   if (movers_.empty()) fail("no grain follows its forces: it needs fix nve/sphere, or fix nve for grains that do not turn");
 }
 

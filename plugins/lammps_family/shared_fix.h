@@ -87,6 +87,7 @@ class GrainFix : public SharedFix {
 
   /// `does`: what this fix does with single grains, for messages.
   void find_movers(const std::string& does);
+  void want_movers() const;
   bool follows_forces(int i) const { return (atom->mask[i] & moving_) && !(atom->mask[i] & frozen_); }
   /// Moment of inertia over m r^2 of a grain that follows its forces; 0 if it does not turn.
   double inertia(int i) const {
