@@ -28,7 +28,7 @@ class EngineFix : public LAMMPS_NS::Fix {
 
  protected:
   static constexpr int on_growth = 0, on_restart = 1;  // of Atom::add_callback()
-  static constexpr const char* sphere_style = "atom_style granular";
+  static constexpr const char* sphere_style = "atom_style granular (or sphere)";
 
   /// Ends the run with one line. Collective.
   [[noreturn]] void fail(const std::string& what) const {
@@ -37,11 +37,11 @@ class EngineFix : public LAMMPS_NS::Fix {
   }
   /// On one rank.
   [[noreturn]] void fail_alone(const std::string& what) const {
-    error->one(FLERR, (name() + ": " + what).c_str());
+    error->one(FLERR, ("Fix " + name() + what).c_str());
     std::abort();  // one() does not return
   }
   void warn(const std::string& what) const {
-    if (comm->me == 0) error->warning(FLERR, (name() + ": " + what).c_str());
+    if (comm->me == 0) error->warning(FLERR, ("fix " + name() + what).c_str());
   }
   bool has_spheres() const { return atom->sphere_flag && atom->rmass && !atom->superquadric_flag && !atom->shapetype_flag; }
   static bool moves_clusters(const Fix& fix) {
@@ -70,7 +70,7 @@ class EngineFix : public LAMMPS_NS::Fix {
   }
 
  private:
-  std::string name() const { return "Fix " + std::string(style) + " (id " + id + ")"; }
+  std::string name() const { return std::string(style) + " (id " + id + "): "; }
 };
 
 }  // namespace dembark_engine
