@@ -17,9 +17,9 @@ TEST_JOBS ?= $(shell nproc)
 # Without tests: those are no reason to build an engine again.
 code = $(foreach file,$(1),$(if $(findstring /tests/,$(file)),,$(file)))
 physics_sources := $(shell find plugins/physics plugins/python postproc/native -type f -not -name '*.pyc' -not -name '*.py')
-liggghts_sources := $(shell find plugins/liggghts -type f -not -path '*/tests/*') $(call code,$(filter plugins/physics/%,$(physics_sources)))
+liggghts_sources := $(shell find plugins/liggghts plugins/lammps_family -type f -not -path '*/tests/*') $(call code,$(filter plugins/physics/%,$(physics_sources)))
 yade_sources := $(shell find plugins/yade -type f -not -path '*/tests/*' -not -name '*.pyc') $(call code,$(filter plugins/physics/%,$(physics_sources)))
-lammps_sources := $(shell find plugins/lammps -type f -not -path '*/tests/*') $(call code,$(filter plugins/physics/%,$(physics_sources)))
+lammps_sources := $(shell find plugins/lammps plugins/lammps_family -type f -not -path '*/tests/*') $(call code,$(filter plugins/physics/%,$(physics_sources)))
 headers := $(filter-out %/first_rank.hpp %/monitor_run.hpp,$(filter %.hpp,$(call code,$(filter plugins/physics/%,$(physics_sources)))))
 
 # The package of LAMMPS is for this processor.

@@ -45,6 +45,11 @@ copy() {  # copy FILE TARGET
 for file in "$here"/plugins/liggghts/*_model_*.h "$here"/plugins/liggghts/{bridge_reach,contact_data,model_properties}.h "$here"/plugins/liggghts/engine_access.{h,cpp}; do
   copy "$file" "$src/$(basename "$file")"
 done
+# What LIGGGHTS and LAMMPS both have.
+family=$here/plugins/lammps_family
+for file in "$here/plugins/liggghts/engine_fix.h" "$family"/{shared,liquid,energy_account,resume}_fix.{h,cpp}; do
+  copy "$file" "$src/$(basename "$file")"
+done
 # Liquid that grains and walls own.
 for file in "$here"/plugins/liggghts/fix_capillary_liquid*; do
   copy "$file" "$src/$(basename "$file")"
@@ -57,7 +62,6 @@ done
 for file in "$here"/plugins/liggghts/{pair_sph_coupled,pair_sph_options,fix_nve_sph_coupled,fix_sph_body,sph_rows,sph_loops_avx2}*; do
   copy "$file" "$src/$(basename "$file")"
 done
-copy "$here/plugins/liggghts/keyword_reader.h" "$src/keyword_reader.h"
 # States to resume from.
 for file in "$here"/plugins/liggghts/fix_resume_exact*; do
   copy "$file" "$src/$(basename "$file")"
@@ -66,7 +70,7 @@ done
 eigen=$(pkg-config --cflags eigen3 2>/dev/null || true)
 [ -n "$eigen" ] || { [ -d /usr/include/eigen3/Eigen ] && eigen=-I/usr/include/eigen3; }
 if [ -n "$eigen" ]; then
-  for file in "$here"/plugins/liggghts/fix_lcp_*.{h,cpp} "$here"/plugins/liggghts/mesh_triangles.h; do
+  for file in "$here"/plugins/liggghts/fix_lcp_*.{h,cpp} "$here"/plugins/liggghts/mesh_triangles.h "$family"/impact_fix.{h,cpp}; do
     copy "$file" "$src/$(basename "$file")"
   done
 else

@@ -4,19 +4,14 @@
 
 #include "error.h"
 
-#include "dembark/contact.hpp"
+#include "shared_fix.h"
 
 namespace dembark_lammps {
 
 typedef dembark::Vec3<double> Vec3;
 
-inline Vec3 vector(const double* v) { return {v[0], v[1], v[2]}; }
-
-DEMBARK_HOT void add(double* to, const Vec3& v, double scale = 1.0) {
-  to[0] += scale * v.x;
-  to[1] += scale * v.y;
-  to[2] += scale * v.z;
-}
+using dembark_family::add;
+using dembark_family::vector;
 
 /// The run ends where a bridge that forms cannot be integrated with this time step (s).
 inline void check_time_step(LAMMPS_NS::Error* error, const dembark::Liquid& liquid, const dembark::ContactBodies& b, double dt) {

@@ -9,15 +9,11 @@
 #include "comm.h"
 #include "error.h"
 #include "force.h"
-#include "modify.h"
-#include "neigh_list.h"
-#include "output.h"
 #include "pair.h"
 #include "update.h"
 #include "utils.h"
 
-#include "dembark/restart/state_files.hpp"
-#include "fix_order.h"
+#include "engine_access.h"
 #include "restart_commands.h"
 
 using namespace LAMMPS_NS;
@@ -30,82 +26,27 @@ enum Head { head_format, head_ranks, head_time, head_time_step, head_next_sort, 
 
 }  // namespace
 
-FixResumeExact::FixResumeExact(LAMMPS* lmp, int narg, char** arg) : Fix(lmp, narg, arg) {
-  if (narg < 5 || !utils::is_integer(arg[3]) || (narg > 5 && std::strcmp(arg[5], "cut") != 0))
-    fail("it is written 'resume/exact EVERY BASE [cut FILE ...]', EVERY a whole number of steps");
-  every_ = utils::bnumeric(FLERR, arg[3], false, lmp);
-  if (every_ < 0) fail("EVERY must be >= 0 steps; with 0 no states are written");
-  base_ = arg[4];
-  if (base_.find_first_of("*%") != std::string::npos) fail("the name of the states must not hold * or %");
-  outputs_.assign(arg + std::min(narg, 6), arg + narg);
-  restart_global = restart_peratom = 1;
-  force_reneighbor = every_ > 0;
-  next_reneighbor = -1;
-  atom->add_callback(Atom::RESTART);
+FixResumeExact::FixResumeExact(LAMMPS* lmp, int narg, char** arg) : ResumeFix(lmp, narg, arg) {
+  restart_peratom = 1;
+  atom->add_callback(on_restart);
 }
 
-FixResumeExact::~FixResumeExact() { atom->delete_callback(id, Atom::RESTART); }
-
-void FixResumeExact::fail(const std::string& what) const { error->all(FLERR, std::string("fix ") + id + " resume/exact: " + what); }
-
-/// On one rank.
-void FixResumeExact::fail_alone(const std::exception& wrong) const {
-  error->one(FLERR, std::string("fix ") + id + " resume/exact: " + wrong.what());
-}
+FixResumeExact::~FixResumeExact() { atom->delete_callback(id, on_restart); }
 
 // The engine calls the set-up of a stage for the fixes of that stage only.
 int FixResumeExact::setmask() { return INITIAL_INTEGRATE | PRE_EXCHANGE | PRE_NEIGHBOR; }
 
-void FixResumeExact::init() {
-  if (std::strcmp(update->integrate_style, "verlet") != 0) fail("only run_style verlet is supported");
-  if (!begun_ && state_step_ < 0 && every_ > 0) refuse_other_states();
-  begun_ = true;
-  if (every_ > 0) next_reneighbor = (update->ntimestep / every_ + 1) * every_;
-  const int acting = PRE_FORCE | POST_FORCE | INITIAL_INTEGRATE | FINAL_INTEGRATE;
-  bool before = false;
-  for (int k = 0; k < modify->nfix; ++k) {
-    if (before && modify->fmask[k] & acting)
-      fail(std::string("it must come after fix ") + modify->fix[k]->id + ", whose set-up it has to undo");
-    before = before || modify->fix[k] == this;
-  }
-}
-
-/// States of another run would be resumed later in the place of those of this one, for their steps may be higher. Collective.
-void FixResumeExact::refuse_other_states() const {
-  long long newest = -1;
-  if (comm->me == 0) {
-    newest = dembark::restart::newest_state(base_).step;
-    if (newest < 0) dembark::restart::delete_states(base_, 0);
-  }
-  MPI_Bcast(&newest, 1, MPI_LONG_LONG, 0, world);
-  if (newest >= 0)
-    fail("there is a state of an earlier run, " + dembark::restart::state_name(base_, newest) +
-         "; go on from it by resume_state, move it away, or give the states another name than " + base_);
-}
-
-// The set-up would sort the atoms out of turn, and a run counts the time from its own beginning on, from a sum that is rounded otherwise.
+// A run counts the time from its own beginning on, from a sum that is rounded otherwise.
 void FixResumeExact::setup_pre_exchange() {
-  sort_frequency_ = atom->sortfreq;
+  ResumeFix::setup_pre_exchange();
   if (state_step_ < 0) return;
-  atom->sortfreq = 0;
   update->atime = time_;
   update->atimestep = time_step_;
 }
 
-void FixResumeExact::setup_pre_neighbor() { atom->sortfreq = sort_frequency_; }
-
-/// Which atoms in which order, their candidates for contacts in which order.
 FixResumeExact::Facts FixResumeExact::facts() const {
-  std::uint64_t hash = 1469598103934665603u;  // FNV-1a, 32 bits at a time
-  const auto mix = [&hash](tagint v) { hash = (hash ^ static_cast<std::uint32_t>(v)) * 1099511628211u; };
-  for (int i = 0; i < atom->nlocal + atom->nghost; ++i) mix(atom->tag[i]);
-  const NeighList* const list = force->pair ? force->pair->list : nullptr;
-  for (int ii = 0; list && ii < list->inum; ++ii) {
-    const int i = list->ilist[ii];
-    mix(list->numneigh[i]);
-    for (int k = 0; k < list->numneigh[i]; ++k) mix(list->firstneigh[i][k]);
-  }
-  return {double(atom->nlocal), double(atom->nghost), double(hash >> 32), double(hash & 0xffffffffu)};
+  const dembark_family::OrderHash order(*atom, force->pair ? force->pair->list : nullptr);
+  return {double(atom->nlocal), double(atom->nghost), order.high(), order.low()};
 }
 
 /// Collective.
@@ -128,12 +69,11 @@ void FixResumeExact::put_back() {
     if (atom->torque) std::copy_n(forces_[std::size_t(i)].data() + 3, 3, atom->torque[i]);
   }
   atom->nextsort = next_sort_;
-  // Output of the step of the state was written before the state.
-  for (int k = 0; k < output->ndump; ++k) output->last_dump[k] = update->ntimestep;
+  skip_dumps();
   std::fflush(nullptr);
   std::error_code wrong;
   for (const auto& [path, size] : kept_)
-    if (std::filesystem::resize_file(path, size, wrong); wrong) fail_alone(std::runtime_error("file " + path + ": " + wrong.message()));
+    if (std::filesystem::resize_file(path, size, wrong); wrong) fail_alone("file " + path + ": " + wrong.message());
   utils::logmesg(lmp, "dembark: resumed at step " + std::to_string(update->ntimestep) + " exactly\n");
   forces_ = {};
   kept_ = {};
@@ -145,30 +85,13 @@ void FixResumeExact::setup(int) {
   dembark_lammps::begin_steps_first(modify, this);
 }
 
-/// The list of candidates was built anew for the step that has ended: here its output is written, and nothing of the next was done.
-void FixResumeExact::initial_integrate(int) {
-  if (every_ == 0 || update->ntimestep != next_reneighbor + 1) return;
-  --update->ntimestep;
-  write_state();
-  ++update->ntimestep;
-  next_reneighbor += every_;
-}
-
 void FixResumeExact::write_state() {
   const Facts own = facts();
   facts_.resize(std::size_t(comm->nprocs));
   MPI_Gather(own.data(), int(own.size()), MPI_DOUBLE, facts_.data(), int(own.size()), MPI_DOUBLE, 0, world);
-  const std::string path = base_ + ".part";
-  dembark_lammps::write_restart_file(lmp, path);
+  dembark_lammps::write_restart_file(lmp, part_path());
   facts_ = {};
-  if (comm->me != 0) return;
-  for (const std::string& output : outputs_) dembark::restart::sync_file(output);
-  try {
-    const int* const grid = comm->procgrid;
-    dembark::restart::keep_state(path, base_, {update->ntimestep, {grid[0], grid[1], grid[2]}});
-  } catch (const std::exception& wrong) {
-    fail_alone(wrong);
-  }
+  if (comm->me == 0) keep_state();
 }
 
 /// Other restart files than states have no facts.
@@ -180,10 +103,7 @@ void FixResumeExact::write_restart(FILE* file) {
   head[head_time] = update->atime;
   head[head_time_step] = double(update->atimestep);
   head[head_next_sort] = double(atom->nextsort);
-  const int bytes = int(sizeof head + facts_.size() * sizeof(Facts));
-  fwrite(&bytes, sizeof(int), 1, file);
-  fwrite(head, sizeof head, 1, file);
-  fwrite(facts_.data(), sizeof(Facts), facts_.size(), file);
+  write_part(file, {{head, sizeof head}, {facts_.data(), facts_.size() * sizeof(Facts)}});
 }
 
 void FixResumeExact::restart(char* buffer) {
@@ -200,14 +120,9 @@ void FixResumeExact::restart(char* buffer) {
   time_step_ = bigint(head[head_time_step]);
   next_sort_ = bigint(head[head_next_sort]);
   if (comm->me != 0) return;
-  try {
-    for (const std::string& path : outputs_) {
-      dembark::restart::cut_output(path, update->ntimestep);
-      if (std::filesystem::exists(path)) kept_.emplace_back(path, std::filesystem::file_size(path));
-    }
-  } catch (const std::exception& wrong) {
-    fail_alone(wrong);
-  }
+  cut_outputs();
+  for (const std::string& path : outputs_)
+    if (std::filesystem::exists(path)) kept_.emplace_back(path, std::filesystem::file_size(path));
 }
 
 int FixResumeExact::pack_restart(int i, double* buffer) {
@@ -219,22 +134,16 @@ int FixResumeExact::pack_restart(int i, double* buffer) {
 }
 
 void FixResumeExact::unpack_restart(int i, int nth) {
-  const double* values = atom->extra[i];
-  for (int k = 0; k < nth; ++k) values += int(values[0]);
   forces_.resize(std::size_t(atom->nlocal));
-  std::copy_n(values + 1, 6, forces_[std::size_t(i)].data());
+  std::copy_n(restart_row(i, nth) + 1, 6, forces_[std::size_t(i)].data());
 }
 
 double FixResumeExact::memory_usage() { return double(forces_.size() * sizeof forces_[0]); }
 
 void ResumeState::command(int narg, char** arg) {
-  if (narg != 1) error->all(FLERR, "resume_state: it is written 'resume_state BASE'");
-  dembark::restart::State state;
-  if (comm->me == 0) state = dembark::restart::newest_state(arg[0]);
-  MPI_Bcast(&state, sizeof state, MPI_BYTE, 0, world);
-  if (state.step < 0)
-    error->all(FLERR, std::string("resume_state: there is no whole state ") + arg[0] +
-                          ".<step>.restart in this folder; write states first (fix resume/exact, restart_every > 0 in dembark's decks)");
+  if (narg != 1) error->all(FLERR, "resume_state: it must have the form resume_state BASE");
+  const dembark::restart::State state = dembark_family::find_state(arg[0], *comm, world);
+  if (state.step < 0) error->all(FLERR, dembark_family::no_state(arg[0]));
   const std::string file = dembark::restart::state_name(arg[0], state.step);
   const int ranks = state.grid[0] * state.grid[1] * state.grid[2];
   if (ranks != comm->nprocs)
@@ -243,7 +152,5 @@ void ResumeState::command(int narg, char** arg) {
         "resume_state: {} is of {} ranks, the run has {}; start it on {}, or take read_restart and another id of fix resume/exact to "
         "go on from positions and velocities alone",
         file, ranks, comm->nprocs, ranks);
-  int* const wanted = comm->user_procgrid;
-  if (!wanted[0] && !wanted[1] && !wanted[2]) std::copy(state.grid, state.grid + 3, wanted);
   dembark_lammps::read_restart_file(lmp, file);
 }

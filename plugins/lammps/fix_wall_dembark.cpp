@@ -33,7 +33,7 @@ constexpr int motion_numbers = 17;
 
 }  // namespace
 
-FixWallDembark::FixWallDembark(LAMMPS* lmp, int narg, char** arg) : Fix(lmp, narg, arg) {
+FixWallDembark::FixWallDembark(LAMMPS* lmp, int narg, char** arg) : RowsFix(lmp, narg, arg) {
   const auto word = [&](int k) { return k < narg ? std::string(arg[k]) : std::string(); };
   const std::string kind = word(3);
   if (narg < 7 || (kind != "region" && kind != "stl") || word(5) != "type" || (narg > 7 && word(7) != "motion"))
@@ -41,39 +41,25 @@ FixWallDembark::FixWallDembark(LAMMPS* lmp, int narg, char** arg) : Fix(lmp, nar
   wall_type_ = utils::is_integer(word(6)) ? utils::inumeric(FLERR, word(6), false, lmp) : 0;
   if (wall_type_ < 1 || wall_type_ > atom->ntypes) fail("there is no atom type " + word(6));
   find_pair();
-  try {
+  checked([&] {
     if (kind == "region") surface_ = std::make_unique<dembark_lammps::RegionSurface>(lmp, word(4));
     else surface_ = std::make_unique<dembark_lammps::TriangleSurface>(lmp, word(4));
     if (narg > 7) motion_ = std::make_unique<dembark::PrescribedMotion>(std::vector<std::string>(arg + 8, arg + narg));
-  } catch (const std::invalid_argument& wrong) {
-    fail(wrong.what());
-  }
+  });
   layout_ = pair_->coefficients().layout();
   slots_ = surface_->slots();
   before_.resize(std::size_t(row_size()));
-  maxexchange = row_size();
-  create_attribute = restart_peratom = restart_global = 1;
+  restart_global = 1;
   vector_flag = peratom_flag = 1;
   size_vector = int(totals_.size()) + (motion_ ? motion_numbers : 0);
   size_peratom_cols = 3;
   nevery = global_freq = peratom_freq = 1;
   extvector = 1;
   time_depend = motion_ ? 1 : 0;
-
-  FixWallDembark::grow_arrays(atom->nmax);
-  atom->add_callback(Atom::GROW);
-  atom->add_callback(Atom::RESTART);
-  for (int i = 0; i < atom->nlocal; ++i) FixWallDembark::set_arrays(i);
+  make_rows(row_size());
 }
 
-FixWallDembark::~FixWallDembark() {
-  atom->delete_callback(id, Atom::GROW);
-  atom->delete_callback(id, Atom::RESTART);
-  memory->destroy(rows_);
-  memory->destroy(force_);
-}
-
-void FixWallDembark::fail(const std::string& what) const { error->all(FLERR, std::string("fix ") + id + " wall/dembark: " + what); }
+FixWallDembark::~FixWallDembark() { memory->destroy(force_); }
 
 void FixWallDembark::find_pair() {
   pair_ = dynamic_cast<PairDembarkGranular*>(force->pair_match(dembark_lammps::ContactCoefficients::style_name, 1));
@@ -86,11 +72,7 @@ void FixWallDembark::init() {
   find_pair();
   liquid_ = layout_.imbalance ? dembark_lammps::find_liquid(modify) : nullptr;
   tally_ = dembark_lammps::find_energy_tally(modify);
-  try {
-    surface_->prepare(pair_->largest_radius() + (layout_.bridge ? neighbor->skin : 0.0), motion_.get());
-  } catch (const std::invalid_argument& wrong) {
-    fail(wrong.what());
-  }
+  checked([&] { surface_->prepare(pair_->largest_radius() + (layout_.bridge ? neighbor->skin : 0.0), motion_.get()); });
   if (pair_->coefficients().layout().size() != layout_.size() || surface_->slots() != slots_)
     fail("pair_style or region have changed; define the fix again");
   if (!motion_) return;
@@ -170,9 +152,8 @@ void FixWallDembark::act_on(int i, bool advance) {
     if (advance && !(volume > 0.0) && (state.bridge_volume > 0.0 || (liquid_ && touching)))
       dembark_lammps::check_time_step(error, p.liquid, b, update->dt);
     if (!out.interacting && !(volume > 0.0)) continue;
-    if (next == end) error->one(FLERR, "fix wall/dembark: a grain touches more than {} parts of a wall", slots_);
-    if (tally_ && out.interacting)
-      tally_->add_wall(p, b, out, state, advance, i, update->dt, acceleration_.at(x - b.separation), acceleration_.angular);
+    if (next == end) fail_alone("a grain touches more than " + std::to_string(slots_) + " parts of a wall");
+    if (tally_ && out.interacting) tally_->add(p, b, out, state, advance, i, acceleration_.at(x - b.separation), acceleration_.angular);
     if (advance) {
       next[0] = contact.surface + 1;
       layout_.store(next + 1, state);
@@ -225,46 +206,20 @@ double FixWallDembark::compute_vector(int k) {
   return numbers[k - int(totals_.size())];
 }
 
-double FixWallDembark::memory_usage() { return double(atom->nmax) * (row_size() + 3) * sizeof(double); }
-
 void FixWallDembark::grow_arrays(int count) {
-  memory->grow(rows_, count, row_size(), "wall/dembark:rows");
+  RowsFix::grow_arrays(count);
   memory->grow(force_, count, 3, "wall/dembark:force");
   array_atom = force_;
 }
 
-void FixWallDembark::copy_arrays(int from, int to, int) {
-  std::copy_n(rows_[from], row_size(), rows_[to]);
+void FixWallDembark::copy_arrays(int from, int to, int mode) {
+  RowsFix::copy_arrays(from, to, mode);
   std::copy_n(force_[from], 3, force_[to]);
 }
 
 void FixWallDembark::set_arrays(int i) {
-  std::fill_n(rows_[i], row_size(), 0.0);
+  RowsFix::set_arrays(i);
   std::fill_n(force_[i], 3, 0.0);
-}
-
-int FixWallDembark::pack_exchange(int i, double* buffer) {
-  std::copy_n(rows_[i], row_size(), buffer);
-  return row_size();
-}
-
-int FixWallDembark::unpack_exchange(int i, double* buffer) {
-  std::copy_n(buffer, row_size(), rows_[i]);
-  return row_size();
-}
-
-int FixWallDembark::pack_restart(int i, double* buffer) {
-  buffer[0] = row_size() + 1;
-  std::copy_n(rows_[i], row_size(), buffer + 1);
-  return row_size() + 1;
-}
-
-void FixWallDembark::unpack_restart(int i, int nth) {
-  const double* values = atom->extra[i];
-  for (int k = 0; k < nth; ++k) values += int(values[0]);
-  if (int(values[0]) != row_size() + 1)
-    error->one(FLERR, "fix wall/dembark: the restart file was written with other options of pair_style or region");
-  std::copy_n(values + 1, row_size(), rows_[i]);
 }
 
 void FixWallDembark::write_restart(FILE* file) {

@@ -13,18 +13,17 @@
 #include <string>
 #include <vector>
 
-#include "fix.h"
-
 #include "dembark/contact_history.hpp"
 #include "dembark/motion/prescribed_motion.hpp"
 #include "dembark/motion/wall_frame.hpp"
 #include "dembark/motion/wall_work.hpp"
 #include "energy_tally.h"
+#include "rows_fix.h"
 #include "wall_surface.h"
 
 namespace LAMMPS_NS {
 
-class FixWallDembark : public Fix {
+class FixWallDembark : public dembark_lammps::RowsFix<dembark_family::SharedFix> {
  public:
   FixWallDembark(LAMMPS* lmp, int narg, char** arg);
   ~FixWallDembark() override;
@@ -34,17 +33,10 @@ class FixWallDembark : public Fix {
   void post_force(int vflag) override;
   void end_of_step() override;
   double compute_vector(int k) override;
-  double memory_usage() override;
 
   void grow_arrays(int count) override;
   void copy_arrays(int from, int to, int) override;
   void set_arrays(int i) override;
-  int pack_exchange(int i, double* buffer) override;
-  int unpack_exchange(int i, double* buffer) override;
-  int pack_restart(int i, double* buffer) override;
-  void unpack_restart(int i, int nth) override;
-  int size_restart(int) override { return 1 + row_size(); }
-  int maxsize_restart() override { return 1 + row_size(); }
   // How a moving region moved in the last step; time and work of a motion.
   void write_restart(FILE* file) override;
   void restart(char* buffer) override;
@@ -67,8 +59,8 @@ class FixWallDembark : public Fix {
   class PairDembarkGranular* pair_ = nullptr;
   class FixCapillaryLiquid* liquid_ = nullptr;
   dembark::HistoryLayout layout_;
-  int slots_ = 0;               // contacts that a grain can have with the wall
-  double** rows_ = nullptr;     // of each grain and slot: the number of the part of the surface plus one (0: free), and the history
+  int slots_ = 0;  // contacts that a grain can have with the wall
+  // A row has of each slot the number of the part of the surface plus one (0: free), and the history.
   double** force_ = nullptr;    // of each grain: of the wall on it, N
   std::vector<double> before_;  // the rows of the grain in work before this step
   std::vector<double> overlaps_;
@@ -84,7 +76,6 @@ class FixWallDembark : public Fix {
   dembark::WallAcceleration acceleration_;  // for the tally; of regions that move by themselves it is not known
   bool resumed_ = false;                    // the last step of `sums_` is that of a restart file
 
-  [[noreturn]] void fail(const std::string& what) const;
   int slot_size() const { return 1 + layout_.size(); }
   int row_size() const { return slots_ * slot_size(); }
   void find_pair();

@@ -120,17 +120,7 @@ void PairDembarkGranular::transfer_history(double* from, double* to, int, int) {
 double PairDembarkGranular::mass(int i) const { return atom->mask[i] & freeze_bit_ ? INFINITY : atom->rmass[i]; }
 
 ContactBodies PairDembarkGranular::bodies(int i, int j) const {
-  ContactBodies b;
-  b.separation = vector(atom->x[i]) - vector(atom->x[j]);
-  b.velocity_1 = vector(atom->v[i]);
-  b.velocity_2 = vector(atom->v[j]);
-  b.angular_velocity_1 = vector(atom->omega[i]);
-  b.angular_velocity_2 = vector(atom->omega[j]);
-  b.radius_1 = atom->radius[i];
-  b.radius_2 = atom->radius[j];
-  b.mass_1 = mass(i);
-  b.mass_2 = mass(j);
-  return b;
+  return dembark_family::grain_pair(*atom, i, j, vector(atom->x[i]) - vector(atom->x[j]), mass(i), mass(j));
 }
 
 /// Calls visit(i, j, touches, row) for each listed pair that may act: grains whose surfaces meet, or that have a history.
@@ -200,7 +190,7 @@ void PairDembarkGranular::compute(int eflag, int vflag) {
       }
     }
     if (!out.interacting) return;
-    if (tally_) tally_->add_pair(p, b, out, state, advance, i, j);
+    if (tally_) tally_->add(p, b, out, state, advance, i, j);
     add(f[i], out.force);
     add(torque[i], out.torque_1);
     if (force->newton_pair || j < atom->nlocal) {

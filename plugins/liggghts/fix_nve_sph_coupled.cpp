@@ -1,40 +1,33 @@
 #include "fix_nve_sph_coupled.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <cstring>
 
 #include "atom.h"
 #include "comm.h"
-#include "error.h"
 #include "fix_property_atom.h"
 #include "force.h"
 #include "modify.h"
 #include "update.h"
 
 #include "fix_sph_body.h"
-#include "keyword_reader.h"
+#include "dembark/keyword_reader.hpp"
 #include "pair_sph_coupled.h"
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
+using dembark::keywords::text;
 using dembark::sph::Energies;
-using dembark_liggghts::text;
 
-FixNveSphCoupled::FixNveSphCoupled(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg) {
-  if (narg != 3) refuse("it takes no keywords: all numbers stand in pair_style sph/coupled");
-  if (!PairSphCoupled::find(force)) refuse("it wants pair_style sph/coupled, alone or in hybrid/overlay, before it");
+FixNveSphCoupled::FixNveSphCoupled(LAMMPS *lmp, int narg, char **arg) : SharedFix(lmp, narg, arg) {
+  if (narg != 3) fail("it takes no keywords: all numbers stand in pair_style sph/coupled");
+  if (!PairSphCoupled::find(force)) fail("it wants pair_style sph/coupled, alone or in hybrid/overlay, before it");
   time_integrate = 1;
   restart_global = 1;
   vector_flag = 1;
   size_vector = 9;
   global_freq = 1;
   extvector = 0;
-}
-
-void FixNveSphCoupled::refuse(const std::string &what) {
-  error->fix_error(FLERR, this, what.c_str());
-  std::abort();  // fix_error() does not return
 }
 
 /// Shifts wait for the next step: they go with the atoms and into restart files.
@@ -52,12 +45,12 @@ int FixNveSphCoupled::setmask() { return INITIAL_INTEGRATE | PRE_FORCE | FINAL_I
 
 void FixNveSphCoupled::init() {
   pair_ = PairSphCoupled::find(force);
-  if (!pair_) refuse("it wants pair_style sph/coupled, alone or in hybrid/overlay");
-  if (bool(shifts_) != (pair_->fluid().shifting.coefficient > 0.0)) refuse("it must come after pair_style sph/coupled ... shifting");
+  if (!pair_) fail("it wants pair_style sph/coupled, alone or in hybrid/overlay");
+  if (bool(shifts_) != (pair_->fluid().shifting.coefficient > 0.0)) fail("it must come after pair_style sph/coupled ... shifting");
   double count = 0.0, all = 0.0;
   for (int i = 0; i < atom->nlocal; ++i) count += (atom->mask[i] & groupbit) != 0;
   MPI_Allreduce(&count, &all, 1, MPI_DOUBLE, MPI_SUM, world);
-  if (all == 0.0) refuse("its group has no atoms: there is no fluid");
+  if (all == 0.0) fail("its group has no atoms: there is no fluid");
 }
 
 /// Of atoms with a radius the engine takes ghosts within half of the cutoff and half of the skin, which would do for grains that touch.
@@ -86,10 +79,9 @@ void FixNveSphCoupled::initial_integrate(int) {
     const double squared = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
     // As a speed that is no number compares, too.
     if (!(squared <= sound * sound))
-      error->one(FLERR, ("Fix nve/sph/coupled: the fluid blew up: at step " + std::to_string(update->ntimestep) + " atom " +
-                         std::to_string(atom->tag[i]) + " moves at " + text(std::sqrt(squared)) + " m/s, faster than sound (" +
-                         text(sound) + " m/s); take a larger sound_speed, a shorter step or thicker walls")
-                            .c_str());
+      fail_alone("the fluid blew up: at step " + std::to_string(update->ntimestep) + " atom " + std::to_string(atom->tag[i]) +
+                 " moves at " + text(std::sqrt(squared)) + " m/s, faster than sound (" + text(sound) +
+                 " m/s); take a larger sound_speed, a shorter step or thicker walls");
     for (int k = 0; k < 3; ++k) atom->x[i][k] += dt * v[k] + (by ? by[k] : 0.0);
   }
 }
@@ -108,8 +100,8 @@ double FixNveSphCoupled::compute_vector(int n) {
     MPI_Allreduce(mine, totals_, 9, MPI_DOUBLE, MPI_SUM, world);
     for (int k = 0; k < 3; ++k) totals_[5 + k] += saved_[k];
     const dembark::sph::Vector &g = pair_->fluid().gravity;
-    for (int k = 0; k < modify->nfix; ++k) {
-      const auto *const solid = dynamic_cast<FixSphBody *>(modify->fix[k]);
+    for (Fix *const fix : fixes()) {
+      const auto *const solid = dynamic_cast<FixSphBody *>(fix);
       if (!solid) continue;
       const dembark::sph::Body &body = solid->body();
       if (body.free) totals_[3] += body.kinetic_energy() - body.mass * dot(g, body.position);
@@ -123,10 +115,7 @@ double FixNveSphCoupled::compute_vector(int n) {
 void FixNveSphCoupled::write_restart(FILE *file) {
   summed_ = -1;
   compute_vector(0);
-  if (comm->me != 0) return;
-  const int bytes = int(sizeof saved_);
-  fwrite(&bytes, sizeof bytes, 1, file);
-  fwrite(totals_ + 5, sizeof(double), 3, file);
+  if (comm->me == 0) write_part(file, {{totals_ + 5, sizeof saved_}});
 }
 
 void FixNveSphCoupled::restart(char *buffer) { std::memcpy(saved_, buffer, sizeof saved_); }

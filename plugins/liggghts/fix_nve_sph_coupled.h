@@ -10,11 +10,11 @@ FixStyle(nve/sph/coupled,FixNveSphCoupled)
 
 #include <string>
 
-#include "fix.h"
+#include "shared_fix.h"
 
 namespace LAMMPS_NS {
 
-class FixNveSphCoupled : public Fix {
+class FixNveSphCoupled : public dembark_family::SharedFix {
  public:
   FixNveSphCoupled(class LAMMPS *, int, char **);
 
@@ -32,7 +32,6 @@ class FixNveSphCoupled : public Fix {
   void restart(char *);
 
  private:
-  [[noreturn]] void refuse(const std::string &what);
   void kick();
 
   class PairSphCoupled *pair_ = nullptr;

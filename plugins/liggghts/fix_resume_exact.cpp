@@ -1,12 +1,8 @@
 #include "fix_resume_exact.h"
 
 #include <algorithm>
-#include <cstdint>
-#include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <numeric>
-#include <stdexcept>
 
 #include "atom.h"
 #include "atom_vec.h"
@@ -25,7 +21,6 @@
 #include "update.h"
 #include "write_restart.h"
 
-#include "dembark/restart/state_files.hpp"
 #include "engine_access.h"
 
 using namespace LAMMPS_NS;
@@ -55,22 +50,14 @@ std::vector<Style *> fixes(Modify *modify) {
 /// Numbers that have to be the same for the saved ones to belong to this run: which atoms in which order, their candidates in which order,
 /// which properties and meshes.
 std::vector<double> structure(Atom *atom, Force *force, Modify *modify) {
-  std::uint64_t hash = 1469598103934665603u;  // FNV-1a, 32 bits at a time
-  const auto mix = [&hash](int v) { hash = (hash ^ static_cast<std::uint32_t>(v)) * 1099511628211u; };
-  for (int i = 0; i < atom->nlocal + atom->nghost; ++i) mix(atom->tag[i]);
-  if (const NeighList *const list = contact_list(force))
-    for (int ii = 0; ii < list->inum; ++ii) {
-      const int i = list->ilist[ii];
-      mix(list->numneigh[i]);
-      for (int k = 0; k < list->numneigh[i]; ++k) mix(list->firstneigh[i][k]);
-    }
+  dembark_family::OrderHash order(*atom, contact_list(force));
   for (FixPropertyAtom *property : fixes<FixPropertyAtom>(modify)) {
-    for (const char *c = property->id; *c; ++c) mix(*c);
-    mix(property->get_nvalues());
+    for (const char *c = property->id; *c; ++c) order.mix(*c);
+    order.mix(property->get_nvalues());
   }
   for (FixContactHistoryMesh *history : fixes<FixContactHistoryMesh>(modify))
-    for (int i = 0; i < atom->nlocal; ++i) mix(history->nneighs(i));
-  return {double(atom->nlocal), double(atom->nghost), double(hash >> 32), double(hash & 0xffffffffu)};
+    for (int i = 0; i < atom->nlocal; ++i) order.mix(history->nneighs(i));
+  return {double(atom->nlocal), double(atom->nghost), order.high(), order.low()};
 }
 
 /// Takes a rank's numbers out of the run, or puts them back in the same order.
@@ -133,61 +120,10 @@ void visit(Stream stream, Atom *atom, Force *force, Modify *modify) {
 
 }  // namespace
 
-FixResumeExact::FixResumeExact(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg), lengths_(std::size_t(comm->nprocs)) {
-  char *end = nullptr;
-  if (narg < 5 || (every_ = std::strtoll(arg[3], &end, 10)) < 0 || *end || end == arg[3] || (narg > 5 && std::strcmp(arg[5], "cut") != 0))
-    refuse("it must have the form fix ID group resume/exact EVERY BASE [cut FILE ...], with EVERY >= 0 steps");
-  base_ = arg[4];
-  if (base_.find_first_of("*%") != std::string::npos) refuse("the name of the states must not hold * or %");
-  for (int k = 6; k < narg; ++k) outputs_.push_back(arg[k]);
-  restart_global = 1;
-  force_reneighbor = every_ > 0;
-  next_reneighbor = -1;
-}
-
-void FixResumeExact::refuse(const std::string &what) {
-  error->fix_error(FLERR, this, what.c_str());
-  std::abort();  // fix_error() does not return
-}
-
-/// On one rank.
-void FixResumeExact::refuse_alone(const std::exception &wrong) {
-  error->one(FLERR, ("Fix resume/exact (id " + std::string(id) + "): " + wrong.what()).c_str());
-}
+FixResumeExact::FixResumeExact(LAMMPS *lmp, int narg, char **arg) : ResumeFix(lmp, narg, arg), lengths_(std::size_t(comm->nprocs)) {}
 
 // The engine calls the set-up of a stage for the fixes of that stage only.
 int FixResumeExact::setmask() { return PRE_INITIAL_INTEGRATE | PRE_EXCHANGE | PRE_NEIGHBOR; }
-
-void FixResumeExact::init() {
-  if (std::strcmp(update->integrate_style, "verlet") != 0) refuse("only run_style verlet is supported");
-  if (!begun_ && state_step_ < 0 && every_ > 0) refuse_other_states();
-  begun_ = true;
-  if (every_ > 0) next_reneighbor = (update->ntimestep / every_ + 1) * every_;
-  const int acting = PRE_FORCE | POST_FORCE | INITIAL_INTEGRATE | FINAL_INTEGRATE;
-  for (int i = modify->my_index(this) + 1; i < modify->nfix; ++i)
-    if (modify->fmask[i] & acting) refuse("it must come after fix " + std::string(modify->fix[i]->id) + ", whose set-up it has to undo");
-}
-
-/// States of another run would be resumed later in the place of those of this one, for their steps may be higher. Collective.
-void FixResumeExact::refuse_other_states() {
-  long long newest = -1;
-  if (comm->me == 0) {
-    newest = dembark::restart::newest_state(base_).step;
-    if (newest < 0) dembark::restart::delete_states(base_, 0);
-  }
-  MPI_Bcast(&newest, 1, MPI_LONG_LONG, 0, world);
-  if (newest < 0) return;
-  refuse("there is a state of an earlier run, " + dembark::restart::state_name(base_, newest) +
-         "; go on from it by resume_state, move it away, or give the states another name than " + base_);
-}
-
-// The set-up would sort the atoms out of turn.
-void FixResumeExact::setup_pre_exchange() {
-  sort_frequency_ = atom->sortfreq;
-  if (!part_.empty()) atom->sortfreq = 0;
-}
-
-void FixResumeExact::setup_pre_neighbor() { atom->sortfreq = sort_frequency_; }
 
 void FixResumeExact::setup(int) {
   if (state_step_ < 0) return;
@@ -203,22 +139,12 @@ void FixResumeExact::setup(int) {
     if (all) visit({part_, true, facts.size()}, atom, force, modify);
     else why = "the atoms or their candidates for contacts are others than in the state";
   }
-  // Output of the step of the state was written before the state.
-  for (int k = 0; k < output->ndump; ++k) output->last_dump[k] = update->ntimestep;
+  skip_dumps();
   if (comm->me == 0 && screen)
     fprintf(screen, "dembark: resumed at step " BIGINT_FORMAT " %s%s\n", update->ntimestep,
             why.empty() ? "exactly" : "approximately: ", why.c_str());
   part_ = {};
   state_step_ = -1;
-}
-
-/// The list of candidates was built anew for the step that has ended: here its output is written, and nothing of the next was done.
-void FixResumeExact::pre_initial_integrate() {
-  if (every_ == 0 || update->ntimestep != next_reneighbor + 1) return;
-  --update->ntimestep;
-  write_state();
-  ++update->ntimestep;
-  next_reneighbor += every_;
 }
 
 void FixResumeExact::write_state() {
@@ -228,19 +154,13 @@ void FixResumeExact::write_state() {
   visit({part_, false}, atom, force, modify);
   const double mine = double(part_.size());
   MPI_Gather(&mine, 1, MPI_DOUBLE, lengths_.data(), 1, MPI_DOUBLE, 0, world);
-  std::string path = base_ + ".part";
+  std::string path = part_path();
   WriteRestart(lmp).write(&path[0]);
   const bool whole = append_parts(path);
   lengths_.assign(lengths_.size(), 0.0);
   if (comm->me != 0) return;
-  for (const std::string &output : outputs_) dembark::restart::sync_file(output);
-  try {
-    if (!whole) throw std::runtime_error("file " + path + " could not be written whole. No space left on the disk?");
-    const int *const grid = comm->procgrid;
-    dembark::restart::keep_state(path, base_, {update->ntimestep, {grid[0], grid[1], grid[2]}});
-  } catch (const std::exception &wrong) {
-    refuse_alone(wrong);
-  }
+  if (!whole) fail_alone("file " + path + " could not be written whole. No space left on the disk?");
+  keep_state();
 }
 
 /// The parts of all ranks to the end of the restart file, one after the other. The engine counts the bytes of a fix in 31 bits, so they
@@ -298,9 +218,7 @@ void FixResumeExact::write_restart(FILE *file) {
   if (comm->me != 0) return;
   std::vector<double> numbers{format, double(update->ntimestep), double(comm->nprocs)};
   numbers.insert(numbers.end(), lengths_.begin(), lengths_.end());
-  const int bytes = int(numbers.size() * sizeof(double));
-  fwrite(&bytes, sizeof(int), 1, file);
-  fwrite(numbers.data(), sizeof(double), numbers.size(), file);
+  write_part(file, {{numbers.data(), numbers.size() * sizeof(double)}});
 }
 
 void FixResumeExact::restart(char *buffer) {
@@ -309,29 +227,15 @@ void FixResumeExact::restart(char *buffer) {
   saved_ranks_ = static_cast<int>(numbers[2]);
   if (numbers[0] != format) lacking_ = "the state was written by another version of dembark";
   else if (static_cast<bigint>(numbers[1]) == update->ntimestep && saved_ranks_ == comm->nprocs) lacking_ = read_parts(numbers + header);
-  if (comm->me != 0) return;
-  try {
-    for (const std::string &path : outputs_) dembark::restart::cut_output(path, update->ntimestep);
-  } catch (const std::exception &wrong) {
-    refuse_alone(wrong);
-  }
+  if (comm->me == 0) cut_outputs();
 }
 
 double FixResumeExact::memory_usage() { return double(part_.size() * sizeof(double)); }
 
 void ResumeState::command(int narg, char **arg) {
   if (narg != 1) error->all(FLERR, "resume_state: it must have the form resume_state BASE");
-  dembark::restart::State state;
-  if (comm->me == 0) state = dembark::restart::newest_state(arg[0]);
-  MPI_Bcast(&state, sizeof state, MPI_BYTE, 0, world);
-  if (state.step < 0) {
-    const std::string line = "resume_state: there is no whole state " + std::string(arg[0]) +
-                             ".<step>.restart in this folder; write states first (fix resume/exact, restart_every > 0 in dembark's decks)";
-    error->all(FLERR, line.c_str());
-  }
-  int *const wanted = comm->user_procgrid;
-  if (state.grid[0] * state.grid[1] * state.grid[2] == comm->nprocs && !wanted[0] && !wanted[1] && !wanted[2])
-    std::copy(state.grid, state.grid + 3, wanted);
+  const dembark::restart::State state = dembark_family::find_state(arg[0], *comm, world);
+  if (state.step < 0) error->all(FLERR, dembark_family::no_state(arg[0]).c_str());
   file = dembark::restart::state_name(arg[0], state.step);
   char *words[] = {&file[0]};
   ReadRestart(lmp).command(1, words);

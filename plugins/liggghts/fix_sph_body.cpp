@@ -1,29 +1,26 @@
 #include "fix_sph_body.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <limits>
-#include <stdexcept>
 #include <vector>
 
 #include "atom.h"
 #include "comm.h"
 #include "domain.h"
-#include "error.h"
 #include "fix_gravity.h"
 #include "fix_property_atom.h"
 #include "force.h"
 #include "modify.h"
 #include "update.h"
 
-#include "keyword_reader.h"
+#include "dembark/keyword_reader.hpp"
 #include "pair_sph_coupled.h"
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
 using namespace dembark::sph;
-using dembark_liggghts::KeywordReader;
+using dembark::keywords::Reader;
 
 namespace {
 
@@ -32,19 +29,19 @@ constexpr int all_numbers = 26;
 
 Vector vector(const double *v) { return {v[0], v[1], v[2]}; }
 
-Vector read_vector(KeywordReader &in, const std::string &of, const std::string &what) {
+Vector read_vector(Reader &in, const std::string &of, const std::string &what) {
   const double x = in.number(of, what), y = in.number(of, what), z = in.number(of, what);
   return {x, y, z};
 }
 
-double read_inertia(KeywordReader &in, const std::string &of) {
+double read_inertia(Reader &in, const std::string &of) {
   if (!in.next_is("inf")) return in.positive(of, "a moment (kg m^2, or inf)");
   in.word(of, "");
   return std::numeric_limits<double>::infinity();
 }
 
 Body read_body(const std::vector<std::string> &words, bool free, int dimension) {
-  KeywordReader in(words);
+  Reader in(words);
   Body body;
   body.free = free;
   const double none = std::numeric_limits<double>::infinity();
@@ -70,39 +67,30 @@ Body read_body(const std::vector<std::string> &words, bool free, int dimension) 
         body.inertia = {first, second, read_inertia(in, of)};
       }
     } else {
-      dembark_liggghts::refuse("'" + of + "' is no keyword; known are " + (free ? "mass, inertia, " : "") + "centre, velocity and spin");
+      dembark::keywords::refuse("'" + of + "' is no keyword; known are " + (free ? "mass, inertia, " : "") + "centre, velocity and spin");
     }
   }
   if (dimension == 2 && (body.velocity.z != 0.0 || body.spin.x != 0.0 || body.spin.y != 0.0))
-    dembark_liggghts::refuse("in the plane bodies move along x and y and turn about z");
-  if (free && !(body.mass > 0.0)) dembark_liggghts::refuse("mass is missing");
+    dembark::keywords::refuse("in the plane bodies move along x and y and turn about z");
+  if (free && !(body.mass > 0.0)) dembark::keywords::refuse("mass is missing");
   if (free && !(body.inertia.z > 0.0))
-    dembark_liggghts::refuse(dimension == 2 ? "inertia is missing: that about z"
-                                            : "inertia is missing: about x, y and z, the principal axes");
-  if (!placed && (free || turns)) dembark_liggghts::refuse("centre is missing: the point about which it turns");
+    dembark::keywords::refuse(dimension == 2 ? "inertia is missing: that about z"
+                                             : "inertia is missing: about x, y and z, the principal axes");
+  if (!placed && (free || turns)) dembark::keywords::refuse("centre is missing: the point about which it turns");
   return body;
 }
 
 }  // namespace
 
-FixSphBody::FixSphBody(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg) {
+FixSphBody::FixSphBody(LAMMPS *lmp, int narg, char **arg) : SharedFix(lmp, narg, arg) {
   const bool free = std::strcmp(arg[2], "sph/body") == 0;
-  if (!PairSphCoupled::find(force)) refuse("it wants pair_style sph/coupled, alone or in hybrid/overlay, before it");
-  try {
-    state_.body = read_body(std::vector<std::string>(arg + 3, arg + narg), free, domain->dimension);
-  } catch (const std::invalid_argument &wrong) {
-    refuse(wrong.what());
-  }
+  if (!PairSphCoupled::find(force)) fail("it wants pair_style sph/coupled, alone or in hybrid/overlay, before it");
+  state_.body = checked([&] { return read_body(std::vector<std::string>(arg + 3, arg + narg), free, domain->dimension); });
   restart_global = 1;
   vector_flag = 1;
   size_vector = all_numbers;
   global_freq = 1;
   extvector = 0;
-}
-
-void FixSphBody::refuse(const std::string &what) {
-  error->fix_error(FLERR, this, what.c_str());
-  std::abort();  // fix_error() does not return
 }
 
 /// Where the particles are in the body is part of restart files: there they may be anywhere.
@@ -128,7 +116,7 @@ void FixSphBody::init() {
   double count = 0.0, all = 0.0;
   for (int i = 0; i < atom->nlocal; ++i) count += (atom->mask[i] & groupbit) != 0;
   MPI_Allreduce(&count, &all, 1, MPI_DOUBLE, MPI_SUM, world);
-  if (all == 0.0) refuse("its group has no atoms: a body is made of particles");
+  if (all == 0.0) fail("its group has no atoms: a body is made of particles");
   place_particles();
 }
 
@@ -203,9 +191,7 @@ void FixSphBody::place_particles() {
     const double place[] = {x.x, x.y, x.z}, speed[] = {v.x, v.y, v.z}, spin[] = {body.spin.x, body.spin.y, body.spin.z};
     for (int k = 0; k < 3; ++k) {
       if (domain->periodicity[k] && !(place[k] >= domain->boxlo[k] && place[k] <= domain->boxhi[k]))
-        error->one(FLERR, ("Fix " + std::string(style) + " (id " + id + "): it crosses the periodic boundary along " + "xyz"[k] +
-                           ", which bodies and walls cannot")
-                              .c_str());
+        fail_alone(std::string("it crosses the periodic boundary along ") + "xyz"[k] + ", which bodies and walls cannot");
       atom->x[i][k] = place[k];
       atom->v[i][k] = speed[k];
       if (atom->omega_flag) atom->omega[i][k] = spin[k];
@@ -224,10 +210,7 @@ double FixSphBody::compute_vector(int n) {
 }
 
 void FixSphBody::write_restart(FILE *file) {
-  if (comm->me != 0) return;
-  const int bytes = int(sizeof state_);
-  fwrite(&bytes, sizeof bytes, 1, file);
-  fwrite(&state_, sizeof state_, 1, file);
+  if (comm->me == 0) write_part(file, {{&state_, sizeof state_}});
 }
 
 void FixSphBody::restart(char *buffer) {

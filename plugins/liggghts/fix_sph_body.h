@@ -11,13 +11,13 @@ FixStyle(sph/wall,FixSphBody) FixStyle(sph/body,FixSphBody)
 
 #include <string>
 
-#include "fix.h"
+#include "shared_fix.h"
 
 #include "dembark/sph/bodies.hpp"
 
 namespace LAMMPS_NS {
 
-class FixSphBody : public Fix {
+class FixSphBody : public dembark_family::SharedFix {
  public:
   FixSphBody(class LAMMPS *, int, char **);
 
@@ -42,7 +42,6 @@ class FixSphBody : public Fix {
   void add_force(const dembark::sph::Vector &force, const dembark::sph::Vector &torque);
 
  private:
-  [[noreturn]] void refuse(const std::string &what);
   void read(int narg, char **arg);
   void gather_forces();
   void place_particles();

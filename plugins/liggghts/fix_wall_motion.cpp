@@ -1,14 +1,11 @@
 #include "fix_wall_motion.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <cstring>
-#include <stdexcept>
 #include <vector>
 
 #include "comm.h"
 #include "domain.h"
-#include "error.h"
 #include "fix_mesh_surface.h"
 #include "fix_wall_gran.h"
 #include "tri_mesh.h"
@@ -29,29 +26,20 @@ NodeVectors *velocities(AbstractMesh &mesh) { return mesh.prop().getElementPrope
 
 }  // namespace
 
-FixWallMotion::FixWallMotion(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg) {
-  if (narg < 6 || std::strcmp(arg[3], "mesh") != 0) refuse("it must have the form fix ID group wall/motion mesh ID MOTION ...");
+FixWallMotion::FixWallMotion(LAMMPS *lmp, int narg, char **arg) : SharedFix(lmp, narg, arg) {
+  if (narg < 6 || std::strcmp(arg[3], "mesh") != 0) fail("it must have the form fix ID group wall/motion mesh ID MOTION ...");
   mesh_id_ = arg[4];
   auto *const fix = dynamic_cast<FixMeshSurface *>(modify->find_fix_id(arg[4]));
-  if (!fix) refuse("there is no fix mesh/surface '" + mesh_id_ + "'");
+  if (!fix) fail("there is no fix mesh/surface '" + mesh_id_ + "'");
   mesh_ = fix->mesh();
-  if (mesh_->isMoving()) refuse("mesh '" + mesh_id_ + "' is moved by another fix already; give all terms of a motion to one fix");
-  if (fix->surfaceVel()) refuse("mesh '" + mesh_id_ + "' has a surface velocity, and cannot be moved too");
-  try {
-    motion_ = dembark::PrescribedMotion(std::vector<std::string>(arg + 5, arg + narg));
-  } catch (const std::invalid_argument &wrong) {
-    refuse(wrong.what());
-  }
+  if (mesh_->isMoving()) fail("mesh '" + mesh_id_ + "' is moved by another fix already; give all terms of a motion to one fix");
+  if (fix->surfaceVel()) fail("mesh '" + mesh_id_ + "' has a surface velocity, and cannot be moved too");
+  motion_ = checked([&] { return dembark::PrescribedMotion(std::vector<std::string>(arg + 5, arg + narg)); });
   restart_global = time_depend = 1;
   nevery = global_freq = 1;
   vector_flag = 1;
   size_vector = all_numbers;
   extvector = 0;
-}
-
-void FixWallMotion::refuse(const std::string &what) {
-  error->fix_error(FLERR, this, what.c_str());
-  std::abort();  // fix_error() does not return
 }
 
 void FixWallMotion::post_create() { mesh_->registerMove(false, true, motion_.turns()); }
@@ -66,14 +54,14 @@ void FixWallMotion::pre_delete(bool unfixed) {
 int FixWallMotion::setmask() { return INITIAL_INTEGRATE | PRE_FORCE | END_OF_STEP; }
 
 void FixWallMotion::init() {
-  if (std::strcmp(update->integrate_style, "verlet") != 0) refuse("only run_style verlet is supported");
+  only_verlet();
   const std::string wrong = motion_.step_error(update->dt);
-  if (!wrong.empty()) refuse(wrong);
+  if (!wrong.empty()) fail(wrong);
   state_ = motion_.at(clock_.time(update->ntimestep, update->dt));
   check_reach();
   knows_load_ = walls_tell_loads;
-  for (int k = 0; k < modify->nfix; ++k) {
-    auto *const wall = dynamic_cast<FixWallGran *>(modify->fix[k]);
+  for (Fix *const each : fixes()) {
+    auto *const wall = dynamic_cast<FixWallGran *>(each);
     if (!wall || !wall->is_mesh_wall()) continue;
     for (int m = 0; m < wall->n_meshes(); ++m)
       if (wall->mesh_list()[m]->mesh() == mesh_ && !wall->contact_match("tangential", "finnie_rabinowicz") &&
@@ -109,10 +97,10 @@ void FixWallMotion::check_reach() {
   for (int k = 0; k < 3; ++k)
     if (!domain->periodicity[k] && domain->boundary[k][0] != 2 && domain->boundary[k][0] != 3 &&
         (low[k] + from[k] < domain->boxlo[k] || high[k] + to[k] > domain->boxhi[k]))
-      refuse(std::string("the motion takes mesh '") + mesh_id_ + "' out of the box along " + "xyz"[k] + ", from " +
-             dembark::motion::text(low[k] + from[k]) + " to " + dembark::motion::text(high[k] + to[k]) + " m beside " +
-             dembark::motion::text(domain->boxlo[k]) + " ... " + dembark::motion::text(domain->boxhi[k]) +
-             " m: make the amplitude smaller or the box larger");
+      fail(std::string("the motion takes mesh '") + mesh_id_ + "' out of the box along " + "xyz"[k] + ", from " +
+           dembark::motion::text(low[k] + from[k]) + " to " + dembark::motion::text(high[k] + to[k]) + " m beside " +
+           dembark::motion::text(domain->boxlo[k]) + " ... " + dembark::motion::text(domain->boxhi[k]) +
+           " m: make the amplitude smaller or the box larger");
 }
 
 void FixWallMotion::set_velocities(const dembark::WallStep &step) {
@@ -190,10 +178,9 @@ void FixWallMotion::end_of_step() {
 /// Collective.
 double FixWallMotion::compute_vector(int n) {
   if (n >= motion_numbers && !knows_load_)
-    error->all(FLERR, ("Fix wall/motion (id " + std::string(id) +
-                       "): what the wall does to the grains is known in liggghts-dembark only, with 'tangential " +
-                       "finnie_rabinowicz' or 'cohesion capillary' in its fix wall/gran")
-                          .c_str());
+    fail(
+        "what the wall does to the grains is known in liggghts-dembark only, with 'tangential finnie_rabinowicz' or 'cohesion capillary' "
+        "in its fix wall/gran");
   const dembark::WallLoad load = n >= motion_numbers ? whole_load() : dembark::WallLoad{};
   const auto &s = state_;
   const double all[all_numbers] = {s.displacement.x,
@@ -223,11 +210,7 @@ double FixWallMotion::compute_vector(int n) {
 }
 
 void FixWallMotion::write_restart(FILE *file) {
-  if (comm->me != 0) return;
-  const int bytes = int(sizeof clock_ + sizeof sums_);
-  fwrite(&bytes, sizeof(int), 1, file);
-  fwrite(&clock_, sizeof clock_, 1, file);
-  fwrite(&sums_, sizeof sums_, 1, file);
+  if (comm->me == 0) write_part(file, {{&clock_, sizeof clock_}, {&sums_, sizeof sums_}});
 }
 
 void FixWallMotion::restart(char *buffer) {

@@ -13,7 +13,7 @@ FixStyle(wall/motion,FixWallMotion)
 
 #include <string>
 
-#include "fix.h"
+#include "shared_fix.h"
 #include "modify.h"
 
 #include "dembark/motion/prescribed_motion.hpp"
@@ -21,7 +21,7 @@ FixStyle(wall/motion,FixWallMotion)
 
 namespace LAMMPS_NS {
 
-class FixWallMotion : public Fix {
+class FixWallMotion : public dembark_family::SharedFix {
  public:
   FixWallMotion(class LAMMPS *, int, char **);
 
@@ -47,7 +47,6 @@ class FixWallMotion : public Fix {
   const dembark::WallAcceleration &acceleration() const { return acceleration_; }
 
  private:
-  [[noreturn]] void refuse(const std::string &what);
   void set_velocities(const dembark::WallStep &step);
   void check_reach();
   dembark::WallLoad whole_load();

@@ -21,7 +21,7 @@
 
 #include "fix_nve_sph_coupled.h"
 #include "fix_sph_body.h"
-#include "keyword_reader.h"
+#include "dembark/keyword_reader.hpp"
 #include "pair_sph_options.h"
 
 using namespace LAMMPS_NS;
@@ -136,8 +136,8 @@ void PairSphCoupled::find_gravity() {
 
 void PairSphCoupled::begin() {
   if (update->dt > settings_.longest_step() * (1.0 + 1e-9))
-    refuse("the time step must be at most 0.6 h/sound_speed = " + dembark_liggghts::text(settings_.longest_step()) + " s, not " +
-           dembark_liggghts::text(update->dt) + " s");
+    refuse("the time step must be at most 0.6 h/sound_speed = " + dembark::keywords::text(settings_.longest_step()) + " s, not " +
+           dembark::keywords::text(update->dt) + " s");
   find_gravity();
   sort_particles();
   check_atoms();
@@ -160,11 +160,11 @@ void PairSphCoupled::check_atoms() {
     if (role_[i] != SphRole::fluid) continue;
     const double mass = atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
     if (!(std::fabs(mass - due) <= 1e-6 * due))
-      refuse_atom(i, "of the fluid has the mass " + dembark_liggghts::text(mass) + " kg where density * spacing^" +
-                         std::to_string(settings_.dimension) + " is " + dembark_liggghts::text(due) + " kg" +
+      refuse_atom(i, "of the fluid has the mass " + dembark::keywords::text(mass) + " kg where density * spacing^" +
+                         std::to_string(settings_.dimension) + " is " + dembark::keywords::text(due) + " kg" +
                          (atom->rmass ? "; set it by set group ... mass" : "; set it by mass TYPE ..."));
     if (!(atom->rho[i] > 0.0) || std::isinf(atom->rho[i]))
-      refuse_atom(i, "of the fluid has the density " + dembark_liggghts::text(atom->rho[i]) + " kg/m^3; set it by set group ... meso_rho");
+      refuse_atom(i, "of the fluid has the density " + dembark::keywords::text(atom->rho[i]) + " kg/m^3; set it by set group ... meso_rho");
   }
 }
 

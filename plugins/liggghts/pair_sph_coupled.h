@@ -48,7 +48,6 @@ class PairSphCoupled : public Pair {
   void advance(double dt, double **shifts);
   /// Of this rank: what is stored, lost since the beginning.
   dembark::sph::Energies energies() const;
-  dembark::sph::Energies &losses() { return lost_; }
 
  private:
   [[noreturn]] void refuse(const std::string &what);

@@ -2,14 +2,17 @@
 
 #include <cmath>
 
-#include "keyword_reader.h"
+#include "dembark/keyword_reader.hpp"
 
 namespace dembark_liggghts {
 
 using namespace dembark::sph;
+using dembark::keywords::Reader;
+using dembark::keywords::refuse;
+using dembark::keywords::text;
 
 Settings read_fluid_settings(const std::vector<std::string> &words, int dimension) {
-  KeywordReader in(words);
+  Reader in(words);
   Settings s;
   s.dimension = dimension;
   s.state.sound_speed = 0.0;

@@ -34,6 +34,34 @@ def test_account_of_an_oblique_impact_is_that_of_liggghts(tmp_path: Path, materi
     assert account.normal_spring.min() < -0.1 * account.turnover
 
 
+@pytest.mark.parametrize("shape", ["", "disc"])
+def test_the_account_knows_with_which_inertia_grains_turn(tmp_path: Path, shape: str) -> None:
+    """In the plane fix nve/sphere turns spheres, or with `disc` solid cylinders."""
+    text = f"""\
+{lammps_driver.head("off", "f f p")}
+dimension 2
+region domain block -0.05 0.05 -0.05 0.05 -0.005 0.005 units box
+create_box 1 domain
+neighbor 0.001 bin
+timestep 2e-6
+pair_style dembark/granular {lammps_driver.settings(DRY)}
+pair_coeff * * {lammps_driver.coefficients(DRY)}
+create_atoms 1 single 0.0 0.0 0.0 units box
+create_atoms 1 single 0.004 0.003 0.0 units box
+set group all diameter 0.006 density 2500
+set atom 1 vx 0.4 vy 0.1
+set atom 2 vx -0.3 vy -0.2 omega 0 0 500
+fix motion all nve/sphere {shape}
+{FIX}
+{THERMO}thermo 100
+run 2000
+"""
+    account = Account(run_deck(tmp_path, text))
+    account.assert_balanced()
+    assert abs(account.tangential_spring[-1]) > 1e-3 * account.turnover
+    assert (account.imposed == 0.0).all()
+
+
 def falling(run: str, *, material: Material = WET, ranks: int = 1, create: str = CREATE, state: str = STATE) -> str:
     """The floor sinks at 0.1 m/s."""
     text = bed(f"{FIX}\n{THERMO}thermo 50\n{run}", material=material, create=create, state=state,

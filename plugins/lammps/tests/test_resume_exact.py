@@ -100,15 +100,15 @@ def test_stock_restart_is_not_exact(tmp_path):
 
 
 @pytest.mark.parametrize(("words", "told"), [
-    ("resume/exact", "fix state resume/exact: it is written"), ("resume/exact ten bed", "EVERY a whole number of steps"),
-    ("resume/exact -1 bed", ">= 0 steps"), ("resume/exact 5 bed keep x", "it is written"), ("resume/exact 5 bed*", "must not hold"),
+    ("resume/exact", "fix state resume/exact: it must have the form"), ("resume/exact ten bed", "EVERY >= 0 steps"),
+    ("resume/exact -1 bed", ">= 0 steps"), ("resume/exact 5 bed keep x", "it must have the form"), ("resume/exact 5 bed*", "must not hold"),
     ("resume/exact 5 bed\nfix late all gravity 1 vector 1 0 0", "must come after fix late"),
 ])
 def test_mistakes_of_the_fix(tmp_path, words, told):
     refused(tmp_path, deck("run 10", states=f"fix state all {words}\n"), told)
 
 
-@pytest.mark.parametrize(("words", "told"), [("resume_state", "'resume_state BASE'"),
+@pytest.mark.parametrize(("words", "told"), [("resume_state", "the form resume_state BASE"),
                                              ("resume_state bed", "there is no whole state bed.<step>")])
 def test_mistakes_of_the_command(tmp_path, words, told):
     refused(tmp_path, deck("run 10", resume=True).replace("resume_state bed", words), told)

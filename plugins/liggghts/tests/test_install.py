@@ -51,9 +51,10 @@ def test_copies_once(tmp_path):
 def test_every_included_header_is_there(tmp_path):
     source = stand_in(tmp_path / "src")
     install(source)
-    for path in [*source.glob("*_model_*.h"), *source.glob("fix_*"), *source.glob("*state*"), *(source / "dembark").rglob("*.hpp")]:
+    for path in [*source.glob("*_model_*.h"), *source.glob("fix_*"), *source.glob("*_fix.*"), *(source / "dembark").rglob("*.hpp")]:
         for name in re.findall(r'^#include "([^"]+)"', path.read_text(), re.MULTILINE):
-            ours = name.startswith("dembark/") or path.suffix == ".hpp" or (ROOT / "plugins/liggghts" / name).exists()
+            ours = name.startswith("dembark/") or path.suffix == ".hpp" or any(
+                (ROOT / "plugins" / folder / name).exists() for folder in ("liggghts", "lammps_family"))
             assert not ours or (path.parent / name).exists() or (source / name).exists(), f"{path.name}: {name}"
 
 
@@ -66,9 +67,10 @@ def test_whitelist_is_what_liggghts_dembark_compiles(tmp_path):
     assert set((source / "style_contact_model_user.whitelist").read_text().splitlines()) == expected
 
 
-def test_private_members_of_the_engine_are_reached_in_one_file():
-    """By explicit instantiation with a pointer to a member."""
-    files = [*(ROOT / "plugins/liggghts").glob("*.h"), *(ROOT / "plugins/liggghts").glob("*.[ch]pp")]
+@pytest.mark.parametrize("engine", ["liggghts", "lammps"])
+def test_private_members_of_an_engine_are_reached_in_one_file(engine):
+    """By explicit instantiation with a pointer to a member; in a header it would be there more than once."""
+    files = [path for folder in (engine, "lammps_family") for path in (ROOT / "plugins" / folder).glob("*.*")]
     reaching = [path.name for path in files if re.search(r"^template (struct|class) \w+<.*&", path.read_text(), re.MULTILINE)]
     assert reaching == ["engine_access.cpp"]
 

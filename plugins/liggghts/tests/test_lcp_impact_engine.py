@@ -60,6 +60,19 @@ def test_a_moving_mesh_carries_its_logs(tmp_path):
     assert found.velocity()[0, 0] == pytest.approx(0.6 / 3.0, rel=1e-2)
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_moving_mesh_crosses_a_periodic_boundary(tmp_path, ranks):
+    """The engine takes triangles that leave the box to its other end, which is no velocity of theirs: a log on the floor goes with it."""
+    floor(tmp_path, squares=8)
+    static = 50.0 * 9.81 * (1e-7 + 1.0 / 4e7)
+    case = Case([Log((1.2, 0.1 - static), (5.0, 0.0))], "stiffness 1e7 wall mesh floor stl stiffness 4e7 friction 0.5", 1e-4, "run 600",
+                gravity=9.81, every=200, box=(-2.0, 2.0, -1.0, 1.0, -0.5, 0.5), boundary="p f f",
+                before="fix stl all mesh/surface file floor.stl type 1\nfix move all move/mesh mesh stl linear 5.0 0.0 0.0")
+    found = run(tmp_path, case, ranks=ranks)
+    assert found.velocity()[0] == pytest.approx([5.0, 0.0, 0.0], abs=1e-9)
+    assert found.last[0, 1:3] == pytest.approx([1.2 + 0.3, 0.1 - static], abs=1e-9)
+
+
 def test_a_drum_of_triangles(tmp_path):
     """A polygon of many sides that turns with fix move/mesh is nearly the cylinder."""
     sides, radius = 180, 1.0

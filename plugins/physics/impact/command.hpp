@@ -4,15 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <iterator>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "../keyword_reader.hpp"
 #include "geometry.hpp"
 #include "types.hpp"
 
@@ -37,71 +35,13 @@ struct Command {
 
 namespace detail {
 
-[[noreturn]] inline void refuse(const std::string& line) { throw std::invalid_argument(line); }
-
-inline std::string text(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.15g", value);
-  return buffer;
-}
-
-/// The words, one after the other. `of`: the keyword that they belong to; `what`: what is wanted, for messages.
-class CommandWords {
- public:
-  explicit CommandWords(const std::vector<std::string>& words) : words_(words) {}
-
-  bool left() const { return at_ < words_.size(); }
-  bool next_is(const char* word) const { return left() && words_[at_] == word; }
-  bool next_is_number() const {
-    double ignored;
-    return left() && is_number(words_[at_], ignored);
-  }
-
-  std::string word(const std::string& of, const std::string& what) {
-    if (!left()) refuse(of + ": " + what + " is missing");
-    return words_[at_++];
-  }
-  double number(const std::string& of, const std::string& what) {
-    const std::string found = word(of, what);
-    double value;
-    if (!is_number(found, value)) refuse(of + ": '" + found + "' is no number; it wants " + what);
-    return value;
-  }
-  double at_least(double lowest, const std::string& of, const std::string& what) {
-    const double value = number(of, what);
-    if (!(value >= lowest)) refuse(of + ": " + what + " must be >= " + text(lowest) + ", not " + text(value));
-    return value;
-  }
-  double positive(const std::string& of, const std::string& what) {
-    const double value = number(of, what);
-    if (!(value > 0.0)) refuse(of + ": " + what + " must be > 0, not " + text(value));
-    return value;
-  }
-  int choice(const std::string& of, const std::string& what, const std::vector<std::string>& all) {
-    const std::string found = word(of, what);
-    std::string list;
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      if (found == all[i]) return int(i);
-      list += (i ? ", " : "") + all[i];
-    }
-    refuse(of + ": " + what + " is one of " + list + ", not '" + found + "'");
-  }
-
- private:
-  static bool is_number(const std::string& word, double& value) {
-    char* end = nullptr;
-    value = std::strtod(word.c_str(), &end);
-    return !word.empty() && *end == '\0' && std::isfinite(value);
-  }
-
-  const std::vector<std::string>& words_;
-  std::size_t at_ = 0;
-};
+using keywords::refuse;
+using keywords::text;
 
 /// Everything that one command says; pair laws come together when all words are read.
-class CommandReader : CommandWords {
+class CommandReader : keywords::Reader {
  public:
-  CommandReader(const std::vector<std::string>& words, int types, const char* mesh) : CommandWords(words), types_(types), mesh_(mesh) {}
+  CommandReader(const std::vector<std::string>& words, int types, const char* mesh) : Reader(words), types_(types), mesh_(mesh) {}
 
   Command read() {
     while (left()) keyword(word("lcp/impact", "a keyword"));

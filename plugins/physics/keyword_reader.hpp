@@ -1,4 +1,5 @@
-// Words of an input line, read one after the other. Wrong ones throw std::invalid_argument with one line: what, where, what would be right.
+// Words of an input line, a keyword and its values, read one after the other. Wrong ones throw std::invalid_argument with one line: what,
+// where, what would be right.
 #pragma once
 
 #include <cmath>
@@ -10,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-namespace dembark_liggghts {
+namespace dembark::keywords {
 
 [[noreturn]] inline void refuse(const std::string& line) { throw std::invalid_argument(line); }
 
@@ -21,11 +22,12 @@ inline std::string text(double value) {
 }
 
 /// `of`: the keyword that they belong to; `what`: what is wanted, for messages.
-class KeywordReader {
+class Reader {
  public:
-  explicit KeywordReader(std::vector<std::string> words) : words_(std::move(words)) {}
+  explicit Reader(std::vector<std::string> words) : words_(std::move(words)) {}
 
   bool left() const { return at_ < words_.size(); }
+  std::size_t count_left() const { return words_.size() - at_; }
   bool next_is(const char* word) const { return left() && words_[at_] == word; }
   bool next_is_number() const {
     double ignored;
@@ -62,15 +64,15 @@ class KeywordReader {
     refuse(of + ": " + what + " is one of " + list + ", not '" + found + "'");
   }
 
- private:
   static bool is_number(const std::string& word, double& value) {
     char* end = nullptr;
     value = std::strtod(word.c_str(), &end);
     return !word.empty() && *end == '\0' && std::isfinite(value);
   }
 
+ private:
   const std::vector<std::string> words_;
   std::size_t at_ = 0;
 };
 
-}  // namespace dembark_liggghts
+}  // namespace dembark::keywords

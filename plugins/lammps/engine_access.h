@@ -1,0 +1,17 @@
+// Private and protected members of LAMMPS that dembark's styles use, all of them, each with the reason why there is no other way.
+#ifndef DEMBARK_ENGINE_ACCESS_H
+#define DEMBARK_ENGINE_ACCESS_H
+
+#include "fix.h"
+#include "modify.h"
+
+namespace dembark_lammps {
+
+/// `fix` begins the steps of this run before all others that do so, and looks at the state of a step after all its output, and before
+/// anything of the next: LAMMPS calls no fix there by itself. Called in the set-up; the fix that is last to call it is the first. The lists
+/// of Modify are protected.
+void begin_steps_first(LAMMPS_NS::Modify* modify, const LAMMPS_NS::Fix* fix);
+
+}  // namespace dembark_lammps
+
+#endif

@@ -1,0 +1,181 @@
+#include "monitor_fix.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "neigh_list.h"
+#include "neighbor.h"
+
+using namespace LAMMPS_NS;
+using dembark::MonitorRun;
+using dembark::ShadowImpact;
+using dembark::Vec3;
+
+namespace dembark_family {
+
+MonitorFix::MonitorFix(LAMMPS* lmp, int narg, char** arg)
+    : GrainFix(lmp, narg, arg), run_(checked([&] { return MonitorRun({arg + std::min(3, narg), arg + narg}, world); })) {
+  only_one();
+  restart_global = 1;
+  nevery = global_freq = 1;
+  vector_flag = 1;
+  size_vector = MonitorRun::figures;
+  extvector = 0;
+}
+
+int MonitorFix::setmask() { return FixConst::END_OF_STEP | (run_.impacts > 0 ? FixConst::PRE_FORCE : 0); }
+
+void MonitorFix::init() {
+  only_verlet();
+  if (!has_coherent_units()) fail("units must be si or cgs");
+  if (!has_spheres()) fail(std::string("it judges spheres only: ") + sphere_style);
+  find_movers("it judges");
+  want_movers();
+  find_contacts();
+  account_ = fix_of_style("energy/account");
+  if (run_.mean_length) {
+    double sum = 0.0, count = 0.0;
+    for (int i = 0; i < atom->nlocal; ++i)
+      if (atom->mask[i] & groupbit) {
+        sum += 2.0 * atom->radius[i];
+        count += 1.0;
+      }
+    if (!run_.measure_length(sum, count)) fail("there are no grains yet whose mean diameter could be taken; give 'length L' (m)");
+  }
+  run_.begin(update->dt, long(update->ntimestep));
+  take_step();
+}
+
+/// kg; infinite of grains that do not follow their forces.
+double MonitorFix::mass(int i) const { return follows_forces(i) ? atom->rmass[i] : INFINITY; }
+
+void MonitorFix::end_of_step() {
+  const long n = long(update->ntimestep);
+  if (run_.monitor.settings.keeps(n)) take_bodies(n);
+  if (run_.monitor.settings.samples(n)) {
+    if (has_contacts()) {
+      take_pairs();
+      take_walls();
+    }
+    for (const std::string& found : run_.new_findings(n, "atom")) {
+      if (run_.monitor.settings.action == dembark::MonitorAction::stop) fail(found);
+      warn(found);
+    }
+  }
+  run_.end_step(n);
+  take_step();
+}
+
+void MonitorFix::take_bodies(long n) {
+  for (int i = 0; i < atom->nlocal; ++i) {
+    if (!(atom->mask[i] & groupbit) || !follows_forces(i)) continue;
+    const double *const f = atom->f[i], *const torque = atom->torque[i], its = inertia(i);
+    const double radius = atom->radius[i], per_mass = 1.0 / atom->rmass[i];
+    const double per_inertia = its > 0.0 ? per_mass / (its * radius * radius) : 0.0;
+    dembark::AccelerationHistory past;
+    std::memcpy(static_cast<void*>(&past), history(i), sizeof past);
+    run_.monitor.take(
+        past,
+        {f[0] * per_mass, f[1] * per_mass, f[2] * per_mass, torque[0] * per_inertia, torque[1] * per_inertia, torque[2] * per_inertia},
+        radius, long(atom->tag[i]), n, update->dt);
+    std::memcpy(history(i), &past, sizeof past);
+  }
+}
+
+void MonitorFix::take_contact(int i, int j, double radius_j, int type_j, double overlap) {
+  const double own = dembark::reduced(mass(i), j < 0 ? INFINITY : mass(j));
+  if (std::isinf(own)) return;
+  const double spring = stiffness(atom->type[i], type_j, dembark::reduced(atom->radius[i], radius_j), own, overlap);
+  run_.monitor.take_contact(own, spring, update->dt, long(atom->tag[i]), j < 0 ? dembark::monitor_wall : long(atom->tag[j]));
+}
+
+void MonitorFix::take_pairs() {
+  const NeighList* const list = pairs();
+  for (int ii = 0; list && ii < list->inum; ++ii) {
+    const int i = list->ilist[ii];
+    for (int k = 0; k < list->numneigh[i]; ++k) {
+      const int j = list->firstneigh[i][k] & NEIGHMASK;
+      const Vec3<double> apart = vector(atom->x[i]) - vector(atom->x[j]);
+      const double reach = atom->radius[i] + atom->radius[j], squared = dot(apart, apart);
+      if (squared < reach * reach && ((atom->mask[i] | atom->mask[j]) & groupbit))
+        take_contact(i, j, atom->radius[j], atom->type[j], reach - std::sqrt(squared));
+    }
+  }
+}
+
+void MonitorFix::pre_force(int) {
+  const long n = long(update->ntimestep);
+  run_.shadows.follow(update->dt, run_.monitor, [this](const ShadowImpact& shadow) {
+    const int i = atom->map(tagint(shadow.one)), j = atom->map(tagint(shadow.two));
+    dembark::ShadowImpacts::Meeting now;
+    now.here = i >= 0 && i < atom->nlocal;
+    now.judged = now.here && j >= 0 && weight(i, j, now.gravity);
+    if (now.judged) now.bodies = bodies(i, j);
+    return now;
+  });
+  // Atoms have changed their ranks.
+  if (neighbor->ago == 0 || run_.monitor.settings.samples(n)) run_.shadows.drop();
+  if (run_.monitor.settings.samples(n)) begin_impacts(n);
+}
+
+/// m/s^2. False where it is not the same for both.
+bool MonitorFix::weight(int i, int j, Vec3<double>& acceleration) const {
+  acceleration = {};
+  for (const Gravity& gravity : gravities_) {
+    const bool acts = atom->mask[i] & gravity.group;
+    if (acts != bool(atom->mask[j] & gravity.group)) return false;
+    if (acts) acceleration += gravity.acceleration();
+  }
+  return true;
+}
+
+dembark::ContactBodies MonitorFix::bodies(int i, int j) const {
+  double apart[3];
+  for (int k = 0; k < 3; ++k) apart[k] = atom->x[i][k] - atom->x[j][k];
+  nearest_image(apart);
+  return grain_pair(*atom, i, j, vector(apart), mass(i), mass(j));
+}
+
+/// Collective. Of pairs that two ranks have, the one that owns the lower number takes the impact.
+void MonitorFix::begin_impacts(long n) {
+  std::vector<ShadowImpact> mine;
+  const NeighList* const list = pairs();
+  for (int ii = 0; list && ii < list->inum; ++ii)
+    for (int k = 0; k < list->numneigh[list->ilist[ii]]; ++k) {
+      int i = list->ilist[ii], j = list->firstneigh[i][k] & NEIGHMASK;
+      if (atom->tag[j] < atom->tag[i]) std::swap(i, j);
+      if (i >= atom->nlocal || !(atom->mask[i] & atom->mask[j] & groupbit)) continue;
+      const Vec3<double> apart = vector(atom->x[i]) - vector(atom->x[j]);
+      const double reach = atom->radius[i] + atom->radius[j];
+      const long one = long(atom->tag[i]), two = long(atom->tag[j]);
+      Vec3<double> gravity;
+      if (dot(apart, apart) >= reach * reach || !weight(i, j, gravity) || !dembark::picked(one, two, n, run_.impacts)) continue;
+      ShadowImpact shadow;
+      if (shadow.begin(parameters(atom->type[i], atom->type[j]), bodies(i, j), one, two, update->dt)) mine.push_back(shadow);
+    }
+  run_.shadows.add(mine);
+}
+
+/// Accelerations of steps of another length are no history.
+void MonitorFix::take_step() {
+  if (update->dt == run_.step()) return;
+  set_time_step(run_.step());
+  clear_histories();
+}
+
+/// Collective.
+double MonitorFix::compute_vector(int n) {
+  if (n != MonitorRun::energy_error) return run_.figure(n, long(update->ntimestep));
+  if (!account_) return 0.0;
+  const double step_error = account_->compute_vector(15), turned_over = account_->compute_vector(16);
+  return turned_over > 0.0 ? step_error / turned_over : 0.0;
+}
+
+/// Collective.
+void MonitorFix::write_restart(FILE* file) {
+  const std::vector<double> saved = run_.saved();
+  if (comm->me == 0) write_part(file, {{saved.data(), saved.size() * sizeof(double)}});
+}
+
+}  // namespace dembark_family

@@ -1,0 +1,115 @@
+#include "resume_fix.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+
+#include "output.h"
+
+using namespace LAMMPS_NS;
+using namespace FixConst;
+namespace states = dembark::restart;
+
+namespace dembark_family {
+
+OrderHash::OrderHash(const Atom& atom, const NeighList* list) {
+  for (int i = 0; i < atom.nlocal + atom.nghost; ++i) mix(atom.tag[i]);
+  for (int ii = 0; list && ii < list->inum; ++ii) {
+    const int i = list->ilist[ii];
+    mix(list->numneigh[i]);
+    for (int k = 0; k < list->numneigh[i]; ++k) mix(list->firstneigh[i][k]);
+  }
+}
+
+ResumeFix::ResumeFix(LAMMPS* lmp, int narg, char** arg) : SharedFix(lmp, narg, arg) {
+  char* end = nullptr;
+  if (narg < 5 || (every_ = std::strtoll(arg[3], &end, 10)) < 0 || *end || end == arg[3] || (narg > 5 && std::strcmp(arg[5], "cut") != 0))
+    fail("it must have the form fix ID group resume/exact EVERY BASE [cut FILE ...], with EVERY >= 0 steps");
+  base_ = arg[4];
+  if (base_.find_first_of("*%") != std::string::npos) fail("the name of the states must not hold * or %");
+  outputs_.assign(arg + std::min(narg, 6), arg + narg);
+  restart_global = 1;
+  force_reneighbor = every_ > 0;
+  next_reneighbor = -1;
+}
+
+void ResumeFix::init() {
+  only_verlet();
+  if (!begun_ && state_step_ < 0 && every_ > 0) refuse_other_states();
+  begun_ = true;
+  if (every_ > 0) next_reneighbor = (update->ntimestep / every_ + 1) * every_;
+  const int acting = PRE_FORCE | POST_FORCE | INITIAL_INTEGRATE | FINAL_INTEGRATE;
+  bool before = false;
+  for (int k = 0; k < modify->nfix; ++k) {
+    if (before && modify->fmask[k] & acting)
+      fail(std::string("it must come after fix ") + modify->fix[k]->id + ", whose set-up it has to undo");
+    before = before || modify->fix[k] == this;
+  }
+}
+
+/// States of another run would be resumed later in the place of those of this one, for their steps may be higher. Collective.
+void ResumeFix::refuse_other_states() const {
+  long long newest = -1;
+  if (comm->me == 0) {
+    newest = states::newest_state(base_).step;
+    if (newest < 0) states::delete_states(base_, 0);
+  }
+  MPI_Bcast(&newest, 1, MPI_LONG_LONG, 0, world);
+  if (newest >= 0)
+    fail("there is a state of an earlier run, " + states::state_name(base_, newest) +
+         "; go on from it by resume_state, move it away, or give the states another name than " + base_);
+}
+
+// The set-up would sort the atoms out of turn.
+void ResumeFix::setup_pre_exchange() {
+  sort_frequency_ = atom->sortfreq;
+  if (keeps_order()) atom->sortfreq = 0;
+}
+
+/// The list of candidates was built anew for the step that has ended: here its output is written, and nothing of the next was done.
+void ResumeFix::begin_step() {
+  if (every_ == 0 || update->ntimestep != next_reneighbor + 1) return;
+  --update->ntimestep;
+  write_state();
+  ++update->ntimestep;
+  next_reneighbor += every_;
+}
+
+void ResumeFix::keep_state() const {
+  for (const std::string& output : outputs_) states::sync_file(output);
+  try {
+    const int* const grid = comm->procgrid;
+    states::keep_state(part_path(), base_, {update->ntimestep, {grid[0], grid[1], grid[2]}});
+  } catch (const std::exception& wrong) {
+    fail_alone(wrong.what());
+  }
+}
+
+void ResumeFix::cut_outputs() const {
+  try {
+    for (const std::string& path : outputs_) states::cut_output(path, update->ntimestep);
+  } catch (const std::exception& wrong) {
+    fail_alone(wrong.what());
+  }
+}
+
+void ResumeFix::skip_dumps() const {
+  for (int k = 0; k < output->ndump; ++k) output->last_dump[k] = update->ntimestep;
+}
+
+states::State find_state(const std::string& base, Comm& comm, MPI_Comm world) {
+  states::State state;
+  if (comm.me == 0) state = states::newest_state(base);
+  MPI_Bcast(&state, sizeof state, MPI_BYTE, 0, world);
+  int* const wanted = comm.user_procgrid;
+  if (state.grid[0] * state.grid[1] * state.grid[2] == comm.nprocs && !wanted[0] && !wanted[1] && !wanted[2])
+    std::copy(state.grid, state.grid + 3, wanted);
+  return state;
+}
+
+std::string no_state(const std::string& base) {
+  return "resume_state: there is no whole state " + base +
+         ".<step>.restart in this folder; write states first (fix resume/exact, restart_every > 0 in dembark's decks)";
+}
+
+}  // namespace dembark_family

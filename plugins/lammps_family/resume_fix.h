@@ -1,0 +1,72 @@
+// fix ID group resume/exact EVERY BASE [cut FILE ...]: states of a run at intervals (dembark/restart/state_files.hpp), and a resumed run
+// that goes on bit for bit. resume_state BASE: read the newest whole state.
+//
+// Restart files hold positions, velocities, and what fixes keep; but the set-up of a run computes the forces anew, from the velocities of
+// the full step instead of those half a step before, and may sort the atoms. So forces and torques are kept with a state, and put back
+// after the set-up.
+#ifndef DEMBARK_RESUME_FIX_H
+#define DEMBARK_RESUME_FIX_H
+
+#include <cstdint>
+
+#include "neigh_list.h"
+
+#include "shared_fix.h"
+
+#include "dembark/restart/state_files.hpp"
+
+namespace dembark_family {
+
+/// Which atoms in which order, and their candidates for contacts in which order.
+class OrderHash {
+ public:
+  OrderHash(const LAMMPS_NS::Atom& atom, const LAMMPS_NS::NeighList* list);
+  void mix(std::int64_t v) { hash_ = (hash_ ^ static_cast<std::uint32_t>(v)) * 1099511628211u; }  // FNV-1a, 32 bits at a time
+  double high() const { return double(hash_ >> 32); }
+  double low() const { return double(hash_ & 0xffffffffu); }
+
+ private:
+  std::uint64_t hash_ = 1469598103934665603u;
+};
+
+class ResumeFix : public SharedFix {
+ public:
+  ResumeFix(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg);
+
+  void init() override;
+  void setup_pre_exchange() override;
+  void setup_pre_neighbor() override { atom->sortfreq = sort_frequency_; }
+
+ protected:
+  /// Before anything of a step, and after all output of the step before.
+  void begin_step();
+  /// The file that a state is written to first.
+  std::string part_path() const { return base_ + ".part"; }
+  /// Makes it to a state of this step. On the first rank.
+  void keep_state() const;
+  /// The outputs up to the step of a state that was read. On the first rank.
+  void cut_outputs() const;
+  /// Output of the step of the state was written before the state.
+  void skip_dumps() const;
+
+  LAMMPS_NS::bigint every_ = 0, state_step_ = -1;  // the step of the state that the run goes on from, -1: none
+  std::string base_;
+  std::vector<std::string> outputs_;
+
+ private:
+  virtual void write_state() = 0;        ///< Collective.
+  virtual bool keeps_order() const = 0;  ///< a state waits to be put back, and the set-up is not to sort the atoms
+  void refuse_other_states() const;
+
+  int sort_frequency_ = 0;
+  bool begun_ = false;
+};
+
+/// The newest whole state, as the first rank finds it; step -1: there is none, which no_state() tells. The grid of processors becomes that
+/// of the state, unless the script has one or there are others. Collective.
+dembark::restart::State find_state(const std::string& base, LAMMPS_NS::Comm& comm, MPI_Comm world);
+std::string no_state(const std::string& base);
+
+}  // namespace dembark_family
+
+#endif

@@ -1,0 +1,108 @@
+// The bases of the fixes that LIGGGHTS, a fork of LAMMPS, and LAMMPS both have. The files of this folder are compiled with the headers of
+// either engine; what differs is in the engine's engine_fix.h, or left to the classes in the engine's own folder.
+#ifndef DEMBARK_SHARED_FIX_H
+#define DEMBARK_SHARED_FIX_H
+
+#include <cstddef>
+#include <cstdio>
+#include <exception>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "dembark/contact.hpp"
+#include "engine_fix.h"
+
+namespace dembark_family {
+
+inline dembark::Vec3<double> vector(const double* v) { return {v[0], v[1], v[2]}; }
+
+DEMBARK_HOT void add(double* to, const dembark::Vec3<double>& v, double scale = 1.0) {
+  to[0] += scale * v.x;
+  to[1] += scale * v.y;
+  to[2] += scale * v.z;
+}
+
+/// Two grains as they are. `separation` (m): that of j's centre to i's; `mass_i`, `mass_j` (kg): infinite of what forces do not move.
+inline dembark::ContactBodies grain_pair(const LAMMPS_NS::Atom& atom, int i, int j, const dembark::Vec3<double>& separation, double mass_i,
+                                         double mass_j) {
+  dembark::ContactBodies b;
+  b.separation = separation;
+  b.velocity_1 = vector(atom.v[i]);
+  b.velocity_2 = vector(atom.v[j]);
+  b.angular_velocity_1 = vector(atom.omega[i]);
+  b.angular_velocity_2 = vector(atom.omega[j]);
+  b.radius_1 = atom.radius[i];
+  b.radius_2 = atom.radius[j];
+  b.mass_1 = mass_i;
+  b.mass_2 = mass_j;
+  return b;
+}
+
+class SharedFix : public dembark_engine::EngineFix {
+ public:
+  using EngineFix::EngineFix;
+
+ protected:
+  static bool begins_with(const std::string& text, const char* with) { return text.rfind(with, 0) == 0; }
+  static bool is(const Fix& fix, const char* style) { return std::string(fix.style) == style; }
+
+  std::vector<Fix*> fixes() const;
+  /// The first of a style, or nullptr.
+  Fix* fix_of_style(const char* style) const;
+  void only_one() const;
+  void only_verlet() const;
+  /// J, kg, m and s are the engine's units, or those of a system like theirs.
+  bool has_coherent_units() const { return force->ftm2v == 1.0 && force->mvv2e == 1.0; }
+
+  /// What `work` returns; what it throws ends the run with its line.
+  template <class Work>
+  auto checked(const Work& work) const -> decltype(work()) {
+    std::string wrong;
+    try {
+      return work();
+    } catch (const std::exception& e) {
+      wrong = e.what();
+    }
+    fail(wrong);
+  }
+
+  /// This fix's part of a restart file, which the first rank writes.
+  static void write_part(FILE* file, const std::vector<std::pair<const void*, std::size_t>>& pieces);
+  /// Of an atom, behind what other fixes have there; the first number is how many there are.
+  const double* restart_row(int i, int nth) const;
+};
+
+/// A fix that asks which grains follow their forces, and what gravity does to them.
+class GrainFix : public SharedFix {
+ public:
+  using SharedFix::SharedFix;
+
+ protected:
+  struct Gravity {
+    int group;  // its bit
+    std::function<dembark::Vec3<double>()> acceleration;
+  };
+
+  /// `does`: what this fix does with single grains, for messages.
+  void find_movers(const std::string& does);
+  void want_movers() const;
+  bool follows_forces(int i) const { return (atom->mask[i] & moving_) && !(atom->mask[i] & frozen_); }
+  /// Moment of inertia over m r^2 of a grain that follows its forces; 0 if it does not turn.
+  double inertia(int i) const {
+    for (const auto& [group, its] : movers_)
+      if (atom->mask[i] & group) return its;
+    return 0.0;
+  }
+
+  std::vector<Gravity> gravities_;
+
+ private:
+  int moving_ = 0, frozen_ = 0;                 // bits of groups
+  std::vector<std::pair<int, double>> movers_;  // bits of groups, and their moments of inertia over m r^2
+};
+
+}  // namespace dembark_family
+
+#endif
