@@ -62,7 +62,7 @@ def _words(p: Parameters, point: Sequence[float], window: list[Word]) -> list[Wo
     elif p.motion == "rocking":
         words += [*axis, "angle", p.motion_angle, *wave]
     elif p.motion == "rotation":
-        words += [*axis, "rate", p.motion_rate, *window]
+        words += [*axis, "rate", p.motion_rate, "acceleration", p.motion_spin_up, *window]
     elif p.motion == "uniform":
         words += ["velocity", *_along(p.motion_direction, p.motion_speed), *push, *window]
     elif p.motion == "jolts":

@@ -9,7 +9,7 @@ from dembark.postproc.instruments.drive import PARTS, Drive, phases, read, stick
 from dembark.postproc.instruments.growth import Growth, ordered
 from dembark.postproc.instruments.momentum import imbalance
 from dembark.postproc.instruments.phases import acceleration
-from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas, Value, exact, over_replicas
+from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, over_replicas, profile
 from dembark.postproc.studies import measured
 
 # Up to this coefficient of restitution the bed counts as one that sticks.
@@ -54,15 +54,30 @@ def measure(replicas: Replicas) -> Measurement:
     return Measurement(values, [*transients(runs), phases(runs, block)])
 
 
+def stiffness(points: Points, moduli: Array) -> list[Curve]:
+    """Power and time in flight over Young's modulus (Pa), beside those of a block that sticks."""
+    block = sticking_block(acceleration(points[0]["parameters"]))
+
+    def curve(quantity: str, title: str, axis: str) -> Curve:
+        found = [measured(point, quantity) for point in points]
+        values, halves = (np.array([getattr(one, part) for one in found]) for part in ("value", "half"))
+        return profile(quantity, title, "log₁₀ of Young's modulus (Pa)", axis, np.log10(moduli), [values], half=halves,
+                       reference=np.full(len(points), getattr(block, quantity)) if block else None, reference_label="sticking block")
+
+    return [curve("power", "Power of the drive", "P / (M g V)"), curve("flight", "Share of the time in flight", "share")]
+
+
 def study(name: str, points: Points, along: str) -> Measurement:
-    """How the gap between both powers grows with the step; how the rise and the kinetic energy of a bed shaken hard grow with the speed of
-    the plate, at one frequency."""
+    """How the gap between both powers grows with the step; what a bed that springs takes; how the rise and the kinetic energy of a
+    bed shaken hard grow with the speed of the plate, at one frequency."""
     points, place = ordered(points, along)
     if name == "step":
         gaps = Growth(place, np.array([abs(measured(point, "power_gap").value) for point in points]), np.zeros(len(points)))
         told = ", ".join(f"{gap:.2e} at {step:g}" for step, gap in zip(place, gaps.values, strict=True))
         return Measurement({"power_gap_order": Value(gaps.exponent, exact(2.0), detail=f"gaps {told} of the Rayleigh time")},
                            [gaps.convergence("power_gap", "Gap between both powers", "time step over the Rayleigh time", 2.0)])
+    if name == "stiffness":
+        return Measurement({}, stiffness(points, place))
     dimensions = int(points[0]["parameters"]["dimensions"])
     speeds = np.array([measured(point, "speed").value for point in points])
     rise, energy = (Growth.of(points, quantity, speeds) for quantity in ("rise", "kinetic_energy"))

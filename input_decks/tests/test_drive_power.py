@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
+from scipy.optimize import brentq
 
 from dembark.common.errors import DembarkError
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
@@ -83,6 +84,40 @@ def test_a_block_leaves_above_g_and_flies_for_a_whole_period_at_most() -> None:
     assert high and high.flight == pytest.approx(1.0, abs=1e-4)
 
 
+def springing(acceleration: float, restitution: float, periods: int = 150) -> float:
+    """P / (M g V) of a block on a plate sin(t) that leaves it with `restitution` of the speed at which it landed, from event to event."""
+    g, time, leaves, lost, begin = 1.0 / acceleration, math.asin(1.0 / acceleration), 0.0, 0.0, 2.0 * math.pi * 30
+    while time < 2.0 * math.pi * periods:
+        speed, height = math.cos(time) + leaves, math.sin(time)
+
+        def above(past: Any, speed: float = speed, height: float = height, time: float = time) -> Any:
+            return height + speed * past - 0.5 * g * past**2 - np.sin(time + past)
+
+        # What springs up with a small speed is back soon; what is left lying leaves with the cube of the time.
+        fine = np.geomspace(0.1 * leaves if leaves else 1e-3, 20.0, 1000)
+        landed = int(np.argmax(above(fine) < 0.0))
+        past = brentq(above, fine[landed - 1], fine[landed])
+        time += past
+        meets = math.cos(time) - (speed - g * past)
+        lost += 0.5 * (1.0 - restitution**2) * meets**2 if time > begin else 0.0
+        leaves, phase = restitution * meets, time % (2.0 * math.pi)
+        if leaves < 1e-3:
+            leaves, start = 0.0, math.asin(g)
+            time += start - phase if phase < start else 0.0 if phase < math.pi - start else 2.0 * math.pi + start - phase
+    return lost * acceleration / (time - begin)
+
+
+@pytest.mark.parametrize("acceleration", [1.5, 2.0, 2.5, 3.0])
+def test_a_block_that_hardly_springs_is_one_that_sticks(acceleration: float) -> None:
+    block = sticking_block(acceleration)
+    assert block and springing(acceleration, 0.005) == pytest.approx(block.power, rel=0.01)
+
+
+def test_at_3_g_a_block_that_springs_a_little_takes_less_and_at_weaker_shaking_it_does_not() -> None:
+    assert springing(1.5, 0.2) == pytest.approx(0.180, rel=0.02) and springing(2.0, 0.2) == pytest.approx(0.584, rel=0.02)
+    assert springing(3.0, 0.1) == pytest.approx(0.86, abs=0.03) and springing(3.0, 0.2) == pytest.approx(0.69, abs=0.05)
+
+
 @pytest.mark.parametrize("acceleration", [1.5, 2.0, 3.0])
 def test_a_known_motion_is_measured_as_it_is(acceleration: float) -> None:
     found = verdicts(real=acceleration)
@@ -139,6 +174,16 @@ def test_the_exponent_of_the_rise(dimensions: int, power: float, verdict: str) -
     found = rise_study(dimensions, power)
     assert found[f"rise_exponent_{dimensions}d"]["value"] == pytest.approx(power)
     assert found[f"rise_exponent_{dimensions}d"]["verdict"] == verdict and found["energy_exponent"]["value"] == pytest.approx(2.0)
+
+
+def test_the_stiffness_is_shown_beside_the_block() -> None:
+    points = [{"parameters": defaults("drive_power", youngs_modulus=modulus, motion_gamma=3.0),
+               "quantities": [{"name": name, "value": value, "interval": [value - 0.1, value + 0.1]}
+                              for name, value in (("power", 0.7), ("flight", 0.8))]}
+              for modulus in (1.4e8, 1.4e7)]
+    power, flight = drive.study("stiffness", points, "youngs_modulus").profiles
+    assert power["place"] == pytest.approx([7.146, 8.146], abs=1e-3) and power["value"] == pytest.approx([0.7, 0.7])
+    assert power["reference"] == pytest.approx([0.9995] * 2, abs=1e-4) and flight["reference"] == pytest.approx([0.950] * 2, abs=1e-3)
 
 
 SMALL = {"grain_count": 32, "youngs_modulus": 5e6, "motion_frequency": 25.0, "motion_ramp": 1, "settle_time": 0.06, "periods": 8}

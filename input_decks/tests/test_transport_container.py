@@ -13,6 +13,7 @@ from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.postproc.instruments.container import ring_period, slid, tops
 from dembark.postproc.instruments.momentum import PARTS
 from dembark.postproc.tests.scenes import frame_of
+from dembark.validation.case.folders import find
 
 container = module("transport_container")
 D, G, DT, EVERY, ROWS, FIRST = 0.005, 9.81, 1e-4, 10, 600, 100
@@ -76,23 +77,26 @@ def verdicts(**changes: Any) -> Verdicts:
     return judged("transport_container", container.measure([run(**changes)]))
 
 
-def study(name: str, along: str, places: list[float], quantities: dict[str, list[float]]) -> Verdicts:
+def study(name: str, along: str, changes: list[dict[str, Any]], quantities: dict[str, list[float]]) -> Verdicts:
     """What the study makes of quantities known within 1 %."""
-    given = [{"parameters": defaults("transport_container") | {along: place}, "quantities": [
+    given = [{"parameters": defaults("transport_container") | changed, "quantities": [
         {"name": key, "value": values[k], "interval": [0.99 * values[k], 1.01 * values[k]], "basis": ""}
-        for key, values in quantities.items()]} for k, place in enumerate(places)]
+        for key, values in quantities.items()]} for k, changed in enumerate(changes)]
     return judged("transport_container", container.study(name, given, along))
 
 
 def pulses(slow: float) -> Verdicts:
     """Pulses of 5 ms to 1 s of a bed that rings with 1 √(d/g), the longest of which takes `slow` times the rigid force."""
-    return study("pulse", "motion_duration", [0.005, 0.02, 0.08, 1.0],
+    return study("pulse", "motion_duration", [{"motion_duration": one} for one in (0.005, 0.02, 0.08, 1.0)],
                  {"amplification": [0.4, 1.3, 1.5, slow], "ring_period": [1.0, 1.0, 1.0, 1.0]})
 
 
 def onset(ramp: float) -> Verdicts:
-    """A bed that slides at the slope `ramp` when it is accelerated, and at 0.4 when it is tilted."""
-    return study("onset", "motion_rate", [0.0, 0.275, 0.55], {"slide_slope": [ramp, 0.4, 0.4]})
+    """What the variants of the study make of a bed that slides at the slope `ramp` when it is accelerated, and at 0.4 when it is tilted."""
+    case = find("transport_container")
+    variants = case.studies["onset"].variants
+    return study("onset", case.studies["onset"].along, [dict(case.variants[one]) for one in variants],
+                 {"slide_slope": [ramp if one == "ramp" else 0.4 for one in variants]})
 
 
 def test_known_forces_are_measured_as_they_are() -> None:

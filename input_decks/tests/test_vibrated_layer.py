@@ -82,7 +82,7 @@ def sweep(critical: float, **changes: Any) -> dict[str, Any]:
 def test_the_onset_is_where_the_power_comes_from_zero() -> None:
     found = sweep(2.5)
     assert found["onset"]["value"] == pytest.approx(2.5, abs=0.05) and found["onset"]["reference"] == 2.5
-    assert "onset_down" not in found and "wavelength" not in found
+    assert "onset_back" not in found and "wavelength" not in found
 
 
 def test_a_sweep_without_waves_is_open() -> None:
@@ -90,9 +90,10 @@ def test_a_sweep_without_waves_is_open() -> None:
     assert found["onset"]["verdict"] == "info" and "too few" in found["onset"]["reason"]
 
 
-def test_up_and_down_have_onsets_of_their_own() -> None:
-    found = sweep(2.45, descent="yes", periods=8)
-    assert found["onset_down"]["value"] == pytest.approx(2.45, abs=0.1)
+@pytest.mark.parametrize("ends", [(1.8, 3.2), (3.2, 1.8)])
+def test_both_ways_have_onsets_of_their_own(ends: tuple[float, float]) -> None:
+    found = sweep(2.45, back="yes", periods=8, motion_gamma=ends[0], last_gamma=ends[1])
+    assert found["onset"]["value"] == pytest.approx(2.45, abs=0.1) and found["onset_back"]["value"] == pytest.approx(2.45, abs=0.1)
 
 
 @pytest.mark.parametrize("change", [{"spins": "blocked"}, {"floor": "strips"}, {"bridge_volume": 8e-11}, {"grain_friction": 0.0}])
@@ -149,7 +150,7 @@ def test_layers_without_an_onset_are_left_out() -> None:
 
 
 def test_the_levels_of_a_run() -> None:
-    p = defaults("vibrated_layer", motion_gamma=2.0, last_gamma=3.0, levels=3, descent="yes", motion_ramp=9.5, level_ramp=4, run_in=6,
+    p = defaults("vibrated_layer", motion_gamma=2.0, last_gamma=3.0, levels=3, back="yes", motion_ramp=9.5, level_ramp=4, run_in=6,
                  periods=16)
     assert [(one.gamma, one.start) for one in levels(p)] == [(2.0, 16), (2.5, 42), (3.0, 68), (2.5, 94), (2.0, 120)]
 

@@ -151,8 +151,8 @@ def study(name: str, results: Points, along: str) -> Measurement:
         ratio = values / tilted
         half = float(np.hypot(halves[0], np.hypot(*halves[1:]) / 2.0)) / tilted if np.isfinite(halves).all() else math.inf
         return Measurement({"sliding_onset": Value(Estimate(float(ratio[0]), half, "the three variants"), exact(1.0))}, [
-            profile("onset", "Onset of sliding", "rate of tilting (rad/s); 0: ramp", "slope of effective gravity", place, [values],
-                    half=halves)])
+            profile("onset", "Onset of sliding", "angular acceleration of tilting (rad/s²); 0: ramp", "slope of effective gravity", place,
+                    [values], half=halves)])
     given = results[-1]["parameters"]
     unit = math.sqrt(given["grain_diameter"] / given["gravity"])
     period = unit * measured(results[0], "ring_period").value

@@ -76,13 +76,13 @@ def of_level(runs: list[Layer], gamma: float, p: Numbers) -> dict[str, Value]:
 
 
 def of_sweep(runs: list[Layer], p: Numbers) -> dict[str, Value]:
-    """Where the waves begin, and where they end when there is a descent."""
+    """From where on there are waves, and on the way back when there is one."""
     begin = over_replicas([one.onset() for one in runs])
     # A sweep that shows no onset decides nothing.
     unknown = "" if math.isfinite(begin.value) else begin.basis
     values = {"onset": Value(begin, exact(ONSET) if plain(p) else None, reason=unknown)}
-    if p["descent"] == "yes":
-        values["onset_down"] = Value(over_replicas([one.onset(down=True) for one in runs]))
+    if p["back"] == "yes":
+        values["onset_back"] = Value(over_replicas([one.onset(back=True) for one in runs]))
     return values
 
 
@@ -108,12 +108,12 @@ def crests(run: Layer) -> list[Curve]:
 
 
 def powers(runs: list[Layer]) -> Curve:
-    """Power of the waves over the acceleration, of the levels upwards."""
-    up = slice(0, runs[0].rising)
-    half = np.array([mean_power(one).half for one in runs[0].waves[up]]) if len(runs) == 1 else None
-    place = np.array([one.gamma for one in runs[0].levels[up]])
+    """Power of the waves over the acceleration, of the levels from the first to the last."""
+    outward = slice(0, runs[0].outward)
+    half = np.array([mean_power(one).half for one in runs[0].waves[outward]]) if len(runs) == 1 else None
+    place = np.array([one.gamma for one in runs[0].levels[outward]])
     return profile("power_over_acceleration", "Power of the waves at f/2", "Γ", "power (d²)", place,
-                   [np.array([mean_power(waves).value for waves in one.waves[up]]) for one in runs], half=half)
+                   [np.array([mean_power(waves).value for waves in one.waves[outward]]) for one in runs], half=half)
 
 
 def diagram(run: Layer) -> xr.Dataset:

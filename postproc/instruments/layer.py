@@ -27,10 +27,10 @@ class Level:
 
 
 def levels(p: Numbers) -> list[Level]:
-    """The levels of a run with the parameters `p`: from motion_gamma to last_gamma, and back where there is a descent."""
+    """The levels of a run with the parameters `p`: from motion_gamma to last_gamma, and back where that is asked for."""
     first = acceleration(p)
-    rising = [first] if p["levels"] == 1 else list(np.linspace(first, p["last_gamma"], p["levels"]))
-    every = rising + (rising[-2::-1] if p["descent"] == "yes" else [])
+    there = [first] if p["levels"] == 1 else list(np.linspace(first, p["last_gamma"], p["levels"]))
+    every = there + (there[-2::-1] if p["back"] == "yes" else [])
     length = p["level_ramp"] + p["run_in"] + p["periods"]
     return [Level(float(one), math.ceil(p["motion_ramp"]) + p["run_in"] + k * length) for k, one in enumerate(every)]
 
@@ -43,18 +43,19 @@ def unexplained(rows: Mapping[str, Array]) -> float:
 
 @dataclass(frozen=True)
 class Layer:
-    """One run: `levels` and the `waves` of each, `rows`: the columns of time.csv, `diameter` and `height` of the layer at rest in m."""
+    """One run: `levels` and the `waves` of each, `rows`: the columns of time.csv, `diameter` and `height` of the layer at rest in m;
+    `outward`: number of levels before those of the way back."""
 
     levels: Sequence[Level]
     waves: Sequence[Waves]
     rows: Mapping[str, Array]
     diameter: float
     height: float
-    rising: int
+    outward: int
 
-    def onset(self, down: bool = False) -> Estimate:
-        """Acceleration (g) at which waves begin, of the levels up to the highest, or from it on."""
-        chosen = slice(self.rising - 1, None) if down else slice(0, self.rising)
+    def onset(self, back: bool = False) -> Estimate:
+        """Acceleration (g) from which on there are waves, of the levels from the first to the last, or of these and the way back."""
+        chosen = slice(self.outward - 1, None) if back else slice(0, self.outward)
         drive = np.array([one.gamma for one in self.levels[chosen]])
         power = [mean_power(one) for one in self.waves[chosen]]
         seen = [one.value > (SEEN - 1.0) * float(waves.noise().sum()) for one, waves in zip(power, self.waves[chosen], strict=True)]
