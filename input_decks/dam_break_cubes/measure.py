@@ -2,12 +2,12 @@
 
 import csv
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from dembark.postproc.history import reached
-from dembark.postproc.instruments.water import growth
 from dembark.postproc.measurement import Array, Measurement, Replica, Replicas, Value, exact, profile
 from dembark.postproc.replica import once
 
@@ -67,7 +67,7 @@ def water(run: Replica) -> dict[str, float]:
 def filled(places: Array, centres: list[Array], half: float, dx: float) -> float:
     """Volume of particles between neighbours of the lowest row, over that of the gaps, where they are side by side."""
     volume = water_there = 0.0
-    for left, right in zip(centres[:-1], centres[1:], strict=True):
+    for left, right in pairwise(centres):
         low = np.array([max(left[0], right[0]) - half, left[1] + half, 0.0])
         high = np.array([min(left[0], right[0]) + half, right[1] - half, NEAR_FLOOR])
         if (high > low).all():
@@ -111,11 +111,12 @@ def measure(replicas: Replicas) -> Measurement:
               "rise": Value(exact(float(np.max(z[time <= 1.0]) - start)), exact(0.0)),
               "x_end": Value(exact(float(np.interp(1.5, time, x)))),
               "inside": Value(exact(seen["inside"]), exact(0.0)), "leaked": Value(exact(seen["leaked"]), exact(0.0)),
-              "floor_wetted": Value(exact(seen["floor_wetted"]), exact(1.0), reason="" if seen["floor_wetted"] >= 0.0 else "the run ends before 1.5 s")}
+              "floor_wetted": Value(exact(seen["floor_wetted"]), exact(1.0),
+                                    reason="" if seen["floor_wetted"] >= 0.0 else "the run ends before 1.5 s")}
     # What can be turned over: the column that comes to lie on the floor.
     energy = 0.5 * p["fluid_density"] * p["gravity"] * p["column_length"] * p["flume_width"] * p["column_height"] ** 2
-    values["energy_growth"] = Value(exact(growth({**rows, "kinetic_energy": np.sum([rows[name] for name in STORED if name in rows], axis=0),
-                                                  "potential_energy": 0.0 * time, "compression_energy": 0.0 * time}) / energy), exact(0.0))
+    stored = np.sum([rows[name] for name in STORED], axis=0)
+    values["energy_growth"] = Value(exact(float(np.max(stored - np.minimum.accumulate(stored))) / energy), exact(0.0))
     if "overlap" in rows:
         values["overlap"] = Value(exact(float(rows["overlap"].max() / p["rounding"])))
     curves = []

@@ -1,4 +1,4 @@
-"""Dam break against cubes: a column that ends at x = 0, a flume along x with its middle at y = 0, and cubes that stand on its floor, z = 0."""
+"""Dam break against cubes: a column that ends at x = 0, a flume around y = 0, and cubes that stand on its floor, z = 0."""
 
 import math
 
@@ -9,7 +9,8 @@ def cubes(p: Parameters) -> list[tuple[float, float, float]]:
     """Centres (m), the top one last."""
     x, half = p.distance + 0.5 * p.edge, 0.5 * p.edge
     rows = {"one": (1,), "three": (1, 1, 1), "six": (3, 2, 1)}[p.arrangement]
-    return [(x, (k - 0.5 * (count - 1)) * (p.edge + p.gap), half + layer * p.edge) for layer, count in enumerate(rows) for k in range(count)]
+    pitch = p.edge + p.gap
+    return [(x, (k - 0.5 * (count - 1)) * pitch, half + layer * p.edge) for layer, count in enumerate(rows) for k in range(count)]
 
 
 def setup(p: Parameters) -> Setup:

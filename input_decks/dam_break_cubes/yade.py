@@ -7,8 +7,8 @@ from yade import dembark
 
 p = dembark.parameters()
 side = 0.5 * p.flume_width
-# Cubes touch by balls in their corners and along their edges, which meet the faces of others as boxes. Springs and dashpots of two materials
-# act in series. The many balls along edges are for edges that cross: with a third of the stiffness of a corner, and hardly damped.
+# Cubes touch by balls in their corners and along their edges, which meet the faces of others as boxes. Springs and dashpots of two
+# materials act in series. The many balls along edges are for edges that cross: with a third of the stiffness of a corner, hardly damped.
 r, inner = p.rounding, 0.5 * p.edge - p.rounding
 SHARE, DAMPED, TANGENTIAL = 1.0 / 3.0, 0.05, 0.82
 
@@ -42,7 +42,7 @@ ends = (-inner, inner)
 corners = [(a, b, d) for a in ends for b in ends for d in ends]
 along = [inner * (0.2 * n - 1.0) for n in range(1, 10)]
 rims = [point for t in along for a in ends for b in ends for point in ((t, a, b), (a, t, b), (a, b, t))]
-centres = list(zip(p.cube_x, p.cube_y, p.cube_z))
+centres = list(zip(p.cube_x, p.cube_y, p.cube_z, strict=True))
 cubes = {}
 for number, centre in enumerate(centres, 1):
     balls = [sphere(Vector3(*centre) + Vector3(*point), r, material=cube_material) for point in corners]
@@ -65,7 +65,7 @@ if p.coupling == "potential":
 column = dembark.lattice((-p.column_length, -side, 0), (0, side, p.column_height), p.spacing)
 water.addParticles(column, pressures=[p.fluid_density * p.gravity * (p.column_height - z) for _, _, z in column])
 water.addWall(dembark.tank_walls((-p.column_length, -side, 0), (p.downstream_length, side, p.flume_height), p.spacing))
-for cube, centre in zip(cubes.values(), centres):
+for cube, centre in zip(cubes.values(), centres, strict=True):
     if p.coupling == "potential":
         half = 0.5 * p.edge
         water.addBody(cube, dembark.lattice([c - half for c in centre], [c + half for c in centre], p.spacing))

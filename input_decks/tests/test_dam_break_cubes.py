@@ -1,4 +1,4 @@
-"""dam_break_cubes: trajectories of the experiment pass, wrong ones fail; the cubes stand where they should; a tiny flume in both engines."""
+"""dam_break_cubes: trajectories of the experiment pass, wrong ones fail; a tiny flume with cubes in both engines."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from dembark.postproc.tests.scenes import frame_of
 
 dam = module("dam_break_cubes")
 DT, STRIDE, SPACING = 1e-3, 100, 0.025
-TINY = {"spacing": 0.05, "column_length": 0.4, "column_height": 0.3, "distance": 0.3, "downstream_length": 0.8, "flume_height": 0.5, "flume_width": 0.25,
-        "run_time": 0.3, "frames": 3, "rows": 70}
+TINY = {"spacing": 0.05, "column_length": 0.4, "column_height": 0.3, "distance": 0.3, "downstream_length": 0.8, "flume_height": 0.5,
+        "flume_width": 0.25, "run_time": 0.3, "frames": 3, "rows": 70}
 
 
 def run(cubes: str, carried: float = 0.0, late: float = 0.0, jumps: float = 0.0, shut: bool = False, dry: bool = False, within: int = 0,
         leaked: int = 0, made: float = 0.0) -> Any:
-    """The top cube on the experiment's way, `carried` (m) too far at the end, `late` (s) in falling, `jumps` (m) at 0.9 s; water on the floor
-    and in the gaps unless it is `dry` or the gaps are `shut`; particles `within` a cube, `leaked` ones; the part `made` of the energy."""
+    """The top cube on the experiment's way, `carried` (m) too far after a second, `late` (s) in falling, `jumps` (m) at 0.9 s; water on
+    the floor and in the gaps unless it is `dry` or the gaps are `shut`; particles `within` a cube or `leaked`; energy `made` of nothing."""
     p = defaults("dam_break_cubes", arrangement=cubes, spacing=SPACING)
     count, time = {"three": 3, "six": 6}[cubes], np.arange(0.0, 1.6001, 0.01)
     rows: dict[str, Any] = {"step": np.round(time / DT), "time": time, "overlap": 0.0 * time}

@@ -89,8 +89,8 @@ void FixSphContact::read(const std::vector<std::string> &words) {
   if (!stiff) dembark_liggghts::refuse("stiffness (N/m) is missing: of one corner");
   if (names_.empty()) dembark_liggghts::refuse("there is no box; name fixes sph/body with their edges");
   if (!(2.0 * contacts_.radius < shortest))
-    dembark_liggghts::refuse("rounding must be less than half of the shortest edge, " + text(shortest) + " m, not " + text(contacts_.radius) +
-                             " m");
+    dembark_liggghts::refuse("rounding must be less than half of the shortest edge, " + text(shortest) + " m, not " +
+                             text(contacts_.radius) + " m");
 }
 
 int FixSphContact::setmask() { return POST_FORCE; }

@@ -36,7 +36,7 @@ class FixSphContact : public Fix {
   void push(bool remember);
 
   dembark::sph::BoxContacts contacts_;
-  std::vector<std::string> names_;             // of the fixes of the boxes
+  std::vector<std::string> names_;  // of the fixes of the boxes
   std::vector<class FixSphBody *> fixes_;
   std::vector<const dembark::sph::Body *> bodies_;
 };

@@ -60,9 +60,9 @@ struct Push {
 
 class BoxContacts {
  public:
-  double stiffness = 1e5;  ///< k of one point, N/m
-  double radius = 0.004;   ///< r, m, less than half of the shortest edge
-  Touch between{};         ///< of two boxes
+  double stiffness = 1e5;    ///< k of one point, N/m
+  double radius = 0.004;     ///< r, m, less than half of the shortest edge
+  Touch between{};           ///< of two boxes
   std::vector<Vector> half;  ///< m, half of the edges of each box, along the axes of its body's frame
   std::vector<ContactPlane> planes;
 
@@ -159,7 +159,9 @@ class BoxContacts {
     const int along = k / 4;
     const double u = k & 1 ? 1.0 : -1.0, v = k & 2 ? 1.0 : -1.0;
     const Body& b = *(*boxes_)[a];
-    const Vector middle = along == 0 ? Vector{0.0, u * h.y, v * h.z} : along == 1 ? Vector{u * h.x, 0.0, v * h.z} : Vector{u * h.x, v * h.y, 0.0};
+    const Vector middle = along == 0   ? Vector{0.0, u * h.y, v * h.z}
+                          : along == 1 ? Vector{u * h.x, 0.0, v * h.z}
+                                       : Vector{u * h.x, v * h.y, 0.0};
     const Vector way = along == 0 ? Vector{h.x, 0.0, 0.0} : along == 1 ? Vector{0.0, h.y, 0.0} : Vector{0.0, 0.0, h.z};
     return {b.position + b.orientation(middle), b.orientation(way)};
   }
@@ -186,7 +188,8 @@ class BoxContacts {
     // t and s grow by these with a place of a.
     const Vector of_t = (1.0 / all) * (pq * q - qq * p), of_s = (1.0 / all) * (pp * q - pq * p);
     const auto slope = [this](double at, double u, double length) { return at < 1.0 ? (u > 0.0 ? -1.0 : 1.0) * length / radius : 0.0; };
-    const Vector by = (-0.5 * stiffness * overlap * overlap * turned) * (at_q * slope(at_p, t, lp) * of_t + at_p * slope(at_q, s, lq) * of_s);
+    const Vector by =
+        (-0.5 * stiffness * overlap * overlap * turned) * (at_q * slope(at_p, t, lp) * of_t + at_p * slope(at_q, s, lq) * of_s);
     add(pushes_[a], *(*boxes_)[a], point, by);
     add(pushes_[b], *(*boxes_)[b], point, -1.0 * by);
   }

@@ -49,7 +49,16 @@ inline double boundary_density(const Settings& s, double rho, double rate, doubl
 struct LoopNumbers {
   PairCoefficients pair{};
   double at_spacing = 1.0;  ///< W(dx)
+  double alone = 0.0;       ///< kg/m^3, m W(0): density of a particle without neighbours
 };
+
+/// Density of a fluid particle after dt (s) at the rate (kg/m^3/s). Without tension nothing holds what flies apart, and errors of steps and
+/// diffusion would carry the density of spray below zero, where viscosity, which divides by it, is without bounds and of any sign. A
+/// particle is never thinner than alone; without pressure this costs no energy.
+inline double fluid_density(const Settings& s, const LoopNumbers& numbers, double rho, double rate, double dt) {
+  const double next = rho + dt * rate;
+  return s.state.tension ? next : std::max(next, numbers.alone);
+}
 
 /// Calls work(kernel) with the kernel of the settings.
 template <class Work>
@@ -62,7 +71,7 @@ inline LoopNumbers loop_numbers(const Settings& s) {
   return with_kernel(s, [&](const auto& kernel) {
     const double moment = lattice_moment(kernel, s.dimension, s.h(), s.spacing);
     return LoopNumbers{PairCoefficients::of(s.mass(), moment, s.h(), s.state.sound_speed, s.state.density, s.alpha, s.delta),
-                       kernel.value(s.spacing)};
+                       kernel.value(s.spacing), s.mass() * kernel.value(0.0)};
   });
 }
 
