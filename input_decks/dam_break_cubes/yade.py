@@ -47,9 +47,13 @@ cubes = {}
 for number, centre in enumerate(centres, 1):
     balls = [sphere(Vector3(*centre) + Vector3(*point), r, material=cube_material) for point in corners]
     balls += [sphere(Vector3(*centre) + Vector3(*point), r, material=rim_material) for point in rims]
-    cube, _ = O.bodies.appendClumped([box(centre, [0.5 * p.edge] * 3, material=cube_material), *balls])
+    core = box(centre, [0.5 * p.edge] * 3, material=cube_material)
+    # A clump takes the axes of its members' inertia. Those of a cube could be any: one that differs along x, y and z keeps them.
+    core.state.mass, core.state.inertia = 1e3, Vector3(10, 20, 30)
+    cube, _ = O.bodies.appendClumped([core, *balls])
     body = O.bodies[cube]
-    body.state.pos, body.state.ori = Vector3(*centre), Quaternion.Identity
+    if body.state.ori.toAngleAxis()[0] > 1e-9 or (body.state.pos - Vector3(*centre)).norm() > 1e-9:
+        dembark.fail(f"cube {number} is turned or out of place when it is made: {body.state.pos}, {body.state.ori}")
     body.state.mass, body.state.inertia = p.cube_mass, Vector3(1, 1, 1) * p.cube_inertia
     body.aspherical = False
     cubes[f"cube{number}"] = cube

@@ -14,7 +14,7 @@ from dembark.postproc.tests.scenes import frame_of
 dam = module("dam_break_cubes")
 DT, STRIDE, SPACING = 1e-3, 100, 0.025
 TINY = {"spacing": 0.05, "column_length": 0.4, "column_height": 0.3, "distance": 0.3, "downstream_length": 0.8, "flume_height": 0.5,
-        "flume_width": 0.25, "run_time": 0.3, "frames": 3, "rows": 70}
+        "flume_width": 0.25, "run_time": 0.3, "frames": 3, "rows": 70, "stiffness": 5e4}
 
 
 def run(cubes: str, carried: float = 0.0, late: float = 0.0, jumps: float = 0.0, shut: bool = False, dry: bool = False, within: int = 0,

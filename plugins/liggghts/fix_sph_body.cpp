@@ -191,7 +191,9 @@ void FixSphBody::initial_integrate(int) {
   body.kick(0.5 * update->dt);
   state_.work += 0.5 * update->dt * power();
   body.drift(update->dt);
-  place_particles();
+  // A wall at rest stays where it is.
+  const bool still = !body.free && norm(body.velocity) == 0.0 && norm(body.spin) == 0.0;
+  if (!still) place_particles();
 }
 
 void FixSphBody::final_integrate() {
