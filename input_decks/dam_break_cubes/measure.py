@@ -139,6 +139,7 @@ def measure(replicas: Replicas) -> Measurement:
         seen_there = times <= time[-1]
         curves.append(profile("z", "Height of the top cube", "t / s", "z / m", times[seen_there], [np.interp(times[seen_there], time, z)],
                               reference=places[seen_there], reference_label="Canelas et al. (2016)"))
-    if cubes == "six":
+    # Into narrower gaps no particle gets.
+    if cubes == "six" and p["gap"] >= p["spacing"]:
         values["gap_filled"] = Value(exact(seen["gap_filled"]), exact(1.0))
     return Measurement(values, curves)
