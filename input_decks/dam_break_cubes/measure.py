@@ -109,7 +109,8 @@ def measure(replicas: Replicas) -> Measurement:
     came = arrival(run)
     values = {"arrival": Value(exact(came), reason="" if came > 0.0 else "the front did not come"),
               "rise": Value(exact(float(np.max(z[time <= 1.0]) - start)), exact(0.0)),
-              "x_end": Value(exact(float(np.interp(1.5, time, x)))),
+              "x_end": Value(exact(float(np.interp(1.5, time, x, right=np.nan))),
+                             reason="" if time[-1] >= 1.5 else "the run ends before 1.5 s"),
               "inside": Value(exact(seen["inside"]), exact(0.0)), "leaked": Value(exact(seen["leaked"]), exact(0.0)),
               "floor_wetted": Value(exact(seen["floor_wetted"]), exact(1.0),
                                     reason="" if seen["floor_wetted"] >= 0.0 else "the run ends before 1.5 s")}
@@ -135,7 +136,9 @@ def measure(replicas: Replicas) -> Measurement:
         # Of six the ends of the curve stand for the layers.
         middle = 0.5 * (places[0] + places[-1]) if cubes == "six" else 0.5 * (start + 0.5 * p["edge"])
         due = reached(times, -places, -middle)
-        values["half_fallen"] = Value(exact(fallen), exact(due), reason="" if fallen > 0.0 else "it stands")
+        if np.isnan(fallen) and time[-1] > due + 0.1:
+            fallen = float(time[-1])
+        values["half_fallen"] = Value(exact(fallen), exact(due), reason="" if fallen > 0.0 else "the run ends before")
         seen_there = times <= time[-1]
         curves.append(profile("z", "Height of the top cube", "t / s", "z / m", times[seen_there], [np.interp(times[seen_there], time, z)],
                               reference=places[seen_there], reference_label="Canelas et al. (2016)"))

@@ -70,6 +70,13 @@ def test_the_experiment_itself_passes() -> None:
     assert three["half_fallen"]["value"] == pytest.approx(1.10, abs=0.02)
 
 
+def test_a_cube_that_stands_has_not_fallen_in_time() -> None:
+    one = run("three")
+    one.times()["cube3_z"][:] = 0.375
+    found = judged("dam_break_cubes", dam.measure([one]))["half_fallen"]
+    assert (found["verdict"], found["value"]) == ("fail", pytest.approx(1.6))
+
+
 def test_a_cube_is_known_however_it_is_turned() -> None:
     """A quarter turn about z takes x to y; the frame of the body sees the reverse."""
     quarter = np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
