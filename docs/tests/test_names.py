@@ -157,7 +157,7 @@ def test_readme_names_every_style() -> None:
     styles |= {f"tangential {name}" for name in re.findall(r"^TANGENTIAL_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
     styles |= {f"cohesion {name}" for name in re.findall(r"^COHESION_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
     table = {name for cell in rows(TEXTS["README.md"], "style") for name in re.findall(r"`([^`]+)`", cell)}
-    assert len(styles) == 13 and table == styles
+    assert len(styles) == 14 and table == styles
 
 
 def test_readme_and_pages_name_every_class_of_yade() -> None:

@@ -128,12 +128,17 @@ void FixSphBody::setup_pre_force(int) {
 
 void FixSphBody::begin_forces(const Vector &gravity) {
   gravity_ = gravity;
-  force_ = torque_ = {};
+  force_ = torque_ = load_ = load_torque_ = {};
 }
 
 void FixSphBody::add_force(const Vector &force, const Vector &torque) {
   force_ += force;
   torque_ += torque;
+}
+
+void FixSphBody::add_load(const Vector &force, const Vector &torque) {
+  load_ += force;
+  load_torque_ += torque;
 }
 
 /// Forces on the body from those on its particles, whoever has added them. Fix gravity adds the weight of particles, which is not the
@@ -156,8 +161,8 @@ void FixSphBody::gather_forces() {
   MPI_Allreduce(MPI_IN_PLACE, sums, 12, MPI_DOUBLE, MPI_SUM, world);
   body.force = sums[0];
   body.torque = sums[1];
-  body.load = sums[2] - sums[0];
-  body.load_torque = sums[3] - sums[1];
+  body.load = sums[2] - sums[0] + load_;
+  body.load_torque = sums[3] - sums[1] + load_torque_;
   body.accelerate(gravity_);
 }
 
@@ -174,7 +179,9 @@ void FixSphBody::initial_integrate(int) {
   body.kick(0.5 * update->dt);
   state_.work += 0.5 * update->dt * power();
   body.drift(update->dt);
-  place_particles();
+  // A wall at rest stays where it is.
+  const bool still = !body.free && norm(body.velocity) == 0.0 && norm(body.spin) == 0.0;
+  if (!still) place_particles();
 }
 
 void FixSphBody::final_integrate() {

@@ -40,6 +40,8 @@ class FixSphBody : public dembark_family::SharedFix {
   void begin_forces(const dembark::sph::Vector &gravity);
   /// Of the fluid on particles of this rank: N, and N m about the centre.
   void add_force(const dembark::sph::Vector &force, const dembark::sph::Vector &torque);
+  /// Of something else on the body in this step, which all ranks know and add alike.
+  void add_load(const dembark::sph::Vector &force, const dembark::sph::Vector &torque);
 
  private:
   void read(int narg, char **arg);
@@ -52,7 +54,7 @@ class FixSphBody : public dembark_family::SharedFix {
     double work = 0.0;
   } state_;
   class FixPropertyAtom *arms_ = nullptr;  // of the particles, in the frame of the body
-  dembark::sph::Vector force_{}, torque_{}, gravity_{};
+  dembark::sph::Vector force_{}, torque_{}, load_{}, load_torque_{}, gravity_{};
   bool restarted_ = false, fresh_ = true;  // fresh: the forces of the set-up are not yet those of the body
 };
 

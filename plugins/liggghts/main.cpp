@@ -22,6 +22,7 @@
 #include "fix_nve_sph_coupled.h"
 #include "fix_resume_exact.h"
 #include "fix_sph_body.h"
+#include "fix_sph_contact.h"
 #include "fix_wall_motion.h"
 #include "granular_combinations.h"
 #include "pair_sph_coupled.h"
@@ -70,6 +71,7 @@ int main(int argc, char** argv) {
   fixes["lcp/impact"] = &create_fix<LAMMPS_NS::FixLcpImpact>;
   fixes["nve/sph/coupled"] = &create_fix<LAMMPS_NS::FixNveSphCoupled>;
   fixes["resume/exact"] = &create_fix<LAMMPS_NS::FixResumeExact>;
+  fixes["sph/contact"] = &create_fix<LAMMPS_NS::FixSphContact>;
   fixes["sph/body"] = fixes["sph/wall"] = &create_fix<LAMMPS_NS::FixSphBody>;
   fixes["wall/motion"] = &create_fix<LAMMPS_NS::FixWallMotion>;
   (*lammps->force->pair_map)["sph/coupled"] = [](LAMMPS_NS::LAMMPS* host) -> LAMMPS_NS::Pair* {

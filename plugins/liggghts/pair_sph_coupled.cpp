@@ -243,7 +243,7 @@ void PairSphCoupled::advance(double dt, double **shifts) {
       atom->rho[i] = boundary_density(settings_, atom->rho[i], rate_[i], dt);
     } else if (role_[i] == SphRole::fluid) {
       atom->drho[i] = rate_[i];
-      atom->rho[i] += dt * rate_[i];
+      atom->rho[i] = fluid_density(settings_, numbers_, atom->rho[i], rate_[i], dt);
       atom->p[i] = settings_.state.pressure(atom->rho[i]);
       if (!shifting) continue;
       const Quad &q = shift_sum_[i];

@@ -209,12 +209,13 @@ double force_across(const LoopArguments& in) {
     for (int k = in.start[row]; k < in.start[row + 1]; k += 4) {
       const Four<P> other = gather<P>(in.others, in.neighbour + k);
       const Vec3<P> d = x - other.x;
-      const P squared = dot(d, d), push = P(in.pair.mass) * kernel.slope(sqrt(squared));
+      const P squared = dot(d, d), distance = sqrt(squared), push = P(in.pair.mass) * kernel.slope(distance);
+      const P guard = guard_stress(in.pair, distance);
       P viscous(0.0);
       if constexpr (!Slip) viscous = artificial_viscosity(in.pair, squared, dot(v - other.v, d), rho, other.b);
-      const P factor = acceleration_factor(push, pressure + other.a + viscous);
+      const P factor = acceleration_factor(push, pressure + other.a + guard + viscous);
       ax += factor * d.x, ay += factor * d.y, az += factor * d.z;
-      lost += (pressure + viscous) * push * dot(u - other.v, d);
+      lost += (pressure + guard + viscous) * push * dot(u - other.v, d);
     }
     Quad& q = in.sum[i];
     q = {q.x + total(ax), q.y + total(ay), q.z + total(az), q.w};

@@ -32,7 +32,9 @@ struct WallState {
 };
 
 /// Density of the solid at the pressure p (Pa). Deep under tension no density has this pressure: the wall's is that of the fluid at rest.
-inline double wall_density(const Tait& state, double p) { return p > -0.5 * state.stiffness() ? state.density_at(p) : state.density; }
+inline double wall_density(const Tait& state, double p) {
+  return p != 0.0 && p > -0.5 * state.stiffness() ? state.density_at(p) : state.density;
+}
 
 /// Of a particle with the velocity and the acceleration of its body there.
 inline WallState wall_state(const Settings& s, const WallSums& sums, const Vector& velocity, const Vector& acceleration) {
@@ -49,7 +51,18 @@ inline double boundary_density(const Settings& s, double rho, double rate, doubl
 struct LoopNumbers {
   PairCoefficients pair{};
   double at_spacing = 1.0;  ///< W(dx)
+  double spray = 0.0;       ///< kg/m^3, the lowest density without tension
 };
+
+/// Density of a fluid particle after dt (s) at the rate (kg/m^3/s). Without tension nothing holds what flies apart, and errors of steps and
+/// diffusion would carry the density of spray below zero, where viscosity, which divides by it, is without bounds and of any sign; a
+/// particle that comes to a wall so thin gets no pressure there and falls through it. Hence the lowest density is (rho_0 + m W(0))/2: a
+/// particle gains (rho_0 - m W(0))/2 on its way to the first place of a lattice on a flat wall or surface, and has rho_0 there, as those
+/// that the surface began with. Without pressure this costs no energy.
+inline double fluid_density(const Settings& s, const LoopNumbers& numbers, double rho, double rate, double dt) {
+  const double next = rho + dt * rate;
+  return s.state.tension ? next : std::max(next, numbers.spray);
+}
 
 /// Calls work(kernel) with the kernel of the settings.
 template <class Work>
@@ -61,8 +74,10 @@ auto with_kernel(const Settings& s, const Work& work) {
 inline LoopNumbers loop_numbers(const Settings& s) {
   return with_kernel(s, [&](const auto& kernel) {
     const double moment = lattice_moment(kernel, s.dimension, s.h(), s.spacing);
-    return LoopNumbers{PairCoefficients::of(s.mass(), moment, s.h(), s.state.sound_speed, s.state.density, s.alpha, s.delta),
-                       kernel.value(s.spacing)};
+    PairCoefficients pair = PairCoefficients::of(s.mass(), moment, s.h(), s.state.sound_speed, s.state.density, s.alpha, s.delta);
+    if (s.boundary == Boundary::extrapolated) pair.guard = 0.5 * s.state.sound_speed * s.state.sound_speed / s.state.density;
+    pair.reach = 0.9 * s.spacing;
+    return LoopNumbers{pair, kernel.value(s.spacing), 0.5 * (s.state.density + s.mass() * kernel.value(0.0))};
   });
 }
 

@@ -71,7 +71,7 @@ class Passes {
       for (int k = 0; k < walls.size(); ++k) walls.density[k] = boundary_density(s, walls.density[k], walls.rate[k], dt);
     }
     scene.each([&](int i) {
-      fluid.density[i] += dt * rate_[i];
+      fluid.density[i] = fluid_density(s, numbers_, fluid.density[i], rate_[i], dt);
       fluid.pressure[i] = s.state.pressure(fluid.density[i]);
       if (shifting) {
         const Quad& q = shift_sum_[i];

@@ -68,7 +68,8 @@ def sph_kernel(name: str, dimension: int, h: float, distance: ArrayLike) -> tupl
 
 
 def tait_pressure(density: ArrayLike, *, rest_density: float, sound_speed: float, gamma: float = 7.0, tension: bool = False) -> Floats:
-    """Pressure (Pa) of Tait's equation of state at `density` (kg/m^3); without `tension` never below 0.
+    """Pressure (Pa) of Tait's equation of state at `density` (kg/m^3), at most rest_density sound_speed^2/10; without `tension` never
+    below 0.
 
     >>> float(tait_pressure(1001.0, rest_density=1000.0, sound_speed=40.0).round())
     1605.0

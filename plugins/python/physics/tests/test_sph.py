@@ -35,7 +35,8 @@ def test_kernels_scale_with_h_and_fall(name, dimension, h, q):
 @given(st.floats(1.0, 9.0), st.floats(1.0, 1e3), st.floats(0.9, 1.1))
 def test_tait_is_its_formula(gamma, sound, ratio):
     p = tait_pressure(850.0 * ratio, rest_density=850.0, sound_speed=sound, gamma=gamma, tension=True)
-    assert p == pytest.approx(850.0 * sound**2 / gamma * (ratio**gamma - 1.0), rel=1e-9, abs=1e-9 * 850.0 * sound**2)
+    due = min(850.0 * sound**2 / gamma * (ratio**gamma - 1.0), 0.1 * 850.0 * sound**2)
+    assert p == pytest.approx(due, rel=1e-9, abs=1e-9 * 850.0 * sound**2)
     assert tait_pressure(850.0 * ratio, rest_density=850.0, sound_speed=sound, gamma=gamma) == max(p, 0.0)
 
 

@@ -4,7 +4,7 @@ The files have the schema of the LIGGGHTS decks. Standard library only; SI units
 """
 
 from yade.dembark.balance import Balance
-from yade.dembark.fluids import FluidRecorder, FluidWriter, fluid, fluid_engine, fluid_loop, lattice, tank_walls
+from yade.dembark.fluids import CubesRecorder, FluidRecorder, FluidWriter, fluid, fluid_engine, fluid_loop, lattice, tank_walls
 from yade.dembark.frames import FrameWriter, StepMeans
 from yade.dembark.logs import LogWriter, drum, log, log_loop, log_wall, logs
 from yade.dembark.machines import TouchWriter, account_history
@@ -31,9 +31,9 @@ from yade.dembark.states import options, run, table
 from yade.dembark.writers import DumpWriter, EnergyWriter, HistoryWriter, energies
 
 __all__ = [
-    "Balance", "DumpWriter", "EnergyWriter", "FluidRecorder", "FluidWriter", "FrameWriter", "HistoryWriter", "LogWriter", "Recorder",
-    "StepMeans", "TouchWriter", "account_history", "begin", "box", "contact_loop", "drum", "energies", "engine_loop", "fail", "finish",
-    "fluid", "fluid_engine", "fluid_loop", "grains", "lattice", "log", "log_loop", "log_wall", "logs", "materials", "mesh", "mesh_loop",
-    "motion", "motion_columns", "motion_values", "options", "packing", "pairs", "parameters", "periodic", "plane", "planes", "run",
-    "slab_loop", "table", "tank_walls",
+    "Balance", "CubesRecorder", "DumpWriter", "EnergyWriter", "FluidRecorder", "FluidWriter", "FrameWriter", "HistoryWriter", "LogWriter",
+    "Recorder", "StepMeans", "TouchWriter", "account_history", "begin", "box", "contact_loop", "drum", "energies", "engine_loop", "fail",
+    "finish", "fluid", "fluid_engine", "fluid_loop", "grains", "lattice", "log", "log_loop", "log_wall", "logs", "materials", "mesh",
+    "mesh_loop", "motion", "motion_columns", "motion_values", "options", "packing", "pairs", "parameters", "periodic", "plane", "planes",
+    "run", "slab_loop", "table", "tank_walls",
 ]

@@ -146,3 +146,45 @@ class FluidRecorder:
         self._history.write(",".join([str(O.iter), *(f"{x:.15g}" for x in row)]) + "\n")
         self._history.flush()
         print(O.iter, f"{O.time:.6g}", f"{energies['kinetic']:.6g}", flush=True)
+
+
+class CubesRecorder:
+    """Writes time.csv and grains.dump of a fluid in space with boxes that touch by springs, when they are due.
+
+    bodies : name -> id of a free body
+    """
+
+    ENERGIES = ("kinetic", "potential", "compression", "contact")
+    POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
+
+    def __init__(self, p, bodies):
+        self._p, self._bodies = p, dict(bodies)
+        bounds = ((-p.column_length, p.downstream_length), (-0.5 * p.flume_width, 0.5 * p.flume_width), (0.0, p.flume_height))
+        self._frames = FluidWriter(bounds, dump="grains.dump", history="")
+        energies = [f"{name}_energy" for name in (*self.ENERGIES[:3], "body", "contact")]
+        poses = [f"{name}_{what}" for name in self._bodies for what in self.POSE]
+        self._history = table("time.csv", ",".join(["step", "time", *energies, *poses]))
+
+    def __call__(self):
+        """Write what is due at this step."""
+        if O.iter and O.iter % self._p.every == 0:
+            self._row()
+        if O.iter and O.iter % self._p.stride == 0:
+            self._frames.frame()
+
+    def _row(self):
+        energies = fluid_engine().energies()
+        moving, poses, springs = 0.0, [], energies["contact"]
+        for number in self._bodies.values():
+            state = O.bodies[number].state
+            # Velocities are half a step behind the forces of this one.
+            moving += 0.5 * state.mass * state.vel.squaredNorm() + 0.5 * state.inertia[0] * state.angVel.squaredNorm()
+            moving += state.mass * self._p.gravity * state.pos[2]
+            poses += [*state.pos, state.ori[3], state.ori[0], state.ori[1], state.ori[2]]
+        for one in O.interactions:
+            if one.isReal:
+                springs += 0.5 * one.phys.normalForce.squaredNorm() / one.phys.kn
+        row = [O.time, *(energies[name] for name in self.ENERGIES[:3]), moving, springs, *poses]
+        self._history.write(",".join([str(O.iter), *(f"{x:.12g}" for x in row)]) + "\n")
+        self._history.flush()
+        print(O.iter, f"{O.time:.6g}", f"{energies['kinetic']:.6g}", flush=True)

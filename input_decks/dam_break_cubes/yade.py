@@ -1,0 +1,93 @@
+"""Dam break against cubes: a column of water, the walls of a flume, and cubes on its floor."""
+
+import math
+import os
+
+from yade import dembark
+
+p = dembark.parameters()
+side = 0.5 * p.flume_width
+# Cubes touch by balls in their corners and along their edges, which meet the faces of others as boxes. Springs and dashpots of two
+# materials act in series. The many balls along edges are for edges that cross: with a third of the stiffness of a corner, hardly damped.
+r, inner = p.rounding, 0.5 * p.edge - p.rounding
+SHARE, DAMPED, TANGENTIAL = 1.0 / 3.0, 0.05, 0.82
+
+
+def damping(restitution, mass):
+    """Of a corner, N s/m: a spring and dashpot that does not pull (Schwager & Poeschel 2007), with a quarter of the mass."""
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        z = 0.5 * (low + high)
+        low, high = (z, high) if math.exp(-z * (math.pi - 2.0 * math.asin(z)) / math.sqrt(1.0 - z * z)) > restitution else (low, z)
+    return 2.0 * low * math.sqrt(0.25 * p.stiffness * mass)
+
+
+def material(k, c, friction):
+    """The least friction of two materials counts."""
+    return O.materials.append(ViscElMat(kn=k, ks=TANGENTIAL * k, cn=c, cs=TANGENTIAL * c, frictionAngle=math.atan(friction),
+                                        density=p.cube_density))
+
+
+def beside(one, both):
+    """What gives `both` in series with `one`; hardly anything softer than `one` when that is too soft."""
+    return one * both / max(one - both, 1e-3 * one)
+
+
+k, c = 2.0 * p.stiffness, 2.0 * damping(p.restitution, 0.5 * p.cube_mass)
+cube_material = material(k, c, p.friction)
+rim_material = material(beside(k, SHARE * p.stiffness), beside(c, DAMPED * 0.5 * c), p.friction)
+floor_material = material(k, beside(c, damping(p.floor_restitution, p.cube_mass)), p.floor_friction)
+glass = material(k, beside(c, damping(p.wall_restitution, p.cube_mass)), p.wall_friction)
+ends = (-inner, inner)
+corners = [(a, b, d) for a in ends for b in ends for d in ends]
+along = [inner * (0.2 * n - 1.0) for n in range(1, 10)]
+rims = [point for t in along for a in ends for b in ends for point in ((t, a, b), (a, t, b), (a, b, t))]
+centres = list(zip(p.cube_x, p.cube_y, p.cube_z, strict=True))
+cubes = {}
+for number, centre in enumerate(centres, 1):
+    balls = [sphere(Vector3(*centre) + Vector3(*point), r, material=cube_material) for point in corners]
+    balls += [sphere(Vector3(*centre) + Vector3(*point), r, material=rim_material) for point in rims]
+    core = box(centre, [0.5 * p.edge] * 3, material=cube_material)
+    # A clump takes the axes of its members' inertia. Those of a cube could be any: one that differs along x, y and z keeps them.
+    core.state.mass, core.state.inertia = 1e3, Vector3(10, 20, 30)
+    cube, _ = O.bodies.appendClumped([core, *balls])
+    body = O.bodies[cube]
+    if body.state.ori.toAngleAxis()[0] > 1e-9 or (body.state.pos - Vector3(*centre)).norm() > 1e-9:
+        dembark.fail(f"cube {number} is turned or out of place when it is made: {body.state.pos}, {body.state.ori}")
+    body.state.mass, body.state.inertia = p.cube_mass, Vector3(1, 1, 1) * p.cube_inertia
+    body.aspherical = False
+    cubes[f"cube{number}"] = cube
+O.bodies.append(wall(0, 2, sense=1, material=floor_material))
+O.bodies.append([wall(-side, 1, sense=1, material=glass), wall(side, 1, sense=-1, material=glass)])
+O.bodies.append(wall(p.downstream_length, 0, sense=-1, material=glass))
+
+water = SphFluid(spacing=p.spacing, soundSpeed=p.sound_speed, density=p.fluid_density, smoothing=p.smoothing, alpha=p.alpha, delta=p.delta,
+                 noSlip=p.no_slip == "yes", tension=p.tension == "yes", slitPressure=p.slit_pressure,
+                 threads=int(os.environ.get("OMP_NUM_THREADS", "1")))
+if p.coupling == "potential":
+    water.boundary, water.contactStiffness, water.contactExponent = "dynamic", p.potential_stiffness, p.potential_exponent
+column = dembark.lattice((-p.column_length, -side, 0), (0, side, p.column_height), p.spacing)
+water.addParticles(column, pressures=[p.fluid_density * p.gravity * (p.column_height - z) for _, _, z in column])
+water.addWall(dembark.tank_walls((-p.column_length, -side, 0), (p.downstream_length, side, p.flume_height), p.spacing))
+for cube, centre in zip(cubes.values(), centres, strict=True):
+    if p.coupling == "potential":
+        half = 0.5 * p.edge
+        water.addBody(cube, dembark.lattice([c - half for c in centre], [c + half for c in centre], p.spacing))
+    else:
+        water.addBox(cube, Vector3(p.edge, p.edge, p.edge))
+if p.coupling != "potential":
+    for point, normal in (((0, 0, 0), (0, 0, 1)), ((0, -side, 0), (0, 1, 0)), ((0, side, 0), (0, -1, 0))):
+        water.addPlane(Vector3(*point), Vector3(*normal))
+
+record = dembark.CubesRecorder(p, cubes)
+O.dt = p.time_step
+O.engines = [
+    ForceResetter(),
+    InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Box_Aabb(), Bo1_Wall_Aabb()]),
+    InteractionLoop([Ig2_Box_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()], [Ip2_ViscElMat_ViscElMat_ViscElPhys()],
+                    [Law2_ScGeom_ViscElPhys_Basic()]),
+    water,
+    PyRunner(command="record()", iterPeriod=1),
+    NewtonIntegrator(damping=0, gravity=(0, 0, -p.gravity)),
+]
+dembark.run(p.steps, outputs=("time.csv", "grains.dump"))

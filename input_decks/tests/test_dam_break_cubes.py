@@ -1,0 +1,96 @@
+"""dam_break_cubes: trajectories of the experiment pass, wrong ones fail; a tiny flume with cubes in both engines."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.postproc.tests.scenes import frame_of
+
+dam = module("dam_break_cubes")
+DT, STRIDE, SPACING = 1e-3, 100, 0.025
+TINY = {"spacing": 0.05, "column_length": 0.4, "column_height": 0.3, "distance": 0.3, "downstream_length": 0.8, "flume_height": 0.5,
+        "flume_width": 0.25, "run_time": 0.42, "frames": 3, "rows": 70, "stiffness": 5e4}
+
+
+def run(cubes: str, carried: float = 0.0, late: float = 0.0, jumps: float = 0.0, shut: bool = False, dry: bool = False, within: int = 0,
+        leaked: int = 0, made: float = 0.0) -> Any:
+    """The top cube on the experiment's way, `carried` (m) too far after a second, `late` (s) in falling, `jumps` (m) at 0.9 s; water on
+    the floor and in the gaps unless it is `dry` or the gaps are `shut`; particles `within` a cube or `leaked`; energy `made` of nothing."""
+    p = defaults("dam_break_cubes", arrangement=cubes, spacing=SPACING)
+    count, time = {"three": 3, "six": 6}[cubes], np.arange(0.0, 1.6001, 0.01)
+    rows: dict[str, Any] = {"step": np.round(time / DT), "time": time, "overlap": 0.0 * time}
+    energy = np.ones(len(time))
+    energy[80:] += made * 0.5 * 1000.0 * 9.81 * p["column_length"] * p["flume_width"] * p["column_height"] ** 2
+    rows |= {name: (energy if name == "kinetic_energy" else 0.0 * time) for name in dam.STORED}
+    for k in range(1, count + 1):
+        place = np.array([1.775, 0.0 if cubes == "three" else (k - 2) * 0.2, 0.075])
+        rows |= {f"cube{k}_{axis}": np.full(len(time), place[i]) for i, axis in enumerate("xyz")}
+        rows |= {f"cube{k}_{part}": np.full(len(time), float(part == "qw")) for part in ("qw", "qx", "qy", "qz")}
+    rows[f"cube{count}_y"] = 0.0 * time
+    rows[f"cube{count}_x"] = np.interp(time, *dam.published(cubes, "x")) + carried * time
+    times, heights = dam.published(cubes, "z")
+    low, high = heights[-1], heights[0]
+    rows[f"cube{count}_z"] = 0.075 + 0.3 * (np.interp(time - late, times, heights) - low) / (high - low)
+    rows[f"cube{count}_z"][90] += jumps
+
+    def frame(step: int) -> Any:
+        x, y, z = (part.ravel() for part in np.meshgrid(np.arange(1.0125, 2.0, SPACING), np.arange(-0.3375, 0.35, SPACING),
+                                                       np.arange(0.0125, 0.05, SPACING), indexing="ij"))
+        places, row, cube = np.stack([x, y, z], axis=1), int(np.searchsorted(rows["step"], step)), np.zeros(len(x), bool)
+        for k in range(1, count + 1):
+            cube |= (np.abs(places - dam.pose(rows, k, row)[0]) < 0.075).all(axis=1)
+        if shut:
+            cube |= (np.abs(x - 1.775) < 0.075) & (np.abs(y) < 0.3)
+        if dry:
+            cube |= x < 1.3
+        places = places[~cube]
+        places[:within] = [1.775, 0.0, 0.075]
+        places[len(places) - leaked:, 2] = -0.1
+        return frame_of(places, 0.5 * SPACING, {}, step=step)
+
+    frames = [frame(step) for step in range(STRIDE, 1601, STRIDE)]
+    derived = {"cube_count": count, "stride": STRIDE, "grain_count": min(len(one.ids) for one in frames)}
+    return SimpleNamespace(parameters=p, derived=derived, time_step=DT, grains=lambda: frames, times=lambda: rows)
+
+
+def verdicts(cubes: str, **changes: Any) -> dict[str, dict[str, Any]]:
+    return judged("dam_break_cubes", dam.measure([run(cubes, **changes)]))
+
+
+def test_the_experiment_itself_passes() -> None:
+    every = {"half_fallen", "rise", "floor_wetted", "inside", "leaked", "energy_growth"}
+    three, six = verdicts("three"), verdicts("six")
+    assert every | {"three_rms_x"} <= names(three, "pass"), three
+    assert every | {"six_rms_x", "gap_filled"} <= names(six, "pass"), six
+    assert three["half_fallen"]["value"] == pytest.approx(1.10, abs=0.02)
+
+
+def test_a_cube_that_stands_has_not_fallen_in_time() -> None:
+    one = run("three")
+    one.times()["cube3_z"][:] = 0.375
+    found = judged("dam_break_cubes", dam.measure([one]))["half_fallen"]
+    assert (found["verdict"], found["value"]) == ("fail", pytest.approx(1.6))
+
+
+def test_a_cube_is_known_however_it_is_turned() -> None:
+    """A quarter turn about z takes x to y; the frame of the body sees the reverse."""
+    quarter = np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
+    np.testing.assert_allclose(dam.rotated(np.array([[0.0, 1.0, 0.0]]), quarter), [[1.0, 0.0, 0.0]], atol=1e-15)
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+def test_water_runs_against_cubes_in_an_engine(engine: str, simulate: Any) -> None:
+    one = simulate("dam_break_cubes", engine, TINY)
+    found = judged("dam_break_cubes", dam.measure([one]))
+    assert {"leaked", "inside", "energy_growth", "rise"} <= names(found, "pass"), found
+    rows = one.times()
+    assert 1.0 <= rows["time"][-1] / 0.42 < 1.1
+    # The water has come, and the cubes are where they were pushed, the lowest ones first.
+    assert max(rows[f"cube{k}_x"][-1] for k in (1, 2, 3)) > 0.375 + 0.002
+    for k in (1, 2, 3):
+        assert rows[f"cube{k}_z"][-1] == pytest.approx(0.075 + 0.15 * (k - 1), abs=0.02)

@@ -1,0 +1,142 @@
+#include "fix_sph_contact.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <stdexcept>
+
+#include "comm.h"
+#include "domain.h"
+#include "error.h"
+#include "modify.h"
+#include "update.h"
+
+#include "fix_sph_body.h"
+#include "keyword_reader.h"
+
+using namespace LAMMPS_NS;
+using namespace FixConst;
+using namespace dembark::sph;
+using dembark_liggghts::KeywordReader;
+using dembark_liggghts::text;
+
+namespace {
+
+Vector read_vector(KeywordReader &in, const std::string &of, const std::string &what) {
+  const double x = in.number(of, what), y = in.number(of, what), z = in.number(of, what);
+  return {x, y, z};
+}
+
+}  // namespace
+
+FixSphContact::FixSphContact(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg) {
+  if (domain->dimension != 3) refuse("boxes are for three dimensions");
+  try {
+    read(std::vector<std::string>(arg + 3, arg + narg));
+  } catch (const std::invalid_argument &wrong) {
+    refuse(wrong.what());
+  }
+  restart_global = 1;
+  vector_flag = 1;
+  size_vector = 3;
+  global_freq = 1;
+  extvector = 0;
+}
+
+void FixSphContact::refuse(const std::string &what) {
+  error->fix_error(FLERR, this, what.c_str());
+  std::abort();  // fix_error() does not return
+}
+
+void FixSphContact::read(const std::vector<std::string> &words) {
+  KeywordReader in(words);
+  double friction = 0.5, restitution = 0.5, shortest = 0.0;
+  bool stiff = false;
+  while (in.left()) {
+    const std::string of = in.word("sph/contact", "a keyword");
+    if (of == "stiffness") {
+      contacts_.stiffness = in.positive(of, "k of a corner (N/m)");
+      stiff = true;
+    } else if (of == "rounding") {
+      contacts_.radius = in.positive(of, "the radius of edges and corners (m)");
+    } else if (of == "friction") {
+      friction = in.number(of, "the coefficient between boxes");
+    } else if (of == "restitution") {
+      restitution = in.number(of, "the coefficient between boxes");
+    } else if (of == "box") {
+      names_.push_back(in.word(of, "the ID of a fix sph/body"));
+      const double a = in.positive(of, "an edge (m)"), b = in.positive(of, "an edge (m)"), c = in.positive(of, "an edge (m)");
+      contacts_.half.push_back(0.5 * Vector{a, b, c});
+      const double least = std::min({a, b, c});
+      shortest = names_.size() == 1 ? least : std::min(shortest, least);
+    } else if (of == "plane") {
+      ContactPlane plane;
+      plane.point = read_vector(in, of, "x, y and z of a point (m)");
+      plane.normal = read_vector(in, of, "x, y and z of the normal, into the space of the boxes");
+      const double length = norm(plane.normal);
+      if (!(length > 0.0)) dembark_liggghts::refuse("plane: the normal must not be zero");
+      plane.normal = (1.0 / length) * plane.normal;
+      const double mu = in.number(of, "the coefficient of friction"), e = in.number(of, "the coefficient of restitution");
+      plane.touch = Touch::of(e, mu);
+      if (const char *const wrong = plane.touch.error()) dembark_liggghts::refuse(std::string("plane: ") + wrong);
+      contacts_.planes.push_back(plane);
+    } else {
+      dembark_liggghts::refuse("'" + of + "' is no keyword; known are stiffness, rounding, friction, restitution, box and plane");
+    }
+  }
+  contacts_.between = Touch::of(restitution, friction);
+  if (const char *const wrong = contacts_.between.error()) dembark_liggghts::refuse(wrong);
+  if (!stiff) dembark_liggghts::refuse("stiffness (N/m) is missing: of one corner");
+  if (names_.empty()) dembark_liggghts::refuse("there is no box; name fixes sph/body with their edges");
+  if (!(2.0 * contacts_.radius < shortest))
+    dembark_liggghts::refuse("rounding must be less than half of the shortest edge, " + text(shortest) + " m, not " +
+                             text(contacts_.radius) + " m");
+}
+
+int FixSphContact::setmask() { return POST_FORCE; }
+
+void FixSphContact::init() {
+  fixes_.clear();
+  bodies_.clear();
+  for (const std::string &name : names_) {
+    const int at = modify->find_fix(name.c_str());
+    auto *const solid = at < 0 ? nullptr : dynamic_cast<FixSphBody *>(modify->fix[at]);
+    if (!solid || !solid->body().free) refuse("box: '" + name + "' is the ID of no fix sph/body");
+    if (std::count(names_.begin(), names_.end(), name) > 1) refuse("box: '" + name + "' stands there twice");
+    fixes_.push_back(solid);
+    bodies_.push_back(&solid->body());
+  }
+  const double most = contacts_.longest_step(bodies_);
+  if (update->dt > most)
+    refuse("the time step must be at most " + text(most) + " s for this stiffness, not " + text(update->dt) + " s; take a softer one");
+}
+
+/// Forces of the state as it is.
+void FixSphContact::setup(int) { push(false); }
+
+void FixSphContact::post_force(int) { push(true); }
+
+/// All ranks have the places of all bodies, and do the same.
+void FixSphContact::push(bool remember) {
+  const std::vector<Push> &pushes = contacts_.push(remember ? update->dt : 0.0, bodies_, remember);
+  for (std::size_t k = 0; k < fixes_.size(); ++k) fixes_[k]->add_load(pushes[k].force, pushes[k].torque);
+}
+
+/// Energy in the springs (J), largest overlap (m), how many points touch.
+double FixSphContact::compute_vector(int n) { return n == 0 ? contacts_.stored : n == 1 ? contacts_.deepest : double(contacts_.count); }
+
+void FixSphContact::write_restart(FILE *file) {
+  if (comm->me != 0) return;
+  static_assert(sizeof(Vector) == 3 * sizeof(double), "numbers only");
+  const int count = int(contacts_.stretches.size()), bytes = int(sizeof count + std::size_t(count) * sizeof(Vector));
+  fwrite(&bytes, sizeof bytes, 1, file);
+  fwrite(&count, sizeof count, 1, file);
+  fwrite(contacts_.stretches.data(), sizeof(Vector), std::size_t(count), file);
+}
+
+void FixSphContact::restart(char *buffer) {
+  int count = 0;
+  std::memcpy(&count, buffer, sizeof count);
+  contacts_.stretches.resize(std::size_t(count));
+  std::memcpy(static_cast<void *>(contacts_.stretches.data()), buffer + sizeof count, std::size_t(count) * sizeof(Vector));
+}

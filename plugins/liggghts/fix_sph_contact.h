@@ -1,0 +1,47 @@
+// fix ID all sph/contact stiffness K [rounding R] [friction MU] [restitution E] box FIX A B C ... plane PX PY PZ NX NY NZ MU E ...:
+// contacts of box-shaped bodies of fix sph/body with each other and with planes, dembark/sph/box_contacts.hpp.
+#ifdef FIX_CLASS
+
+FixStyle(sph/contact,FixSphContact)
+
+#else
+
+#ifndef LMP_FIX_SPH_CONTACT_H
+#define LMP_FIX_SPH_CONTACT_H
+
+#include <string>
+#include <vector>
+
+#include "fix.h"
+
+#include "dembark/sph/box_contacts.hpp"
+
+namespace LAMMPS_NS {
+
+class FixSphContact : public Fix {
+ public:
+  FixSphContact(class LAMMPS *, int, char **);
+
+  int setmask();
+  void init();
+  void setup(int);
+  void post_force(int);
+  double compute_vector(int);
+  void write_restart(FILE *);
+  void restart(char *);
+
+ private:
+  [[noreturn]] void refuse(const std::string &what);
+  void read(const std::vector<std::string> &words);
+  void push(bool remember);
+
+  dembark::sph::BoxContacts contacts_;
+  std::vector<std::string> names_;  // of the fixes of the boxes
+  std::vector<class FixSphBody *> fixes_;
+  std::vector<const dembark::sph::Body *> bodies_;
+};
+
+}  // namespace LAMMPS_NS
+
+#endif
+#endif

@@ -1,0 +1,120 @@
+"""fix sph/contact: cubes that fall on each other, on any number of ranks, resumed exactly, with energy; what it refuses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rig.liggghts_driver import read_dump, run_deck
+
+# Two cubes of 3 x 3 x 3 particles over a floor, turned against each other by their spins, and a little water beside them.
+DECK = """units si
+atom_style hybrid granular sph
+atom_modify map array
+boundary f f f
+newton off
+communicate single vel yes
+{grid}
+{begin}
+neighbor 0.0052 bin
+neigh_modify delay 0 check yes exclude type 2 3
+pair_style sph/coupled spacing 0.02 sound_speed 20
+pair_coeff * *
+timestep 2e-4
+fix weight all gravity 9.81 vector 0 0 -1
+fix water water nve/sph/coupled
+fix one one sph/body mass 0.2 inertia 1.2e-4 1.2e-4 1.2e-4 centre 0.1 0.1 0.05 spin 3 5 0
+fix two two sph/body mass 0.2 inertia 1.2e-4 1.2e-4 1.2e-4 centre 0.105 0.11 0.16
+fix touch all sph/contact stiffness 2e4 friction 0.4 restitution 0.5 box one 0.06 0.06 0.06 box two 0.06 0.06 0.06 &
+    plane 0 0 0 0 0 1 0.4 0.6
+fix state all resume/exact 400 state
+variable energy equal f_water[4]+f_touch[1]
+fix rows all print 50 "$(step) $(f_one[3]) $(f_two[3]) $(v_energy) $(f_touch[2]) $(f_touch[3])" screen no file {rows} title none
+dump cubes two custom 100 cubes.dump id type x y z vx vy vz
+dump_modify cubes sort id format "%d %d %.17g %.17g %.17g %.17g %.17g %.17g"
+thermo_style custom step
+thermo 1000
+thermo_modify lost error norm no
+{run}
+"""
+MADE = """region domain block -0.1 0.5 -0.1 0.3 -0.1 0.4 units box
+create_box 3 domain
+lattice sc 0.02 origin 0.5 0.5 0.5
+region pool block 0.3 0.36 0.1 0.16 0.2 0.26 units box
+create_atoms 1 region pool
+lattice sc 0.02 origin 0 0 0
+region first block 0.079 0.121 0.079 0.121 0.029 0.071 units box
+create_atoms 2 region first
+lattice sc 0.02 origin 0.25 0.5 0
+region second block 0.084 0.126 0.089 0.131 0.139 0.181 units box
+create_atoms 3 region second
+mass * 0.008
+set group all diameter 0.02 density 1000
+set group all mass 0.008
+set group all meso_rho 1000
+group water type 1
+group one type 2
+group two type 3"""
+GROUPS = "resume_state state\ngroup water type 1\ngroup one type 2\ngroup two type 3"
+
+
+def deck(*, begin: str = MADE, grid: str = "", run: str = "run 600", rows: str = "rows", old: str = "", new: str = "") -> str:
+    text = DECK.format(begin=begin, grid=grid, run=run, rows=rows)
+    assert old in text
+    return text.replace(old, new) if old else text
+
+
+def table(folder: Path, name: str = "rows") -> np.ndarray:
+    return np.loadtxt(folder / name, skiprows=1)
+
+
+def test_cubes_fall_on_each_other_and_on_the_floor(tmp_path: Path) -> None:
+    done = run_deck(tmp_path / "one", deck())
+    assert done.code == 0, done.error or done.output[-1500:]
+    rows = table(tmp_path / "one")
+    assert rows[:, 5].max() >= 3
+    assert 0.0 < rows[:, 4].max() < 0.004
+    # Both have touched: they would be below the floor. What they have of energy only falls.
+    assert rows[-1, 1] > 0.025
+    assert rows[-1, 2] > 0.025
+    assert np.diff(rows[:, 3]).max() < 1e-3 * rows[0, 3]
+    assert rows[-1, 3] < 0.9 * rows[0, 3]
+    two = run_deck(tmp_path / "two", deck(grid="processors 2 1 1", run="run 500"), ranks=2)
+    assert two.code == 0, two.error or two.output[-1500:]
+    frames = [read_dump(tmp_path / name / "cubes.dump")[1][5] for name in ("one", "two")]
+    assert rows[5:9, 5].max() > 0
+    np.testing.assert_allclose(frames[1], frames[0], rtol=1e-9, atol=1e-12)
+
+
+def test_resumes_to_the_bit(tmp_path: Path) -> None:
+    whole = run_deck(tmp_path / "whole", deck(run="run 500"))
+    first = run_deck(tmp_path / "parts", deck(run="run 450"))
+    again = run_deck(tmp_path / "parts", deck(begin=GROUPS, run="run 500 upto", rows="late"), name="second.in")
+    for done in (whole, first, again):
+        assert done.code == 0, done.error or done.output[-1500:]
+    assert "resumed at step 400 exactly" in again.output
+    frames = [read_dump(tmp_path / name / "cubes.dump")[1][-1] for name in ("whole", "parts")]
+    assert (frames[0] == frames[1]).all()
+
+
+REFUSED = {
+    "stiffness": ("stiffness 2e4 ", "", "stiffness (N/m) is missing"),
+    "keyword": ("stiffness 2e4 ", "soft 3 ", "'soft' is no keyword; known are stiffness, rounding"),
+    "restitution": ("restitution 0.5", "restitution 0.1", "restitution must be between 0.14 (critical damping) and 1"),
+    "plane": ("plane 0 0 0 0 0 1 0.4 0.6", "plane 0 0 0 0 0 1 -0.4 0.6", "plane: friction must be a number >= 0"),
+    "normal": ("plane 0 0 0 0 0 1", "plane 0 0 0 0 0 0", "plane: the normal must not be zero"),
+    "no body": ("box two", "box water", "box: 'water' is the ID of no fix sph/body"),
+    "twice": ("box two", "box one", "box: 'one' stands there twice"),
+    "no box": ("box one 0.06 0.06 0.06 box two 0.06 0.06 0.06", "", "there is no box"),
+    "rounding": ("friction 0.4 ", "rounding 0.03 friction 0.4 ", "rounding must be less than half of the shortest edge"),
+    "step": ("stiffness 2e4", "stiffness 2e7", "the time step must be at most"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_says_what_is_wrong(name: str, tmp_path: Path) -> None:
+    old, new, message = REFUSED[name]
+    done = run_deck(tmp_path, deck(run="run 1", old=old, new=new))
+    assert done.code != 0
+    assert message in done.error, done.error or done.output[-800:]
