@@ -25,7 +25,7 @@ def measure(replicas: Replicas) -> Measurement:
     found = [channel_plug.estimates(one) for one in channels]
     over = {name: pooled(found, name) for name in found[0]}
     first, unsteady, slip = channels[0], next((one.remark for one in channels if one.remark), ""), 1.0 - over["wall_slip"].value
-    faint = f"the layer at the walls lags by only {slip:.1%}: no measurable shear zone" if slip < LEAST_DEFICIT else ""
+    faint = f"the layer at the walls lags by only {slip:.1%}: no shear zone to measure" if slip < LEAST_DEFICIT else ""
     values = {name: Value(one) for name, one in over.items()}
     values |= {name: Value(over[name], Estimate(0.0, 0.0), reason=unsteady) for name in JUDGED}
     values |= {name: Value(over[name], reason=faint, compared=not faint) for name in ("shear_zone_width", "shear_zone_width_90")}

@@ -34,9 +34,9 @@ def head_on(one: Impacts, flight: Flight, known: Solutions) -> Found:
                                               bound=known.bound("restitution", one.restitution)[k])
         inside, found = flight.overlaps[:, k] > -0.05 * one.peak_overlap[k], 1e-3 * flight.forces[:, k]
         curves += [
-            profile(f"force_overlap_{key}", f"Force against overlap,  {key.upper()}", "δ (µm)", "N (kN)", 1e6 * flight.overlaps[inside, k],
+            profile(f"force_overlap_{key}", f"Force against overlap, {key.upper()}", "δ (µm)", "N (kN)", 1e6 * flight.overlaps[inside, k],
                     [found[inside]], reference=1e-3 * forces[inside, k], reference_label="Hertz"),
-            profile(f"force_time_{key}", f"Force against time,  {key.upper()}", "time since touch (µs)", "N (kN)", 1e6 * since_touch[:, k],
+            profile(f"force_time_{key}", f"Force against time, {key.upper()}", "time since touch (µs)", "N (kN)", 1e6 * since_touch[:, k],
                     [found], reference=1e-3 * pulse[:, k], reference_label="Hertz")]
     return values, curves
 

@@ -91,7 +91,7 @@ def _judged(difference: float, halves: tuple[float, float], counts: tuple[float,
     half = joint_half(*halves)
     few = min(counts)
     if few < PACKINGS:
-        return "info", (f"the joint interval (±{half:.1%}) is from {few:g} packing{'s' * (few > 1)}; "
+        return "info", (f"the joint interval (±{half:.1%}) comes from within {few:g} packing{'s' * (few > 1)}; "
                         f"{PACKINGS} in each engine are needed for a verdict")
     limit = max(half, joint_limit(*halves, *counts, 1.0 - (1.0 - CONFIDENCE) / comparisons))
     if difference > limit:

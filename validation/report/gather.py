@@ -101,7 +101,7 @@ class Gathered:
     def left_out(self) -> str:
         """Which optional engines were left out because they are not installed, in a sentence; empty when none was."""
         names = [engine_name(engine) for engine in self.summary.get("left_out", {})]
-        return f"Left out, because not installed on this machine:  {', '.join(names)}." if names else ""
+        return f"Left out, because not installed on this machine: {', '.join(names)}." if names else ""
 
     @property
     def missing(self) -> list[str]:

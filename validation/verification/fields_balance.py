@@ -49,7 +49,7 @@ def balance() -> Item:
     return Item(
         "balance",
         "Static balance: ∇·σ = ρ g + wall forces",
-        f"A heap of {len(network.frame.ids)} grains at random positions on a base; its {len(network.links.ids)} contacts carry forces  "
+        f"A heap of {len(network.frame.ids)} grains at random positions on a base; its {len(network.links.ids)} contacts carry forces "
         "of any direction under which each grain is in equilibrium to round-off. The fields must then satisfy ∇·σ − ρ g − t = 0 in every "
         "cell, t being the coarse-grained force of the base (Weinhart et al. 2012). The divergence is taken by central differences, which "
         "have an error that is second order in the spacing over the width of the kernel; there is no other error.",
