@@ -62,8 +62,8 @@ def examine() -> list[Finding]:
         *(_asked(facts.program, partial(_engine, facts.name), not facts.optional) for facts in map(engines.facts, engines.names())),
         _asked("cases", _decks),
         Finding("mpirun", mpirun, False, "install openmpi-bin to use --ranks"),
-        Finding("Slurm", shutil.which("sbatch"), False, "only a cluster has it; campaigns run here without it"),
+        Finding("Slurm", shutil.which("sbatch"), False, "only on clusters; campaigns run here without it"),
         Finding("commit", commit["commit"] and commit["commit"][:12] + (" with changes" if commit["dirty"] else ""), False,
-                "not a Git checkout: results will not name a commit"),
+                "not a Git checkout: results will not state a commit"),
         Finding("machine", f"{os.cpu_count()} cores, {free >> 30} GB free in this folder", False),
     ]

@@ -101,7 +101,7 @@ def quantity_table(result: Result) -> Table:
 
 
 def open_lines(result: Result) -> list[str]:
-    """Why quantities got neither pass nor fail although one was due, or why they say little: a line for each reason."""
+    """Why quantities have neither pass nor fail although one was expected, or little meaning: a line for each reason."""
     reasons: dict[tuple[str, str], list[str]] = {}
     for one in result.quantities:
         if one.verdict == "info" and one.reason:
@@ -130,4 +130,4 @@ def show_outcome(outcome: Outcome, what: str, advice: str) -> None:
         here.print(str(outcome.report), markup=False, soft_wrap=True)
     if not outcome.complete:
         count = len(outcome.unfinished) + len(outcome.problems) + (outcome.report is None)
-        raise RunError(f"{what} is incomplete", f"{count} things went wrong (above)", advice)
+        raise RunError(f"{what} is incomplete", f"{count} problem{'s' * (count > 1)} (above)", advice)

@@ -1,4 +1,4 @@
-"""Angle of repose: the slope of both flanks of the heap, beside the measured law for glass beads and beside another code.
+"""Angle of repose: the slope of both flanks of the heap, compared with the measured law for glass beads and with another code.
 
 V&V 20: the error E = S − D of a simulated value S against the datum D is known within U_val, U_val² = U_sim² + U_num² + U_input² +
 U_D². U_input follows from the exponents with which the angle grows with each coefficient (fit of Zhou et al. to their simulations).
@@ -55,10 +55,10 @@ def flanks(replica: Replica) -> tuple[float, float, bool]:
 def measure(replicas: Replicas) -> Measurement:
     """The angle, mean of both flanks and of all packings."""
     p, found = replicas[0].parameters, [flanks(replica) for replica in replicas]
-    simulated = over_replicas([Estimate(0.5 * (left + right), math.inf, "one packing says nothing about their spread")
+    simulated = over_replicas([Estimate(0.5 * (left + right), math.inf, "one packing gives no scatter between packings")
                                for left, right, _ in found])
     of_input = simulated.value * p["input_uncertainty"] * math.hypot(*EXPONENTS)
-    reason = "" if all(rests for *_, rests in found) else "the heap still moves"
+    reason = "" if all(rests for *_, rests in found) else "the heap is still moving"
     values = {"flank_difference": Value(exact(max(abs(left - right) for left, right, _ in found)))}
     if p["beads"] == "glass":
         datum = Estimate(law(p["grain_diameter"], p["confinement"]), MEASURED, "error of the measured angles")

@@ -47,7 +47,7 @@ def measure(replicas: Replicas) -> Measurement:
               "velocity": Value(exact(speed)), "peak_force": Value(exact(high))}
     middle = int(np.argmin(np.abs(times - 0.5 * (begun + ended))))
     return Measurement(values, [
-        profile("wave", "Force along the row, when the wave is between both places", "contact", "N", np.arange(1.0, force.shape[1] + 1.0),
+        profile("wave", "Force along the row, with the wave between the two contacts", "contact", "N", np.arange(1.0, force.shape[1] + 1.0),
                 [force[middle]])])
 
 

@@ -13,9 +13,9 @@ from dembark.postproc.instruments.growth import Growth, ordered
 from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas, Value, exact, over_replicas
 
 # What takes the energy, with the titles of the curves; liquid does so in wet columns.
-WAYS = {"kinetic": "Kinetic energy", "friction": "Lost by friction", "normal_viscous": "Lost by normal damping",
-        "tangential_viscous": "Lost by tangential damping", "held": "Held by springs", "gate": "Taken by the gate"}
-WET = {"liquid_viscous": "Lost in the viscous liquid", "capillary": "Taken by liquid bridges"}
+WAYS = {"kinetic": "Kinetic energy", "friction": "Dissipated by friction", "normal_viscous": "Dissipated by normal damping",
+        "tangential_viscous": "Dissipated by tangential damping", "held": "Elastic energy of springs", "gate": "Work on the gate"}
+WET = {"liquid_viscous": "Dissipated in the viscous liquid", "capillary": "Work against liquid bridges"}
 
 
 def run_out_law(aspect: float) -> float | None:
@@ -34,7 +34,7 @@ def measure(replicas: Replicas) -> Measurement:
     ways = WAYS | (WET if replicas[0].parameters["bridge_volume"] > 0.0 else {})
 
     def over(number: Callable[[Collapse], float]) -> Estimate:
-        return over_replicas([Estimate(number(one), math.inf, "one run of a chaotic motion says nothing about its spread") for one in runs])
+        return over_replicas([Estimate(number(one), math.inf, "one run of a chaotic motion gives no scatter between runs") for one in runs])
 
     def share(name: str) -> Value:
         return Value(over(lambda one: float(one.lost_in(name)[-1])))
@@ -43,7 +43,7 @@ def measure(replicas: Replicas) -> Measurement:
         return Value(exact(np.max([number(one) for one in runs])), exact(0.0))  # of numbers that are none: none
 
     def beside(number: Callable[[Collapse], float], law: float | None) -> Value:
-        other = "experiments with sand, sugar and rice between side walls, not with spheres that roll"
+        other = "the experiments used sand, sugar and rice between side walls, not rolling spheres"
         return Value(over(number), None if law is None else exact(law), reason="" if law is None else other)
 
     aspect = over(lambda one: one.height() / one.width)
@@ -59,9 +59,9 @@ def measure(replicas: Replicas) -> Measurement:
         "final_height": beside(lambda one: one.height_at_wall() / one.width, height_law(aspect.value)),
     }
     fallen, turned = 1e3 * np.mean([(one.fallen, one.rows["scale"][-1]) for one in runs], axis=0)
-    remarks = [f"The collapse loses {fallen:.4g} mJ of potential energy; all works of the run, rain included, make {turned:.4g} mJ."]
+    remarks = [f"The collapse loses {fallen:.4g} mJ of potential energy; the total work of the run, with the rain, is {turned:.4g} mJ."]
     if len(runs) < 3:
-        remarks.append("Shares and deposit vary from packing to packing; fewer than three tell nothing about by how much.")
+        remarks.append("Shares and deposit vary from packing to packing; fewer than three packings do not show by how much.")
     return Measurement(values, [*shares(runs, {"potential": "Potential energy lost"} | ways), deposits(runs)], remarks)
 
 
@@ -72,5 +72,5 @@ def study(_name: str, points: Points, along: str) -> Measurement:
     told = ", ".join(f"{error:.2e} at {step:g}" for step, error in zip(steps, errors.values, strict=True))
     return Measurement(
         {"order_step_error": Value(errors.exponent, exact(2.0), detail=f"errors {told} of the Rayleigh time")},
-        [errors.convergence("step_error", "Energy error of the step", "time step over the Rayleigh time", 2.0)],
-        ["Works balance the kinetic energy to round-off at each of these steps; this is what the step makes of the energy."])
+        [errors.convergence("step_error", "Energy error of the time step", "time step over the Rayleigh time", 2.0)],
+        ["Work and kinetic energy balance to round-off at each of these steps; the error shown is that of the time step."])

@@ -1,4 +1,4 @@
-"""Compressed chain: an engine's motion and its monitor beside exact solutions; what the reference integrator can and cannot."""
+"""Compressed chain: the motion and the monitor of an engine against exact solutions; order and errors of the reference integrator."""
 
 import math
 from types import SimpleNamespace

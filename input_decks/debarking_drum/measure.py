@@ -1,4 +1,4 @@
-"""Debarking drum: how many impacts logs get in a revolution, how hard they are, and whether the simulation keeps its books.
+"""Debarking drum: how many impacts logs get in a revolution, how hard they are, and whether the energy balances.
 
 Everything is taken per revolution of the measuring window, and per log where that makes drums of different size comparable. What must hold
 whatever the logs do: the certificate of the contact problem in every step; the energy that the shell brings in (its moment times its
@@ -15,8 +15,8 @@ from dembark.postproc.instruments.growth import Growth, ordered
 from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas, Value, pooled
 
 CURVES = {"impacts_per_log": ("Impacts per log and revolution", "1"), "peak_force_mean": ("Mean peak force", "kN"),
-          "peak_force_p99": ("Peak force that 1 % exceed", "kN"), "dissipated_energy": ("Energy lost per revolution", "kJ"),
-          "torque_arm": ("Moment over weight × radius", "1")}
+          "peak_force_p99": ("Peak force that 1 % exceed", "kN"), "dissipated_energy": ("Energy dissipated per revolution", "kJ"),
+          "torque_arm": ("Torque over weight × radius", "1")}
 
 
 def measure(replicas: Replicas) -> Measurement:
@@ -24,9 +24,9 @@ def measure(replicas: Replicas) -> Measurement:
     drums, given = [read(replica) for replica in replicas], replicas[0].parameters
     found, zero, limit, first = [estimates(drum) for drum in drums], Estimate(0.0, 0.0), given["impact_speed"], drums[0]
     references = dict.fromkeys(("power_ratio", "lift_over_weight"), Estimate(1.0, 0.0))
-    begin = f"contacts that begin with {limit:g} m/s or more"
+    begin = f"contacts that begin at {limit:g} m/s or more"
     details = {"impacts_per_revolution": f"{begin}; {first.logs} logs",
-               "impact_loss_share": f"{begin}; the rest is lost in rolling and sliding contacts"}
+               "impact_loss_share": f"{begin}; the rest is dissipated in rolling and sliding contacts"}
     values = {
         "certificate_max": Value(Estimate(max(drum.certificate for drum in drums), 0.0, "every step of every run"), zero),
         "energy_balance_error": Value(Estimate(max(drum.energy_error for drum in drums), 0.0, "worst row of time.csv"), zero),
@@ -34,20 +34,20 @@ def measure(replicas: Replicas) -> Measurement:
     recorded = np.mean([drum.recorded / drum.lost.sum() for drum in drums])
     share = given["drum_speed"] / math.sqrt(given["gravity"] / first.radius)
     remarks = [
-        (f"{first.logs} logs in a drum of radius {first.radius:.3g} m; its speed is {share:.0%} of the critical one, at which logs would "
-         "stay at the shell all around."),
-        "The last revolution of the first load of each engine lies as an animation (GIF) among the figures beside the report.",
-        f"The records of contacts that ended hold {recorded:.0%} of the energy lost in the window; contacts that last are not in them.",
+        (f"{first.logs} logs in a drum of radius {first.radius:.3g} m; its speed is {share:.0%} of the critical speed, at which logs would "
+         "stay on the shell all the way round."),
+        "The figures of the report include an animation (GIF) of the last revolution of the first load of each engine.",
+        f"Records of ended contacts account for {recorded:.0%} of the energy dissipated in the window; ongoing contacts are missing.",
     ]
     if given["drum_radius"] is not None and given["drum_radius"] > 0.0:
-        remarks.append("The drum's radius is given, so the number of logs follows from it and the filling; log_count is not used.")
+        remarks.append("The number of logs follows from the given drum radius and the filling; log_count is not used.")
     if len(replicas) < 3:
         remarks.append("With fewer than three loads the intervals come from quarter revolutions within the run.")
     return Measurement(values, profiles(drums, limit), remarks, fields(replicas))
 
 
 def study(_name: str, points: Points, along: str) -> Measurement:
-    """The studies `filling` and `speed`: curves of impacts, peak forces and power, and the power of `along` that each grows with."""
+    """The studies `filling` and `speed`: curves of impacts, peak forces and power, and the exponent of `along` of each."""
     points, place = ordered(points, along)
     label = {"filling": "filling", "drum_speed": "speed of the drum (rad/s)"}.get(along, along.replace("_", " "))
     values, curves = {}, []
@@ -55,5 +55,5 @@ def study(_name: str, points: Points, along: str) -> Measurement:
         grown = Growth.of(points, quantity, place, 1e-3 if unit[0] == "k" else 1.0)
         values[f"{quantity}_exponent"] = Value(grown.exponent, detail=f"slope of a line through {len(points)} points on logarithmic axes")
         curves.append(grown.curve(quantity, title, label, title.lower() + ("" if unit == "1" else f" ({unit})")))
-    remark = "Every point is a drum of the same size; the logs of each are loaded anew and run in for the same number of revolutions."
+    remark = "All points are drums of the same size, each loaded separately and run in for the same number of revolutions."
     return Measurement(values, curves, [remark])

@@ -1,4 +1,4 @@
-"""Granular collapse: run-out and height of the deposit beside the experiments with glass beads, and their exponents in a = H/W.
+"""Granular collapse: run-out and height of the deposit compared with experiments with glass beads, and their exponents in a = H/W.
 
 Columns of few grains run out less far: the deposit ends where it is half a layer thin, and that is a length in grains. So run-out and
 height of three widths of the column are carried on along d/W, in which they are linear, to columns as wide as those of the experiments.
@@ -52,16 +52,16 @@ def deposit(replica: Replica) -> dict[str, float]:
 def measure(replicas: Replicas) -> Measurement:
     """Run-out and height of columns of one width, and the surface of the deposit."""
     found = [deposit(replica) for replica in replicas]
-    alone = "one run of a chaotic motion says nothing about its spread"
+    alone = "one run of a chaotic motion gives no scatter between runs"
     of = {name: over_replicas([Estimate(one[name], math.inf, alone) for one in found]) for name in ("aspect_ratio_measured", *TITLES)}
-    moving = "" if all(one["rests"] for one in found) else "The deposit still moves when the run ends. "
+    moving = "" if all(one["rests"] for one in found) else "The deposit is still moving at the end of the run. "
     return Measurement({name: Value(one) for name, one in of.items()}, [_surface(replicas)],
-                       [f"{moving}Verdicts are those of the studies, which know what the number of grains makes of it."])
+                       [f"{moving}Verdicts are given by the studies, which include the effect of the number of grains."])
 
 
 def study(name: str, results: Points, along: str) -> Measurement:
-    """Along the width: run-out and height of columns as wide as the measured ones. Along the aspect ratio: exponents beside the measured
-    ones. Along friction: how much hangs on it."""
+    """Along the width: run-out and height of columns as wide as the measured ones. Along the aspect ratio: exponents and the measured
+    ones. Along friction: sensitivities."""
     results, place = ordered(results, along)
     if along == "column_width":
         return _as_wide(results)
@@ -108,7 +108,7 @@ def _as_wide(results: Points) -> Measurement:
         curves.append(profile(f"{quantity}_width", title, "d/W", "over W", place[order], [np.append(sizes, simulated.value)[order]],
                               half=np.append(halves, simulated.half)[order], reference=np.full(len(place), reference.value),
                               reference_half=np.full(len(place), reference.half), reference_label="Lajeunesse et al. (2005)",
-                              note="The leftmost point is the straight line through the others, carried on."))
+                              note="The leftmost point is extrapolated by a straight line through the others."))
     return Measurement(values, curves)
 
 

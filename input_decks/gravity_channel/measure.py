@@ -17,7 +17,7 @@ from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas
 # Quantities without a verdict where no steady flow was found.
 FLOW = ("greatest_velocity", "slip_velocity", "velocity_ratio", "shear_zone_thickness", "core_flatness")
 # What grows with the width: the curve's title and label, and the published power.
-GROWN = {"greatest_velocity": ("Greatest velocity", "u_max (m/s)", 0.5), "slip_velocity": ("Velocity at the wall", "u_slip (m/s)", 0.5),
+GROWN = {"greatest_velocity": ("Maximum velocity", "u_max (m/s)", 0.5), "slip_velocity": ("Velocity at the wall", "u_slip (m/s)", 0.5),
          "thickness": ("Thickness of the shear zones", "thickness / d", 1.0)}
 
 
@@ -45,7 +45,7 @@ def study(_name: str, points: Points, along: str) -> Measurement:
              "thickness": Growth.of(points, "shear_zone_thickness", cells)}
     reasons = [next(one["reason"] for one in point["quantities"] if one["name"] == "greatest_velocity") for point in points]
     broken = next((f"W = {width:.0f} d: {reason}" for width, reason in zip(cells, reasons, strict=True) if reason), "")
-    short = f"the abstract speaks of sufficiently wide channels and names no width; these are {cells[0]:.0f} to {cells[-1]:.0f} d"
+    short = f"the abstract refers to sufficiently wide channels without a width; these are {cells[0]:.0f} to {cells[-1]:.0f} d"
     scaled = [tuple(np.array(one[part], float) for part in ("place", "value"))
               for point in points for one in point["profiles"] if one["name"] == "scaled_velocity"]
     amplitude, worst = common_exponential(scaled)
@@ -56,10 +56,10 @@ def study(_name: str, points: Points, along: str) -> Measurement:
         **{f"exponent_{name}": Value(grown[name].exponent, exact(power), reason=broken or short) for name, (*_, power) in GROWN.items()},
         "ratio_spread": Value(spread, exact(0.0), reason=broken),
         "profile_collapse": Value(
-            Estimate(worst, 0.0, "largest of all places and widths"), exact(0.0),
-            reason=broken or "the abstract does not say how the profile is scaled; this scaling was chosen here, with first runs at hand",
+            Estimate(worst, 0.0, "largest over all positions and widths"), exact(0.0),
+            reason=broken or "the abstract does not state how the profile is scaled; this scaling was chosen here after the first runs",
             detail=f"(u_max − u)/(u_max − u_slip) against {amplitude:.2f} exp(−distance/thickness) in cells of one diameter; the distance "
-                   "is that from the layer at the wall"),
+                   "is measured from the layer at the wall"),
     }
     curves = [grown[name].curve(name, title, "width W / d", label, power, "proportional to " + ("√W" if power == 0.5 else "W"))
               for name, (title, label, power) in GROWN.items()]
@@ -67,6 +67,6 @@ def study(_name: str, points: Points, along: str) -> Measurement:
     core, wall = (Growth.of(points, name, cells).values for name in ("solid_fraction", "wall_solid_fraction"))
     loose = ", ".join(f"{one:.3f} and {other:.3f} at {width:.0f} d" for one, other, width in zip(core, wall, cells, strict=True))
     return Measurement(values, curves, [
-        (f"Solid fraction of the core and within two diameters of the walls: {loose}. Velocities in proportion to √W belong to shear zones "
-         "of the same solid fraction; those of a channel in which the plug leaves them room for one or two layers only get looser as it "
-         "gets wider, and the flow faster.")])
+        (f"Solid fraction of the core and within two diameters of the walls: {loose}. Velocities proportional to √W require shear zones "
+         "of the same solid fraction; in a channel in which the plug leaves room for only one or two layers they become looser with the "
+         "width, and the flow becomes faster.")])

@@ -1,4 +1,4 @@
-"""Discharge of a bin: mass that has left against time, beside a published curve, and the law of Beverloo in the width of the slot.
+"""Discharge of a bin: discharged mass against time, compared with a published curve, and the law of Beverloo in the width of the slot.
 
 Times are counted from the moment at which 10 % of the mass have left: published curves do not say how their gate opens. V&V 20: the error
 E = S − D is known within U_val, U_val² = U_num² + U_input² + U_D²; studies of friction and stiffness find U_input and U_num.
@@ -34,7 +34,7 @@ PUBLISHED = Path(__file__).with_name("reference") / "anand_2008.csv"
 LOW, HIGH, K = 0.1, 0.7, 1.4
 # 95 % limits of a digitised point: the largest difference of two digitisations.
 READ = 0.0035
-TITLES = ("Mass discharged", "time since 10 % have left (s)", "over the mass of all grains")
+TITLES = ("Discharged mass", "time since 10 % discharged (s)", "fraction of the mass of all grains")
 # What makes a run one of the published bin.
 ANAND = {"grain_count": 6790, "grain_diameter": 0.00224, "bin_width": 0.12544, "bin_depth": 0.0056, "outlet_width": 0.025088}
 
@@ -126,7 +126,7 @@ def measure(replicas: Replicas) -> Measurement:
 
 
 def _whole(share: float, run: Discharge) -> Estimate:
-    return Estimate(share, abs(share - float(run.share[-max(2, len(run.share) // 20)])), "what left in the last twentieth of the time")
+    return Estimate(share, abs(share - float(run.share[-max(2, len(run.share) // 20)])), "mass discharged in the last 5 % of the time")
 
 
 def _mean(runs: Sequence[Discharge], times: Array) -> list[Array]:
@@ -155,14 +155,14 @@ def _plain(runs: Sequence[Discharge]) -> Curve:
 
 
 def study(name: str, points: Points, along: str) -> Measurement:
-    """The law of Beverloo in the width of the slot; or what the parameter that is varied makes of the rate."""
+    """The law of Beverloo in the width of the slot; or the effect of the varied parameter on the rate."""
     points, places = ordered(points, along)
     if name != "outlet":
         one = next(point for point in points if point["variant"] == "anand")
         found = np.array([measured(point, "rate").value for point in points])
         half, rate, due = float(np.ptp(found)), measured(one, "rate"), datum()["rate"]
         varied = {"input": 0.5 * half, "num": 0.0} if name == "friction" else {"input": 0.0, "num": half}
-        joint = Estimate(rate.value, math.hypot(rate.half, *varied.values()), "scatter and what is varied")
+        joint = Estimate(rate.value, math.hypot(rate.half, *varied.values()), "scatter and effect of the varied parameter")
         return Measurement({"rate": Value(joint, due, detail=compared(rate.value, due, sim=rate.half, **varied).text)},
                            [profile("rate", "Discharge rate", along, "1/s", places, [found])])
     every = [measured(point, "mass_rate") for point in points]

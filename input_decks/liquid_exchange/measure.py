@@ -1,4 +1,4 @@
-"""Liquid exchange: what every grain, the wall and the bridges own, against the rule on the given paths. Round-off is all that may differ.
+"""Liquid exchange: the liquid of each grain, the wall and the bridges against the rule on the prescribed paths, to round-off.
 
 The reference follows from the parameters alone, so that the set-up of the decks is checked, too.
 """
@@ -49,4 +49,4 @@ def measure(replicas: Replicas) -> Measurement:
     curves = [profile(name, title, "time (s)", "V (mm³)", times["time"], [1e9 * found], reference=1e9 * known, reference_label="rule")
               for name, title, found, known in [*shown, ("bridges", "Liquid in bridges", times["liquid_bridges"], due.bridges)]]
     return Measurement(values | {"changes": number(changes, changes_due)}, curves,
-                       [f"All liquid: {total:.6g} m³. Paths are given; forces move nothing."])
+                       [f"Total liquid: {total:.6g} m³. The paths are prescribed; forces have no effect."])

@@ -29,7 +29,7 @@ def measure(replicas: Replicas) -> Measurement:
     values = {
         f"velocity_{log + 1}_after": number(
             final[log], due[log], bound=1.25 * abs(with_loss[log] - due[log]) + phase * speed, scale=speed,
-            detail=f"the scheme's loss at its step is expected to change it by {with_loss[log] - due[log]:+.2e} m/s")
+            detail=f"the numerical dissipation of the scheme is expected to change it by {with_loss[log] - due[log]:+.2e} m/s")
         for log in range(len(final))
     } | {
         "scheme_deviation": number(np.abs(final - with_loss).max() / speed, 0.0, bound=phase),
@@ -40,5 +40,5 @@ def measure(replicas: Replicas) -> Measurement:
     }
     shares = ", ".join(f"{value:.4f}" for value in due / speed)
     return Measurement(values, row_curves(run, chain, motion), [
-        (f"Exact velocities after, over that of the first log: {shares} ({motion.events} contacts close or open on the way). All act at "
-         "the same time; a row of separate pairs would hand on the whole speed.")])
+        (f"Exact velocities after, over that of the first log: {shares} ({motion.events} contacts close or open meanwhile). All act at "
+         "the same time; a row of separate pairs would pass on the whole velocity.")])

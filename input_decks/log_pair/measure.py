@@ -40,9 +40,9 @@ def measure(replicas: Replicas) -> Measurement:
     end = run.kinetic[-1] + run.history["elastic_energy"][-1] + run.history["dissipated_energy"][-1]
     values = {
         "peak_force": number(run.history["highest_force"][-1], motion.peak, bound=0.5 * loss + 0.75 * square, scale=motion.peak,
-                             detail="damped" if damped else f"the scheme's own deviation is −π/4 (2θ−1) ωτ = {-50.0 * loss:.2g} %"),
+                             detail="damped" if damped else f"the deviation of the scheme is −π/4 (2θ−1) ωτ = {-50.0 * loss:.2g} %"),
         "contact_time": number(run.impacts[0, 3] if len(run.impacts) else math.nan, duration, bound=run.time_step + 1e-12 * duration,
-                               scale=duration, detail=f"counted in whole steps, so that one more or less is due; ωτ = {turn:.3g}"),
+                               scale=duration, detail=f"counted in whole steps, hence uncertain by one step; ωτ = {turn:.3g}"),
         **velocities(run, bodies, motion, loss + 0.25 * square),
         "restitution": number(e, e_exact * math.exp(-loss), bound=0.25 * square + turned, detail=f"exact two-body solution: {e_exact:.6f}"),
         "velocity_curve_error": number(np.abs(run.velocities[:, 0, :2] - motion.velocities[:, 0]).max() / bodies.speed),
@@ -54,8 +54,8 @@ def measure(replicas: Replicas) -> Measurement:
     if not on_wall:
         values |= {"momentum_error": number(run.momentum_error(), 0.0), "angular_momentum_error": number(run.angular_momentum_error(), 0.0)}
     if damped:
-        values |= {name: replace(one, bound=None, reason="with damping the scheme's loss has no formula") for name, one in values.items()
-                   if one.bound is not None}
+        values |= {name: replace(one, bound=None, reason="there is no formula for the dissipation of the scheme with damping")
+                   for name, one in values.items() if one.bound is not None}
     elif bodies.offset == 0.0 and len(run.impacts):
         change = p["mass_1"] * float(np.linalg.norm(run.velocities[-1, 0] - run.velocities[0, 0]))
         values["impulse"] = number(run.impacts[0, 5], change, scale=change)
@@ -74,4 +74,4 @@ def study(_name: str, points: Points, along: str) -> Measurement:
         values[f"order_{quantity}"] = number(errors.exponent.value, order, detail=f"relative errors {told}")
         curves.append(errors.convergence(f"convergence_{quantity}", label, "τ (s)", order))
     return Measurement(values, curves,
-                       [f"θ = {theta:g}. Each impact begins at the end of a step, so that the errors differ by the step alone."])
+                       [f"θ = {theta:g}. Each impact begins at the end of a step, so that the errors depend on the step only."])

@@ -1,4 +1,4 @@
-"""Moving walls: forces on held grains beside the contact law, on a bed beside one at rest, landings of a grain, impulse of the walls."""
+"""Moving walls: forces on fixed grains against the contact law, on a bed against one at rest, landings of a grain, impulse of the walls."""
 
 import math
 from collections.abc import Mapping
@@ -54,7 +54,7 @@ def _held(run: Replica) -> tuple[dict[str, float], list[Curve]]:
     size = amplitude(SimpleNamespace(**p))
     last = times > times[-1] - 2.0 / p["motion_frequency"]
     return {"place_error": float(np.abs(plate - way)[late].max() / size)}, [
-        _curve("place", "Place of the plate, by the force on a held grain", times[last], plate[last], way[last], "m")]
+        _curve("place", "Position of the plate from the force on a fixed grain", times[last], plate[last], way[last], "m")]
 
 
 def _bed(run: Replica) -> tuple[dict[str, float], list[Curve]]:
@@ -68,9 +68,9 @@ def _bed(run: Replica) -> tuple[dict[str, float], list[Curve]]:
     weight, lasts = masses.sum() * np.linalg.norm(gravity), times[-1] - times[0]
     missing = impulse + masses.sum() * gravity * lasts - (momentum[1] - momentum[0])
     push = (forces - masses[:, None] * gravity).ravel()
-    label = "frame by frame, grain by grain, x, y, z"
+    label = "index: by frame, grain and component"
     return {"impulse_error": float(np.linalg.norm(missing) / (weight * lasts))}, [
-        profile("forces", "Forces of contacts on all grains", label, "N", np.arange(len(push), dtype=float), [push])]
+        profile("forces", "Contact forces on all grains", label, "N", np.arange(len(push), dtype=float), [push])]
 
 
 def _bounce(run: Replica) -> tuple[dict[str, float], list[Curve]]:
@@ -93,7 +93,7 @@ def _curve(name: str, title: str, times: Array, found: Array, due: Array, unit: 
 
 
 def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001 (there is one study)
-    """Forces in vessels that move beside those in vessels at rest."""
+    """Forces in moving vessels against those in vessels at rest."""
     forces = {point["parameters"][along]: _forces(point) for point in points}
     pairs = {"speed_error": ("speed", "rest"), "push_error": ("push", "tilt")}
     return Measurement({found: Value(exact(float(np.abs(forces[one] - forces[other]).max() / np.abs(forces[other]).max())), exact(0.0))

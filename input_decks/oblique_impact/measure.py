@@ -1,4 +1,4 @@
-"""Oblique impact: what each sphere does after it, and what that is worth beside the measurement.
+"""Oblique impact: the motion of each sphere after it, compared with the measurement.
 
 V&V 20: the error E = S − D of a simulated value S against the datum D is known within U_val, U_val² = U_num² + U_input² + U_D². A run knows
 U_input, from spheres with changed inputs; the study of three time steps adds U_num and the datum, and has the verdicts.
@@ -49,11 +49,11 @@ def measure(replicas: Sequence[Replica]) -> Measurement:
     for k, row in enumerate(rows):
         nominal, *changed = found[row["quantity"]][k :: len(rows)]
         values[row["name"]] = Value(Estimate(nominal, math.dist([nominal] * len(changed), changed), "uncertainty of the inputs"))
-    return Measurement(values, remarks=["Verdicts are those of the study, which knows what the time step leaves."])
+    return Measurement(values, remarks=["Verdicts are given by the study, which includes the error of the time step."])
 
 
 def study(_name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measurement:
-    """The simulation with the smallest time step beside the measurement, with all parts of U_val."""
+    """The simulation with the smallest time step against the measurement, with all parts of U_val."""
     steps = [refinement(along, point["parameters"][along]) for point in points]
     runs = [{one["name"]: one for one in point["quantities"]} for point in points]
     fine, rows, values, known = runs[int(np.argmin(steps))], measured(), {}, 0
@@ -62,14 +62,14 @@ def study(_name: str, points: Sequence[Mapping[str, Any]], along: str) -> Measur
         of_inputs = 0.5 * (one["interval"][1] - one["interval"][0])
         of_steps = _of_steps(steps, [run[row["name"]]["value"] for run in runs])
         simulated = Estimate(one["value"], math.hypot(of_inputs, of_steps), "inputs and time step")
-        datum = Estimate(row["value"], math.hypot(row["value_digitised"], row["value_measured"]), "measurement and its reading")
+        datum = Estimate(row["value"], math.hypot(row["value_digitised"], row["value_measured"]), "measurement and reading of the figure")
         error = compared(simulated.value, datum, num=of_steps, input=of_inputs)
         known += error.seen
         values[row["name"]] = Value(simulated, datum, detail=error.text)
     return Measurement(values, [_curve(quantity, [(row["angle"], values[row["name"]]) for row in rows if row["quantity"] == quantity])
                                 for quantity in TITLES], [
-        f"At {known} of {len(rows)} points |E| exceeds U_val: an error of the model is seen there, whether or not the tolerance allows it.",
-        "Friction was inferred from the same experiment, in gross sliding (beyond 32°); what is below that angle is predicted."])
+        f"At {known} of {len(rows)} points |E| exceeds U_val: a model error is detected there, whether or not the tolerance allows it.",
+        "Friction was inferred from the same experiment, in gross sliding (beyond 32°); below that angle the values are predictions."])
 
 
 def _of_steps(steps: Sequence[float], values: Sequence[float]) -> float:

@@ -1,4 +1,4 @@
-"""Penetration: the bed before the ball comes, and the height of the ball against time, beside what eight codes published."""
+"""Penetration: the bed before the ball comes, and the height of the ball against time, compared with eight published codes."""
 
 import csv
 import math
@@ -10,7 +10,7 @@ from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Re
 from dembark.postproc.spheres import slice_volumes
 
 REFERENCE = Path(__file__).with_name("reference")
-ONE_RUN = "one packing says nothing about how packings scatter"
+ONE_RUN = "one packing gives no scatter between packings"
 
 
 def published() -> dict[str, list[float]]:
@@ -65,7 +65,7 @@ def flight(replica: Replica) -> dict[str, float]:
 
 
 def measure(replicas: Replicas) -> Measurement:
-    """Each quantity over the packings beside the mean of the codes' means."""
+    """Each quantity over the packings against the mean of the codes' means."""
     runs, known = [bed(one) | flight(one) for one in replicas], published()
     values = {"free_flight": Value(exact(max(map(free_flight, replicas))), exact(0.0))}
     for name in (name for name in runs[0] if all(name in run for run in runs)):
@@ -74,8 +74,8 @@ def measure(replicas: Replicas) -> Measurement:
         values[name] = Value(over_replicas([Estimate(run[name], math.inf, ONE_RUN) for run in runs]), reference,
                              detail=f"means of {len(codes)} codes: {min(codes):.6g} to {max(codes):.6g}" if len(codes) > 1 else "")
     return Measurement(values, curves(replicas), [
-        "The packings are not those of the publication: they are made to its solid fraction. Packings scatter more than codes.",
-        "From 40 ms on the ball flies freely, so that all later heights say one thing, its speed on leaving the bed."])
+        "The packings are not the published ones: they are generated with the same solid fraction. Packings scatter more than codes.",
+        "From 40 ms on the ball flies freely, so that all later heights express one quantity, its speed on leaving the bed."])
 
 
 def curves(replicas: Replicas) -> list[Curve]:
@@ -93,4 +93,4 @@ def curves(replicas: Replicas) -> list[Curve]:
         return drawn | {"reference_low": list(low - less), "reference_high": list(high - less)}
 
     return [curve("ball_height", "Height of the ball", "z (mm)", np.zeros(len(mean))),
-            curve("ball_height_difference", "Height of the ball less the mean of the codes", "difference (mm)", mean)]
+            curve("ball_height_difference", "Height of the ball minus the mean of the codes", "difference (mm)", mean)]

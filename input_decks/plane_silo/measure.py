@@ -20,6 +20,6 @@ def measure(replicas: Replicas) -> Measurement:
     """Values, profiles and remarks of all replicas of a series."""
     given = replicas[0].parameters
     found = silo.measured([read(replica) for replica in replicas], "W", "x", replicas[0].derived)
-    remark = (f"The slab is a period of {given['slab_depth'] / given['grain_diameter']:.1f} d, so that grains pack in three dimensions; a "
-              "layer one grain deep would need walls in front and behind, which carry weight too, or grains that are held in a plane.")
+    remark = (f"The period of the slab is {given['slab_depth'] / given['grain_diameter']:.1f} d, so that grains pack in three dimensions; "
+              "a layer one grain deep would need front and rear walls, which carry weight too, or grains constrained to a plane.")
     return replace(found, remarks=[*found.remarks, remark])

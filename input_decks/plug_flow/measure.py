@@ -13,9 +13,9 @@ LEAST_DEFICIT = 0.02
 # What nothing is said of when no steady part was found.
 JUDGED = ("core_flatness", "flux_error", "inertial_number", "force_balance_error")
 REMARKS = (
-    "The published flow is driven by gravity alone; here the plate sets the speed, so the widths are shown and not judged by it.",
-    ("Published widths of shear zones exist for rough and smooth walls; none of these papers could be read for this report, so no range is "
-     "quoted."),
+    "The published flow is driven by gravity alone; here the plate sets the speed, so the widths are shown without a verdict.",
+    ("Published widths of shear zones exist for rough and smooth walls; none of these papers was available for this report, so no range is "
+     "given."),
 )
 
 
@@ -25,7 +25,7 @@ def measure(replicas: Replicas) -> Measurement:
     found = [channel_plug.estimates(one) for one in channels]
     over = {name: pooled(found, name) for name in found[0]}
     first, unsteady, slip = channels[0], next((one.remark for one in channels if one.remark), ""), 1.0 - over["wall_slip"].value
-    faint = f"the walls' layer lags by {slip:.1%} only: no shear zone to measure" if slip < LEAST_DEFICIT else ""
+    faint = f"the layer at the walls lags by only {slip:.1%}: no shear zone to measure" if slip < LEAST_DEFICIT else ""
     values = {name: Value(one) for name, one in over.items()}
     values |= {name: Value(over[name], Estimate(0.0, 0.0), reason=unsteady) for name in JUDGED}
     values |= {name: Value(over[name], reason=faint, compared=not faint) for name in ("shear_zone_width", "shear_zone_width_90")}
@@ -34,7 +34,7 @@ def measure(replicas: Replicas) -> Measurement:
     fields = channel_fields.measured(replicas, unsteady)
     steady = f"The steady part holds {first.steady_share:.0%} of the measuring window (MSER-5 and a drift test on the wall friction)."
     d, window = first.diameter, first.levels[-1] - first.levels[0]
-    size = (f"The channel is {first.width / d:.0f} d wide and filled {first.height / d:.0f} d high; the cells that rest in the laboratory "
-            f"cover {window / d:.0f} d of it.")
+    size = (f"The channel is {first.width / d:.0f} d wide and filled {first.height / d:.0f} d high; the cells, which are at rest in the "
+            f"laboratory frame, cover {window / d:.0f} d of it.")
     remarks = [unsteady + "." if unsteady else steady, size, *REMARKS]
     return Measurement({**values, **liquid_values(replicas), **fields.values}, channel_plug.profiles(channels), remarks, fields.fields)

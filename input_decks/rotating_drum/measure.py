@@ -1,4 +1,4 @@
-"""Rotating drum: flow on the normal of the free surface through the axis, beside particle tracking and another code.
+"""Rotating drum: flow on the normal of the free surface through the axis, compared with particle tracking and another code.
 
 V&V 20: the error E = S − D of a simulated value S against the datum D is known within U_val, U_val² = U_num² + U_input² + U_D². A run knows
 how it scatters in time and the limits of the datum; the studies of friction and stiffness add U_input and U_num.
@@ -69,7 +69,7 @@ def measure(replicas: Replicas) -> Measurement:
         values["centrifuging"] = Value(over["overhead"], exact(row["centrifuging"]))
         if flows:
             depth, angle, d = over["layer_depth"], over["surface_angle"], given["grain_diameter"]
-            datum = Estimate(row["angle"], row["angle_limit"], "scatter of the other code")
+            datum = Estimate(row["angle"], row["angle_limit"], "scatter in the other code")
             values["repose_angle"] = Value(angle, datum, detail=compared(angle.value, datum, sim=angle.half).text)
             values["layer_over_diameter"] = Value(Estimate(depth.value / d, depth.half / d, depth.basis), exact(row["layer"])
                                                   if math.isfinite(row["layer"]) else None)
@@ -77,7 +77,7 @@ def measure(replicas: Replicas) -> Measurement:
 
 
 def speeds(drums: list[Tumbler], beside: bool) -> Curve:
-    """The speed along the surface over n, beside what was tracked."""
+    """The speed along the surface over n, with the tracked points."""
     every = np.ones(len(drums[0].solid), bool)
     known = ~np.isnan([drum.velocity(every) for drum in drums]).any(axis=0)
     place = drums[0].middle[known]
@@ -111,15 +111,15 @@ def study(name: str, points: Points, along: str) -> Measurement:
         half = (0.5 if name == "friction" else 1.0) * float(np.ptp([one.value for one in found]))
         one = measured(middle, quantity)
         varied = {"input": half, "num": 0.0} if name == "friction" else {"input": 0.0, "num": half}
-        values[quantity] = Value(Estimate(one.value, math.hypot(one.half, half), "scatter in time and what is varied"), datum[quantity],
-                                 detail=compared(one.value, datum[quantity], sim=one.half, **varied).text)
+        values[quantity] = Value(Estimate(one.value, math.hypot(one.half, half), "scatter in time and effect of the varied parameter"),
+                                 datum[quantity], detail=compared(one.value, datum[quantity], sim=one.half, **varied).text)
     curves = [profile(quantity, quantity.replace("_", " "), along, quantity, places,
                       [np.array([measured(point, quantity).value for point in points])]) for quantity in FLOW]
     return Measurement(values, curves)
 
 
 def angles(points: Points) -> Measurement:
-    """The curve of angles beside that of the other code."""
+    """The curve of angles with that of the other code."""
     found, place = [measured(point, "repose_angle") for point in points], [measured(point, "froude").value for point in points]
     rows = [other_code()[point["variant"]] for point in points]
     datum, limit = (np.array([row[key] for row in rows]) for key in ("angle", "angle_limit"))

@@ -42,4 +42,4 @@ def measured(p: Numbers, flight: Flight) -> Measurement:
     else:
         more, curves = (mirrored if one.spin.any() else head_on)(one, flight, known)
     return Measurement(values | more, curves,
-                       [f"{one.duration.min() / p['time_step']:.0f} steps from touch to release in the shortest impact, after Hertz."])
+                       [f"{one.duration.min() / p['time_step']:.0f} steps from touch to release in the shortest impact, by Hertz's law."])

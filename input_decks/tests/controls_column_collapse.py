@@ -14,9 +14,9 @@ from dembark.input_decks.tests.test_collapse_measure import column_collapse, fou
 def controls(folder: Path) -> Iterator[Control]:
     right = found(replica(folder / "right"))
     for name, spoil in {
-            "a hundredth of the damping that is not booked": spoiled(normal_viscous=lambda work: 0.99 * work),
+            "a hundredth of the damping missing from the account": spoiled(normal_viscous=lambda work: 0.99 * work),
             "gravity doubled in the potential energy": spoiled(potential_energy=lambda energy: 2.0 * energy),
-            "damping that drives": spoiled(tangential_viscous=np.negative)}.items():
+            "damping that adds energy": spoiled(tangential_viscous=np.negative)}.items():
         yield Control(name, right, found(replica(folder / name, spoil)))
     yield Control("a step error of first order", *(judged("column_collapse", column_collapse.study("step", points(order, 0.05),
                                                                                               "time_step_fraction"))

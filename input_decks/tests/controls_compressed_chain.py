@@ -24,8 +24,8 @@ def with_integrator(folder: Path, integrate: Any) -> dict[str, Any]:
 
 def controls(folder: Path) -> Iterator[Control]:
     right, rough = verdicts(folder), verdicts(folder, 0.2)
-    yield Control("a step that is a millionth longer than told", right, verdicts(folder, longer=1.0 + 1e-6))
-    yield Control("a monitor that tells a twentieth too much", rough, verdicts(folder, 0.2, told=1.05))
+    yield Control("a step that is a millionth longer than prescribed", right, verdicts(folder, longer=1.0 + 1e-6))
+    yield Control("a monitor that reports values a twentieth too large", rough, verdicts(folder, 0.2, told=1.05))
     second = spoiled(lambda step, time: 0.1 * step**2 * time)
     yield Control("an integrator of second order", right, with_integrator(folder, second))
     yield Control("an integrator that damps", right, with_integrator(folder, spoiled(lambda _, time: 1e-3 * time)))

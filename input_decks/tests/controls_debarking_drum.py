@@ -15,5 +15,5 @@ def controls(folder: Path) -> Iterator[Control]:
     with patch.object(drum, "fields", lambda _: None):
         right = measured(replica(folder / "right"))
         for name, change in {"a step that is not solved": {"certificate": 2e-10}, "a hundredth of the energy that vanishes": {"leak": 0.01},
-                             "a drum that takes a twelfth too much power": {"leak": 0.08}, "gravity 3 % too weak": {"lift": 0.97}}.items():
+                             "a drum with a twelfth too much power": {"leak": 0.08}, "gravity 3 % too weak": {"lift": 0.97}}.items():
             yield Control(name, right, measured(replica(folder / name, **change)))

@@ -19,7 +19,7 @@ def widths(folder: Path, slips: tuple[float, ...]) -> Verdicts:
 
 def controls(folder: Path) -> Iterator[Control]:
     right = measured(gravity_channel(folder / "right"))
-    yield Control("a fluid's parabola", right, measured(gravity_channel(folder / "fluid", slip=0.0, decay=6.0)))
+    yield Control("the parabolic profile of a fluid", right, measured(gravity_channel(folder / "fluid", slip=0.0, decay=6.0)))
     yield Control("walls with nine tenths of the friction", right, measured(gravity_channel(folder / "walls", friction=0.9)))
     yield Control("a slip that does not grow with the width", widths(folder / "grown", (2.0, 2.0, 2.0)),
                   widths(folder / "same", (2.4, 2.0, 1.6)))

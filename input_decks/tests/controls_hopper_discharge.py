@@ -11,8 +11,9 @@ from dembark.input_decks.tests.test_hopper_discharge import hopper, points, verd
 
 def controls(_folder: Path) -> Iterator[Control]:
     right = verdicts()
-    yield Control("an eighth slower", right, verdicts(faster=0.875))
+    yield Control("a discharge an eighth slower", right, verdicts(faster=0.875))
     yield Control("steeper slopes remain", right, verdicts(left=0.2))
     right = judged("hopper_discharge", hopper.study("outlet", points(), "outlet_width"))
-    for name, change in {"a liquid's rate": {"exponent": 1.0}, "grains as wide as a third of their diameter": {"k": 0.5}}.items():
+    for name, change in {"the discharge rate of a liquid": {"exponent": 1.0},
+                         "grains as wide as a third of their diameter": {"k": 0.5}}.items():
         yield Control(name, right, judged("hopper_discharge", hopper.study("outlet", points(**change), "outlet_width")))

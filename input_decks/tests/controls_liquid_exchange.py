@@ -31,6 +31,6 @@ def controls(folder: Path) -> Iterator[Control]:
     for name, spoil in {"liquid that dries up": dried, "liquid that drains": drained, "a grain that is counted twice": twice}.items():
         yield Control(name, right, of_run(replica(folder / name, "limited", spoil)))
     for name, change in {"paths half as wide": {"amplitude": 0.5 * values("limited")["amplitude"]},
-                         "halves given back instead of what was taken": {"liquid_return": "equal"}}.items():
+                         "halves returned instead of what was taken": {"liquid_return": "equal"}}.items():
         wrong = by_the_rule(values("limited", **change), STEPS)
         yield Control(name, right, of_run(replica(folder / name, "limited", books=wrong)))

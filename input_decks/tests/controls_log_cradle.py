@@ -18,9 +18,9 @@ def controls(_folder: Path) -> Iterator[Control]:
                         ("log 1 a tenth faster", {"velocity": 1.1 * p["velocity"]})):
         yield Control(name, right, of_cradle(replace(cradle_run(time_step=1e-5, **wrong), parameters=p)))
     lossless = replace(run, parameters=p | {"theta": 0.5})
-    yield Control("the loss of θ = 1 where θ = ½ was asked for",
+    yield Control("the dissipation of θ = 1 where θ = ½ was set",
                   of_cradle(cradle_run(time_step=1e-5, theta=0.5)), of_cradle(lossless))
     pushed = run.velocities.copy()
     pushed[-1, :, 0] += 0.01
-    yield Control("a push from outside", right, of_cradle(replace(run, velocities=pushed)))
+    yield Control("an external push", right, of_cradle(replace(run, velocities=pushed)))
     yield Control("a step that is not solved", right, of_cradle(unsolved(run)))

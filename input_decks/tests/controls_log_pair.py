@@ -34,7 +34,7 @@ def controls(_folder: Path) -> Iterator[Control]:
     softer = pair_run(stiffness_1=0.5 * p["stiffness_1"], stiffness_2=0.5 * p["stiffness_2"])
     yield Control("springs half as stiff", right, of_pair(replace(softer, parameters=p)))
     yield Control("log 1 a tenth faster", right, of_pair(replace(pair_run(velocity_1=1.1 * p["velocity_1"]), parameters=p)))
-    yield Control("the loss of θ = 1 where θ = ½ was asked for",
+    yield Control("the dissipation of θ = 1 where θ = ½ was set",
                   of_pair(pair_run(theta=0.5)), of_pair(replace(run, parameters=p | {"theta": 0.5})))
     oblique = off_centre()
     along, rubbed = np.array([1.0, -1.0])[:, None], oblique.velocities.copy()
@@ -44,9 +44,9 @@ def controls(_folder: Path) -> Iterator[Control]:
     yield Control("friction between smooth logs", of_pair(oblique), of_pair(replace(oblique, velocities=rubbed)))
     pushed = run.velocities.copy()
     pushed[-1, 1] += [0.0, 1e-9, 0.0]
-    yield Control("a push from outside", right, of_pair(replace(run, velocities=pushed)))
+    yield Control("an external push", right, of_pair(replace(run, velocities=pushed)))
     lossy = history | {"dissipated_energy": history["dissipated_energy"] * (1.0 - 1e-6)}
-    yield Control("a millionth of the loss that is not booked", right, of_pair(replace(run, history=lossy)))
+    yield Control("a millionth of the dissipation missing from the account", right, of_pair(replace(run, history=lossy)))
     short = run.impacts * np.where(np.arange(11) == 5, 0.99, 1.0)
     yield Control("an impulse recorded a hundredth too small", right, of_pair(replace(run, impacts=short)))
     yield Control("a step that is not solved", right, of_pair(unsolved(run)))

@@ -29,5 +29,5 @@ def controls(_folder: Path) -> Iterator[Control]:
     yield Control("half of the contacts lost", right, of_pile(kept(walls < 0)))
     yield Control("logs that creep", right, of_pile(replace(run, velocities=run.velocities + np.array([0.1, 0.0, 0.0]))))
     lossy = dict(run.history) | {"dissipated_energy": 0.9 * run.history["dissipated_energy"]}
-    yield Control("a tenth of the loss that is not booked", right, of_pile(replace(run, history=lossy)))
+    yield Control("a tenth of the dissipation missing from the account", right, of_pile(replace(run, history=lossy)))
     yield Control("a step that is not solved", right, of_pile(unsolved(run)))

@@ -52,8 +52,8 @@ def ball(*, gravity: float = 1.0, depth: float = 1.0, duration: float = 1.0, reb
 
 def controls(_folder: Path) -> Iterator[Control]:
     right = ball()
-    yield Control("a bed that is filled 3 % too loosely", right, ball(height=1.03))
+    yield Control("a bed that is 3 % too loose", right, ball(height=1.03))
     yield Control("gravity off by 15 %", right, ball(gravity=1.15))
-    yield Control("a ball that is stopped on seven tenths of the way", right, ball(depth=0.7))
+    yield Control("a ball that is stopped after seven tenths of the distance", right, ball(depth=0.7))
     yield Control("a bed that takes 1.4 times as long to stop it", right, ball(duration=1.4))
-    yield Control("a bed that gives twice the speed back", right, ball(rebound=2.0))
+    yield Control("a bed that returns twice the speed", right, ball(rebound=2.0))

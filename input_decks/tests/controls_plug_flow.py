@@ -16,5 +16,5 @@ def controls(folder: Path) -> Iterator[Control]:
                          "gravity 1 % too weak": {"lift": 0.99},
                          "velocities a twentieth above the displacements": {"faster": 1.05}}.items():
         yield Control(name, right, measured(plug_flow(folder / name, **flat, **change)))
-    yield Control("a plate a tenth faster than told", right, measured(told(plug_flow(folder / "plate", **flat), base_speed=0.018)))
+    yield Control("a plate a tenth faster than prescribed", right, measured(told(plug_flow(folder / "plate", **flat), base_speed=0.018)))
     yield dried("plug_flow")

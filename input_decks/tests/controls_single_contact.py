@@ -53,7 +53,7 @@ def controls(_folder: Path) -> Iterator[Control]:
     yield Control("a modulus a tenth too low", head_on, of("test_1", scaled(e_star=0.9)))
     yield Control("a force a thousandth off at its overlap", head_on,
                   of("test_1", spoil=lambda one: replace(one, forces=1.001 * one.forces)))
-    yield Control("a push from outside", head_on, of("test_1", spoil=lambda one: replace(one, momentum_error=1e-9)))
+    yield Control("an external push", head_on, of("test_1", spoil=lambda one: replace(one, momentum_error=1e-9)))
     for variant in ("test_1", "test_3", "test_4", "test_7"):
         yield Control("restitution a tenth too low", of(variant), of(variant, scaled(restitution=0.9)))
     # Of two mirror images one turns less.

@@ -144,7 +144,7 @@ def test_a_high_column_stands_beside_the_experiments_without_a_verdict(tmp_path:
     assert measured["run_out"]["reference"] == pytest.approx(1.9 * 4.0 ** (2 / 3))
     assert measured["final_height"]["reference"] == pytest.approx(4.0**0.4)
     assert {(measured[name]["verdict"], measured[name]["source"]) for name in ("run_out", "final_height")} == {("info", "Lube et al. 2005")}
-    assert "spheres that roll" in measured["run_out"]["reason"]
+    assert "not rolling spheres" in measured["run_out"]["reason"]
 
 
 def points(order: float, spread: float) -> list[dict[str, Any]]:

@@ -120,8 +120,8 @@ def test_run_out_and_height_of_a_deposit(tmp_path: Path) -> None:
 
 
 def test_what_still_moves_is_told(tmp_path: Path) -> None:
-    assert "still moves" not in deposit(tmp_path / "rests", 12, 0.6, 1.08, 0.59).remarks[0]
-    assert "still moves" in deposit(tmp_path / "moves", 12, 0.6, 1.08, 0.59, speed=0.05).remarks[0]
+    assert "still moving" not in deposit(tmp_path / "rests", 12, 0.6, 1.08, 0.59).remarks[0]
+    assert "still moving" in deposit(tmp_path / "moves", 12, 0.6, 1.08, 0.59, speed=0.05).remarks[0]
 
 
 @pytest.mark.parametrize(("aspect", "run_out", "height", "verdict"), [

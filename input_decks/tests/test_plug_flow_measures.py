@@ -61,5 +61,5 @@ def test_a_window_that_hardly_stays_filled_is_told(tmp_path):
     record = json.loads((folder / "replica-1" / "run.json").read_text())
     record["parameters"]["grain_diameter"] *= 5.0
     (folder / "replica-1" / "run.json").write_text(json.dumps(record))
-    with pytest.raises(RunError, match="of its height stay filled while the plate sinks, take more grains or less travel"):
+    with pytest.raises(RunError, match="of its height stay filled while the plate sinks, use more grains or less travel"):
         measure(folder)

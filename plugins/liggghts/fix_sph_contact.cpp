@@ -11,18 +11,19 @@
 #include "modify.h"
 #include "update.h"
 
+#include "dembark/keyword_reader.hpp"
 #include "fix_sph_body.h"
-#include "keyword_reader.h"
+
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
 using namespace dembark::sph;
-using dembark_liggghts::KeywordReader;
-using dembark_liggghts::text;
+using dembark::keywords::Reader;
+using dembark::keywords::text;
 
 namespace {
 
-Vector read_vector(KeywordReader &in, const std::string &of, const std::string &what) {
+Vector read_vector(Reader &in, const std::string &of, const std::string &what) {
   const double x = in.number(of, what), y = in.number(of, what), z = in.number(of, what);
   return {x, y, z};
 }
@@ -49,7 +50,7 @@ void FixSphContact::refuse(const std::string &what) {
 }
 
 void FixSphContact::read(const std::vector<std::string> &words) {
-  KeywordReader in(words);
+  Reader in(words);
   double friction = 0.5, restitution = 0.5, shortest = 0.0;
   bool stiff = false;
   while (in.left()) {
@@ -74,22 +75,22 @@ void FixSphContact::read(const std::vector<std::string> &words) {
       plane.point = read_vector(in, of, "x, y and z of a point (m)");
       plane.normal = read_vector(in, of, "x, y and z of the normal, into the space of the boxes");
       const double length = norm(plane.normal);
-      if (!(length > 0.0)) dembark_liggghts::refuse("plane: the normal must not be zero");
+      if (!(length > 0.0)) dembark::keywords::refuse("plane: the normal must not be zero");
       plane.normal = (1.0 / length) * plane.normal;
       const double mu = in.number(of, "the coefficient of friction"), e = in.number(of, "the coefficient of restitution");
       plane.touch = Touch::of(e, mu);
-      if (const char *const wrong = plane.touch.error()) dembark_liggghts::refuse(std::string("plane: ") + wrong);
+      if (const char *const wrong = plane.touch.error()) dembark::keywords::refuse(std::string("plane: ") + wrong);
       contacts_.planes.push_back(plane);
     } else {
-      dembark_liggghts::refuse("'" + of + "' is no keyword; known are stiffness, rounding, friction, restitution, box and plane");
+      dembark::keywords::refuse("'" + of + "' is no keyword; known are stiffness, rounding, friction, restitution, box and plane");
     }
   }
   contacts_.between = Touch::of(restitution, friction);
-  if (const char *const wrong = contacts_.between.error()) dembark_liggghts::refuse(wrong);
-  if (!stiff) dembark_liggghts::refuse("stiffness (N/m) is missing: of one corner");
-  if (names_.empty()) dembark_liggghts::refuse("there is no box; name fixes sph/body with their edges");
+  if (const char *const wrong = contacts_.between.error()) dembark::keywords::refuse(wrong);
+  if (!stiff) dembark::keywords::refuse("stiffness (N/m) is missing: of one corner");
+  if (names_.empty()) dembark::keywords::refuse("there is no box; name fixes sph/body with their edges");
   if (!(2.0 * contacts_.radius < shortest))
-    dembark_liggghts::refuse("rounding must be less than half of the shortest edge, " + text(shortest) + " m, not " +
+    dembark::keywords::refuse("rounding must be less than half of the shortest edge, " + text(shortest) + " m, not " +
                              text(contacts_.radius) + " m");
 }
 

@@ -55,9 +55,9 @@ def _maps(datasets: Mapping[str, Any], looks: Looks) -> FieldFigure:
             axes[-1].set_xlabel("x / d", fontsize=7, labelpad=1.0)
             bar(figure, list(axes), scale, paint, label, location="bottom", pad=0.46 / tall, aspect=16, fraction=0.07)
     caption = (
-        "Coarse-grained fields in the window that rests in the laboratory, walls at the left and right end, averaged along the periodic "
-        f"direction and over {first['frames']} frames of the steady part: downward velocity, its slope across the channel, granular "
-        "temperature T = ⟨v′²⟩/3 about the affine mean flow of each cell, solid fraction. "
+        "Coarse-grained fields in the window, at rest in the laboratory frame, walls at the left and right end, averaged along the "
+        f"periodic direction and over {first['frames']} frames of the steady part: downward velocity, its slope across the channel, "
+        "granular temperature T = ⟨v′²⟩/3 about the affine mean flow of each cell, solid fraction. "
         f"Gaussian kernel of width {first['width'] / d:g} d; same colour scales for all engines."
     )
     table = grid_table(["x_m", "z_m", *(name for name, *_ in _MAPS)], {
@@ -88,12 +88,12 @@ def _profiles(datasets: Mapping[str, Any], looks: Looks) -> FieldFigure:
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="lower center", ncols=4, fontsize=6.8)
     caption = (
-        "The same over the whole height of the window, across the channel, with 95 % intervals over time blocks. Full lines: Eulerian, "
-        "momentum over mass in cells at rest; dotted: Lagrangian, displacements of single grains over the same time, smoothed by the same "
-        "kernel."
+        "The same across the channel, averaged over the whole height of the window, with 95 % intervals over time blocks. Full lines: "
+        "Eulerian, momentum over mass in cells at rest; dotted: Lagrangian, displacements of single grains over the same time, smoothed "
+        "with the same kernel."
     )
     columns = {engine: [one.x.values, one.velocity_lagrangian.values,
                         *(one[f"{name}_profile{end}"].values for name in titles for end in ("", "_half"))]
                for engine, one in datasets.items()}
     header = ["x_m", "velocity_lagrangian", *(f"{name}{end}" for name in titles for end in ("", "_half_width"))]
-    return FieldFigure("profiles", figure, "Eulerian beside Lagrangian profiles", caption, {"profiles": long_table(header, columns)})
+    return FieldFigure("profiles", figure, "Eulerian and Lagrangian profiles", caption, {"profiles": long_table(header, columns)})

@@ -42,11 +42,12 @@ def _map(datasets: Mapping[str, Any], looks: Looks) -> FieldFigure:
             axes.set(aspect="equal", xlim=(-1.04 * radius, 1.04 * radius), ylim=(-1.04 * radius, 1.04 * radius))
             axes.set_title(looks[engine].title, loc="center")
             axes.axis("off")
-        bar(figure, list(panels), scale, SEQUENTIAL, "log₁₀ of the power lost in impacts (W/m²)", shrink=0.8, aspect=22, pad=0.02)
+        bar(figure, list(panels), scale, SEQUENTIAL, "log₁₀ of the power dissipated in impacts (W/m²)", shrink=0.8, aspect=22, pad=0.02)
     caption = (
-        f"Energy lost in impacts (approach of {first['impact_speed']:g} m/s or more) per time and area of the cross-section, over "
-        f"{first['revolutions']} revolutions{_loads(first)}, from the records of {first['impacts']} impacts; each counts where it began. "
-        f"White: nothing was hit. Circles: logs of the last frame. The drum turns clockwise; logs are {first['log_length']:g} m long."
+        f"Energy dissipated in impacts (approach of {first['impact_speed']:g} m/s or more) per time and area of the cross-section, over "
+        f"{first['revolutions']} revolutions{_loads(first)}, from the records of {first['impacts']} impacts; each counts "
+        f"at the position where it began. White: no impacts. Circles: logs of the last frame. The drum turns clockwise; logs are "
+        f"{first['log_length']:g} m long."
     )
     table = grid_table(["x_m", "z_m", "power_W_per_m2"], {
         engine: (one.x.values, one.z.values, [one.impact_power.values]) for engine, one in datasets.items()})
@@ -67,7 +68,7 @@ def _shell(datasets: Mapping[str, Any], looks: Looks) -> FieldFigure:
         left, *panels = figure.subplots(1, 1 + len(datasets), width_ratios=[1.25, *[1.0] * len(datasets)])
         for engine, one in datasets.items():
             curve(left, looks[engine], one.angle.values, one.shell_power.values, one.shell_power_half.values, marked=False)
-        left.set(title="Power on the shell", xlabel="angle past the lowest point (°)", ylabel="W/m²", xlim=(-180, 180),
+        left.set(title="Power on the shell", xlabel="angle from the lowest point (°)", ylabel="W/m²", xlim=(-180, 180),
                  xticks=[-180, -90, 0, 90, 180])
         left.set_ylim(bottom=0.0)
         left.legend(fontsize=6.8)
@@ -82,11 +83,11 @@ def _shell(datasets: Mapping[str, Any], looks: Looks) -> FieldFigure:
                 axes.set_yticklabels([])
             else:
                 axes.set_ylabel("peak force (N)")
-        bar(figure, list(panels), scale, SEQUENTIAL, "log₁₀ of impacts per turn", aspect=18, pad=0.02)
+        bar(figure, list(panels), scale, SEQUENTIAL, "log₁₀ of impacts per revolution", aspect=18, pad=0.02)
     caption = (
-        "Left: energy lost in impacts on the shell per time and area of it, along its angle, with 95 % intervals over quarter revolutions. "
-        "Right: histogram of peak forces of impacts on the shell, angle by angle: number per revolution in bins of 10° and a fifth of a "
-        "decade."
+        "Left: energy dissipated in impacts on the shell per time and area, against the angle, with 95 % intervals over quarter "
+        "revolutions. Right: histogram of peak forces of impacts on the shell, angle by angle: number per revolution in bins of 10° "
+        "and a fifth of a decade."
     )
     tables = {
         "shell_power": long_table(["angle_deg", "power_W_per_m2", "half_width"], {

@@ -116,15 +116,15 @@ def _profiles(datasets: Mapping[str, Any], looks: Looks) -> FieldFigure:
                 axes.set_yticklabels([])
         right[0].set_ylabel("K = σ$_{rr}$ / σ$_{zz}$")
         handles, labels = left.get_legend_handles_labels()
-        right[0].plot([], [], "*", color="#4a4f57", markersize=7, markeredgecolor="white", label="with the wall's own normal stress")
+        right[0].plot([], [], "*", color="#4a4f57", markersize=7, markeredgecolor="white", label="with the normal stress of the wall")
         more = right[0].get_legend_handles_labels()
         figure.legend([*handles, more[0][-1]], [*labels, more[1][-1]], loc="lower center", ncols=5, fontsize=6.8, handlelength=1.6,
                       columnspacing=1.2)
     caption = (
         "Left: vertical stress of the coarse-grained field, mean over the cross-section, and Janssen's law with K, μ_mob and ρ_b of the "
         "same column. Right: ratio of radial to vertical stress from the axis to the wall, averaged over the heights given; stars: the "
-        "normal stress that the wall itself feels there over σ_zz of the outermost ring. Bands: 95 % intervals, on the left of what varies "
-        "in time only."
+        "normal stress measured at the wall over σ_zz of the outermost ring. Bands: 95 % intervals; those on the left only include "
+        "variations in time."
     )
     tables = {
         "section": long_table(["height_m", "sigma_zz_Pa", "half_width_Pa", "janssen_Pa", "wall_normal_Pa", "wall_shear_Pa"], {
@@ -134,7 +134,7 @@ def _profiles(datasets: Mapping[str, Any], looks: Looks) -> FieldFigure:
             engine: [*(np.repeat(bands[:, side], one.sizes["radius"]) for side in (0, 1)), np.tile(one.radius.values, len(bands)),
                      one.k_profile.values, one.k_profile_half.values] for engine, one in shown.items()}),
     }
-    return FieldFigure("profiles", figure, "Stress against Janssen, and K from the axis to the wall", caption, tables)
+    return FieldFigure("profiles", figure, "Stress compared with Janssen, and K from the axis to the wall", caption, tables)
 
 
 def _wall_ratio(one: Any, band: Array) -> float:

@@ -237,7 +237,7 @@ def read(replica: Replica) -> Channel:
     low, high = bottom.max() + 2.0 * diameter, top.min() - 2.0 * diameter
     if high - low < 4.0 * diameter:
         raise RunError(f"{replica.folder} is too short to be measured", f"{max(0.0, (high - low) / diameter):.1f} d of its height stay "
-                       "filled while the plate sinks", "take more grains or less travel")
+                       "filled while the plate sinks", "use more grains or less travel")
     levels, edges = np.linspace(low, high, max(4, round((high - low) / diameter)) + 1), cells_across(width, diameter)
     rows, paths = [], []
     for grains, contacts in _chosen(replica, used):
@@ -312,8 +312,8 @@ def estimates(one: Channel, series: Array, more: Mapping[str, Measure], apart: b
 def across(channels: Sequence[Channel], name: str, title: str, label: str, get: Callable[[Channel], Array], **more: Any) -> dict[str, Any]:
     """A curve from wall to wall, the same in all `channels`: `get` gives it for each cell, or between the middles of neighbours."""
     rows, place = [get(one) for one in channels], channels[0].middle / channels[0].diameter
-    return profile(name, title, "from the left wall x / d", label, place if len(rows[0]) == len(place) else 0.5 * (place[1:] + place[:-1]),
-                   rows, **more)
+    return profile(name, title, "distance from the left wall x / d", label,
+                   place if len(rows[0]) == len(place) else 0.5 * (place[1:] + place[:-1]), rows, **more)
 
 
 def upward(channels: Sequence[Channel], name: str, title: str, label: str, get: Callable[[Channel], Array]) -> dict[str, Any]:
@@ -344,7 +344,7 @@ def steady_part(series: Array, when: Array, steps: NDArray[np.int64]) -> tuple[i
     thinned = series[: len(series) // thin * thin].reshape(-1, thin).mean(axis=1)
     start = steady_start(thinned)
     if start >= len(thinned) or when[start * thin] > steps[len(steps) // 2]:
-        return int(steps[len(steps) // 2]), "no steady part was found in the measuring window, its second half was used"
+        return int(steps[len(steps) // 2]), "no steady part was found in the measuring window; its second half was used"
     return int(when[start * thin]), ""
 
 

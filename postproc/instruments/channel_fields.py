@@ -31,7 +31,7 @@ from dembark.postproc.walls import PlaneWall, wall_contacts
 WIDTH = 0.5  # of the kernel, in grain diameters: the layers at the walls stay apart
 _FIELDS = {
     "velocity": ("1", "downward velocity over that of the plate"),
-    "shear_rate": ("1", "rise of the downward velocity along x, times d over the plate's velocity"),
+    "shear_rate": ("1", "gradient of the downward velocity along x, times d over the plate's velocity"),
     "temperature": ("1", "granular temperature over the plate's velocity squared"),
     "solid_fraction": ("1", "volume of grains per volume"),
     "stress_xx": ("Pa", "normal stress across the channel, compression positive"),
@@ -188,9 +188,9 @@ def _dataset(flows: Sequence[Flow]) -> Any:
         cells = [over_replicas(list(same)) for same in zip(*(one[name] for one in curves), strict=True)]
         variables |= with_interval(f"{name}_profile", ["x"], cells, units, f"{text}, mean over the height")
     variables["velocity_lagrangian"] = variable(["x"], np.mean([one.lagrangian() for one in flows], axis=0), "1",
-                                                "the same from displacements of single grains, smoothed by the same kernel")
+                                                "the same from displacements of single grains, smoothed with the same kernel")
     coordinates = {"x": variable(["x"], first.across, "m", "distance from the left wall"),
-                   "z": variable(["z"], heights, "m", "height in the window that rests in the laboratory")}
+                   "z": variable(["z"], heights, "m", "height in the window, at rest in the laboratory frame")}
     return labelled(variables, coordinates, kind="channel", kernel="gaussian", width=WIDTH * channel.diameter, channel_width=channel.width,
                     averaged="along y and over the frames of the steady part", frames=sum(len(one.channel.solid) for one in flows),
                     replicas=len(flows), grain_diameter=channel.diameter, base_speed=channel.speed)

@@ -98,7 +98,7 @@ def shares(runs: Sequence[Collapse], ways: Mapping[str, str]) -> list[dict[str, 
     """Curves over time of the shares that `ways` have taken, by name with a title."""
     times = [one.gained("time") for one in runs]
     place = np.linspace(0.0, times[0][-1], 101)
-    return [profile(name, title, "time since the gate moves (s)", "over the potential energy lost", place,
+    return [profile(name, title, "time since the gate moves (s)", "fraction of the potential energy lost", place,
                     [np.interp(place, time, one.lost_in(name)) for time, one in zip(times, runs, strict=True)])
             for name, title in ways.items()]
 

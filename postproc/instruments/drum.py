@@ -185,19 +185,20 @@ def profiles(drums: Sequence[Drum], limit: float) -> list[Curve]:
     def curve(name: str, title: str, along: str, across: str, place: Array, get: Callable[[Drum], Array], **more: Any) -> Curve:
         return profile(name, title, along, across, place, [get(drum) for drum in drums], **more)
 
-    note, around, number = f"approach ≥ {limit:g} m/s", "angle past the lowest point (°)", "per log, turn and 10°"
+    note, around, number = f"approach ≥ {limit:g} m/s", "angle from the lowest point (°)", "per log, revolution and 10°"
     return [
-        curve("peak_forces", "Peak forces of impacts", "log₁₀ of the peak force (N)", "per log, turn and decade",
+        curve("peak_forces", "Peak forces of impacts", "log₁₀ of the peak force (N)", "per log, revolution and decade",
               np.log10(np.sqrt(forces[1:] * forces[:-1])),
               lambda one: one.per_log(np.histogram(one.peak, forces)[0]) / np.diff(np.log10(forces)), note=note),
-        curve("peak_forces_exceeded", "Impacts harder than F", "log₁₀ of F (N)", "log₁₀ of number per log, turn", np.log10(forces),
+        curve("peak_forces_exceeded", "Impacts above F", "log₁₀ of F (N)", "log₁₀ of number per log, revolution", np.log10(forces),
               lambda one: np.log10(one.exceeding(forces)), note=note),
-        curve("impacts_at_angle", "Where logs meet", around, number, PLACES, lambda one: one.at_angle(one.angle), note="all impacts"),
-        curve("shell_impacts_at_angle", "Where logs meet the shell", around, number, PLACES,
+        curve("impacts_at_angle", "Angles of impacts", around, number, PLACES, lambda one: one.at_angle(one.angle), note="all impacts"),
+        curve("shell_impacts_at_angle", "Angles of shell impacts", around, number, PLACES,
               lambda one: one.at_angle(one.angle[one.shell]), note="impacts on the shell"),
-        curve("peak_force_at_angle", "How hard they meet", around, "mean peak force (kN)", PLACES, lambda one: 1e-3 * one.peak_at_angle()),
-        curve("power", "Power", "revolutions of the window", "power of the drum (W)", turned, lambda one: one.power(one.work, 20),
-              reference=np.mean([one.power(one.lost, 20) for one in drums], axis=0), reference_label="power that is lost"),
+        curve("peak_force_at_angle", "Peak force against angle", around, "mean peak force (kN)", PLACES,
+              lambda one: 1e-3 * one.peak_at_angle()),
+        curve("power", "Power", "revolutions in the window", "power of the drum (W)", turned, lambda one: one.power(one.work, 20),
+              reference=np.mean([one.power(one.lost, 20) for one in drums], axis=0), reference_label="power dissipated"),
     ]
 
 
@@ -215,8 +216,8 @@ def fields(replicas: Sequence[Replica]) -> xarray.Dataset:
     along = [over_replicas(cell) for cell in zip(*(_along_shell(one, patch) for one in drums), strict=True)]
     variables = {
         "impact_power": variable(("x", "z"), cells / (edges[1] - edges[0]) ** 2, "W m-2",
-                                 "energy lost in impacts per time and area of the cross-section"),
-        **with_interval("shell_power", ["angle"], along, "W m-2", "energy lost in impacts on the shell per time and area of it"),
+                                 "energy dissipated in impacts per time and area of the cross-section"),
+        **with_interval("shell_power", ["angle"], along, "W m-2", "energy dissipated in impacts on the shell per time and area of it"),
         "shell_peaks": variable(("angle", "force"), peaks, "1", "impacts on the shell per revolution, angle bin and force bin"),
         "log_x": variable(["log"], frame.positions[:, 0], "m", "logs of the last frame"),
         "log_z": variable(["log"], frame.positions[:, 2], "m", "logs of the last frame"),
@@ -224,7 +225,7 @@ def fields(replicas: Sequence[Replica]) -> xarray.Dataset:
     }
     middle, force = 0.5 * (edges[1:] + edges[:-1]), np.sqrt(_FORCES[1:] * _FORCES[:-1])
     coordinates = {"x": variable(["x"], middle, "m", "across the drum"), "z": variable(["z"], middle, "m", "upward"),
-                   "angle": variable(["angle"], PLACES, "degree", "angle past the lowest point, the way the drum turns"),
+                   "angle": variable(["angle"], PLACES, "degree", "angle from the lowest point in the direction of rotation"),
                    "force": variable(["force"], force, "N", "peak force, middle of the bin on a logarithmic scale")}
     return labelled(variables, coordinates, kind="drum", drum_radius=radius, drum_speed=float(given["drum_speed"]),
                     log_length=float(given["log_length"]), impact_speed=float(given["impact_speed"]), revolutions=drums[0].revolutions,

@@ -34,9 +34,9 @@ def head_on(one: Impacts, flight: Flight, known: Solutions) -> Found:
                                               bound=known.bound("restitution", one.restitution)[k])
         inside, found = flight.overlaps[:, k] > -0.05 * one.peak_overlap[k], 1e-3 * flight.forces[:, k]
         curves += [
-            profile(f"force_overlap_{key}", f"Force over overlap, {key.upper()}", "δ (µm)", "N (kN)", 1e6 * flight.overlaps[inside, k],
+            profile(f"force_overlap_{key}", f"Force against overlap, {key.upper()}", "δ (µm)", "N (kN)", 1e6 * flight.overlaps[inside, k],
                     [found[inside]], reference=1e-3 * forces[inside, k], reference_label="Hertz"),
-            profile(f"force_time_{key}", f"Force over time, {key.upper()}", "time since touch (µs)", "N (kN)", 1e6 * since_touch[:, k],
+            profile(f"force_time_{key}", f"Force against time, {key.upper()}", "time since touch (µs)", "N (kN)", 1e6 * since_touch[:, k],
                     [found], reference=1e-3 * pulse[:, k], reference_label="Hertz")]
     return values, curves
 
@@ -48,8 +48,8 @@ def restitutions(one: Impacts, flight: Flight, known: Solutions) -> Found:
     values = {f"restitution_{key}_{asked[k]:.2g}": number(found[k], asked[k], bound=bound[k])
               for key, which in materials(len(one)).items() for k in range(len(one))[which]}
     return values, _curves([
-        ("restitution", "Restitution", "e asked for", "e found", asked, found, asked, "equal"),
-        ("restitution_error", "Its error", "e asked for", "1000 (e found − e)", asked, 1e3 * (found - asked), 0.0 * asked, "0")])
+        ("restitution", "Restitution", "prescribed e", "measured e", asked, found, asked, "equal"),
+        ("restitution_error", "Its error", "prescribed e", "1000 (measured e − e)", asked, 1e3 * (found - asked), 0.0 * asked, "0")])
 
 
 def mirrored(one: Impacts, flight: Flight, known: Solutions) -> Found:
@@ -80,7 +80,7 @@ def oblique(one: Impacts, flight: Flight, known: Solutions, sweep: str, swept: A
             worst = int(np.abs(found - due).argmax())
             values[f"{name}_{key}"] = number(
                 found[worst], due[worst], bound=allowed.max(), scale=max(1.0, np.abs(due).max()),
-                detail=f"at {swept[which][worst]:.3g}°, the worst angle; there {allowed[worst]:.2g} would be allowed")
+                detail=f"at {swept[which][worst]:.3g}°, the worst angle; the tolerance there is {allowed[worst]:.2g}")
         if gross[which].any():
             values[f"rigid_sliding_difference_{key}"] = number(np.abs(after["patch"] - rigid["patch"])[which][gross[which]].max())
         if known.slip:
@@ -94,7 +94,7 @@ Entry = tuple[str, str, str, str, Array, Array, Array, str]
 
 def _rebounds(one: Impacts, found: Rebounds, known: Solutions, sweep: str, swept: Array) -> list[Entry]:
     """The curves of the publication, with each theory as the reference of one of them."""
-    rigid, law, exactly, throughout = sliding_throughout(one), known.law[0], "the law, exactly", "sliding throughout"
+    rigid, law, exactly, throughout = sliding_throughout(one), known.law[0], "exact solution of the law", "sliding throughout"
     after, due, before = found.numbers(one), law.numbers(one), one.sliding / one.closing
     if sweep == "direction":
         angle, due_angle = (np.degrees(np.arctan2(each["patch"], each["restitution"])) for each in (after, due))
@@ -108,7 +108,7 @@ def _rebounds(one: Impacts, found: Rebounds, known: Solutions, sweep: str, swept
                     due["spin"] / one.friction, exactly)]
     else:
         entries = [
-            ("stick", "Sliding given back", "7/2 μ (1+e) v_n / v_s", "−v_s after / v_s",
+            ("stick", "Reversed sliding", "7/2 μ (1+e) v_n / v_s", "−v_s after / v_s",
              3.5 * one.friction * (1.0 + one.restitution) / before, -after["patch"] / before, -due["patch"] / before, exactly),
             ("recoil_rigid", "Recoil", "v_s / v_n", "v_s after / v_n after", before, after["patch"] / one.restitution,
              rigid.numbers(one)["patch"] / one.restitution, throughout)]

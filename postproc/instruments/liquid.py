@@ -24,7 +24,7 @@ def liquid_values(replicas: Sequence[Replica]) -> dict[str, Value]:
 
     return {
         "liquid_total": Value(exact(max(float(np.abs(total / total[0] - 1.0).max()) for total in totals)), exact(0.0),
-                              detail=f"on grains, in bridges and on walls, and what left; {totals[0][0]:.4g} m³ at the start, over the "
+                              detail=f"on grains, in bridges, on walls and lost; {totals[0][0]:.4g} m³ at the start, over the "
                                      "whole run"),
         "bridge_count": Value(late([times["bridge_count"] / grains for times in tables])),
         "liquid_in_bridges": Value(late([times["liquid_bridges"] / total for times, total in zip(tables, totals, strict=True)])),

@@ -98,7 +98,7 @@ def at_rest(run: LogRun, stack: Loads, rest: slice) -> dict[str, Value]:
     net = np.linalg.norm(stack.net[rest].mean(axis=0) - down, axis=1) / weights
     rough, per_log, one = p["friction"] > 0.0, block_mean(stack.contacts[rest] / logs), exact(1.0)
     least = 1.5 if rough else 2.0
-    told = "3/2: three equations a log, two unknowns a contact" if rough else "2: two equations a log, one unknown a contact"
+    told = "3/2: three equations per log, two unknowns per contact" if rough else "2: two equations per log, one unknown per contact"
     values = {
         "lift_over_weight": Value(block_mean(walls[:, :, 1].sum(axis=1)), one),
         "ground_share": Value(block_mean(walls[:, 0, 1]), one if p["stake_friction"] == 0.0 else None),
@@ -153,13 +153,13 @@ def curves(run: LogRun, stack: Loads) -> list[Curve]:
     kinetic = np.log10(np.maximum(run.history["kinetic_energy"] / energy, 1e-12))
     least = np.full(len(times), 1.5 if p["friction"] > 0.0 else 2.0)
     return [
-        over_time("lift", "Force upwards over the weight", "F / W", times, lift, np.ones(len(times)), label="weight", seconds=True),
+        over_time("lift", "Upward force over the weight", "F / W", times, lift, np.ones(len(times)), label="weight", seconds=True),
         over_time("lift_at_rest", "The same, close to rest", "F / W − 1", times[last], lift[last] - 1.0, np.zeros(100), label="weight",
                   seconds=True),
         over_time("kinetic", "Kinetic energy", "log₁₀ E / (½ W d)", times[1:], kinetic, seconds=True),
-        over_time("active", "Contacts that carry, per log", "contacts / log", times, stack.contacts / len(run.masses), least,
+        over_time("active", "Loaded contacts per log", "contacts / log", times, stack.contacts / len(run.masses), least,
                   label="least number at rest", seconds=True),
-        over_time("impacts", "Impacts begun", "number", times[1:], run.history["impacts"], seconds=True),
+        over_time("impacts", "Impacts started", "number", times[1:], run.history["impacts"], seconds=True),
         profile("peaks", "Impacts by peak force", "log₁₀ peak force (N)", "impacts", 0.5 * (edges[1:] + edges[:-1]),
                 [counts.astype(np.float64)]),
     ]

@@ -131,5 +131,5 @@ def energy_curves(run: LogRun, due: Array) -> list[dict[str, Any]]:
     elastic, lost = (np.concatenate([[0.0], run.history[name]]) / start for name in ("elastic_energy", "dissipated_energy"))
     return [
         over_time("elastic", "Elastic energy", "E / E₀", run.times, elastic, due / start),
-        over_time("lost", "Energy lost", "1000 E / E₀", run.times, 1e3 * lost, np.zeros(len(run.times))),
+        over_time("lost", "Energy dissipated", "1000 E / E₀", run.times, 1e3 * lost, np.zeros(len(run.times))),
     ]

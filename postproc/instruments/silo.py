@@ -59,7 +59,7 @@ def scalars(one: Column) -> dict[str, Estimate]:
         "hydrostatic_height": lambda f, s: pair(f, s)[1] / size,
         "two_parameter_gain": lambda f, s: pair(f, s)[2],
     }
-    unknown = "only other packings tell how far this varies"
+    unknown = "only other packings show how much this varies"
     return {
         **{name: resampled(measure, frames, sectors, overlap(len(sectors))) for name, measure in measures.items()},
         "apparent_mass_ratio": resampled(one.base_share, frames),
@@ -108,8 +108,8 @@ def predicted(points: Sequence[Mapping[str, Any]]) -> Measurement:
     curve = profile("apparent_mass", "Apparent mass", "filled mass / (ρ_b π R³)", "force on the base / (g ρ_b π R³)", place, [every.values],
                     half=every.halves, reference=place * janssen.base_share(2.0 * k_mu.value * place),
                     reference_label="Janssen, K and μ_mob of dry alone")
-    remark = ("Calibrated in `dry` alone are K of the contact stress, μ_mob and ρ_b; every other point is a prediction. Each is a packing "
-              "of its own, filled by rain, with the wall creeping upward, so that all have the same history.")
+    remark = ("K of the contact stress, μ_mob and ρ_b are calibrated with `dry` alone; every other point is a prediction. Each is a "
+              "separate packing, filled by rain, with the wall creeping upward, so that all have the same history.")
     return Measurement(values, [curve], [remark])
 
 
@@ -149,16 +149,16 @@ def _remarks(columns: Sequence[Column], over: Mapping[str, Estimate], wet: bool,
               else "Spheres roll along a smooth wall instead of sliding, which keeps the shear below Coulomb's limit.")
     if wet:
         share = 1.0 - over["_hanging_weight"].value / float(np.mean([column.weight for column in columns]))
-        manner += (f" Liquid bridges pull the grains to the wall with {over['wall_adhesion'].value:.3g} Pa; the friction of that pull "
-                   f"alone carries {share:.0%} of the weight, and Janssen's law is taken with what is left of it.")
+        manner += (f" Liquid bridges pull the grains to the wall with {over['wall_adhesion'].value:.3g} Pa; the friction due to this pull "
+                   f"alone carries {share:.0%} of the weight, and Janssen's law is applied to the remaining weight.")
     remarks = [(f"The wall carries {limits} friction (μ_mob = {mobilised:.3f}; static {static:g}, kinetic {kinetic:g}). {manner} With the "
-               "static coefficient in its place λ would come out shorter by the first of these shares."),
-               ("Calibrated in the column itself, and therefore counted as identities: λ = size / (2 K μ_mob), whose K μ_mob is the walls' "
-                "shear over σ_zz, and Janssen's profile with it. They hold for any shear that is proportional to σ_zz, and tell nothing of "
-                "its size. Predicted: the force on the base, from K of the contact stress and the kinetic friction given to the wall.")]
+               "static coefficient in its place λ would be shorter by the first of these fractions."),
+               ("Calibrated in the same column, and therefore counted as identities: λ = size / (2 K μ_mob), where K μ_mob is the wall "
+                "shear over σ_zz, and Janssen's profile with it. They hold for any shear that is proportional to σ_zz and do not test its "
+                "magnitude. Predicted: the force on the base, from K of the contact stress and the given kinetic friction of the wall.")]
     if len(columns) < 3:
         remarks.append("With fewer than three packings the intervals come from time blocks and from sectors of the walls within the "
-                       "packing; what varies from packing to packing as a whole is not in them.")
+                       "packing; they do not include variations from packing to packing.")
     return remarks
 
 

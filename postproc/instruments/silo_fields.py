@@ -178,7 +178,7 @@ def measured(replicas: Sequence[Replica], known: Mapping[str, Value]) -> Measure
         **{f"stress_ratio_k_{place}": Value(over_replicas([one.k(0, chosen) for one in silos])) for place, chosen in near.items()},
     }
     remark = (f"The fields are coarse-grained with a Gaussian of width {diameter:g} m = 1 d and averaged around the axis in closed form, "
-              "which conserves mass and momentum exactly; within one width of a wall they are means over what the kernel sees inside.")
+              "which conserves mass and momentum exactly; within one width of a wall they are means over the part of the kernel inside.")
     return Measurement(values, remarks=[remark], fields=_dataset(silos, law, diameter, gravity))
 
 
@@ -197,7 +197,7 @@ def _dataset(silos: Sequence[Silo], law: _Janssen, diameter: float, gravity: flo
         "coverage": variable(both, cells.coverage, "1", "part of the kernel that lies inside the vessel"),
         "wall_force": variable(both, fields.mean("wall", cells), "N m-3", "upward force density of walls on grains"),
         "unbalanced": variable(both, fields.unbalanced(cells, gravity), "N m-3",
-                               "walls less weight less divergence of the vertical stresses"),
+                               "wall forces minus weight minus divergence of the vertical stresses"),
         "net_force": variable(both, fields.mean("net", cells), "N m-3", "upward force density that accelerates grains"),
         **with_interval("stress_zz_section", high, stress, "Pa", "vertical stress, mean over the cross-section"),
         "janssen": variable(high, law(cells.heights), "Pa", "vertical stress by Janssen's law with K and friction of the same column"),

@@ -1,1 +1,1 @@
-"""Verdicts: quantities with intervals beside their references, engines beside each other, and the tally of all of it."""
+"""Verdicts: quantities with intervals against their references, comparisons of engines, and the tally of both."""

@@ -29,7 +29,7 @@ CONFIDENCE = 0.99
 
 
 def compare(folder: Path) -> Comparison:
-    """The engines that have a `metrics.json` below the folder of a case and variant, beside each other. RunError for fewer than two.
+    """The engines that have a `metrics.json` below the folder of a case and variant, compared. RunError for fewer than two.
 
     Of each pair of engines the first in alphabetical order is the reference. What chance may do is shared by all pairs of the page.
     """
@@ -63,11 +63,11 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
     kind, tolerance, half, chance = "relative", CAP, None, None
     bounds = [one.agreement for one in both if one.agreement is not None]
     if value.value is None or reference.value is None or not (bounds or reference.value):
-        verdict, reason = "fail", "no number to compare"
+        verdict, reason = "fail", "no value to compare"
     elif bounds:
         kind, tolerance, deviation = "absolute", max(bounds), value.value - reference.value
         same = abs(deviation) <= tolerance
-        verdict, reason = ("pass", "") if same else ("fail", "the same numbers are due")
+        verdict, reason = ("pass", "") if same else ("fail", "the values must agree")
     else:
         deviation = (value.value - reference.value) / abs(reference.value)
         unknown = next((one for one in both if one.half is None), None)
@@ -92,12 +92,12 @@ def _judged(difference: float, halves: tuple[float, float], counts: tuple[float,
     few = min(counts)
     if few < PACKINGS:
         return "info", (f"the joint interval (±{half:.1%}) comes from within {few:g} packing{'s' * (few > 1)}; "
-                        f"{PACKINGS} in each engine are needed to judge it")
+                        f"{PACKINGS} in each engine are needed for a verdict")
     limit = max(half, joint_limit(*halves, *counts, 1.0 - (1.0 - CONFIDENCE) / comparisons))
     if difference > limit:
-        within = ", though within 10 %" if difference <= CAP else ""
-        return "fail", f"beyond chance{within}: the joint interval is ±{half:.1%}, chance allows ±{limit:.1%}"
+        within = ", although within 10 %" if difference <= CAP else ""
+        return "fail", f"larger than expected by chance{within}: the joint interval is ±{half:.1%}, chance explains ±{limit:.1%}"
     if difference + half > CAP:
         return "info", (f"the joint interval (±{half:.0%}) is wider than 10 %" if half > CAP else
-                        f"the joint interval (±{half:.1%}) reaches beyond 10 %")
+                        f"the joint interval (±{half:.1%}) extends beyond 10 %")
     return "pass", ""

@@ -134,7 +134,7 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
 def _tolerance(one: Declared, value: Value, name: str) -> float | None:
     if one.tolerance != "bound":
         if value.bound is not None:
-            raise DembarkError(f"quantity {name} has a bound", 'its tolerance is not the word "bound"', "take the bound away or declare it")
+            raise DembarkError(f"quantity {name} has a bound", 'its tolerance is not the word "bound"', "remove the bound or declare it")
         return None if one.tolerance is None or value.reference is None else float(one.tolerance)
     if value.bound is None and value.reference is not None and not value.reason:
         raise DembarkError(f"quantity {name} is declared with tolerance = \"bound\"", "", "give bound=... in its Value")
@@ -182,10 +182,10 @@ def judge(deviation: float, half: float, tolerance: float) -> tuple[str, str]:
         return "fail", ""
     if not half <= tolerance:
         wide = f"±{half:.2g}" if math.isfinite(half) else "unknown"
-        return "info", f"its interval ({wide}) is wider than what is allowed"
+        return "info", f"its interval ({wide}) is wider than the tolerance"
     if abs(deviation) > tolerance:
         return "fail", ""
-    return ("pass", "") if abs(deviation) + half <= tolerance else ("info", f"its interval (±{half:.2g}) reaches beyond what is allowed")
+    return ("pass", "") if abs(deviation) + half <= tolerance else ("info", f"its interval (±{half:.2g}) extends beyond the tolerance")
 
 
 def packings(basis: str) -> float:

@@ -83,7 +83,7 @@ class QuantityRecord:
 
 @dataclass(frozen=True)
 class ComparedRecord(QuantityRecord):
-    """The same quantity in two engines: `value` of `engine` beside `reference`, the value of `reference_engine`."""
+    """The same quantity in two engines: `value` of `engine` against `reference`, the value of `reference_engine`."""
 
     evidence: str = "code"
     control: str = "one engine a quarter off, or by twice the bound"
@@ -124,7 +124,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The engines of one case and variant beside each other: no two may differ by more than `cap`, relative."""
+    """The comparison of the engines of one case and variant: no two may differ by more than `cap`, relative."""
 
     case: str
     variant: str
@@ -174,7 +174,7 @@ def read(path: Path) -> Result:
 def _read(path: Path, kind: type[Kind]) -> Kind:
     content = read_json(path)
     if content is None:
-        raise RunError(f"{path} cannot be read", "it is not there or holds no JSON")
+        raise RunError(f"{path} cannot be read", "the file does not exist or holds no JSON")
     return from_json(content, kind, str(path))
 
 
@@ -183,7 +183,7 @@ def from_json(content: Mapping[str, Any], kind: type[Kind], where: str = "") -> 
     notes: dict[str, None] = {}
     found = _value(content, kind, where, notes)
     if notes and isinstance(found, Result | Comparison):
-        note = f"This was written by another version of dembark: {', '.join(notes)}. Measure again to have all of it."
+        note = f"This was written by another version of dembark: {', '.join(notes)}. Measure again for complete results."
         found = dataclasses.replace(found, remarks=(*found.remarks, note))
     return found
 
@@ -197,7 +197,7 @@ def _value(content: Mapping[str, Any], kind: type[Kind], where: str, notes: dict
     known = _KEYS[kind]
     missing = [key for key, needed in known.items() if needed and key not in content]
     if missing:
-        raise RunError(f"{where} has no {', '.join(missing)}", "it is no result of this version of dembark", "measure it again")
+        raise RunError(f"{where} has no {', '.join(missing)}", "it is not a result of this version of dembark", "measure it again")
     notes |= {f"unknown {key!r} left out": None for key in content if key not in known}
     if issubclass(kind, QuantityRecord) and "evidence" not in content:
         notes |= {"no kind of evidence": None} if kind is QuantityRecord else {}

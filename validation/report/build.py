@@ -89,7 +89,7 @@ def write_pdf(html: str, path: Path) -> None:
     except OSError as error:
         path.unlink(missing_ok=True)
         reason = " ".join(str(error).split())[:120]
-        print(f"dembark: no {path.name}, for Pango is missing ({reason}); report.html holds the same", file=sys.stderr)
+        print(f"dembark: no {path.name}, because Pango is missing ({reason}); report.html holds the same", file=sys.stderr)
         return
     write_whole(path, HTML(string=html, base_url=str(_HERE)).write_pdf())
 

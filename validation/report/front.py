@@ -1,4 +1,4 @@
-"""The first pages: verdicts by kind of evidence, what failed, what is missing, and what is open and why."""
+"""The first pages: verdicts by kind of evidence, failed checks, missing results, and open checks with their reasons."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from dembark.validation.report.gather import Row
 # Lines of each list that the first pages of the PDF hold; what is left out is counted, and in the HTML.
 MOST = {"failed": 8, "open": 24, "missing": 6}
 
-# What a failure says most about comes first.
+# The kinds of evidence in order of importance of a failure.
 _WEIGHT = ("experiment", "theory", "identity", "", "code")
 
 # Of a quantity in all tables, see `cells`.
@@ -42,7 +42,7 @@ def open_lines(rows: Iterable[Row]) -> list[OpenLine]:
     found: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         if row.record.standing == "open":
-            reason = re.sub(r" \([^()]*\d[^()]*\)", "", row.record.reason) or "there is no number to judge"
+            reason = re.sub(r" \([^()]*\d[^()]*\)", "", row.record.reason) or "there is no value to judge"
             found.setdefault((row.case, reason), []).append(row)
     return [OpenLine(case, group[0].anchor, reason, len(group), _names(group)) for (case, reason), group in found.items()]
 
@@ -63,9 +63,9 @@ def badness(row: Row) -> float:
 
 def evidence(counted: Tally) -> list[dict[str, Any]]:
     """Rows of the table of verdicts: each kind of evidence with its counts, and all together."""
-    # That nothing is compared with experiments is worth a row, too.
+    # A row also shows that nothing is compared with experiments.
     kinds = {kind: Counts() for kind in EVIDENCE} | dict(counted.by_evidence)
-    return [*({"kind": kind or "not stated", "meaning": MEANING[kind] if kind else "the case does not say", "counts": counts}
+    return [*({"kind": kind or "not stated", "meaning": MEANING[kind] if kind else "not stated by the case", "counts": counts}
               for kind, counts in kinds.items()), {"kind": "all", "meaning": "", "counts": counted}]
 
 

@@ -72,7 +72,7 @@ class Page:
         return f"{self.case.replace('_', ' ')}, {self.words}"
 
     def rows(self) -> Iterator[Row]:
-        """All that was judged, engine by engine, then the engines beside each other."""
+        """All that was judged, engine by engine, then the comparison of the engines."""
         for engine, one in sorted(self.results.items()):
             yield from (Row(self.case, self.name, self.anchor, engine, record) for record in one.quantities)
         for record in self.comparison.quantities if self.comparison else ():
@@ -99,9 +99,9 @@ class Gathered:
 
     @property
     def left_out(self) -> str:
-        """Which optional engines were left out, for they are not installed, in a sentence; empty when none was."""
+        """Which optional engines were left out because they are not installed, in a sentence; empty when none was."""
         names = [engine_name(engine) for engine in self.summary.get("left_out", {})]
-        return f"Left out, for this machine does not have it: {', '.join(names)}." if names else ""
+        return f"Left out, because not installed on this machine: {', '.join(names)}." if names else ""
 
     @property
     def missing(self) -> list[str]:
@@ -131,7 +131,7 @@ def gather(folder: Path) -> Gathered:
     failed = {run[:3] for run in expected if run[3]}
     for case, variant, engine in sorted({run[:3] for run in expected} - failed):
         if engine not in pages[case, variant].results:
-            pages[case, variant].missing.append(f"{engine_name(engine)}: it could not be measured")
+            pages[case, variant].missing.append(f"{engine_name(engine)}: could not be measured")
 
     def order(one: Page) -> tuple[Any, ...]:
         """Variants as the case lists them, for the first ones are shown with all their figures; then those of campaigns by name."""

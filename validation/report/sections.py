@@ -58,7 +58,7 @@ class Part:
 
 @dataclass
 class Section:
-    """A case: `decided` quantities by evidence, one line each for identities and for the engines beside each other, figures, and
+    """A case: `decided` quantities by evidence, one line each for identities and for the comparison of the engines, figures, and
     `parts`."""
 
     case: str
@@ -104,7 +104,7 @@ def decided(rows: Iterable[Row]) -> list[Decided]:
 
 
 def line(rows: Sequence[Row], what: str) -> str:
-    """How checks of one kind stand together, and which is nearest to its limit, or what failed."""
+    """The result of all checks of one kind, and which is closest to its limit, or what failed."""
     checks = [row for row in rows if row.record.standing != "information"]
     if not checks:
         return ""
@@ -117,8 +117,8 @@ def line(rows: Sequence[Row], what: str) -> str:
     if not closed:
         return f"{text}."
     worst = max(closed, key=front.badness)
-    return (f"{text}; nearest to its limit: {worst.record.title} ({worst.place}, {worst.who}), "
-            f"at {100.0 * front.badness(worst):.2g} % of what is allowed.")
+    return (f"{text}; closest to its limit: {worst.record.title} ({worst.place}, {worst.who}), "
+            f"at {100.0 * front.badness(worst):.2g} % of the tolerance.")
 
 
 def sections(gathered: Gathered, folder: Path) -> list[Section]:
@@ -137,7 +137,7 @@ def _section(gathered: Gathered, name: str, pages: list[Page], folder: Path) -> 
     main = [one for number, found in enumerate(printed) for one in (found[:1] if number else found)]
     engines, others = ([row for row in rows if isinstance(row.record, ComparedRecord) is compared] for compared in (True, False))
     kinds = {kind: [row for row in others if row.record.evidence == kind] for kind in ("identity", "code")}
-    lines = [line(kinds["identity"], "Identities"), line(engines, "Engines beside each other"), line(kinds["code"], "Other codes")]
+    lines = [line(kinds["identity"], "Identities"), line(engines, "Comparison of the engines"), line(kinds["code"], "Other codes")]
     drawn = next((shown for part in variants if (shown := _pictures(part.page))), [])
     return Section(name, known.title if known else name.replace("_", " "), known.description if known else "",
                    known.source if known else (),

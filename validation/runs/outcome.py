@@ -1,4 +1,4 @@
-"""How a run ended: what the engine's exit, its words, its files and the disk say of it."""
+"""How a run ended: by the engine's exit code, messages, files and the disk."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ def _tail(log: Path, size: int = 20000) -> list[str]:
 
 
 def reason(lines: list[str]) -> str:
-    """The engine's own word about what went wrong: the last line that looks like an error, else its last line."""
+    """The engine's message about what went wrong: the last line that looks like an error, else its last line."""
     told = re.compile(r"^\s*(?:dembark: (?!steps|finished|resumed|integration)|ERROR|\w*(?:Error|Exception)\b.*|.*[Nn]o space left)")
     spoken = [line.strip() for line in lines if line.strip()]
-    return next((line for line in reversed(spoken) if told.match(line)), spoken[-1] if spoken else "it said nothing")
+    return next((line for line in reversed(spoken) if told.match(line)), spoken[-1] if spoken else "it printed nothing")
 
 
 def judge(run: Run, code: int, parser: OutputParser, work: Path) -> None:
-    """Killed or RunError, with the reason, unless the engine ended well and said so."""
+    """Killed or RunError, with the reason, unless the engine finished and printed so."""
     stop_message, lines = run.engine.facts.stop_message, _tail(work / "engine.log")
     where = f"at step {parser.step} of {parser.steps}" if parser.steps else "before its first step"
     if any("No space left" in line for line in lines):
@@ -63,13 +63,13 @@ def judge(run: Run, code: int, parser: OutputParser, work: Path) -> None:
         kind = Killed if number in _STOPPED else RunError
         raise kind(f"the engine was killed by {signal.Signals(number).name} {where}", hint)
     if stop_message and not parser.finished and any(line.startswith(stop_message) for line in lines):
-        raise Killed(f"the engine was told to stop {where}")
+        raise Killed(f"the engine was asked to stop {where}")
     if code:
         raise RunError(f"the engine ended with exit code {code} {where}", reason(lines))
     if not parser.finished:
         raise RunError(f"the engine ended without 'dembark: finished' {where}", reason(lines))
     if not parser.steps:
-        raise RunError("the engine never said 'dembark: steps <N> time_step <dt>'", "the deck must print this line")
+        raise RunError("the engine did not print 'dembark: steps <N> time_step <dt>'", "the deck must print this line")
 
 
 def integration(work: Path) -> dict[str, float]:

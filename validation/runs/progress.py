@@ -66,7 +66,7 @@ def describe(state: State) -> str:  # noqa: PLR0911 - one return for each state
             simulated = f"{state.step * state.time_step:.4g}/{state.steps * state.time_step:.4g} s simulated"
             return f"{state.name}: step {state.step}/{state.steps} ({100 * state.step // state.steps} %), {simulated}{eta}"
         case "running" if state.attempt > 1:
-            return f"{state.name}: attempt {state.attempt}, goes on at step {state.resumed_from}"
+            return f"{state.name}: attempt {state.attempt}, resumes at step {state.resumed_from}"
         case "running":
             return f"{state.name}: started"
         case "finished":

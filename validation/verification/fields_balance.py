@@ -1,4 +1,4 @@
-"""Balance of momentum in coarse-grained fields of a heap at rest, and the force that its base feels."""
+"""Momentum balance in coarse-grained fields of a heap at rest, and the force on its base."""
 
 from __future__ import annotations
 
@@ -49,10 +49,10 @@ def balance() -> Item:
     return Item(
         "balance",
         "Static balance: ∇·σ = ρ g + wall forces",
-        f"A heap of {len(network.frame.ids)} grains at random places stands on a base; its {len(network.links.ids)} contacts carry forces "
+        f"A heap of {len(network.frame.ids)} grains at random positions on a base; its {len(network.links.ids)} contacts carry forces "
         "of any direction under which each grain is in equilibrium to round-off. The fields must then satisfy ∇·σ − ρ g − t = 0 in every "
         "cell, t being the coarse-grained force of the base (Weinhart et al. 2012). The divergence is taken by central differences, which "
-        "err with the square of the spacing over the width of the kernel; nothing else is left out.",
+        "have an error that is second order in the spacing over the width of the kernel; there is no other error.",
         [order("balance_order", "residual (rms, Lucy's kernel): exponent of the spacing", _SPACINGS[-2:], fall[-2:], 2.0,
                "central differences", "gravity doubled", "the two finest grids")],
         [Panel("Residual against the spacing", "spacing / width", "rms of |∇·σ − ρ g − t| / max ρ g", [
@@ -60,9 +60,9 @@ def balance() -> Item:
             Curve("slope 2", _SPACINGS / _WIDTHS["lucy"], fall[0] * (_SPACINGS / _SPACINGS[0]) ** 2, theory=True)]),
          Panel("Residual against the width", "width (m; cells of 0.07 m)", "rms of |∇·σ − ρ g − t| / max ρ g", [
              Curve("lucy", widths, by_width), Curve("slope −2", widths, by_width[0] * (widths[0] / widths) ** 2, theory=True)])],
-        "Left: one width for each kernel (Lucy 0.35 m, Gaussian 0.15 m). Right: one grid. The Gaussian is cut at three widths, where it "
-        "still has 1 % of its height: "
-        "on very fine grids differences stop to converge at that jump. Lucy's kernel is smooth.",
+        "Left: one width for each kernel (Lucy 0.35 m, Gaussian 0.15 m). Right: one grid. The Gaussian is truncated at three widths, "
+        "where it still has 1 % of its height: "
+        "on very fine grids differences stop converging because of this jump. Lucy's kernel is smooth.",
     )
 
 
@@ -78,11 +78,11 @@ def wall_forces() -> Item:
     return Item(
         "wall_forces",
         "Force on a wall",
-        "The same heap: what the patches of the base carry, what the wall's part of the coarse-grained balance holds, and the sum over the "
-        "base's contacts must be one force, and its vertical part the weight.",
-        [exact("wall_force_patches", "normal stress of the patches, integrated, over the force of the contacts, − 1",
+        "The same heap: the force on the patches of the base, the wall term of the coarse-grained balance, and the sum over the "
+        "contacts of the base must be equal, and the vertical component must be the weight.",
+        [exact("wall_force_patches", "integrated normal stress of the patches over the force of the contacts, − 1",
                of_patches[0] / total[2] - 1.0, "Newton's third law", "a base with a hundredth too much force"),
-         exact("wall_force_field", "wall's force density, integrated, − force of the contacts, over the weight",
+         exact("wall_force_field", "integrated wall force density − force of the contacts, over the weight",
                float(np.abs(of_field - total).max()) / weight, "Weinhart et al. 2012", "a base with a hundredth too much force"),
          exact("wall_force_weight", "vertical force of the contacts over the weight, − 1", total[2] / weight - 1.0, "Newton's second law",
                "gravity doubled")],

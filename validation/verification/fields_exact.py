@@ -1,4 +1,4 @@
-"""Coarse-grained fields of systems whose fields are known: totals, crystals, shear and rotation; and that they depend on nothing else."""
+"""Coarse-grained fields of systems with known fields: totals, crystals, shear and rotation; and independence of the threads."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def conservation() -> Item:
     return Item(
         "conservation",
         "Conservation of mass, momentum and stress",
-        f"What {len(frame.ids)} grains of unequal size and {len(network.links.ids)} contacts carry must be found in the cells, to "
-        "round-off, whatever the kernel and however narrow or wide it is against the cells (0.15 of the system's size).",
+        f"The totals of {len(frame.ids)} grains of different sizes and {len(network.links.ids)} contacts must be those of the cells, to "
+        "round-off, for each kernel and for any width relative to the cells (0.15 of the size of the system).",
         [exact("mass_error", "mass: Σ ρ V / Σ m − 1, the worst kernel and width", worst[0], GOLDHIRSCH, "a grain without its mass"),
          exact("momentum_error", "momentum: |Σ ρ v V − Σ m v|, over Σ m |v|", worst[1], GOLDHIRSCH, "a grain without its mass"),
          exact("stress_error", "contact stress: |Σ σ V + Σ f l|, over Σ |f l|", worst[2], GOLDHIRSCH, "a lost contact")],
@@ -70,17 +70,17 @@ def threads() -> Item:
     return Item(
         "threads",
         "Independence of the number of threads",
-        "The compiled coarse graining on 1, 2, 3 and 7 threads, bit by bit, and beside the plain implementation in numpy, which shares no "
+        "The compiled coarse graining on 1, 2, 3 and 7 threads, bit for bit, and against the implementation in numpy, which shares no "
         "compiled code with it.",
         [exact("thread_differences", "sums that differ in any bit on 2, 3 or 7 threads from those on 1", different,
                "same order of additions", "threads that skip a grain", tolerance=0.0),
-         exact("backend_difference", "compiled against plain, largest difference over the largest sum", gap, "two implementations",
+         exact("backend_difference", "compiled against numpy: largest difference over the largest sum", gap, "two implementations",
                "a plain implementation that skips a grain")],
     )
 
 
 def lattice() -> Item:
-    """A crystal under pressure: the mean exactly, the ripple as the kernel's transform says."""
+    """A crystal under pressure: the exact mean, and the ripple by the transform of the kernel."""
     frame, links = scenes.lattice(2, 1.0)
     pressure = 2.0 * np.sqrt(2.0)  # f / d^2, of 12 neighbours at the distance d
     edge = np.sqrt(2.0)
@@ -102,15 +102,15 @@ def lattice() -> Item:
     return Item(
         "lattice",
         "Crystal under pressure",
-        "A periodic face-centred cubic crystal whose neighbours at the distance d press on each other with the force f is under the "
-        "pressure 2√2 f/d². The mean of the field must be that to round-off, isotropic and without shear. What remains of the single "
-        "contacts is a ripple, which a Gaussian of width w damps by exp(−k² w²/2), k = 2π√3/a being the crystal's longest wave.",
+        "A periodic face-centred cubic crystal whose neighbours at the distance d repel each other with the force f is under the "
+        "pressure 2√2 f/d². The mean of the field must equal it to round-off, isotropic and without shear. The single contacts "
+        "leave a ripple, which a Gaussian of width w damps by exp(−k² w²/2), where k = 2π√3/a is the wave number of the longest wave.",
         [exact("lattice_pressure", "mean stress over 2√2 f/d², − unit tensor, the worst component", mean_error,
                "sum over the 12 neighbours", "a lost contact")],
         [Panel("Ripple of the pressure against the width", "standard deviation of the kernel / d", "largest |p / p̄ − 1|", [
             *(Curve(kernel, widths[: len(found)], np.array(found)) for kernel, found in ripple.items()),
             Curve("∝ exp(−k² w²/2)", widths[seen], ripple["gaussian"][0] * (due / due[0])[seen], theory=True)], linear=True)],
-        "Kernels of the same second moment. The Gaussian follows its transform until its cut at three widths shows, at about 10⁻³.",
+        "Kernels of the same second moment. The Gaussian follows its transform down to about 10⁻³, the effect of its cut at three widths.",
     )
 
 
@@ -122,7 +122,7 @@ def _periodic(frame: GrainFrame, links: ContactFrame, kernel: str, width: float,
 
 
 def shear() -> Item:
-    """Uniform shear and rotation of random grains exactly, a wave of shear to the second order of the width."""
+    """Uniform shear and rotation of random grains exactly, a shear wave to second order in the width."""
     network = scenes.heap()
     place, radii = network.frame.positions, network.frame.radii
     gradient = np.array([[0.1, 1.0, -0.4], [0.3, -0.2, 0.6], [0.0, 0.5, 0.1]])
@@ -137,24 +137,24 @@ def shear() -> Item:
     return Item(
         "shear",
         "Shear, rotation and granular temperature",
-        "Grains of unequal size at random places with the velocities of a uniform gradient must give this gradient in every cell, those of "
-        "a rigid rotation no strain rate and twice the spin as vorticity; and what the mean flow does within a kernel must not count as "
-        "temperature. A wave v = sin(2π y) is recovered up to what the kernel averages away, an error with the square of its width.",
+        "Grains of different sizes at random positions with the velocities of a uniform gradient must give this gradient in every cell, "
+        "those of a rigid rotation no strain rate and twice the spin as vorticity; variation of the mean flow within a kernel must not "
+        "count as temperature. A wave v = sin(2π y) is smoothed by the kernel, an error of second order in its width.",
         [exact("gradient_error", "uniform gradient: largest error of any component, over the largest",
                _worst(one.velocity_gradient - gradient),
                "affine velocity field", "grains that jitter", tolerance=1e-9,
-               detail="round-off, times what fitting a gradient to few grains magnifies it by"),
+               detail="round-off, amplified by fitting a gradient to few grains"),
          exact("rotation_error", "rigid rotation: largest strain rate, and error of the vorticity, over the spin",
                max(_worst(turning.strain_rate), _worst(turning.vorticity - 2.0 * spin)) / float(np.linalg.norm(spin)), "rigid rotation",
                "grains that jitter", tolerance=1e-9),
-         exact("shear_temperature", "uniform gradient: temperature, over that of the velocities in a kernel's width",
+         exact("shear_temperature", "uniform gradient: temperature over that of the velocities within the width of the kernel",
                _worst(one.temperature) / (0.15**2 * float((gradient**2).sum())), "no fluctuations", "grains that jitter",
                tolerance=1e-9),
-         order("wave_order", "wave of shear: exponent of the width in the error", widths, errors, 2.0, "second moment of the kernel",
+         order("wave_order", "shear wave: exponent of the width in the error", widths, errors, 2.0, "second moment of the kernel",
                "velocities a hundredth too large")],
-        [Panel("Wave of shear", "width / wavelength", "largest error of ∂v/∂y / 2π", [
+        [Panel("Shear wave", "width / wavelength", "largest error of ∂v/∂y / 2π", [
             Curve("gaussian", widths, errors), Curve("slope 2", widths, errors[0] * (widths / widths[0]) ** 2, theory=True)])],
-        "A row of 80 grains a wavelength; the error is the largest of all cells.",
+        "A row of 80 grains per wavelength; the error is the largest over all cells.",
     )
 
 

@@ -19,7 +19,7 @@ _RADIUS = 0.75
 
 
 def rings() -> Item:
-    """Mass and momentum balance of ring-shaped cells, and their stress beside that of ever finer cubes."""
+    """Mass and momentum balance of ring-shaped cells, and their stress against that of ever finer cubes."""
     network = _centred(scenes.heap())
     cells = Rings.around(_RADIUS, 1.0, _WIDTH, 0.1)
     fields, _ = ring_fields(network.frame, network.links, [network.base], cells, np.ones((len(cells.heights), 1)),
@@ -32,17 +32,17 @@ def rings() -> Item:
         "rings",
         "Average around an axis",
         "Fields over radius and height, as on the pages of silos, are averaged around the axis before they are put on a grid. Mass must be "
-        "conserved, the vertical momentum that flows through the faces of each ring must balance weight and base of the heap at rest, and "
-        "averages of the three-dimensional fields over the same shells must come to the same stresses as their cubes become small.",
+        "conserved, the vertical momentum that flows through the faces of each ring must balance weight and base force of the heap "
+        "at rest, and averages of the three-dimensional fields over the same shells must converge to the same stresses for small cubes.",
         [exact("ring_mass", "mass in the rings over that of the grains, − 1", fields.mass.sum() / network.frame.masses.sum() - 1.0,
                "closed form", "a grain without its mass"),
-         exact("ring_balance", "balance of vertical momentum, the worst ring, over max ρ g", float(unbalanced), "momentum balance",
+         exact("ring_balance", "balance of vertical momentum in the worst ring, over max ρ g", float(unbalanced), "momentum balance",
                "gravity doubled", tolerance=1e-3,
-               detail="Gauss's rule along the lines, and the table of the kernel; the limit is that of the cases")],
+               detail="errors of Gauss's rule along the lines and of the table of the kernel; the tolerance is that of the cases")],
         [Panel("Rings against cubes", "spacing of the cubes / width", "largest difference / largest stress", [
             Curve("σ$_{zz}$, σ$_{rr}$, σ$_{rz}$", spacings / _WIDTH, errors),
-            Curve("cut of the cubes' Gaussian", spacings / _WIDTH, np.full(len(spacings), cut), theory=True)])],
-        "What remains on fine grids is the part of the Gaussian beyond three widths, 0.8 %, which the three-dimensional kernel leaves out.",
+            Curve("truncation of the cubes' Gaussian", spacings / _WIDTH, np.full(len(spacings), cut), theory=True)])],
+        "The difference on fine grids is the part of the Gaussian beyond three widths, 0.8 %, which the three-dimensional kernel omits.",
     )
 
 

@@ -1,4 +1,4 @@
-"""Flows of the SPH solver beside hydrostatics and potential theory: apart from any engine."""
+"""Flows of the SPH solver against hydrostatics and potential theory, without any engine."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ def still_water() -> Item:
     return Item(
         "still_water",
         "SPH: water at rest",
-        f"A tank {width:g} m wide is filled {depth:g} m deep, {round(depth / dx)} particles, and left alone for two seconds. The pressure "
-        "of the particles must be that of their depth, and the walls must carry the weight.",
+        f"A tank {width:g} m wide is filled {depth:g} m deep, {round(depth / dx)} particles, and left at rest for two seconds. The "
+        "pressure of the particles must correspond to their depth, and the walls must carry the weight.",
         [_compared("pressure_rms", "pressure: rms deviation from ρ g depth, over ρ g H", np.sqrt(np.mean(squares)) / scale, 0.0, 0.01,
                    absolute=True, evidence="theory", source=HYDROSTATICS, why="a fifth of the pressure of one layer of particles",
                    control="gravity a fiftieth too strong"),
@@ -86,10 +86,10 @@ def added_mass() -> Item:
         "added_mass",
         "SPH: added mass of a cylinder",
         f"A cylinder of radius {a:.3f} m, {2 * a / dx:.0f} particles across, is accelerated by {acceleration:g} m/s² from rest within "
-        f"water that fills a larger one of {b:.3f} m. Potential theory gives the mass that seems to be added, ρ π a² (b² + a²)/(b² − a²) "
-        "per metre (Lamb, Hydrodynamics, 6th ed. 1932, art. 69). No model adds it here: it comes with the acceleration of the wall's "
-        f"particles in their pressure. The acceleration grows for {ramp:g} s, lest sound run to and fro; the mean force after that is "
-        "compared. By then the cylinder has moved a tenth of a spacing: further on the lattice of the water resists shear.",
+        f"water that fills a larger one of {b:.3f} m. Potential theory gives the added mass ρ π a² (b² + a²)/(b² − a²) "
+        "per metre (Lamb, Hydrodynamics, 6th ed. 1932, art. 69). No model adds it here: it follows from the acceleration of the "
+        f"wall particles, which enters their pressure. The acceleration is ramped over {ramp:g} s to avoid sound waves; the mean "
+        "force after that is compared. By then the cylinder has moved a tenth of a spacing: later the lattice of the water resists shear.",
         [_compared("added_mass_ratio", "added mass over that of theory", found[times > ramp].mean() / due, 1.0, 0.05, evidence="theory",
                    source="Lamb 1932, art. 69", why="steps of the lattice on both circles", control="water a tenth too light")],
         [Panel("Force", "time (s)", "force over acceleration (kg/m)", [
@@ -123,12 +123,12 @@ def floating() -> Item:
     share = draught / side
     return Item(
         "floating",
-        "SPH: a block afloat",
-        f"A block of {side:g} m side and {ratio:g} times the density of water is let go, upright and without turning, a tenth of its side "
-        "above where it floats. Its mean draught in the second 0.7 s follows from its height, as the volume of water stays.",
-        [_compared("displaced_volume", "displaced over whole volume", float(np.mean(share[35:])), ratio, 0.02, absolute=True,
+        "SPH: floating block",
+        f"A block of {side:g} m side and {ratio:g} times the density of water is released, upright and without rotation, a tenth of "
+        "its side above its floating position. Its mean draught in the second 0.7 s follows from its height and the volume of water.",
+        [_compared("displaced_volume", "displaced over total volume", float(np.mean(share[35:])), ratio, 0.02, absolute=True,
                    evidence="theory", source="Archimedes", why="a third of a layer of particles on 16", control="water a tenth too light")],
-        [Panel("Draught", "time (s)", "displaced over whole volume", [
+        [Panel("Draught", "time (s)", "displaced over total volume", [
             Curve("block", (0.02 * np.arange(1, 71)).tolist(), share.tolist()),
             Curve("Archimedes", [0.02, 1.4], [ratio, ratio], theory=True)], linear=True)],
     )

@@ -6,7 +6,7 @@ from dembark.postproc.measurement import Estimate, Measurement, Value
 
 
 def measure(replicas):
-    """Numbers by the names that case.toml declares; replicas[k].parameters, .grains(), .times() are what there is to measure."""
+    """The values by their names in case.toml, from replicas[k].parameters, .grains() and .times()."""
     run, p = replicas[0], replicas[0].parameters
     energies = [0.5 * frame.velocities[0, 2] ** 2 + 9.81 * (frame.positions[0, 2] - p["radius"]) for frame in run.grains()]
     ratio = np.sqrt(energies[-1] / energies[0])

@@ -28,7 +28,7 @@ def build(folder: Path) -> Path:
     """
     gathered = gather(folder)
     if not any(page.results for page in gathered.pages):
-        raise RunError(f"nothing to report in {folder}", "the campaign has no measured run yet", "see 'dembark status'")
+        raise RunError(f"nothing to report in {folder}", "no run of the campaign has been measured yet", "see 'dembark status'")
     return write(gathered, lambda drawn: _chapters(gathered, drawn))
 
 
@@ -45,10 +45,10 @@ def _sweep(sweep: Sweep, gathered: Gathered, drawn: Path) -> dict[str, Any]:
     write_whole(drawn / f"{name}.tex", tables.latex(sweep, quantities).encode())
     study = figures.study_figure(sweep, chosen)
     shown = [embed(study, drawn, f"{name}-study",
-                   "Quantities along the sweep with 95 % intervals; grey and dashed: the reference of each point.")] if study else []
+                   "Quantities along the sweep with 95 % intervals; grey dashed: reference of each point.")] if study else []
     maps = {engine: figures.map_figure(sweep, engine, chosen) for engine in sweep.engines}
     shown += [embed(one, drawn, f"{name}-map-{engine}",
-                    f"{engine_name(engine)} over both parameters; a red frame marks a check that failed.")
+                    f"{engine_name(engine)} over both parameters; red frames mark failed checks.")
               for engine, one in maps.items() if one]
     compared = {page.variant: page.comparison for page in gathered.pages if page.case == sweep.case}
     return {"sweep": sweep, "shown": len(chosen), "left_out": len(quantities) - len(chosen), "figures": shown,
@@ -56,8 +56,8 @@ def _sweep(sweep: Sweep, gathered: Gathered, drawn: Path) -> dict[str, Any]:
 
 
 def _verdicts(sweep: Sweep, point: Point, comparison: Comparison | None) -> dict[str, Any]:
-    """One line of the table of checks: the tally of each engine and of the engines beside each other, and what failed."""
+    """One line of the table of checks: the tally of each engine and of the comparison of the engines, and what failed."""
     groups: dict[str, Any] = {engine_name(engine): result.quantities for engine, result in sorted(point.results.items())}
-    groups |= {"engines beside each other": comparison.quantities} if comparison else {}
+    groups |= {"comparison of the engines": comparison.quantities} if comparison else {}
     return {"values": {axis: point.values[axis] for axis in sweep.axes}, "counts": {who: tally(found) for who, found in groups.items()},
             "failed": [f"{who}: {one.title}" for who, found in groups.items() for one in found if one.standing == "failed"]}

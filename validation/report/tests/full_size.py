@@ -35,7 +35,7 @@ def quantity(number: int, seed: int) -> QuantityRecord:
         f"quantity_{number}", value, "info" if unsure else "pass", f"quantity σ_zz number {number} of the packing, over its weight", "kPa",
         (value - half, value + half),
         "5 replicas", reference, None, value - reference, "absolute" if kind == "identity" else "relative", 0.1,
-        f"its interval (±{half:.2g}) is wider than what is allowed" if unsure else "", "a detail", "a source", kind, number % 2 == 0,
+        f"its interval (±{half:.2g}) is wider than the tolerance" if unsure else "", "a detail", "a source", kind, number % 2 == 0,
         control="friction off")
 
 

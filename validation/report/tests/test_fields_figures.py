@@ -28,7 +28,7 @@ def results(tmp_path_factory):
 
 def test_fields_are_drawn_with_their_data_beside_them(results):
     html = (results / "report.html").read_text()
-    assert "Fields over radius and height" in html and "Eulerian beside Lagrangian profiles" in html
+    assert "Fields over radius and height" in html and "Eulerian and Lagrangian profiles" in html
     rows = list(csv.DictReader((results / "figures" / "silo-dry-fields-section.csv").open()))
     assert {row["engine"] for row in rows} == {"liggghts", "yade"}
     fields = xarray.load_dataset(results / "silo" / "dry" / "yade" / "fields.nc", engine="h5netcdf")

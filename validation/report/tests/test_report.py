@@ -147,11 +147,11 @@ def test_symbols_have_subscripts_and_no_number_is_parted_from_its_per_cent():
 
 
 def test_open_checks_are_one_line_for_each_case_and_reason():
-    rows = [row(8, reason="its interval (±0.4) is wider than what is allowed"),
-            row(17, reason="its interval (±0.5) is wider than what is allowed"),
+    rows = [row(8, reason="its interval (±0.4) is wider than the tolerance"),
+            row(17, reason="its interval (±0.5) is wider than the tolerance"),
             row(26, reason="the run is too short")]
     first, second = front.open_lines(rows)
-    assert (first.count, first.reason) == (2, "its interval is wider than what is allowed") and "1 more" in first.names
+    assert (first.count, first.reason) == (2, "its interval is wider than the tolerance") and "1 more" in first.names
     assert (second.count, second.reason) == (1, "the run is too short")
 
 

@@ -51,4 +51,4 @@ def test_the_report_names_what_was_left_out(tmp_path: Path, monkeypatch: pytest.
     assert gather(folder).left_out == ""
     runs = read_json(folder / "runs.json")
     write_json(folder / "runs.json", {**runs, "left_out": {"third": "not found"}})
-    assert gather(folder).left_out == "Left out, for this machine does not have it: The Third."
+    assert gather(folder).left_out == "Left out, because not installed on this machine: The Third."

@@ -214,7 +214,7 @@ def test_the_engines_own_word_is_found() -> None:
     assert outcome.reason(["Traceback (most recent call last):", "  x", "ValueError: no", "bye"]) == "ValueError: no"
     assert outcome.reason(["ERROR: Unknown pair style (force.cpp:1)", "Last command: x"]).startswith("ERROR: Unknown pair")
     assert outcome.reason(["dembark: steps 3", "only this"]) == "only this"
-    assert outcome.reason([]) == "it said nothing"
+    assert outcome.reason([]) == "it printed nothing"
 
 
 def test_a_result_is_written_once_with_all_that_is_known_of_it(tmp_path: Path) -> None:
