@@ -14,7 +14,6 @@
 #include "dembark/keyword_reader.hpp"
 #include "fix_sph_body.h"
 
-
 using namespace LAMMPS_NS;
 using namespace FixConst;
 using namespace dembark::sph;
@@ -91,7 +90,7 @@ void FixSphContact::read(const std::vector<std::string> &words) {
   if (names_.empty()) dembark::keywords::refuse("there is no box; name fixes sph/body with their edges");
   if (!(2.0 * contacts_.radius < shortest))
     dembark::keywords::refuse("rounding must be less than half of the shortest edge, " + text(shortest) + " m, not " +
-                             text(contacts_.radius) + " m");
+                              text(contacts_.radius) + " m");
 }
 
 int FixSphContact::setmask() { return POST_FORCE; }
