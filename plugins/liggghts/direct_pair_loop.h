@@ -2,8 +2,8 @@
 //
 // The engine's loop hands every number from model to model through memory and decides pair by pair whether there is a contact. Here
 // the contacts of many grains are picked first and computed in packs (dembark/pairs): the same laws and the same numbers to round-off, in
-// less time than the stock friction law takes. Whatever else the engine may ask of a pair style (energies, virial, stored forces, rigid
-// bodies, accounts of energy, ...) is left to its own loop, step by step.
+// less time than the stock friction law takes. Whatever else the engine may ask of a pair style (stored forces, rigid bodies, accounts of
+// energy, ...) is left to its own loop, step by step. The virial is not: a run must not depend on when it is asked for.
 #ifndef DEMBARK_DIRECT_PAIR_LOOP_H
 #define DEMBARK_DIRECT_PAIR_LOOP_H
 
@@ -28,6 +28,7 @@
 #include "fix_energy_account.h"
 #include "model_properties.h"
 #include "pair_parameters.h"
+#include "shared_fix.h"
 
 namespace dembark_liggghts {
 
@@ -57,12 +58,40 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   const std::unique_ptr<PairBlock> block_ = std::make_unique<PairBlock>();
   std::vector<dembark::PairLaw<double>> laws_;  // of this step
 
-  bool plain_step(LAMMPS_NS::PairGran* pair, int eflag, int vflag, int addflag) const {
+  bool plain_step(LAMMPS_NS::PairGran* pair, int addflag) const {
     const LAMMPS_NS::Atom* atom = lmp_->atom;
-    return plain_settings_ && !tallied_ && !eflag && !vflag && !(pair->cpl() && addflag) && pair->computeflag() && pair->listgranhistory &&
+    return plain_settings_ && !tallied_ && !(pair->cpl() && addflag) && pair->computeflag() && pair->listgranhistory &&
            !pair->storeContactForces() && !pair->storeContactForcesStress() && !pair->storeSumDelta() && !pair->store_sum_normal_force() &&
            !pair->fr_pair() && atom->rmass && lmp_->force->nktv2p == 1.0 && atom->sphere_flag && !atom->shapetype_flag &&
            lmp_->modify->n_fixes_style("insert/stream/predefined") == 0;
+  }
+
+  /// Adds up the virial of the forces that the packs are about to compute. Contacts have no potential energy in this engine.
+  void tally_virial(LAMMPS_NS::PairGran& pair) const {
+    const LAMMPS_NS::Atom& atom = *lmp_->atom;
+    const LAMMPS_NS::NeighList &list = *pair.list, &histories = *list.listgranhistory;
+    const auto mass = [&](int i) { return atom.mask[i] & pair.freeze_group_bit() ? INFINITY : atom.rmass[i]; };
+    for (int n = 0; n < list.inum; ++n) {
+      const int i = list.ilist[n];
+      for (int k = 0; k < list.numneigh[i]; ++k) {
+        const int j = list.firstneigh[i][k] & NEIGHMASK;
+        const Vec3 apart = vector(atom.x[i]) - vector(atom.x[j]);
+        const dembark::ContactBodies b = dembark_family::grain_pair(atom, i, j, apart, mass(i), mass(j));
+        const double* const history = histories.firstdouble[i] + pair.dnum() * k;
+        dembark::ContactState state;
+        if (wet) {
+          state.bridge_volume = history[bridge_offset_];
+          state.rupture_distance = history[bridge_offset_ + 1];
+        }
+        const double reach = b.radius_1 + b.radius_2;
+        if (dot(apart, apart) >= reach * reach && !(state.bridge_volume > 0.0)) continue;
+        state.friction = load_friction(history + friction_offset_);
+        if (rings_offset_ >= 0) state.rings = load_rings(history + rings_offset_);
+        if (angle_offset_ >= 0) state.rolling_angle = vector(history + angle_offset_);
+        const Vec3 f = contact_step(parameters(atom.type[i], atom.type[j]), b, dt_, state).force;
+        pair.ev_tally_xyz(i, j, atom.nlocal, lmp_->force->newton_pair, 0.0, 0.0, f.x, f.y, f.z, apart.x, apart.y, apart.z);
+      }
+    }
   }
 
   void collect_laws() {
@@ -196,15 +225,17 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   }
 
   void compute_force(LAMMPS_NS::PairGran* pair, int eflag, int vflag, int addflag) override {
-    if (!plain_step(pair, eflag, vflag, addflag)) {
+    if (!plain_step(pair, addflag)) {
       Stock::compute_force(pair, eflag, vflag, addflag);
       return;
     }
-    pair->evflag = pair->vflag_fdotr = 0;
+    if (eflag || vflag) pair->ev_setup(eflag, vflag);
+    else pair->evflag = pair->vflag_fdotr = 0;
     if (pair->list->inum == 0) return;
     LAMMPS_NS::Atom& atom = *lmp_->atom;
     update_history_ = pair->shearupdate();
     dt_ = update_history_ ? lmp_->update->dt : 0.0;
+    if (vflag) tally_virial(*pair);
     collect_laws();
     const int owned = lmp_->force->newton_pair ? atom.nlocal + atom.nghost : atom.nlocal;
     // The scalar law knows the exponential curve, and what a step of no length is.

@@ -42,3 +42,33 @@ def test_same_bits_with_narrower_vectors(tmp_path, monkeypatch, cohesion, settin
         monkeypatch.setenv("DEMBARK_LANES", str(lanes))
         runs.append(frames(tmp_path / str(lanes), cohesion=cohesion, rolling="", settings=settings))
     assert np.array_equal(runs[0], runs[1]) and np.array_equal(runs[1], runs[2])
+
+
+VIRIAL = """
+compute virial all pressure NULL virial
+thermo_style custom step c_virial c_virial[1] c_virial[4]
+thermo_modify format float %.17g
+"""
+
+
+def virial(folder, every=100, **words) -> np.ndarray:
+    """Rows of step, pressure and two components of the virial (Pa), every so many steps."""
+    folder.mkdir()
+    (folder / "cloud.data").write_text(cloud())
+    done = run_deck(folder, DECK.format(**words).replace("thermo 100\n", f"{VIRIAL}thermo {every}\n"))
+    assert done.code == 0, done.error
+    rows = [line.split() for line in done.output.splitlines()]
+    return np.array([row for row in rows if len(row) == 4 and row[0].isdigit() and row[0] != "0"], dtype=float)
+
+
+@pytest.mark.parametrize(("cohesion", "settings"), [("cohesion capillary", ""), ("", "presliding partial_slip")])
+def test_the_virial_is_that_of_the_engines_loop_and_does_not_change_the_run(tmp_path, cohesion, settings):
+    ours = virial(tmp_path / "ours", cohesion=cohesion, rolling="", settings=settings)
+    engine = virial(tmp_path / "engine", cohesion=cohesion, rolling="rolling_friction cdt", settings=settings)
+    assert len(ours) >= 10 and np.ptp(ours[:, 1]) > 1.0
+    np.testing.assert_allclose(ours, engine, rtol=1e-7, atol=1e-7 * np.abs(ours[:, 1]).max())
+    often = virial(tmp_path / "often", every=7, cohesion=cohesion, rolling="", settings=settings)
+    assert len(often) > 100
+    never = frames(tmp_path / "never", cohesion=cohesion, rolling="", settings=settings)
+    for folder in ("ours", "often"):
+        assert np.array_equal(np.stack(read_dump(tmp_path / folder / "grains.dump")[1]), never)

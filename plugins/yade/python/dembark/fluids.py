@@ -114,7 +114,26 @@ class FluidWriter(FrameWriter):
         print(O.iter, f"{O.time:.6g}", f"{energies['kinetic']:.6g}", flush=True)
 
 
-class FluidRecorder:
+class _CaseRecorder:
+    """Writes a row of time.csv and a frame of grains.dump when they are due; those that follow it know what a row holds."""
+
+    def __init__(self, p, bounds, columns):
+        self._p = p
+        self._frames = FluidWriter(bounds, dump="grains.dump", history="")
+        self._history = table("time.csv", ",".join(["step", "time", *columns]))
+
+    def __call__(self):
+        """Write what is due at this step."""
+        if O.iter and O.iter % self._p.every == 0:
+            energies = fluid_engine().energies()
+            self._history.write(",".join([str(O.iter), *(f"{x:.15g}" for x in (O.time, *self._row(energies)))]) + "\n")
+            self._history.flush()
+            print(O.iter, f"{O.time:.6g}", f"{energies['kinetic']:.6g}", flush=True)
+        if O.iter and O.iter % self._p.stride == 0:
+            self._frames.frame()
+
+
+class FluidRecorder(_CaseRecorder):
     """Writes time.csv and grains.dump of a fluid in the plane when they are due.
 
     tank: number of the wall whose force is written; bodies : name -> id of a free body
@@ -123,57 +142,37 @@ class FluidRecorder:
     ENERGIES = ("kinetic", "potential", "compression")
 
     def __init__(self, p, tank, bodies=None):
-        self._p, self._tank, self._bodies = p, tank, dict(bodies or {})
-        self._frames = FluidWriter(((p.low_x, p.high_x), (p.low_y, p.high_y), (-p.spacing, p.spacing)), dump="grains.dump", history="")
+        self._tank, self._bodies = tank, dict(bodies or {})
         poses = [f"{name}_{what}" for name in self._bodies for what in ("x", "y", "vx")]
         energies = [f"{name}_energy" for name in self.ENERGIES]
-        self._history = table("time.csv", ",".join(["step", "time", *energies, "tank_fx", "tank_fy", *poses]))
+        bounds = ((p.low_x, p.high_x), (p.low_y, p.high_y), (-p.spacing, p.spacing))
+        super().__init__(p, bounds, [*energies, "tank_fx", "tank_fy", *poses])
 
-    def __call__(self):
-        """Write what is due at this step."""
-        if O.iter and O.iter % self._p.every == 0:
-            self._row()
-        if O.iter and O.iter % self._p.stride == 0:
-            self._frames.frame()
-
-    def _row(self):
-        water = fluid_engine()
-        energies, force = water.energies(), water.wallForce(self._tank)
-        row = [O.time, *(energies[name] for name in self.ENERGIES), force[0], force[1]]
+    def _row(self, energies):
+        force = fluid_engine().wallForce(self._tank)
+        row = [*(energies[name] for name in self.ENERGIES), force[0], force[1]]
         for number in self._bodies.values():
             state = O.bodies[number].state
             row += [state.pos[0], state.pos[1], state.vel[0]]
-        self._history.write(",".join([str(O.iter), *(f"{x:.15g}" for x in row)]) + "\n")
-        self._history.flush()
-        print(O.iter, f"{O.time:.6g}", f"{energies['kinetic']:.6g}", flush=True)
+        return row
 
 
-class CubesRecorder:
+class CubesRecorder(_CaseRecorder):
     """Writes time.csv and grains.dump of a fluid in space with boxes that touch by springs, when they are due.
 
     bodies : name -> id of a free body
     """
 
-    ENERGIES = ("kinetic", "potential", "compression", "contact")
+    ENERGIES = ("kinetic", "potential", "compression")
     POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 
     def __init__(self, p, bodies):
-        self._p, self._bodies = p, dict(bodies)
+        self._bodies = dict(bodies)
         bounds = ((-p.column_length, p.downstream_length), (-0.5 * p.flume_width, 0.5 * p.flume_width), (0.0, p.flume_height))
-        self._frames = FluidWriter(bounds, dump="grains.dump", history="")
-        energies = [f"{name}_energy" for name in (*self.ENERGIES[:3], "body", "contact")]
-        poses = [f"{name}_{what}" for name in self._bodies for what in self.POSE]
-        self._history = table("time.csv", ",".join(["step", "time", *energies, *poses]))
+        energies = [f"{name}_energy" for name in (*self.ENERGIES, "body", "contact")]
+        super().__init__(p, bounds, [*energies, *(f"{name}_{what}" for name in self._bodies for what in self.POSE)])
 
-    def __call__(self):
-        """Write what is due at this step."""
-        if O.iter and O.iter % self._p.every == 0:
-            self._row()
-        if O.iter and O.iter % self._p.stride == 0:
-            self._frames.frame()
-
-    def _row(self):
-        energies = fluid_engine().energies()
+    def _row(self, energies):
         moving, poses, springs = 0.0, [], energies["contact"]
         for number in self._bodies.values():
             state = O.bodies[number].state
@@ -184,7 +183,4 @@ class CubesRecorder:
         for one in O.interactions:
             if one.isReal:
                 springs += 0.5 * one.phys.normalForce.squaredNorm() / one.phys.kn
-        row = [O.time, *(energies[name] for name in self.ENERGIES[:3]), moving, springs, *poses]
-        self._history.write(",".join([str(O.iter), *(f"{x:.12g}" for x in row)]) + "\n")
-        self._history.flush()
-        print(O.iter, f"{O.time:.6g}", f"{energies['kinetic']:.6g}", flush=True)
+        return [*(energies[name] for name in self.ENERGIES), moving, springs, *poses]
