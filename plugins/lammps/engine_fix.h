@@ -46,8 +46,9 @@ class EngineFix : public LAMMPS_NS::Fix {
     if (!a) fail(std::string("fix ") + fix->id + " (gravity) does not tell its acceleration");
     return [a] { return dembark::Vec3<double>{a[0], a[1], a[2]}; };
   }
-  /// Moment of inertia over m r^2 with which the engine turns grains, spheres. Then that of a fix nve/sphere, which may turn cylinders.
+  /// Moment of inertia over m r^2 with which the engine turns grains: of spheres.
   static double own_inertia() { return 0.4; }
+  /// The same of a fix nve/sphere, which may turn cylinders.
   double inertia_of(const Fix& fix) const {
     const double inertia = static_cast<const dembark_lammps::NveSphere&>(fix).inertia;
     if (inertia != own_inertia() && inertia != 0.5)

@@ -32,12 +32,14 @@ void enter(PluginStyle* style, void* host) {
 }
 
 int run(int argc, char** argv) {
-  LAMMPS_NS::LAMMPS lammps(argc, argv, MPI_COMM_WORLD);
+  // As in LAMMPS's own program: after an error nothing is destroyed, for a destructor may wait for the other ranks.
+  auto* const lammps = new LAMMPS_NS::LAMMPS(argc, argv, MPI_COMM_WORLD);
   if (!filled) {
     std::fputs("dembark: this LAMMPS's library does not let a program add styles; use a LAMMPS with the package PLUGIN\n", stderr);
     return 1;
   }
-  lammps.input->file();
+  lammps->input->file();
+  delete lammps;
   return 0;
 }
 

@@ -3,6 +3,7 @@
 #define DEMBARK_ROWS_FIX_H
 
 #include <algorithm>
+#include <string>
 
 #include "memory.h"
 
@@ -42,7 +43,9 @@ class RowsFix : public Base {
   }
   void unpack_restart(int i, int nth) override {
     const double* const row = this->restart_row(i, nth);
-    if (int(row[0]) != width_ + 1) this->fail_alone("the restart file was written with other options");
+    if (int(row[0]) != width_ + 1)
+      this->fail_alone("the restart file keeps " + std::to_string(int(row[0]) - 1) + " numbers an atom, not " + std::to_string(width_) +
+                       ": it was written with another pair_style or other options of this fix");
     std::copy_n(row + 1, width_, rows_[i]);
   }
   int size_restart(int) override { return width_ + 1; }

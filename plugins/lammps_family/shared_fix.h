@@ -1,4 +1,4 @@
-// The bases of the fixes that LIGGGHTS, a fork of LAMMPS, and LAMMPS both have. The files of this folder are compiled with the headers of
+// Bases of fixes that both LIGGGHTS (a fork of LAMMPS) and LAMMPS have. The files of this folder are compiled with the headers of
 // either engine; what differs is in the engine's engine_fix.h, or left to the classes in the engine's own folder.
 #ifndef DEMBARK_SHARED_FIX_H
 #define DEMBARK_SHARED_FIX_H

@@ -70,13 +70,15 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   void tally_virial(LAMMPS_NS::PairGran& pair) const {
     const LAMMPS_NS::Atom& atom = *lmp_->atom;
     const LAMMPS_NS::NeighList &list = *pair.list, &histories = *list.listgranhistory;
-    const auto mass = [&](int i) { return atom.mask[i] & pair.freeze_group_bit() ? INFINITY : atom.rmass[i]; };
+    const auto frozen = [&](int i) { return (atom.mask[i] & pair.freeze_group_bit()) != 0; };
     for (int n = 0; n < list.inum; ++n) {
       const int i = list.ilist[n];
       for (int k = 0; k < list.numneigh[i]; ++k) {
         const int j = list.firstneigh[i][k] & NEIGHMASK;
         const Vec3 apart = vector(atom.x[i]) - vector(atom.x[j]);
-        const dembark::ContactBodies b = dembark_family::grain_pair(atom, i, j, apart, mass(i), mass(j));
+        // Of two frozen grains the engine takes the mass of the first.
+        const double mass_i = frozen(i) && !frozen(j) ? INFINITY : atom.rmass[i], mass_j = frozen(j) ? INFINITY : atom.rmass[j];
+        const dembark::ContactBodies b = dembark_family::grain_pair(atom, i, j, apart, mass_i, mass_j);
         const double* const history = histories.firstdouble[i] + pair.dnum() * k;
         dembark::ContactState state;
         if (wet) {

@@ -56,7 +56,7 @@ class EngineFix : public LAMMPS_NS::Fix {
       return dembark::Vec3<double>{a[0], a[1], a[2]};
     };
   }
-  /// Moment of inertia over m r^2 with which the engine turns grains: spheres, in two dimensions cylinders. Then that of a fix nve/sphere.
+  /// Moment of inertia over m r^2 with which the engine turns grains: of spheres, in two dimensions of cylinders.
   double own_inertia() const { return domain->dimension == 2 ? 0.5 : 0.4; }
   double inertia_of(const Fix&) const { return own_inertia(); }
   void nearest_image(double* apart) const { domain->minimum_image(apart); }

@@ -25,12 +25,13 @@ std::string unknown_model(Host &host) {
 
 }  // namespace
 
-FixEnergyAccount::FixEnergyAccount(LAMMPS *lmp, int narg, char **arg) : EnergyAccountFix(lmp, narg, arg, tally) { tally.atom = atom; }
+FixEnergyAccount::FixEnergyAccount(LAMMPS *lmp, int narg, char **arg) : EnergyAccountFix(lmp, narg, arg, tally) {}
 
 int FixEnergyAccount::setmask() { return PRE_INITIAL_INTEGRATE | POST_INTEGRATE | PRE_FORCE | FINAL_INTEGRATE | END_OF_STEP; }
 
 void FixEnergyAccount::init() {
   EnergyAccountFix::init();
+  tally.atom = atom;
   tally.driven.clear();
   for (Fix *const fix : fixes())
     if (auto *const wall = dynamic_cast<FixWallMotion *>(fix)) tally.driven.emplace_back(wall->mesh(), &wall->acceleration());

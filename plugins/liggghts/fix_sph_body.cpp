@@ -118,6 +118,12 @@ void FixSphBody::init() {
   MPI_Allreduce(&count, &all, 1, MPI_DOUBLE, MPI_SUM, world);
   if (all == 0.0) fail("its group has no atoms: a body is made of particles");
   place_particles();
+  // Then a wall must be put back in each step.
+  int moved = 0;
+  for (const Fix *const fix : fixes())
+    if (fix->time_integrate && !dynamic_cast<const FixSphBody *>(fix))
+      for (int i = 0; i < atom->nlocal; ++i) moved |= (atom->mask[i] & groupbit) && (atom->mask[i] & fix->groupbit);
+  MPI_Allreduce(&moved, &moved_by_others_, 1, MPI_INT, MPI_MAX, world);
 }
 
 /// A state of a restart file has its forces.
@@ -180,7 +186,7 @@ void FixSphBody::initial_integrate(int) {
   state_.work += 0.5 * update->dt * power();
   body.drift(update->dt);
   // A wall at rest stays where it is.
-  const bool still = !body.free && norm(body.velocity) == 0.0 && norm(body.spin) == 0.0;
+  const bool still = !moved_by_others_ && !body.free && norm(body.velocity) == 0.0 && norm(body.spin) == 0.0;
   if (!still) place_particles();
 }
 

@@ -1,9 +1,7 @@
 #include "fix_sph_contact.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <cstring>
-#include <stdexcept>
 
 #include "comm.h"
 #include "domain.h"
@@ -29,23 +27,14 @@ Vector read_vector(Reader &in, const std::string &of, const std::string &what) {
 
 }  // namespace
 
-FixSphContact::FixSphContact(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg) {
-  if (domain->dimension != 3) refuse("boxes are for three dimensions");
-  try {
-    read(std::vector<std::string>(arg + 3, arg + narg));
-  } catch (const std::invalid_argument &wrong) {
-    refuse(wrong.what());
-  }
+FixSphContact::FixSphContact(LAMMPS *lmp, int narg, char **arg) : SharedFix(lmp, narg, arg) {
+  if (domain->dimension != 3) fail("boxes are for three dimensions");
+  checked([&] { read(std::vector<std::string>(arg + 3, arg + narg)); });
   restart_global = 1;
   vector_flag = 1;
   size_vector = 3;
   global_freq = 1;
   extvector = 0;
-}
-
-void FixSphContact::refuse(const std::string &what) {
-  error->fix_error(FLERR, this, what.c_str());
-  std::abort();  // fix_error() does not return
 }
 
 void FixSphContact::read(const std::vector<std::string> &words) {
@@ -101,14 +90,14 @@ void FixSphContact::init() {
   for (const std::string &name : names_) {
     const int at = modify->find_fix(name.c_str());
     auto *const solid = at < 0 ? nullptr : dynamic_cast<FixSphBody *>(modify->fix[at]);
-    if (!solid || !solid->body().free) refuse("box: '" + name + "' is the ID of no fix sph/body");
-    if (std::count(names_.begin(), names_.end(), name) > 1) refuse("box: '" + name + "' stands there twice");
+    if (!solid || !solid->body().free) fail("box: '" + name + "' is the ID of no fix sph/body");
+    if (std::count(names_.begin(), names_.end(), name) > 1) fail("box: '" + name + "' stands there twice");
     fixes_.push_back(solid);
     bodies_.push_back(&solid->body());
   }
   const double most = contacts_.longest_step(bodies_);
   if (update->dt > most)
-    refuse("the time step must be at most " + text(most) + " s for this stiffness, not " + text(update->dt) + " s; take a softer one");
+    fail("the time step must be at most " + text(most) + " s for this stiffness, not " + text(update->dt) + " s; take a softer one");
 }
 
 /// Forces of the state as it is.
@@ -119,24 +108,36 @@ void FixSphContact::post_force(int) { push(true); }
 /// All ranks have the places of all bodies, and do the same.
 void FixSphContact::push(bool remember) {
   const std::vector<Push> &pushes = contacts_.push(remember ? update->dt : 0.0, bodies_, remember);
+  // Twice as deep, two edges have passed each other, and their springs push on.
+  if (contacts_.deepest > contacts_.radius)
+    fail("at step " + std::to_string(update->ntimestep) + " boxes overlap by " + text(contacts_.deepest) + " m, more than the rounding, " +
+         text(contacts_.radius) + " m; take a higher stiffness");
   for (std::size_t k = 0; k < fixes_.size(); ++k) fixes_[k]->add_load(pushes[k].force, pushes[k].torque);
 }
 
 /// Energy in the springs (J), largest overlap (m), how many points touch.
 double FixSphContact::compute_vector(int n) { return n == 0 ? contacts_.stored : n == 1 ? contacts_.deepest : double(contacts_.count); }
 
+std::string FixSphContact::written() const {
+  std::string all;
+  for (const std::string &name : names_) all += "box " + name + " ";
+  return all + "and " + std::to_string(contacts_.planes.size()) + " planes";
+}
+
 void FixSphContact::write_restart(FILE *file) {
   if (comm->me != 0) return;
   static_assert(sizeof(Vector) == 3 * sizeof(double), "numbers only");
-  const int count = int(contacts_.stretches.size()), bytes = int(sizeof count + std::size_t(count) * sizeof(Vector));
-  fwrite(&bytes, sizeof bytes, 1, file);
-  fwrite(&count, sizeof count, 1, file);
-  fwrite(contacts_.stretches.data(), sizeof(Vector), std::size_t(count), file);
+  const std::string of = written();
+  const std::size_t count = contacts_.stretches.size();
+  write_part(file, {{of.c_str(), of.size() + 1}, {&count, sizeof count}, {contacts_.stretches.data(), count * sizeof(Vector)}});
 }
 
 void FixSphContact::restart(char *buffer) {
-  int count = 0;
+  const std::string of = buffer;
+  if (of != written()) fail("the state has contacts of " + of + ", not of " + written());
+  buffer += of.size() + 1;
+  std::size_t count = 0;
   std::memcpy(&count, buffer, sizeof count);
-  contacts_.stretches.resize(std::size_t(count));
-  std::memcpy(static_cast<void *>(contacts_.stretches.data()), buffer + sizeof count, std::size_t(count) * sizeof(Vector));
+  contacts_.stretches.resize(count);
+  std::memcpy(static_cast<void *>(contacts_.stretches.data()), buffer + sizeof count, count * sizeof(Vector));
 }

@@ -12,13 +12,12 @@ FixStyle(sph/contact,FixSphContact)
 #include <string>
 #include <vector>
 
-#include "fix.h"
-
 #include "dembark/sph/box_contacts.hpp"
+#include "shared_fix.h"
 
 namespace LAMMPS_NS {
 
-class FixSphContact : public Fix {
+class FixSphContact : public dembark_family::SharedFix {
  public:
   FixSphContact(class LAMMPS *, int, char **);
 
@@ -31,11 +30,13 @@ class FixSphContact : public Fix {
   void restart(char *);
 
  private:
-  [[noreturn]] void refuse(const std::string &what);
   void read(const std::vector<std::string> &words);
   void push(bool remember);
 
   dembark::sph::BoxContacts contacts_;
+  /// What the stretches of a state belong to.
+  std::string written() const;
+
   std::vector<std::string> names_;  // of the fixes of the boxes
   std::vector<class FixSphBody *> fixes_;
   std::vector<const dembark::sph::Body *> bodies_;

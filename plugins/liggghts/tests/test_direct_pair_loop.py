@@ -45,30 +45,32 @@ def test_same_bits_with_narrower_vectors(tmp_path, monkeypatch, cohesion, settin
 
 
 VIRIAL = """
-compute virial all pressure NULL virial
+compute virial all pressure thermo_temp virial
 thermo_style custom step c_virial c_virial[1] c_virial[4]
 thermo_modify format float %.17g
-"""
+thermo """
 
 
-def virial(folder, every=100, **words) -> np.ndarray:
-    """Rows of step, pressure and two components of the virial (Pa), every so many steps."""
+def asked(folder, every, **words) -> tuple[np.ndarray, np.ndarray]:
+    """Step, pressure and two components of the virial (Pa), told every so many steps (0: never), and the frames. Held grains touch."""
     folder.mkdir()
     (folder / "cloud.data").write_text(cloud())
-    done = run_deck(folder, DECK.format(**words).replace("thermo 100\n", f"{VIRIAL}thermo {every}\n"))
+    text = DECK.format(**words).replace("stuck id 1:64", "stuck id 1:128")
+    done = run_deck(folder, text.replace("thermo 100\n", f"{VIRIAL}{every}\n") if every else text)
     assert done.code == 0, done.error
     rows = [line.split() for line in done.output.splitlines()]
-    return np.array([row for row in rows if len(row) == 4 and row[0].isdigit() and row[0] != "0"], dtype=float)
+    told = [row for row in rows if len(row) == 4 and row[0].isdigit() and row[0] != "0"]
+    return np.array(told, dtype=float), np.stack(read_dump(folder / "grains.dump")[1])
 
 
 @pytest.mark.parametrize(("cohesion", "settings"), [("cohesion capillary", ""), ("", "presliding partial_slip")])
 def test_the_virial_is_that_of_the_engines_loop_and_does_not_change_the_run(tmp_path, cohesion, settings):
-    ours = virial(tmp_path / "ours", cohesion=cohesion, rolling="", settings=settings)
-    engine = virial(tmp_path / "engine", cohesion=cohesion, rolling="rolling_friction cdt", settings=settings)
+    words = {"cohesion": cohesion, "settings": settings}
+    ours, frames = asked(tmp_path / "ours", 100, rolling="", **words)
+    engine, _ = asked(tmp_path / "engine", 100, rolling="rolling_friction cdt", **words)
     assert len(ours) >= 10 and np.ptp(ours[:, 1]) > 1.0
     np.testing.assert_allclose(ours, engine, rtol=1e-7, atol=1e-7 * np.abs(ours[:, 1]).max())
-    often = virial(tmp_path / "often", every=7, cohesion=cohesion, rolling="", settings=settings)
+    often, others = asked(tmp_path / "often", 7, rolling="", **words)
     assert len(often) > 100
-    never = frames(tmp_path / "never", cohesion=cohesion, rolling="", settings=settings)
-    for folder in ("ours", "often"):
-        assert np.array_equal(np.stack(read_dump(tmp_path / folder / "grains.dump")[1]), never)
+    for found in (others, asked(tmp_path / "never", 0, rolling="", **words)[1]):
+        assert np.array_equal(found, frames)

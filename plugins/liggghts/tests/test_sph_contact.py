@@ -98,6 +98,22 @@ def test_resumes_to_the_bit(tmp_path: Path) -> None:
     assert (frames[0] == frames[1]).all()
 
 
+def test_a_state_of_other_boxes_is_refused(tmp_path: Path) -> None:
+    assert run_deck(tmp_path, deck(run="run 450")).code == 0
+    done = run_deck(tmp_path, deck(begin=GROUPS, run="run 500 upto", old="plane 0 0 0 0 0 1 0.4 0.6",
+                                   new="plane 0 0 0 0 0 1 0.4 0.6 plane 0 0 0 1 0 0 0.4 0.6"), name="second.in")
+    assert done.code != 0
+    assert "the state has contacts of box one box two and 1 planes, not of box one box two and 2 planes" in done.error, done.error
+
+
+def test_boxes_that_are_too_soft_end_the_run(tmp_path: Path) -> None:
+    """Deeper than the rounding two edges would pass each other, and then their springs push the wrong way."""
+    done = run_deck(tmp_path, deck(old="stiffness 2e4", new="stiffness 1e3"))
+    assert done.code != 0
+    assert "boxes overlap by" in done.error
+    assert "more than the rounding, 0.004 m; take a higher stiffness" in done.error
+
+
 REFUSED = {
     "stiffness": ("stiffness 2e4 ", "", "stiffness (N/m) is missing"),
     "keyword": ("stiffness 2e4 ", "soft 3 ", "'soft' is no keyword; known are stiffness, rounding"),

@@ -89,8 +89,8 @@ class FinnieRabinowicz:
         points = np.zeros((n, 3))
         points[:, : 1 if path.ndim == 1 else path.shape[1]] = path[:, None] if path.ndim == 1 else path
 
-        # Of a path along a line any plane through it will do.
-        normal = tuple(map(float, np.linalg.svd(points)[2][-1])) if n else (0.0, 0.0, 1.0)
+        # Of a path along a line any plane through it will do. The factor R has the plane of the points, in nine numbers at most.
+        normal = tuple(map(float, np.linalg.svd(np.linalg.qr(points, mode="r"))[2][-1])) if n else (0.0, 0.0, 1.0)
 
         def column(name: str, value: ArrayLike, unit: str, **limits: Unpack[Limits]) -> NDArray[np.float64]:
             array = numbers(name, value, unit, **limits)

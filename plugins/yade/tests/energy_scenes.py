@@ -5,7 +5,7 @@ import os
 import random
 
 from columns import dilute_column
-from scene_results import write_results
+from scene_results import advance, write_results
 from yade import dembark, utils
 
 PAIR = dict(restitution=0.6, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5)
@@ -184,7 +184,7 @@ def carried():
     account = scene_with(flying(3, 0.0052, 1.0), words, dict(capillaryModel="willett", carriedLiquid=True), step=1e-5, before=[liquid])
     counts = []
     for _ in range(20):
-        O.run(50, True)
+        advance(50)
         counts.append(liquid.bridgeCount())
     return {"energies": account.energies(), "bridges": counts}
 
@@ -196,7 +196,7 @@ def two_steps():
         account, _ = column(step=step, count=3)
         errors = []
         for _ in range(20):
-            O.run(round(1.5e-3 / step), True)
+            advance(round(1.5e-3 / step))
             errors.append(account["step_error"])
         found.append(errors)
     return found

@@ -5,7 +5,7 @@ import math
 import os
 import re
 
-from scene_results import write_results
+from scene_results import advance, write_results
 from yade import dembark, utils
 
 GRAVITY = 9.81
@@ -50,12 +50,6 @@ def motion():
     """Position, velocity and angular velocity of each sphere, to the bit."""
     return [[float(x).hex() for v in (b.state.pos, b.state.vel, b.state.angVel) for x in v] for b in O.bodies
             if isinstance(b.shape, Sphere)]
-
-
-def steps(count):
-    """O.run(count, True) looks only every 40 ms whether it is over."""
-    for _ in range(count):
-        O.step()
 
 
 def kinetic():
@@ -125,7 +119,7 @@ def cradle():
     engine = setting([log((0.2 * i, 0, 0), 0.1, 50.0, (float(i == 0), 0, 0)) for i in range(5)], 1e-6, stiffness=2e7)
     worst = 0.0
     for _ in range(20):
-        steps(1000)
+        advance(1000)
         worst = max(worst, abs(sum(b.state.vel[0] for b in O.bodies) - 1.0))
     return {"velocity": [b.state.vel[0] for b in O.bodies], "momentum": worst, "outputs": outputs(engine)}
 
@@ -175,7 +169,7 @@ def drum():
         O.bodies[1].state.blockedDOFs = blocked
         highest = 0.0
         for _ in range(600):
-            steps(100)
+            advance(100)
             x, y, _ = O.bodies[1].state.pos
             highest = max(highest, math.atan2(x, -y))
         state = O.bodies[1].state
@@ -302,7 +296,7 @@ def first_impacts():
                      walls=[dict(bodies=[0], stiffness=4e7, friction=0.4, name="floor")])
     rows = []
     for _ in range(40):
-        steps(200)
+        advance(200)
         rows.append([[*b.state.pos, *b.state.vel, *b.state.angVel] for b in O.bodies if b.dynamic])
     return {"rows": rows, "radii": radii, "masses": masses, "places": places, "outputs": outputs(engine)}
 

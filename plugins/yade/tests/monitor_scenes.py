@@ -5,7 +5,7 @@ import os
 import random
 import sys
 
-from scene_results import write_results
+from scene_results import advance, write_results
 from yade import utils
 
 R, DENSITY = 2.5e-3, 2500.0
@@ -78,7 +78,7 @@ def struck():
     scene_with([grain(2 * R * k, 0.5 if k == 0 else 0.0) for k in range(count)], IntegrationMonitor(speed=0.5), step)
     rows = []
     for _ in range(steps // stride):
-        O.run(stride, True)
+        advance(stride)
         rows.append([b.state.pos[0] for b in O.bodies])
     return {"rows": rows, "figures": O.engines[3].figures()}
 

@@ -4,7 +4,7 @@ import os
 import sys
 from pathlib import Path
 
-from scene_results import refusal, write_results
+from scene_results import advance, refusal, write_results
 from yade import utils
 
 sys.path.insert(0, str(Path(sys.argv[0] if sys.argv[0].endswith(".py") else __file__).resolve().parents[2] / "tests"))
@@ -132,7 +132,7 @@ def pushed():
         books, _, _ = scene("uniform velocity 0 0 0 acceleration 0 0 60", grains, (0, 0, 0), step=step, restitution=1.0, **SMOOTH)
         errors = []
         for _ in range(200):
-            O.run(round(1e-4 / step), True)
+            advance(round(1e-4 / step))
             errors.append(abs(books["step_error"]))
         found.append(max(errors) / books["scale"])
     return found

@@ -4,6 +4,10 @@ import json
 import sys
 from pathlib import Path
 
+from yade import Omega
+
+O = Omega()
+
 
 def refusal(do, otherwise="accepted"):
     """What YADE says when `do()` is wrong."""
@@ -12,6 +16,12 @@ def refusal(do, otherwise="accepted"):
     except RuntimeError as error:
         return str(error)
     return otherwise
+
+
+def advance(count):
+    """Make so many steps; O.run(count, True) looks only every 40 ms whether it is over."""
+    for _ in range(count):
+        O.step()
 
 
 def write_results(scenes):

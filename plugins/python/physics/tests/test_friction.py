@@ -193,13 +193,21 @@ def test_any_path(law, path, data):
 @pytest.mark.parametrize("law", EVERY + PARTIAL)
 def test_loops_with_reversals_dissipate(law):
     """The area of the loop of force over displacement is what the state says is lost."""
-    points, amplitude = 4000, 5e-5
+    points, amplitude = 1000, 5e-5
     path = amplitude * np.sin(2.0 * np.pi * np.arange(1, 4 * points + 1) / points)
     out = law.follow(N, K, AREA, path, time_step=1e-3)
     last = slice(3 * points - 1, None)
     area = np.trapezoid(out.force[last], path[last])
     assert area > N * amplitude * 0.1
     assert area == pytest.approx(out.dissipated_energy[-1] - out.dissipated_energy[3 * points - 1], rel=5e-3)
+
+
+def test_a_long_path_needs_memory_for_its_points_alone():
+    """A path of 2e5 points in an oblique plane; a matrix of points by points would have 320 GB."""
+    turns = np.linspace(0.0, 40.0, 200_000)
+    path = 1e-5 * (np.outer(np.sin(turns), [1.0, 0.0, 1.0]) + np.outer(turns, [0.0, 0.2, 0.0]))
+    force = COULOMB.drive(N, K, AREA, path)
+    assert np.abs(force[:, 0] - force[:, 2]).max() < 1e-9 * np.abs(force).max()
 
 
 @pytest.mark.parametrize(("change", "words"), [

@@ -181,6 +181,7 @@ class CubesRecorder(_CaseRecorder):
             moving += state.mass * self._p.gravity * state.pos[2]
             poses += [*state.pos, state.ori[3], state.ori[0], state.ori[1], state.ori[2]]
         for one in O.interactions:
+            # Fn is the spring's force; normalForce has the dashpot's, too.
             if one.isReal:
-                springs += 0.5 * one.phys.normalForce.squaredNorm() / one.phys.kn
+                springs += 0.5 * (one.phys.Fn**2 / one.phys.kn + one.phys.shearForce.squaredNorm() / one.phys.ks)
         return [*(energies[name] for name in self.ENERGIES), moving, springs, *poses]
