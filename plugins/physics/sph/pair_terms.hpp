@@ -9,7 +9,7 @@
 // that pressure does no work but that of compression. The second: D. Molteni & A. Colagrossi, Comput. Phys. Commun. 180 (2009) 861, which
 // takes the noise out of the pressure; of rho only what the weight of still water does not explain diffuses (G. Fourtakas et al., Comput.
 // Fluids 190 (2019) 346), here linear in g.x, so that water at rest stays there. Their m/rho_j is m/rho_0 here, 1 % apart at most:
-// diffusion conserves sum(rho) to round-off.
+// diffusion conserves sum(rho) to round-off, but where a density is lifted to the lowest that spray may have.
 //
 //   P/rho_0^2 = c_0^2/(2 rho_0) (1 - r/q)^2 if r < q = 0.9 dx, else 0                                                  (4)
 //
