@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import traceback
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from dembark.postproc import DumpError, GrainsDump
+from dembark.validation.case.deck import failed
 from dembark.validation.case.model import Case
 
 # Below these numbers most checks have nothing to average over.
 _FEW_GRAINS = 100
 _FEW_FRAMES = 4
+_MISTAKES = (NameError, AttributeError, ImportError, TypeError)
 
 
 @contextmanager
@@ -31,17 +32,12 @@ def warnings_kept() -> Iterator[list[str]]:
 
 
 def reasons(folder: Path, error: Exception, case: Case) -> tuple[str, ...]:
-    """Parts of one line about `error`, which the measure.py of `case` raised for the runs in `folder`: what is too small, error and
-    line."""
-    frames = traceback.extract_tb(error.__traceback__)
-    own = [frame for frame in frames if Path(frame.filename) == case.folder / "measure.py"] or frames
-    told = f"{type(error).__name__}: {error} ({Path(own[-1].filename).name}, line {own[-1].lineno})"
-    small = [too_small(path) for path in sorted(folder.glob("replica-*"))]
+    """Parts of one line about `error`, which the measure.py of `case` raised for the runs in `folder`: the error, file and line, and what
+    of the run is too small, unless the error is one of the program itself."""
+    told = str(failed(case.folder / "measure.py", error))
+    small = () if isinstance(error, _MISTAKES) else (too_small(path) for path in sorted(folder.glob("replica-*")))
     worst = next(filter(None, small), "")
-    if not worst:
-        return (told,)
-    return (f"the run is too small or too short to be measured: {worst}", "take more grains or frames, or a longer time to settle",
-            f"({told})")
+    return (told, f"the run may be too small or too short to be measured: {worst}") if worst else (told,)
 
 
 def too_small(replica: Path) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import fnmatch
 import os
 import sys
 from collections.abc import Callable
@@ -116,6 +117,9 @@ def run(
     console.print(show.quantity_table(result))
     for line in show.open_lines(result):
         console.print(line, markup=False, soft_wrap=True)
+    told = [quantity.name for quantity in result.quantities]
+    if gone := [name for name, check in one.quantities.items() if check.tolerance is not None and not fnmatch.filter(told, name)]:
+        console.print(f"declared, not measured in this run: {', '.join(gone)}", markup=False, soft_wrap=True)
     counted = tally(result.quantities)
     show.print_tally(console, counted)
     console.print(str(folder / METRICS), markup=False, soft_wrap=True)
@@ -200,8 +204,7 @@ def _on_dumps(name: str) -> Callable[[typer.Context], None]:
     return work
 
 
-for _name, _help in (("fields", "Coarse-grain trajectories to fields."),
-                     ("walls", "Measure stresses on walls and inclusions.")):
+for _name, _help in (("fields", "Coarse-grain trajectories to fields."), ("walls", "Measure stresses on walls and inclusions.")):
     app.command(_name, add_help_option=False, context_settings=_PASSED_ON, help=_help)(_on_dumps(_name))
 
 

@@ -89,22 +89,20 @@ def finding_table(findings: Iterable[Finding]) -> Table:
 
 def quantity_table(result: Result) -> Table:
     """One row a quantity: value with interval, reference, deviation, tolerance, kind of evidence and verdict."""
-    title = f"{result.case} {result.variant} {result.engine} ({result.profile})"
-    columns = ("quantity", "value", "95 % interval", "unit", "reference", "its interval", "deviation", "tolerance", "evidence", "verdict")
-    table = _plain(*columns, title=title)
+    table = _plain("quantity", "value", "95 % interval", "unit", "reference", "reference interval", "deviation", "tolerance", "evidence",
+                   "verdict", title=f"{result.case} {result.variant} {result.engine} ({result.profile})")
     for one in result.quantities:
-        verdict = _SHOWN[one.standing]
         table.add_row(
             escape(one.title), number(one.value), interval(one.interval), escape(one.unit), number(one.reference),
-            interval(one.reference_interval), number(one.deviation), number(one.tolerance), one.evidence, verdict)
+            interval(one.reference_interval), number(one.deviation), number(one.tolerance), one.evidence, _SHOWN[one.standing])
     return table
 
 
 def open_lines(result: Result) -> list[str]:
-    """Why quantities have neither pass nor fail although one was expected, or little meaning: a line for each reason."""
+    """Why quantities are open, failed without a number, or have little meaning: a line for each reason."""
     reasons: dict[tuple[str, str], list[str]] = {}
     for one in result.quantities:
-        if one.verdict == "info" and one.reason:
+        if one.verdict != "pass" and one.reason:
             reasons.setdefault((one.standing, one.reason), []).append(one.title)
     return [f"{standing}: {', '.join(names)}: {reason}" for (standing, reason), names in reasons.items()]
 

@@ -41,7 +41,7 @@ def deck(
     change: Annotated[list[str] | None,
                       typer.Option("--set", metavar="KEY=VALUE", help='Set a parameter: --set "grain_diameter=4 mm".')] = None,
 ) -> None:
-    """Write a deck that runs without dembark. The folder holds the input script with all numbers, the packing and the meshes."""
+    """Write a deck that runs without the harness. The folder holds the input script with all numbers, the packing and the meshes."""
     from dembark.common.choices import pick
     from dembark.validation import engines
     from dembark.validation.case.deck import write
@@ -50,7 +50,6 @@ def deck(
 
     one = find(case)
     pick(engine, engines.names(), "engine", "in --engine")
-    pick(engine, one.engines, "engine", f"in case {one.name}")
     values = portable(resolve(one, profile, variant or next(iter(one.variants)), settings(change or ())))
     _empty(out)
     try:
@@ -69,7 +68,7 @@ def _empty(folder: Path) -> None:
 
 @app.command("new-case")
 def new_case(
-    name: Annotated[str, typer.Argument(help="Name of the case: letters, digits and underscores.")],
+    name: Annotated[str, typer.Argument(help="Name of the case: lower-case letters, digits and underscores.")],
     folder: Annotated[Path, typer.Option("--in", help="Folder of your cases; the case gets a folder of its name in it.")] = Path(),
 ) -> None:
     """Write a template of a case that runs."""

@@ -63,10 +63,7 @@ def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
     path = case.folder / "setup.py"
     known = case.with_derived(values)
     if not path.is_file():
-        missing = [name for name in ("steps", "time_step") if not isinstance(known.get(name), int | float)]
-        if missing:
-            raise DembarkError(f"case {case.name} does not say its {' and '.join(missing)}", str(case.folder),
-                               "add a setup.py, or expressions in a table [derived]")
+        require_steps(case, values)
         return Setup(round(float(known["steps"])), float(known["time_step"]), None,  # type: ignore[arg-type]
                      {name: known[name] for name in case.derived})  # type: ignore[misc]
     try:
@@ -94,6 +91,14 @@ def _check_sum(path: Path, _changed: int) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
+def require_steps(case: Case, values: Mapping[str, Value]) -> None:
+    """DembarkError when neither a setup.py nor [derived] gives the steps of a run with the parameters `values`."""
+    known = {} if (case.folder / "setup.py").is_file() else case.with_derived(values)
+    if missing := [name for name in ("steps", "time_step") if known and not isinstance(known.get(name), int | float)]:
+        raise DembarkError(f"case {case.name} does not say its {' and '.join(missing)}", f"[derived] of {case.folder / 'case.toml'}",
+                           "add expressions there, or a setup.py")
+
+
 def require_measure(case: Case) -> None:
     """DembarkError when `case` has no measure.py: its runs could not be measured. Nothing is imported."""
     if not (case.folder / "measure.py").is_file():
@@ -101,7 +106,10 @@ def require_measure(case: Case) -> None:
 
 
 def require_capable(case: Case, engine: str, values: Mapping[str, Value]) -> None:
-    """DembarkError when `engine` cannot do what a run of `case` with the parameters `values` needs."""
+    """DembarkError when `case` has no deck of `engine`, or the engine cannot do what a run with the parameters `values` needs."""
+    if engine not in case.engines or not case.deck(engine).is_file():
+        raise DembarkError(f"case {case.name} has no {engines.facts(engine).deck}", f"in {case.folder}",
+                           f"it has decks for {' and '.join(case.engines)}")
     if lacking := case.lacks(engine, values):
         others = [name for name in case.engines if not case.lacks(name, values)]
         raise DembarkError(f"{engines.facts(engine).title} has no {' and no '.join(lacking)}",

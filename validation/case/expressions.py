@@ -11,6 +11,7 @@ from functools import partial
 from itertools import pairwise
 from typing import Any
 
+from dembark.common.choices import nearest
 from dembark.common.errors import DembarkError
 
 _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
@@ -93,6 +94,8 @@ class Expression:
                 return self._applied(_FUNCTIONS[name], args, needed)
             case ast.Call(func=ast.Name(id="first"), args=args, keywords=[]) if args:
                 return partial(_first, [self._read(part, needed=False) for part in args])
+            case ast.Call(func=ast.Name(id=name)):
+                raise DembarkError(f"{self.text!r} has an unknown call of {name}()", "", nearest(name, [*_FUNCTIONS, "first"]))
         raise DembarkError(f"{self.text!r} holds something other than arithmetic and comparisons")
 
     def _name(self, name: str, needed: bool) -> Callable[[Values], Any]:

@@ -137,6 +137,8 @@ class CaseReader(TableReader):
             raise self.fail(table, "a tolerance without evidence", f"say what the reference is: {', '.join(EVIDENCE)}")
         if tolerance is not None and not (tolerance == "bound" or (isinstance(tolerance, int | float) and tolerance >= 0)):
             raise self.fail(table, f"tolerance = {tolerance!r}", 'a number >= 0, or "bound"')
+        if isinstance(tolerance, int | float) and tolerance > 0 and not entry.get("why"):
+            raise self.fail(table, "a tolerance without why", "say where the deviation that it allows comes from")
         return Declared(name=name, control="; ".join(controls), **entry)
 
     def parameter(self, name: str, entry: Mapping[str, Any]) -> Parameter:
@@ -155,7 +157,7 @@ class CaseReader(TableReader):
         if (entry["type"] == "choice") != ("values" in entry):
             raise self.fail(table, "type and values do not fit", 'values = [...] together with type = "choice"')
         if not si_unit(entry.get("unit", "1")):
-            raise self.fail(table, f"{entry['unit']!r} is no SI unit without a factor", 'such as kg/m^3, or "1"; values may have others')
+            raise self.fail(table, f"{entry['unit']!r} is no base SI unit", 'such as m or kg/m^3, or "1"; --set accepts others')
         parameter = Parameter(name=name, **{**entry, "values": tuple(entry.get("values", ()))})
         self.value(table, parameter, parameter.value)
         return parameter

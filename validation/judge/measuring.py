@@ -80,6 +80,8 @@ def _call(case: Case, name: str, call: Callable[[Callable[..., Any]], Any]) -> M
         raise deck.failed(path, error) from error
     if not isinstance(found, Measurement):
         raise DembarkError(f"{name} of {path} returned {type(found).__name__}", "", "return a Measurement, see docs/cases.md")
+    if wrong := next((f"{key} = {value!r}" for key, value in found.values.items() if not isinstance(value, Value)), ""):
+        raise DembarkError(f"{name} of {path} returned {wrong}", "", "give a Value with an Estimate, see docs/cases.md")
     return found
 
 

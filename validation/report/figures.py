@@ -209,6 +209,5 @@ def _draw(axes: Any, panel: Panel) -> None:
 
 def verification_table(item: Item) -> tuple[list[str], list[list[Any]]]:
     """Header and rows of all curves of an item of the verification."""
-    return ["panel", "curve", "place", "value"], [
-        [panel.title, curve.label, float(place), float(value)]
+    return ["panel", "curve", "place", "value"], [[panel.title, curve.label, float(place), float(value)]
         for panel in item.panels for curve in panel.curves for place, value in zip(curve.place, curve.value, strict=True)]

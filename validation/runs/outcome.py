@@ -46,7 +46,7 @@ def reason(lines: list[str]) -> str:
     """The engine's message about what went wrong: the last line that looks like an error, else its last line."""
     told = re.compile(r"^\s*(?:dembark: (?!steps|finished|resumed|integration)|ERROR|\w*(?:Error|Exception)\b.*|.*[Nn]o space left)")
     spoken = [line.strip() for line in lines if line.strip()]
-    return next((line for line in reversed(spoken) if told.match(line)), spoken[-1] if spoken else "it printed nothing")
+    return next((line for line in reversed(spoken) if told.match(line)), f"its last line: {spoken[-1]}" if spoken else "it printed nothing")
 
 
 def judge(run: Run, code: int, parser: OutputParser, work: Path) -> None:

@@ -14,7 +14,7 @@ from dembark.common.choices import Value, pick
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
 from dembark.validation import engines
-from dembark.validation.case.deck import require_capable, require_measure, sources
+from dembark.validation.case.deck import require_capable, require_measure, require_steps, sources
 from dembark.validation.case.folders import discover
 from dembark.validation.case.model import Case, Study
 from dembark.validation.case.resolve import for_replica, portable, resolve
@@ -154,12 +154,10 @@ def series(case: Case, variant: str, profile: str | None, engine: Engine, change
 
     With `changes` to the variant, `name` tells it from the variant itself; it has no part in the hash of the inputs.
     """
-    pick(engine.name, case.engines, "engine", f"in case {case.name}")
-    if not case.deck(engine.name).is_file():
-        raise DembarkError(f"{case.deck(engine.name)} is missing", "", f"remove {engine.name} from engines in case.toml or add the deck")
     require_measure(case)
     values = portable(resolve(case, profile, variant, changes))
     require_capable(case, engine.name, values)
+    require_steps(case, values)
     count = values.get("replicas")
     numbers = range(1, (count if isinstance(count, int) else 1) + 1)
     return Series(tuple(Run(case, name or variant, profile or "default", engine, k, for_replica(values, k)) for k in numbers))

@@ -63,6 +63,9 @@ def chunks(process: subprocess.Popen[bytes], pause: float = 0.3) -> Iterator[byt
             yield chunk
         # A grandchild may hold the pipe open although the engine itself has ended.
         elif process.poll() is not None:
+            # What it wrote after that look, and before it ended.
+            while select([process.stdout], [], [], 0.0)[0] and (chunk := os.read(process.stdout.fileno(), 1 << 16)):
+                yield chunk
             return
         else:
             yield b""

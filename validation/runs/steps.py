@@ -112,8 +112,7 @@ def draw(folder: Path) -> list[str]:
     return pictures.draw(folder, picture(folder))
 
 
-def measure_series(folder: Path, runs: Iterable[Run], drawn: Future[list[str]] | None = None,
-                   early: Early | None = None) -> Result:
+def measure_series(folder: Path, runs: Iterable[Run], drawn: Future[list[str]] | None = None, early: Early | None = None) -> Result:
     """Measure the finished ones of `runs` and write `folder/metrics.json`; results of other inputs are put aside first.
 
     `drawn`: what `draw` returns, where the pictures are being drawn already; `early`: what was read already. Raises RunError when none is

@@ -149,7 +149,7 @@ variants = ["dry", "wet", "large"]
 @pytest.mark.parametrize(("old", "new", "words"), [
     ('type = "int"', 'type = "integer"', ["integer", "int"]),
     ('unit = "m"', 'unit = "metrez"', ["metrez", "parameters.grain_diameter"]),
-    ('unit = "m"', 'unit = "d"', ["'d' is no SI unit without a factor", "parameters.grain_diameter"]),
+    ('unit = "m"', 'unit = "d"', ["'d' is no base SI unit", "parameters.grain_diameter"]),
     ("value = 0.005", "value = -0.005", ["out of range", "parameters.grain_diameter"]),
     ("value = 0.005\n", "", ["value is missing"]),
     ('doc = "diameter"', "", ["doc is missing"]),
@@ -170,7 +170,7 @@ variants = ["dry", "wet", "large"]
     ('name = "box"', 'name = "bax"', ["bax", "box"]),
     ('engines = ["liggghts", "yade"]', 'engines = ["ligghts"]', ["did you mean liggghts"]),
     ("kinetic_friction <= static", "kinetic_frictio <= static", ["kinetic_frictio"]),
-    ("kinetic_friction <= static_friction", "__import__('os')", ["arithmetic"]),
+    ("kinetic_friction <= static_friction", "__import__('os')", ["unknown call of __import__()"]),
     ("[case]", "[case", ["cannot be read"]),
     ('title = "A box"', "title = 3", ["title", "wrong type"]),
     ("[runs]", STUDY.replace('along = "grain_count"', 'along = "grain_cont"') + "[runs]", ["studies.size", "did you mean grain_count"]),
@@ -179,6 +179,8 @@ variants = ["dry", "wet", "large"]
     ("[runs]", '[controls]\n"gravity doubled" = ["weight"]\n[runs]', ["weight", "quantity", "[controls]"]),
     ("[runs]", '[controls]\n"gravity doubled" = "weight"\n[runs]', ["gravity doubled", "a list of the quantities", "[controls]"]),
     ("[runs]", STUDY.replace("along", "alone") + "[runs]", ["studies.size", "alone"]),
+    ("[runs]", '[quantities.k]\nlabel = "K"\nevidence = "theory"\ntolerance = 0.1\n[runs]', ["quantities.k", "a tolerance without why"]),
+    ("[derived]\n", '[derived]\nrows = "cel(grain_count / 2)"\n', ["cel()", "did you mean ceil?"]),
 ])
 def test_mistakes_in_a_case_file_are_told(decks: Path, old: str, new: str, words: list[str]) -> None:
     path = edited(decks, old, new)

@@ -86,6 +86,13 @@ def test_run_measures_and_shows_verdicts(dembark: Dembark, tmp_path: Path) -> No
     assert read_json(tmp_path / "o/metrics.json")["parameters"]["grain_diameter"] == 0.004
 
 
+def test_a_check_that_nothing_measures_is_told(dembark: Dembark, tmp_path: Path) -> None:
+    path = tmp_path / "decks/box/case.toml"
+    path.write_text(path.read_text() + '\n[quantities.gone]\nlabel = "gone"\nevidence = "theory"\ntolerance = 0.1\nwhy = "noise"\n')
+    done = dembark("run", "box", "--engine", "liggghts", "--out", "o")
+    assert "declared, not measured in this run: gone" in done.stdout.splitlines(), done.stderr
+
+
 def test_a_failed_check_counts_only_when_asked(dembark: Dembark, tmp_path: Path) -> None:
     """The wet box fails a check: exit code 0 as ever, 1 with --strict."""
     words = ("run", "box", "--engine", "liggghts", "--variant", "wet", "--out", "o")

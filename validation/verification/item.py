@@ -67,8 +67,7 @@ def exact(name: str, label: str, error: float, source: str, control: str, *, tol
     return judged(declared, Value(Estimate(float(error), 0.0), Estimate(0.0, 0.0)))
 
 
-def order(name: str, label: str, steps: Array, errors: Array, due: float, source: str, control: str,
-          detail: str = "") -> QuantityRecord:
+def order(name: str, label: str, steps: Array, errors: Array, due: float, source: str, control: str, detail: str = "") -> QuantityRecord:
     """Observed order of convergence, the slope of ln(error) over ln(step), against the one of theory; `control`: what fails it."""
     slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
     declared = Declared(name, label, "1", "theory", ORDER_TOLERANCE, absolute=True, source=source, detail=detail, compared=False,

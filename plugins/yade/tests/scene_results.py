@@ -6,8 +6,6 @@ from pathlib import Path
 
 from yade import Omega
 
-O = Omega()
-
 
 def refusal(do, otherwise="accepted"):
     """What YADE says when `do()` is wrong."""
@@ -20,8 +18,9 @@ def refusal(do, otherwise="accepted"):
 
 def advance(count):
     """Make so many steps; O.run(count, True) looks only every 40 ms whether it is over."""
+    scene = Omega()
     for _ in range(count):
-        O.step()
+        scene.step()
 
 
 def write_results(scenes):

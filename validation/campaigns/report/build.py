@@ -47,8 +47,7 @@ def _sweep(sweep: Sweep, gathered: Gathered, drawn: Path) -> dict[str, Any]:
     shown = [embed(study, drawn, f"{name}-study",
                    "Quantities along the sweep with 95 % intervals; grey dashed: reference of each point.")] if study else []
     maps = {engine: figures.map_figure(sweep, engine, chosen) for engine in sweep.engines}
-    shown += [embed(one, drawn, f"{name}-map-{engine}",
-                    f"{engine_name(engine)} over both parameters; red frames mark failed checks.")
+    shown += [embed(one, drawn, f"{name}-map-{engine}", f"{engine_name(engine)} over both parameters; red frames mark failed checks.")
               for engine, one in maps.items() if one]
     compared = {page.variant: page.comparison for page in gathered.pages if page.case == sweep.case}
     return {"sweep": sweep, "shown": len(chosen), "left_out": len(quantities) - len(chosen), "figures": shown,

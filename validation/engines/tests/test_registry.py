@@ -194,7 +194,7 @@ def test_a_new_engine_is_found_everywhere(stub: Path, capsys: pytest.CaptureFixt
                             (["--engine", "stub", "--ranks", "2"], "with The Stub, use --threads")):
         assert main(["run", "box", *words]) == 2
         assert expected in capsys.readouterr().err
-    with pytest.raises(DembarkError, match=r"stub\.txt is missing"):
+    with pytest.raises(DembarkError, match=r"case box has no stub\.txt"):
         series(folders.find("box"), "default", None, engines.find("stub"))
     (stub / "stub.txt").write_text("deck\n")
     (run,) = series(folders.find("box"), "default", None, engines.find("stub")).runs

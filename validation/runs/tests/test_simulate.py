@@ -32,6 +32,25 @@ Command = tuple[subprocess.Popen[str], Path]
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
 
+class Ended:
+    """A process that writes its last line between two looks, and has ended at the second."""
+
+    def __init__(self) -> None:
+        out, self.into = os.pipe()
+        self.stdout = os.fdopen(out, "rb")
+
+    def poll(self) -> int:
+        os.write(self.into, b"dembark: finished\n")
+        os.close(self.into)
+        return 0
+
+
+def test_the_last_lines_of_a_process_are_read() -> None:
+    ended = Ended()
+    with ended.stdout:
+        assert b"".join(simulate.chunks(ended, pause=0.01)) == b"dembark: finished\n"  # type: ignore[arg-type]
+
+
 def plan(engine: str = "liggghts", **changes: object) -> Run:
     engines.find.cache_clear()
     folders.load.cache_clear()
@@ -213,7 +232,7 @@ def test_mpi_ranks_are_for_liggghts() -> None:
 def test_the_engines_own_word_is_found() -> None:
     assert outcome.reason(["Traceback (most recent call last):", "  x", "ValueError: no", "bye"]) == "ValueError: no"
     assert outcome.reason(["ERROR: Unknown pair style (force.cpp:1)", "Last command: x"]).startswith("ERROR: Unknown pair")
-    assert outcome.reason(["dembark: steps 3", "only this"]) == "only this"
+    assert outcome.reason(["dembark: steps 3", "only this"]) == "its last line: only this"
     assert outcome.reason([]) == "it printed nothing"
 
 
