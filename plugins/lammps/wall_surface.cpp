@@ -1,5 +1,6 @@
 #include "wall_surface.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -8,6 +9,7 @@
 
 #include "contact_call.h"
 #include "dembark/surface/stl.hpp"
+#include "shared_fix.h"
 
 using namespace LAMMPS_NS;
 using dembark::Triangle;
@@ -119,6 +121,18 @@ bool TriangleSurface::goes_on(int before, const WallContact& now, const Vec3& ce
   for (const int t : copies_[std::size_t(before)])
     if (surface_.follow(t, place, radius) == now.triangle) return true;
   return false;
+}
+
+std::string TriangleSurface::outside(const Vec3& back, const Vec3& forth) const {
+  Vec3 low{1e300, 1e300, 1e300}, high = -1.0 * low;
+  for (const Triangle& triangle : own_) {
+    const Vec3 centre = (1.0 / 3.0) * (triangle.node[0] + triangle.node[1] + triangle.node[2]);
+    for (double Vec3::* const axis : axes) {
+      low.*axis = std::min(low.*axis, centre.*axis);
+      high.*axis = std::max(high.*axis, centre.*axis);
+    }
+  }
+  return dembark_family::out_of_box(*domain, low + back, high + forth);
 }
 
 }  // namespace dembark_lammps
