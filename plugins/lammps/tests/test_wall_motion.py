@@ -195,7 +195,7 @@ def test_wrong_motions_are_told_in_one_line(tmp_path, motion, line):
 
 
 @pytest.mark.parametrize(("motion", "line"), [
-    ("harmonic amplitude 0 0 0.08 frequency 5", "out of the box along z"), ("uniform velocity 400 0 0", "out of the box along x"),
+    ("harmonic amplitude 0 0 0.08 frequency 5", "out of the box along z"), ("uniform velocity 1000 0 0", "out of the box along x"),
     (SHAKE, "")])
 def test_a_wall_that_leaves_the_box_is_warned_of(tmp_path, motion, line):
     """LAMMPS loses grains beyond the box, but not walls: a gate may leave."""
