@@ -8,8 +8,8 @@
 #include "region.h"
 
 #include "contact_call.h"
+#include "dembark/motion/words.hpp"
 #include "dembark/surface/stl.hpp"
-#include "shared_fix.h"
 
 using namespace LAMMPS_NS;
 using dembark::Triangle;
@@ -132,7 +132,16 @@ std::string TriangleSurface::outside(const Vec3& back, const Vec3& forth) const 
       high.*axis = std::max(high.*axis, centre.*axis);
     }
   }
-  return dembark_family::out_of_box(*domain, low + back, high + forth);
+  low += back;
+  high += forth;
+  for (int k = 0; k < 3; ++k) {
+    const double from = low.*axes[k], to = high.*axes[k];
+    if (domain->periodicity[k] || domain->boundary[k][0] >= 2 || (from >= domain->boxlo[k] && to <= domain->boxhi[k])) continue;
+    using dembark::motion::text;
+    return std::string("out of the box along ") + "xyz"[k] + ", from " + text(from) + " to " + text(to) + " m beside " +
+           text(domain->boxlo[k]) + " ... " + text(domain->boxhi[k]) + " m";
+  }
+  return "";
 }
 
 }  // namespace dembark_lammps

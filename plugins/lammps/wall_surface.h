@@ -45,7 +45,8 @@ class WallSurface : protected LAMMPS_NS::Pointers {
   virtual dembark::Vec3<double> spin() const { return {}; }    ///< rad/s, of its own motion
   virtual dembark::Vec3<double> origin() const { return {}; }  ///< m, of moments
   virtual LAMMPS_NS::Region* region() const { return nullptr; }
-  /// What of it is out of the box when it is moved by `back` to `forth` (m); nothing for surfaces without bounds.
+  /// Where it is out of the box when it is moved by `back` to `forth` (m), with the bounds of both; nothing when it is not or has none.
+  /// Middles of triangles count, in directions that neither are periodic nor shrink.
   virtual std::string outside(const dembark::Vec3<double>& /*back*/, const dembark::Vec3<double>& /*forth*/) const { return ""; }
 
  protected:

@@ -2,24 +2,9 @@
 
 #include <cstring>
 
-#include "domain.h"
-
-#include "dembark/motion/words.hpp"
-
 using namespace LAMMPS_NS;
 
 namespace dembark_family {
-
-std::string out_of_box(const Domain& domain, const dembark::Vec3<double>& low, const dembark::Vec3<double>& high) {
-  const double from[3] = {low.x, low.y, low.z}, to[3] = {high.x, high.y, high.z};
-  const auto text = [](double x) { return dembark::motion::text(x); };
-  for (int k = 0; k < 3; ++k)
-    if (!domain.periodicity[k] && domain.boundary[k][0] != 2 && domain.boundary[k][0] != 3 &&
-        (from[k] < domain.boxlo[k] || to[k] > domain.boxhi[k]))
-      return std::string("out of the box along ") + "xyz"[k] + ", from " + text(from[k]) + " to " + text(to[k]) + " m beside " +
-             text(domain.boxlo[k]) + " ... " + text(domain.boxhi[k]) + " m";
-  return "";
-}
 
 std::vector<Fix*> SharedFix::fixes() const {
   std::vector<Fix*> all;

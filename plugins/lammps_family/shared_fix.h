@@ -40,10 +40,6 @@ inline dembark::ContactBodies grain_pair(const LAMMPS_NS::Atom& atom, int i, int
   return b;
 }
 
-/// Where a wall whose triangles' centres are within `low` to `high` (m) is out of the box, with the bounds of both; nothing when it is not.
-/// Directions that are periodic or shrink do not count.
-std::string out_of_box(const LAMMPS_NS::Domain& domain, const dembark::Vec3<double>& low, const dembark::Vec3<double>& high);
-
 class SharedFix : public dembark_engine::EngineFix {
  public:
   using EngineFix::EngineFix;

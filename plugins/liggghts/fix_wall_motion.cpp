@@ -93,8 +93,14 @@ void FixWallMotion::check_reach() {
   motion_.reach(now, now + double(update->laststep - update->ntimestep) * update->dt, back, forth);
   back -= state_.displacement;
   forth -= state_.displacement;
-  const std::string wrong = dembark_family::out_of_box(*domain, dembark_family::vector(low) + back, dembark_family::vector(high) + forth);
-  if (!wrong.empty()) fail("the motion takes mesh '" + mesh_id_ + "' " + wrong + ": make the amplitude smaller or the box larger");
+  const double from[3] = {back.x, back.y, back.z}, to[3] = {forth.x, forth.y, forth.z};
+  for (int k = 0; k < 3; ++k)
+    if (!domain->periodicity[k] && domain->boundary[k][0] != 2 && domain->boundary[k][0] != 3 &&
+        (low[k] + from[k] < domain->boxlo[k] || high[k] + to[k] > domain->boxhi[k]))
+      fail(std::string("the motion takes mesh '") + mesh_id_ + "' out of the box along " + "xyz"[k] + ", from " +
+           dembark::motion::text(low[k] + from[k]) + " to " + dembark::motion::text(high[k] + to[k]) + " m beside " +
+           dembark::motion::text(domain->boxlo[k]) + " ... " + dembark::motion::text(domain->boxhi[k]) +
+           " m: make the amplitude smaller or the box larger");
 }
 
 void FixWallMotion::set_velocities(const dembark::WallStep &step) {
