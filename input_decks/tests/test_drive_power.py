@@ -213,6 +213,7 @@ def test_spheres_in_a_plane_stay_in_it_and_rest_after_the_stop(engine: str, simu
 @pytest.mark.parametrize(("changes", "message"), [
     ({"youngs_modulus": 5e6, "motion_gamma": 3.0}, "raise youngs_modulus"), ({"time_step_fraction": 0.3}, "lower time_step_fraction"),
     ({"cell_width": 0.015}, "must be at least 4 grain_diameter"), ({"motion": "circular"}, "shakes up and down"),
+    ({"motion_amplitude": 0.002}, "set motion_gamma"),
 ])
 def test_decks_that_do_not_suit_the_impacts_are_refused(changes: dict[str, Any], message: str, decks: Any, tmp_path: Path) -> None:
     with pytest.raises(DembarkError, match=message):

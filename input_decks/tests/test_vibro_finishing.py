@@ -18,7 +18,7 @@ from dembark.postproc.instruments.drive import PARTS
 from dembark.postproc.instruments.machines import Trough, read
 from dembark.postproc.instruments.tests.test_machines import trough
 from dembark.postproc.replica import Replica
-from dembark.postproc.walls.mesh import cut
+from dembark.postproc.walls.mesh import cut, read_stl
 from dembark.validation.case.folders import find
 
 finishing = module("vibro_finishing")
@@ -97,6 +97,16 @@ def test_the_trough_shakes_bed_and_part_in_their_plane(engine: str, simulate: An
     assert all((frame.positions[:, 1] == 0.0).all() and np.hypot(*frame.positions[:, [0, 2]].T).max() < 0.05 for frame in frames)
     assert frames[0].radii[-1] == pytest.approx(0.01) and len(frames[0].ids) == 61
     assert 0.001 < found["power"]["value"] < 1.5 and found["noise"]["value"] > 0.0
+
+
+@pytest.mark.parametrize("trough", ["round", "file"])
+def test_the_box_has_room_for_grains_that_part_and_side_pinch(trough: str, decks: Any, tmp_path: Path) -> None:
+    """The variant `small` lost one that flew up with 5.6 times the drive's speed, and was within the sides of the trough still."""
+    motion = {"round": "circular", "file": "table"}[trough]
+    folder = decks("vibro_finishing", "liggghts", tmp_path, {**SMALL, "trough_width": 0.14, "trough": trough, "motion": motion}).folder
+    box = [line.split() for line in (folder / "packing.data").read_text().splitlines() if line.endswith("zlo zhi")]
+    sides = read_stl(folder / "trough.stl").triangles[..., 2].max()
+    assert float(box[0][1]) > sides + (5.6 * 2.0 * np.pi * 19.3 * 0.002) ** 2 / (2.0 * 9.81) + 0.0055
 
 
 def test_a_cylinder_turns_with_its_own_moment_of_inertia(simulate: Any) -> None:

@@ -77,7 +77,12 @@ void FixWallDembark::init() {
     fail("pair_style or region have changed; define the fix again");
   if (!motion_) return;
   if (const std::string wrong = motion_->step_error(update->dt); !wrong.empty()) fail(wrong);
-  clock_.time(update->ntimestep, update->dt);
+  const double now = clock_.time(update->ntimestep, update->dt);
+  Vec3 back, forth;
+  motion_->reach(now, now + double(update->laststep - update->ntimestep) * update->dt, back, forth);
+  // A gate may leave, but grains cannot follow.
+  if (const std::string gone = surface_->outside(back, forth); !gone.empty())
+    warn("the motion takes its surface " + gone + ": grains that it takes along are lost");
 }
 
 /// Takes up where the wall is now.

@@ -1,5 +1,6 @@
 #include "wall_surface.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -7,6 +8,7 @@
 #include "region.h"
 
 #include "contact_call.h"
+#include "dembark/motion/words.hpp"
 #include "dembark/surface/stl.hpp"
 
 using namespace LAMMPS_NS;
@@ -119,6 +121,27 @@ bool TriangleSurface::goes_on(int before, const WallContact& now, const Vec3& ce
   for (const int t : copies_[std::size_t(before)])
     if (surface_.follow(t, place, radius) == now.triangle) return true;
   return false;
+}
+
+std::string TriangleSurface::outside(const Vec3& back, const Vec3& forth) const {
+  Vec3 low{1e300, 1e300, 1e300}, high = -1.0 * low;
+  for (const Triangle& triangle : own_) {
+    const Vec3 centre = (1.0 / 3.0) * (triangle.node[0] + triangle.node[1] + triangle.node[2]);
+    for (double Vec3::* const axis : axes) {
+      low.*axis = std::min(low.*axis, centre.*axis);
+      high.*axis = std::max(high.*axis, centre.*axis);
+    }
+  }
+  low += back;
+  high += forth;
+  for (int k = 0; k < 3; ++k) {
+    const double from = low.*axes[k], to = high.*axes[k];
+    if (domain->periodicity[k] || domain->boundary[k][0] >= 2 || (from >= domain->boxlo[k] && to <= domain->boxhi[k])) continue;
+    using dembark::motion::text;
+    return std::string("out of the box along ") + "xyz"[k] + ", from " + text(from) + " to " + text(to) + " m beside " +
+           text(domain->boxlo[k]) + " ... " + text(domain->boxhi[k]) + " m";
+  }
+  return "";
 }
 
 }  // namespace dembark_lammps

@@ -184,11 +184,23 @@ def test_a_history_goes_over_edges(tmp_path):
     ("harmonic amplitude 0 0 1e-3 frequency 20000", "below ten time steps"),
     ("harmonic amplitude 0 0 1e-3 frequency 0", "frequency 0 must be > 0"),
     ("table file vessel.stl", "line 1: it must have four numbers"),
+    ("table file back.csv", "line 3: the times do not ascend"),
+    ("jolts shape half_sine acceleration 1 0 0 duration 2e-5", "below ten time steps"),
     ("shake amplitude 1", "there is no motion 'shake'")])
 def test_wrong_motions_are_told_in_one_line(tmp_path, motion, line):
+    (tmp_path / "back.csv").write_text("0,0,0,0\n0.1,1e-3,0,0\n0.1,2e-3,0,0\n")
     done = run_deck(tmp_path, deck(tmp_path, motion, "run 10"))
     assert done.code != 0
     assert line in done.error, done.error or done.output[-500:]
+
+
+@pytest.mark.parametrize(("motion", "line"), [
+    ("harmonic amplitude 0 0 0.08 frequency 5", "out of the box along z"), ("uniform velocity 1000 0 0", "out of the box along x"),
+    (SHAKE, "")])
+def test_a_wall_that_leaves_the_box_is_warned_of(tmp_path, motion, line):
+    """LAMMPS loses grains beyond the box, but not walls: a gate may leave."""
+    warnings = [one for one in run_deck(tmp_path, deck(tmp_path, motion, "run 10")).output.splitlines() if "takes its surface" in one]
+    assert [line in one for one in warnings] == [True] * bool(line), warnings
 
 
 @pytest.mark.parametrize(("old", "new", "line"), [
