@@ -33,9 +33,10 @@ def still(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
     rows = run.times()
     force = -float(rows["tank_fy"][late(run, rows["time"])].mean()) / (weight * depth * width)
     levels = np.argsort(-below)
-    shown = profile("pressure", "Pressure at the end", "depth / H", "p / (ρ g H)", below[levels] / depth, [found[levels] / (weight * depth)],
-                    reference=below[levels] / depth, reference_label="hydrostatics")
-    return {"pressure_rms": Value(exact(math.sqrt(float(np.mean(squares)))), exact(0.0)), "wall_force": Value(exact(force), exact(1.0))}, [shown]
+    shown = profile("pressure", "Pressure at the end", "depth / H", "p / (ρ g H)", below[levels] / depth,
+                    [found[levels] / (weight * depth)], reference=below[levels] / depth, reference_label="hydrostatics")
+    return {"pressure_rms": Value(exact(math.sqrt(float(np.mean(squares)))), exact(0.0)),
+            "wall_force": Value(exact(force), exact(1.0))}, [shown]
 
 
 def floating(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
@@ -69,7 +70,8 @@ def cylinder(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
     radius = math.sqrt(d["body_count"] / math.pi) * d["spacing"]
     theory = added_mass(radius, d["tank_right"], d["depth"])
     straight = speeds[0] + d["load"] / (d["body_mass"] + theory * displaced) * (times - times[0])
-    shown = profile("speed", "Speed of the cylinder", "t / s", "v / (m/s)", times, [speeds], reference=straight, reference_label="added mass")
+    shown = profile("speed", "Speed of the cylinder", "t / s", "v / (m/s)", times, [speeds], reference=straight,
+                    reference_label="theory")
     return {"added_mass": Value(exact(found / (theory * displaced)), exact(1.0))}, [shown]
 
 
