@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -133,3 +134,15 @@ def test_both_engines_have_the_same_flow(scene: str, simulate: Any) -> None:
         assert found[engine]["leaked"]["verdict"] == "pass"
     for name, one in found["liggghts"].items():
         assert found["yade"][name]["value"] == pytest.approx(one["value"], abs=2e-3), name
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+def test_a_run_that_goes_on_is_the_same(engine: str, tmp_path: Path, decks: Any) -> None:
+    """While the force on the cylinder still grows."""
+    short = {"across": 8, "run_time": 0.45}
+    whole, resumed = (decks("water_tank", engine, tmp_path / name, short, "cylinder") for name in ("whole", "resumed"))
+    for one in (whole, resumed):
+        one.run(restart_every=300)
+    assert "dembark: resumed at step" in resumed.run(restart_every=300, resume="yes")
+    for name in ("time.csv", "grains.dump"):
+        assert (whole.folder / name).read_text() == (resumed.folder / name).read_text()
