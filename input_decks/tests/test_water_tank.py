@@ -1,0 +1,148 @@
+"""water_tank: flows whose answers are known are measured as they are, wrong ones fail, and both engines let the same water flow."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.postproc.tests.scenes import frame_of
+from dembark.validation.case.folders import find
+
+tank = module("water_tank")
+DT, ROWS, G = 1e-3, 200, 9.81
+# Particles that are there at the start.
+COUNTS = {"still": 200, "floating": 1000, "cylinder": 400, "slot": 4000}
+WIDTHS = {"still": 1.0, "floating": 0.6, "cylinder": 4.0, "slot": 0.4}
+
+
+def run(scene: str, heavier: float = 1.0, lighter: float = 1.0, lost: float = 0.0, leaked: int = 0, made: float = 0.0) -> Any:
+    """The theory of `scene`: with gravity stronger by the factor `heavier`, water `lighter` by a factor, a slot `lost` (spacings) narrower,
+    `leaked` particles in the floor, and the part `made` of the energy from nowhere."""
+    p = defaults("water_tank") | find("water_tank").variants[scene]
+    dx, depth, width, count = p["size"] / p["across"], p["water_depth"], WIDTHS[scene], COUNTS[scene]
+    steps = round(p["run_time"] / DT)
+    every = steps // ROWS
+    steps = every * ROWS
+    time, zero = DT * every * np.arange(1, ROWS + 1), np.zeros(ROWS)
+    d: dict[str, Any] = {"spacing": dx, "depth": depth, "tank_right": width, "tank_top": depth, "thick": 3 * dx, "middle": 0.5 * width,
+                         "half": 0.5 * p["size"], "grain_count": count, "steps": steps, "body_count": 200, "body_mass": 0.0, "load": 0.0}
+    rows = {"time": time, "kinetic_energy": zero.copy(), "potential_energy": zero, "compression_energy": zero,
+            "tank_fx": zero, "tank_fy": zero - heavier * 1000.0 * G * depth * width}
+    rows["kinetic_energy"][ROWS // 2:] += made * 0.5 * 1000.0 * G * width * depth**2
+    if scene == "floating":
+        # The level follows from the draught, and the block's height from both.
+        share = 0.8 / lighter + 0.05 * np.exp(-20.0 * time / p["run_time"])
+        rows["body_y"] = (count * dx**2 + share * p["size"] ** 2) / width - (share - 0.5) * p["size"]
+    if scene == "cylinder":
+        d |= {"body_mass": 1000.0 * 200 * dx**2, "load": 20.0}
+        theory = tank.added_mass(np.sqrt(200 / np.pi) * dx, width, depth) * lighter * d["body_mass"]
+        rows["body_vx"] = 20.0 / (d["body_mass"] + theory) * (time - 0.5 * p["ramp"])
+    # What has flown out: dV/dt = contraction times width times the square root of 2 g (depth - V/width).
+    slot = (p["size"] - lost * dx) * 0.6110154703516573 * np.sqrt(2.0 * G)
+
+    def frame(step: int) -> Any:
+        places = np.zeros((count, 3))
+        places[:, 0], places[:, 1] = 0.5 * width, (np.arange(count) + 0.5) * depth / count
+        if scene == "slot":
+            now = step * DT
+            flown = slot * np.sqrt(depth) * now - 0.25 * slot**2 / width * now**2
+            places[:round(flown / dx**2), 1] = -0.5
+        pressures = heavier * 1000.0 * G * np.maximum(depth - places[:, 1], 0.0)
+        places[:leaked] = [0.1 * width, -dx, 0.0]
+        return replace(frame_of(places, 0.5 * dx, step=step), extra={"pressure": pressures})
+
+    frames = [frame(every * ROWS // 40 * k) for k in range(1, 41)]
+    return SimpleNamespace(parameters=p, derived=d, time_step=DT, grains=lambda: frames, times=lambda: rows)
+
+
+def verdicts(scene: str, **changes: Any) -> dict[str, dict[str, Any]]:
+    return judged("water_tank", tank.measure([run(scene, **changes)]))
+
+
+def study(name: str, ratio: float) -> dict[str, dict[str, Any]]:
+    """Three spacings, the error at the finest `ratio` times that at the coarsest."""
+    quantity, due = {"still": ("pressure_rms", 0.0), "floating": ("displaced_volume", 0.8), "cylinder": ("added_mass", 1.0),
+                     "slot": ("slot_error", 0.0)}[name]
+    points = [{"parameters": {"across": across, "body_density": 800.0, "fluid_density": 1000.0},
+               "quantities": [{"name": quantity, "value": due - error, "interval": None}]}
+              for across, error in ((4, 0.01), (8, 0.02), (16, 0.01 * ratio))]
+    return judged("water_tank", tank.study(name, points, "across"))
+
+
+def test_theory_passes_and_is_measured_as_it_is() -> None:
+    expected = {"still": {"pressure_rms": 0.0, "wall_force": 1.0, "energy_growth": 0.0, "leaked": 0.0},
+                "floating": {"displaced_volume": 0.8, "leaked": 0.0}, "cylinder": {"added_mass": 1.0, "leaked": 0.0},
+                "slot": {"slot_width": 0.0, "energy_growth": 0.0, "leaked": 0.0}}
+    for scene, values in expected.items():
+        found = verdicts(scene)
+        assert set(values) <= names(found, "pass"), found
+        for name, value in values.items():
+            assert found[name]["value"] == pytest.approx(value, abs=0.02 if name == "slot_width" else 2e-3), name
+
+
+def test_a_narrow_slot_is_shown_and_not_judged() -> None:
+    one = run("slot")
+    one.parameters["across"] = 3
+    found = judged("water_tank", tank.measure([one]))
+    assert "slot_width" not in found and found["slot_error"]["verdict"] == "info"
+
+
+def potential(radius: float, width: float, height: float) -> float:
+    """Added mass of the cylinder over the water displaced, from Laplace's equation: harmonics r^±n cos n θ, n odd, fitted to the normal
+    velocities on the cylinder, cos θ, and on the box, none."""
+    orders, angles, part = np.arange(1, 28, 2), (np.arange(200) + 0.5) * np.pi / 400, (np.arange(200) + 0.5) / 400
+
+    def harmonics(z: Any) -> tuple[Any, Any, Any]:
+        """Potentials and velocities along x and y (n, harmonics)."""
+        z = z[:, None]
+        slopes = np.hstack([-orders * (radius / z) ** orders / z, 2.0 * orders * (2.0 * z / height) ** (orders - 1) / height])
+        return np.hstack([(radius / z) ** orders, (2.0 * z / height) ** orders]).real, slopes.real, -slopes.imag
+
+    _, u, v = harmonics(radius * np.exp(1j * angles))
+    _, side, _ = harmonics(0.5 * width + 1j * height * part)
+    _, _, roof = harmonics(width * part + 0.5j * height)
+    rows = np.vstack([u * np.cos(angles)[:, None] + v * np.sin(angles)[:, None], side, roof])
+    fitted = np.linalg.lstsq(rows, np.concatenate([np.cos(angles), np.zeros(400)]), rcond=None)[0]
+    around = 2.0 * np.pi * (np.arange(400) + 0.5) / 400
+    on_it, _, _ = harmonics(radius * np.exp(1j * around))
+    return float(-2.0 * np.mean(on_it @ fitted * np.cos(around)) / radius)
+
+
+@pytest.mark.parametrize(("width", "height"), [(4.0, 4.0), (2.4, 2.4), (2.4, 1.6), (1.6, 2.4)])
+def test_the_added_mass_in_a_box_is_that_of_laplaces_equation(width: float, height: float) -> None:
+    assert tank.added_mass(0.4, width, height) == pytest.approx(potential(0.4, width, height), rel=(0.4 / min(width, height)) ** 6 * 10)
+    assert tank.added_mass(1e-3, width, height) == pytest.approx(1.0, abs=1e-5)
+
+
+SHORT: dict[str, dict[str, float]] = {"still": {"across": 10, "run_time": 0.6}, "floating": {"across": 8, "run_time": 0.8},
+                                      "cylinder": {"across": 8}, "slot": {"across": 3, "run_time": 0.1}}
+
+
+@pytest.mark.parametrize("scene", SHORT)
+def test_both_engines_have_the_same_flow(scene: str, simulate: Any) -> None:
+    found = {}
+    for engine in ("liggghts", "yade"):
+        one = simulate("water_tank", engine, SHORT[scene], scene)
+        assert {frame.step for frame in one.grains()} == {one.derived["stride"] * k for k in range(1, 41)}
+        found[engine] = judged("water_tank", tank.measure([one]))
+        assert found[engine]["leaked"]["verdict"] == "pass"
+    for name, one in found["liggghts"].items():
+        assert found["yade"][name]["value"] == pytest.approx(one["value"], abs=2e-3), name
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+def test_a_run_that_goes_on_is_the_same(engine: str, tmp_path: Path, decks: Any) -> None:
+    """While the force on the cylinder still grows."""
+    short = {"across": 8, "run_time": 0.45}
+    whole, resumed = (decks("water_tank", engine, tmp_path / name, short, "cylinder") for name in ("whole", "resumed"))
+    for one in (whole, resumed):
+        one.run(restart_every=300)
+    assert "dembark: resumed at step" in resumed.run(restart_every=300, resume="yes")
+    for name in ("time.csv", "grains.dump"):
+        assert (whole.folder / name).read_text() == (resumed.folder / name).read_text()

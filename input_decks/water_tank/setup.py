@@ -1,0 +1,40 @@
+"""Water in a tank in the plane: a lattice that fills it, less a body or with a slot in the floor, and walls of three layers."""
+
+import math
+
+import numpy as np
+
+from dembark.input_decks.common.setup import Number, Parameters, Setup
+from dembark.input_decks.common.water import fluid_setup, whole
+
+LAYERS = 3
+
+
+def setup(p: Parameters) -> Setup:
+    """The tank is 0 < x < tank_right, y > 0, open above but for the box of the cylinder. A slot is in the middle of the floor."""
+    dx, closed = p.spacing, p.scene == "cylinder"
+    right, depth = whole(p.tank_width, dx), whole(p.water_depth, dx)
+    if p.scene == "slot":
+        # As many particles on the floor left of the slot as right of it.
+        right = p.size + 2.0 * whole(0.5 * (p.tank_width - p.size), dx)
+    # A block begins a tenth of its side too high.
+    low = whole(p.water_depth - (p.body_density / p.fluid_density - 0.1) * p.size, dx)
+    middle, body_y, half = 0.5 * right, low + 0.5 * p.size if p.scene == "floating" else 0.5 * depth, 0.5 * p.size
+    x, y = np.meshgrid((np.arange(round(right / dx)) + 0.5) * dx - middle, (np.arange(round(depth / dx)) + 0.5) * dx - body_y)
+    within = np.zeros(x.shape, bool)
+    if p.scene == "floating":
+        within = (np.abs(x) < half) & (np.abs(y) < half)
+    elif closed:
+        within = x**2 + y**2 < half**2
+    # The block rises above the water.
+    count = round(p.size / dx) ** 2 if p.scene == "floating" else int(within.sum())
+    mass, pushed = p.body_density * count * dx**2, p.run_time - 0.5 * p.ramp
+    # Its own mass and as much of water are accelerated.
+    body: dict[str, Number] = {"middle": middle, "body_y": body_y, "half": half, "body_count": count, "body_mass": mass,
+                               "load": 4.0 * mass * p.moved * dx / pushed**2}
+    # A jet falls until the end.
+    fall = 2.0 * math.sqrt(2.0 * p.gravity * depth) * p.run_time + 0.5 * p.gravity * p.run_time**2 if p.scene == "slot" else 0.0
+    thick, top = LAYERS * dx, depth if closed else depth + whole(p.headroom, dx)
+    return fluid_setup(p, (-thick, right + thick, -thick - whole(fall, dx), top + (thick if closed else whole(p.headroom, dx))),
+                       spacing=dx, sound_speed=p.sound_speed, depth=depth, filled_at_rest=1, tank_right=right, tank_top=top, thick=thick,
+                       grain_count=x.size - int(within.sum()), **body)
