@@ -92,9 +92,8 @@ def quantity_table(result: Result) -> Table:
     table = _plain("quantity", "value", "95 % interval", "unit", "reference", "reference interval", "deviation", "tolerance", "evidence",
                    "verdict", title=f"{result.case} {result.variant} {result.engine} ({result.profile})")
     for one in result.quantities:
-        table.add_row(
-            escape(one.title), number(one.value), interval(one.interval), escape(one.unit), number(one.reference),
-            interval(one.reference_interval), number(one.deviation), number(one.tolerance), one.evidence, _SHOWN[one.standing])
+        table.add_row(escape(one.title), number(one.value), interval(one.interval), escape(one.unit), number(one.reference),
+                      interval(one.reference_interval), number(one.deviation), number(one.tolerance), one.evidence, _SHOWN[one.standing])
     return table
 
 

@@ -13,7 +13,7 @@ STORED = ("kinetic_energy", "potential_energy", "compression_energy")
 
 
 def pressure(frame: GrainFrame) -> Array:
-    """Pa, of the particles (n,): LIGGGHTS calls it p."""
+    """Pa, of the particles (n,): the column `pressure` of the dump, or `p`."""
     return np.asarray(frame.extra["pressure" if "pressure" in frame.extra else "p"])
 
 
