@@ -12,7 +12,7 @@ from rig import lammps_driver, liggghts_driver
 from rig.chains import MATERIAL, RADIUS, CompressedChain
 from rig.lammps_driver import run_deck
 from rig.liggghts_driver import Run, read_dump
-from rig.monitor import MONITOR, POSITION, SPIN, THERMO, VELOCITY, figures, line_of_grains
+from rig.monitor import MONITOR, POSITION, SPIN, THERMO, VELOCITY, assert_estimates_are_true, figures, line_of_grains
 from rig.scenarios import Material
 
 BED = Material(static_friction=0.5, kinetic_friction=0.4, restitution=0.7, youngs_modulus=5e6)
@@ -33,14 +33,7 @@ run {steps}"""))
 @pytest.mark.parametrize("phase", [0.05, 0.2])
 def test_the_estimates_are_the_true_local_errors(tmp_path: Path, phase: float) -> None:
     chain = CompressedChain(phase)
-    found = figures(compressed(tmp_path, chain, 4000))[-1, 1:]
-    along, speed = chain.true_errors()
-    assert found[POSITION][1] == pytest.approx(along, rel=0.02)
-    assert found[VELOCITY][1] == pytest.approx(speed, rel=0.02)
-    assert found[SPIN][0] == 0.0
-    assert found[12] == 8 * (4000 - 3)
-    # Half a period of two grains on the spring between them.
-    assert found[13] == pytest.approx(np.pi * np.sqrt(2) * np.sin(8 * np.pi / 18) / phase, rel=1e-9)
+    assert_estimates_are_true(compressed(tmp_path, chain, 4000), chain, 4000)
 
 
 def pairs(driver: object, folder: Path, step: float, count: int = 16) -> np.ndarray:

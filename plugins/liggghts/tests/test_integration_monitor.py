@@ -8,7 +8,7 @@ import pytest
 from rig import liggghts_driver
 from rig.chains import MATERIAL, RADIUS, CompressedChain, solitary_wave
 from rig.liggghts_driver import read_dump, run_deck
-from rig.monitor import MONITOR, POSITION, SPIN, THERMO, VELOCITY, figures, line_of_grains
+from rig.monitor import MONITOR, POSITION, SPIN, THERMO, VELOCITY, assert_estimates_are_true, figures, line_of_grains
 from rig.packing import CREATE, STATE, packing
 from rig.scenarios import Material
 
@@ -41,14 +41,7 @@ def test_a_compressed_chain_follows_the_exact_solution_of_the_scheme(tmp_path):
 @pytest.mark.parametrize("phase", [0.05, 0.2])
 def test_the_estimates_are_the_true_local_errors(tmp_path, phase):
     chain = CompressedChain(phase)
-    found = figures(compressed(tmp_path, chain, 4000))[-1, 1:]
-    along, speed = chain.true_errors()
-    assert found[POSITION][1] == pytest.approx(along, rel=0.02)
-    assert found[VELOCITY][1] == pytest.approx(speed, rel=0.02)
-    assert found[SPIN][0] == 0.0
-    assert found[12] == 8 * (4000 - 3)
-    # Half a period of two grains on the spring between them.
-    assert found[13] == pytest.approx(np.pi * np.sqrt(2) * np.sin(8 * np.pi / 18) / phase, rel=1e-9)
+    assert_estimates_are_true(compressed(tmp_path, chain, 4000), chain, 4000)
 
 
 def test_a_struck_chain_has_the_speed_of_the_solitary_wave(tmp_path):

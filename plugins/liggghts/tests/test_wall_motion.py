@@ -11,9 +11,8 @@ from rig.energy_account import FIX, THERMO, Account
 from rig.liggghts_driver import Run, head, models, properties, read_dump, run_deck
 from rig.scenarios import Material
 from rig.vessel import STEP, rectangle
+from rig.wall_balance import Told, assert_walls_move_the_grains
 from rig.walls import stl
-
-from dembark.physics import WallMotion
 
 DRY = Material(static_friction=0.5, kinetic_friction=0.4, restitution=0.6, youngs_modulus=vessel.MODULUS)
 SHAKE = "harmonic amplitude 1e-3 0 2e-3 frequency 50 ramp 2"
@@ -140,21 +139,10 @@ def test_moving_vessel_is_one_at_rest_in_its_frame(tmp_path, name):
 
 
 def test_forces_of_the_walls_are_what_moves_the_grains(tmp_path):
-    """Impulse of the walls = change of momentum and of what gravity gave, 1e-9 of the weight; and power is force times velocity."""
-    done = run_deck(tmp_path, deck(tmp_path, SHAKE, rows(50) + "run 4000", every=50))
-    table, grains = history(done), frames(tmp_path)
-    mass = vessel.DENSITY * 4.0 / 3.0 * math.pi * grains[0, :, 10] ** 3
-    momentum = np.einsum("g,fgk->fk", mass, grains[:, :, 4:7])
-    t = STEP * table[:, 0]
+    table = history(run_deck(tmp_path, deck(tmp_path, SHAKE, rows(50) + "run 4000", every=50)))
     assert (table[:, 0] == 50 * np.arange(1, 81)).all()
-    expected = momentum[1:] - momentum[0] + np.outer(t, [0, 0, 9.81 * mass.sum()])
-    assert np.abs(table[:, 21:24] - expected).max() < 1e-9 * mass.sum() * 9.81 * t[-1]
-    wall = WallMotion(SHAKE)
-    np.testing.assert_allclose(table[:, 5:8], wall.velocity(t), atol=1e-12)
-    np.testing.assert_allclose(table[:, 19], np.einsum("nk,nk->n", table[:, 13:16], wall.velocity(t)), rtol=1e-12, atol=1e-15)
-    # All forces that are not between grains are those of the wall.
-    forces = grains[1:, :, 7:10].sum(axis=1) + np.outer(np.ones(len(t)), [0, 0, 9.81 * mass.sum()])
-    assert np.abs(table[:, 13:16] - forces).max() < 1e-12 * np.abs(forces).max()
+    told = Told(table[:, 0], force=table[:, 13:16], impulse=table[:, 21:24], velocity=table[:, 5:8], power=table[:, 19])
+    assert_walls_move_the_grains(told, frames(tmp_path), SHAKE)
 
 
 SMOOTH = Material(static_friction=0.0, kinetic_friction=0.0, restitution=0.6, youngs_modulus=vessel.MODULUS)

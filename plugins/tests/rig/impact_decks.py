@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from rig import lammps_driver, liggghts_driver
@@ -170,3 +171,23 @@ def assert_same(a: NDArray[np.float64], b: NDArray[np.float64], tolerance: float
     found = {name: np.abs(a[:, k : k + 3] - b[:, k : k + 3]).max() / max(np.abs(a[:, k : k + 3]).max(), 1e-300)
              for k, name in ((1, "position"), (4, "velocity"), (7, "spin"), (10, "force"), (13, "torque"))}
     assert max(found.values()) <= tolerance, found
+
+
+def rolled(folder: Path, factor: float, words: str, engine: str, **settings: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Speeds and spins, every 20 steps of 1e-4 s, of a log that begins to slide at 1 m/s on a floor with the friction 0.3, until it rolls;
+    `factor`: its moment of inertia over m r^2.
+
+    Friction leaves v0 / (1 + factor) of the speed, and the angular momentum about the line of contact as it was, also while the friction
+    spring swings between log and floor; both are asserted.
+    """
+    mass, s = 50.0, 1e6
+    static = mass * 9.81 * 2.0 / s  # deformation of log and floor under the weight
+    case = Case([Log((-1.0, 0.1 - static), (1.0, 0.0), mass=mass)],
+                f"stiffness {s!r} {words} wall plane floor y 0 lo stiffness {s!r} friction 0.3", 1e-4, "run 4000", gravity=9.81, every=20,
+                **settings)
+    speed, spin = np.array([(frame[0, 4], frame[0, 9]) for frame in run(folder, case, engine=engine).frames]).T
+    arm = 0.1 - 0.5 * static
+    assert mass * arm * (speed - 1.0) == pytest.approx(factor * mass * 0.1**2 * spin, rel=1e-6, abs=1e-9)
+    assert speed[50:].mean() == pytest.approx(1.0 / (1.0 + factor), rel=1e-2)
+    assert -arm * spin[50:].mean() == pytest.approx(speed[50:].mean(), rel=1e-2)
+    return speed, spin

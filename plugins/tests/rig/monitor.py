@@ -6,10 +6,11 @@ import re
 from types import ModuleType
 
 import numpy as np
+import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from rig import lammps_driver, liggghts_driver
-from rig.chains import DENSITY, RADIUS
+from rig.chains import DENSITY, RADIUS, CompressedChain
 from rig.liggghts_driver import Run
 from rig.scenarios import Material
 
@@ -25,6 +26,18 @@ def figures(done: Run) -> NDArray[np.float64]:
     assert done.code == 0, done.error or done.output[-2000:]
     lines = re.findall(rf"^ *(\d+(?: +[-+.\de]+){{{COUNT}}}) *$", done.output, re.MULTILINE)
     return np.array([line.split() for line in lines], dtype=float)
+
+
+def assert_estimates_are_true(done: Run, chain: CompressedChain, steps: int) -> None:
+    """What the monitor estimates of a compressed chain, watched in each of so many steps, is its true local error, to 2 %."""
+    found = figures(done)[-1, 1:]
+    along, speed = chain.true_errors()
+    assert found[POSITION][1] == pytest.approx(along, rel=0.02)
+    assert found[VELOCITY][1] == pytest.approx(speed, rel=0.02)
+    assert found[SPIN][0] == 0.0
+    assert found[12] == chain.count * (steps - 3)
+    # Half a period of two grains on the spring between them.
+    assert found[13] == pytest.approx(np.pi * np.sqrt(2) * np.sin(8 * np.pi / 18) / chain.phase, rel=1e-9)
 
 
 def law(driver: ModuleType, m: Material) -> str:
