@@ -169,7 +169,7 @@ def make_report(
 
     folder = directory.resolve() if directory else results.resolve() / profile
     if not any(folder.glob("*/*/*/metrics.json")):
-        raise DembarkError(f"no results in {folder}", "", "give the folder of a campaign; what a single run measured is in its metrics.json" if directory else
+        raise DembarkError(f"no results in {folder}", "", "give a campaign's folder; single runs have metrics.json" if directory else
                            f"run 'dembark validate --profile {profile}' first, or give --results")
     build_report(folder)
     show.console().print(f"{folder / 'report.html'}\n{folder / 'report.pdf'}", markup=False, soft_wrap=True)
