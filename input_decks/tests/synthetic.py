@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from dembark.physics import capillary_force
+from dembark.postproc.instruments.momentum import PARTS
 from dembark.postproc.tests.dumps import BOX, contacts_text, grains_text, write_times
 
 GRAVITY, DIAMETER, DENSITY = 9.81, 0.005, 2500.0
@@ -48,6 +49,16 @@ class Written:
                   "frames": len(self.grains), "inputs": "", "provenance": provenance}
         (self.folder / "run.json").write_text(json.dumps(record))
         return self.folder.parent
+
+
+def account(rows: int, lost: float) -> dict[str, np.ndarray]:
+    """Columns of an energy account that balances: damping takes 0.3 J, of which the part `lost` is not tallied."""
+    rise = np.arange(rows) / (rows - 1.0)
+    table = {"first_kinetic": np.zeros(rows), "gravity": rise, "walls": 0.01 * rise}
+    table |= dict.fromkeys(PARTS, -0.05 * rise) | {"normal_viscous": -0.3 * rise}
+    table["kinetic_energy"] = table["gravity"] + table["walls"] + sum(table[name] for name in PARTS)
+    table |= {name: np.zeros(rows) for name in ("other", "imposed", "balance")} | {"scale": 1e-3 + 2.0 * rise}
+    return table | {"normal_viscous": (1.0 - lost) * table["normal_viscous"]}
 
 
 def told(folder: Path, **changes: float) -> Path:

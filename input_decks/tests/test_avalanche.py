@@ -12,8 +12,9 @@ import pytest
 
 from dembark.common.errors import DembarkError
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.synthetic import account
 from dembark.postproc.instruments.avalanche import Slope, front_law, profile_power
-from dembark.postproc.instruments.momentum import PARTS, imbalance
+from dembark.postproc.instruments.momentum import imbalance
 from dembark.postproc.tests.scenes import frame_of
 
 avalanche = module("avalanche")
@@ -28,12 +29,7 @@ def history(missed: float = 0.0, lost: float = 0.0) -> dict[str, np.ndarray]:
     """Rows of known energies, impulses and momentum: the obstacle takes 2 N s, of which the part `missed` is not in its force, and damping
     takes 0.3 J, of which the part `lost` is not tallied."""
     random, step = np.random.default_rng(1), EVERY * np.arange(1.0, ROWS + 1.0)
-    rise = np.arange(ROWS) / (ROWS - 1.0)
-    table = {"step": step, "time": step * DT, "first_kinetic": np.zeros(ROWS), "gravity": rise, "walls": 0.01 * rise}
-    table |= dict.fromkeys(PARTS, -0.05 * rise) | {"normal_viscous": -0.3 * rise}
-    table["kinetic_energy"] = table["gravity"] + table["walls"] + sum(table[name] for name in PARTS)
-    table |= {name: np.zeros(ROWS) for name in ("other", "imposed", "balance")} | {"scale": 1e-3 + 2.0 * rise}
-    table["normal_viscous"] = (1.0 - lost) * table["normal_viscous"]
+    table = {"step": step, "time": step * DT} | account(ROWS, lost)
     gained = np.zeros((ROWS, 2))
     for wall, total in (("floor", 5.0), ("obstacle", -2.0), ("finish", -0.1)):
         for k, axis in enumerate("xz"):

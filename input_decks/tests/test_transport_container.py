@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.synthetic import account
 from dembark.postproc.instruments.container import ring_period, slid, tops
-from dembark.postproc.instruments.momentum import PARTS
 from dembark.postproc.tests.scenes import frame_of
 from dembark.validation.case.folders import find
 
@@ -28,12 +28,7 @@ def history(factor: float, duration: float, acceleration: float, mass: float, mi
     pulse = np.where((time > 0.0) & (time < duration), np.sin(math.pi * time / duration), 0.0) * acceleration * mass
     ring = np.where(time >= duration, 0.05 * acceleration * mass * np.sin(2.0 * math.pi * (time - duration) / 0.02), 0.0)
     force = factor * pulse + ring
-    rise = np.arange(ROWS) / (ROWS - 1.0)
-    table = {"step": step, "time": DT * step, "first_kinetic": np.zeros(ROWS), "gravity": rise, "walls": 0.01 * rise}
-    table |= dict.fromkeys(PARTS, -0.05 * rise) | {"normal_viscous": -0.3 * rise}
-    table["kinetic_energy"] = table["gravity"] + table["walls"] + sum(table[name] for name in PARTS)
-    table |= {name: np.zeros(ROWS) for name in ("other", "imposed", "balance")} | {"scale": 1e-3 + 2.0 * rise}
-    table["normal_viscous"] = (1.0 - lost) * table["normal_viscous"]
+    table = {"step": step, "time": DT * step} | account(ROWS, lost)
     impulse = np.concatenate([[0.0], np.cumsum(0.5 * DT * EVERY * (force[1:] + force[:-1]))])
     mean = np.concatenate([[0.0], 0.5 * (force[1:] + force[:-1])])
     # The mean over a row's steps such that the impulse is that of the trapezoidal rule.

@@ -40,6 +40,14 @@ def grains(count: int = 4) -> list[tuple[Point, float, Point]]:
     return found
 
 
+def moving_and_resting(accelerated: bool) -> tuple[str, list[tuple[Point, float, Point]], Point]:
+    """Motion of a vessel at constant velocity or acceleration, its grains, and the gravity (m/s^2) in which one at rest is the same."""
+    if accelerated:
+        return "uniform velocity 0 0 0 acceleration 3 -2 1.5", grains(), (-3.0, 2.0, -9.81 - 1.5)
+    moved = [(place, radius, (u + 0.4, v - 0.3, w + 0.2)) for place, radius, (u, v, w) in grains()]
+    return "uniform velocity 0.4 -0.3 0.2", moved, (0.0, 0.0, -9.81)
+
+
 # A grain that falls on a shaken plate: amplitude (m), frequency (Hz), restitution, gap at the start (m), modulus (Pa), time step (s).
 BOUNCE_AMPLITUDE, BOUNCE_FREQUENCY, BOUNCE_RESTITUTION, BOUNCE_GAP, BOUNCE_MODULUS, BOUNCE_STEP = 8.747e-4, 25.0, 0.5, 0.01, 1e8, 2e-6
 

@@ -1,11 +1,10 @@
 """Runs inside YADE: `PYTHONPATH=. yade -n -x energy_scenes.py out.json scene...`. Each scene is a function that returns plain data."""
 
-import math
 import os
 import random
 
 from columns import dilute_column
-from scene_results import advance, write_results
+from scene_results import advance, place, write_results
 from yade import dembark, utils
 
 PAIR = dict(restitution=0.6, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5)
@@ -17,13 +16,7 @@ DENSITY, R = 2500.0, 0.0025
 def scene_with(bodies, pair=None, law=None, gravity=(0, 0, 0), damping=0.0, step=2e-6, before=(), between=(), **newton):
     """A new scene of `bodies` with an account, engines before it and between it and the integrator; returns the account."""
     O.reset()
-    O.materials.append(FrictMat(young=5e6, poisson=0.3, density=DENSITY, frictionAngle=0))
-    for body in bodies:
-        body.mat = O.materials[0]
-        if isinstance(body.shape, Sphere):
-            mass = 4 / 3 * math.pi * body.shape.radius**3 * DENSITY
-            body.state.mass, body.state.inertia = mass, Vector3(1, 1, 1) * 0.4 * mass * body.shape.radius**2
-        O.bodies.append(body)
+    place(bodies, DENSITY)
     account, surface = EnergyAccount(), FacetSurface()
     O.dt = step
     O.engines = [

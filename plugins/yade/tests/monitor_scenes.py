@@ -5,7 +5,7 @@ import os
 import random
 import sys
 
-from scene_results import advance, write_results
+from scene_results import advance, place, write_results
 from yade import utils
 
 R, DENSITY = 2.5e-3, 2500.0
@@ -14,13 +14,7 @@ R, DENSITY = 2.5e-3, 2500.0
 def scene_with(bodies, monitor, step, gravity=(0, 0, 0), law=None, **pair):
     """A new scene of `bodies` with `monitor`."""
     O.reset()
-    O.materials.append(FrictMat(young=5e6, poisson=0.3, density=DENSITY, frictionAngle=0))
-    for body in bodies:
-        body.mat = O.materials[0]
-        if isinstance(body.shape, Sphere):
-            mass = 4 / 3 * math.pi * body.shape.radius**3 * DENSITY
-            body.state.mass, body.state.inertia = mass, Vector3(1, 1, 1) * 0.4 * mass * body.shape.radius**2
-        O.bodies.append(body)
+    place(bodies, DENSITY)
     O.dt = step
     O.engines = [
         ForceResetter(),

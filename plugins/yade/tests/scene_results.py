@@ -1,10 +1,11 @@
 """What scenes leave for the tests; imported inside YADE."""
 
 import json
+import math
 import sys
 from pathlib import Path
 
-from yade import Omega
+from yade import FrictMat, Omega, Sphere, Vector3
 
 
 def refusal(do, otherwise="accepted"):
@@ -14,6 +15,18 @@ def refusal(do, otherwise="accepted"):
     except RuntimeError as error:
         return str(error)
     return otherwise
+
+
+def place(bodies, density):
+    """Make `bodies` those of the scene, of one material; spheres get the masses of solid ones."""
+    scene = Omega()
+    scene.materials.append(FrictMat(young=5e6, poisson=0.3, density=density, frictionAngle=0))
+    for body in bodies:
+        body.mat = scene.materials[0]
+        if isinstance(body.shape, Sphere):
+            mass = 4 / 3 * math.pi * body.shape.radius**3 * density
+            body.state.mass, body.state.inertia = mass, Vector3(1, 1, 1) * 0.4 * mass * body.shape.radius**2
+        scene.bodies.append(body)
 
 
 def advance(count):
