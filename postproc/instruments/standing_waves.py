@@ -140,16 +140,18 @@ def amplitude(power: float) -> float:
 def onset(drive: Array, power: Array, halves: Array, seen: Mask) -> Estimate:
     """Where the straight line through `power` (n,), with half-widths `halves` of 95 % intervals, over `drive` (n,) comes from zero.
 
-    The square of the amplitude of waves grows so beyond their onset, when they begin without a jump. Points that count are those from
-    the first on from which waves are `seen` (n,) in all. The interval is that of Student for the scatter about the line, or what the
+    The square of the amplitude of waves grows so beyond their onset, when they begin without a jump, and no longer where it has its
+    maximum. Points that count are those from the first on from which waves are `seen` (n,) in all, to that maximum. The interval is that of Student for the scatter about the line, or what the
     intervals of the points make of it, if these are known and that is wider; infinite for fewer than three points.
     """
     order = np.argsort(drive)
     x, y, half = (np.asarray(values, float)[order] for values in (drive, power, halves))
     below = np.flatnonzero(~np.asarray(seen, bool)[order])
     x, y, half = (values[below[-1] + 1 if len(below) else 0:] for values in (x, y, half))
+    if len(y):
+        x, y, half = (values[: int(np.argmax(y)) + 1] for values in (x, y, half))
     if len(x) < 3:
-        return Estimate(math.nan, math.inf, f"{len(x)} points above the noise are too few")
+        return Estimate(math.nan, math.inf, f"{len(x)} points from the noise to the maximum are too few")
     slope, start = np.polyfit(x, y, 1)
     if slope <= 0.0:
         return Estimate(math.nan, math.inf, "the power does not grow with the drive")

@@ -120,6 +120,13 @@ def test_an_onset_of_points_without_intervals_rests_on_their_scatter() -> None:
     assert known == unknown and 0.0 < known.half < 0.2
 
 
+def test_a_power_that_falls_again_does_not_bend_the_line() -> None:
+    """Far beyond the onset waves saturate: points beyond the largest power are none of the line."""
+    drive = np.array([2.4, 2.6, 2.8, 3.0, 3.2, 3.4])
+    power = np.array([0.0, 0.1, 0.2, 0.3, 0.25, 0.2])
+    assert onset(drive, power, np.zeros(6), power > 0.01).value == pytest.approx(2.4, rel=1e-12)
+
+
 def test_too_few_points_above_noise_have_no_onset() -> None:
     seen = np.array([False, False, True, True])
     assert math.isinf(onset(np.array([2.0, 2.5, 3.0, 3.5]), np.array([0.0, 0.0, 0.5, 1.0]), np.zeros(4), seen).half)
