@@ -141,8 +141,9 @@ def onset(drive: Array, power: Array, halves: Array, seen: Mask) -> Estimate:
     """Where the straight line through `power` (n,), with half-widths `halves` of 95 % intervals, over `drive` (n,) comes from zero.
 
     The square of the amplitude of waves grows so beyond their onset, when they begin without a jump, and no longer where it has its
-    maximum. Points that count are those from the first on from which waves are `seen` (n,) in all, to that maximum. The interval is that of Student for the scatter about the line, or what the
-    intervals of the points make of it, if these are known and that is wider; infinite for fewer than three points.
+    maximum. Points that count are those from the first on from which waves are `seen` (n,) in all, to that maximum. The interval is that
+    of Student for the scatter about the line, or what the intervals of the points make of it, if these are known and that is wider;
+    infinite for fewer than three points.
     """
     order = np.argsort(drive)
     x, y, half = (np.asarray(values, float)[order] for values in (drive, power, halves))
