@@ -76,20 +76,20 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
       for (int k = 0; k < list.numneigh[i]; ++k) {
         const int j = list.firstneigh[i][k] & NEIGHMASK;
         const Vec3 apart = vector(atom.x[i]) - vector(atom.x[j]);
-        // Of two frozen grains the engine takes the mass of the first.
-        const double mass_i = frozen(i) && !frozen(j) ? INFINITY : atom.rmass[i], mass_j = frozen(j) ? INFINITY : atom.rmass[j];
-        const dembark::ContactBodies b = dembark_family::grain_pair(atom, i, j, apart, mass_i, mass_j);
         const double* const history = histories.firstdouble[i] + pair.dnum() * k;
         dembark::ContactState state;
         if (wet) {
           state.bridge_volume = history[bridge_offset_];
           state.rupture_distance = history[bridge_offset_ + 1];
         }
-        const double reach = b.radius_1 + b.radius_2;
+        const double reach = atom.radius[i] + atom.radius[j];
         if (dot(apart, apart) >= reach * reach && !(state.bridge_volume > 0.0)) continue;
         state.friction = load_friction(history + friction_offset_);
         if (rings_offset_ >= 0) state.rings = load_rings(history + rings_offset_);
         if (angle_offset_ >= 0) state.rolling_angle = vector(history + angle_offset_);
+        // Of two frozen grains the engine takes the mass of the first.
+        const double mass_i = frozen(i) && !frozen(j) ? INFINITY : atom.rmass[i], mass_j = frozen(j) ? INFINITY : atom.rmass[j];
+        const dembark::ContactBodies b = dembark_family::grain_pair(atom, i, j, apart, mass_i, mass_j);
         const Vec3 f = contact_step(parameters(atom.type[i], atom.type[j]), b, dt_, state).force;
         pair.ev_tally_xyz(i, j, atom.nlocal, lmp_->force->newton_pair, 0.0, 0.0, f.x, f.y, f.z, apart.x, apart.y, apart.z);
       }

@@ -14,25 +14,23 @@
 #include "modify.h"
 #include "update.h"
 
-#include "dembark/keyword_reader.hpp"
 #include "pair_sph_coupled.h"
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
 using namespace dembark::sph;
 using dembark::keywords::Reader;
+using dembark_family::vector;
+
+Vector LAMMPS_NS::read_vector(Reader &in, const std::string &of, const std::string &what) {
+  const double x = in.number(of, what), y = in.number(of, what), z = in.number(of, what);
+  return {x, y, z};
+}
 
 namespace {
 
 /// Global vector: position, velocity, spin, orientation; force and torque of the fluid, of anything else but gravity; work.
 constexpr int all_numbers = 26;
-
-Vector vector(const double *v) { return {v[0], v[1], v[2]}; }
-
-Vector read_vector(Reader &in, const std::string &of, const std::string &what) {
-  const double x = in.number(of, what), y = in.number(of, what), z = in.number(of, what);
-  return {x, y, z};
-}
 
 double read_inertia(Reader &in, const std::string &of) {
   if (!in.next_is("inf")) return in.positive(of, "a moment (kg m^2, or inf)");

@@ -13,9 +13,13 @@ FixStyle(sph/wall,FixSphBody) FixStyle(sph/body,FixSphBody)
 
 #include "shared_fix.h"
 
+#include "dembark/keyword_reader.hpp"
 #include "dembark/sph/bodies.hpp"
 
 namespace LAMMPS_NS {
+
+/// Three numbers after the keyword `of`.
+dembark::sph::Vector read_vector(dembark::keywords::Reader &in, const std::string &of, const std::string &what);
 
 class FixSphBody : public dembark_family::SharedFix {
  public:

@@ -18,15 +18,6 @@ using namespace dembark::sph;
 using dembark::keywords::Reader;
 using dembark::keywords::text;
 
-namespace {
-
-Vector read_vector(Reader &in, const std::string &of, const std::string &what) {
-  const double x = in.number(of, what), y = in.number(of, what), z = in.number(of, what);
-  return {x, y, z};
-}
-
-}  // namespace
-
 FixSphContact::FixSphContact(LAMMPS *lmp, int narg, char **arg) : SharedFix(lmp, narg, arg) {
   if (domain->dimension != 3) fail("boxes are for three dimensions");
   checked([&] { read(std::vector<std::string>(arg + 3, arg + narg)); });

@@ -6,26 +6,20 @@ import os
 import sys
 
 from columns import dilute_column
-from scene_results import refusal, write_results
+from scene_results import place, refusal, write_results
 from yade import dembark, utils
 
 PAIR = dict(restitution=0.6, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5)
 ROLLING = dict(rollingFriction=0.1, rollingDampingRatio=0.3)
 WET = dict(bridgeVolume=2e-10, surfaceTension=0.072, contactAngle=0.35)
-DENSITY, YOUNG, POISSON = 2500.0, 5e6, 0.3
+DENSITY = 2500.0
 STEP = 2e-6
 
 
 def scene_with(bodies, pair=None, gravity=(0, 0, 0), **law):
     """A new scene of `bodies`; returns its law."""
     O.reset()
-    material = O.materials.append(FrictMat(young=YOUNG, poisson=POISSON, density=DENSITY, frictionAngle=0))
-    for body in bodies:
-        body.mat = O.materials[material]
-        if isinstance(body.shape, Sphere):
-            mass = 4 / 3 * math.pi * body.shape.radius**3 * DENSITY
-            body.state.mass, body.state.inertia = mass, Vector3(1, 1, 1) * 0.4 * mass * body.shape.radius**2
-        O.bodies.append(body)
+    place(bodies, DENSITY)
     law = Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(**law)
     O.dt = STEP
     O.engines = [

@@ -75,6 +75,14 @@ def fluid_loop(p, water, push=None):
             NewtonIntegrator(damping=0, gravity=(0, -p.gravity, 0))]
 
 
+def _pose_names(bodies):
+    return [f"{name}_{what}" for name in bodies for what in ("x", "y", "z", "qw", "qx", "qy", "qz")]
+
+
+def _pose(state):
+    return [*state.pos, state.ori[3], state.ori[0], state.ori[1], state.ori[2]]
+
+
 class FluidWriter(FrameWriter):
     """Appends frames of the fluid to fluid.dump, and rows of poses of bodies and energies of the fluid to fluid.csv.
 
@@ -83,14 +91,12 @@ class FluidWriter(FrameWriter):
     """
 
     ENERGIES = ("kinetic", "potential", "compression", "contact", "viscous", "diffusive", "boundary", "work")
-    POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
     COLUMNS = "id type x y z vx vy vz radius mass density pressure"
 
     def __init__(self, bounds, bodies=None, dump="fluid.dump", history="fluid.csv"):
         self._bodies, self._dump = dict(bodies or {}), dump
         self._box = "".join(f"{low:.17g} {high:.17g}\n" for low, high in bounds)
-        poses = [f"{name}_{what}" for name in self._bodies for what in self.POSE]
-        self._history = table(history, ",".join(["step", "time", *poses, *self.ENERGIES])) if history else None
+        self._history = table(history, ",".join(["step", "time", *_pose_names(self._bodies), *self.ENERGIES])) if history else None
         if dump:
             self._begin(dump)
 
@@ -106,8 +112,7 @@ class FluidWriter(FrameWriter):
         energies = fluid_engine().energies()
         numbers = [O.time]
         for body in self._bodies.values():
-            state = O.bodies[body].state
-            numbers += [*state.pos, state.ori[3], state.ori[0], state.ori[1], state.ori[2]]
+            numbers += _pose(O.bodies[body].state)
         numbers += [energies[name] for name in self.ENERGIES]
         self._history.write(",".join([str(O.iter), *(f"{x:.17g}" for x in numbers)]) + "\n")
         self._history.flush()
@@ -116,6 +121,8 @@ class FluidWriter(FrameWriter):
 
 class _CaseRecorder:
     """Writes a row of time.csv and a frame of grains.dump when they are due; those that follow it know what a row holds."""
+
+    ENERGIES = ("kinetic", "potential", "compression")
 
     def __init__(self, p, bounds, columns):
         self._p = p
@@ -139,8 +146,6 @@ class FluidRecorder(_CaseRecorder):
     tank: number of the wall whose force is written; bodies : name -> id of a free body
     """
 
-    ENERGIES = ("kinetic", "potential", "compression")
-
     def __init__(self, p, tank, bodies=None):
         self._tank, self._bodies = tank, dict(bodies or {})
         poses = [f"{name}_{what}" for name in self._bodies for what in ("x", "y", "vx")]
@@ -163,14 +168,11 @@ class CubesRecorder(_CaseRecorder):
     bodies : name -> id of a free body
     """
 
-    ENERGIES = ("kinetic", "potential", "compression")
-    POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
-
     def __init__(self, p, bodies):
         self._bodies = dict(bodies)
         bounds = ((-p.column_length, p.downstream_length), (-0.5 * p.flume_width, 0.5 * p.flume_width), (0.0, p.flume_height))
         energies = [f"{name}_energy" for name in (*self.ENERGIES, "body", "contact")]
-        super().__init__(p, bounds, [*energies, *(f"{name}_{what}" for name in self._bodies for what in self.POSE)])
+        super().__init__(p, bounds, [*energies, *_pose_names(self._bodies)])
 
     def _row(self, energies):
         moving, poses, springs = 0.0, [], energies["contact"]
@@ -179,7 +181,7 @@ class CubesRecorder(_CaseRecorder):
             # Velocities are half a step behind the forces of this one.
             moving += 0.5 * state.mass * state.vel.squaredNorm() + 0.5 * state.inertia[0] * state.angVel.squaredNorm()
             moving += state.mass * self._p.gravity * state.pos[2]
-            poses += [*state.pos, state.ori[3], state.ori[0], state.ori[1], state.ori[2]]
+            poses += _pose(state)
         for one in O.interactions:
             # Fn is the spring's force; normalForce has the dashpot's, too.
             if one.isReal:
