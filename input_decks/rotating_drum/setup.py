@@ -24,14 +24,22 @@ def setup(p: Parameters) -> Setup:
 
 
 def close_packed(radius: float, depth: float, spacing: float) -> packing.Array:
-    """Points (n, 3) in m of a face-centred lattice with the period `depth` (m) along z within `radius` (m) of the z axis, which are at
-    least `spacing` (m) apart."""
-    side = spacing / math.sqrt(2.0)
-    reach, layers = math.ceil(radius / side), 2 * int(depth / (2.0 * side))
-    plane, height = np.arange(-reach, reach + 1), np.arange(layers)
-    k, j, i = (axis.ravel() for axis in np.meshgrid(height, plane, plane, indexing="ij"))
+    """Points (n, 3) in m within `radius` (m) of the z axis, which are at least `spacing` (m) apart, with the period `depth` (m) along z.
+
+    Layers of a face-centred lattice: stretched along z to fit the period, or compressed along z and stretched across, whichever holds more.
+    """
+    fewest = 2 * int(depth / (math.sqrt(2.0) * spacing))
+    return max((_layers(count, radius, depth, spacing) for count in (fewest, fewest + 2) if 2.0 * depth >= count * spacing), key=len)
+
+
+def _layers(count: int, radius: float, depth: float, spacing: float) -> packing.Array:
+    height = depth / count
+    side = math.sqrt(max(0.5 * spacing**2, spacing**2 - height**2))
+    reach = math.ceil(radius / side)
+    plane = np.arange(-reach, reach + 1)
+    k, j, i = (axis.ravel() for axis in np.meshgrid(np.arange(count), plane, plane, indexing="ij"))
     kept = ((i + j + k) % 2 == 0) & (side * np.hypot(i, j) <= radius)
-    return np.column_stack((side * i, side * j, depth / layers * (k + 0.5)))[kept]
+    return np.column_stack((side * i, side * j, height * (k + 0.5)))[kept]
 
 
 def lining(p: Parameters) -> packing.Array:

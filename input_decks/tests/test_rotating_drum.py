@@ -8,11 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.postproc.instruments.tumbler import read
+from dembark.validation.case import deck
 from dembark.validation.case.folders import find
+from dembark.validation.case.resolve import resolve
 
+CASE = find("rotating_drum")
 drum = module("rotating_drum")
 JUDGED = {"surface_speed", "zero_crossing", "layer_depth"}
 
@@ -121,15 +125,19 @@ def test_a_smooth_wall_holds_the_grains_and_drags_them_the_same_way(engine: str,
     assert low.sum() > 20 and last.velocities[low, 0].mean() > 0.01
 
 
-def test_the_lattice_leaves_no_two_grains_in_touch() -> None:
+@pytest.mark.parametrize("variant", [SMALL | {"wall_lining": "grains"}, "alizadeh", "smooth", "sunday_smooth", "sunday_15"], ids=str)
+def test_all_grains_have_room_and_no_two_touch(variant: str | dict[str, Any]) -> None:
     """Nor one of them and the lining."""
-    from dembark.validation.case import deck
-    values = defaults("rotating_drum", **SMALL | {"wall_lining": "grains"})
-    packed = deck.prepare(find("rotating_drum"), values).packing
+    values = resolve(CASE, "standard", variant, {}) if isinstance(variant, str) else resolve(CASE, None, None, variant)
+    packed = deck.prepare(CASE, values).packing
     assert packed is not None
-    period = packed.box[2, 1]
-    apart = packed.positions[:, None] - packed.positions
-    apart[..., 2] -= period * np.round(apart[..., 2] / period)
-    far = np.linalg.norm(apart, axis=2) + np.eye(len(apart))
     moving = packed.types == 1
-    assert far[moving].min() >= 1.005 * values["grain_diameter"] and far.min() >= values["grain_diameter"]
+    period = packed.box[2, 1]
+    drum_volume = np.pi * values["drum_radius"] ** 2 * period
+    assert np.pi / 6.0 * (packed.diameters[moving] ** 3).sum() == pytest.approx(values["solid_filling"] * drum_volume, rel=0.01)
+    images = np.vstack([packed.positions + shift for shift in ((0.0, 0.0, 0.0), (0.0, 0.0, period), (0.0, 0.0, -period))])
+    far = cKDTree(images).query(packed.positions, 2)[0][:, 1]
+    largest = values["grain_diameter"] * (1.0 + values["grain_diameter_spread"])
+    assert far[moving].min() >= 1.005 * largest and far.min() >= values["grain_diameter"]
+    shell = values["drum_radius"] - 0.5 * packed.diameters - np.hypot(*packed.positions[:, :2].T)
+    assert shell[moving].min() > 0.0
