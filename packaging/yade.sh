@@ -15,7 +15,7 @@ here=$(cd "$(dirname "$0")" && pwd)
 version=2025.2.0
 sha256=42702372251bf5e8f07a364bdf30533a1318947e4db90435b1f89293dc029156
 python=/usr/bin/python3
-# Header features that change the layout of classes are part of the cache key: whatever is added here makes a new build.
+# Whatever is added here, or changed in how the sources are compiled, makes a new build.
 flags=(-DDISABLE_ALL=ON -DENABLE_OPENMP=ON -DENABLE_LOGGER=ON -DENABLE_USEFUL_ERRORS=OFF -DENABLE_MULTI_REAL_HP=OFF
        -DNOSUFFIX=ON -DDISABLE_SAVE_TEMPS=ON
        -DDISABLE_PKGS=fem,lbm,levelSet,openfoam,pfv,polyhedra,potential,image,vtk
@@ -45,7 +45,8 @@ if packaged; then
   [ -x /usr/bin/yade ] || die "YADE's package is not installed; run 'make system'"
 else
   pyversion=$($python -c 'import sys; print("%d.%d" % sys.version_info[:2])')
-  key=$(printf '%s\n' "$version" "$pyversion" "$(c++ -dumpfullversion 2>/dev/null || echo none)" "$(uname -m)" "${flags[@]}" | sha256sum | cut -c1-10)
+  key=$({ printf '%s\n' "$version" "$pyversion" "$(c++ -dumpfullversion 2>/dev/null || echo none)" "$(uname -m)" "${flags[@]}"
+          cat "$here/yade/targets.cmake" "$here/../plugins/yade/engine_classes.cmake"; } | sha256sum | cut -c1-10)
   store=$cache/yade-$version-$key prefix=$store/prefix
 fi
 source=$store/source

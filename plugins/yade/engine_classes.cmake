@@ -5,7 +5,8 @@
 #
 # writes HEADER, which is to be included first (-include) by SOURCES. It includes those of YADE's headers in FOLDERS that SOURCES include,
 # with these members declared and not defined. The classes keep their layout: the same members are virtual, in the same order. FOLDERS
-# must not own SOURCES. The wrappers of Boost.Python run once a call from Python, so they are optimised less.
+# must not own SOURCES. The wrappers of Boost.Python and of the archives run once a call from Python or once a file, so they are optimised
+# less. What the loops of a simulation are made of is included before them: GCC inlines no function into one that is optimised more.
 function(dembark_declare_engine_classes)
   cmake_parse_arguments(PARSE_ARGV 0 given "" "HEADER;SOURCE_DIR" "FOLDERS;SOURCES")
   list(JOIN given_FOLDERS "|" folders)
@@ -30,6 +31,44 @@ function(dembark_declare_engine_classes)
   list(SORT included)
   set(text [[
 #pragma once
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <complex>
+#include <deque>
+#include <fstream>
+#include <functional>
+#include <iomanip>
+#include <iostream>
+#include <limits>
+#include <list>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <numeric>
+#include <random>
+#include <set>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <unordered_map>
+#include <unordered_set>
+#include <utility>
+#include <vector>
+#include <boost/array.hpp>
+#include <boost/foreach.hpp>
+#include <boost/function.hpp>
+#include <boost/make_shared.hpp>
+#include <boost/optional.hpp>
+#include <boost/range.hpp>
+#include <boost/scoped_ptr.hpp>
+#include <boost/shared_ptr.hpp>
+#include <boost/tuple/tuple.hpp>
+#include <boost/weak_ptr.hpp>
+#include <boost/enable_shared_from_this.hpp>
+#include <boost/smart_ptr/scoped_array.hpp>
+#include <boost/smart_ptr/shared_array.hpp>
 #pragma GCC push_options
 #pragma GCC optimize("O1")
 #include <boost/archive/binary_iarchive.hpp>
