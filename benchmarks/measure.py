@@ -144,11 +144,11 @@ def lammps_sample(engine: Engine, bed: Path, variables: dict[str, object], wall_
     return read_lammps(re.sub(r"^Loop time.*$", "", text, flags=re.MULTILINE) if done.returncode else text, wall_clock)
 
 
-def yade_sample(engine: Engine, bed: Path, law: str, relax: int, steps: int) -> Sample:
-    """One timed run of yade_bed.py with contact law `law` (`stock`, `dembark`, or a pre-sliding curve of it)."""
+def yade_sample(engine: Engine, bed: Path, law: str, relax: int, steps: int, loop: str = "InteractionLoop") -> Sample:
+    """One timed run of yade_bed.py with contact law `law` (`stock`, `dembark`, or a pre-sliding curve of it) in an engine `loop`."""
     words = [str(engine.executable), "-j1", "-n", "-x", str(HERE / "yade_bed.py")]
     with tempfile.TemporaryDirectory(prefix="dembark-bench-") as name:
-        done = _call([*words, f"bed={bed}", f"law={law}", f"relax={relax}", f"steps={steps}", "samples=1"], Path(name),
+        done = _call([*words, f"bed={bed}", f"law={law}", f"loop={loop}", f"relax={relax}", f"steps={steps}", "samples=1"], Path(name),
                      engine.environment())
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
     if done.returncode or not lines:

@@ -90,7 +90,8 @@ def yade_comparison(bed: Path, relax: int, steps: int) -> Comparison:
     return Comparison("YADE, dry", [
         Subject("Law2_ScGeom_MindlinPhys_Mindlin (stock)", lambda: yade_sample(engine, bed, "stock", relax, steps)),
         Subject("Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz", lambda: yade_sample(engine, bed, "dembark", relax, steps)),
-        Subject("the same, presliding partial_slip", lambda: yade_sample(engine, bed, "partial_slip", relax, steps)),
+        Subject("the same, SphereContactLoop", lambda: yade_sample(engine, bed, "dembark", relax, steps, "SphereContactLoop")),
+        Subject("the same, presliding partial_slip", lambda: yade_sample(engine, bed, "partial_slip", relax, steps, "SphereContactLoop")),
     ], steps, {"Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz": 1.1})
 
 

@@ -1,4 +1,6 @@
-"""The settled bed in YADE under one contact law, timed. In YADE: `yade -n -j1 -x yade_bed.py bed=FILE law=stock|dembark|PRESLIDING ...`.
+"""The settled bed in YADE under one contact law, timed.
+
+    yade -n -j1 -x yade_bed.py bed=FILE law=stock|dembark|PRESLIDING [loop=SphereContactLoop] ...
 
 Prints one line of JSON a sample: processor time of the whole loop and of the interaction loop (its share of the loop by the engine's
 own timers), in seconds.
@@ -35,7 +37,7 @@ else:
         restitution=restitution, staticFriction=friction, kineticFriction=kinetic, criticalSlipDistance=1e-5)
     law = Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding="linear" if options["law"] == "dembark" else options["law"])
 motion = NewtonIntegrator(damping=0.3, gravity=(0, 0, -9.81))
-loop = InteractionLoop([Ig2_Sphere_Sphere_ScGeom(), Ig2_Box_Sphere_ScGeom()], [physics], [law])
+loop = globals()[options.get("loop", "InteractionLoop")]([Ig2_Sphere_Sphere_ScGeom(), Ig2_Box_Sphere_ScGeom()], [physics], [law])
 O.engines = [
     ForceResetter(),
     InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Box_Aabb()], allowBiggerThanPeriod=True, verletDist=0.1 * diameter),

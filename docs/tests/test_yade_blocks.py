@@ -78,8 +78,9 @@ NO_ATTRIBUTES = {"static", "kinetic", "slip", "strength", "area", "healing", "xy
 
 def fragment(text: str) -> str:
     """A script that uses the fragment as its page says."""
-    if text.startswith("InteractionLoop("):
-        return BEFORE + SPHERES + LOOP.format(bounds="", loop=text.strip()) + "assert O.interactions[0, 1].phys.ruptureDistance > 0"
+    if text.startswith(("InteractionLoop(", "SphereContactLoop(")):
+        met = "O.interactions[0, 1].phys.ruptureDistance > 0" if text.startswith("I") else "O.engines[2].shortWay == 1"
+        return BEFORE + SPHERES + LOOP.format(bounds=", Bo1_Wall_Aabb()", loop=text.strip()) + f"assert {met}"
     if "MatchMaker" in text:
         functor = text[text.index("Ip2_"):].strip()
         loop = f"InteractionLoop([Ig2_Sphere_Sphere_ScGeom()], [{functor}], {LAW})"

@@ -40,7 +40,7 @@ def record():
 O.engines = [
     ForceResetter(),
     InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()], verletDist=0.1 * p.grain_diameter),
-    InteractionLoop(
+    SphereContactLoop(
         [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
         [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(restitution=of_pairs(p.restitution, p.grain_steel_restitution, p.steel_restitution),
                                                     staticFriction=friction, kineticFriction=friction, criticalSlipDistance=0)],

@@ -160,17 +160,14 @@ inline void add_couple(const Vec3<double>& couple, ContactForce& out) {
   out.torque_2 -= couple;
 }
 
-/// One step of one contact. `dt` in s. With `update` false (the set-up of a run) forces are those of the present state, which
-/// stays as it is.
-inline ContactForce contact_step(const ContactParameters& p, const ContactBodies& b, double dt, ContactState& stored, bool update = true) {
+/// One step of one contact. `dt` in s.
+inline ContactForce contact_step(const ContactParameters& p, const ContactBodies& b, double dt, ContactState& state) {
   ContactForce out;
   const double distance = norm(b.separation);
   out.overlap = b.radius_1 + (std::isinf(b.radius_2) ? 0.0 : b.radius_2) - distance;
   // Coincident centres have no direction; any will do to drive them apart.
   out.normal = distance > 0.0 ? b.separation * (1.0 / distance) : Vec3<double>{0.0, 0.0, 1.0};
 
-  ContactState scratch;
-  ContactState& state = update ? stored : (scratch = stored);
   const bool touching = out.overlap > 0.0;
   out.capillary_force = bridge_step(p.liquid, b.radius_1, b.radius_2, -out.overlap, touching, state.bridge_volume, state.rupture_distance);
   const bool viscous = p.liquid.viscous.on() && state.bridge_volume > 0.0;
@@ -182,17 +179,17 @@ inline ContactForce contact_step(const ContactParameters& p, const ContactBodies
   if (touching) {
     const NormalResponse<double> response = adjusted(
         p.respond(b.effective_radius(), b.effective_mass(), out.overlap, motion.normal_velocity), p.limit_force, p.tangential_damping);
-    const double step = update ? dt : 0.0, twist = contact_twist(out.normal, b.angular_velocity_1, b.angular_velocity_2, step);
+    const double twist = contact_twist(out.normal, b.angular_velocity_1, b.angular_velocity_2, dt);
     out.normal_force = response.force;
     out.normal_stiffness = response.normal_stiffness;
     out.tangential_stiffness = response.tangential_stiffness;
     out.tangential =
-        contact_friction(p.friction, out.normal, twist, response, motion.tangential_velocity, step, state.friction, &state.rings);
+        contact_friction(p.friction, out.normal, twist, response, motion.tangential_velocity, dt, state.friction, &state.rings);
     if (p.rolling.on())
       couple = rolling_step(p.rolling,
                             {out.normal, twist, b.effective_radius(), relative_inertia(b.mass_1, b.radius_1, b.mass_2, b.radius_2),
                              response.force, response.tangential_stiffness, b.relative_spin()},
-                            step, state.rolling_angle);
+                            dt, state.rolling_angle);
   } else {
     state.friction = {};
     state.rolling_angle = {};
@@ -202,6 +199,13 @@ inline ContactForce contact_step(const ContactParameters& p, const ContactBodies
   if (p.rolling.on()) add_couple(couple, out);
   out.interacting = touching || state.bridge_volume > 0.0;
   return out;
+}
+
+/// With `update` false (the set-up of a run) forces are those of the present state, which stays as it is.
+inline ContactForce contact_step(const ContactParameters& p, const ContactBodies& b, double dt, ContactState& state, bool update) {
+  if (update) return contact_step(p, b, dt, state);
+  ContactState scratch = state;
+  return contact_step(p, b, 0.0, scratch);
 }
 
 }  // namespace dembark

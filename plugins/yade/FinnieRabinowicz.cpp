@@ -67,10 +67,19 @@ void choose(const char* attribute, const std::string& word, const std::vector<st
 
 }  // namespace
 
+void Phys::get(::dembark::ContactState& now) const {
+	now.friction         = {vec(elasticDisplacement), slip, dissipatedEnergy};
+	now.bridge_volume    = bridgeVolume;
+	now.rupture_distance = ruptureDistance;
+	now.rolling_angle    = vec(rollingAngle);
+	if (contact.friction.presliding != ::dembark::Presliding::partial_slip) return;
+	if (slipRings.size() == ringNumbers) std::memcpy(static_cast<void*>(&now.rings), slipRings.data(), sizeof now.rings);
+	else now.rings = {};
+}
+
 ::dembark::ContactState Phys::state() const {
-	::dembark::ContactState now{
-		{vec(elasticDisplacement), slip, dissipatedEnergy}, bridgeVolume, ruptureDistance, {}, vec(rollingAngle)};
-	if (slipRings.size() == ringNumbers) std::memcpy(&now.rings, slipRings.data(), sizeof now.rings);
+	::dembark::ContactState now;
+	get(now);
 	return now;
 }
 
@@ -201,7 +210,8 @@ void Law2::prepare(Phys& phys, const ScGeom& geom, const Body& body1, const Body
 }
 
 /// Tells CapillaryLiquid, after the forces are known, that the contact touches without a bridge, or that its bridge broke.
-void Law2::reportBridge(Phys& phys, const ScGeom& geom, const Interaction& interaction, double volumeBefore) {
+void Law2::reportBridge(Phys& phys, const Interaction& interaction, const ::dembark::ContactBodies& bodies, double overlap,
+                        double volumeBefore) {
 	if (phys.bridgeVolume > 0.0) return;
 	const bool                              swapped = phys.wallBody == 1, wall = phys.wallBody != 0;
 	const Body::id_t                        id1 = interaction.getId1(), id2 = interaction.getId2();
@@ -209,63 +219,30 @@ void Law2::reportBridge(Phys& phys, const ScGeom& geom, const Interaction& inter
 	if (volumeBefore > 0.0) {
 		exchange->bridgeBroke(scene->iter, {sides, volumeBefore, phys.bridgeImbalance});
 		phys.bridgeImbalance = 0.0;
-	} else if (geom.penetrationDepth > 0.0) {
-		exchange->requestBridge(scene->iter,
-		                        {{sides, swapped ? geom.radius2 : geom.radius1, wall ? INFINITY : geom.radius2}, &phys});
+	} else if (overlap > 0.0) {
+		exchange->requestBridge(scene->iter, {{sides, bodies.radius_1, bodies.radius_2}, &phys});
 	}
 }
 
-bool Law2::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* interaction) try {
-	const ScGeom& geom = *static_cast<ScGeom*>(igeom.get());
-	Phys&         phys = *static_cast<Phys*>(iphys.get());
-	if (dembark_yade::postponed(*scene)) return phys.effectiveYoungsModulus > 0.0;
-	const Body::id_t id1 = interaction->getId1(), id2 = interaction->getId2();
-	const Body&      body1  = *Body::byId(id1, scene);
-	const Body&      body2  = *Body::byId(id2, scene);
-	const State&     state1 = *body1.state;
-	const State&     state2 = *body2.state;
-	if (phys.preparedBy != revision) prepare(phys, geom, body1, body2);
-
-	const bool free1 = phys.wallBody != 1 && body1.isDynamic(), free2 = phys.wallBody != 2 && body2.isDynamic();
-	if (!free1 && !free2) {  // nothing that they do to each other has an effect
-		phys.normalForce = phys.shearForce = phys.rollingTorque = Vector3r::Zero();
-		if (const double volume = phys.bridgeVolume; carriedLiquid && volume > 0.0) {
-			bridge_step(phys.contact.liquid, geom.radius1, geom.radius2, -geom.penetrationDepth, false, phys.bridgeVolume,
-			            phys.ruptureDistance);
-			reportBridge(phys, geom, *interaction, volume);
-		}
-		return geom.penetrationDepth > 0.0 || phys.bridgeVolume > 0.0;
-	}
-
-	Vector3r shift = Vector3r::Zero(), shiftVelocity = Vector3r::Zero();
-	if (scene->isPeriodic && !interaction->cellDist.isZero()) {
-		shift         = scene->cell->intrShiftPos(interaction->cellDist);
-		shiftVelocity = scene->cell->intrShiftVel(interaction->cellDist);
-	}
-
-	if (phys.wallBody && !((phys.wallBody == 1 ? geom.radius2 : geom.radius1) > geom.penetrationDepth))
-		fail("the centre of sphere " + std::to_string(phys.wallBody == 1 ? id2 : id1) + " went through wall " +
-		             std::to_string(phys.wallBody == 1 ? id1 : id2) + " in step " + std::to_string(scene->iter) +
-		             "; take a smaller time step or a stiffer material",
-		     1);
-	ContactView view(phys.wallBody, geom, body1, body2, shift);
-	view.move(state1.vel, state1.angVel, state2.vel + shiftVelocity, state2.angVel);
-
-	const double                  volumeBefore = phys.bridgeVolume;
-	::dembark::ContactState       state        = phys.state();
-	const ::dembark::ContactForce out          = ::dembark::contact_step(phys.contact, view.bodies, scene->dt, state);
+::dembark::ContactForce Law2::act(Phys& phys, const Interaction& interaction, const ContactView& view) {
+	const Body::id_t id1 = interaction.getId1(), id2 = interaction.getId2();
+	const double     volumeBefore = phys.bridgeVolume;
+	// Kept: eight rings of zeros in every step would cost more than the friction.
+	static thread_local ::dembark::ContactState state;
+	phys.get(state);
+	const ::dembark::ContactForce out = ::dembark::contact_step(phys.contact, view.bodies, scene->dt, state);
 	// A comparison with what is no number is false: such a contact would vanish without a word.
 	if (!std::isfinite(out.overlap + out.force.x + out.force.y + out.force.z))
-		fail("the contact of " + pairName(body1, body2) + " has no finite force in step " + std::to_string(scene->iter) +
-		             "; look at their positions, velocities and parameters, and at the time step",
+		fail("the contact of bodies " + std::to_string(id1) + " and " + std::to_string(id2) + " has no finite force in step " +
+		             std::to_string(scene->iter) + "; look at their positions, velocities and parameters, and at the time step",
 		     1);
 
 	if (!(out.overlap > 0.0) && phys.dissipatedEnergy > 0.0) endedDissipation += phys.dissipatedEnergy;
 	phys.setState(state);
 	phys.capillaryForce = out.capillary_force;
 	phys.viscousForce   = out.viscous_normal;
-	if (carriedLiquid) reportBridge(phys, geom, *interaction, volumeBefore);
-	if (!out.interacting) return false;
+	if (carriedLiquid) reportBridge(phys, interaction, view.bodies, out.overlap, volumeBefore);
+	if (!out.interacting) return out;
 
 	const Vector3r force      = vec(out.force);
 	const Vector3r tangential = vec(out.tangential + out.viscous_tangential);
@@ -285,7 +262,45 @@ bool Law2::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* i
 		if (phys.wallBody == 0) scene->forces.addTorque(second, vec(out.torque_2));
 	}
 	if (phys.wallBody) scene->forces.addTorque(second, -view.surface.cross(force) - vec(out.rolling));
-	return true;
+	return out;
+}
+
+bool Law2::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* interaction) try {
+	const ScGeom& geom = *static_cast<ScGeom*>(igeom.get());
+	Phys&         phys = *static_cast<Phys*>(iphys.get());
+	if (dembark_yade::postponed(*scene)) return phys.effectiveYoungsModulus > 0.0;
+	const Body::id_t id1 = interaction->getId1(), id2 = interaction->getId2();
+	const Body&      body1  = *Body::byId(id1, scene);
+	const Body&      body2  = *Body::byId(id2, scene);
+	const State&     state1 = *body1.state;
+	const State&     state2 = *body2.state;
+	if (phys.preparedBy != revision) prepare(phys, geom, body1, body2);
+
+	Vector3r shift = Vector3r::Zero(), shiftVelocity = Vector3r::Zero();
+	if (scene->isPeriodic && !interaction->cellDist.isZero()) {
+		shift         = scene->cell->intrShiftPos(interaction->cellDist);
+		shiftVelocity = scene->cell->intrShiftVel(interaction->cellDist);
+	}
+	ContactView view(phys.wallBody, geom, body1, body2, shift);
+
+	const bool free1 = phys.wallBody != 1 && body1.isDynamic(), free2 = phys.wallBody != 2 && body2.isDynamic();
+	if (!free1 && !free2) {  // nothing that they do to each other has an effect
+		phys.normalForce = phys.shearForce = phys.rollingTorque = Vector3r::Zero();
+		if (const double volume = phys.bridgeVolume; carriedLiquid && volume > 0.0) {
+			bridge_step(phys.contact.liquid, geom.radius1, geom.radius2, -geom.penetrationDepth, false, phys.bridgeVolume,
+			            phys.ruptureDistance);
+			reportBridge(phys, *interaction, view.bodies, geom.penetrationDepth, volume);
+		}
+		return geom.penetrationDepth > 0.0 || phys.bridgeVolume > 0.0;
+	}
+
+	if (phys.wallBody && !((phys.wallBody == 1 ? geom.radius2 : geom.radius1) > geom.penetrationDepth))
+		fail("the centre of sphere " + std::to_string(phys.wallBody == 1 ? id2 : id1) + " went through wall " +
+		             std::to_string(phys.wallBody == 1 ? id1 : id2) + " in step " + std::to_string(scene->iter) +
+		             "; take a smaller time step or a stiffer material",
+		     1);
+	view.move(state1.vel, state1.angVel, state2.vel + shiftVelocity, state2.angVel);
+	return act(phys, *interaction, view).interacting;
 } catch (const std::exception& error) {
 	dembark_yade::postpone(*scene, error);
 	return true;

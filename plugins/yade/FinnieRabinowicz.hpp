@@ -17,6 +17,10 @@
 
 namespace yade {
 
+namespace dembark_yade {
+struct ContactView;
+}
+
 class FinnieRabinowiczPhys : public NormShearPhys {
 public:
 	virtual ~FinnieRabinowiczPhys() = default;
@@ -28,6 +32,7 @@ public:
 
 	void                    postLoad(FinnieRabinowiczPhys&) { preparedBy = -1; }
 	::dembark::ContactState state() const;
+	void                    get(::dembark::ContactState& now) const;  // its rings only under partial slip
 	void                    setState(const ::dembark::ContactState& now);
 	/// A bridge of carried liquid forms between spheres of these radii (m; infinite = a wall).
 	void setBridge(double volume, double imbalance, double radius1, double radius2) {
@@ -128,8 +133,12 @@ public:
 	// clang-format on
 
 private:
+	friend class SphereContactLoop;
+
 	void prepare(FinnieRabinowiczPhys&, const ScGeom&, const Body&, const Body&) const;
-	void reportBridge(FinnieRabinowiczPhys&, const ScGeom&, const Interaction&, double volumeBefore);
+	/// A step of the contact seen in `view`: its forces, into `scene->forces`, and its state. What it gives says whether there is one.
+	::dembark::ContactForce act(FinnieRabinowiczPhys&, const Interaction&, const dembark_yade::ContactView& view);
+	void reportBridge(FinnieRabinowiczPhys&, const Interaction&, const ::dembark::ContactBodies&, double overlap, double volumeBefore);
 
 	::dembark::NormalLaw        normal   = ::dembark::NormalLaw::hertz;
 	::dembark::Presliding       path     = ::dembark::Presliding::linear;

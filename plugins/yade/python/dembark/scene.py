@@ -11,13 +11,13 @@ from yade import (
     Ig2_FacetSurface_Sphere_ScGeom,
     Ig2_Sphere_Sphere_ScGeom,
     InsertionSortCollider,
-    InteractionLoop,
     Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys,
     Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz,
     MatchMaker,
     NewtonIntegrator,
     Omega,
     PyRunner,
+    SphereContactLoop,
     utils,
 )
 from yade.dembark.report import fail
@@ -131,7 +131,7 @@ def pairs(materials, between_grains, at_wall):
 
 
 def contact_loop(p, materials, walls, static=None, kinetic=None):
-    """InteractionLoop of the Finnie-Rabinowicz law with the numbers `p` of a deck; `walls`: Ig2 functors beside that of two spheres.
+    """SphereContactLoop of the Finnie-Rabinowicz law with the numbers `p` of a deck; `walls`: Ig2 functors beside that of two spheres.
 
     `static`, `kinetic`: friction (of grains, of walls) other than that of `p`.
     """
@@ -144,7 +144,7 @@ def contact_loop(p, materials, walls, static=None, kinetic=None):
     if given.get("rolling_resistance", "off") != "off":
         more |= {"rollingFriction": pairs(materials, p.grain_rolling, p.wall_rolling), "rollingDampingRatio": p.rolling_damping_ratio}
         law["rollingResistance"] = p.rolling_resistance
-    return InteractionLoop(
+    return SphereContactLoop(
         [Ig2_Sphere_Sphere_ScGeom(), *walls],
         [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
             restitution=pairs(materials, p.restitution, given.get("wall_restitution", p.restitution)),

@@ -1,0 +1,187 @@
+#include "SphereContactLoop.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <typeinfo>
+
+#include <core/Scene.hpp>
+#include <pkg/common/Sphere.hpp>
+#include <pkg/dem/Ig2_Sphere_Sphere_ScGeom.hpp>
+
+#include "ContactView.hpp"
+#include "report.hpp"
+
+namespace yade {
+
+YADE_PLUGIN((SphereContactLoop));
+
+using dembark_yade::ContactView;
+using dembark_yade::vec;
+
+namespace {
+
+/// The last of `functors` whose class is `Functor` itself.
+template <class Functor, class List>
+Functor* lastOf(const List& functors) {
+	Functor* found = nullptr;
+	for (const auto& each : functors)
+		if (typeid(*each) == typeid(Functor)) found = static_cast<Functor*>(each.get());
+	return found;
+}
+
+void prefetch(const void* from, std::size_t bytes) {
+	for (std::size_t at = 0; at < bytes; at += 64) __builtin_prefetch(static_cast<const char*>(from) + at);
+}
+
+/// Interactions, their geometry and physics are strewn over the memory: the loop asks for those that come next while it works.
+void fetchAhead(const InteractionContainer& all, long i, long end) {
+	constexpr long far = 32, near = 16;
+	if (i + far < end) prefetch(all[i + far].get(), sizeof(Interaction));
+	if (i + near >= end || !all[i + near]->geom) return;
+	prefetch(all[i + near]->geom.get(), sizeof(ScGeom));
+	prefetch(all[i + near]->phys.get(), sizeof(FinnieRabinowiczPhys));
+}
+
+}  // namespace
+
+void SphereContactLoop::collect() {
+	grains.resize(scene->bodies->size());
+	for (std::size_t id = 0; id < grains.size(); ++id) {
+		const Body* const body  = (*scene->bodies)[id].get();
+		Grain&            grain = grains[id];
+		const auto* const sphere =
+			body && body->shape && typeid(*body->shape) == typeid(Sphere) ? static_cast<Sphere*>(body->shape.get()) : nullptr;
+		grain.sphere = sphere && !body->isClump();
+#ifdef YADE_MPI
+		grain.sphere = grain.sphere && body->subdomain == scene->subdomain;
+#endif
+		if (!grain.sphere) continue;
+		const State& state = *body->state;
+		grain.pos          = state.pos;
+		grain.vel          = state.vel;
+		grain.angVel       = state.angVel;
+		grain.radius       = sphere->radius;
+		grain.mass         = body->isDynamic() ? state.mass : INFINITY;
+	}
+}
+
+/// What the short way does for the pair: nothing, or no more than to see that it is too far apart to touch (`reach`: over the sum of the
+/// radii, squared), or its step.
+SphereContactLoop::Way SphereContactLoop::take(const shared_ptr<Interaction>& interaction, Real reach) const {
+	if (!meeting || interaction->functorCache.geom.get() != meeting || dembark_yade::postponed(*scene)) return Way::none;
+	const Grain &grain1 = grains[interaction->getId1()], &grain2 = grains[interaction->getId2()];
+	if (!grain1.sphere || !grain2.sphere) return Way::none;
+	const bool     across = scene->isPeriodic && !interaction->cellDist.isZero();
+	const Vector3r shift  = across ? scene->cell->intrShiftPos(interaction->cellDist) : Vector3r::Zero();
+	if (!interaction->isReal()) {
+		const Real sum = grain1.radius + grain2.radius;
+		return (grain2.pos + shift - grain1.pos).squaredNorm() > reach * sum * sum ? Way::apart : Way::none;
+	}
+	if (!law || interaction->functorCache.constLaw.get() != law) return Way::none;
+	auto& phys = static_cast<FinnieRabinowiczPhys&>(*interaction->phys);
+	if (phys.preparedBy != law->revision || (std::isinf(grain1.mass) && std::isinf(grain2.mass))) return Way::none;
+
+	ContactView view;
+	view.bodies.separation = vec(Vector3r(grain1.pos - grain2.pos - shift));
+	view.bodies.radius_1   = grain1.radius;
+	view.bodies.radius_2   = grain2.radius;
+	view.bodies.mass_1     = grain1.mass;
+	view.bodies.mass_2     = grain2.mass;
+	const Vector3r drift   = across ? scene->cell->intrShiftVel(interaction->cellDist) : Vector3r::Zero();
+	view.move(grain1.vel, grain1.angVel, grain2.vel + drift, grain2.angVel);
+	const ::dembark::ContactForce out = law->act(phys, *interaction, view);
+
+	auto& geom            = static_cast<ScGeom&>(*interaction->geom);
+	geom.normal           = -vec(out.normal);
+	geom.penetrationDepth = out.overlap;
+	geom.contactPoint     = grain1.pos + (grain1.radius - 0.5 * out.overlap) * geom.normal;
+	geom.radius1          = grain1.radius;
+	geom.radius2          = grain2.radius;
+	if (!out.interacting) scene->interactions->requestErase(interaction);
+	return Way::touching;
+}
+
+/// One interaction by the functors of the three dispatchers, each found once and then known to the interaction.
+void SphereContactLoop::dispatch(const shared_ptr<Interaction>& interaction) const {
+	const shared_ptr<Body>*first = &Body::byId(interaction->getId1(), scene), *second = &Body::byId(interaction->getId2(), scene);
+	if (!*first || !*second) return scene->interactions->requestErase(interaction);
+#ifdef YADE_MPI
+	if ((*first)->subdomain != scene->subdomain && (*second)->subdomain != scene->subdomain)
+		return scene->interactions->requestErase(interaction->getId1(), interaction->getId2());
+#endif
+	auto& known = interaction->functorCache;
+	if ((*first)->isClump() || (*second)->isClump() || !known.geomExists || !(*first)->shape || !(*second)->shape) return;
+
+	bool swapped = false;
+	if (!known.geom) known.geom = geomDispatcher->getFunctor2D((*first)->shape, (*second)->shape, swapped);
+	known.geomExists = static_cast<bool>(known.geom);
+	if (!known.geom) return;
+	if (swapped) {
+		interaction->swapOrder();
+		std::swap(first, second);
+	}
+	const Body &   body1 = **first, &body2 = **second;
+	const bool     wasReal = interaction->isReal();
+	const Vector3r shift   = scene->isPeriodic ? Vector3r(scene->cell->hSize * interaction->cellDist.cast<Real>()) : Vector3r::Zero();
+	const bool     meets   = known.geom->go(body1.shape, body2.shape, *body1.state, *body2.state, shift, false, interaction);
+	if (!meets) {
+		if (wasReal) scene->interactions->requestErase(interaction);
+		return;
+	}
+
+	if (!known.phys) known.phys = physDispatcher->getFunctor2D((*first)->material, (*second)->material, swapped);
+	if (!known.phys)
+		dembark_yade::fail("SphereContactLoop: no Ip2 functor for the materials of bodies " + std::to_string(body1.getId()) +
+		                   " and " + std::to_string(body2.getId()) + ", " + body1.material->getClassName() + " and " +
+		                   body2.material->getClassName());
+	known.phys->go(body1.material, body2.material, interaction);
+	if (!wasReal) interaction->iterMadeReal = scene->iter;
+
+	if (!known.constLaw) known.constLaw = lawDispatcher->getFunctor2D(interaction->geom, interaction->phys, swapped);
+	if (!known.constLaw)
+		dembark_yade::fail("SphereContactLoop: no Law2 functor for " + interaction->geom->getClassName() + " and " +
+		                   interaction->phys->getClassName() + " of bodies " + std::to_string(body1.getId()) + " and " +
+		                   std::to_string(body2.getId()));
+	if (!known.constLaw->go(interaction->geom, interaction->phys, interaction.get())) scene->interactions->requestErase(interaction);
+}
+
+void SphereContactLoop::action() {
+	const InteractionContainer& all     = *scene->interactions;
+	const bool                  removal = all.iterColliderLastRun >= 0 && all.iterColliderLastRun == scene->iter;
+	shortWay                            = 0;
+	if (!callbacks.empty() || loopOnSortedInteractions || removal) return InteractionLoop::action();
+
+	geomDispatcher->scene = physDispatcher->scene = lawDispatcher->scene = scene;
+	geomDispatcher->updateScenePtr();
+	physDispatcher->updateScenePtr();
+	lawDispatcher->updateScenePtr();
+	const auto* const spheres = lastOf<Ig2_Sphere_Sphere_ScGeom>(geomDispatcher->functors);
+	meeting                   = spheres;
+	law                       = lastOf<Law>(lawDispatcher->functors);
+	// A little beyond where the functor sees a contact: it has the last word there.
+	const Real reach = spheres ? 1.000001 * spheres->interactionDetectionFactor * spheres->interactionDetectionFactor : 0.0;
+	collect();
+
+	// Blocks: no thread looks at what another one works on.
+	constexpr long size  = 256;
+	const long     count = static_cast<long>(scene->interactions->size());
+	long           taken = 0;
+#ifdef YADE_OPENMP
+	const int threads = ompThreads > 0 ? std::min(ompThreads, omp_get_max_threads()) : omp_get_max_threads();
+#pragma omp parallel for schedule(guided) num_threads(threads) reduction(+ : taken)
+#endif
+	for (long begin = 0; begin < count; begin += size) {
+		const long end = std::min(begin + size, count);
+		for (long i = begin; i < end; ++i) try {
+				fetchAhead(all, i, end);
+				const Way way = take(all[i], reach);
+				if (way == Way::none) dispatch(all[i]);
+				taken += way == Way::touching;
+			} catch (const std::exception& error) {
+				dembark_yade::postpone(*scene, error);
+			}
+	}
+	shortWay = taken;
+}
+
+}  // namespace yade

@@ -1,0 +1,199 @@
+"""Runs inside YADE: `PYTHONPATH=. yade -n -x loop_scenes.py out.json scene...`. Each scene returns what both loops leave."""
+
+import hashlib
+
+from columns import dilute_column
+from scene_results import advance, place, refusal, write_results
+from yade import utils
+
+PAIR = dict(restitution=0.6, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5)
+ROLLING = dict(rollingFriction=0.1, rollingDampingRatio=0.3)
+WET = dict(bridgeVolume=2e-11, surfaceTension=0.072, contactAngle=0.35)
+LOOPS = {"stock": InteractionLoop, "short": SphereContactLoop}
+D = 0.005
+
+
+def column(count=60, **options):
+    """Grains of 0.8 to 1.2 D that fall onto one another in a narrow column."""
+    grains = []
+    for k, (x, y, z, radius) in enumerate(dilute_column((2, 2, 16), 1.25 * D, (-1.25 * D, -1.25 * D, 0), count, D, 0.2, 3, 0.1 * D)):
+        body = utils.sphere((x, y, z), radius, **options)
+        body.state.vel, body.state.angVel = Vector3(0.2 * (-1) ** k, 0.1, -0.5), Vector3(5, 3 * (-1) ** k, 1)
+        grains.append(body)
+    return grains
+
+
+def walls():
+    sides = [utils.wall(side * 1.3 * D, axis, sense=-side) for axis in (0, 1) for side in (-1, 1)]
+    return [utils.wall((0, 0, 0), 2, sense=1), *sides]
+
+
+def scene_with(loop, bodies, pair=None, law=None, geometry=None, engines=()):
+    """A new scene of `bodies` with this `loop`; returns its loop and its law."""
+    O.reset()
+    place(bodies, 2500.0)
+    law = Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(**(law or {}))
+    O.dt = 1e-5
+    contacts = LOOPS[loop](geometry or [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
+                           [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**{**PAIR, **(pair or {})})], [law])
+    bounds = [Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()]
+    O.engines = [ForceResetter(), InsertionSortCollider(bounds, verletDist=0.1 * D, allowBiggerThanPeriod=True), contacts,
+                 *engines, NewtonIntegrator(damping=0, gravity=(0, 0, -50))]
+    return contacts, law
+
+
+def left(loop, law):
+    """Every number of the bodies, and of the contacts all but what the short way leaves alone: digests, and some to look at."""
+    exact = lambda v: [float(x).hex() for x in v] if hasattr(v, "__len__") else float(v).hex()
+    bodies = [[exact(v) for v in (b.state.pos, b.state.vel, b.state.angVel)] for b in O.bodies]
+    real = sorted((i for i in O.interactions if i.isReal), key=lambda i: (i.id1, i.id2))
+    states = [[i.id1, i.id2, i.iterMadeReal, sorted((name, exact(value)) for name, value in i.phys.dict().items())] for i in real]
+    geometry = [[*i.geom.normal, *i.geom.contactPoint, i.geom.penetrationDepth, i.geom.refR1, i.geom.refR2] for i in real]
+    digest = lambda rows: hashlib.sha256(repr(rows).encode()).hexdigest()
+    return {"bodies": digest(bodies), "contacts": digest(states), "geometry": geometry, "count": len(real), "listed": len(O.interactions),
+            "lost": law.dissipatedEnergy(), "bridges": law.bridgeCount(), "fall": sum(b.state.pos[2] for b in O.bodies),
+            "short": getattr(loop, "shortWay", None)}
+
+
+def both(run):
+    return {name: run(name) for name in LOOPS}
+
+
+def _after(steps, *arguments, **options):
+    def run(name):
+        loop, law = scene_with(name, *(each() if callable(each) else each for each in arguments), **options)
+        advance(steps)
+        return left(loop, law)
+
+    return both(run)
+
+
+def bed():
+    return lambda: [*walls(), *column()]
+
+
+def dry():
+    return _after(6000, bed())
+
+
+def wet():
+    return _after(6000, bed(), WET, {"capillaryModel": "willett"})
+
+
+def partial_slip():
+    return _after(6000, bed(), ROLLING, {"presliding": "partial_slip", "rollingResistance": "elastic_plastic"})
+
+
+def carried():
+    """With liquid that is exchanged, by an engine that the scene gets once it stands."""
+    def run(name):
+        loop, law = scene_with(name, [*walls(), *column()], {"surfaceTension": 0.072, "contactAngle": 0.35},
+                               {"capillaryModel": "willett", "carriedLiquid": True}, engines=[CapillaryLiquid(content=0.02)])
+        advance(6000)
+        return left(loop, law)
+
+    return both(run)
+
+
+def periodic():
+    """In a cell of two and a half grains that is sheared and pressed together."""
+    def run(name):
+        loop, law = scene_with(name, column(), geometry=[Ig2_Sphere_Sphere_ScGeom()])
+        O.engines[-1].gravity = Vector3(0, 0, 0)
+        O.periodic = True
+        O.cell.setBox(2.5 * D, 2.5 * D, 20 * D)
+        O.cell.velGrad = Matrix3(0, 0, 2, 0, 0, 0, 0, 0, -18)
+        advance(6000)
+        return left(loop, law)
+
+    return both(run)
+
+
+def odd_bodies():
+    """Held spheres, a clump, contacts seen from afar, and a body that is erased on the way."""
+    def run(name):
+        loop, law = scene_with(name, walls() + column(40), geometry=[Ig2_Sphere_Sphere_ScGeom(interactionDetectionFactor=1.05),
+                                                                    Ig2_Wall_Sphere_ScGeom()])
+        O.engines[1].boundDispatcher.functors = [Bo1_Sphere_Aabb(aabbEnlargeFactor=1.05), Bo1_Wall_Aabb()]
+        held = [O.bodies.append(utils.sphere((0.4 * D * side, 0, 0.5 * D), 0.5 * D, fixed=True)) for side in (-1, 1)]
+        O.bodies.appendClumped([utils.sphere((0.3 * D * side, 0, 30 * D), 0.5 * D) for side in (-1, 1)])
+        advance(5000)
+        O.bodies.erase(10)
+        O.bodies[held[1]].dynamic = True
+        advance(5000)
+        return left(loop, law)
+
+    return both(run)
+
+
+def changed_on_the_way():
+    """New attributes of the law, of a contact and of the functors, and other spheres of the same contacts."""
+    def run(name):
+        loop, law = scene_with(name, walls() + column())
+        advance(6000)
+        law.presliding = "exponential"
+        for i in O.interactions:
+            if i.isReal:
+                i.phys.kineticFriction = 0.1
+        advance(500)
+        for body in O.bodies:
+            if isinstance(body.shape, Sphere):
+                body.shape.radius *= 1.001
+        loop.geomDispatcher.functors = [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()]
+        advance(500)
+        return left(loop, law)
+
+    return both(run)
+
+
+def saved():
+    """Saved and loaded in the middle."""
+    def run(name):
+        scene_with(name, walls() + column(), WET, {"capillaryModel": "willett"})
+        advance(6000)
+        O.save("loop.yade.gz")
+        O.load("loop.yade.gz")
+        loop = O.engines[2]
+        assert type(loop) is LOOPS[name]
+        advance(3000)
+        return left(loop, loop.lawDispatcher.functors[0])
+
+    return both(run)
+
+
+def callback():
+    """A callback of every contact: YADE's own way is taken."""
+    def run(name):
+        loop, law = scene_with(name, walls() + column())
+        loop.callbacks = [SumIntrForcesCb()]
+        advance(6000)
+        return left(loop, law)
+
+    return both(run)
+
+
+def said():
+    """What mistakes in the parameters say, and missing functors."""
+    def told(**words):
+        loop, _ = scene_with("short", walls() + column(), words.get("pair"))
+        for dispatcher in ("geomDispatcher", "physDispatcher", "lawDispatcher"):
+            if dispatcher in words:
+                getattr(loop, dispatcher).functors = words[dispatcher]
+        return refusal(lambda: advance(6000), "nothing")
+
+    return {"restitution": told(pair={"restitution": 2.0}), "no law": told(lawDispatcher=[]), "no physics": told(physDispatcher=[]),
+            "no geometry": told(geomDispatcher=[])}
+
+
+def no_number():
+    """A grain without a finite velocity, met on the short way."""
+    def run(name):
+        scene_with(name, walls() + column())
+        advance(6000)
+        O.bodies[8].state.vel = Vector3(float("nan"), 0, 0)
+        return refusal(lambda: advance(10), "nothing")
+
+    return both(run)
+
+
+write_results(globals())

@@ -1,0 +1,61 @@
+"""SphereContactLoop leaves what InteractionLoop leaves."""
+
+import numpy as np
+import pytest
+
+SCENES = ("dry", "wet", "partial_slip", "carried", "periodic", "odd_bodies", "changed_on_the_way", "saved")
+
+
+@pytest.fixture(scope="module")
+def found(yade):
+    return yade.scenes(*SCENES, "callback", "said", "no_number", script="loop_scenes.py")
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_every_bit_of_bodies_and_contacts_is_that_of_the_stock_loop(found, scene):
+    stock, short = found[scene]["stock"], found[scene]["short"]
+    assert stock["count"] > 20
+    for what in ("bodies", "contacts", "count", "listed", "lost", "bridges"):
+        assert short[what] == stock[what], what
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_geometry_of_contacts_is_kept_up(found, scene):
+    stock, short = (np.array(found[scene][loop]["geometry"]) for loop in ("stock", "short"))
+    assert np.abs(short - stock).max() < 1e-12
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_pairs_of_spheres_do_take_the_short_way(found, scene):
+    short = found[scene]["short"]
+    # Contacts that know a functor of before keep it, and are dispatched to it.
+    least = 0 if scene == "changed_on_the_way" else 0.3 * short["count"]
+    ended_in_the_step = 2
+    assert least < short["short"] <= short["count"] + ended_in_the_step
+
+
+def test_callbacks_are_called_by_the_stock_loop(found):
+    stock, short = found["callback"]["stock"], found["callback"]["short"]
+    assert short["short"] == 0
+    assert (short["bodies"], short["contacts"]) == (stock["bodies"], stock["contacts"])
+
+
+def test_two_threads_sum_forces_in_another_order_only(yade, found):
+    one, two = found["dry"]["short"], yade.scenes("dry", script="loop_scenes.py", threads=2)["dry"]["short"]
+    assert two["fall"] == pytest.approx(one["fall"], rel=0.05)
+    assert two["count"] == pytest.approx(one["count"], rel=0.3)
+    assert two["short"] > 0
+
+
+def test_mistakes_are_told_in_one_line(found):
+    said = found["said"]
+    assert said["restitution"].startswith("dembark: restitution of materials 0 and 0 is 2;")
+    assert said["no law"].startswith("dembark: SphereContactLoop: no Law2 functor for ScGeom and FinnieRabinowiczPhys of bodies")
+    assert said["no physics"].startswith("dembark: SphereContactLoop: no Ip2 functor for the materials of bodies")
+    assert said["no geometry"] == "nothing"
+    assert not any("\n" in line for line in said.values())
+
+
+def test_a_force_that_is_no_number_ends_the_run(found):
+    for loop in ("stock", "short"):
+        assert "has no finite force in step" in found["no_number"][loop]
