@@ -78,7 +78,7 @@ $(BUILD)/.python: pyproject.toml CMakeLists.txt $(call code,$(physics_sources)) 
 yade-engine: | system ## find YADE, or build it once into the cache
 	@JOBS=$(JOBS) packaging/yade.sh > /dev/null
 
-$(BUILD)/.yade: $(yade_sources) packaging/yade.sh | system
+$(BUILD)/.yade: $(yade_sources) packaging/yade.sh packaging/yade/targets.cmake | system
 	@where=$$(JOBS=$(JOBS) packaging/yade.sh) && eval "$$where" && echo "dembark: building the YADE plugin" >&2 && \
 	 packaging/build.py --name "YADE plugin" --log $(BUILD)/yade.log --resume "make yade-plugin" -- \
 	   cmake -G Ninja -S plugins/yade -B $(BUILD)/yade -DYADE_PREFIX="$$YADE_PREFIX" -DYADE_SOURCE_DIR="$$YADE_SOURCE_DIR" \

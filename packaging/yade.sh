@@ -15,7 +15,7 @@ here=$(cd "$(dirname "$0")" && pwd)
 version=2025.2.0
 sha256=42702372251bf5e8f07a364bdf30533a1318947e4db90435b1f89293dc029156
 python=/usr/bin/python3
-# Whatever is added here, or changed in how the sources are compiled, makes a new build.
+# Whatever is changed here, in targets.cmake or in engine_classes.cmake makes a new build.
 flags=(-DDISABLE_ALL=ON -DENABLE_OPENMP=ON -DENABLE_LOGGER=ON -DENABLE_USEFUL_ERRORS=OFF -DENABLE_MULTI_REAL_HP=OFF
        -DNOSUFFIX=ON -DDISABLE_SAVE_TEMPS=ON
        -DDISABLE_PKGS=fem,lbm,levelSet,openfoam,pfv,polyhedra,potential,image,vtk

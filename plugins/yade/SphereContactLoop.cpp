@@ -37,7 +37,7 @@ void prefetch(const void* from, std::size_t bytes) {
 void fetchAhead(const InteractionContainer& all, long i, long end) {
 	constexpr long far = 32, near = 16;
 	if (i + far < end) prefetch(all[i + far].get(), sizeof(Interaction));
-	if (i + near >= end || !all[i + near]->geom) return;
+	if (i + near >= end || !all[i + near]->isReal()) return;
 	prefetch(all[i + near]->geom.get(), sizeof(ScGeom));
 	prefetch(all[i + near]->phys.get(), sizeof(FinnieRabinowiczPhys));
 }
@@ -77,7 +77,7 @@ SphereContactLoop::Way SphereContactLoop::take(const shared_ptr<Interaction>& in
 		const Real sum = grain1.radius + grain2.radius;
 		return (grain2.pos + shift - grain1.pos).squaredNorm() > reach * sum * sum ? Way::apart : Way::none;
 	}
-	if (!law || interaction->functorCache.constLaw.get() != law) return Way::none;
+	if (!law || interaction->functorCache.constLaw.get() != law || interaction->functorCache.phys.get() != physics) return Way::none;
 	auto& phys = static_cast<FinnieRabinowiczPhys&>(*interaction->phys);
 	if (phys.preparedBy != law->revision || (std::isinf(grain1.mass) && std::isinf(grain2.mass))) return Way::none;
 
@@ -91,10 +91,13 @@ SphereContactLoop::Way SphereContactLoop::take(const shared_ptr<Interaction>& in
 	view.move(grain1.vel, grain1.angVel, grain2.vel + drift, grain2.angVel);
 	const ::dembark::ContactForce out = law->act(phys, *interaction, view);
 
-	auto& geom            = static_cast<ScGeom&>(*interaction->geom);
-	geom.normal           = -vec(out.normal);
-	geom.penetrationDepth = out.overlap;
-	geom.contactPoint     = grain1.pos + (grain1.radius - 0.5 * out.overlap) * geom.normal;
+	// As Ig2_Sphere_Sphere_ScGeom does it: the same bits, for all that look at them.
+	auto& geom      = static_cast<ScGeom&>(*interaction->geom);
+	geom.normal     = (grain2.pos + shift) - grain1.pos;
+	const Real norm = geom.normal.norm();
+	geom.normal /= norm;
+	geom.penetrationDepth = grain1.radius + grain2.radius - norm;
+	geom.contactPoint     = grain1.pos + (grain1.radius - 0.5 * geom.penetrationDepth) * geom.normal;
 	geom.radius1          = grain1.radius;
 	geom.radius2          = grain2.radius;
 	if (!out.interacting) scene->interactions->requestErase(interaction);
@@ -157,17 +160,21 @@ void SphereContactLoop::action() {
 	lawDispatcher->updateScenePtr();
 	const auto* const spheres = lastOf<Ig2_Sphere_Sphere_ScGeom>(geomDispatcher->functors);
 	meeting                   = spheres;
+	physics                   = lastOf<Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys>(physDispatcher->functors);
 	law                       = lastOf<Law>(lawDispatcher->functors);
 	// A little beyond where the functor sees a contact: it has the last word there.
 	const Real reach = spheres ? 1.000001 * spheres->interactionDetectionFactor * spheres->interactionDetectionFactor : 0.0;
 	collect();
 
-	// Blocks: no thread looks at what another one works on.
-	constexpr long size  = 256;
-	const long     count = static_cast<long>(scene->interactions->size());
-	long           taken = 0;
+	const long count   = static_cast<long>(scene->interactions->size());
+	long       taken   = 0;
+	int        threads = 1;
 #ifdef YADE_OPENMP
-	const int threads = ompThreads > 0 ? std::min(ompThreads, omp_get_max_threads()) : omp_get_max_threads();
+	threads = ompThreads > 0 ? std::min(ompThreads, omp_get_max_threads()) : omp_get_max_threads();
+#endif
+	// Blocks: no thread looks at what another one works on.
+	const long size = std::clamp(count / (4 * threads), 16L, 256L);
+#ifdef YADE_OPENMP
 #pragma omp parallel for schedule(guided) num_threads(threads) reduction(+ : taken)
 #endif
 	for (long begin = 0; begin < count; begin += size) {

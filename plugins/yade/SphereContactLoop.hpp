@@ -33,6 +33,7 @@ private:
 
 	std::vector<Grain>  grains;             // by id
 	const IGeomFunctor* meeting = nullptr;  // of two spheres, of this step
+	const IPhysFunctor* physics = nullptr;
 	Law*                law     = nullptr;
 };
 REGISTER_SERIALIZABLE(SphereContactLoop);

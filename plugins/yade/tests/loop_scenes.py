@@ -1,6 +1,7 @@
 """Runs inside YADE: `PYTHONPATH=. yade -n -x loop_scenes.py out.json scene...`. Each scene returns what both loops leave."""
 
 import hashlib
+import math
 
 from columns import dilute_column
 from scene_results import advance, place, refusal, write_results
@@ -157,6 +158,20 @@ def saved():
         assert type(loop) is LOOPS[name]
         advance(3000)
         return left(loop, loop.lawDispatcher.functors[0])
+
+    return both(run)
+
+
+def crowd():
+    """Many grains that are pressed into one another, for a few steps."""
+    def run(name):
+        side = [0.97 * D * k for k in range(10)]
+        grains = [utils.sphere((x, y, z), 0.5 * D) for x in side for y in side for z in side]
+        for k, grain in enumerate(grains):
+            grain.state.vel = Vector3(0.1 * math.sin(k), 0.1 * math.cos(3 * k), 0.1 * math.sin(7 * k))
+        loop, law = scene_with(name, grains)
+        advance(30)
+        return left(loop, law)
 
     return both(run)
 
