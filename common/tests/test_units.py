@@ -24,6 +24,12 @@ def test_other_units_are_left_to_the_library() -> None:
     assert units.known_unit("mm^2") and units.known_unit("deg") and not units.known_unit("nonsense") and not units.known_unit("m/")
 
 
+def test_signs_that_the_library_may_overlook_are_no_units() -> None:
+    """Up to Python 3.11 its tokeniser drops them: √(L/g) would be a litre over a gram."""
+    assert not any(map(units.known_unit, ("√(L/g)", "√(g d)", "m, s", "$m", "m?")))
+    assert all(map(units.known_unit, ("µm", "°C", "kg·m", "1/s", "m**2", "N*s/m", "m^0.5")))
+
+
 def test_scales_of_quantities_are_no_units_of_parameters() -> None:
     assert units.known_unit("d") and units.known_unit("R") and not units.si_unit("d") and not units.si_unit("R")
     assert all(map(units.si_unit, ("1", "m", "N*s/m", "kg/m^3", "1/s", "Hz", "rad")))
