@@ -24,7 +24,6 @@ _IN_UNIT = re.compile(r"(?:[^\W\d]+\d?|[%°]|(?:\^|\*\*)\s*\(?[-+]?\d+(?:\.\d+)?
 # Products and powers of these are known without the library, which takes a while to load.
 _SYMBOL = r"(?:m|s|kg|N|Pa|J|W|rad|K)(?:\^[1-9])?"
 _PLAIN = re.compile(rf"1|{_SYMBOL}(?:[*/ ]{_SYMBOL})*")
-_SIGNS = re.compile(r"[\w\s*/^()·°%.+-]*")
 # What a quantity may be measured in, a grain's diameter or a vessel's radius, is a day and the gas constant to the library.
 _SCALES = ("d", "R")
 _POWER = re.compile(r"([^\W\d]+)(\d)")
@@ -54,7 +53,7 @@ def known_unit(unit: str) -> bool:
         return True
     try:
         # Another sign is dropped by the tokeniser of some versions of Python, and is an error to that of others.
-        return bool(_SIGNS.fullmatch(unit) and _registry().Unit(unit))
+        return bool(_IN_UNIT.fullmatch(unit.removeprefix("1")) and _registry().Unit(unit))
     except Exception:  # noqa: BLE001 (the parser of unit texts raises many kinds, none of which means anything else here)
         return False
 

@@ -14,11 +14,11 @@ LOOPS = {"stock": InteractionLoop, "short": SphereContactLoop}
 D = 0.005
 
 
-def column(count=60, **options):
+def column(count=60):
     """Grains of 0.8 to 1.2 D that fall onto one another in a narrow column."""
     grains = []
     for k, (x, y, z, radius) in enumerate(dilute_column((2, 2, 16), 1.25 * D, (-1.25 * D, -1.25 * D, 0), count, D, 0.2, 3, 0.1 * D)):
-        body = utils.sphere((x, y, z), radius, **options)
+        body = utils.sphere((x, y, z), radius)
         body.state.vel, body.state.angVel = Vector3(0.2 * (-1) ** k, 0.1, -0.5), Vector3(5, 3 * (-1) ** k, 1)
         grains.append(body)
     return grains
@@ -29,18 +29,18 @@ def walls():
     return [utils.wall((0, 0, 0), 2, sense=1), *sides]
 
 
-def scene_with(loop, bodies, pair=None, law=None, geometry=None, engines=()):
-    """A new scene of `bodies` with this `loop`; returns its loop and its law."""
+def scene_with(kind, bodies, pair=None, law=None, geometry=None, engines=()):
+    """A new scene of `bodies` with this kind of loop; returns its loop and its law."""
     O.reset()
     place(bodies, 2500.0)
     law = Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(**(law or {}))
     O.dt = 1e-5
-    contacts = LOOPS[loop](geometry or [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
-                           [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**{**PAIR, **(pair or {})})], [law])
+    loop = LOOPS[kind](geometry or [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
+                       [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**{**PAIR, **(pair or {})})], [law])
     bounds = [Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()]
-    O.engines = [ForceResetter(), InsertionSortCollider(bounds, verletDist=0.1 * D, allowBiggerThanPeriod=True), contacts,
+    O.engines = [ForceResetter(), InsertionSortCollider(bounds, verletDist=0.1 * D, allowBiggerThanPeriod=True), loop,
                  *engines, NewtonIntegrator(damping=0, gravity=(0, 0, -50))]
-    return contacts, law
+    return loop, law
 
 
 def left(loop, law):
@@ -56,159 +56,135 @@ def left(loop, law):
             "short": getattr(loop, "shortWay", None)}
 
 
-def both(run):
-    return {name: run(name) for name in LOOPS}
+def both(scene):
+    """The scene with both kinds of loop: it takes the kind, and returns what there is to tell."""
+    return lambda: {kind: scene(kind) for kind in LOOPS}
 
 
-def _after(steps, *arguments, **options):
-    def run(name):
-        loop, law = scene_with(name, *(each() if callable(each) else each for each in arguments), **options)
-        advance(steps)
-        return left(loop, law)
-
-    return both(run)
+def settled(kind, *words, **options):
+    """The loop and the law of grains that have come to rest on one another."""
+    loop, law = scene_with(kind, walls() + column(), *words, **options)
+    advance(6000)
+    return loop, law
 
 
-def bed():
-    return lambda: [*walls(), *column()]
+@both
+def dry(kind):
+    return left(*settled(kind))
 
 
-def dry():
-    return _after(6000, bed())
+@both
+def wet(kind):
+    return left(*settled(kind, WET, {"capillaryModel": "willett"}))
 
 
-def wet():
-    return _after(6000, bed(), WET, {"capillaryModel": "willett"})
+@both
+def partial_slip(kind):
+    return left(*settled(kind, ROLLING, {"presliding": "partial_slip", "rollingResistance": "elastic_plastic"}))
 
 
-def partial_slip():
-    return _after(6000, bed(), ROLLING, {"presliding": "partial_slip", "rollingResistance": "elastic_plastic"})
+@both
+def carried(kind):
+    """With liquid that is exchanged."""
+    return left(*settled(kind, {"surfaceTension": 0.072, "contactAngle": 0.35}, {"capillaryModel": "willett", "carriedLiquid": True},
+                         engines=[CapillaryLiquid(content=0.02)]))
 
 
-def carried():
-    """With liquid that is exchanged, by an engine that the scene gets once it stands."""
-    def run(name):
-        loop, law = scene_with(name, [*walls(), *column()], {"surfaceTension": 0.072, "contactAngle": 0.35},
-                               {"capillaryModel": "willett", "carriedLiquid": True}, engines=[CapillaryLiquid(content=0.02)])
-        advance(6000)
-        return left(loop, law)
-
-    return both(run)
-
-
-def periodic():
+@both
+def periodic(kind):
     """In a cell of two and a half grains that is sheared and pressed together."""
-    def run(name):
-        loop, law = scene_with(name, column(), geometry=[Ig2_Sphere_Sphere_ScGeom()])
-        O.engines[-1].gravity = Vector3(0, 0, 0)
-        O.periodic = True
-        O.cell.setBox(2.5 * D, 2.5 * D, 20 * D)
-        O.cell.velGrad = Matrix3(0, 0, 2, 0, 0, 0, 0, 0, -18)
-        advance(6000)
-        return left(loop, law)
-
-    return both(run)
+    loop, law = scene_with(kind, column(), geometry=[Ig2_Sphere_Sphere_ScGeom()])
+    O.engines[-1].gravity = Vector3(0, 0, 0)
+    O.periodic = True
+    O.cell.setBox(2.5 * D, 2.5 * D, 20 * D)
+    O.cell.velGrad = Matrix3(0, 0, 2, 0, 0, 0, 0, 0, -18)
+    advance(6000)
+    return left(loop, law)
 
 
-def odd_bodies():
+@both
+def odd_bodies(kind):
     """Held spheres, a clump, contacts seen from afar, and a body that is erased on the way."""
-    def run(name):
-        loop, law = scene_with(name, walls() + column(40), geometry=[Ig2_Sphere_Sphere_ScGeom(interactionDetectionFactor=1.05),
-                                                                    Ig2_Wall_Sphere_ScGeom()])
-        O.engines[1].boundDispatcher.functors = [Bo1_Sphere_Aabb(aabbEnlargeFactor=1.05), Bo1_Wall_Aabb()]
-        held = [O.bodies.append(utils.sphere((0.4 * D * side, 0, 0.5 * D), 0.5 * D, fixed=True)) for side in (-1, 1)]
-        O.bodies.appendClumped([utils.sphere((0.3 * D * side, 0, 30 * D), 0.5 * D) for side in (-1, 1)])
-        advance(5000)
-        O.bodies.erase(10)
-        O.bodies[held[1]].dynamic = True
-        advance(5000)
-        return left(loop, law)
-
-    return both(run)
+    loop, law = scene_with(kind, walls() + column(40),
+                           geometry=[Ig2_Sphere_Sphere_ScGeom(interactionDetectionFactor=1.05), Ig2_Wall_Sphere_ScGeom()])
+    O.engines[1].boundDispatcher.functors = [Bo1_Sphere_Aabb(aabbEnlargeFactor=1.05), Bo1_Wall_Aabb()]
+    held = [O.bodies.append(utils.sphere((0.4 * D * side, 0, 0.5 * D), 0.5 * D, fixed=True)) for side in (-1, 1)]
+    O.bodies.appendClumped([utils.sphere((0.3 * D * side, 0, 30 * D), 0.5 * D) for side in (-1, 1)])
+    advance(5000)
+    O.bodies.erase(10)
+    O.bodies[held[1]].dynamic = True
+    advance(5000)
+    return left(loop, law)
 
 
-def changed_on_the_way():
+@both
+def changed_on_the_way(kind):
     """New attributes of the law, of a contact and of the functors, and other spheres of the same contacts."""
-    def run(name):
-        loop, law = scene_with(name, walls() + column())
-        advance(6000)
-        law.presliding = "exponential"
-        for i in O.interactions:
-            if i.isReal:
-                i.phys.kineticFriction = 0.1
-        advance(500)
-        for body in O.bodies:
-            if isinstance(body.shape, Sphere):
-                body.shape.radius *= 1.001
-        loop.geomDispatcher.functors = [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()]
-        advance(500)
-        return left(loop, law)
-
-    return both(run)
+    loop, law = settled(kind)
+    law.presliding = "exponential"
+    for i in O.interactions:
+        if i.isReal:
+            i.phys.kineticFriction = 0.1
+    advance(500)
+    for body in O.bodies:
+        if isinstance(body.shape, Sphere):
+            body.shape.radius *= 1.001
+    loop.geomDispatcher.functors = [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()]
+    advance(500)
+    return left(loop, law)
 
 
-def saved():
+@both
+def saved(kind):
     """Saved and loaded in the middle."""
-    def run(name):
-        scene_with(name, walls() + column(), WET, {"capillaryModel": "willett"})
-        advance(6000)
-        O.save("loop.yade.gz")
-        O.load("loop.yade.gz")
-        loop = O.engines[2]
-        assert type(loop) is LOOPS[name]
-        advance(3000)
-        return left(loop, loop.lawDispatcher.functors[0])
-
-    return both(run)
+    settled(kind, WET, {"capillaryModel": "willett"})
+    O.save("loop.yade.gz")
+    O.load("loop.yade.gz")
+    loop = O.engines[2]
+    assert type(loop) is LOOPS[kind]
+    advance(3000)
+    return left(loop, loop.lawDispatcher.functors[0])
 
 
-def crowd():
+@both
+def crowd(kind):
     """Many grains that are pressed into one another, for a few steps."""
-    def run(name):
-        side = [0.97 * D * k for k in range(10)]
-        grains = [utils.sphere((x, y, z), 0.5 * D) for x in side for y in side for z in side]
-        for k, grain in enumerate(grains):
-            grain.state.vel = Vector3(0.1 * math.sin(k), 0.1 * math.cos(3 * k), 0.1 * math.sin(7 * k))
-        loop, law = scene_with(name, grains)
-        advance(30)
-        return left(loop, law)
-
-    return both(run)
+    side = [0.97 * D * k for k in range(10)]
+    grains = [utils.sphere((x, y, z), 0.5 * D) for x in side for y in side for z in side]
+    for k, grain in enumerate(grains):
+        grain.state.vel = Vector3(0.1 * math.sin(k), 0.1 * math.cos(3 * k), 0.1 * math.sin(7 * k))
+    loop, law = scene_with(kind, grains)
+    advance(30)
+    return left(loop, law)
 
 
-def callback():
+@both
+def callback(kind):
     """A callback of every contact: YADE's own way is taken."""
-    def run(name):
-        loop, law = scene_with(name, walls() + column())
-        loop.callbacks = [SumIntrForcesCb()]
-        advance(6000)
-        return left(loop, law)
+    loop, law = scene_with(kind, walls() + column())
+    loop.callbacks = [SumIntrForcesCb()]
+    advance(6000)
+    return left(loop, law)
 
-    return both(run)
+
+@both
+def no_number(kind):
+    """A grain without a finite velocity, met on the short way."""
+    settled(kind)
+    O.bodies[8].state.vel = Vector3(float("nan"), 0, 0)
+    return refusal(lambda: advance(10), "nothing")
 
 
 def said():
     """What mistakes in the parameters say, and missing functors."""
-    def told(**words):
-        loop, _ = scene_with("short", walls() + column(), words.get("pair"))
-        for dispatcher in ("geomDispatcher", "physDispatcher", "lawDispatcher"):
-            if dispatcher in words:
-                getattr(loop, dispatcher).functors = words[dispatcher]
+    def told(pair=None, **functors):
+        loop, _ = scene_with("short", walls() + column(), pair)
+        for dispatcher, given in functors.items():
+            getattr(loop, dispatcher).functors = given
         return refusal(lambda: advance(6000), "nothing")
 
     return {"restitution": told(pair={"restitution": 2.0}), "no law": told(lawDispatcher=[]), "no physics": told(physDispatcher=[]),
             "no geometry": told(geomDispatcher=[])}
-
-
-def no_number():
-    """A grain without a finite velocity, met on the short way."""
-    def run(name):
-        scene_with(name, walls() + column())
-        advance(6000)
-        O.bodies[8].state.vel = Vector3(float("nan"), 0, 0)
-        return refusal(lambda: advance(10), "nothing")
-
-    return both(run)
 
 
 write_results(globals())
