@@ -13,6 +13,9 @@ namespace yade::dembark_yade {
 inline ::dembark::Vec3<double> vec(const Vector3r& v) { return {v[0], v[1], v[2]}; }
 inline Vector3r                vec(const ::dembark::Vec3<double>& v) { return Vector3r(v.x, v.y, v.z); }
 
+/// Mass (kg) against contacts: infinite of a body that is not dynamic.
+inline double inertialMass(const Body& body) { return body.isDynamic() ? body.state->mass : INFINITY; }
+
 /// Bodies 1 and 2 of `bodies` are YADE's of two spheres; of a sphere and a wall body 1 is always the sphere.
 struct ContactView {
 	::dembark::ContactBodies bodies;
@@ -28,11 +31,7 @@ struct ContactView {
 	ContactView(int wall, const ScGeom& geom, const Body& body1, const Body& body2, const Vector3r& shift) : wallBody(wall) {
 		const State &state1 = *body1.state, &state2 = *body2.state;
 		if (wallBody == 0) {
-			bodies.separation = vec(Vector3r(state1.pos - state2.pos - shift));
-			bodies.radius_1   = geom.radius1;
-			bodies.radius_2   = geom.radius2;
-			bodies.mass_1     = body1.isDynamic() ? state1.mass : INFINITY;
-			bodies.mass_2     = body2.isDynamic() ? state2.mass : INFINITY;
+			setSpheres(state1.pos - state2.pos - shift, geom.radius1, geom.radius2, inertialMass(body1), inertialMass(body2));
 			return;
 		}
 		const Body&    round   = swapped() ? body2 : body1;
@@ -40,10 +39,19 @@ struct ContactView {
 		const State&   plane   = swapped() ? state1 : state2;
 		const Vector3r outward = sign() * geom.normal;  // from the wall to the sphere
 		bodies.radius_1        = swapped() ? geom.radius2 : geom.radius1;
-		bodies.mass_1          = round.isDynamic() ? sphere.mass : INFINITY;
+		bodies.mass_1          = inertialMass(round);
 		const double distance  = bodies.radius_1 - geom.penetrationDepth;
 		bodies.separation      = vec(Vector3r(distance * outward));
 		surface                = sphere.pos + sign() * shift - plane.pos - distance * outward;
+	}
+
+	/// Places and masses of two spheres; `separation`: of 1 from the image of 2 that takes part.
+	void setSpheres(const Vector3r& separation, double radius1, double radius2, double mass1, double mass2) {
+		bodies.separation = vec(separation);
+		bodies.radius_1   = radius1;
+		bodies.radius_2   = radius2;
+		bodies.mass_1     = mass1;
+		bodies.mass_2     = mass2;
 	}
 
 	/// Velocities and angular velocities of the interaction's bodies; of a wall the velocity becomes that of its surface.

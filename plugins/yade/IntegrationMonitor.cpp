@@ -191,8 +191,7 @@ void IntegrationMonitor::takeContacts() {
 		const auto* const geom = dynamic_cast<const ScGeom*>(interaction->geom.get());
 		const auto* const phys = dynamic_cast<const NormPhys*>(interaction->phys.get());
 		if (!geom || !phys || !(geom->penetrationDepth > 0.0)) continue;
-		const Real mass = ::dembark::reduced<Real>(body1.isDynamic() ? body1.state->mass : INFINITY,
-		                                           body2.isDynamic() ? body2.state->mass : INFINITY);
+		const Real mass = ::dembark::reduced<Real>(dembark_yade::inertialMass(body1), dembark_yade::inertialMass(body2));
 		if (std::isinf(mass)) continue;
 		Real stiffness = phys->kn;
 		int  wall      = 0;
@@ -223,8 +222,8 @@ namespace {
 	b.angular_velocity_2 = vec(two.state->angVel);
 	b.radius_1           = radiusOf(one);
 	b.radius_2           = radiusOf(two);
-	b.mass_1             = one.isDynamic() ? one.state->mass : INFINITY;
-	b.mass_2             = two.isDynamic() ? two.state->mass : INFINITY;
+	b.mass_1             = dembark_yade::inertialMass(one);
+	b.mass_2             = dembark_yade::inertialMass(two);
 	return b;
 }
 

@@ -16,7 +16,6 @@ namespace yade {
 YADE_PLUGIN((SphereContactLoop));
 
 using dembark_yade::ContactView;
-using dembark_yade::vec;
 
 namespace {
 
@@ -61,7 +60,7 @@ void SphereContactLoop::collect() {
 		grain.vel          = state.vel;
 		grain.angVel       = state.angVel;
 		grain.radius       = sphere->radius;
-		grain.mass         = body->isDynamic() ? state.mass : INFINITY;
+		grain.mass         = dembark_yade::inertialMass(*body);
 	}
 }
 
@@ -82,12 +81,8 @@ SphereContactLoop::Way SphereContactLoop::take(const shared_ptr<Interaction>& in
 	if (phys.preparedBy != law->revision || (std::isinf(grain1.mass) && std::isinf(grain2.mass))) return Way::none;
 
 	ContactView view;
-	view.bodies.separation = vec(Vector3r(grain1.pos - grain2.pos - shift));
-	view.bodies.radius_1   = grain1.radius;
-	view.bodies.radius_2   = grain2.radius;
-	view.bodies.mass_1     = grain1.mass;
-	view.bodies.mass_2     = grain2.mass;
-	const Vector3r drift   = across ? scene->cell->intrShiftVel(interaction->cellDist) : Vector3r::Zero();
+	view.setSpheres(grain1.pos - grain2.pos - shift, grain1.radius, grain2.radius, grain1.mass, grain2.mass);
+	const Vector3r drift = across ? scene->cell->intrShiftVel(interaction->cellDist) : Vector3r::Zero();
 	view.move(grain1.vel, grain1.angVel, grain2.vel + drift, grain2.angVel);
 	const ::dembark::ContactForce out = law->act(phys, *interaction, view);
 
@@ -125,7 +120,7 @@ void SphereContactLoop::dispatch(const shared_ptr<Interaction>& interaction) con
 	}
 	const Body &   body1 = **first, &body2 = **second;
 	const bool     wasReal = interaction->isReal();
-	const Vector3r shift   = scene->isPeriodic ? Vector3r(scene->cell->hSize * interaction->cellDist.cast<Real>()) : Vector3r::Zero();
+	const Vector3r shift   = scene->isPeriodic ? scene->cell->intrShiftPos(interaction->cellDist) : Vector3r::Zero();
 	const bool     meets   = known.geom->go(body1.shape, body2.shape, *body1.state, *body2.state, shift, false, interaction);
 	if (!meets) {
 		if (wasReal) scene->interactions->requestErase(interaction);
