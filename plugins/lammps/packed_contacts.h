@@ -19,7 +19,7 @@ class NeighList;
 
 namespace dembark_lammps {
 
-class PackedContacts : dembark::ScalarLaws, LAMMPS_NS::Pointers {
+class PackedContacts : dembark::ScalarLaws, dembark::ScalarMemory, LAMMPS_NS::Pointers {
  public:
   PackedContacts(LAMMPS_NS::LAMMPS* lmp, const ContactCoefficients& coefficients) : Pointers(lmp), coefficients_(coefficients) {}
 
@@ -47,7 +47,7 @@ class PackedContacts : dembark::ScalarLaws, LAMMPS_NS::Pointers {
   dembark::HistoryLayout layout_;
   int freeze_bit_ = 0;
   LAMMPS_NS::FixCapillaryLiquid* liquid_ = nullptr;
-  dembark::PairPacks* const packs_ = dembark::choose_pair_packs();
+  const dembark::PairLoops packs_ = dembark::PairLoops::choose();
   const std::unique_ptr<PairBlock> block_ = std::make_unique<PairBlock>();
   std::vector<dembark::PairLaw<double>> laws_;  // of this step
 };

@@ -36,6 +36,7 @@ namespace dembark_liggghts {
 template <class Style>
 class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactModels::ContactModel<Style>>,
                        dembark::ScalarLaws,
+                       dembark::ScalarMemory,
                        PairParameters {
   typedef dembark::PairBlock PairBlock;
   typedef LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactModels::ContactModel<Style>> Stock;
@@ -54,7 +55,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   dembark::Presliding presliding_ = dembark::Presliding::linear;
   dembark::RollingModel rolling_model_ = dembark::RollingModel::off;
   dembark::capillary::Model model_ = dembark::capillary::Model::exact;
-  dembark::PairPacks* const packs_ = dembark::choose_pair_packs();
+  const dembark::PairLoops packs_ = dembark::PairLoops::choose();
   const std::unique_ptr<PairBlock> block_ = std::make_unique<PairBlock>();
   std::vector<dembark::PairLaw<double>> laws_;  // of this step
 
@@ -248,41 +249,43 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     const int numbers = (rings_offset_ >= 0 ? ring_numbers : 0) + (angle_offset_ >= 0 ? 3 : 0);
     namespace models = LIGGGHTS::ContactModels;
     const LAMMPS_NS::NeighList &list = *pair->list, &histories = *list.listgranhistory;
-    packs_({*this,
-            laws_.data(),
-            friction_.types() + 1,
-            owned,
-            friction_offset_,
-            rings_offset_,
-            more,
-            numbers,
-            dt_,
-            wet,
-            limit_force_,
-            tangential_damping_,
-            pack_friction,
-            rolling_model_ != dembark::RollingModel::off,
-            atom.x[0],
-            atom.v[0],
-            atom.omega[0],
-            atom.radius,
-            atom.rmass,
-            atom.type,
-            atom.mask,
-            atom.f[0],
-            atom.torque[0],
-            pair->freeze_group_bit(),
-            list.inum,
-            pair->dnum(),
-            list.ilist,
-            list.numneigh,
-            list.firstneigh,
-            histories.firstneigh,
-            histories.firstdouble,
-            NEIGHMASK,
-            models::CONTACT_NORMAL_MODEL | models::CONTACT_TANGENTIAL_MODEL,
-            models::CONTACT_COHESION_MODEL},
-           *block_);
+    packs_.lists({*this,
+                  this,
+                  nullptr,
+                  laws_.data(),
+                  friction_.types() + 1,
+                  owned,
+                  friction_offset_,
+                  rings_offset_,
+                  more,
+                  numbers,
+                  dt_,
+                  wet,
+                  limit_force_,
+                  tangential_damping_,
+                  pack_friction,
+                  rolling_model_ != dembark::RollingModel::off,
+                  atom.x[0],
+                  atom.v[0],
+                  atom.omega[0],
+                  atom.radius,
+                  atom.rmass,
+                  atom.type,
+                  atom.mask,
+                  atom.f[0],
+                  atom.torque[0],
+                  pair->freeze_group_bit(),
+                  list.inum,
+                  pair->dnum(),
+                  list.ilist,
+                  list.numneigh,
+                  list.firstneigh,
+                  histories.firstneigh,
+                  histories.firstdouble,
+                  NEIGHMASK,
+                  models::CONTACT_NORMAL_MODEL | models::CONTACT_TANGENTIAL_MODEL,
+                  models::CONTACT_COHESION_MODEL},
+                 *block_);
   }
 };
 

@@ -31,7 +31,7 @@ struct ContactView {
 	ContactView(int wall, const ScGeom& geom, const Body& body1, const Body& body2, const Vector3r& shift) : wallBody(wall) {
 		const State &state1 = *body1.state, &state2 = *body2.state;
 		if (wallBody == 0) {
-			setSpheres(state1.pos - state2.pos - shift, geom.radius1, geom.radius2, inertialMass(body1), inertialMass(body2));
+			setSpheres(state1.pos - (state2.pos + shift), geom.radius1, geom.radius2, inertialMass(body1), inertialMass(body2));
 			return;
 		}
 		const Body&    round   = swapped() ? body2 : body1;

@@ -67,6 +67,47 @@ void choose(const char* attribute, const std::string& word, const std::vector<st
 
 }  // namespace
 
+namespace dembark_yade {
+
+void refuseForce(const Scene& scene, Body::id_t id1, Body::id_t id2) {
+	fail("the contact of bodies " + std::to_string(id1) + " and " + std::to_string(id2) + " has no finite force in step " +
+	             std::to_string(scene.iter) + "; look at their positions, velocities and parameters, and at the time step",
+	     1);
+}
+
+int LawKinds::of(const ::dembark::ContactParameters& p) {
+	if (p.normal_law != ::dembark::NormalLaw::hertz || p.friction.presliding != ::dembark::Presliding::linear || p.rolling.on() ||
+	    p.liquid.viscous.on())
+		return -1;
+	constexpr std::size_t most    = 64;
+	const auto            numbers = [](const ::dembark::HertzParameters& e, const ::dembark::FinnieRabinowicz& f) {
+		return std::make_tuple(e.effective_youngs_modulus, e.effective_shear_modulus, e.damping, f.static_friction,
+		                       f.kinetic_friction, f.interface_shear_strength, f.healing_time);
+	};
+	const std::lock_guard<std::mutex> lock(guard);
+	const auto                        found = std::find_if(kinds.begin(), kinds.end(), [&](const Kind& kind) {
+		return numbers(kind.elasticity, kind.friction) == numbers(p.elasticity, p.friction);
+	});
+	if (found == kinds.end() && kinds.size() == most) return -1;
+	const auto number = static_cast<int>(found - kinds.begin());
+	if (found == kinds.end()) kinds.push_back({p.elasticity, p.friction});
+	return number;
+}
+
+void LawKinds::clear() { kinds.clear(); }
+
+std::vector<::dembark::PairLaw<double>> LawKinds::laws(double dt) const {
+	std::vector<::dembark::PairLaw<double>> all;
+	for (const Kind& kind : kinds) {
+		const ::dembark::FinnieRabinowicz& f = kind.friction;
+		all.push_back({kind.elasticity.effective_youngs_modulus, kind.elasticity.effective_shear_modulus, kind.elasticity.damping,
+		               f.static_friction, f.kinetic_friction, f.interface_shear_strength, kept_slip(f, dt), 0.0});
+	}
+	return all;
+}
+
+}  // namespace dembark_yade
+
 void Phys::get(::dembark::ContactState& now) const {
 	now.friction         = {vec(elasticDisplacement), slip, dissipatedEnergy};
 	now.bridge_volume    = bridgeVolume;
@@ -161,9 +202,10 @@ void Law2::postLoad(Law2&) {
 	wet      = chosen > 0;
 	model    = static_cast<::dembark::capillary::Model>(wet ? chosen - 1 : 0);
 	revision = ++revisions;
+	kinds.clear();
 }
 
-void Law2::prepare(Phys& phys, const ScGeom& geom, const Body& body1, const Body& body2) const {
+void Law2::prepare(Phys& phys, const ScGeom& geom, const Body& body1, const Body& body2) {
 	const bool sphere1 = dynamic_cast<const Sphere*>(body1.shape.get()), sphere2 = dynamic_cast<const Sphere*>(body2.shape.get());
 	if (!sphere1 && !sphere2)
 		fail(pairName(body1, body2) +
@@ -197,6 +239,13 @@ void Law2::prepare(Phys& phys, const ScGeom& geom, const Body& body1, const Body
 			fail(ip2 + "contactAngle: " + error.what());
 		}
 	phys.contact = p;
+	// Packs leave alone what is zero here.
+	phys.kind = phys.wallBody || carriedLiquid || (phys.bridgeVolume > 0.0 && !p.liquid.force) ? -1 : kinds.of(p);
+	if (phys.kind >= 0) {
+		phys.viscousForce  = 0.0;
+		phys.rollingTorque = Vector3r::Zero();
+		if (!wet) phys.capillaryForce = 0.0;
+	}
 	if (!p.liquid.viscous.on()) phys.viscousShearForce = Vector3r::Zero();
 
 	const ContactView view(phys.wallBody, geom, body1, body2, Vector3r::Zero());
@@ -232,10 +281,7 @@ void Law2::reportBridge(Phys& phys, const Interaction& interaction, const ::demb
 	phys.get(state);
 	const ::dembark::ContactForce out = ::dembark::contact_step(phys.contact, view.bodies, scene->dt, state);
 	// A comparison with what is no number is false: such a contact would vanish without a word.
-	if (!std::isfinite(out.overlap + out.force.x + out.force.y + out.force.z))
-		fail("the contact of bodies " + std::to_string(id1) + " and " + std::to_string(id2) + " has no finite force in step " +
-		             std::to_string(scene->iter) + "; look at their positions, velocities and parameters, and at the time step",
-		     1);
+	if (!std::isfinite(out.overlap + out.force.x + out.force.y + out.force.z)) dembark_yade::refuseForce(*scene, id1, id2);
 
 	if (!(out.overlap > 0.0) && phys.dissipatedEnergy > 0.0) endedDissipation += phys.dissipatedEnergy;
 	phys.setState(state);

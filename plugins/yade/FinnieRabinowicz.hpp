@@ -2,6 +2,8 @@
 // pair of materials, and the law. The formulas are those of dembark/contact.hpp; here only YADE's conventions are mapped to them.
 #pragma once
 
+#include <mutex>
+
 #include <boost/make_shared.hpp>
 
 #include <core/Dispatching.hpp>
@@ -14,21 +16,48 @@
 #include "CapillaryLiquid.hpp"
 #include "SavedFormat.hpp"
 #include "dembark/contact.hpp"
+#include "dembark/pairs/pair_step.hpp"
 
 namespace yade {
 
 namespace dembark_yade {
+
 struct ContactView;
-}
+
+/// Ends the run: the contact of these bodies has no finite force.
+[[noreturn]] void refuseForce(const Scene&, Body::id_t, Body::id_t);
+
+/// Different parameters of contacts as packs take them (dembark/pairs), each known by its number.
+class LawKinds {
+public:
+	/// Of these parameters, a new one if need be; -1 if packs do not know the law, or if there are too many kinds.
+	int  of(const ::dembark::ContactParameters&);
+	void clear();
+	/// For time steps of this length.
+	std::vector<::dembark::PairLaw<double>> laws(double dt) const;
+
+private:
+	struct Kind {
+		::dembark::HertzParameters  elasticity;
+		::dembark::FinnieRabinowicz friction;
+	};
+	std::vector<Kind> kinds;
+	std::mutex        guard;
+};
+
+}  // namespace dembark_yade
 
 class FinnieRabinowiczPhys : public NormShearPhys {
 public:
 	virtual ~FinnieRabinowiczPhys() = default;
 
-	// Built from the attributes by the law and valid as long as `preparedBy` is the law's revision.
-	::dembark::ContactParameters contact;
-	long                         preparedBy = -1;
-	int                          wallBody   = 0;  // 1 or 2: this body of the interaction is a wall; 0: two spheres
+	// What a dry contact takes and leaves in a step stands in the first so many bytes.
+	static constexpr std::size_t ofEveryStep = 192;
+
+	// Valid for the law of this revision.
+	long preparedBy = -1;
+	int  wallBody   = 0;   // 1 or 2: this body of the interaction is a wall; 0: two spheres
+	int  kind       = -1;  // of the law's kinds; -1: not for packs
 
 	void                    postLoad(FinnieRabinowiczPhys&) { preparedBy = -1; }
 	::dembark::ContactState state() const;
@@ -76,6 +105,9 @@ public:
 	);
 	// clang-format on
 	REGISTER_CLASS_INDEX(FinnieRabinowiczPhys, NormShearPhys);
+
+	// Built from the attributes by the law; behind what every step takes, which shares few lines of the memory.
+	::dembark::ContactParameters contact;
 };
 REGISTER_SERIALIZABLE(FinnieRabinowiczPhys);
 
@@ -135,7 +167,7 @@ public:
 private:
 	friend class SphereContactLoop;
 
-	void prepare(FinnieRabinowiczPhys&, const ScGeom&, const Body&, const Body&) const;
+	void prepare(FinnieRabinowiczPhys&, const ScGeom&, const Body&, const Body&);
 	/// A step of the contact seen in `view`: its forces, into `scene->forces`, and its state. What it gives says whether there is one.
 	::dembark::ContactForce act(FinnieRabinowiczPhys&, const Interaction&, const dembark_yade::ContactView& view);
 	void reportBridge(FinnieRabinowiczPhys&, const Interaction&, const ::dembark::ContactBodies&, double overlap, double volumeBefore);
@@ -146,6 +178,7 @@ private:
 	bool                        wet      = false;
 	::dembark::capillary::Model model    = ::dembark::capillary::Model::exact;
 	long                        revision = 0;
+	dembark_yade::LawKinds      kinds;  // of this revision
 };
 REGISTER_SERIALIZABLE(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz);
 

@@ -15,6 +15,7 @@ namespace yade {
 
 YADE_PLUGIN((SphereContactLoop));
 
+using dembark_yade::ContactPacks;
 using dembark_yade::ContactView;
 
 namespace {
@@ -38,69 +39,45 @@ void fetchAhead(const InteractionContainer& all, long i, long end) {
 	if (i + far < end) prefetch(all[i + far].get(), sizeof(Interaction));
 	if (i + near >= end || !all[i + near]->isReal()) return;
 	prefetch(all[i + near]->geom.get(), sizeof(ScGeom));
-	prefetch(all[i + near]->phys.get(), sizeof(FinnieRabinowiczPhys));
+	prefetch(all[i + near]->phys.get(), FinnieRabinowiczPhys::ofEveryStep);
 }
 
 }  // namespace
 
-void SphereContactLoop::collect() {
-	grains.resize(scene->bodies->size());
-	for (std::size_t id = 0; id < grains.size(); ++id) {
-		const Body* const body  = (*scene->bodies)[id].get();
-		Grain&            grain = grains[id];
-		const auto* const sphere =
-			body && body->shape && typeid(*body->shape) == typeid(Sphere) ? static_cast<Sphere*>(body->shape.get()) : nullptr;
-		grain.sphere = sphere && !body->isClump();
-#ifdef YADE_MPI
-		grain.sphere = grain.sphere && body->subdomain == scene->subdomain;
-#endif
-		if (!grain.sphere) continue;
-		const State& state = *body->state;
-		grain.pos          = state.pos;
-		grain.vel          = state.vel;
-		grain.angVel       = state.angVel;
-		grain.radius       = sphere->radius;
-		grain.mass         = dembark_yade::inertialMass(*body);
-	}
-}
-
 /// What the short way does for the pair: nothing, or no more than to see that it is too far apart to touch (`reach`: over the sum of the
 /// radii, squared), or its step.
-SphereContactLoop::Way SphereContactLoop::take(const shared_ptr<Interaction>& interaction, Real reach) const {
-	if (!meeting || interaction->functorCache.geom.get() != meeting || dembark_yade::postponed(*scene)) return Way::none;
-	const Grain &grain1 = grains[interaction->getId1()], &grain2 = grains[interaction->getId2()];
-	if (!grain1.sphere || !grain2.sphere) return Way::none;
+SphereContactLoop::Way SphereContactLoop::take(const shared_ptr<Interaction>& interaction, Real reach, ContactPacks& packs) {
+	if (!meeting || interaction->functorCache.geom.get() != meeting) return Way::none;
+	const Body::id_t id1 = interaction->getId1(), id2 = interaction->getId2();
+	if (!spheres.known(id1) || !spheres.known(id2)) return Way::none;
 	const bool     across = scene->isPeriodic && !interaction->cellDist.isZero();
 	const Vector3r shift  = across ? scene->cell->intrShiftPos(interaction->cellDist) : Vector3r::Zero();
-	if (!interaction->isReal()) {
-		const Real sum = grain1.radius + grain2.radius;
-		return (grain2.pos + shift - grain1.pos).squaredNorm() > reach * sum * sum ? Way::apart : Way::none;
-	}
+	const Vector3r pos1 = spheres.pos(id1), pos2 = spheres.pos(id2) + shift;
+	const Real     radius1 = spheres.radius(id1), radius2 = spheres.radius(id2), sum = radius1 + radius2;
+	const Real     squared = (pos2 - pos1).squaredNorm();
+	if (!interaction->isReal()) return squared > reach * sum * sum ? Way::apart : Way::none;
 	if (!law || interaction->functorCache.constLaw.get() != law || interaction->functorCache.phys.get() != physics) return Way::none;
 	auto& phys = static_cast<FinnieRabinowiczPhys&>(*interaction->phys);
-	if (phys.preparedBy != law->revision || (std::isinf(grain1.mass) && std::isinf(grain2.mass))) return Way::none;
+	if (phys.preparedBy != law->revision || !(spheres.dynamic(id1) || spheres.dynamic(id2))) return Way::none;
+	// The law has the last word on whether those at the very end of a contact touch.
+	if (phys.kind >= 0 && squared < (1.0 - 1e-9) * sum * sum) {
+		packs.add(*interaction, phys, across);
+		return Way::touching;
+	}
 
+	packs.finish();
 	ContactView view;
-	view.setSpheres(grain1.pos - grain2.pos - shift, grain1.radius, grain2.radius, grain1.mass, grain2.mass);
+	view.setSpheres(pos1 - pos2, radius1, radius2, spheres.mass(id1), spheres.mass(id2));
 	const Vector3r drift = across ? scene->cell->intrShiftVel(interaction->cellDist) : Vector3r::Zero();
-	view.move(grain1.vel, grain1.angVel, grain2.vel + drift, grain2.angVel);
+	view.move(spheres.vel(id1), spheres.angVel(id1), spheres.vel(id2) + drift, spheres.angVel(id2));
 	const ::dembark::ContactForce out = law->act(phys, *interaction, view);
-
-	// As Ig2_Sphere_Sphere_ScGeom does it: the same bits, for all that look at them.
-	auto& geom      = static_cast<ScGeom&>(*interaction->geom);
-	geom.normal     = (grain2.pos + shift) - grain1.pos;
-	const Real norm = geom.normal.norm();
-	geom.normal /= norm;
-	geom.penetrationDepth = grain1.radius + grain2.radius - norm;
-	geom.contactPoint     = grain1.pos + (grain1.radius - 0.5 * geom.penetrationDepth) * geom.normal;
-	geom.radius1          = grain1.radius;
-	geom.radius2          = grain2.radius;
+	dembark_yade::setSphereGeometry(static_cast<ScGeom&>(*interaction->geom), pos1, radius1, pos2, radius2);
 	if (!out.interacting) scene->interactions->requestErase(interaction);
 	return Way::touching;
 }
 
 /// One interaction by the functors of the three dispatchers, each found once and then known to the interaction.
-void SphereContactLoop::dispatch(const shared_ptr<Interaction>& interaction) const {
+void SphereContactLoop::dispatch(const shared_ptr<Interaction>& interaction, ContactPacks& packs) {
 	const shared_ptr<Body>*first = &Body::byId(interaction->getId1(), scene), *second = &Body::byId(interaction->getId2(), scene);
 	if (!*first || !*second) return scene->interactions->requestErase(interaction);
 #ifdef YADE_MPI
@@ -140,50 +117,68 @@ void SphereContactLoop::dispatch(const shared_ptr<Interaction>& interaction) con
 		dembark_yade::fail("SphereContactLoop: no Law2 functor for " + interaction->geom->getClassName() + " and " +
 		                   interaction->phys->getClassName() + " of bodies " + std::to_string(body1.getId()) + " and " +
 		                   std::to_string(body2.getId()));
+	packs.finish();
 	if (!known.constLaw->go(interaction->geom, interaction->phys, interaction.get())) scene->interactions->requestErase(interaction);
 }
 
 void SphereContactLoop::action() {
 	const InteractionContainer& all     = *scene->interactions;
 	const bool                  removal = all.iterColliderLastRun >= 0 && all.iterColliderLastRun == scene->iter;
-	shortWay                            = 0;
+	shortWay = packed = 0;
 	if (!callbacks.empty() || loopOnSortedInteractions || removal) return InteractionLoop::action();
 
 	geomDispatcher->scene = physDispatcher->scene = lawDispatcher->scene = scene;
 	geomDispatcher->updateScenePtr();
 	physDispatcher->updateScenePtr();
 	lawDispatcher->updateScenePtr();
-	const auto* const spheres = lastOf<Ig2_Sphere_Sphere_ScGeom>(geomDispatcher->functors);
-	meeting                   = spheres;
-	physics                   = lastOf<Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys>(physDispatcher->functors);
-	law                       = lastOf<Law>(lawDispatcher->functors);
+	const auto* const pairs = lastOf<Ig2_Sphere_Sphere_ScGeom>(geomDispatcher->functors);
+	meeting                 = pairs;
+	physics                 = lastOf<Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys>(physDispatcher->functors);
+	law                     = lastOf<Law>(lawDispatcher->functors);
 	// A little beyond where the functor sees a contact: it has the last word there.
-	const Real reach = spheres ? 1.000001 * spheres->interactionDetectionFactor * spheres->interactionDetectionFactor : 0.0;
-	collect();
-
-	const long count   = static_cast<long>(scene->interactions->size());
-	long       taken   = 0;
+	const Real reach = pairs ? 1.000001 * pairs->interactionDetectionFactor * pairs->interactionDetectionFactor : 0.0;
+	const long count = static_cast<long>(scene->interactions->size());
+	long       taken = 0, inPacks = 0;
 	int        threads = 1;
 #ifdef YADE_OPENMP
 	threads = ompThreads > 0 ? std::min(ompThreads, omp_get_max_threads()) : omp_get_max_threads();
 #endif
+	if (count == 0) return;
+	spheres.collect(*scene, threads);
+	const auto kinds = law ? law->kinds.laws(scene->dt) : std::vector<::dembark::PairLaw<double>>();
 	// Blocks: no thread looks at what another one works on.
-	const long size = std::clamp(count / (4 * threads), 16L, 256L);
+	const long size   = std::clamp(count / (4 * threads), 16L, 256L);
+	const auto safely = [this](auto work) {
+		try {
+			work();
+		} catch (const std::exception& error) {
+			dembark_yade::postpone(*scene, error);
+		}
+	};
 #ifdef YADE_OPENMP
-#pragma omp parallel for schedule(guided) num_threads(threads) reduction(+ : taken)
+#pragma omp parallel num_threads(threads) reduction(+ : taken, inPacks)
 #endif
-	for (long begin = 0; begin < count; begin += size) {
-		const long end = std::min(begin + size, count);
-		for (long i = begin; i < end; ++i) try {
-				fetchAhead(all, i, end);
-				const Way way = take(all[i], reach);
-				if (way == Way::none) dispatch(all[i]);
-				taken += way == Way::touching;
-			} catch (const std::exception& error) {
-				dembark_yade::postpone(*scene, error);
-			}
+	{
+		ContactPacks packs(*scene, spheres, law, kinds);
+#ifdef YADE_OPENMP
+#pragma omp for schedule(guided) nowait
+#endif
+		for (long begin = 0; begin < count; begin += size) {
+			const long end = std::min(begin + size, count);
+			if (dembark_yade::postponed(*scene)) continue;
+			for (long i = begin; i < end; ++i)
+				safely([&] {
+					fetchAhead(all, i, end);
+					const Way way = take(all[i], reach, packs);
+					if (way == Way::none) dispatch(all[i], packs);
+					taken += way == Way::touching;
+				});
+		}
+		safely([&] { packs.finish(); });
+		inPacks += packs.computed();
 	}
 	shortWay = taken;
+	packed   = inPacks;
 }
 
 }  // namespace yade

@@ -1,9 +1,10 @@
-// InteractionLoop with a short way for what most of its time goes to: pairs of spheres under the Finnie-Rabinowicz law.
+// InteractionLoop with a short way for what most of its time goes to: pairs of spheres under the Finnie-Rabinowicz law, in packs of
+// contacts.
 #pragma once
 
 #include <core/InteractionLoop.hpp>
 
-#include "FinnieRabinowicz.hpp"
+#include "ContactPacks.hpp"
 
 namespace yade {
 
@@ -13,28 +14,21 @@ public:
 	// clang-format off
 	YADE_CLASS_BASE_DOC_ATTRS(SphereContactLoop,InteractionLoop,":yref:`InteractionLoop`, faster where :yref:`spheres<Sphere>` meet under :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz` with :yref:`Ig2_Sphere_Sphere_ScGeom`; same arguments, and on one thread the same trajectories to the last bit. All other interactions are dispatched as there. Of the geometry of the pairs that take the short way the normal, the point of contact, the depth and the radii are kept up; :yref:`ScGeom.shearInc` and the axes of rotation, which this law does not use, are not.",
 		((long,shortWay,0,Attr::readonly,"Contacts of the last step that took the short way"))
+		((long,packed,0,Attr::readonly,"Those of them that were computed in packs"))
 	);
 	// clang-format on
 
 private:
 	typedef Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz Law;
 
-	/// What a step needs of a body, in one place of the memory.
-	struct Grain {
-		Vector3r pos, vel, angVel;
-		Real     radius, mass;  // mass: infinite of one that is not dynamic
-		bool     sphere;        // false: its pairs are dispatched
-	};
-
-	void collect();
 	enum class Way { none, apart, touching };
-	Way  take(const shared_ptr<Interaction>&, Real reach) const;
-	void dispatch(const shared_ptr<Interaction>&) const;
+	Way  take(const shared_ptr<Interaction>&, Real reach, dembark_yade::ContactPacks&);
+	void dispatch(const shared_ptr<Interaction>&, dembark_yade::ContactPacks&);
 
-	std::vector<Grain>  grains;             // by id
-	const IGeomFunctor* meeting = nullptr;  // of two spheres, of this step
-	const IPhysFunctor* physics = nullptr;
-	Law*                law     = nullptr;
+	dembark_yade::Spheres spheres;            // of this step
+	const IGeomFunctor*   meeting = nullptr;  // of two spheres, of this step
+	const IPhysFunctor*   physics = nullptr;
+	Law*                  law     = nullptr;
 };
 REGISTER_SERIALIZABLE(SphereContactLoop);
 

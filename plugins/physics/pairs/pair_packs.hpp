@@ -84,8 +84,12 @@ inline void gather(const PairStep& s, PairBlock& b, int found) {
     __builtin_prefetch(s.torque + 3 * j, 1);
     *b.flags[k] = (*b.flags[k] & ~(s.contact_flags | s.bridge_flag)) | (-(b.pick[k] & 1) & (s.contact_flags | (s.wet ? s.bridge_flag : 0)));
   }
-  // Lanes behind the last pair repeat it.
-  for (int k = found; k % 8; ++k) {
+}
+
+/// Lanes behind the last pair repeat it.
+template <class P>
+inline void repeat_last(PairBlock& b, int found) {
+  for (int k = found; k % P::size; ++k) {
     b.grain[k] = b.grain[found - 1];
     b.partner[k] = b.partner[found - 1];
     b.kind[k] = b.kind[found - 1];
@@ -119,7 +123,7 @@ __attribute__((noinline)) void scalar_rolling(const PairStep& s, const PairBlock
     if (!(touching >> k & 1)) continue;
     const auto lane = [k](const PackVec<P>& v) { return Vec3<double>{v.x[k], v.y[k], v.z[k]}; };
     const Vec3<double> couple =
-        s.scalar.rolling(b, first + k, lane(normal), twist[k], response.force[k], response.tangential_stiffness[k], lane(spin));
+        s.memory->rolling(b, first + k, lane(normal), twist[k], response.force[k], response.tangential_stiffness[k], lane(spin));
     const auto add_to = [&s](int grain, const Vec3<double>& torque) {
       if (grain >= s.owned) return;
       double* const to = s.torque + 3 * static_cast<long>(grain);
@@ -158,7 +162,7 @@ DEMBARK_HOT unsigned partial_slip(const PairStep& s, const PairBlock& b, int fir
   const auto other_limit = (state.slip > 0.0) | (law.interface_shear_strength < unlimited_strength);
   for (unsigned rest = bits(other_limit) & served; rest != 0; rest &= rest - 1) {
     const int k = __builtin_ctz(rest);
-    limit[k] = s.scalar.limit(b, first + k, response.force[k], response.contact_area[k], slip[k]);
+    limit[k] = s.memory->limit(b, first + k, response.force[k], response.contact_area[k], slip[k]);
   }
   for (int k = 0; k < N; ++k) {
     if (!(served >> k & 1)) continue;
@@ -167,7 +171,7 @@ DEMBARK_HOT unsigned partial_slip(const PairStep& s, const PairBlock& b, int fir
     RingSums found;
     while (move_rings<P>(lane, limit[k], slides[k] > 0.0, rings, rings + Rings::count, found)) {
       slides[k] = 1.0;
-      limit[k] = s.scalar.sliding_limit(b, first + k, lane, rings, response.force[k], response.contact_area[k], slip[k]);
+      limit[k] = s.memory->sliding_limit(b, first + k, lane, rings, response.force[k], response.contact_area[k], slip[k]);
     }
     sums[0][k] = found.along, sums[1][k] = found.across, sums[2][k] = found.lost;
     __builtin_memcpy(rings + axis, frame[k], sizeof frame[k]);
@@ -211,6 +215,7 @@ DEMBARK_HOT void scatter(const PairStep& s, const int* grain, const int* partner
 template <class P>
 inline void compute(const PairStep& s, PairBlock& b, int found) {
   constexpr int N = P::size;
+  repeat_last<P>(b, found);
   PairLaw<P> law = laws_of_kinds<P>(s.laws, b.kind);
   for (int first = 0; first < found; first += N) {
     const int *i = b.grain + first, *j = b.partner + first, count = found - first < N ? found - first : N;
@@ -294,7 +299,16 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
     alignas(64) double forces[N][4], moments[N][4];
     store_rows(Quad<P>{force.x, force.y, force.z, motion.arm_1}, [&forces](int k) { return forces[k]; });
     store_rows(Quad<P>{moment.x, moment.y, moment.z, motion.arm_2}, [&moments](int k) { return moments[k]; });
-    scatter<P>(s, i, j, forces, moments, count);
+    if (!s.results) {
+      scatter<P>(s, i, j, forces, moments, count);
+      continue;
+    }
+    const PackVec<P> along = force - tangential;
+    alignas(64) double normals[N][4], frictions[N][4];
+    store_rows(Quad<P>{along.x, along.y, along.z, response.normal_stiffness}, [&normals](int k) { return normals[k]; });
+    store_rows(Quad<P>{tangential.x, tangential.y, tangential.z, response.tangential_stiffness},
+               [&frictions](int k) { return frictions[k]; });
+    s.results->store(b, first, count, {forces, moments, normals, frictions});
   }
 }
 
@@ -319,6 +333,11 @@ void pair_packs(const PairStep& step, PairBlock& block) {
     }
   }
   finish();
+}
+
+template <class P>
+void picked_packs(const PairStep& step, PairBlock& block, int found) {
+  if (found > 0) compute<P>(step, block, found);
 }
 
 }  // namespace dembark

@@ -1,6 +1,7 @@
 // One step of the pairs of spheres under Hertz's law, Finnie-Rabinowicz friction and capillary bridges, computed in packs of contacts
-// with the widest vectors that the processor has, for engines whose neighbour lists are those of LAMMPS and LIGGGHTS. An engine compiles
-// pair_packs.hpp once for each instruction set; what that includes of others comes through this file, before the set is chosen.
+// with the widest vectors that the processor has: of all that neighbour lists like those of LAMMPS and LIGGGHTS hold, or of those that an
+// engine has picked. pair_packs.hpp is compiled once for each instruction set (packs_*.cpp); what it includes of others comes through this
+// file, before the set is chosen.
 #pragma once
 
 #include <cmath>
@@ -50,6 +51,12 @@ struct ScalarLaws {
   /// Friction on the first grain (N); the state is stored.
   virtual Vec3<double> friction(const PairBlock& block, int k, const Vec3<double>& normal, double twist,
                                 const NormalResponse<double>& response, const Vec3<double>& velocity) = 0;
+  /// Pulls (N) of the bridges of `count` pairs over their gaps (m).
+  virtual void bridges(const PairBlock& block, int first, int count, const double* gap, double* pull) = 0;
+};
+
+/// The same of contacts that remember more: the rings of partial slip, a rolling spring.
+struct ScalarMemory {
   /// Couple of rolling resistance on the first grain (N m); the state is stored.
   virtual Vec3<double> rolling(const PairBlock& block, int k, const Vec3<double>& normal, double twist, double normal_force,
                                double tangential_stiffness, const Vec3<double>& spin) = 0;
@@ -57,62 +64,87 @@ struct ScalarLaws {
   virtual double limit(const PairBlock& block, int k, double normal_force, double contact_area, double slip) = 0;
   virtual double sliding_limit(const PairBlock& block, int k, const RingMotion<double>& motion, const double* rings, double normal_force,
                                double contact_area, double& slip) = 0;
-  /// Pulls (N) of the bridges of `count` pairs over their gaps (m).
-  virtual void bridges(const PairBlock& block, int first, int count, const double* gap, double* pull) = 0;
+};
+
+/// What a pack of contacts has come to, for an engine that stores it: rows of four numbers, one a contact.
+struct PackResults {
+  const double (*force)[4];     ///< N, on the first grain, and its lever arm (m)
+  const double (*moment)[4];    ///< N, normal x tangential force, and the lever arm (m) of the second grain
+  const double (*normal)[4];    ///< N, the part of the force along the normal, and the normal stiffness (N/m)
+  const double (*friction)[4];  ///< N, the part along the surface, and the tangential stiffness (N/m)
+};
+struct ResultStore {
+  /// Of `count` contacts of the block; their states are in their histories.
+  virtual void store(const PairBlock& block, int first, int count, const PackResults& results) = 0;
 };
 
 /// What a step works on. Arrays of grains are (grains, 3) or (grains), in SI units.
 struct PairStep {
   ScalarLaws& scalar;
-  const PairLaw<double>* laws;  ///< one a pair of types, row by row
-  int types;                    ///< in a row; with 2, only the pair 1-1 is there
-  int owned;                    ///< grains from here on get no forces
-  int offset;                   ///< of friction in a history
-  int rings;                    ///< of partial slip; -1: there is none
-  int more, more_numbers;       ///< of partial slip and of a rolling spring together; -1: there is neither
-  double dt;
-  bool wet, limit_force, tangential_damping;
-  bool pack_friction;  ///< false leaves all friction to the scalar law
-  bool rolls;
+  ScalarMemory* memory = nullptr;         ///< asked with `rings` or `rolls` only
+  ResultStore* results = nullptr;         ///< takes the forces in place of `f` and `torque`, unless null
+  const PairLaw<double>* laws = nullptr;  ///< one a pair of types, row by row
+  int types = 0;                          ///< in a row; with 2, only the pair 1-1 is there
+  int owned = 0;                          ///< grains from here on get no forces
+  int offset = 0;                         ///< of friction in a history
+  int rings = -1;                         ///< of partial slip; -1: there is none
+  int more = -1, more_numbers = 0;        ///< of partial slip and of a rolling spring together; -1: there is neither
+  double dt = 0.0;
+  bool wet = false, limit_force = false, tangential_damping = true;
+  bool pack_friction = true;  ///< false leaves all friction to the scalar law
+  bool rolls = false;
 
-  const double *x, *v, *omega, *radius, *mass;
-  const int *type, *mask;
-  double *f, *torque;
-  int frozen;  ///< bit of `mask` of grains that never move
+  const double *x = nullptr, *v = nullptr, *omega = nullptr, *radius = nullptr, *mass = nullptr;
+  const int *type = nullptr, *mask = nullptr;
+  double *f = nullptr, *torque = nullptr;
+  int frozen = 0;  ///< bit of `mask` of grains that never move
 
-  int count, stride;  ///< grains with neighbours; numbers of a history
-  const int *grains, *numneigh;
-  int* const* neighbors;
-  int* const* flags;
-  double* const* histories;
-  int number_bits;                 ///< of a neighbour in the list
-  int contact_flags, bridge_flag;  ///< set while surfaces touch, and while a bridge holds
+  int count = 0, stride = 0;  ///< grains with neighbours; numbers of a history
+  const int *grains = nullptr, *numneigh = nullptr;
+  int* const* neighbors = nullptr;
+  int* const* flags = nullptr;
+  double* const* histories = nullptr;
+  int number_bits = 0;                     ///< of a neighbour in the list
+  int contact_flags = 0, bridge_flag = 0;  ///< set while surfaces touch, and while a bridge holds
 };
 
-/// The loop with packs of the type `P`.
+/// All pairs of the neighbour lists, in packs of the type `P`.
 template <class P>
 void pair_packs(const PairStep& step, PairBlock& block);
-
-typedef void PairPacks(const PairStep& step, PairBlock& block);
+/// The first `found` pairs of the block, whose grains, kinds and histories are filled in, and all of which touch.
+template <class P>
+void picked_packs(const PairStep& step, PairBlock& block, int found);
 
 extern template void pair_packs<Pack<2, Portable>>(const PairStep&, PairBlock&);
+extern template void picked_packs<Pack<2, Portable>>(const PairStep&, PairBlock&, int);
 #ifdef DEMBARK_PAIR_PACKS_X86
 extern template void pair_packs<Pack<4, Avx2>>(const PairStep&, PairBlock&);
+extern template void picked_packs<Pack<4, Avx2>>(const PairStep&, PairBlock&, int);
 extern template void pair_packs<Pack<8, Avx512>>(const PairStep&, PairBlock&);
+extern template void picked_packs<Pack<8, Avx512>>(const PairStep&, PairBlock&, int);
 #endif
 
-/// The one for this processor, or a narrower one: the environment variable DEMBARK_LANES may hold 2, 4 or 8.
-inline PairPacks* choose_pair_packs() {
+struct PairLoops {
+  void (*lists)(const PairStep&, PairBlock&);
+  void (*picked)(const PairStep&, PairBlock&, int found);
+
+  template <class P>
+  static PairLoops of() {
+    return {pair_packs<P>, picked_packs<P>};
+  }
+  /// Those for this processor, or narrower ones: the environment variable DEMBARK_LANES may hold 2, 4 or 8.
+  static PairLoops choose() {
 #ifdef DEMBARK_PAIR_PACKS_X86
-  const char* const asked = std::getenv("DEMBARK_LANES");
-  const int lanes = asked ? std::atoi(asked) : 8;
-  __builtin_cpu_init();
-  if (lanes >= 8 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
-      __builtin_cpu_supports("avx512bw"))
-    return pair_packs<Pack<8, Avx512>>;
-  if (lanes >= 4 && __builtin_cpu_supports("avx2")) return pair_packs<Pack<4, Avx2>>;
+    const char* const asked = std::getenv("DEMBARK_LANES");
+    const int lanes = asked ? std::atoi(asked) : 8;
+    __builtin_cpu_init();
+    if (lanes >= 8 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
+        __builtin_cpu_supports("avx512bw"))
+      return of<Pack<8, Avx512>>();
+    if (lanes >= 4 && __builtin_cpu_supports("avx2")) return of<Pack<4, Avx2>>();
 #endif
-  return pair_packs<Pack<2, Portable>>;
-}
+    return of<Pack<2, Portable>>();
+  }
+};
 
 }  // namespace dembark

@@ -45,7 +45,8 @@ def scene_with(kind, bodies, pair=None, law=None, geometry=None, engines=()):
 
 def left(loop, law):
     """Every number of the bodies, and of the contacts all but what the short way leaves alone: digests, and some to look at."""
-    exact = lambda v: [float(x).hex() for x in v] if hasattr(v, "__len__") else float(v).hex()
+    one = lambda x: (float(x) + 0.0).hex()  # zero has one sign
+    exact = lambda v: [one(x) for x in v] if hasattr(v, "__len__") else one(v)
     bodies = [[exact(v) for v in (b.state.pos, b.state.vel, b.state.angVel)] for b in O.bodies]
     real = sorted((i for i in O.interactions if i.isReal), key=lambda i: (i.id1, i.id2))
     states = [[i.id1, i.id2, i.iterMadeReal, sorted((name, exact(value)) for name, value in i.phys.dict().items())] for i in real]
@@ -53,7 +54,7 @@ def left(loop, law):
     digest = lambda rows: hashlib.sha256(repr(rows).encode()).hexdigest()
     return {"bodies": digest(bodies), "contacts": digest(states), "geometry": geometry, "count": len(real), "listed": len(O.interactions),
             "lost": law.dissipatedEnergy(), "bridges": law.bridgeCount(), "fall": sum(b.state.pos[2] for b in O.bodies),
-            "short": getattr(loop, "shortWay", None)}
+            "short": getattr(loop, "shortWay", None), "packed": getattr(loop, "packed", None)}
 
 
 def both(scene):
@@ -131,6 +132,18 @@ def changed_on_the_way(kind):
             body.shape.radius *= 1.001
     loop.geomDispatcher.functors = [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()]
     advance(500)
+    return left(loop, law)
+
+
+@both
+def many_laws(kind):
+    """Contacts each with a friction of its own: more kinds than packs know."""
+    loop, law = settled(kind)
+    for n, i in enumerate(sorted((i for i in O.interactions if i.isReal), key=lambda i: (i.id1, i.id2))):
+        i.phys.kineticFriction, i.phys.healingTime = 0.3 - 0.001 * n, 1e-4 * (n % 2)
+        if n % 3 == 0:
+            i.phys.interfaceShearStrength = 2e4
+    advance(1000)
     return left(loop, law)
 
 

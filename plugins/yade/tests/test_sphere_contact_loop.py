@@ -2,7 +2,8 @@
 
 import pytest
 
-SCENES = ("dry", "wet", "partial_slip", "carried", "periodic", "odd_bodies", "changed_on_the_way", "saved")
+SCENES = ("dry", "wet", "partial_slip", "carried", "periodic", "odd_bodies", "changed_on_the_way", "many_laws",
+          "saved")
 
 
 @pytest.fixture(scope="module")
@@ -32,10 +33,28 @@ def test_pairs_of_spheres_do_take_the_short_way(found, scene):
     assert least < short["short"] <= short["count"] + ended_in_the_step
 
 
+def test_packs_take_what_touches_under_a_law_that_they_know(found):
+    packed = {scene: found[scene]["short"]["packed"] for scene in SCENES}
+    for scene in ("dry", "periodic", "odd_bodies"):
+        assert packed[scene] == found[scene]["short"]["short"] > 20, scene
+    assert 20 < packed["wet"] < found["wet"]["short"]["short"]  # the others are held by their bridges
+    assert 5 < packed["many_laws"] < found["many_laws"]["short"]["short"]
+    assert packed["partial_slip"] == packed["carried"] == packed["changed_on_the_way"] == 0
+
+
 def test_callbacks_are_called_by_the_stock_loop(found):
     stock, short = found["callback"]["stock"], found["callback"]["short"]
     assert short["short"] == 0
     assert (short["bodies"], short["contacts"]) == (stock["bodies"], stock["contacts"])
+
+
+@pytest.mark.parametrize("lanes", ["2", "4", "8"])
+def test_packs_of_any_width_give_the_same_bits(yade, found, monkeypatch, lanes):
+    monkeypatch.setenv("DEMBARK_LANES", lanes)
+    narrower = yade.scenes("crowd", "many_laws", script="loop_scenes.py")
+    for scene, both in narrower.items():
+        assert both["short"]["short"] > 50
+        assert both["short"] == found[scene]["short"], scene
 
 
 def test_two_threads_sum_forces_in_another_order_only(yade, found):

@@ -1,3 +1,0 @@
-#include "dembark/pairs/pair_packs.hpp"
-
-template void dembark::pair_packs<dembark::Pack<2>>(const PairStep&, PairBlock&);
