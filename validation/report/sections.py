@@ -5,12 +5,14 @@ from __future__ import annotations
 import base64
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from dembark.common.parallel import mapped
 from dembark.postproc import figures as field_figures
 from dembark.postproc import pictures
 from dembark.postproc.figures.panels import Look
@@ -123,14 +125,19 @@ def line(rows: Sequence[Row], what: str) -> str:
 
 def sections(gathered: Gathered, folder: Path) -> list[Section]:
     """All cases of the results, their data written into `folder`."""
-    cases = list(dict.fromkeys(page.case for page in gathered.pages))
-    return [_section(gathered, case, [page for page in gathered.pages if page.case == case], folder) for case in cases]
+    drawn = mapped(partial(_figures, folder=folder), gathered.pages)
+    of_case: dict[str, list[tuple[Page, list[Shown]]]] = {}
+    for page, (shown, wrong) in zip(gathered.pages, drawn, strict=True):
+        page.missing += wrong
+        of_case.setdefault(page.case, []).append((page, shown))
+    return [_section(gathered, case, of_page) for case, of_page in of_case.items()]
 
 
-def _section(gathered: Gathered, name: str, pages: list[Page], folder: Path) -> Section:
+def _section(gathered: Gathered, name: str, of_page: list[tuple[Page, list[Shown]]]) -> Section:
+    pages = [page for page, _ in of_page]
     rows = [row for page in pages for row in page.rows()]
     known = gathered.cases.get(name)
-    parts = [_part(page, pages, folder) for page in pages]
+    parts = [_part(page, pages, shown) for page, shown in of_page]
     variants = [part for part in parts if not part.page.is_study]
     printed = [[one for one in part.figures if one.printed]
                for part in (*variants[:VARIANTS], *(part for part in parts if part.page.is_study))]
@@ -157,7 +164,7 @@ def _pictures(page: Page) -> list[Shown]:
     return found
 
 
-def _part(page: Page, pages: list[Page], folder: Path) -> Part:
+def _part(page: Page, pages: list[Page], shown: list[Shown]) -> Part:
     rows = list(page.rows())
     names = list(dict.fromkeys(row.record.name for row in rows))
     shared = [text for one in page.results.values() for text in one.remarks]
@@ -165,9 +172,14 @@ def _part(page: Page, pages: list[Page], folder: Path) -> Part:
                for engine, one in sorted(page.results.items()) for text in one.remarks]
     bases = [f"{engine_name(engine)}: {', '.join(dict.fromkeys(filter(None, (record.basis for record in one.quantities))))}"
              for engine, one in sorted(page.results.items())]
-    return Part(page, [[row for row in rows if row.record.name == name] for name in names],
-                [*_profiles(page, folder), *_fields(page, folder)],
-                beside(page, pages), list(dict.fromkeys(remarks)), bases)
+    return Part(page, [[row for row in rows if row.record.name == name] for name in names], shown, beside(page, pages),
+                list(dict.fromkeys(remarks)), bases)
+
+
+def _figures(page: Page, folder: Path) -> tuple[list[Shown], list[str]]:
+    """All figures of a page, and what cannot be drawn."""
+    fields, wrong = _fields(page, folder)
+    return [*_profiles(page, folder), *fields], wrong
 
 
 def _profiles(page: Page, folder: Path) -> list[Shown]:
@@ -192,21 +204,20 @@ def _look(engine: str) -> Look:
     return Look(facts.title, facts.colour, facts.marker)
 
 
-def _fields(page: Page, folder: Path) -> list[Shown]:
+def _fields(page: Page, folder: Path) -> tuple[list[Shown], list[str]]:
     """The page's figures of fields; their data are written beside the report, and why there are none is told."""
     try:
         shown = sorted(page.results)
         drawn = field_figures.draw(field_figures.read(page.folder, shown), {engine: _look(engine) for engine in shown})
     except (OSError, ValueError, KeyError, AttributeError) as error:
-        page.missing.append(f"fields.nc cannot be drawn: {error}")
-        return []
+        return [], [f"fields.nc cannot be drawn: {error}"]
     found = []
     for one in drawn:
         for name, table in one.tables.items():
             figures.write_csv(folder / f"{page.anchor}-fields-{name}.csv", *table)
         found.append(embed(one.figure, folder, f"{page.anchor}-fields-{one.name}", f"{page.name}: {one.title}. {one.caption}",
                            [f"{page.anchor}-fields-{name}.csv" for name in one.tables]))
-    return found
+    return found, []
 
 
 def verification(gathered: Gathered, folder: Path) -> list[dict[str, Any]]:

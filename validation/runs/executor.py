@@ -7,8 +7,6 @@ by its own fault is not. Steps work in a few processes that stay, so that what t
 from __future__ import annotations
 
 import multiprocessing
-import os
-import signal
 import socket
 import threading
 from collections import Counter
@@ -17,11 +15,11 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessP
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Protocol
 
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
+from dembark.common.parallel import prepare_worker
 from dembark.validation.runs.plan import RETRIES, Resources, Run
 from dembark.validation.runs.simulate import Progress, simulate
 from dembark.validation.runs.steps import Step
@@ -80,19 +78,6 @@ class Local:
         self._pool.shutdown()
 
 
-def _prepare_worker() -> None:
-    """In a process that works on steps: it ends with the one that started it, which alone gets the signals of interruptions."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-
-
-def _end_with(parent: BaseProcess) -> None:
-    parent.join()
-    os._exit(1)
-
-
 class Workers:
     """A few processes that work on steps and stay, so that what they import is imported once."""
 
@@ -104,7 +89,7 @@ class Workers:
         """Begin with a step; the future raises BrokenProcessPool when its process, or another one, was killed."""
         try:
             if self._pool is None:
-                self._pool = ProcessPoolExecutor(self._count, multiprocessing.get_context("spawn"), _prepare_worker)
+                self._pool = ProcessPoolExecutor(self._count, multiprocessing.get_context("spawn"), prepare_worker)
             return self._pool.submit(step.call, *step.arguments)
         except BrokenProcessPool:
             self.close()

@@ -1,0 +1,42 @@
+"""Work in other processes of this machine."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing.process import BaseProcess
+from typing import TypeVar
+
+Item = TypeVar("Item")
+Found = TypeVar("Found")
+
+_FEW = 16
+
+
+def prepare_worker() -> None:
+    """First call in a process that works for another one: it ends with that one, which alone gets the signals of interruptions."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: BaseProcess) -> None:
+    parent.join()
+    os._exit(1)
+
+
+def mapped(function: Callable[[Item], Found], items: Sequence[Item], few: int = _FEW) -> list[Found]:
+    """`function` of each of `items`, in their order; by as many processes as there are cores when there are more than `few`, for which
+    all three must be picklable. What `function` raises is raised here."""
+    cores = len(os.sched_getaffinity(0))
+    if cores == 1 or len(items) <= few:
+        return [function(item) for item in items]
+    # Only a process without threads may be copied; one that is begun anew imports all again.
+    method = "fork" if threading.active_count() == 1 else "spawn"
+    with ProcessPoolExecutor(cores, multiprocessing.get_context(method), prepare_worker) as pool:
+        return list(pool.map(function, items))
