@@ -138,7 +138,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
   }
 
  public:
-  static constexpr const char* history_name = "capillary";
+  static constexpr const char *history_name = "capillary", *imbalance_name = "capillary_imbalance";
 
   CohesionModel(LAMMPS* lmp, IContactHistorySetup* host, class ContactModelBase* models)
       : CohesionModelBase(lmp, host, models),
@@ -155,8 +155,10 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     settings.registerOnOff("carried_liquid", carried_, false);
   }
 
-  inline void postSettings(IContactHistorySetup* host, ContactModelBase*) {
-    if (carried_) imbalance_ = host->add_history_value("bridge_imbalance", "1");
+  inline void postSettings(IContactHistorySetup* host, ContactModelBase* models) {
+    if (!carried_) return;
+    imbalance_ = host->add_history_value("bridge_imbalance", "1");
+    models->add_history_offset(imbalance_name, imbalance_);
   }
 
   void connectToProperties(PropertyRegistry& registry) {

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "atom.h"
@@ -25,6 +26,7 @@
 #include "dembark/pairs/pair_step.hpp"
 #include "bridge_reach.h"
 #include "contact_data.h"
+#include "fix_capillary_liquid.h"
 #include "fix_energy_account.h"
 #include "model_properties.h"
 #include "pair_parameters.h"
@@ -48,10 +50,12 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   PairTable<dembark::FinnieRabinowicz> friction_;
   PairTable<dembark::RollingResistance> rolling_;
   PairTable<dembark::Liquid> liquids_;
-  int friction_offset_ = 0, rings_offset_ = -1, angle_offset_ = -1, bridge_offset_ = 0;  // in the history of a contact
-  double dt_ = 0.0;                                                                      // of this step
+  int friction_offset_ = 0, rings_offset_ = -1, angle_offset_ = -1, bridge_offset_ = 0,
+      imbalance_offset_ = -1;  // in the history of a contact
+  double dt_ = 0.0;            // of this step
   bool update_history_ = false;
-  bool plain_settings_ = true, tallied_ = false, limit_force_ = false, tangential_damping_ = true;
+  LAMMPS_NS::FixCapillaryLiquid* liquid_ = nullptr;  // of carried liquid
+  bool plain_settings_ = true, carried_ = false, tallied_ = false, limit_force_ = false, tangential_damping_ = true;
   dembark::Presliding presliding_ = dembark::Presliding::linear;
   dembark::RollingModel rolling_model_ = dembark::RollingModel::off;
   dembark::capillary::Model model_ = dembark::capillary::Model::exact;
@@ -163,13 +167,20 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
       double* const history = block.history[k] + bridge_offset_;
       double volume = history[0], rupture_distance = history[1];
       const bool was_there = volume > 0.0;
-      pull[n] =
-          bridge_step(liquids_(atom->type[i], atom->type[j]), atom->radius[i], atom->radius[j], gap[n], touching, volume, rupture_distance);
+      const dembark::Liquid& liquid = liquids_(atom->type[i], atom->type[j]);
+      pull[n] = bridge_step(liquid, atom->radius[i], atom->radius[j], gap[n], touching, volume, rupture_distance);
       const bool is_there = volume > 0.0;
       if (is_there && !touching) *block.flags[k] |= LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL;
+      const bool update = update_history_ && !(carried_ && !liquid_->collecting());
+      if (carried_ && update && !is_there) {
+        double& imbalance = block.history[k][imbalance_offset_];
+        const dembark::capillary::BridgeSides sides{i, j, false};
+        if (was_there) liquid_->bridge_broke({sides, history[0], std::exchange(imbalance, 0.0)});
+        if (touching) liquid_->request_bridge({{sides, atom->radius[i], atom->radius[j]}, history, &imbalance, liquid.force, false});
+      }
       if (is_there == was_there) continue;
       if (is_there) check_reach(lmp_->neighbor, lmp_->error, rupture_distance, atom->radius[i] + atom->radius[j], false);
-      if (!update_history_) continue;
+      if (!update) continue;
       history[0] = volume;
       history[1] = rupture_distance;
     }
@@ -187,6 +198,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
       else if (word == "tangential_damping") tangential_damping_ = value == "on";
       else if (word == "presliding") dembark::option_from_name(dembark::presliding_names(), value, presliding_);
       else if (word == "rolling_resistance") dembark::option_from_name(dembark::rolling_names(), value, rolling_model_);
+      else if (word == "carried_liquid") carried_ = value == "on";
       else if (word == "capillary_model") dembark::capillary::model_from_name(words[k + 1], model_);
       else if (value != "off") plain_settings_ = false;
     }
@@ -207,8 +219,11 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     if (rolling_model_ != dembark::RollingModel::off) rolling_ = read_rolling(read, rolling_model_);
     if (rolling_model_ == dembark::RollingModel::elastic_plastic) angle_offset_ = Stock::get_history_offset(Friction::angle_name);
     if (wet && plain_settings_) {
-      liquids_ = read_liquids(read, model_, false, false);
-      bridge_offset_ = Stock::get_history_offset(models::CohesionModel<models::COHESION_CAPILLARY>::history_name);
+      typedef models::CohesionModel<models::COHESION_CAPILLARY> Bridges;
+      liquids_ = read_liquids(read, model_, false, carried_);
+      bridge_offset_ = Stock::get_history_offset(Bridges::history_name);
+      if (carried_) imbalance_offset_ = Stock::get_history_offset(Bridges::imbalance_name);
+      liquid_ = carried_ ? static_cast<LAMMPS_NS::FixCapillaryLiquid*>(lmp_->modify->find_fix_style("capillary/liquid", 0)) : nullptr;
     }
     tallied_ = find_energy_tally(lmp_->modify);
     known = plain_settings_ ? this : nullptr;

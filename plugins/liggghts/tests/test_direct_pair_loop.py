@@ -7,10 +7,10 @@ from rig.cloud import DECK, cloud, deviation
 from rig.liggghts_driver import read_dump, run_deck
 
 
-def frames(folder, ranks=1, **words) -> np.ndarray:
+def frames(folder, ranks=1, deck=DECK, **words) -> np.ndarray:
     folder.mkdir()
     (folder / "cloud.data").write_text(cloud())
-    done = run_deck(folder, DECK.format(**words), ranks=ranks)
+    done = run_deck(folder, deck.format(**words), ranks=ranks)
     assert done.code == 0, done.error
     steps, tables = read_dump(folder / "grains.dump")
     assert steps[-1] == 1000
@@ -27,6 +27,23 @@ def test_same_motion_as_in_the_engines_loop(tmp_path, cohesion, settings):
     # Round-off grows in a cloud of collisions.
     assert deviation(ours[:2], engine[:2]) < 1e-13
     assert deviation(ours, engine) < 1e-10
+
+
+BRIDGES = "fix m11 all property/global bridgeVolume peratomtypepair 2 1e-12 5e-12 5e-12 0\n"
+LIQUID = DECK.replace(BRIDGES, "fix liquid all capillary/liquid content 0.01\n") + (
+    'variable held equal f_liquid[2]\nprint "bridges hold ${{held}}" append liquid.txt\n')
+
+
+def test_same_liquid_and_motion_as_in_the_engines_loop(tmp_path):
+    """Liquid that the grains carry, which bridges take and give back."""
+    words = {"deck": LIQUID, "cohesion": "cohesion capillary", "settings": "carried_liquid on"}
+    ours = frames(tmp_path / "ours", rolling="", **words)
+    engine = frames(tmp_path / "engine", rolling="rolling_friction cdt", **words)
+    assert deviation(ours[:2], engine[:2]) < 1e-13
+    assert deviation(ours, engine) < 1e-10
+    held, other = (float((tmp_path / loop / "liquid.txt").read_text().split()[-1]) for loop in ("ours", "engine"))
+    assert held > 1e-10
+    assert held == pytest.approx(other, rel=1e-10)
 
 
 def test_same_motion_on_two_ranks(tmp_path):
