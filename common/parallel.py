@@ -8,8 +8,11 @@ import signal
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.process import BaseProcess
 from typing import TypeVar
+
+from dembark.common.errors import RunError
 
 Item = TypeVar("Item")
 Found = TypeVar("Found")
@@ -32,11 +35,14 @@ def _end_with(parent: BaseProcess) -> None:
 
 def mapped(function: Callable[[Item], Found], items: Sequence[Item], few: int = _FEW) -> list[Found]:
     """`function` of each of `items`, in their order; by as many processes as there are cores when there are more than `few`, for which
-    all three must be picklable. What `function` raises is raised here."""
+    all three must be picklable. What `function` raises is raised here; RunError when a process was killed."""
     cores = len(os.sched_getaffinity(0))
     if cores == 1 or len(items) <= few:
         return [function(item) for item in items]
-    # Only a process without threads may be copied; one that is begun anew imports all again.
+    # A process with threads of Python must not be copied; one that is begun anew imports all again.
     method = "fork" if threading.active_count() == 1 else "spawn"
-    with ProcessPoolExecutor(cores, multiprocessing.get_context(method), prepare_worker) as pool:
-        return list(pool.map(function, items))
+    try:
+        with ProcessPoolExecutor(cores, multiprocessing.get_context(method), prepare_worker) as pool:
+            return list(pool.map(function, items))
+    except BrokenProcessPool:
+        raise RunError("a process that worked on a part of this was killed", "most often because memory ran out") from None

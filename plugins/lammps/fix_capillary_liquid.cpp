@@ -62,21 +62,6 @@ int FixCapillaryLiquid::wall_number(const FixWallDembark* wall) const {
   return int(std::find(walls_.begin(), walls_.end(), wall) - walls_.begin());
 }
 
-void FixCapillaryLiquid::report(const capillary::BridgeSides& sides, double radius, double other_radius, const dembark::Liquid& law,
-                                bool touching, double before, double* bridge, double* imbalance) {
-  if (bridge[0] > 0.0) return;
-  if (before > 0.0) bridge_broke({sides, before, std::exchange(*imbalance, 0.0)});
-  if (!touching) return;
-  Request request;
-  request.sides = sides;
-  request.radius = radius;
-  request.other_radius = other_radius;
-  request.bridge = bridge;
-  request.imbalance = imbalance;
-  request.force = law.force;
-  request_bridge(request);
-}
-
 void FixCapillaryLiquid::each_pair_bridge(const VisitPair& visit) const {
   if (!pair_ || !pair_->list) return;
   const dembark::HistoryLayout layout = pair_->coefficients().layout();

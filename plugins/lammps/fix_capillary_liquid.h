@@ -20,10 +20,6 @@ class FixCapillaryLiquid : public dembark_family::LiquidFix {
 
   /// The number of a wall in BridgeSides.
   int wall_number(const class FixWallDembark* wall) const;
-  /// After a step of a contact: `before` is its bridge's volume (m^3) before it, `bridge` its volume and rupture distance (m) now,
-  /// `imbalance` as in NewBridge; where these stand until the end of the step.
-  void report(const dembark::capillary::BridgeSides& sides, double radius, double other_radius, const dembark::Liquid& law, bool touching,
-              double before, double* bridge, double* imbalance);
 
  private:
   double* volumes() const override { return own_; }

@@ -52,6 +52,7 @@ void PackedContacts::step(const LAMMPS_NS::NeighList& list, const NeighborHistor
                 nullptr,
                 laws_.data(),
                 atom->ntypes + 1,
+                atom->ntypes == 1,
                 force->newton_pair ? atom->nlocal + atom->nghost : atom->nlocal,
                 0,
                 rings,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
+#include <utility>
 
 #include "neighbor.h"
 
@@ -70,6 +71,22 @@ void LiquidFix::setup_pre_force(int) {
   requests_.clear();
   broken_.clear();
   after_new_list();
+}
+
+void LiquidFix::report(const capillary::BridgeSides& sides, double radius, double other_radius, const dembark::Liquid& law, bool touching,
+                       double before, double* bridge, double* imbalance, bool primitive_wall) {
+  if (bridge[0] > 0.0) return;
+  if (before > 0.0) bridge_broke({sides, before, std::exchange(*imbalance, 0.0)});
+  if (!touching) return;
+  Request request;
+  request.sides = sides;
+  request.radius = radius;
+  request.other_radius = other_radius;
+  request.bridge = bridge;
+  request.imbalance = imbalance;
+  request.force = law.force;
+  request.primitive_wall = primitive_wall;
+  request_bridge(request);
 }
 
 void LiquidFix::pre_force(int) {

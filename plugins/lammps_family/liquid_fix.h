@@ -10,6 +10,7 @@
 
 #include "dembark/capillary/bridge.hpp"
 #include "dembark/capillary/liquid_words.hpp"
+#include "dembark/contact.hpp"
 
 namespace dembark_family {
 
@@ -50,6 +51,11 @@ class LiquidFix : public SharedFix {
 
   void request_bridge(const Request& request) { requests_.push_back(request); }
   void bridge_broke(const dembark::capillary::BrokenBridge& bridge) { broken_.push_back(bridge); }
+  /// After a step of a contact: `before` is its bridge's volume (m^3) before it, `bridge` its volume and rupture distance (m) now,
+  /// `imbalance` as in NewBridge; where these stand until the end of the step. A bridge that broke gives its liquid back, a touching
+  /// contact without one requests it.
+  void report(const dembark::capillary::BridgeSides& sides, double radius, double other_radius, const dembark::Liquid& law, bool touching,
+              double before, double* bridge, double* imbalance, bool primitive_wall = false);
 
  protected:
   typedef std::function<void(int i, int j, double volume, double imbalance)> VisitPair;

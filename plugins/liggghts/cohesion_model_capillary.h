@@ -79,19 +79,6 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
   // A contact with a grain or a wall, as fix capillary/liquid numbers them.
   dembark::capillary::BridgeSides sides(int i, int j) const { return {i, wall_ ? owner_->wall_number(wall_) : j, wall_ != nullptr}; }
 
-  // A touching contact without a bridge requests liquid, once in a step.
-  void request_bridge(const SurfacesCloseData& d, const dembark::Liquid& liquid) const {
-    LAMMPS_NS::FixCapillaryLiquid::Request request;
-    request.sides = sides(d.i, d.j);
-    request.radius = d.radi;
-    request.other_radius = d.is_wall ? dembark::capillary::flat<double> : d.radj;
-    request.bridge = d.contact_history + offset_;
-    request.imbalance = d.contact_history + imbalance_;
-    request.force = liquid.force;
-    request.primitive_wall = d.is_wall && !d.mesh;
-    owner_->request_bridge(request);
-  }
-
   // A bridge of carried liquid ruptures: its liquid goes back to the two.
   void return_liquid(int i, int j, double* history) const {
     owner_->bridge_broke({sides(i, j), history[offset_], history[imbalance_]});
@@ -116,10 +103,11 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
       dembark_liggghts::check_reach(neighbor, error, rupture_distance, d.is_wall ? d.radi : d.radsum, d.is_wall && !d.mesh);
     if (touching && !was_there && (is_there || carried_)) check_time_step(liquid, bodies.effective_radius(), effective_mass);
     if (update_history) {
-      if (carried_ && was_there && !is_there) return_liquid(d.i, d.j, d.contact_history);
-      if (carried_ && touching && !is_there) request_bridge(d, liquid);
-      history[0] = volume;
+      const double before = std::exchange(history[0], volume);
       history[1] = rupture_distance;
+      if (carried_)
+        owner_->report(sides(d.i, d.j), bodies.radius_1, bodies.radius_2, liquid, touching, before, history, d.contact_history + imbalance_,
+                       d.is_wall && !d.mesh);
     }
     if (!is_there) return false;
     dembark::RelativeMotion motion;

@@ -170,19 +170,16 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
       const dembark::Liquid& liquid = liquids_(atom->type[i], atom->type[j]);
       pull[n] = bridge_step(liquid, atom->radius[i], atom->radius[j], gap[n], touching, volume, rupture_distance);
       const bool is_there = volume > 0.0;
-      if (is_there && !touching) *block.flags[k] |= LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL;
       const bool update = update_history_ && !(carried_ && !liquid_->collecting());
-      if (carried_ && update && !is_there) {
-        double& imbalance = block.history[k][imbalance_offset_];
-        const dembark::capillary::BridgeSides sides{i, j, false};
-        if (was_there) liquid_->bridge_broke({sides, history[0], std::exchange(imbalance, 0.0)});
-        if (touching) liquid_->request_bridge({{sides, atom->radius[i], atom->radius[j]}, history, &imbalance, liquid.force, false});
-      }
-      if (is_there == was_there) continue;
-      if (is_there) check_reach(lmp_->neighbor, lmp_->error, rupture_distance, atom->radius[i] + atom->radius[j], false);
+      // One that cannot break in this pass, the set-up of a run, is looked at again in the next.
+      if (!touching && (is_there || (was_there && !update))) *block.flags[k] |= LIGGGHTS::ContactModels::CONTACT_COHESION_MODEL;
+      if (is_there && !was_there) check_reach(lmp_->neighbor, lmp_->error, rupture_distance, atom->radius[i] + atom->radius[j], false);
       if (!update) continue;
-      history[0] = volume;
+      const double before = std::exchange(history[0], volume);
       history[1] = rupture_distance;
+      if (carried_)
+        liquid_->report({i, j, false}, atom->radius[i], atom->radius[j], liquid, touching, before, history,
+                        block.history[k] + imbalance_offset_);
     }
   }
 
@@ -269,6 +266,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
                   nullptr,
                   laws_.data(),
                   friction_.types() + 1,
+                  friction_.types() == 1,
                   owned,
                   friction_offset_,
                   rings_offset_,

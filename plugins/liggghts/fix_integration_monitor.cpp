@@ -70,8 +70,7 @@ dembark::ContactParameters FixIntegrationMonitor::parameters(int type_i, int typ
 
 void FixIntegrationMonitor::setup_pre_force(int) {
   if (!PairParameters::known)
-    fail(
-        "impacts are integrated anew for pair_style gran model hertz tangential finnie_rabinowicz only, without viscous or carried liquid");
+    fail("impacts are integrated anew for pair_style gran model hertz tangential finnie_rabinowicz only, without viscous liquid");
   if (atom->map_style == 0) fail("impacts needs 'atom_modify map array'");
 }
 

@@ -1,5 +1,6 @@
 #include "ContactPacks.hpp"
 
+#include <tuple>
 #include <typeinfo>
 
 #include <core/Scene.hpp>
@@ -29,7 +30,7 @@ void Spheres::collect(const Scene& scene, int threads) {
 	radii.resize(rooms);
 	masses.resize(rooms);
 	fixed.resize(rooms);
-	free.resize(count);
+	roles.resize(count);
 	anyHeld = false;
 	for (long id = 0; id < count; ++id) {
 		const Body* const body = (*scene.bodies)[id].get();
@@ -39,12 +40,12 @@ void Spheres::collect(const Scene& scene, int threads) {
 #ifdef YADE_MPI
 		isSphere = isSphere && body->subdomain == scene.subdomain;
 #endif
-		free[id] = isSphere ? 0 : -1;
+		roles[id] = Role::none;
 		if (!isSphere) continue;
 		const State& state = *body->state;
 		set(id, state.pos, state.vel, state.angVel, sphere->radius, inertialMass(*body));
-		free[id] = !fixed[id];
-		anyHeld  = anyHeld || fixed[id];
+		roles[id] = fixed[id] ? Role::held : Role::free;
+		anyHeld   = anyHeld || fixed[id];
 	}
 }
 
@@ -69,17 +70,14 @@ const ::dembark::PairLoops& ContactPacks::loops() {
 	return chosen;
 }
 
-ContactPacks::ContactPacks(Scene& ofScene, Spheres& ofSpheres, const Law* law, const std::vector<::dembark::PairLaw<double>>& kinds)
-	: scene(ofScene), spheres(ofSpheres), step{*this} {
+ContactPacks::ContactPacks(Scene& ofScene, Spheres& ofSpheres, Law* law) : scene(ofScene), spheres(ofSpheres), step{*this} {
 	spheres.describe(step);
-	step.results              = this;
+	step.results       = this;
+	step.dt            = scene.dt;
+	step.pack_friction = scene.dt > 0.0;
+	if (law) kinds = law->forPacks(step);
 	step.laws                 = kinds.data();
-	step.types                = kinds.size() == 1 ? 2 : 0;
-	step.dt                   = scene.dt;
-	step.wet                  = law && law->capillaryModel != "none";
-	step.limit_force          = law && law->limitForce;
-	step.tangential_damping   = law && law->tangentialDamping;
-	step.pack_friction        = scene.dt > 0.0;
+	step.one_law              = kinds.size() == 1;
 	std::tie(forces, torques) = threadForces(scene);
 }
 

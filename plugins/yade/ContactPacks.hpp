@@ -2,6 +2,7 @@
 // steps, many contacts at once.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "FinnieRabinowicz.hpp"
@@ -15,8 +16,8 @@ class Spheres {
 public:
 	void collect(const Scene& scene, int threads);
 
-	bool     known(Body::id_t id) const { return free[id] >= 0; }
-	bool     dynamic(Body::id_t id) const { return free[id] > 0; }
+	bool     known(Body::id_t id) const { return roles[id] != Role::none; }
+	bool     dynamic(Body::id_t id) const { return roles[id] == Role::free; }
 	Real     radius(long at) const { return radii[at]; }
 	Real     mass(long at) const { return masses[at]; }
 	Vector3r pos(long at) const { return Vector3r::Map(&places[3 * at]); }
@@ -28,11 +29,14 @@ public:
 	void describe(::dembark::PairStep& step) const;
 
 private:
+	/// Pairs of a body that is no sphere are dispatched.
+	enum class Role : char { none, held, free };
+
 	void set(long at, const Vector3r& pos, const Vector3r& vel, const Vector3r& angVel, Real radius, Real mass);
 
 	std::vector<double> places, velocities, spins, radii, masses;
-	std::vector<int>    free;   // by id: 1 dynamic, 0 held, -1 no sphere (its pairs are dispatched)
-	std::vector<int>    fixed;  // by place: 1 if the mass is infinite
+	std::vector<Role>   roles;  // by id
+	std::vector<int>    fixed;  // by place: 1 if the mass is infinite, as packs want it
 	long                count   = 0;
 	bool                anyHeld = false;
 };
@@ -42,11 +46,14 @@ class ContactPacks : ::dembark::ScalarLaws, ::dembark::ResultStore {
 public:
 	typedef Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz Law;
 
-	/// Of a step: forces go to those of the calling thread. Without a law nothing can be added.
-	ContactPacks(Scene&, Spheres&, const Law*, const std::vector<::dembark::PairLaw<double>>& kinds);
-	/// A contact of spheres that touch, with a law that packs know. Computes those that wait when there is no room for more.
+	/// Of a step: forces go to those of the calling thread. `law`: of all that is added; null if there is none.
+	ContactPacks(Scene&, Spheres&, Law* law);
+	/// Whether packs know the law of the contact.
+	bool know(const FinnieRabinowiczPhys& data) const { return data.kind >= 0 && data.kind < static_cast<int>(kinds.size()); }
+	/// Such a contact, of spheres that touch. Computes those that wait when there is no room for more.
 	void add(const Interaction&, FinnieRabinowiczPhys&, bool across);
-	/// Computes all that wait: before forces are added in any other way, so that all are summed in the order of the interactions.
+	/// Computes all that wait, unless the run is about to stop: before forces are added in any other way, so that all are summed in the
+	/// order of the interactions.
 	void finish();
 	/// Number of contacts so far.
 	long computed() const { return done; }
@@ -62,17 +69,18 @@ private:
 
 	static const ::dembark::PairLoops& loops();
 
-	Scene&                scene;
-	Spheres&              spheres;
-	::dembark::PairStep   step;
-	Block                 block;
-	double                histories[Block::room][5];  // displacement, slip and energy of friction
-	FinnieRabinowiczPhys* phys[Block::room];
-	ScGeom*               geom[Block::room];
-	Body::id_t            partner[Block::room];
-	Vector3r *            forces, *torques;  // of the thread, by id
-	int                   waiting = 0;
-	long                  done    = 0;
+	Scene&                                  scene;
+	Spheres&                                spheres;
+	::dembark::PairStep                     step;
+	std::vector<::dembark::PairLaw<double>> kinds;
+	Block                                   block;
+	double                                  histories[Block::room][5];  // displacement, slip and energy of friction
+	FinnieRabinowiczPhys*                   phys[Block::room];
+	ScGeom*                                 geom[Block::room];
+	Body::id_t                              partner[Block::room];
+	Vector3r *                              forces, *torques;  // of the thread, by id
+	int                                     waiting = 0;
+	long                                    done    = 0;
 };
 
 /// As Ig2_Sphere_Sphere_ScGeom does it: the same bits, for all that look at them.

@@ -1,5 +1,6 @@
 #include "FinnieRabinowicz.hpp"
 
+#include <tuple>
 #include <algorithm>
 #include <atomic>
 #include <cstring>
@@ -79,6 +80,7 @@ int LawKinds::of(const ::dembark::ContactParameters& p) {
 	if (p.normal_law != ::dembark::NormalLaw::hertz || p.friction.presliding != ::dembark::Presliding::linear || p.rolling.on() ||
 	    p.liquid.viscous.on())
 		return -1;
+	// Contacts that slip are left to the law itself, which knows their critical slip distance.
 	constexpr std::size_t most    = 64;
 	const auto            numbers = [](const ::dembark::HertzParameters& e, const ::dembark::FinnieRabinowicz& f) {
 		return std::make_tuple(e.effective_youngs_modulus, e.effective_shear_modulus, e.damping, f.static_friction,
@@ -94,9 +96,13 @@ int LawKinds::of(const ::dembark::ContactParameters& p) {
 	return number;
 }
 
-void LawKinds::clear() { kinds.clear(); }
+void LawKinds::clear() {
+	const std::lock_guard<std::mutex> lock(guard);
+	kinds.clear();
+}
 
-std::vector<::dembark::PairLaw<double>> LawKinds::laws(double dt) const {
+std::vector<::dembark::PairLaw<double>> LawKinds::laws(double dt) {
+	const std::lock_guard<std::mutex>       lock(guard);
 	std::vector<::dembark::PairLaw<double>> all;
 	for (const Kind& kind : kinds) {
 		const ::dembark::FinnieRabinowicz& f = kind.friction;
@@ -199,13 +205,24 @@ void Law2::postLoad(Law2&) {
 	choose("presliding", presliding, ::dembark::presliding_names(), path);
 	choose("rollingResistance", rollingResistance, ::dembark::rolling_names(), rolling);
 	choose("capillaryModel", capillaryModel, models, chosen);
-	wet      = chosen > 0;
-	model    = static_cast<::dembark::capillary::Model>(wet ? chosen - 1 : 0);
-	revision = ++revisions;
+	wet     = chosen > 0;
+	model   = static_cast<::dembark::capillary::Model>(wet ? chosen - 1 : 0);
+	damped  = tangentialDamping;
+	limited = limitForce;
+	// In this order: a contact that is prepared meanwhile has a kind of the new table, or is prepared again.
 	kinds.clear();
+	revision = ++revisions;
+}
+
+std::vector<::dembark::PairLaw<double>> Law2::forPacks(::dembark::PairStep& step) {
+	step.wet                = wet;
+	step.limit_force        = limited;
+	step.tangential_damping = damped;
+	return kinds.laws(step.dt);
 }
 
 void Law2::prepare(Phys& phys, const ScGeom& geom, const Body& body1, const Body& body2) {
+	const long current = revision;
 	const bool sphere1 = dynamic_cast<const Sphere*>(body1.shape.get()), sphere2 = dynamic_cast<const Sphere*>(body2.shape.get());
 	if (!sphere1 && !sphere2)
 		fail(pairName(body1, body2) +
@@ -216,8 +233,8 @@ void Law2::prepare(Phys& phys, const ScGeom& geom, const Body& body1, const Body
 	p.normal_law              = normal;
 	p.elasticity              = {phys.effectiveYoungsModulus, phys.effectiveShearModulus, phys.restitution};
 	p.characteristic_velocity = characteristicVelocity;
-	p.tangential_damping      = tangentialDamping;
-	p.limit_force             = limitForce;
+	p.tangential_damping      = damped;
+	p.limit_force             = limited;
 	p.friction                = {phys.staticFriction,         phys.kineticFriction, phys.criticalSlipDistance,
 	                             phys.interfaceShearStrength, phys.healingTime,     path};
 	if (rolling != ::dembark::RollingModel::off && !phys.rolls)
@@ -239,7 +256,7 @@ void Law2::prepare(Phys& phys, const ScGeom& geom, const Body& body1, const Body
 			fail(ip2 + "contactAngle: " + error.what());
 		}
 	phys.contact = p;
-	// Packs leave alone what is zero here.
+	// Packs do not write what the law would set to zero.
 	phys.kind = phys.wallBody || carriedLiquid || (phys.bridgeVolume > 0.0 && !p.liquid.force) ? -1 : kinds.of(p);
 	if (phys.kind >= 0) {
 		phys.viscousForce  = 0.0;
@@ -255,7 +272,7 @@ void Law2::prepare(Phys& phys, const ScGeom& geom, const Body& body1, const Body
 		     " s, or a larger minimumGap");
 	if (normal == ::dembark::NormalLaw::hooke && !(characteristicVelocity > 0.0))
 		fail(law2 + "characteristicVelocity must be > 0 m/s for normalLaw='hooke'");
-	phys.preparedBy = revision;
+	phys.preparedBy = current;
 }
 
 /// Tells CapillaryLiquid, after the forces are known, that the contact touches without a bridge, or that its bridge broke.

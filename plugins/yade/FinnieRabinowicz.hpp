@@ -2,6 +2,7 @@
 // pair of materials, and the law. The formulas are those of dembark/contact.hpp; here only YADE's conventions are mapped to them.
 #pragma once
 
+#include <atomic>
 #include <mutex>
 
 #include <boost/make_shared.hpp>
@@ -28,13 +29,14 @@ struct ContactView;
 [[noreturn]] void refuseForce(const Scene&, Body::id_t, Body::id_t);
 
 /// Different parameters of contacts as packs take them (dembark/pairs), each known by its number.
+/// A set that once was in use counts until the law changes.
 class LawKinds {
 public:
 	/// Of these parameters, a new one if need be; -1 if packs do not know the law, or if there are too many kinds.
 	int  of(const ::dembark::ContactParameters&);
 	void clear();
 	/// For time steps of this length.
-	std::vector<::dembark::PairLaw<double>> laws(double dt) const;
+	std::vector<::dembark::PairLaw<double>> laws(double dt);
 
 private:
 	struct Kind {
@@ -51,7 +53,7 @@ class FinnieRabinowiczPhys : public NormShearPhys {
 public:
 	virtual ~FinnieRabinowiczPhys() = default;
 
-	// What a dry contact takes and leaves in a step stands in the first so many bytes.
+	// What a dry contact takes and leaves in a step stands in the first so many bytes: from kn to dissipatedEnergy.
 	static constexpr std::size_t ofEveryStep = 192;
 
 	// Valid for the law of this revision.
@@ -142,6 +144,8 @@ public:
 	Real getDissipatedEnergy() const;
 	long bridgeCount() const;
 	long contactCount() const;
+	/// What packs take of the law: its kinds for the time step of `step`, and into `step` its switches.
+	std::vector<::dembark::PairLaw<double>> forPacks(::dembark::PairStep& step);
 	FUNCTOR2D(ScGeom, FinnieRabinowiczPhys);
 
 	const shared_ptr<LiquidExchange> exchange = boost::make_shared<LiquidExchange>();
@@ -172,12 +176,13 @@ private:
 	::dembark::ContactForce act(FinnieRabinowiczPhys&, const Interaction&, const dembark_yade::ContactView& view);
 	void reportBridge(FinnieRabinowiczPhys&, const Interaction&, const ::dembark::ContactBodies&, double overlap, double volumeBefore);
 
-	::dembark::NormalLaw        normal   = ::dembark::NormalLaw::hertz;
-	::dembark::Presliding       path     = ::dembark::Presliding::linear;
-	::dembark::RollingModel     rolling  = ::dembark::RollingModel::off;
-	bool                        wet      = false;
-	::dembark::capillary::Model model    = ::dembark::capillary::Model::exact;
-	long                        revision = 0;
+	::dembark::NormalLaw        normal  = ::dembark::NormalLaw::hertz;
+	::dembark::Presliding       path    = ::dembark::Presliding::linear;
+	::dembark::RollingModel     rolling = ::dembark::RollingModel::off;
+	bool                        wet     = false;
+	::dembark::capillary::Model model   = ::dembark::capillary::Model::exact;
+	bool                        damped = true, limited = false;
+	std::atomic<long>           revision{0};
 	dembark_yade::LawKinds      kinds;  // of this revision
 };
 REGISTER_SERIALIZABLE(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz);

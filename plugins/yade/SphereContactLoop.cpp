@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 #include <typeinfo>
+#include <utility>
 
 #include <core/Scene.hpp>
 #include <pkg/common/Sphere.hpp>
@@ -33,34 +34,44 @@ void prefetch(const void* from, std::size_t bytes) {
 	for (std::size_t at = 0; at < bytes; at += 64) __builtin_prefetch(static_cast<const char*>(from) + at);
 }
 
+}  // namespace
+
 /// Interactions, their geometry and physics are strewn over the memory: the loop asks for those that come next while it works.
-void fetchAhead(const InteractionContainer& all, long i, long end) {
+void SphereContactLoop::fetchAhead(const InteractionContainer& all, long i, long end) const {
 	constexpr long far = 32, near = 16;
-	if (i + far < end) prefetch(all[i + far].get(), sizeof(Interaction));
-	if (i + near >= end || !all[i + near]->isReal()) return;
+	const auto     looksAt = [&](long k) { return k < end && all[k] != distant[k].interaction; };
+	if (looksAt(i + far)) prefetch(all[i + far].get(), sizeof(Interaction));
+	if (!looksAt(i + near) || !all[i + near]->isReal()) return;
 	prefetch(all[i + near]->geom.get(), sizeof(ScGeom));
 	prefetch(all[i + near]->phys.get(), FinnieRabinowiczPhys::ofEveryStep);
 }
 
-}  // namespace
+/// Whether both are spheres, too far apart to touch.
+bool SphereContactLoop::separated(Body::id_t id1, Body::id_t id2, const Vector3i& cellDist) const {
+	if (!spheres.known(id1) || !spheres.known(id2)) return false;
+	const bool     across = scene->isPeriodic && !cellDist.isZero();
+	const Vector3r shift  = across ? scene->cell->intrShiftPos(cellDist) : Vector3r::Zero();
+	const Real     sum    = spheres.radius(id1) + spheres.radius(id2);
+	return (spheres.pos(id2) + shift - spheres.pos(id1)).squaredNorm() > reach * sum * sum;
+}
 
-/// What the short way does for the pair: nothing, or no more than to see that it is too far apart to touch (`reach`: over the sum of the
-/// radii, squared), or its step.
-SphereContactLoop::Way SphereContactLoop::take(const shared_ptr<Interaction>& interaction, Real reach, ContactPacks& packs) {
+/// What the short way does for the pair: nothing, or no more than to see that it is too far apart to touch, or its step.
+SphereContactLoop::Way SphereContactLoop::take(const shared_ptr<Interaction>& interaction, ContactPacks& packs) {
 	if (!meeting || interaction->functorCache.geom.get() != meeting) return Way::none;
 	const Body::id_t id1 = interaction->getId1(), id2 = interaction->getId2();
+	if (!interaction->isReal()) return separated(id1, id2, interaction->cellDist) ? Way::apart : Way::none;
 	if (!spheres.known(id1) || !spheres.known(id2)) return Way::none;
 	const bool     across = scene->isPeriodic && !interaction->cellDist.isZero();
 	const Vector3r shift  = across ? scene->cell->intrShiftPos(interaction->cellDist) : Vector3r::Zero();
 	const Vector3r pos1 = spheres.pos(id1), pos2 = spheres.pos(id2) + shift;
 	const Real     radius1 = spheres.radius(id1), radius2 = spheres.radius(id2), sum = radius1 + radius2;
 	const Real     squared = (pos2 - pos1).squaredNorm();
-	if (!interaction->isReal()) return squared > reach * sum * sum ? Way::apart : Way::none;
 	if (!law || interaction->functorCache.constLaw.get() != law || interaction->functorCache.phys.get() != physics) return Way::none;
 	auto& phys = static_cast<FinnieRabinowiczPhys&>(*interaction->phys);
 	if (phys.preparedBy != law->revision || !(spheres.dynamic(id1) || spheres.dynamic(id2))) return Way::none;
 	// The law has the last word on whether those at the very end of a contact touch.
-	if (phys.kind >= 0 && squared < (1.0 - 1e-9) * sum * sum) {
+	// So it has where there is no normal.
+	if (packs.know(phys) && squared > 0.0 && squared < (1.0 - 1e-9) * sum * sum) {
 		packs.add(*interaction, phys, across);
 		return Way::touching;
 	}
@@ -125,7 +136,10 @@ void SphereContactLoop::action() {
 	const InteractionContainer& all     = *scene->interactions;
 	const bool                  removal = all.iterColliderLastRun >= 0 && all.iterColliderLastRun == scene->iter;
 	shortWay = packed = 0;
-	if (!callbacks.empty() || loopOnSortedInteractions || removal) return InteractionLoop::action();
+	if (!callbacks.empty() || loopOnSortedInteractions || removal) {
+		distant.clear();
+		return InteractionLoop::action();
+	}
 
 	geomDispatcher->scene = physDispatcher->scene = lawDispatcher->scene = scene;
 	geomDispatcher->updateScenePtr();
@@ -136,16 +150,17 @@ void SphereContactLoop::action() {
 	physics                 = lastOf<Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys>(physDispatcher->functors);
 	law                     = lastOf<Law>(lawDispatcher->functors);
 	// A little beyond where the functor sees a contact: it has the last word there.
-	const Real reach = pairs ? 1.000001 * pairs->interactionDetectionFactor * pairs->interactionDetectionFactor : 0.0;
+	reach            = pairs ? 1.000001 * pairs->interactionDetectionFactor * pairs->interactionDetectionFactor : 0.0;
 	const long count = static_cast<long>(scene->interactions->size());
 	long       taken = 0, inPacks = 0;
 	int        threads = 1;
 #ifdef YADE_OPENMP
 	threads = ompThreads > 0 ? std::min(ompThreads, omp_get_max_threads()) : omp_get_max_threads();
 #endif
+	if (std::exchange(distantFor, meeting) != meeting) distant.clear();
+	distant.resize(count);
 	if (count == 0) return;
 	spheres.collect(*scene, threads);
-	const auto kinds = law ? law->kinds.laws(scene->dt) : std::vector<::dembark::PairLaw<double>>();
 	// Blocks: no thread looks at what another one works on.
 	const long size   = std::clamp(count / (4 * threads), 16L, 256L);
 	const auto safely = [this](auto work) {
@@ -159,17 +174,20 @@ void SphereContactLoop::action() {
 #pragma omp parallel num_threads(threads) reduction(+ : taken, inPacks)
 #endif
 	{
-		ContactPacks packs(*scene, spheres, law, kinds);
+		ContactPacks packs(*scene, spheres, law);
 #ifdef YADE_OPENMP
 #pragma omp for schedule(guided) nowait
 #endif
 		for (long begin = 0; begin < count; begin += size) {
 			const long end = std::min(begin + size, count);
-			if (dembark_yade::postponed(*scene)) continue;
-			for (long i = begin; i < end; ++i)
+			for (long i = begin; i < end && !dembark_yade::postponed(*scene); ++i)
 				safely([&] {
 					fetchAhead(all, i, end);
-					const Way way = take(all[i], reach, packs);
+					Apart& known = distant[i];
+					if (known.interaction == all[i] && separated(known.id1, known.id2, known.cellDist)) return;
+					const Way way = take(all[i], packs);
+					if (way == Way::apart) known = {all[i], all[i]->getId1(), all[i]->getId2(), all[i]->cellDist};
+					else known.interaction.reset();
 					if (way == Way::none) dispatch(all[i], packs);
 					taken += way == Way::touching;
 				});

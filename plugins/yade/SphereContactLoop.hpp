@@ -14,7 +14,7 @@ public:
 	// clang-format off
 	YADE_CLASS_BASE_DOC_ATTRS(SphereContactLoop,InteractionLoop,":yref:`InteractionLoop`, faster where :yref:`spheres<Sphere>` meet under :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz` with :yref:`Ig2_Sphere_Sphere_ScGeom`; same arguments, and on one thread the same trajectories to the last bit. All other interactions are dispatched as there. Of the geometry of the pairs that take the short way the normal, the point of contact, the depth and the radii are kept up; :yref:`ScGeom.shearInc` and the axes of rotation, which this law does not use, are not.",
 		((long,shortWay,0,Attr::readonly,"Contacts of the last step that took the short way"))
-		((long,packed,0,Attr::readonly,"Those of them that were computed in packs"))
+		((long,packed,0,(Attr::readonly|Attr::noSave),"Those of them that were computed in packs"))
 	);
 	// clang-format on
 
@@ -22,13 +22,26 @@ private:
 	typedef Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz Law;
 
 	enum class Way { none, apart, touching };
-	Way  take(const shared_ptr<Interaction>&, Real reach, dembark_yade::ContactPacks&);
+	/// A potential interaction of spheres that were too far apart, held so that none other can stand at its address. Only this loop
+	/// makes it real.
+	struct Apart {
+		shared_ptr<Interaction> interaction;
+		Body::id_t              id1 = 0, id2 = 0;
+		Vector3i                cellDist;
+	};
+
+	void fetchAhead(const InteractionContainer&, long i, long end) const;
+	bool separated(Body::id_t, Body::id_t, const Vector3i& cellDist) const;
+	Way  take(const shared_ptr<Interaction>&, dembark_yade::ContactPacks&);
 	void dispatch(const shared_ptr<Interaction>&, dembark_yade::ContactPacks&);
 
-	dembark_yade::Spheres spheres;            // of this step
-	const IGeomFunctor*   meeting = nullptr;  // of two spheres, of this step
-	const IPhysFunctor*   physics = nullptr;
-	Law*                  law     = nullptr;
+	dembark_yade::Spheres spheres;               // of this step
+	std::vector<Apart>    distant;               // by place in the container: seen without a look at the interaction
+	const IGeomFunctor*   distantFor = nullptr;  // the functor that they know
+	Real                  reach      = 0;        // of its contacts, over the sum of the radii, squared
+	const IGeomFunctor*   meeting    = nullptr;  // of two spheres, of this step
+	const IPhysFunctor*   physics    = nullptr;
+	Law*                  law        = nullptr;
 };
 REGISTER_SERIALIZABLE(SphereContactLoop);
 

@@ -46,6 +46,21 @@ def test_same_liquid_and_motion_as_in_the_engines_loop(tmp_path):
     assert held == pytest.approx(other, rel=1e-10)
 
 
+PULLED = LIQUID.replace("run 1000\n", "run 998\ngroup two type 2\ndisplace_atoms two move 1e-4 0 1e-4\nrun 2\n")
+
+
+@pytest.mark.parametrize(("ranks", "lanes"), [(1, 2), (2, 4), (2, 8)])
+def test_liquid_of_bridges_that_a_displacement_breaks_is_given_back(tmp_path, monkeypatch, ranks, lanes):
+    """They are longer than they may be in a set-up, which changes nothing, and break in the step after it."""
+    words = {"deck": PULLED, "cohesion": "cohesion capillary", "settings": "carried_liquid on"}
+    monkeypatch.setenv("DEMBARK_LANES", str(lanes))
+    ours = frames(tmp_path / "ours", rolling="", ranks=ranks, **words)
+    engine = frames(tmp_path / "engine", rolling="rolling_friction cdt", **words)
+    assert deviation(ours, engine) < 1e-9
+    held, other = (float((tmp_path / loop / "liquid.txt").read_text().split()[-1]) for loop in ("ours", "engine"))
+    assert held == pytest.approx(other, rel=1e-9)
+
+
 def test_same_motion_on_two_ranks(tmp_path):
     words = {"cohesion": "cohesion capillary", "rolling": "", "settings": ""}
     assert deviation(frames(tmp_path / "two", ranks=2, **words), frames(tmp_path / "one", **words)) < 1e-10

@@ -74,7 +74,7 @@ inline void gather(const PairStep& s, PairBlock& b, int found) {
     const int place = b.pick[k] >> 1;
     b.history[k] = s.histories[i] + static_cast<long>(s.stride) * place;
     b.flags[k] = s.flags[i] + place;
-    b.kind[k] = s.types == 2 ? 3 : s.type[i] * s.types + s.type[j];
+    b.kind[k] = s.type[i] * s.types + s.type[j];
     // By the time that the pair's turn has come these are there.
     __builtin_prefetch(b.history[k] + s.offset, 1);
     __builtin_prefetch(b.history[k] + s.offset + 4, 1);
@@ -220,7 +220,7 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
   for (int first = 0; first < found; first += N) {
     const int *i = b.grain + first, *j = b.partner + first, count = found - first < N ? found - first : N;
     const unsigned there = (1u << count) - 1;
-    if (s.types != 2) law = laws_of_kinds<P>(s.laws, b.kind + first);
+    if (!s.one_law) law = laws_of_kinds<P>(s.laws, b.kind + first);
     const P radius_i = values<P>(s.radius, i), radius_j = values<P>(s.radius, j), radius_sum = radius_i + radius_j;
     const PackVec<P> delta = rows3<P>(s.x, i) - rows3<P>(s.x, j);
     const P squared = dot(delta, delta), distance = sqrt(squared), overlap = radius_sum - distance, half = 0.5 * overlap;

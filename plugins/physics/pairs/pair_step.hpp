@@ -84,7 +84,8 @@ struct PairStep {
   ScalarMemory* memory = nullptr;         ///< asked with `rings` or `rolls` only
   ResultStore* results = nullptr;         ///< takes the forces in place of `f` and `torque`, unless null
   const PairLaw<double>* laws = nullptr;  ///< one a pair of types, row by row
-  int types = 0;                          ///< in a row; with 2, only the pair 1-1 is there
+  int types = 0;                          ///< in a row
+  bool one_law = false;                   ///< for all contacts that come
   int owned = 0;                          ///< grains from here on get no forces
   int offset = 0;                         ///< of friction in a history
   int rings = -1;                         ///< of partial slip; -1: there is none

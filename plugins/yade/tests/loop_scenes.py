@@ -172,6 +172,31 @@ def crowd(kind):
 
 
 @both
+def cell(kind):
+    """Wet grains in a sheared cell, for as long as round-off stays small."""
+    loop, law = scene_with(kind, column(), WET, {"capillaryModel": "willett"}, geometry=[Ig2_Sphere_Sphere_ScGeom()])
+    O.engines[-1].gravity = Vector3(0, 0, 0)
+    O.periodic = True
+    O.cell.setBox(2.5 * D, 2.5 * D, 20 * D)
+    O.cell.velGrad = Matrix3(0, 0, 2, 0, 0, 0, 0, 0, -18)
+    advance(5000)
+    return left(loop, law)
+
+
+@both
+def coincident(kind):
+    """Two spheres in one place, in the plane."""
+    loop, law = scene_with(kind, [utils.sphere((0, 0, 0), 0.5 * D), utils.sphere((0.9 * D, 0, 0), 0.5 * D)])
+    O.engines[-1].gravity = Vector3(0, 0, 0)
+    for body in O.bodies:
+        body.state.blockedDOFs = "zXY"
+    advance(3)
+    O.bodies[1].state.pos = O.bodies[0].state.pos
+    advance(1)
+    return left(loop, law)
+
+
+@both
 def callback(kind):
     """A callback of every contact: YADE's own way is taken."""
     loop, law = scene_with(kind, walls() + column())

@@ -8,7 +8,7 @@ SCENES = ("dry", "wet", "partial_slip", "carried", "periodic", "odd_bodies", "ch
 
 @pytest.fixture(scope="module")
 def found(yade):
-    return yade.scenes(*SCENES, "crowd", "callback", "said", "no_number", script="loop_scenes.py")
+    return yade.scenes(*SCENES, "coincident", "crowd", "cell", "callback", "said", "no_number", script="loop_scenes.py")
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -57,13 +57,23 @@ def test_packs_of_any_width_give_the_same_bits(yade, found, monkeypatch, lanes):
         assert both["short"] == found[scene]["short"], scene
 
 
+def test_what_has_no_normal_is_left_to_the_law(found):
+    stock, short = found["coincident"]["stock"], found["coincident"]["short"]
+    assert stock["count"] == short["short"] == 1
+    assert short["packed"] == 0
+    assert (short["bodies"], short["contacts"]) == (stock["bodies"], stock["contacts"])
+
+
 def test_two_threads_sum_forces_in_another_order_only(yade, found):
-    one, two = found["crowd"], yade.scenes("crowd", script="loop_scenes.py", threads=2)["crowd"]
-    assert one["short"]["count"] > 1000  # several blocks a thread
-    for loop in ("stock", "short"):
-        assert two[loop]["count"] == one["stock"]["count"]
-        assert two[loop]["lost"] == pytest.approx(one["stock"]["lost"], rel=1e-9)
-        assert two[loop]["fall"] == pytest.approx(one["stock"]["fall"], rel=1e-12)
+    assert found["crowd"]["short"]["count"] > 1000  # several blocks a thread
+    for scene, two in yade.scenes("crowd", "cell", script="loop_scenes.py", threads=2).items():
+        one = found[scene]
+        for loop in ("stock", "short"):
+            assert two[loop]["count"] == one["stock"]["count"] > 20
+            assert two[loop]["bridges"] == one["stock"]["bridges"]
+            assert two[loop]["lost"] == pytest.approx(one["stock"]["lost"], rel=1e-9)
+            assert two[loop]["fall"] == pytest.approx(one["stock"]["fall"], rel=1e-12)
+    assert found["cell"]["stock"]["bridges"] > 20
 
 
 def test_mistakes_are_told_in_one_line(found):
