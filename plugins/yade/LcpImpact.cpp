@@ -13,6 +13,7 @@
 
 #include "CylinderWall.hpp"
 #include "SavedNumbers.hpp"
+#include "engine_access.hpp"
 #include "report.hpp"
 
 namespace yade {
@@ -238,6 +239,7 @@ void LcpImpact::prepare() {
 }
 
 void LcpImpact::action() {
+	dembark_yade::keepThreadState();
 	if (scene->isPeriodic) fail("LcpImpact: the scene is periodic; use an aperiodic one");
 	if (stiffnessRows.empty()) fail("LcpImpact.stiffness is not set; give the stiffness of the logs' boundaries in N/m");
 	const bool first = steps == 0 && velocityAtStart;

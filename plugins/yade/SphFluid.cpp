@@ -12,6 +12,7 @@
 
 #include "ContactView.hpp"
 #include "SavedNumbers.hpp"
+#include "engine_access.hpp"
 #include "engine_order.hpp"
 #include "report.hpp"
 
@@ -192,6 +193,7 @@ void SphFluid::push() {
 }
 
 void SphFluid::action() {
+	dembark_yade::keepThreadState();
 	using namespace sph_fluid;
 	const Vector3r& now   = weight();
 	const bool      again = scene->iter == lastIteration;

@@ -10,6 +10,7 @@
 #include <pkg/dem/Ig2_Sphere_Sphere_ScGeom.hpp>
 
 #include "ContactView.hpp"
+#include "engine_access.hpp"
 #include "report.hpp"
 
 namespace yade {
@@ -133,6 +134,7 @@ void SphereContactLoop::dispatch(const shared_ptr<Interaction>& interaction, Con
 }
 
 void SphereContactLoop::action() {
+	dembark_yade::keepThreadState();
 	const InteractionContainer& all     = *scene->interactions;
 	const bool                  removal = all.iterColliderLastRun >= 0 && all.iterColliderLastRun == scene->iter;
 	shortWay = packed = 0;

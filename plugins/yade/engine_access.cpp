@@ -1,3 +1,5 @@
+#include <Python.h>
+
 #include "engine_access.hpp"
 
 #include <core/BodyContainer.hpp>
@@ -36,6 +38,13 @@ std::pair<Vector3r*, Vector3r*> threadForces(Scene& scene) {
 #else
 	return {forcesOf(scene.forces).data(), torquesOf(scene.forces).data()};
 #endif
+}
+
+void keepThreadState() {
+	static thread_local bool asked = false;
+	if (std::exchange(asked, true) || PyGILState_GetThisThreadState()) return;
+	PyGILState_Ensure();  // never released
+	PyEval_SaveThread();
 }
 
 }  // namespace yade::dembark_yade

@@ -76,6 +76,10 @@ def test_two_threads_sum_forces_in_another_order_only(yade, found):
     assert found["cell"]["stock"]["bridges"] > 20
 
 
+def test_python_keeps_what_it_knows_of_the_thread(yade):
+    assert yade.scenes("interpreter", script="loop_scenes.py")["interpreter"] == {"stock": [1] * 3, "short": [1, 2, 3]}
+
+
 def test_mistakes_are_told_in_one_line(found):
     said = found["said"]
     assert said["restitution"].startswith("dembark: restitution of materials 0 and 0 is 2;")
