@@ -16,12 +16,13 @@
 
 #include "dembark/contact.hpp"
 #include "dembark/contact_history.hpp"
+#include "shared_fix.h"
 
 namespace dembark_liggghts {
 
 typedef dembark::Vec3<double> Vec3;
 
-inline Vec3 vector(const double* v) { return {v[0], v[1], v[2]}; }
+using dembark_family::vector;
 
 /// The two bodies but for their masses, which the models do not ask for.
 inline dembark::ContactBodies bodies(const LIGGGHTS::ContactModels::SurfacesCloseData& d, double* const* omega) {

@@ -43,7 +43,7 @@ const Loops &loops_of_processor() {
   return portable_loops();
 }
 
-Vector vector(const double *v) { return {v[0], v[1], v[2]}; }
+using dembark_family::vector;
 
 }  // namespace
 
