@@ -33,11 +33,12 @@ def _end_with(parent: BaseProcess) -> None:
     os._exit(1)
 
 
-def mapped(function: Callable[[Item], Found], items: Sequence[Item], few: int = _FEW) -> list[Found]:
-    """`function` of each of `items`, in their order; by as many processes as there are cores when there are more than `few`, for which
-    all three must be picklable. What `function` raises is raised here; RunError when a process was killed."""
+def mapped(function: Callable[[Item], Found], items: Sequence[Item]) -> list[Found]:
+    """`function` of each of `items`, in their order; by as many processes as there are cores when they are many, for which
+    `function`, items and what comes of them must be picklable. What `function` raises is raised here; RunError when a process was
+    killed."""
     cores = len(os.sched_getaffinity(0))
-    if cores == 1 or len(items) <= few:
+    if cores == 1 or len(items) <= _FEW:
         return [function(item) for item in items]
     # A process with threads of Python must not be copied; one that is begun anew imports all again.
     method = "fork" if threading.active_count() == 1 else "spawn"

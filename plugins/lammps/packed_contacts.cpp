@@ -10,6 +10,7 @@
 
 #include "contact_call.h"
 #include "fix_capillary_liquid.h"
+#include "pair_grains.h"
 
 namespace dembark_lammps {
 
@@ -47,44 +48,28 @@ void PackedContacts::step(const LAMMPS_NS::NeighList& list, const NeighborHistor
   // The rolling spring stands behind the rings.
   const int rings = layout_.rings ? layout_.rings_at() : -1;
   const int more = layout_.rings || layout_.rolling ? layout_.rings_at() : -1;
-  packs_.lists({*this,
-                this,
-                nullptr,
-                laws_.data(),
-                atom->ntypes + 1,
-                atom->ntypes == 1,
-                force->newton_pair ? atom->nlocal + atom->nghost : atom->nlocal,
-                0,
-                rings,
-                more,
-                layout_.imbalance_at() - layout_.rings_at(),
-                update->dt,
-                layout_.bridge,
-                any.limit_force,
-                any.tangential_damping,
-                any.friction.presliding != dembark::Presliding::exponential,  // the scalar law knows that curve
-                any.rolling.model != dembark::RollingModel::off,
-                atom->x[0],
-                atom->v[0],
-                atom->omega[0],
-                atom->radius,
-                atom->rmass,
-                atom->type,
-                atom->mask,
-                atom->f[0],
-                atom->torque[0],
-                freeze_bit_,
-                list.inum,
-                layout_.size(),
-                list.ilist,
-                list.numneigh,
-                list.firstneigh,
-                history.firstflag,
-                history.firstvalue,
-                NEIGHMASK,
-                1,
-                1},
-               *block_);
+  dembark::PairStep step{*this};
+  dembark_family::describe_pairs(step, *atom, list);
+  step.memory = this;
+  step.laws = laws_.data();
+  step.types = atom->ntypes + 1;
+  step.one_law = atom->ntypes == 1;
+  step.owned = force->newton_pair ? atom->nlocal + atom->nghost : atom->nlocal;
+  step.rings = rings;
+  step.more = more;
+  step.more_numbers = layout_.imbalance_at() - layout_.rings_at();
+  step.dt = update->dt;
+  step.wet = layout_.bridge;
+  step.limit_force = any.limit_force;
+  step.tangential_damping = any.tangential_damping;
+  step.pack_friction = any.friction.presliding != dembark::Presliding::exponential;  // the scalar law knows that curve
+  step.rolls = any.rolling.model != dembark::RollingModel::off;
+  step.frozen = freeze_bit_;
+  step.stride = layout_.size();
+  step.flags = history.firstflag;
+  step.histories = history.firstvalue;
+  step.contact_flags = step.bridge_flag = 1;
+  packs_.lists(step, *block_);
 }
 
 const ContactParameters& PackedContacts::law(const PairBlock& block, int k) const {

@@ -86,7 +86,7 @@ void LiquidFix::report(const capillary::BridgeSides& sides, double radius, doubl
   request.imbalance = imbalance;
   request.force = law.force;
   request.primitive_wall = primitive_wall;
-  request_bridge(request);
+  requests_.push_back(request);
 }
 
 void LiquidFix::pre_force(int) {

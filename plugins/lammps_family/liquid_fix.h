@@ -49,7 +49,6 @@ class LiquidFix : public SharedFix {
   void write_restart(FILE* file) override;
   void restart(char* buffer) override;
 
-  void request_bridge(const Request& request) { requests_.push_back(request); }
   void bridge_broke(const dembark::capillary::BrokenBridge& bridge) { broken_.push_back(bridge); }
   /// After a step of a contact: `before` is its bridge's volume (m^3) before it, `bridge` its volume and rupture distance (m) now,
   /// `imbalance` as in NewBridge; where these stand until the end of the step. A bridge that broke gives its liquid back, a touching

@@ -29,6 +29,7 @@
 #include "fix_capillary_liquid.h"
 #include "fix_energy_account.h"
 #include "model_properties.h"
+#include "pair_grains.h"
 #include "pair_parameters.h"
 #include "shared_fix.h"
 
@@ -261,44 +262,30 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     const int numbers = (rings_offset_ >= 0 ? ring_numbers : 0) + (angle_offset_ >= 0 ? 3 : 0);
     namespace models = LIGGGHTS::ContactModels;
     const LAMMPS_NS::NeighList &list = *pair->list, &histories = *list.listgranhistory;
-    packs_.lists({*this,
-                  this,
-                  nullptr,
-                  laws_.data(),
-                  friction_.types() + 1,
-                  friction_.types() == 1,
-                  owned,
-                  friction_offset_,
-                  rings_offset_,
-                  more,
-                  numbers,
-                  dt_,
-                  wet,
-                  limit_force_,
-                  tangential_damping_,
-                  pack_friction,
-                  rolling_model_ != dembark::RollingModel::off,
-                  atom.x[0],
-                  atom.v[0],
-                  atom.omega[0],
-                  atom.radius,
-                  atom.rmass,
-                  atom.type,
-                  atom.mask,
-                  atom.f[0],
-                  atom.torque[0],
-                  pair->freeze_group_bit(),
-                  list.inum,
-                  pair->dnum(),
-                  list.ilist,
-                  list.numneigh,
-                  list.firstneigh,
-                  histories.firstneigh,
-                  histories.firstdouble,
-                  NEIGHMASK,
-                  models::CONTACT_NORMAL_MODEL | models::CONTACT_TANGENTIAL_MODEL,
-                  models::CONTACT_COHESION_MODEL},
-                 *block_);
+    dembark::PairStep step{*this};
+    dembark_family::describe_pairs(step, atom, list);
+    step.memory = this;
+    step.laws = laws_.data();
+    step.types = friction_.types() + 1;
+    step.one_law = friction_.types() == 1;
+    step.owned = owned;
+    step.offset = friction_offset_;
+    step.rings = rings_offset_;
+    step.more = more;
+    step.more_numbers = numbers;
+    step.dt = dt_;
+    step.wet = wet;
+    step.limit_force = limit_force_;
+    step.tangential_damping = tangential_damping_;
+    step.pack_friction = pack_friction;
+    step.rolls = rolling_model_ != dembark::RollingModel::off;
+    step.frozen = pair->freeze_group_bit();
+    step.stride = pair->dnum();
+    step.flags = histories.firstneigh;
+    step.histories = histories.firstdouble;
+    step.contact_flags = models::CONTACT_NORMAL_MODEL | models::CONTACT_TANGENTIAL_MODEL;
+    step.bridge_flag = models::CONTACT_COHESION_MODEL;
+    packs_.lists(step, *block_);
   }
 };
 

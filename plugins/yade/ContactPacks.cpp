@@ -30,22 +30,20 @@ void Spheres::collect(const Scene& scene, int threads) {
 	radii.resize(rooms);
 	masses.resize(rooms);
 	fixed.resize(rooms);
-	roles.resize(count);
+	isSphere.resize(count);
 	anyHeld = false;
 	for (long id = 0; id < count; ++id) {
 		const Body* const body = (*scene.bodies)[id].get();
 		const auto* const sphere =
 			body && body->shape && typeid(*body->shape) == typeid(Sphere) ? static_cast<Sphere*>(body->shape.get()) : nullptr;
-		bool isSphere = sphere && !body->isClump();
+		isSphere[id] = sphere && !body->isClump();
 #ifdef YADE_MPI
-		isSphere = isSphere && body->subdomain == scene.subdomain;
+		isSphere[id] = isSphere[id] && body->subdomain == scene.subdomain;
 #endif
-		roles[id] = Role::none;
-		if (!isSphere) continue;
+		if (!isSphere[id]) continue;
 		const State& state = *body->state;
 		set(id, state.pos, state.vel, state.angVel, sphere->radius, inertialMass(*body));
-		roles[id] = fixed[id] ? Role::held : Role::free;
-		anyHeld   = anyHeld || fixed[id];
+		anyHeld = anyHeld || fixed[id];
 	}
 }
 
@@ -81,15 +79,15 @@ ContactPacks::ContactPacks(Scene& ofScene, Spheres& ofSpheres, Law* law) : scene
 	std::tie(forces, torques) = threadForces(scene);
 }
 
-void ContactPacks::add(const Interaction& interaction, FinnieRabinowiczPhys& data, bool across) {
+void ContactPacks::add(const Interaction& interaction, FinnieRabinowiczPhys& data) {
 	if (waiting == Block::capacity) finish();
 	const int        k   = waiting++;
 	const Body::id_t id2 = interaction.getId2();
 	block.grain[k]       = interaction.getId1();
 	block.partner[k]     = id2;
-	if (across)
-		block.partner[k] = spheres.addImage(threadNumber(), k, id2, scene.cell->intrShiftPos(interaction.cellDist),
-		                                    scene.cell->intrShiftVel(interaction.cellDist));
+	if (crosses(scene, interaction.cellDist))
+		block.partner[k] = spheres.addImage(threadNumber(), k, id2, imageShift(scene, interaction.cellDist),
+		                                    imageDrift(scene, interaction.cellDist));
 	block.kind[k]               = data.kind;
 	block.history[k]            = histories[k];
 	partner[k]                  = id2;
@@ -109,14 +107,9 @@ void ContactPacks::finish() {
 
 ContactPacks::Vec3 ContactPacks::friction(const Block& b, int k, const Vec3& normal, double twist,
                                           const ::dembark::NormalResponse<double>& response, const Vec3& velocity) {
-	double* const                    history = b.history[k];
-	::dembark::FrictionState<double> state{{history[0], history[1], history[2]}, history[3], history[4]};
+	auto       state = ::dembark::load_friction(b.history[k]);
 	const Vec3 force = contact_friction(phys[k]->contact.friction, normal, twist, response, velocity, step.dt, state, nullptr);
-	history[0]       = state.displacement.x;
-	history[1]       = state.displacement.y;
-	history[2]       = state.displacement.z;
-	history[3]       = state.slip;
-	history[4]       = state.dissipated_energy;
+	::dembark::store_friction(b.history[k], state);
 	return force;
 }
 

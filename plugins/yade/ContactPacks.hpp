@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "FinnieRabinowicz.hpp"
+#include "dembark/contact_history.hpp"
 #include "dembark/pairs/pair_step.hpp"
 
 namespace yade::dembark_yade {
@@ -16,8 +17,8 @@ class Spheres {
 public:
 	void collect(const Scene& scene, int threads);
 
-	bool     known(Body::id_t id) const { return roles[id] != Role::none; }
-	bool     dynamic(Body::id_t id) const { return roles[id] == Role::free; }
+	bool     known(Body::id_t id) const { return isSphere[id]; }
+	bool     dynamic(Body::id_t id) const { return !fixed[id]; }
 	Real     radius(long at) const { return radii[at]; }
 	Real     mass(long at) const { return masses[at]; }
 	Vector3r pos(long at) const { return Vector3r::Map(&places[3 * at]); }
@@ -29,14 +30,11 @@ public:
 	void describe(::dembark::PairStep& step) const;
 
 private:
-	/// Pairs of a body that is no sphere are dispatched.
-	enum class Role : char { none, held, free };
-
 	void set(long at, const Vector3r& pos, const Vector3r& vel, const Vector3r& angVel, Real radius, Real mass);
 
 	std::vector<double> places, velocities, spins, radii, masses;
-	std::vector<Role>   roles;  // by id
-	std::vector<int>    fixed;  // by place: 1 if the mass is infinite, as packs want it
+	std::vector<char>   isSphere;  // by id; pairs of other bodies are dispatched
+	std::vector<int>    fixed;     // by place: 1 if the mass is infinite, as packs want it
 	long                count   = 0;
 	bool                anyHeld = false;
 };
@@ -51,7 +49,7 @@ public:
 	/// Whether packs know the law of the contact.
 	bool know(const FinnieRabinowiczPhys& data) const { return data.kind >= 0 && data.kind < static_cast<int>(kinds.size()); }
 	/// Such a contact, of spheres that touch. Computes those that wait when there is no room for more.
-	void add(const Interaction&, FinnieRabinowiczPhys&, bool across);
+	void add(const Interaction&, FinnieRabinowiczPhys&);
 	/// Computes all that wait, unless the run is about to stop: before forces are added in any other way, so that all are summed in the
 	/// order of the interactions.
 	void finish();

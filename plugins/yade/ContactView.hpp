@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <core/Body.hpp>
+#include <core/Scene.hpp>
 #include <pkg/dem/ScGeom.hpp>
 
 #include "dembark/contact.hpp"
@@ -12,6 +13,16 @@ namespace yade::dembark_yade {
 
 inline ::dembark::Vec3<double> vec(const Vector3r& v) { return {v[0], v[1], v[2]}; }
 inline Vector3r                vec(const ::dembark::Vec3<double>& v) { return Vector3r(v.x, v.y, v.z); }
+
+/// Whether an interaction crosses a border of the periodic cell; and where (m) the image of its body 2 then is that takes part in it, from
+/// the body, and how much faster (m/s): zero otherwise.
+inline bool     crosses(const Scene& scene, const Vector3i& cellDist) { return scene.isPeriodic && !cellDist.isZero(); }
+inline Vector3r imageShift(const Scene& scene, const Vector3i& cellDist) {
+	return crosses(scene, cellDist) ? scene.cell->intrShiftPos(cellDist) : Vector3r::Zero();
+}
+inline Vector3r imageDrift(const Scene& scene, const Vector3i& cellDist) {
+	return crosses(scene, cellDist) ? scene.cell->intrShiftVel(cellDist) : Vector3r::Zero();
+}
 
 /// Mass (kg) against contacts: infinite of a body that is not dynamic.
 inline double inertialMass(const Body& body) { return body.isDynamic() ? body.state->mass : INFINITY; }

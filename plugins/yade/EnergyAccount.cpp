@@ -250,9 +250,8 @@ void EnergyAccount::recordContact(Contact& c, const Interaction& interaction) co
 	// Without a law that has seen it, or between two held bodies, a contact has no force.
 	if (phys.preparedBy < 0 || !((phys.wallBody != 1 && body1.isDynamic()) || (phys.wallBody != 2 && body2.isDynamic()))) return;
 
-	Vector3r shift = Vector3r::Zero();
-	if (scene->isPeriodic) shift = scene->cell->intrShiftPos(interaction.cellDist);
-	dembark_yade::ContactView view(phys.wallBody, *static_cast<const ScGeom*>(interaction.geom.get()), body1, body2, shift);
+	dembark_yade::ContactView view(phys.wallBody, *static_cast<const ScGeom*>(interaction.geom.get()), body1, body2,
+	                               dembark_yade::imageShift(*scene, interaction.cellDist));
 	view.move(body1.state->vel, body1.state->angVel, body2.state->vel, body2.state->angVel);
 	const auto                      on1      = [&](const Vector3r& force) { return vec(Vector3r(view.sign() * force)); };
 	const ::dembark::Vec3<Real>     along    = on1(phys.normalForce);

@@ -5,6 +5,7 @@
 
 #include <core/Scene.hpp>
 
+#include "ContactView.hpp"
 #include "report.hpp"
 
 namespace yade {
@@ -96,9 +97,8 @@ void FacetSurface::action() {
 		const auto&   body   = Body::byId(each->getId2(), scene);
 		const Sphere* sphere = body ? dynamic_cast<const Sphere*>(body->shape.get()) : nullptr;
 		if (!sphere) continue;
-		Vector3r centre = body->state->pos;
-		if (scene->isPeriodic) centre += scene->cell->intrShiftPos(each->cellDist);
-		const int now = surface.follow(facet, xyz(centre), sphere->radius);
+		const Vector3r centre = body->state->pos + dembark_yade::imageShift(*scene, each->cellDist);
+		const int      now    = surface.follow(facet, xyz(centre), sphere->radius);
 		if (now != facet) moved.push_back({each, now});
 	}
 	for (const auto& [interaction, facet] : moved) handOver(interaction, facet);

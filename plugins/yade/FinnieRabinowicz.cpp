@@ -339,12 +339,7 @@ bool Law2::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* i
 	const State&     state2 = *body2.state;
 	if (phys.preparedBy != revision) prepare(phys, geom, body1, body2);
 
-	Vector3r shift = Vector3r::Zero(), shiftVelocity = Vector3r::Zero();
-	if (scene->isPeriodic && !interaction->cellDist.isZero()) {
-		shift         = scene->cell->intrShiftPos(interaction->cellDist);
-		shiftVelocity = scene->cell->intrShiftVel(interaction->cellDist);
-	}
-	ContactView view(phys.wallBody, geom, body1, body2, shift);
+	ContactView view(phys.wallBody, geom, body1, body2, dembark_yade::imageShift(*scene, interaction->cellDist));
 
 	const bool free1 = phys.wallBody != 1 && body1.isDynamic(), free2 = phys.wallBody != 2 && body2.isDynamic();
 	if (!free1 && !free2) {  // nothing that they do to each other has an effect
@@ -362,7 +357,7 @@ bool Law2::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* i
 		             std::to_string(phys.wallBody == 1 ? id1 : id2) + " in step " + std::to_string(scene->iter) +
 		             "; take a smaller time step or a stiffer material",
 		     1);
-	view.move(state1.vel, state1.angVel, state2.vel + shiftVelocity, state2.angVel);
+	view.move(state1.vel, state1.angVel, state2.vel + dembark_yade::imageDrift(*scene, interaction->cellDist), state2.angVel);
 	return act(phys, *interaction, view).interacting;
 } catch (const std::exception& error) {
 	dembark_yade::postpone(*scene, error);

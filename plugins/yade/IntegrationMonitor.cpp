@@ -235,7 +235,7 @@ void IntegrationMonitor::beginImpact(const Interaction& interaction, const Finni
 	const Body &     body1 = *Body::byId(id1, scene), &body2 = *Body::byId(id2, scene);
 	if (body1.state->blockedDOFs || body2.state->blockedDOFs || !::dembark::picked(id1, id2, scene->iter, impacts)) return;
 	Shadow shadow;
-	if (scene->isPeriodic) shadow.shift = vec(Vector3r(scene->cell->intrShiftPos(interaction.cellDist)));
+	shadow.shift = vec(dembark_yade::imageShift(*scene, interaction.cellDist));
 	if (shadow.impact.begin(phys.contact, pairOf(body1, body2, shadow.shift), id1, id2, scene->dt)) shadows.push_back(shadow);
 }
 

@@ -19,6 +19,8 @@ YADE_PLUGIN((SphereContactLoop));
 
 using dembark_yade::ContactPacks;
 using dembark_yade::ContactView;
+using dembark_yade::imageDrift;
+using dembark_yade::imageShift;
 
 namespace {
 
@@ -50,10 +52,9 @@ void SphereContactLoop::fetchAhead(const InteractionContainer& all, long i, long
 /// Whether both are spheres, too far apart to touch.
 bool SphereContactLoop::separated(Body::id_t id1, Body::id_t id2, const Vector3i& cellDist) const {
 	if (!spheres.known(id1) || !spheres.known(id2)) return false;
-	const bool     across = scene->isPeriodic && !cellDist.isZero();
-	const Vector3r shift  = across ? scene->cell->intrShiftPos(cellDist) : Vector3r::Zero();
-	const Real     sum    = spheres.radius(id1) + spheres.radius(id2);
-	return (spheres.pos(id2) + shift - spheres.pos(id1)).squaredNorm() > reach * sum * sum;
+	const Vector3r pos2 = spheres.pos(id2) + imageShift(*scene, cellDist);
+	const Real     sum  = spheres.radius(id1) + spheres.radius(id2);
+	return (pos2 - spheres.pos(id1)).squaredNorm() > reach * sum * sum;
 }
 
 /// What the short way does for the pair: nothing, or no more than to see that it is too far apart to touch, or its step.
@@ -62,26 +63,22 @@ SphereContactLoop::Way SphereContactLoop::take(const shared_ptr<Interaction>& in
 	const Body::id_t id1 = interaction->getId1(), id2 = interaction->getId2();
 	if (!interaction->isReal()) return separated(id1, id2, interaction->cellDist) ? Way::apart : Way::none;
 	if (!spheres.known(id1) || !spheres.known(id2)) return Way::none;
-	const bool     across = scene->isPeriodic && !interaction->cellDist.isZero();
-	const Vector3r shift  = across ? scene->cell->intrShiftPos(interaction->cellDist) : Vector3r::Zero();
-	const Vector3r pos1 = spheres.pos(id1), pos2 = spheres.pos(id2) + shift;
+	const Vector3r pos1 = spheres.pos(id1), pos2 = spheres.pos(id2) + imageShift(*scene, interaction->cellDist);
 	const Real     radius1 = spheres.radius(id1), radius2 = spheres.radius(id2), sum = radius1 + radius2;
 	const Real     squared = (pos2 - pos1).squaredNorm();
 	if (!law || interaction->functorCache.constLaw.get() != law || interaction->functorCache.phys.get() != physics) return Way::none;
 	auto& phys = static_cast<FinnieRabinowiczPhys&>(*interaction->phys);
 	if (phys.preparedBy != law->revision || !(spheres.dynamic(id1) || spheres.dynamic(id2))) return Way::none;
-	// The law has the last word on whether those at the very end of a contact touch.
-	// So it has where there is no normal.
+	// Those at the very end of a contact, and those without a normal, are left to the law.
 	if (packs.know(phys) && squared > 0.0 && squared < (1.0 - 1e-9) * sum * sum) {
-		packs.add(*interaction, phys, across);
+		packs.add(*interaction, phys);
 		return Way::touching;
 	}
 
 	packs.finish();
 	ContactView view;
 	view.setSpheres(pos1 - pos2, radius1, radius2, spheres.mass(id1), spheres.mass(id2));
-	const Vector3r drift = across ? scene->cell->intrShiftVel(interaction->cellDist) : Vector3r::Zero();
-	view.move(spheres.vel(id1), spheres.angVel(id1), spheres.vel(id2) + drift, spheres.angVel(id2));
+	view.move(spheres.vel(id1), spheres.angVel(id1), spheres.vel(id2) + imageDrift(*scene, interaction->cellDist), spheres.angVel(id2));
 	const ::dembark::ContactForce out = law->act(phys, *interaction, view);
 	dembark_yade::setSphereGeometry(static_cast<ScGeom&>(*interaction->geom), pos1, radius1, pos2, radius2);
 	if (!out.interacting) scene->interactions->requestErase(interaction);
@@ -109,7 +106,7 @@ void SphereContactLoop::dispatch(const shared_ptr<Interaction>& interaction, Con
 	}
 	const Body &   body1 = **first, &body2 = **second;
 	const bool     wasReal = interaction->isReal();
-	const Vector3r shift   = scene->isPeriodic ? scene->cell->intrShiftPos(interaction->cellDist) : Vector3r::Zero();
+	const Vector3r shift   = imageShift(*scene, interaction->cellDist);
 	const bool     meets   = known.geom->go(body1.shape, body2.shape, *body1.state, *body2.state, shift, false, interaction);
 	if (!meets) {
 		if (wasReal) scene->interactions->requestErase(interaction);

@@ -92,16 +92,20 @@ def carried(kind):
                          engines=[CapillaryLiquid(content=0.02)]))
 
 
-@both
-def periodic(kind):
-    """In a cell of two and a half grains that is sheared and pressed together."""
-    loop, law = scene_with(kind, column(), geometry=[Ig2_Sphere_Sphere_ScGeom()])
+def in_cell(kind, steps, *words):
+    """What is left of grains in a cell of two and a half grains that is sheared and pressed together."""
+    loop, law = scene_with(kind, column(), *words, geometry=[Ig2_Sphere_Sphere_ScGeom()])
     O.engines[-1].gravity = Vector3(0, 0, 0)
     O.periodic = True
     O.cell.setBox(2.5 * D, 2.5 * D, 20 * D)
     O.cell.velGrad = Matrix3(0, 0, 2, 0, 0, 0, 0, 0, -18)
-    advance(6000)
+    advance(steps)
     return left(loop, law)
+
+
+@both
+def periodic(kind):
+    return in_cell(kind, 6000)
 
 
 @both
@@ -174,14 +178,8 @@ def crowd(kind):
 
 @both
 def cell(kind):
-    """Wet grains in a sheared cell, for as long as round-off stays small."""
-    loop, law = scene_with(kind, column(), WET, {"capillaryModel": "willett"}, geometry=[Ig2_Sphere_Sphere_ScGeom()])
-    O.engines[-1].gravity = Vector3(0, 0, 0)
-    O.periodic = True
-    O.cell.setBox(2.5 * D, 2.5 * D, 20 * D)
-    O.cell.velGrad = Matrix3(0, 0, 2, 0, 0, 0, 0, 0, -18)
-    advance(5000)
-    return left(loop, law)
+    """Wet grains, for as long as round-off stays small."""
+    return in_cell(kind, 5000, WET, {"capillaryModel": "willett"})
 
 
 @both
