@@ -33,4 +33,4 @@ def setup(p: Parameters) -> Setup:
                        *(strip((x, 0.0, -d), (0.0, 0.0, d), p.thickness) for x in (0.0, p.plate_width))])
     sides = {name: strip((x, 0.0, -pit - d), (0.0, 0.0, top + pit + d), p.thickness)
              for name, x in (("left", 0.0), ("right", p.plate_width))}
-    return Setup(steps, step, grains, {**numbers, **contacts(p, skin=0.2)}, {"plate": plate, **sides})
+    return Setup(steps, step, grains, {**numbers, **contacts(p, skin=0.4)}, {"plate": plate, **sides})

@@ -30,7 +30,7 @@ def setup(p: Parameters) -> Setup:
     foot = 0.15 * d
     gate = strip((p.column_width, 0.0, foot), (0.0, 0.0, top - foot), p.column_depth)
     numbers = {"first": first, "stride": stride, "every": every, "gate_speed": speed, "opened": first + opened, "base": -0.5 * d}
-    return Setup(steps, step, bodies, {**numbers, **contacts(p, skin=0.2)}, {"gate": gate})
+    return Setup(steps, step, bodies, {**numbers, **contacts(p, skin=0.4)}, {"gate": gate})
 
 
 def glued(p: Parameters, far: float) -> packing.Array:

@@ -20,4 +20,4 @@ def setup(p: Parameters) -> Setup:
     layers = math.ceil(1.3 * p.grain_count * spacing**2 / (math.pi * inside**2)) + 2
     box = [(-half, half), (-half, half), (-d_max, low + layers * spacing + 4.0 * d_max)]
     grains = packing.grains(p, packing.cylinder(inside, spacing, spacing, layers), box)
-    return Setup(steps["steps"], step, grains, {**steps, **contacts(p)})
+    return Setup(steps["steps"], step, grains, {**steps, **contacts(p, skin=0.3)})

@@ -37,7 +37,7 @@ void PackedContacts::collect_laws() {
                                                  p.friction.kinetic_friction,
                                                  p.friction.interface_shear_strength,
                                                  dembark::kept_slip(p.friction, update->dt),
-                                                 0.0};
+                                                 p.friction.critical_slip_distance};
     }
 }
 

@@ -108,9 +108,9 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     for (int i = 1; i <= types; ++i)
       for (int j = 1; j <= types; ++j) {
         const dembark::FinnieRabinowicz& law = friction_(i, j);
-        laws_[i * (types + 1) + j] = {
-            youngs_modulus_[i][j], shear_modulus_[i][j],         damping_factor_[i][j],        law.static_friction,
-            law.kinetic_friction,  law.interface_shear_strength, dembark::kept_slip(law, dt_), 0.0};
+        laws_[i * (types + 1) + j] = {youngs_modulus_[i][j],        shear_modulus_[i][j],      damping_factor_[i][j],
+                                      law.static_friction,          law.kinetic_friction,      law.interface_shear_strength,
+                                      dembark::kept_slip(law, dt_), law.critical_slip_distance};
       }
   }
 

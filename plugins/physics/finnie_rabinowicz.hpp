@@ -29,6 +29,7 @@
 #include <string>
 #include <vector>
 
+#include "exponential.hpp"
 #include "vec3.hpp"
 
 namespace dembark {
@@ -68,13 +69,15 @@ struct FrictionState {
   Real dissipated_energy{};   ///< J, by slip and by tangential damping, since the contact began
 };
 
-/// mu(s), equation (1).
-template <class Real>
-inline Real friction_coefficient(const FinnieRabinowicz& law, Real slip) {
-  using std::exp;
-  if (!(slip > 0.0)) return Real(law.static_friction);
-  if (law.critical_slip_distance == 0.0) return Real(law.kinetic_friction);
-  return law.kinetic_friction + (law.static_friction - law.kinetic_friction) * exp(-slip / law.critical_slip_distance);
+/// mu(s), equation (1). `Law` here and below: FinnieRabinowicz, or those of its members that are used as packs.
+template <class Law, class Real>
+DEMBARK_HOT Real friction_coefficient(const Law& law, Real slip) {
+  const Real kinetic = law.kinetic_friction, fixed = law.static_friction;
+  Real mu = select(slip > 0.0, kinetic, fixed);
+  // Far beyond s_c what is left of the drop, exp(-40) = 4e-18, is below the rounding of mu.
+  const auto falling = (slip > 0.0) & (slip < 40.0 * law.critical_slip_distance);
+  if (any(falling)) mu = select(falling, kinetic + (fixed - kinetic) * exponential(-slip / law.critical_slip_distance), mu);
+  return mu;
 }
 
 /// T_max (N), equation (2), for a friction coefficient mu.
@@ -91,32 +94,56 @@ inline Real shear_limit(const FinnieRabinowicz& law, Real mu, Real normal_force,
 
 namespace detail {
 
-/// The slip ds > 0 for which k_t (xi - ds) = T_max(s + ds): the return to the limit curve. Newton's method from the largest
-/// possible slip (kinetic limit) descends monotonically to the last root, because the residual is concave there; where the
-/// spring is softer than the drop of friction it thus takes the whole drop at once, as a quasi-static contact does.
-template <class Real>
-inline Real slip_to_limit(const FinnieRabinowicz& law, Real k_t, Real trial, Real slip, Real normal_force, Real contact_area) {
-  using std::abs;
-  using std::exp;
-  const Real kinetic_limit = shear_limit(law, Real(law.kinetic_friction), normal_force, contact_area);
-  Real ds = trial - kinetic_limit / k_t;
+/// The slip ds > 0 for which k_t (xi - ds) = T_max(s + ds), the return to the limit curve, of an interface without a limit of its own.
+/// `coefficient` is mu(s). Newton's method, which descends monotonically to the last root from any place beyond it, because the residual is
+/// concave; where the spring is softer than the drop of friction it thus takes the whole drop at once, as a quasi-static contact does.
+template <class Law, class Real, class Truth>
+DEMBARK_HOT Real slip_to_coulomb(const Law& law, Real k_t, Real trial, Real slip, Real coefficient, Real normal_force, Truth wanted) {
+  const Real kinetic = law.kinetic_friction, drop = law.static_friction - kinetic;
+  const Real load = select(normal_force > 0.0, normal_force, Real(0.0));
+  // The largest possible slip, to the kinetic limit.
+  Real ds = trial - kinetic * load / k_t;
+  auto open = wanted & (drop > 0.0) & (slip < 40.0 * law.critical_slip_distance);
+  if (!any(open)) return ds;
+  const Real per_distance = Real(1.0) / law.critical_slip_distance;
+  // The tangent at the present slip meets zero beyond the root, too: mostly close to it, for the slip of a step is short beside s_c.
+  Real slope = load * (coefficient - kinetic) * per_distance - k_t;
+  const Real first = (coefficient * load - k_t * trial) / slope;
+  ds = select(open & (slope < 0.0) & (first < ds), first, ds);
+  for (int i = 0; i < 32 && any(open); ++i) {
+    const Real weakening = drop * exponential(-(slip + ds) * per_distance), gradient = load * weakening * per_distance;
+    slope = gradient - k_t;
+    const Real step = (k_t * (trial - ds) - (kinetic + weakening) * load) / slope;
+    open = open & (slope < 0.0);
+    ds = select(open, ds - step, ds);
+    // The method doubles the digits: what it leaves is the square of the step times half the curvature over the slope.
+    open = open & (step * step > 1e-30 * trial * trial) & (0.5 * step * step * gradient * per_distance > -1e-17 * trial * slope);
+  }
+  return select(ds > 0.0, ds, Real(0.0));
+}
+
+/// The same with any interface. Beside a shear strength the residual need not be concave everywhere, and the search begins at the largest
+/// possible slip.
+inline double slip_to_limit(const FinnieRabinowicz& law, double k_t, double trial, double slip, double normal_force, double contact_area) {
+  if (law.interface_shear_strength >= unlimited_strength)
+    return slip_to_coulomb(law, k_t, trial, slip, friction_coefficient(law, slip), normal_force, true);
+  const double kinetic_limit = shear_limit(law, law.kinetic_friction, normal_force, contact_area);
+  double ds = trial - kinetic_limit / k_t;
   const double drop = law.static_friction - law.kinetic_friction;
   if (drop == 0.0 || law.critical_slip_distance == 0.0) return ds;
   for (int i = 0; i < 32; ++i) {
-    const Real weakening = drop * exp(-(slip + ds) / law.critical_slip_distance);
-    const Real mu = law.kinetic_friction + weakening;
-    const Real limit = shear_limit(law, mu, normal_force, contact_area);
-    Real gradient = -normal_force * weakening / law.critical_slip_distance;
-    if (law.interface_shear_strength < unlimited_strength)
-      gradient *= exp(-mu * normal_force / (law.interface_shear_strength * contact_area));
-    const Real residual = k_t * (trial - ds) - limit;
-    const Real slope = -k_t - gradient;
+    const double weakening = drop * exponential(-(slip + ds) / law.critical_slip_distance);
+    const double mu = law.kinetic_friction + weakening;
+    const double limit = shear_limit(law, mu, normal_force, contact_area);
+    const double gradient = -normal_force * weakening / law.critical_slip_distance *
+                            std::exp(-mu * normal_force / (law.interface_shear_strength * contact_area));
+    const double slope = -k_t - gradient;
     if (!(slope < 0.0)) break;
-    const Real step = residual / slope;
+    const double step = (k_t * (trial - ds) - limit) / slope;
     ds -= step;
-    if (abs(step) <= 1e-15 * trial) break;
+    if (std::abs(step) <= 1e-15 * trial) break;
   }
-  return ds > 0.0 ? ds : Real(0.0);
+  return ds > 0.0 ? ds : 0.0;
 }
 
 }  // namespace detail
@@ -201,35 +228,63 @@ DEMBARK_COLD bool was_sliding(const FinnieRabinowicz& law, Real normal_force, Re
   return stiffness * norm(state.displacement) > 0.99 * shear_limit(law, friction_coefficient(law, state.slip), normal_force, contact_area);
 }
 
-/// The linear spring beyond static friction's first limit: slipping, or about to stick again.
+/// What a contact that slips by `slip` of its spring's `trial` length (m) does to its state. Lost is the work of the step less what the
+/// spring gained: the mean of its force before and after, along the slip. Where friction drops faster than the spring follows, that
+/// includes what the spring lets go.
 template <class Real>
-DEMBARK_COLD bool linear_slip(const FinnieRabinowicz& law, Real normal_force, Real stiffness, Real contact_area,
-                              const Vec3<Real>& increment, FrictionState<Real>& state) {
-  const Real limit = shear_limit(law, friction_coefficient(law, state.slip), normal_force, contact_area);
-  const Real trial = norm(state.displacement);
+DEMBARK_HOT FrictionState<Real> slipped(const FrictionState<Real>& state, Real slip, Real trial, Real stiffness,
+                                        const Vec3<Real>& increment) {
+  const Vec3<Real> slid = state.displacement * (slip / trial), before = state.displacement - increment, after = state.displacement - slid;
+  const Real lost = 0.5 * stiffness * dot(before + after, slid);
+  return {after, state.slip + slip, state.dissipated_energy + select(lost > 0.0, lost, Real(0.0))};
+}
+
+}  // namespace detail
+
+/// The linear spring of an interface without a limit of its own beyond static friction's first limit: whether it slips, of those that are
+/// `wanted`, with `moved`, what has then become of its state. The others are about to stick again.
+template <class Law, class Real, class Truth>
+DEMBARK_HOT Truth coulomb_slip(const Law& law, Real normal_force, Real stiffness, const Vec3<Real>& increment, Truth wanted,
+                               const FrictionState<Real>& state, FrictionState<Real>& moved) {
+  using std::sqrt;
+  const Real coefficient = friction_coefficient(law, state.slip);
+  const Real limit = coefficient * select(normal_force > 0.0, normal_force, Real(0.0));
+  const Real trial = sqrt(dot(state.displacement, state.displacement));
+  const Truth slips = wanted & (stiffness * trial > limit);
+  if (!any(slips)) return slips;
+  const Real slip = detail::slip_to_coulomb(law, stiffness, trial, state.slip, coefficient, normal_force, slips);
+  moved = detail::slipped(state, slip, trial, stiffness, increment);
+  return slips;
+}
+
+namespace detail {
+
+/// The same with any interface, one contact at a time.
+DEMBARK_COLD inline bool linear_slip(const FinnieRabinowicz& law, double normal_force, double stiffness, double contact_area,
+                                     const Vec3<double>& increment, FrictionState<double>& state) {
+  if (law.interface_shear_strength >= unlimited_strength) {
+    FrictionState<double> moved;
+    const bool slips = coulomb_slip(law, normal_force, stiffness, increment, true, state, moved);
+    if (slips) state = moved;
+    return slips;
+  }
+  const double limit = shear_limit(law, friction_coefficient(law, state.slip), normal_force, contact_area);
+  const double trial = norm(state.displacement);
   if (!(stiffness * trial > limit)) return false;
-  const Real slip = slip_to_limit(law, stiffness, trial, state.slip, normal_force, contact_area);
-  state.slip += slip;
-  // Lost is the work of the step less what the spring gained: the mean of its force before and after, along the slip. Where
-  // friction drops faster than the spring follows, that includes what the spring lets go.
-  const Vec3<Real> slid = state.displacement * (slip / trial), before = state.displacement - increment;
-  state.displacement -= slid;
-  const Real lost = 0.5 * stiffness * dot(before + state.displacement, slid);
-  if (lost > 0.0) state.dissipated_energy += lost;
+  state = slipped(state, slip_to_limit(law, stiffness, trial, state.slip, normal_force, contact_area), trial, stiffness, increment);
   return true;
 }
 
 }  // namespace detail
 
-/// T_max (N) of a contact that has not slipped, where the interface has no limit of its own. `Law`: FinnieRabinowicz, or the members used
-/// here as packs.
+/// T_max (N) of a contact that has not slipped, where the interface has no limit of its own.
 template <class Law, class Real>
 DEMBARK_HOT Real first_limit(const Law& law, Real normal_force) {
   return law.static_friction * select(normal_force > 0.0, normal_force, Real(0.0));
 }
 
 /// Whether a linear spring, displaced already, sticks without a doubt. Most contacts of a dense bed do, far from their limit: they are
-/// told by a bound that needs neither root nor exponential, T_max >= mu_k N (1 - mu_k N / (2 tau_s A)). `Law` as in first_limit().
+/// told by a bound that needs neither root nor exponential, T_max >= mu_k N (1 - mu_k N / (2 tau_s A)).
 template <class Law, class Real>
 DEMBARK_HOT auto plainly_sticks(const Law& law, Real normal_force, Real stiffness, Real contact_area, const FrictionState<Real>& state) {
   const Real coulomb = select(state.slip > 0.0, Real(law.kinetic_friction), Real(law.static_friction)) * normal_force;

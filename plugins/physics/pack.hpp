@@ -29,6 +29,7 @@ template <int N>
 struct Vectors {
   typedef double Doubles __attribute__((vector_size(8 * N)));
   typedef long long Truths __attribute__((vector_size(8 * N)));
+  typedef unsigned long long Bits __attribute__((vector_size(8 * N)));
 };
 
 }  // namespace detail
@@ -121,6 +122,21 @@ DEMBARK_HOT unsigned bits(const Mask<N, Set>& mask) {
 template <int N, class Set>
 DEMBARK_HOT bool any(const Mask<N, Set>& mask) {
   return bits(mask) != 0;
+}
+
+/// `value` times two to the integer in the last bits of `exponent` (see exponential.hpp), where both are normal numbers.
+template <int N, class Set>
+DEMBARK_HOT Pack<N, Set> times_power_of_two(const Pack<N, Set>& value, const Pack<N, Set>& exponent) {
+  typedef typename detail::Vectors<N>::Bits Bits;
+  return typename Pack<N, Set>::Lanes(Bits(value.lanes) + (Bits(exponent.lanes) << 52));
+}
+inline double times_power_of_two(double value, double exponent) {
+  unsigned long long bits, more;
+  __builtin_memcpy(&bits, &value, sizeof bits);
+  __builtin_memcpy(&more, &exponent, sizeof more);
+  bits += more << 52;
+  __builtin_memcpy(&value, &bits, sizeof value);
+  return value;
 }
 
 /// Sum of the lanes of `Count` packs, as halves of what they hold, halves of that, and so on: the same bits from packs of any size.

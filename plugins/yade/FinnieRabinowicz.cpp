@@ -80,11 +80,10 @@ int LawKinds::of(const ::dembark::ContactParameters& p) {
 	if (p.normal_law != ::dembark::NormalLaw::hertz || p.friction.presliding != ::dembark::Presliding::linear || p.rolling.on() ||
 	    p.liquid.viscous.on())
 		return -1;
-	// Contacts that slip are left to the law itself, which knows their critical slip distance.
 	constexpr std::size_t most    = 64;
 	const auto            numbers = [](const ::dembark::HertzParameters& e, const ::dembark::FinnieRabinowicz& f) {
 		return std::make_tuple(e.effective_youngs_modulus, e.effective_shear_modulus, e.damping, f.static_friction,
-		                       f.kinetic_friction, f.interface_shear_strength, f.healing_time);
+		                       f.kinetic_friction, f.interface_shear_strength, f.healing_time, f.critical_slip_distance);
 	};
 	const std::lock_guard<std::mutex> lock(guard);
 	const auto                        found = std::find_if(kinds.begin(), kinds.end(), [&](const Kind& kind) {
@@ -107,7 +106,7 @@ std::vector<::dembark::PairLaw<double>> LawKinds::laws(double dt) {
 	for (const Kind& kind : kinds) {
 		const ::dembark::FinnieRabinowicz& f = kind.friction;
 		all.push_back({kind.elasticity.effective_youngs_modulus, kind.elasticity.effective_shear_modulus, kind.elasticity.damping,
-		               f.static_friction, f.kinetic_friction, f.interface_shear_strength, kept_slip(f, dt), 0.0});
+		               f.static_friction, f.kinetic_friction, f.interface_shear_strength, kept_slip(f, dt), f.critical_slip_distance});
 	}
 	return all;
 }

@@ -7,8 +7,12 @@ the cosine of the angle between the two for vectors that turn with the angle,
 
     K_n(r; s) = exp(-(r^2 + s^2) / 2 w^2) I_n(r s / w^2) / (2 pi w^2),    n = 0, 1, 2,
 
-I_n being the modified Bessel functions. Cells are rings; what they hold are exact integrals of K_n, so mass is conserved to round-off, and
-the momentum that flows through the faces of a ring is balanced by its weight and the force of the walls (Fields.unbalanced).
+I_n being the modified Bessel functions. Cells are rings; what they hold are integrals of K_n, so mass is conserved to round-off, and the
+momentum that flows through the faces of a ring is balanced by its weight and the force of the walls (Fields.unbalanced).
+
+The integrals are taken from tables, one over the radius and one over the height of a point, that cubic splines go through. A spline is a
+sum of B-splines (de Boor, A Practical Guide to Splines, 1978), of which four do not vanish at a place. So points are summed first, each on
+4 x 4 nodes of both tables, and only these sums are multiplied by the tables.
 """
 
 from __future__ import annotations
@@ -25,13 +29,13 @@ from dembark.postproc import ContactFrame, GrainFrame, spheres
 from dembark.postproc.fields.coarse_graining import WallContacts
 
 if TYPE_CHECKING:
-    from scipy.interpolate import CubicSpline
+    from scipy.sparse import csr_array
 
 Array = NDArray[np.float64]
 
 REACH = 4.0  # widths beyond the vessel that the rings go on
 _POINTS = 3  # of Gauss's rule on a line as long as the width, at least, and within a ring
-_TABLE = 24  # radii for each width in the table of the kernel
+_TABLE = 12  # places for each width in the tables of the kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,11 +80,9 @@ class Rings:
         return self.areas[:, None] * np.diff(self.vertical)
 
     @cached_property
-    def _table(self) -> CubicSpline:
+    def radially(self) -> _Table:
         """Shares (k,) of K_0, K_1 and K_2 in the rings and, at their k + 1 borders, the values of K_1, over the radius of the source."""
-        from scipy.interpolate import CubicSpline  # slow to import, and not needed before something is measured
-
-        places = np.linspace(0.0, self.radial[-1], 1 + int(np.ceil(_TABLE * self.radial[-1] / self.width)))
+        places = self._places(0.0, self.radial[-1])
         node, weight = np.polynomial.legendre.leggauss(_POINTS)
         half = 0.5 * np.diff(self.radial)[:, None]
         points, weights = self.radii[:, None] + half * node, half * weight
@@ -89,7 +91,16 @@ class Rings:
         borders = self._kernel(1, self.radial, places[:, None])
         # Beyond the last ring is nothing that it could flow into.
         borders[:, -1] = 0.0
-        return CubicSpline(places, np.hstack([*shares, borders]))
+        return _Table(places, np.hstack([*shares, borders]))
+
+    @cached_property
+    def upward(self) -> _Table:
+        """What `along` says, side by side, over the height of the source."""
+        places = self._places(self.vertical[0], self.vertical[-1])
+        return _Table(places, np.hstack(self.along(places)))
+
+    def _places(self, low: float, high: float) -> Array:
+        return np.linspace(low, high, 4 + int(np.ceil(_TABLE * (high - low) / self.width)))
 
     def _kernel(self, order: int, radius: Array, source: Array) -> Array:
         from scipy.special import ive
@@ -97,22 +108,31 @@ class Rings:
         scaled = ive(order, radius * source / self.width**2) * np.exp(-0.5 * ((radius - source) / self.width) ** 2)
         return np.asarray(scaled / (2.0 * np.pi * self.width**2))
 
+    @cached_property
+    def radial_table(self) -> tuple[Array, Array, Array, Array]:
+        """What `across` says of a source, for each B-spline of the table: (nr, k) three times and (nr, k + 1)."""
+        return self._parted(self.radially.coefficients)
+
+    @cached_property
+    def vertical_table(self) -> tuple[Array, Array]:
+        """The same of `along`: (nz, l) and (nz, l + 1)."""
+        count = len(self.heights)
+        return self.upward.coefficients[:, :count], self.upward.coefficients[:, count:]
+
     def across(self, source: Array) -> tuple[Array, Array, Array, Array]:
         """For sources at the radii (m,): shares (m, k) of K_0, K_1, K_2, and values (m, k + 1) of K_1 at the borders in 1/m2."""
+        return self._parted(self.radially(source))
+
+    def _parted(self, columns: Array) -> tuple[Array, Array, Array, Array]:
         count = len(self.radii)
-        found = self._table(np.minimum(source, self.radial[-1]))
-        return found[:, :count], found[:, count : 2 * count], found[:, 2 * count : 3 * count], found[:, 3 * count :]
+        return columns[:, :count], columns[:, count : 2 * count], columns[:, 2 * count : 3 * count], columns[:, 3 * count :]
 
     def along(self, source: Array) -> tuple[Array, Array]:
         """For sources at the heights (m,): shares (m, l) in the layers, and values (m, l + 1) at their borders in 1/m."""
         from scipy.special import ndtr
 
-        # In place, for asking the system for memory takes as long as the arithmetic.
-        density = self.vertical - source[:, None]
-        density /= self.width
-        below = ndtr(density)
-        np.exp(np.multiply(np.square(density, out=density), -0.5, out=density), out=density)
-        density /= np.sqrt(2.0 * np.pi) * self.width
+        distance = (self.vertical - source[:, None]) / self.width
+        below, density = ndtr(distance), np.exp(-0.5 * distance**2) / (np.sqrt(2.0 * np.pi) * self.width)
         # The outermost layers hold what lies beyond them, so nothing flows through their outer borders.
         below[:, 0], below[:, -1] = 0.0, 1.0
         density[:, [0, -1]] = 0.0
@@ -133,6 +153,30 @@ class Rings:
         source = 0.5 * self.radius * (node + 1.0)
         inside = (np.pi * self.radius * weight * source) @ self.across(source)[0] / self.areas
         return np.asarray(inside[:, None] * self.above)
+
+
+class _Table:
+    """Functions of a place, c of them, as the cubic splines through their `values` (n, c) at the even `places` (n,) say; beyond these they
+    stay what they are at the first and the last."""
+
+    def __init__(self, places: Array, values: Array) -> None:
+        from scipy.interpolate import make_interp_spline  # slow to import, and not needed before something is measured
+
+        spline = make_interp_spline(places, values)
+        self._knots, self.coefficients = spline.t, spline.c
+
+    def basis(self, place: Array) -> csr_array:
+        """Values of the B-splines at the places (m,), (m, n), four in each row."""
+        from scipy.interpolate import BSpline
+        from scipy.sparse import csr_array
+
+        if not len(place):
+            return csr_array((0, len(self.coefficients)))
+        return BSpline.design_matrix(np.clip(place, self._knots[0], self._knots[-1]), self._knots, 3)
+
+    def __call__(self, place: Array) -> Array:
+        """The functions at the places, (m, c)."""
+        return np.asarray(self.basis(place) @ self.coefficients)
 
 
 @dataclass
@@ -199,39 +243,67 @@ def coarse_grain(
              *((one.positions, one.points - one.positions, one.forces) for one in walls)]
     first, branch, forces = (np.concatenate(parts) for parts in zip(*lines, strict=True))
     place, tensor = _points(first, branch, forces, rings.width)
-    count = len(place)
     # The streaming part is a line of no length: the momentum m v is carried with v.
-    place = np.concatenate([place, grains.positions])
-    tensor = _turned(np.concatenate([tensor, np.einsum("n,na,nb->nab", grains.masses, grains.velocities, grains.velocities)]), place)
-    zero, one, two, border = rings.across(np.hypot(place[:, 0], place[:, 1]))
-    layer, level = rings.along(place[:, 2])
-    trace, difference = 0.5 * (tensor[:, 0, 0] + tensor[:, 1, 1]), 0.5 * (tensor[:, 0, 0] - tensor[:, 1, 1])
-    vertical = zero * tensor[:, 2, 2, None]
-    even, odd = zero * trace[:, None], two * difference[:, None]
-    even_sum, odd_sum = even.T @ layer, odd.T @ layer
+    streaming = np.einsum("n,na,nb->nab", grains.masses, grains.velocities, grains.velocities)
+    lined = _Sources(rings, place, tensor)
+    carried = _Sources(rings, grains.positions, streaming)
     touched, pull = np.concatenate([wall.points for wall in walls]), np.concatenate([wall.forces[:, 2] for wall in walls])
+    contact, flow = lined.summed(lined.stress), carried.summed(carried.stress)
+    mass, volume, net = carried.summed(np.column_stack([grains.masses, spheres.volume(grains.radii), grains.forces[:, 2]]))
+    wall, = _Sources(rings, touched).summed(pull[:, None])
+    (zero, one, two, border), (layer, level) = rings.radial_table, rings.vertical_table
 
-    def of_grains(values: Array) -> Array:
-        return np.asarray((zero[count:] * values[:, None]).T @ layer[count:])
+    def ringed(across: Array, sums: Array, along: Array = layer) -> Array:
+        return np.asarray(across.T @ (sums @ along))
 
+    vertical, even, odd, outward, upward = contact + flow
+    even_sum, odd_sum = ringed(zero, even), ringed(two, odd)
     found = Fields(
         frames=1,
-        mass=of_grains(grains.masses),
-        volume=of_grains(spheres.volume(grains.radii)),
-        net=of_grains(grains.forces[:, 2]),
-        wall=(rings.across(np.hypot(touched[:, 0], touched[:, 1]))[0] * pull[:, None]).T @ rings.along(touched[:, 2])[0],
-        zz=vertical.T @ layer,
+        mass=ringed(zero, mass),
+        volume=ringed(zero, volume),
+        net=ringed(zero, net),
+        wall=ringed(zero, wall),
+        zz=ringed(zero, vertical),
         rr=even_sum + odd_sum,
         tt=even_sum - odd_sum,
-        zr=(one * tensor[:, 2, 0, None]).T @ layer,
-        rz=(one * tensor[:, 0, 2, None]).T @ layer,
-        through_rings=2.0 * np.pi * rings.radial[:, None] * ((border[:count] * tensor[:count, 2, 0, None]).T @ layer[:count]),
-        through_layers=vertical[:count].T @ level[:count],
+        zr=ringed(one, outward),
+        rz=ringed(one, upward),
+        through_rings=2.0 * np.pi * rings.radial[:, None] * ringed(border, contact[3]),
+        through_layers=ringed(zero, contact[0], level),
     )
-    shares = (layer @ layers)[:, :, None] * sector_shares(place)[:, None, :]
-    table = shares.reshape(len(place), -1).T
-    size = (layers.shape[1], shares.shape[2], len(rings.radii))
-    return found, Zones(np.stack([(table @ part).reshape(size) for part in (vertical, even + odd)], axis=-1), found.zz.sum(axis=0))
+    zones = lined.zoned(layer @ layers, sector_shares) + carried.zoned(layer @ layers, sector_shares)
+    return found, Zones(zones, found.zz.sum(axis=0))
+
+
+class _Sources:
+    """Points at `place` (m, 3) that carry stress times volume `tensor` (m, 3, 3) in J."""
+
+    def __init__(self, rings: Rings, place: Array, tensor: Array | None = None) -> None:
+        self._rings, self._place = rings, place
+        self._across = rings.radially.basis(np.hypot(place[:, 0], place[:, 1]))
+        self._along = rings.upward.basis(place[:, 2])
+        if tensor is not None:
+            self.stress = _around(tensor, place)
+
+    def summed(self, values: Array) -> Array:
+        """Sums (q, nr, nz) of `values` (m, q) over the nodes of both tables."""
+        from scipy.sparse import csr_array
+
+        (count, nr), nz = self._across.shape, self._along.shape[1]
+        share = self._across.data.reshape(count, 4, 1) * self._along.data.reshape(count, 1, 4)
+        node = nz * self._across.indices.reshape(count, 4, 1) + self._along.indices.reshape(count, 1, 4)
+        spread = csr_array((share.ravel(), node.ravel(), np.arange(0, 16 * count + 1, 16)), shape=(count, nr * nz))
+        return np.asarray(spread.T @ values).T.reshape(-1, nr, nz)
+
+    def zoned(self, layers: Array, sector_shares: Callable[[Array], Array]) -> Array:
+        """Stress zz and rr times volume (zones, sectors, k, 2) in J; `layers` (nz, zones) as of the table of heights."""
+        zones, sectors = self._along @ layers, sector_shares(self._place)
+        weights = (zones[:, :, None] * sectors[:, None, :]).reshape(-1, zones.shape[1] * sectors.shape[1])
+        zero, _, two, _ = self._rings.radial_table
+        zz, even, odd = ((self._across.T @ (weights * one[:, None])).T @ table
+                         for one, table in zip(self.stress.T[:3], (zero, zero, two), strict=True))
+        return np.stack([zz, even + odd], axis=-1).reshape(zones.shape[1], sectors.shape[1], -1, 2)
 
 
 def _points(first: Array, branch: Array, forces: Array, width: float) -> tuple[Array, Array]:
@@ -249,11 +321,12 @@ def _points(first: Array, branch: Array, forces: Array, width: float) -> tuple[A
     return np.concatenate(places), np.concatenate(tensors)
 
 
-def _turned(tensor: Array, place: Array) -> Array:
-    """Components (m, 3, 3) along the directions outward, around and up at each place."""
+def _around(tensor: Array, place: Array) -> Array:
+    """Of tensors (m, 3, 3), components (m, 5) along the directions outward, around and up at each place: zz, half the sum and half the
+    difference of rr and tt, zr and rz."""
     radius = np.hypot(place[:, 0], place[:, 1])
     safe = np.where(radius > 0.0, radius, 1.0)
     cosine, sine = np.where(radius > 0.0, place[:, 0] / safe, 1.0), place[:, 1] / safe
-    turn = np.zeros((len(place), 3, 3))
-    turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1], turn[:, 2, 2] = cosine, sine, -sine, cosine, 1.0
-    return np.asarray(turn @ tensor @ turn.transpose(0, 2, 1))
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = tensor.transpose(1, 2, 0)
+    difference = 0.5 * (xx - yy) * (cosine**2 - sine**2) + (xy + yx) * cosine * sine
+    return np.column_stack([zz, 0.5 * (xx + yy), difference, cosine * zx + sine * zy, cosine * xz + sine * yz])

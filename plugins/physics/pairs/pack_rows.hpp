@@ -15,6 +15,9 @@ struct Quad {
   P x, y, z, w;
 };
 
+template <class P>
+using LaneMask = Mask<P::size, typename P::InstructionSet>;
+
 /// A pack of N lanes for the same processor as `P`.
 template <class P, int N>
 using Part = Pack<N, typename P::InstructionSet>;

@@ -134,6 +134,30 @@ __attribute__((noinline)) void scalar_rolling(const PairStep& s, const PairBlock
   }
 }
 
+/// Of the lanes of a linear spring that do not stick without a doubt: those that stick, and those that slip, which have then become
+/// `moved`. Interfaces with a shear strength, and what is no number, are in neither.
+template <class P>
+struct Slip {
+  unsigned sticks = 0;
+  LaneMask<P> slips{};
+  FrictionState<P> moved{};
+};
+template <class P>
+__attribute__((noinline)) Slip<P> slip_of(const PairLaw<P>& law, const NormalResponse<P>& response, const PackVec<P>& increment,
+                                          const LaneMask<P>& unsure, const FrictionState<P>& state) {
+  const auto plain = unsure & !(law.interface_shear_strength < unlimited_strength) &
+                     (response.tangential_stiffness * dot(state.displacement, state.displacement) < P(INFINITY));
+  Slip<P> found;
+  found.slips = coulomb_slip(law, response.force, response.tangential_stiffness, increment, plain, state, found.moved);
+  found.sticks = bits(plain & !found.slips);
+  return found;
+}
+
+template <class P>
+DEMBARK_HOT void replace(const LaneMask<P>& which, PackVec<P>& old, const PackVec<P>& now) {
+  old = {select(which, now.x, old.x), select(which, now.y, old.y), select(which, now.z, old.z)};
+}
+
 /// Partial slip of the lanes `there`: displacement, slip and energy into `state`; the dash-pot's constant and the share of slip that is
 /// kept of those that slide as a whole. Returns the lanes that it has served: of the others, which are new or have changed much, nothing
 /// has changed.
@@ -247,17 +271,31 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
     const P dt = s.dt, twist = contact_twist<P>(normal, omega_i, omega_j, dt);
     const Quad<P> old = rows<P, 4>(history);
     FrictionState<P> state{{old.x, old.y, old.z}, old.w, collect<P>([=](int k) { return history(k)[4]; })};
-    unsigned sticking = 0;
+    unsigned served = 0, slipping = 0;
     P kept_slip = law.kept_slip;
+    Slip<P> slip;
     if (s.rings < 0) {
+      const PackVec<P> increment = motion.tangential_velocity * dt;
       state.displacement = rotate_to_plane<P>(state.displacement, normal, twist);
-      state.displacement += motion.tangential_velocity * dt;
-      sticking = bits(plainly_sticks(law, response.force, response.tangential_stiffness, response.contact_area, state));
+      state.displacement += increment;
+      const auto sticks = plainly_sticks(law, response.force, response.tangential_stiffness, response.contact_area, state);
+      served = bits(sticks);
+      if (s.pack_friction && there & ~served & ~apart) {
+        slip = slip_of<P>(law, response, increment, touching & !sticks, state);
+        slipping = bits(slip.slips);
+        served |= slip.sticks | slipping;
+      }
     } else if (s.pack_friction) {
-      sticking = partial_slip<P>(s, b, first, there & ~apart, law, normal, twist, motion.tangential_velocity, response, state, kept_slip);
+      served = partial_slip<P>(s, b, first, there & ~apart, law, normal, twist, motion.tangential_velocity, response, state, kept_slip);
     }
     PackVec<P> tangential =
         sticking_force<P>(response.tangential_stiffness, response.tangential_damping, motion.tangential_velocity, dt, kept_slip, state);
+    if (slipping) {
+      replace<P>(slip.slips, state.displacement, slip.moved.displacement);
+      state.slip = select(slip.slips, slip.moved.slip, state.slip);
+      state.dissipated_energy = select(slip.slips, slip.moved.dissipated_energy, state.dissipated_energy);
+      replace<P>(slip.slips, tangential, -response.tangential_stiffness * state.displacement);
+    }
     if (apart) {  // such a pair has forgotten its contact
       const auto forget = [&touching](P& part) __attribute__((always_inline)) { part = select(touching, part, P(0.0)); };
       forget(response.force);
@@ -268,7 +306,7 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
       for (int k = 0; s.more >= 0 && k < count; ++k)
         if (apart >> k & 1) __builtin_memset(b.history[first + k] + s.more, 0, s.more_numbers * sizeof(double));
     }
-    const unsigned packed = (s.pack_friction ? sticking | apart : apart) & there;
+    const unsigned packed = (s.pack_friction ? served | apart : apart) & there;
     const Quad<P> spring{state.displacement.x, state.displacement.y, state.displacement.z, state.slip};
     alignas(64) double energy[N];
     state.dissipated_energy.store(energy);

@@ -34,7 +34,7 @@ template <class Real>
 struct PairLaw {
   Real effective_youngs_modulus, effective_shear_modulus, damping;
   Real static_friction, kinetic_friction, interface_shear_strength, kept_slip;
-  Real unused;
+  Real critical_slip_distance;
 };
 
 /// The pairs in work: those that touch, and those with a contact or a bridge stored, to hold or to end it.
