@@ -176,14 +176,13 @@ def animate(section: Section, path: Path, *, duration: int = 60) -> Path:
     left, right, bottom, upper = section.view
     scale = _OVERSAMPLING * section.pixels / max(right - left, upper - bottom)
     width, height = round((right - left) * scale), round((upper - bottom) * scale)
-    paint = matplotlib.colormaps[_MAP]
-    top = limit(section)
+    colours = matplotlib.colormaps[_MAP](np.minimum(section.speeds / limit(section), 1.0), bytes=True)[..., :3]
 
     def at(place: Array) -> tuple[float, float]:
         return (place[0] - left) * scale, (upper - place[1]) * scale
 
     images = []
-    for number, (places, speeds, time) in enumerate(zip(section.places, section.speeds, section.times, strict=True)):
+    for number, (places, paint, time) in enumerate(zip(section.places, colours.tolist(), section.times, strict=True)):
         image = Image.new("RGB", (width, height), "white")
         draw = ImageDraw.Draw(image)
         if section.drum_radius > 0.0:
@@ -196,10 +195,11 @@ def animate(section: Section, path: Path, *, duration: int = 60) -> Path:
                 draw.line([at(section.drum_radius * way), at(1.035 * section.drum_radius * way)], fill=_SHELL, width=2 * _OVERSAMPLING)
         for start, end in section.walls[number] if len(section.walls) else ():
             draw.line([at(start), at(end)], fill=_SHELL, width=_OVERSAMPLING)
-        for place, size, speed in zip(places, section.radii * scale, speeds, strict=True):
-            x, y = at(place)
-            colour = tuple(int(255 * part) for part in paint(min(1.0, speed / top))[:3])
-            draw.ellipse([x - size, y - size, x + size, y + size], fill=colour, outline="white", width=max(1, _OVERSAMPLING // 2))
-        images.append(image.resize((width // _OVERSAMPLING, height // _OVERSAMPLING), Image.Resampling.LANCZOS).quantize(32))
+        size = section.radii * scale
+        x, y = (places[:, 0] - left) * scale, (upper - places[:, 1]) * scale
+        for box, colour in zip(np.column_stack([x - size, y - size, x + size, y + size]).tolist(), paint, strict=True):
+            draw.ellipse(box, fill=tuple(colour), outline="white", width=max(1, _OVERSAMPLING // 2))
+        # The mean of the oversampled pixels, which costs a twentieth of a filter that reaches further.
+        images.append(image.reduce(_OVERSAMPLING).quantize(32))
     images[0].save(path, save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)
     return path
