@@ -115,7 +115,7 @@ def slab(p: Parameters, width: float, depth: float, margin: float, foot: float) 
     """Sites (n, 3) in m of a dilute column in a slab and its height (m): 0 < x < `width` less `margin` at both walls, period `depth` in y.
 
     Cells are at least 1.15 d_max wide, 1.3 times more than grains, from z = `foot` on. With a shift of up to 0.05 d_max no two grains
-    touch, nor does one a wall that is 0.15 d_max or more away from the cells: no engine starts with a candidate contact at a wall.
+    touch, nor does one a wall that is 0.15 d_max or more away from the cells.
     """
     least = 1.15 * largest(p)
     n_x, n_y = int((width - 2.0 * margin) / least), int(depth / least)

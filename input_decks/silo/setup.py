@@ -7,11 +7,8 @@ from dembark.input_decks.common.setup import Parameters, Setup, contacts, time_s
 
 
 def setup(p: Parameters) -> Setup:
-    """Sites of a cubic lattice, 1.3 times more than grains; no grain touches another or a wall, even when it is shifted.
-
-    Neighbours are 0.15 d_max apart, and so are walls, which is beyond the reach of the neighbour search: no engine starts with a candidate
-    contact.
-    """
+    """Sites of a cubic lattice, 1.3 times more than grains; no grain touches another or a wall, even when it is shifted: neighbours are
+    0.15 d_max apart, and so are walls. With a skin this wide few steps of the rain need new neighbour lists."""
     step = time_step(p)
     steps = window(math.ceil(p.settle_time / step), math.ceil(p.measure_time / step / p.frames), p.frames)
     d_max = packing.largest(p)

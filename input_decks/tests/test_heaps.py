@@ -218,7 +218,7 @@ def test_flanks_have_a_sign() -> None:
 
 
 TINY: dict[str, dict[str, Any]] = {
-    "granular_collapse": {"column_width": 0.03, "collapse_time": 10.0},
+    "granular_collapse": {"column_width": 0.03, "collapse_time": 14.0},
     "angle_of_repose": {"plate_width": 0.16, "fill_height": 0.06, "discharge_time": 0.8, "settle_time": 0.35},
 }
 

@@ -62,7 +62,8 @@ void PackedContacts::step(const LAMMPS_NS::NeighList& list, const NeighborHistor
   step.wet = layout_.bridge;
   step.limit_force = any.limit_force;
   step.tangential_damping = any.tangential_damping;
-  step.pack_friction = any.friction.presliding != dembark::Presliding::exponential;  // the scalar law knows that curve
+  // The scalar law knows that curve, and steps of zero length.
+  step.pack_friction = any.friction.presliding != dembark::Presliding::exponential && update->dt > 0.0;
   step.rolls = any.rolling.model != dembark::RollingModel::off;
   step.frozen = freeze_bit_;
   step.stride = layout_.size();
@@ -78,7 +79,7 @@ const ContactParameters& PackedContacts::law(const PairBlock& block, int k) cons
 
 Vec3 PackedContacts::friction(const PairBlock& block, int k, const Vec3& normal, double twist,
                               const dembark::NormalResponse<double>& response, const Vec3& velocity) {
-  // What is no number never sticks in a pack: pairs without a normal end up here.
+  // What is no number neither sticks nor slips in a pack: pairs without a normal end up here.
   if (!(normal.x == normal.x))
     error->one(FLERR, "pair_style dembark/granular: grains {} and {} are at the same place", atom->tag[block.grain[k]],
                atom->tag[block.partner[k]]);

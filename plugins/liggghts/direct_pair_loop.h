@@ -118,7 +118,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
                 const Vec3& velocity) override {
     const LAMMPS_NS::Atom* const atom = lmp_->atom;
     const int i = block.grain[k], j = block.partner[k];
-    // What is no number never sticks in a pack: pairs without a normal end up here.
+    // What is no number neither sticks nor slips in a pack: pairs without a normal end up here.
     if (!(normal.x == normal.x)) refuse_coincidence(lmp_->error, atom->tag, i, j);
     double* const history = block.history[k] + friction_offset_;
     dembark::FrictionState<double> state = load_friction(history);

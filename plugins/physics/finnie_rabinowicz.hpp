@@ -25,6 +25,7 @@
 // Units SI. N is the repulsive force of the normal law (>= 0): adhesion acts through the larger overlap that it causes.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -72,11 +73,11 @@ struct FrictionState {
 /// mu(s), equation (1). `Law` here and below: FinnieRabinowicz, or those of its members that are used as packs.
 template <class Law, class Real>
 DEMBARK_HOT Real friction_coefficient(const Law& law, Real slip) {
-  const Real kinetic = law.kinetic_friction, fixed = law.static_friction;
-  Real mu = select(slip > 0.0, kinetic, fixed);
-  // Far beyond s_c what is left of the drop, exp(-40) = 4e-18, is below the rounding of mu.
+  const Real kinetic = law.kinetic_friction, at_rest = law.static_friction;
+  Real mu = select(slip > 0.0, kinetic, at_rest);
+  // Far beyond s_c what is left, exp(-40) = 4e-18, is below the rounding of the drop.
   const auto falling = (slip > 0.0) & (slip < 40.0 * law.critical_slip_distance);
-  if (any(falling)) mu = select(falling, kinetic + (fixed - kinetic) * exponential(-slip / law.critical_slip_distance), mu);
+  if (any(falling)) mu = select(falling, kinetic + (at_rest - kinetic) * exponential(-slip / law.critical_slip_distance), mu);
   return mu;
 }
 
@@ -94,9 +95,9 @@ inline Real shear_limit(const FinnieRabinowicz& law, Real mu, Real normal_force,
 
 namespace detail {
 
-/// The slip ds > 0 for which k_t (xi - ds) = T_max(s + ds), the return to the limit curve, of an interface without a limit of its own.
-/// `coefficient` is mu(s). Newton's method, which descends monotonically to the last root from any place beyond it, because the residual is
-/// concave; where the spring is softer than the drop of friction it thus takes the whole drop at once, as a quasi-static contact does.
+/// The return to the limit curve: the slip ds >= 0 for which k_t (xi - ds) = T_max(s + ds), where the interface has no limit of its own;
+/// `coefficient` is mu(s). The residual is concave, so Newton's method descends to its last root from any place beyond it. Where the spring
+/// is softer than the drop of friction it thus takes the whole drop at once, as a quasi-static contact does.
 template <class Law, class Real, class Truth>
 DEMBARK_HOT Real slip_to_coulomb(const Law& law, Real k_t, Real trial, Real slip, Real coefficient, Real normal_force, Truth wanted) {
   const Real kinetic = law.kinetic_friction, drop = law.static_friction - kinetic;
@@ -104,12 +105,12 @@ DEMBARK_HOT Real slip_to_coulomb(const Law& law, Real k_t, Real trial, Real slip
   // The largest possible slip, to the kinetic limit.
   Real ds = trial - kinetic * load / k_t;
   auto open = wanted & (drop > 0.0) & (slip < 40.0 * law.critical_slip_distance);
-  if (!any(open)) return ds;
+  if (!any(open)) return select(ds > 0.0, ds, Real(0.0));
   const Real per_distance = Real(1.0) / law.critical_slip_distance;
   // The tangent at the present slip meets zero beyond the root, too: mostly close to it, for the slip of a step is short beside s_c.
   Real slope = load * (coefficient - kinetic) * per_distance - k_t;
-  const Real first = (coefficient * load - k_t * trial) / slope;
-  ds = select(open & (slope < 0.0) & (first < ds), first, ds);
+  const Real on_tangent = (coefficient * load - k_t * trial) / slope;
+  ds = select(open & (slope < 0.0) & (on_tangent < ds), on_tangent, ds);
   for (int i = 0; i < 32 && any(open); ++i) {
     const Real weakening = drop * exponential(-(slip + ds) * per_distance), gradient = load * weakening * per_distance;
     slope = gradient - k_t;
@@ -140,10 +141,10 @@ inline double slip_to_limit(const FinnieRabinowicz& law, double k_t, double tria
     const double slope = -k_t - gradient;
     if (!(slope < 0.0)) break;
     const double step = (k_t * (trial - ds) - limit) / slope;
-    ds -= step;
+    ds = std::max(ds - step, 0.0);
     if (std::abs(step) <= 1e-15 * trial) break;
   }
-  return ds > 0.0 ? ds : 0.0;
+  return std::max(ds, 0.0);
 }
 
 }  // namespace detail
@@ -241,8 +242,8 @@ DEMBARK_HOT FrictionState<Real> slipped(const FrictionState<Real>& state, Real s
 
 }  // namespace detail
 
-/// The linear spring of an interface without a limit of its own beyond static friction's first limit: whether it slips, of those that are
-/// `wanted`, with `moved`, what has then become of its state. The others are about to stick again.
+/// Which of the `wanted` linear springs slip, of interfaces without a limit of their own; `moved` is what the states of these become. The
+/// others stick.
 template <class Law, class Real, class Truth>
 DEMBARK_HOT Truth coulomb_slip(const Law& law, Real normal_force, Real stiffness, const Vec3<Real>& increment, Truth wanted,
                                const FrictionState<Real>& state, FrictionState<Real>& moved) {

@@ -1,18 +1,18 @@
 """Coarse-grained fields of a vessel about the z axis, averaged around it: functions of radius and height only.
 
 The fields are those of Gaussian coarse graining in three dimensions (Goldhirsch, Granular Matter 12 (2010) 239, with the lines of wall
-contacts of Weinhart et al., Granular Matter 14 (2012) 289), and the average around the axis is taken before anything is put on a grid.
-It has a closed form: a point at the radius s carries to the radius r the mean of the Gaussian around the axis, and of its products with
-the cosine of the angle between the two for vectors that turn with the angle,
+contacts of Weinhart et al., Granular Matter 14 (2012) 289), and the average around the axis is taken in closed form: a point at the radius
+s carries to the radius r the mean of the Gaussian around the axis, and of its products with the cosine of the angle between the two for
+vectors that turn with the angle,
 
     K_n(r; s) = exp(-(r^2 + s^2) / 2 w^2) I_n(r s / w^2) / (2 pi w^2),    n = 0, 1, 2,
 
 I_n being the modified Bessel functions. Cells are rings; what they hold are integrals of K_n, so mass is conserved to round-off, and the
 momentum that flows through the faces of a ring is balanced by its weight and the force of the walls (Fields.unbalanced).
 
-The integrals are taken from tables, one over the radius and one over the height of a point, that cubic splines go through. A spline is a
-sum of B-splines (de Boor, A Practical Guide to Splines, 1978), of which four do not vanish at a place. So points are summed first, each on
-4 x 4 nodes of both tables, and only these sums are multiplied by the tables.
+The integrals are taken from tables, one over the radius and one over the height of a point, that cubic splines go through, to 1e-6. A
+spline is a sum of B-splines (de Boor, A Practical Guide to Splines, 1978), of which four do not vanish at a place. So points are summed
+first, each on 4 x 4 nodes of both tables, and only these sums are multiplied by the tables.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 
 REACH = 4.0  # widths beyond the vessel that the rings go on
 _POINTS = 3  # of Gauss's rule on a line as long as the width, at least, and within a ring
+_BEYOND = 6.0  # widths beyond the layers that sources may lie
 _TABLE = 12  # places for each width in the tables of the kernel
 
 
@@ -95,8 +96,8 @@ class Rings:
 
     @cached_property
     def upward(self) -> _Table:
-        """What `along` says, side by side, over the height of the source."""
-        places = self._places(self.vertical[0], self.vertical[-1])
+        """What `along` says, side by side, over the height of the source. Beyond the table nothing flows any more."""
+        places = self._places(self.vertical[0] - _BEYOND * self.width, self.vertical[-1] + _BEYOND * self.width)
         return _Table(places, np.hstack(self.along(places)))
 
     def _places(self, low: float, high: float) -> Array:

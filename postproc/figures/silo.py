@@ -75,9 +75,9 @@ def _maps(datasets: Mapping[str, Any], looks: Looks) -> FieldFigure:
     caption = (
         "Cut through the silo, axis in the middle: coarse-grained fields with the lines of the contacts with wall and base, averaged "
         f"around the axis and over {first['frames']} frames of {first['replicas']} packing{'s' if first['replicas'] > 1 else ''}. Gaussian "
-        "kernel of width 1 d; the average around the axis is taken in closed form before anything is put on the grid, so that mass and "
-        "momentum are conserved exactly. Each value is divided by the part of its kernel that lies inside the vessel. Same colour scale "
-        "for all engines; compression positive, σ_rz is negative where the wall carries weight."
+        "kernel of width 1 d; the average around the axis is taken in closed form, so that mass is conserved exactly and momentum but "
+        "for the quadrature along the contacts. Each value is divided by the part of its kernel that lies inside the vessel. Same colour "
+        "scale for all engines; compression positive, σ_rz is negative where the wall carries weight."
     )
     table = grid_table(["radius_m", "height_m", *_LABELS], {
         engine: (one.radius.values, one.height.values, list(panels[engine].values())) for engine, one in shown.items()})

@@ -178,7 +178,8 @@ def measured(replicas: Sequence[Replica], known: Mapping[str, Value]) -> Measure
         **{f"stress_ratio_k_{place}": Value(over_replicas([one.k(0, chosen) for one in silos])) for place, chosen in near.items()},
     }
     remark = (f"The fields are coarse-grained with a Gaussian of width {diameter:g} m = 1 d and averaged around the axis in closed form, "
-              "which conserves mass and momentum exactly; within one width of a wall they are means over the part of the kernel inside.")
+              "which conserves mass exactly and momentum but for the quadrature along the contacts; "
+              "within one width of a wall they are means over the part of the kernel inside.")
     return Measurement(values, remarks=[remark], fields=_dataset(silos, law, diameter, gravity))
 
 

@@ -38,7 +38,7 @@ def rings() -> Item:
                "closed form", "a grain without its mass"),
          exact("ring_balance", "balance of vertical momentum in the worst ring, over max ρ g", float(unbalanced), "momentum balance",
                "gravity doubled", tolerance=1e-3,
-               detail="errors of Gauss's rule along the lines and of the table of the kernel; the tolerance is that of the cases")],
+               detail="errors of Gauss's rule along the lines and of the tables of the kernel; the tolerance is that of the cases")],
         [Panel("Rings against cubes", "spacing of the cubes / width", "largest difference / largest stress", [
             Curve("σ$_{zz}$, σ$_{rr}$, σ$_{rz}$", spacings / _WIDTH, errors),
             Curve("truncation of the cubes' Gaussian", spacings / _WIDTH, np.full(len(spacings), cut), theory=True)])],

@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lammps_bed import WET, bed
+from lammps_bed import COLUMNS, WET, bed
 from rig.lammps_driver import run_deck
 from rig.liggghts_driver import read_dump
+from rig.scenarios import Material
 
 
 def run(folder, text, ranks=1):
@@ -48,6 +49,29 @@ def test_what_is_asked_of_a_step_does_not_change_it(tmp_path, presliding):
     run(tmp_path / "asked", text.replace("thermo 1000", "thermo 7"))
     run(tmp_path / "left", text)
     assert (tmp_path / "asked/grains.dump").read_bytes() == (tmp_path / "left/grains.dump").read_bytes()
+
+
+DRY = Material(static_friction=0.5, kinetic_friction=0.3, critical_slip_distance=2e-6, healing_time=1e-3)
+
+
+@pytest.mark.parametrize("lanes", ["2", "4"])
+def test_narrower_packs_give_the_same_bits(tmp_path, monkeypatch, lanes):
+    """Of contacts that stick, slip and heal."""
+    run(tmp_path / "wide", bed("run 2000", material=DRY))
+    monkeypatch.setenv("DEMBARK_LANES", lanes)
+    run(tmp_path / "narrow", bed("run 2000", material=DRY))
+    assert (tmp_path / "wide/grains.dump").read_bytes() == (tmp_path / "narrow/grains.dump").read_bytes()
+
+
+def test_steps_of_zero_length_change_nothing(tmp_path):
+    """Contacts that slide neither stick in them nor forget their slip."""
+    material = replace(DRY, healing_time=0.0)
+    end = f"write_dump all custom end.dump {COLUMNS} modify sort id format float %.17g"
+    for folder, between in (("left", ""), ("asked", "timestep 0.0\nrun 2\ntimestep 1e-5\n")):
+        run(tmp_path / folder, bed(f"run 1000\n{between}run 500\n{end}", material=material))
+    left, asked = (read_dump(tmp_path / folder / "end.dump")[1][0] for folder in ("left", "asked"))
+    assert (np.abs(left[:, 10:13]) > 0.0).any()
+    np.testing.assert_array_equal(left, asked)
 
 
 def test_the_virial_is_that_of_the_pairs(tmp_path):

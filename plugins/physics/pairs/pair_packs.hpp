@@ -145,6 +145,7 @@ struct Slip {
 template <class P>
 __attribute__((noinline)) Slip<P> slip_of(const PairLaw<P>& law, const NormalResponse<P>& response, const PackVec<P>& increment,
                                           const LaneMask<P>& unsure, const FrictionState<P>& state) {
+  // Bounded, which what is no number is not.
   const auto plain = unsure & !(law.interface_shear_strength < unlimited_strength) &
                      (response.tangential_stiffness * dot(state.displacement, state.displacement) < P(INFINITY));
   Slip<P> found;

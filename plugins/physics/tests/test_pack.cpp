@@ -59,9 +59,10 @@ void compare() {
   Lanes<N> draw;
   int stuck = 0, slipped = 0;
   for (int round = 0; round < 500; ++round) {
-    const LawPack<N> p{draw.uniform(1e6, 1e7), draw.uniform(1e5, 1e6),       draw.uniform(-0.5, 0.0),
-                       draw.uniform(0.4, 0.6), draw.uniform(0.1, 0.4),       draw.among({1e4, 1e30, INFINITY}),
-                       draw.among({0.0, 0.9}), draw.among({0.0, 1e-7, 1e-5})};
+    const LawPack<N> p{draw.uniform(1e6, 1e7),      draw.uniform(1e5, 1e6),
+                       draw.uniform(-0.5, 0.0),     draw.among({0.4, 0.5, 0.6}),
+                       draw.among({0.0, 0.2, 0.4}), draw.among({1e4, 1e30, INFINITY}),
+                       draw.among({0.0, 0.9}),      draw.among({0.0, 1e-7, 1e-5, INFINITY})};
     const Pack<N> radius = draw.uniform(1e-3, 2e-3), mass = draw.uniform(1e-5, 1e-4), overlap = draw.uniform(1e-6, 1e-4), dt = 1e-5;
     Vec3<Pack<N>> normal = draw.vector(1.0);
     normal *= 1.0 / sqrt(dot(normal, normal));
@@ -120,7 +121,8 @@ void compare() {
       CHECK(same(whole, slips[k] ? -one.tangential_stiffness * lane(slid.displacement, k) : lane(force, k)));
       CHECK(same(single.displacement, lane(then.displacement, k)));
       CHECK(single.dissipated_energy == then.dissipated_energy[k]);
-      CHECK(single.slip == Approx(then.slip[k]).epsilon(1e-14).margin(0.0));
+      // The share of its slip that a contact keeps has gone through a logarithm here.
+      CHECK(single.slip == Approx(then.slip[k]).epsilon(slips[k] ? 0.0 : 1e-14).margin(0.0));
     }
   }
   CHECK(stuck > 100);

@@ -21,7 +21,7 @@ fix m3 all property/global coefficientRestitution peratomtypepair 2 0.5 0.7 0.7 
 fix m4 all property/global staticFriction peratomtypepair 2 0.5 0.3 0.3 0.6
 fix m5 all property/global kineticFriction peratomtypepair 2 0.4 0.3 0.3 0.2
 fix m6 all property/global criticalSlipDistance peratomtypepair 2 1e-5 2e-5 2e-5 1e-6
-fix m7 all property/global interfaceShearStrength peratomtypepair 2 1e4 1e300 1e300 1e5
+fix m7 all property/global interfaceShearStrength peratomtypepair 2 1e4 1e300 1e300 1e300
 fix m8 all property/global coefficientRollingFriction peratomtypepair 2 0 0 0 0
 fix m9 all property/global surfaceTension scalar 0.072
 fix m10 all property/global contactAngle peratomtype 0.3 0.1

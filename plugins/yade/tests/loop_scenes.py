@@ -145,8 +145,10 @@ def many_laws(kind):
     """Contacts each with a friction of its own: more kinds than packs know."""
     loop, law = settled(kind)
     for n, i in enumerate(sorted((i for i in O.interactions if i.isReal), key=lambda i: (i.id1, i.id2))):
-        i.phys.kineticFriction, i.phys.healingTime = 0.3 - 0.001 * n, 1e-4 * (n % 2)
-        if n % 3 == 0:
+        # Two neighbours each differ in nothing but the distance.
+        i.phys.kineticFriction, i.phys.healingTime = 0.3 - 0.002 * (n // 2), 1e-4 * (n // 2 % 2)
+        i.phys.criticalSlipDistance = 1e-5 * (1 + n % 2)
+        if n // 2 % 3 == 0:
             i.phys.interfaceShearStrength = 2e4
     advance(1000)
     return left(loop, law)
