@@ -106,7 +106,8 @@ std::vector<::dembark::PairLaw<double>> LawKinds::laws(double dt) {
 	for (const Kind& kind : kinds) {
 		const ::dembark::FinnieRabinowicz& f = kind.friction;
 		all.push_back({kind.elasticity.effective_youngs_modulus, kind.elasticity.effective_shear_modulus, kind.elasticity.damping,
-		               f.static_friction, f.kinetic_friction, f.interface_shear_strength, kept_slip(f, dt), f.critical_slip_distance});
+		               f.static_friction, f.kinetic_friction, f.interface_shear_strength, kept_slip(f, dt),
+		               f.critical_slip_distance});
 	}
 	return all;
 }
