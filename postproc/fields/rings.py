@@ -273,8 +273,8 @@ def coarse_grain(
         through_rings=2.0 * np.pi * rings.radial[:, None] * ringed(border, contact[3]),
         through_layers=ringed(zero, contact[0], level),
     )
-    zones = lined.zoned(layer @ layers, sector_shares) + carried.zoned(layer @ layers, sector_shares)
-    return found, Zones(zones, found.zz.sum(axis=0))
+    parts = layer @ layers
+    return found, Zones(lined.zoned(parts, sector_shares) + carried.zoned(parts, sector_shares), found.zz.sum(axis=0))
 
 
 class _Sources:
