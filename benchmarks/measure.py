@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import re
 import shutil
@@ -11,7 +12,7 @@ import statistics
 import subprocess
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,21 @@ from dembark.common.errors import DembarkError, RunError
 from dembark.validation.engines import Engine
 
 HERE = Path(__file__).parent
-DIAMETER = 0.005
+
+
+@dataclass(frozen=True)
+class Bed:
+    """Settled spheres in a data file: most have the `diameter` (m), the others are `ratio` times as large; the base is `width` (m) wide."""
+
+    path: Path
+    diameter: float = 0.005
+    ratio: float = 1.0
+    width: float = 0.1
+
+    @property
+    def variables(self) -> dict[str, object]:
+        """Of replay.in and replay_lammps.in: the step grows with the diameter, as the time of a contact does."""
+        return {"bed": self.path, "skin": 0.2 * self.diameter, "step": 0.004 * self.diameter}
 
 
 @dataclass(frozen=True)
@@ -121,9 +136,10 @@ def _call(words: Sequence[str], folder: Path, environment: dict[str, str]) -> su
                           stdin=subprocess.DEVNULL, check=False)
 
 
-def liggghts_sample(program: Path, bed: Path, variables: dict[str, object], environment: dict[str, str]) -> Sample:
+def liggghts_sample(program: Path, bed: Bed, variables: dict[str, object], environment: dict[str, str]) -> Sample:
     """Run replay.in with `variables` under `program` in a scratch folder."""
-    given = [word for key, value in {"bed": bed, **variables}.items() for word in ("-var", key, str(value))]
+    more = {"diameter": bed.diameter, "grown": int(bed.ratio == 1.0)}
+    given = [word for key, value in {**bed.variables, **more, **variables}.items() for word in ("-var", key, str(value))]
     with tempfile.TemporaryDirectory(prefix="dembark-bench-") as name:
         folder = Path(name)
         done = _call([str(program), "-in", str(HERE / "replay.in"), "-log", "log", *given], folder, environment)
@@ -134,9 +150,9 @@ def liggghts_sample(program: Path, bed: Path, variables: dict[str, object], envi
         return read_log(text)
 
 
-def lammps_sample(engine: Engine, bed: Path, variables: dict[str, object], wall_clock: bool) -> Sample:
+def lammps_sample(engine: Engine, bed: Bed, variables: dict[str, object], wall_clock: bool) -> Sample:
     """Run replay_lammps.in with `variables`; the stock style is one of the same program."""
-    given = [word for key, value in {"bed": bed, **variables}.items() for word in ("-var", key, str(value))]
+    given = [word for key, value in {**bed.variables, **variables}.items() for word in ("-var", key, str(value))]
     with tempfile.TemporaryDirectory(prefix="dembark-bench-") as name:
         words = [str(engine.executable), "-in", str(HERE / "replay_lammps.in"), "-log", "none", *given]
         done = _call(words, Path(name), engine.environment())
@@ -144,12 +160,12 @@ def lammps_sample(engine: Engine, bed: Path, variables: dict[str, object], wall_
     return read_lammps(re.sub(r"^Loop time.*$", "", text, flags=re.MULTILINE) if done.returncode else text, wall_clock)
 
 
-def yade_sample(engine: Engine, bed: Path, law: str, relax: int, steps: int, loop: str = "InteractionLoop") -> Sample:
+def yade_sample(engine: Engine, bed: Bed, law: str, relax: int, steps: int, loop: str = "InteractionLoop") -> Sample:
     """One timed run of yade_bed.py with contact law `law` (`stock`, `dembark`, or a pre-sliding curve of it) in an engine `loop`."""
     words = [str(engine.executable), "-j1", "-n", "-x", str(HERE / "yade_bed.py")]
     with tempfile.TemporaryDirectory(prefix="dembark-bench-") as name:
-        done = _call([*words, f"bed={bed}", f"law={law}", f"loop={loop}", f"relax={relax}", f"steps={steps}", "samples=1"], Path(name),
-                     engine.environment())
+        done = _call([*words, f"bed={bed.path}", f"width={bed.width}", f"step={0.004 * bed.diameter}", f"law={law}", f"loop={loop}",
+                      f"relax={relax}", f"steps={steps}", "samples=1"], Path(name), engine.environment())
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
     if done.returncode or not lines:
         last = (done.stderr or done.stdout).strip().splitlines()[-1:] or ["it says nothing"]
@@ -160,30 +176,49 @@ def yade_sample(engine: Engine, bed: Path, law: str, relax: int, steps: int, loo
     return Sample(found["loop"], found["pair"])
 
 
-def settled_bed(cache: Path, count: int, say: Callable[[str], None]) -> Path:
+def bed_of(count: int, ratio: float) -> tuple[Bed, dict[str, object]]:
+    """The bed of `count` spheres, without its path, and the variables of settle.in. Of two sizes each has half of the volume."""
+    if ratio == 1.0:
+        return Bed(Path()), {"count": count}
+    large = max(1, round(count / (1.0 + ratio**3)))
+    bed = Bed(Path(), 0.02 / ratio, ratio)
+    # As wide as it is high, but not narrower than three large ones; spheres fill 0.62 of it.
+    volume = math.pi / 6.0 * bed.diameter**3 * (count - large + large * ratio**3) / 0.62
+    width = round(max(volume ** (1.0 / 3.0), 0.06), 4)
+    high = 3.0 * volume / width**2 + 0.03
+    step = 0.004 * bed.diameter
+    given = {"count": count, "large": large, "ratio": ratio, "diameter": bed.diameter, "width": width, "high": high, "top": 1.1 * high,
+             "step": step, "steps": round((math.sqrt(2.0 * high / 9.81) + 0.2) / step)}
+    return Bed(Path(), bed.diameter, ratio, width), given
+
+
+def settled_bed(cache: Path, count: int, say: Callable[[str], None], ratio: float = 1.0) -> Bed:
     """Data file of `count` settled spheres, made by stock LIGGGHTS once and kept in `cache`."""
     deck = HERE / "settle.in"
-    key = hashlib.sha256(deck.read_bytes() + str(count).encode()).hexdigest()[:12]
+    bed, variables = bed_of(count, ratio)
+    key = hashlib.sha256(deck.read_bytes() + repr(variables).encode()).hexdigest()[:12]
     target = cache / f"bed-{key}.data"
+    bed = replace(bed, path=target)
     if target.exists():
-        return target
+        return bed
     say(f"settling {count} spheres with stock LIGGGHTS, once (2-3 minutes)")
     with tempfile.TemporaryDirectory(prefix="dembark-bench-") as name:
         folder = Path(name)
-        words = [str(stock_liggghts()), "-in", str(deck), "-log", "log", "-var", "count", str(count)]
-        _call(words, folder, dict(os.environ))
+        words = [str(stock_liggghts()), "-in", str(deck), "-log", "log"]
+        _call([*words, *(word for key, value in variables.items() for word in ("-var", key, str(value)))], folder, dict(os.environ))
         dump = folder / "bed.dump"
         if not dump.exists():
             raise RunError("stock LIGGGHTS did not settle the bed", "see benchmarks/settle.in")
         rows = dump.read_text(encoding="utf-8").splitlines()[9:]
     if len(rows) != count:
         raise RunError(f"only {len(rows)} of {count} spheres are in the settled bed")
-    lines = ["settled bed", "", f"{count} atoms", "1 atom types", "", "0 0.1 xlo xhi", "0 0.1 ylo yhi", "-0.005 0.5 zlo zhi", "", "Atoms",
-             ""]
+    top = variables.get("top", 0.5)
+    lines = ["settled bed", "", f"{count} atoms", "1 atom types", "", f"0 {bed.width} xlo xhi", f"0 {bed.width} ylo yhi",
+             f"{-bed.diameter} {top} zlo zhi", "", "Atoms", ""]
     for row in rows:
-        number, *place = row.split()
-        lines.append(f"{number} 1 {DIAMETER} 2500 {' '.join(place)}")
+        number, radius, *place = row.split()
+        lines.append(f"{number} 1 {2.0 * float(radius)!r} 2500 {' '.join(place)}")
     part = target.with_suffix(".part")
     part.write_text("\n".join(lines) + "\n", encoding="utf-8")
     part.replace(target)
-    return target
+    return bed

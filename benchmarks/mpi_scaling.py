@@ -66,12 +66,12 @@ def tiled(bed: str, times: int) -> str:
 def bed_of(cache: Path, grains: int) -> tuple[Path, float]:
     """Data file of a bed of `grains`, kept in `cache`, and the width of its base (m)."""
     if grains in SETTLED:
-        return settled_bed(cache, grains, say), 0.1
+        return settled_bed(cache, grains, say).path, 0.1
     times = round((grains / SETTLED[-1]) ** 0.5)
     if times < 2 or times * times * SETTLED[-1] != grains:
         known = [*SETTLED, *(SETTLED[-1] * k * k for k in (2, 3, 4))]
         raise DembarkError(f"--grains {grains}", "", f"choose among {', '.join(map(str, known))}, ...")
-    base = settled_bed(cache, SETTLED[-1], say)
+    base = settled_bed(cache, SETTLED[-1], say).path
     target = base.with_name(f"{base.stem}-{times}x{times}.data")
     if not target.exists():
         part = target.with_suffix(".part")

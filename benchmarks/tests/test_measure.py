@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.measure import HERE, Comparison, Sample, Subject, read_lammps, read_log, spread
+from benchmarks.measure import HERE, Comparison, Sample, Subject, bed_of, read_lammps, read_log, spread
 from benchmarks.run import main, markdown
 from dembark.common.errors import RunError
 
@@ -76,8 +76,8 @@ def test_rounds_alternate_and_ratios_are_of_one_round():
 def test_table_says_what_was_missed():
     comparison = Comparison("c", subjects([]), 10, {"b": 0.49})
     comparison.run(1, lambda line: None)
-    facts = {"grains": 20, "diameter": 0.005, "clock": "processor time", "rounds": 1, "date": "d", "cpu": "c", "cores": 2, "load": 1.0,
-             "load_after": 1.0, "commit": None, "dirty": None, "versions": {"dembark": "0", "yade": None}}
+    facts = {"grains": 20, "diameter": 0.005, "size_ratio": 1.0, "clock": "processor time", "rounds": 1, "date": "d", "cpu": "c",
+             "cores": 2, "load": 1.0, "load_after": 1.0, "commit": None, "dirty": None, "versions": {"dembark": "0", "yade": None}}
     text = markdown(comparison.rows(), facts)
     assert "| c | b | 0.500 (0.500-0.500) | 0.500 (0.500-0.500) | 1.000 (1.000-1.000) | 0.500 (0.500-0.500) | <= 0.49 MISSED |" in text
     assert "commit none" in text and "yade" not in text
@@ -88,6 +88,17 @@ def test_bridge_of_the_stock_model_has_our_volume():
     text = (HERE / "replay.in").read_text()
     content = float(text.split("variable liquid index ")[1].split()[0])
     assert 2 * 1333.333333e-3 * 3.141592653589793 * content * 0.05 == pytest.approx(1e-3, rel=1e-6)
+
+
+def test_beds_of_two_sizes_have_half_of_the_volume_each():
+    bed, given = bed_of(20000, 10.0)
+    assert (given["large"], bed.diameter, bed.ratio) == (20, 0.002, 10.0)
+    assert given["large"] * 10.0**3 == pytest.approx(20000 - given["large"], rel=0.01)
+    # There is room for all: the bed is below the top of the region that is filled, and the large ones fit beside each other.
+    assert bed.width >= 3 * 0.02 - 1e-12 and given["high"] < given["top"]
+    assert given["step"] == pytest.approx(2e-5 * bed.diameter / 0.005)
+    one, alone = bed_of(20000, 1.0)
+    assert (one.diameter, one.width, alone) == (0.005, 0.1, {"count": 20000})
 
 
 def test_wrong_option(capsys):

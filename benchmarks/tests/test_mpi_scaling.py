@@ -3,6 +3,7 @@
 import pytest
 
 from benchmarks import mpi_scaling
+from benchmarks.measure import Bed
 from benchmarks.mpi_scaling import Point, bed_of, main, markdown, planned, rows, tiled
 from dembark.common.errors import DembarkError
 
@@ -36,7 +37,7 @@ def test_a_tiled_bed_holds_every_grain_at_each_place(times):
 
 
 def test_only_beds_that_are_whole_tiles(tmp_path, monkeypatch):
-    monkeypatch.setattr(mpi_scaling, "settled_bed", lambda cache, grains, say: cache / f"bed-{grains}.data")
+    monkeypatch.setattr(mpi_scaling, "settled_bed", lambda cache, grains, say: Bed(cache / f"bed-{grains}.data"))
     (tmp_path / "bed-20000.data").write_text(BED)
     assert bed_of(tmp_path, 2500) == (tmp_path / "bed-2500.data", 0.1)
     path, width = bed_of(tmp_path, 80000)

@@ -4,11 +4,14 @@ import csv
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from dembark.postproc.convergence import convergence
 from dembark.postproc.history import reached
-from dembark.postproc.measurement import Array, Measurement, Replica, Replicas, Value, exact, profile
+from dembark.postproc.instruments.growth import Growth, ordered
+from dembark.postproc.measurement import Array, Measurement, Points, Replica, Replicas, Value, exact, over_replicas, profile
 from dembark.postproc.replica import once
 
 MEASURED = Path(__file__).with_name("reference") / "trajectories.csv"
@@ -18,6 +21,10 @@ FROM = {"three": 0.5, "six": 0.0, "one": 0.5}
 FLOW = (0.8, 1.2)  # s: the flow passes the cubes
 NEAR_FLOOR = 0.05  # m: gaps are looked at below this height
 BARE = (1.0, 1.7)  # m along the flume, before the cubes
+WORST = ("inside", "leaked", "energy_growth", "overlap")
+CONVERGING = (("x_end", "x of the top cube at 1.5 s", "m"), ("half_fallen", "Time at which the top cube is half fallen", "s"))
+# Of which arrangements there are data that agree with each other.
+JUDGED = ("three", "six")
 
 
 def published(cubes: str, axis: str) -> tuple[Array, Array]:
@@ -99,50 +106,87 @@ def prepare(run: Replica) -> None:
     water(run)
 
 
-def measure(replicas: Replicas) -> Measurement:
-    """Of the one run: nothing is random."""
-    run = replicas[0]
-    p, rows, seen = run.parameters, run.times(), water(run)
+@once
+def moved(run: Replica) -> dict[str, float]:
+    """What the history shows of the cubes and of energies; nan for what the run does not reach."""
+    p, rows = run.parameters, run.times()
     cubes, top = p["arrangement"], int(run.derived["cube_count"])
     time, x, z = rows["time"], rows[f"cube{top}_x"], rows[f"cube{top}_z"]
-    start = z[0]
-    came = arrival(run)
-    values = {"arrival": Value(exact(came), reason="" if came > 0.0 else "the front did not come"),
-              "rise": Value(exact(float(np.max(z[time <= 1.0]) - start)), exact(0.0)),
-              "x_end": Value(exact(float(np.interp(1.5, time, x, right=np.nan))),
-                             reason="" if time[-1] >= 1.5 else "the run ends before 1.5 s"),
-              "inside": Value(exact(seen["inside"]), exact(0.0)), "leaked": Value(exact(seen["leaked"]), exact(0.0)),
-              "floor_wetted": Value(exact(seen["floor_wetted"]), exact(1.0),
-                                    reason="" if seen["floor_wetted"] >= 0.0 else "the run ends before 1.5 s")}
+    found = {"rise": float(np.max(z[time <= 1.0]) - z[0]), "x_end": float(np.interp(1.5, time, x, right=np.nan))}
     # What can be turned over: the column that comes to lie on the floor.
     energy = 0.5 * p["fluid_density"] * p["gravity"] * p["column_length"] * p["flume_width"] * p["column_height"] ** 2
     stored = np.sum([rows[name] for name in STORED], axis=0)
-    values["energy_growth"] = Value(exact(float(np.max(stored - np.minimum.accumulate(stored))) / energy), exact(0.0))
+    found["energy_growth"] = float(np.max(stored - np.minimum.accumulate(stored))) / energy
     if "overlap" in rows:
-        values["overlap"] = Value(exact(float(rows["overlap"].max() / p["rounding"])))
-    curves = []
-    data = {axis: published(cubes, axis) for axis in "xz"}
-    times, places = data["x"]
+        found["overlap"] = float(rows["overlap"].max() / p["rounding"])
+    times, places = published(cubes, "x")
     judged = (times >= FROM[cubes]) & (times <= time[-1])
-    if judged.any():
-        own = np.interp(times[judged], time, x)
-        if cubes in ("three", "six"):
-            values[f"{cubes}_rms_x"] = Value(exact(float(np.sqrt(np.mean((own - places[judged]) ** 2)))), exact(0.0))
-        curves.append(profile("x", "Top cube along the flume", "t / s", "x / m", times[judged], [own], reference=places[judged],
-                              reference_label="Canelas et al. (2016)"))
-    times, places = data["z"]
-    if cubes in ("three", "six"):
-        fallen = reached(time, -z, -0.5 * (start + 0.5 * p["edge"]))
-        # Of six the ends of the curve stand for the layers.
-        middle = 0.5 * (places[0] + places[-1]) if cubes == "six" else 0.5 * (start + 0.5 * p["edge"])
-        due = reached(times, -places, -middle)
-        if np.isnan(fallen) and time[-1] > due + 0.1:
-            fallen = float(time[-1])
-        values["half_fallen"] = Value(exact(fallen), exact(due), reason="" if fallen > 0.0 else "the run ends before")
-        seen_there = times <= time[-1]
-        curves.append(profile("z", "Height of the top cube", "t / s", "z / m", times[seen_there], [np.interp(times[seen_there], time, z)],
-                              reference=places[seen_there], reference_label="Canelas et al. (2016)"))
+    if cubes in JUDGED and judged.any():
+        found[f"{cubes}_rms_x"] = float(np.sqrt(np.mean((np.interp(times[judged], time, x) - places[judged]) ** 2)))
+    if cubes in JUDGED:
+        found["half_fallen"] = reached(time, -z, -0.5 * (z[0] + 0.5 * p["edge"]))
+        if np.isnan(found["half_fallen"]) and time[-1] > half_fallen(cubes, p["edge"]) + 0.1:
+            found["half_fallen"] = float(time[-1])
+    return found
+
+
+def half_fallen(cubes: str, edge: float) -> float:
+    """Time (s) at which the experiment's top cube is half fallen. Of six the ends of the curve stand for the layers."""
+    times, places = published(cubes, "z")
+    top = 2.5 * edge
+    return reached(times, -places, -0.5 * (places[0] + places[-1] if cubes == "six" else top + 0.5 * edge))
+
+
+def curves(replicas: Replicas) -> list[Any]:
+    """The top cube's way in all replicas, beside the experiment."""
+    cubes, top, found = replicas[0].parameters["arrangement"], int(replicas[0].derived["cube_count"]), []
+    for axis, title in (("x", "Top cube along the flume"), ("z", "Height of the top cube")):
+        times, places = published(cubes, axis)
+        first = FROM[cubes] if axis == "x" else 0.0
+        seen = (times >= first) & (times <= min(run.times()["time"][-1] for run in replicas))
+        if seen.any() and (axis == "x" or cubes in JUDGED):
+            own = [np.interp(times[seen], run.times()["time"], run.times()[f"cube{top}_{axis}"]) for run in replicas]
+            found.append(profile(axis, title, "t / s", f"{axis} / m", times[seen], own, reference=places[seen],
+                                 reference_label="Canelas et al. (2016)"))
+    return found
+
+
+def measure(replicas: Replicas) -> Measurement:
+    """Means over replicas, whose lattices and cubes are displaced a little."""
+    p = replicas[0].parameters
+    cubes = p["arrangement"]
+    late = "the run ends before 1.5 s"
+    due = {"rise": 0.0, "inside": 0.0, "leaked": 0.0, "energy_growth": 0.0, "three_rms_x": 0.0, "six_rms_x": 0.0, "floor_wetted": 1.0}
+    missing = {"arrival": "the front did not come", "x_end": late, "floor_wetted": late, "half_fallen": "the run ends before"}
+    every = [{**moved(run), "arrival": arrival(run), **{name: water(run)[name] for name in ("inside", "leaked", "floor_wetted")}}
+             for run in replicas]
     # Into narrower gaps no particle gets.
     if cubes == "six" and p["gap"] >= p["spacing"]:
-        values["gap_filled"] = Value(exact(seen["gap_filled"]), exact(1.0))
-    return Measurement(values, curves)
+        due["gap_filled"] = 1.0
+        for one, run in zip(every, replicas, strict=True):
+            one["gap_filled"] = water(run)["gap_filled"]
+    if cubes in JUDGED:
+        due["half_fallen"] = half_fallen(cubes, p["edge"])
+    values = {}
+    for name in every[0]:
+        # What may in no run happen is that of the worst.
+        mean = exact(max(one[name] for one in every)) if name in WORST else over_replicas([exact(one[name]) for one in every])
+        values[name] = Value(mean, exact(due[name]) if name in due else None, reason="" if np.isfinite(mean.value) else missing[name])
+    return Measurement(values, curves(replicas))
+
+
+def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001 (there is one study)
+    """How far the two finest spacings are apart, and the order that three show."""
+    points, place = ordered(points, along)
+    values, shown, remarks = {}, [], []
+    for quantity, label, unit in CONVERGING:
+        growth = Growth.of(points, quantity, place)
+        found, halves = growth.values.tolist(), growth.halves.tolist()
+        between = exact(found[0] - found[1], float(np.hypot(halves[0], halves[1])))
+        values[f"{quantity}_converged"] = Value(between, exact(0.0))
+        shown.append(growth.curve(quantity, label, "spacing / m", f"{label} / {unit}"))
+        judged = convergence(place.tolist(), found, halves)
+        more = "" if judged.extrapolated is None else f", order {judged.order:.2g}, extrapolated {judged.extrapolated:.3f} {unit}"
+        bound = "none can be given" if judged.uncertainty is None else f"± {judged.uncertainty:.3f} {unit}"
+        remarks.append(f"{label}: {judged.kind}{more}; numerical uncertainty of the finest: {bound}.")
+    return Measurement(values, shown, remarks)

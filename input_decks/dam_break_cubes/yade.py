@@ -2,6 +2,7 @@
 
 import math
 import os
+import random
 
 from yade import dembark
 
@@ -48,11 +49,12 @@ for number, centre in enumerate(centres, 1):
     balls = [sphere(Vector3(*centre) + Vector3(*point), r, material=cube_material) for point in corners]
     balls += [sphere(Vector3(*centre) + Vector3(*point), r, material=rim_material) for point in rims]
     core = box(centre, [0.5 * p.edge] * 3, material=cube_material)
-    # A clump takes the axes of its members' inertia. Those of a cube could be any: one that differs along x, y and z keeps them.
+    # A clump takes the axes of its members' inertia. Those of a cube could be any: one that differs along x, y and z has them along its
+    # edges, up to half a turn.
     core.state.mass, core.state.inertia = 1e3, Vector3(10, 20, 30)
     cube, _ = O.bodies.appendClumped([core, *balls])
     body = O.bodies[cube]
-    if body.state.ori.toAngleAxis()[0] > 1e-9 or (body.state.pos - Vector3(*centre)).norm() > 1e-9:
+    if max(abs(part) for part in body.state.ori) < 1.0 - 1e-9 or (body.state.pos - Vector3(*centre)).norm() > 1e-9:
         dembark.fail(f"cube {number} is turned or out of place when it is made: {body.state.pos}, {body.state.ori}")
     body.state.mass, body.state.inertia = p.cube_mass, Vector3(1, 1, 1) * p.cube_inertia
     body.aspherical = False
@@ -67,7 +69,10 @@ water = SphFluid(spacing=p.spacing, soundSpeed=p.sound_speed, density=p.fluid_de
 if p.coupling == "potential":
     water.boundary, water.contactStiffness, water.contactExponent = "dynamic", p.potential_stiffness, p.potential_exponent
 column = dembark.lattice((-p.column_length, -side, 0), (0, side, p.column_height), p.spacing)
-water.addParticles(column, pressures=[p.fluid_density * p.gravity * (p.column_height - z) for _, _, z in column])
+# Places of the water and of the cubes vary a little from replica to replica.
+drawn, noise = random.Random(p.seed), p.lattice_noise * p.spacing
+water.addParticles([[c + drawn.uniform(-noise, noise) for c in point] for point in column],
+                   pressures=[p.fluid_density * p.gravity * (p.column_height - z) for _, _, z in column])
 water.addWall(dembark.tank_walls((-p.column_length, -side, 0), (p.downstream_length, side, p.flume_height), p.spacing))
 for cube, centre in zip(cubes.values(), centres, strict=True):
     if p.coupling == "potential":

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from dembark.input_decks.tests.measuring import Control
-from dembark.input_decks.tests.test_dam_break_cubes import verdicts
+from dembark.input_decks.tests.test_dam_break_cubes import study, verdicts
 
 
 def controls(_folder: Path) -> Iterator[Control]:
@@ -19,4 +19,5 @@ def controls(_folder: Path) -> Iterator[Control]:
     yield Control("a dry floor", three, verdicts("three", dry=True))
     yield Control("a particle in a cube", three, verdicts("three", within=1))
     yield Control("a particle that leaks out", three, verdicts("three", leaked=1))
+    yield Control("a fall that the spacing decides", study(2.19), study(2.17, 1.0))
     yield Control("a scheme that makes energy", three, verdicts("three", made=0.05))

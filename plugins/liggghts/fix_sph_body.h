@@ -11,6 +11,8 @@ FixStyle(sph/wall,FixSphBody) FixStyle(sph/body,FixSphBody)
 
 #include <string>
 
+#include "atom.h"
+#include "fix_property_atom.h"
 #include "shared_fix.h"
 
 #include "dembark/keyword_reader.hpp"
@@ -38,6 +40,9 @@ class FixSphBody : public dembark_family::SharedFix {
 
   /// As all ranks have it.
   const dembark::sph::Body &body() const { return state_.body; }
+  /// Calls visit(i, arm) for the particles i of this rank; arm (m): from the centre, in the frame of the body.
+  template <class Visit>
+  void each_arm(const Visit &visit) const;
   /// Work (J) done so far, by the motion of a wall or by what acts on a body beside fluid and gravity.
   double work() const { return state_.work; }
   /// Gravity (m/s^2), and no force of the fluid yet in this step.
@@ -61,6 +66,12 @@ class FixSphBody : public dembark_family::SharedFix {
   int moved_by_others_ = 0;                // another fix integrates particles of this one
   bool restarted_ = false, fresh_ = true;  // fresh: the forces of the set-up are not yet those of the body
 };
+
+template <class Visit>
+void FixSphBody::each_arm(const Visit &visit) const {
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (atom->mask[i] & groupbit) visit(i, dembark_family::vector(arms_->array_atom[i]));
+}
 
 }  // namespace LAMMPS_NS
 

@@ -18,7 +18,7 @@ using namespace dembark::sph;
 using dembark::keywords::Reader;
 using dembark::keywords::text;
 
-FixSphContact::FixSphContact(LAMMPS *lmp, int narg, char **arg) : SharedFix(lmp, narg, arg) {
+FixSphContact::FixSphContact(LAMMPS *lmp, int narg, char **arg) : SharedFix(lmp, narg, arg), films_(lmp) {
   if (domain->dimension != 3) fail("boxes are for three dimensions");
   checked([&] { read(std::vector<std::string>(arg + 3, arg + narg)); });
   restart_global = 1;
@@ -43,6 +43,9 @@ void FixSphContact::read(const std::vector<std::string> &words) {
       friction = in.number(of, "the coefficient between boxes");
     } else if (of == "restitution") {
       restitution = in.number(of, "the coefficient between boxes");
+    } else if (of == "slit_pressure") {
+      slit_pressure_ = in.number(of, "the share of the pressure around it that a film has, 0 ... 1");
+      if (!(slit_pressure_ >= 0.0 && slit_pressure_ <= 1.0)) dembark::keywords::refuse("slit_pressure must be between 0 and 1");
     } else if (of == "box") {
       names_.push_back(in.word(of, "the ID of a fix sph/body"));
       const double a = in.positive(of, "an edge (m)"), b = in.positive(of, "an edge (m)"), c = in.positive(of, "an edge (m)");
@@ -61,7 +64,8 @@ void FixSphContact::read(const std::vector<std::string> &words) {
       if (const char *const wrong = plane.touch.error()) dembark::keywords::refuse(std::string("plane: ") + wrong);
       contacts_.planes.push_back(plane);
     } else {
-      dembark::keywords::refuse("'" + of + "' is no keyword; known are stiffness, rounding, friction, restitution, box and plane");
+      dembark::keywords::refuse("'" + of +
+                                "' is no keyword; known are stiffness, rounding, friction, restitution, slit_pressure, box and plane");
     }
   }
   contacts_.between = Touch::of(restitution, friction);
@@ -89,6 +93,10 @@ void FixSphContact::init() {
   const double most = contacts_.longest_step(bodies_);
   if (update->dt > most)
     fail("the time step must be at most " + text(most) + " s for this stiffness, not " + text(update->dt) + " s; take a softer one");
+  if (slit_pressure_ == 0.0) return;
+  std::vector<LatticePlane> planes;
+  for (const ContactPlane &plane : contacts_.planes) planes.push_back({plane.point, plane.normal});
+  checked([&] { films_.begin(fixes_, names_, contacts_.half, planes); });
 }
 
 /// Forces of the state as it is.
@@ -104,6 +112,7 @@ void FixSphContact::push(bool remember) {
     fail("at step " + std::to_string(update->ntimestep) + " boxes overlap by " + text(contacts_.deepest) + " m, more than the rounding, " +
          text(contacts_.radius) + " m; take a higher stiffness");
   for (std::size_t k = 0; k < fixes_.size(); ++k) fixes_[k]->add_load(pushes[k].force, pushes[k].torque);
+  if (slit_pressure_ > 0.0) films_.push(slit_pressure_);
 }
 
 /// Energy in the springs (J), largest overlap (m), how many points touch.

@@ -1,5 +1,6 @@
-// fix ID all sph/contact stiffness K [rounding R] [friction MU] [restitution E] box FIX A B C ... plane PX PY PZ NX NY NZ MU E ...:
-// contacts of box-shaped bodies of fix sph/body with each other and with planes, dembark/sph/box_contacts.hpp.
+// fix ID all sph/contact stiffness K [rounding R] [friction MU] [restitution E] [slit_pressure XI] box FIX A B C ... plane PX PY PZ NX NY
+// NZ MU E ...: contacts of box-shaped bodies of fix sph/body with each other and with planes, dembark/sph/box_contacts.hpp, and the films
+// of water between them, dembark/sph/slits.hpp.
 #ifdef FIX_CLASS
 
 FixStyle(sph/contact,FixSphContact)
@@ -14,6 +15,7 @@ FixStyle(sph/contact,FixSphContact)
 
 #include "dembark/sph/box_contacts.hpp"
 #include "shared_fix.h"
+#include "sph_films.h"
 
 namespace LAMMPS_NS {
 
@@ -34,6 +36,8 @@ class FixSphContact : public dembark_family::SharedFix {
   void push(bool remember);
 
   dembark::sph::BoxContacts contacts_;
+  dembark_liggghts::SphFilms films_;
+  double slit_pressure_ = 0.0;
   /// What the stretches of a state belong to.
   std::string written() const;
 

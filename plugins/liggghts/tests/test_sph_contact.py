@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rig.fluid import neutral, solved, standing
 from rig.liggghts_driver import read_dump, run_deck
 
 # Two cubes of 3 x 3 x 3 particles over a floor, turned against each other by their spins, and a little water beside them.
@@ -43,7 +44,7 @@ create_box 3 domain
 lattice sc 0.02 origin 0.5 0.5 0.5
 region pool block 0.3 0.36 0.1 0.16 0.2 0.26 units box
 create_atoms 1 region pool
-lattice sc 0.02 origin 0 0 0
+lattice sc 0.02 origin 0 0 0.5
 region first block 0.079 0.121 0.079 0.121 0.029 0.071 units box
 create_atoms 2 region first
 lattice sc 0.02 origin 0.25 0.5 0
@@ -98,6 +99,34 @@ def test_resumes_to_the_bit(tmp_path: Path) -> None:
     assert (frames[0] == frames[1]).all()
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_films_in_slits_are_those_of_the_solver(ranks: int, tmp_path: Path) -> None:
+    """Boxes that open and close slits: 60 steps, as in Python to 1e-9; without films they are elsewhere."""
+    scene = standing(0.7)
+    table, energies = solved(tmp_path, scene, 60, ranks=ranks)
+    fluid, bodies = neutral(scene, 60)
+    _, dry = neutral(standing(0.0), 60)
+    for number, (body, without) in enumerate(zip(bodies, dry, strict=True), 3):
+        found, due = table[table[:, 1] == number][:, 2:5], body.particles[0]
+        np.testing.assert_allclose(found, due, rtol=0.0, atol=1e-9)
+        assert np.abs(due - without.particles[0]).max() > 1e-4
+    np.testing.assert_allclose(table[table[:, 1] == 1][:, 2:5], fluid.positions, rtol=0.0, atol=1e-9)
+    # The work of films stands with that of loads.
+    due = np.array(fluid.energies())
+    assert np.abs(energies - due).max() <= 1e-8 * np.abs(due).max()
+    assert abs(due[8]) > 1e-4
+
+
+def test_resumes_to_the_bit_with_films(tmp_path: Path) -> None:
+    films = {"old": "friction 0.4 restitution", "new": "friction 0.4 slit_pressure 1 restitution"}
+    whole = run_deck(tmp_path / "whole", deck(run="run 500", **films))
+    run_deck(tmp_path / "parts", deck(run="run 450", **films))
+    again = run_deck(tmp_path / "parts", deck(begin=GROUPS, run="run 500 upto", rows="late", **films), name="second.in")
+    assert whole.code == again.code == 0, again.error or again.output[-1500:]
+    frames = [read_dump(tmp_path / name / "cubes.dump")[1][-1] for name in ("whole", "parts")]
+    assert (frames[0] == frames[1]).all()
+
+
 def test_a_state_of_other_boxes_is_refused(tmp_path: Path) -> None:
     assert run_deck(tmp_path, deck(run="run 450")).code == 0
     done = run_deck(tmp_path, deck(begin=GROUPS, run="run 500 upto", old="plane 0 0 0 0 0 1 0.4 0.6",
@@ -125,6 +154,11 @@ REFUSED = {
     "no box": ("box one 0.06 0.06 0.06 box two 0.06 0.06 0.06", "", "there is no box"),
     "rounding": ("friction 0.4 ", "rounding 0.03 friction 0.4 ", "rounding must be less than half of the shortest edge"),
     "step": ("stiffness 2e4", "stiffness 2e7", "the time step must be at most"),
+    "share": ("friction 0.4 ", "slit_pressure 2 friction 0.4 ", "slit_pressure must be between 0 and 1"),
+    "edge": ("box two 0.06 0.06 0.06", "box two 0.06 0.06 0.05 slit_pressure 1",
+             "an edge of box two, 0.05 m, must be a whole number of the spacing, 0.02 m"),
+    "lattice": ("box two 0.06 0.06 0.06", "box two 0.06 0.06 0.08 slit_pressure 1",
+                "the particles of box two must be the lattice that fills it, 36 of them; of its 27, 0 are on that lattice"),
 }
 
 

@@ -105,8 +105,12 @@ class Passes {
         b.force += force;
         b.torque += cross(set.position[k] - b.position, force);
       }
-    scene.slits.push(s.slit_pressure, s.spacing, s.state.density, s.gravity, scene.solids[0], scene.bodies);
-    for (Body& b : scene.bodies) b.accelerate(s.gravity);
+    scene.slits.push(s.slit_pressure, s.spacing, s.state.density, s.gravity, scene.solids[0].pressure, scene.bodies);
+    for (Body& b : scene.bodies) {
+      b.force += b.film;
+      b.torque += b.film_torque;
+      b.accelerate(s.gravity);
+    }
   }
 
  private:

@@ -11,14 +11,23 @@
 // is covered nothing flows, and where it is dry p = 0. xi = 1: the film is full and connected to the water around it; xi = 0: it is dry.
 // Neither is known of blocks that stand on each other: the difference is uncertainty of the model.
 //
-// Exact for pressures that are linear along the face; a box on the floor of still water feels Archimedes' force. Limits: xi = 0 is no
-// force. Units SI; in space only.
+// A film that opens at the rate V lacks water. What comes through the rim has the speed V d/s at the distance d from it in a gap s, and
+// the pressure falls by what that speed takes (Bernoulli), to that of the air and not below:
+//
+//   p <- max(p - rho/2 (V d/max(s, thin))^2, 0),  V > 0                                                                   (2)
+//
+// Without (2) a block that leaves its floor would be pushed on over half of a spacing by water that is not there. thin, spacing/50, keeps
+// V at which the pressure is gone within what time steps of the fluid resolve; in thinner films it would be gone at once.
+//
+// (1) is exact for pressures that are linear along the face; a box on the floor of still water feels Archimedes' force. Limits: xi = 0 is
+// no force. Units SI; in space only.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "solids.hpp"
@@ -45,133 +54,207 @@ class Slits {
   std::vector<LatticeBox> boxes;
   std::vector<LatticePlane> planes;
 
-  /// Adds the forces of all films to those of the bodies. factor: xi; spacing (m): films are narrower than half of it; density, kg/m^3.
-  void push(double factor, double spacing, double density, const Vector& gravity, const Solids& solids, std::vector<Body>& bodies) {
+  /// Forces of all films, `film` and `film_torque` of the bodies. factor: xi; spacing (m): films are narrower than half of it; density,
+  /// kg/m^3; pressure (Pa): of the boxes' particles.
+  void push(double factor, double spacing, double density, const Vector& gravity, const std::vector<double>& pressure,
+            std::vector<Body>& bodies) {
     for (Body& b : bodies) b.film = b.film_torque = {};
     if (!(factor > 0.0)) return;
     for (const LatticeBox& box : boxes)
       for (int axis = 0; axis < 3; ++axis)
-        for (const double side : {-1.0, 1.0}) face(box, axis, side, factor, spacing, density, gravity, solids, bodies);
-    for (Body& b : bodies) {
-      b.force += b.film;
-      b.torque += b.film_torque;
-    }
+        for (const double side : {-1.0, 1.0}) {
+          const Face face(box, axis, side, bodies[std::size_t(box.body)]);
+          if (!hidden(face, 0.5 * spacing, bodies)) continue;
+          rims(face, 0.5 * spacing, density, gravity, pressure, bodies);
+          relax(face);
+          spread_ways(face);
+          add(face, factor, spacing, density, bodies);
+        }
   }
 
  private:
   static constexpr int open = -2, on_plane = -1, sweeps = 80;
-  static constexpr double relaxation = 1.6;
+  static constexpr double relaxation = 1.6, thin = 0.02;
 
   static double get(const Vector& v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
   static void set(Vector& v, int k, double value) { (k == 0 ? v.x : k == 1 ? v.y : v.z) = value; }
 
-  /// What is at a place: a box but `own`, a plane, or nothing.
-  int covers(const Vector& place, const LatticeBox& own, const std::vector<Body>& bodies) const {
-    for (const LatticePlane& plane : planes)
-      if (dot(place - plane.point, plane.normal) < 0.0) return on_plane;
-    for (std::size_t k = 0; k < boxes.size(); ++k) {
-      const LatticeBox& box = boxes[k];
-      if (box.body == own.body) continue;
-      const Body& b = bodies[std::size_t(box.body)];
-      const Vector d = b.orientation.inverse()(place - b.position);
-      if (std::abs(d.x) < box.half.x && std::abs(d.y) < box.half.y && std::abs(d.z) < box.half.z) return int(k);
-    }
-    return open;
-  }
+  /// A face of a box, in elements of its lattice, rows along u and columns along v.
+  struct Face {
+    const LatticeBox* box;
+    const Body* body;
+    int axis, u, v, rows, columns;
+    double side, du, dv;
+    Vector normal;
 
-  void face(const LatticeBox& box, int axis, double side, double factor, double spacing, double density, const Vector& gravity,
-            const Solids& solids, std::vector<Body>& bodies) {
-    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-    const int rows = box.count[std::size_t(u)], columns = box.count[std::size_t(v)];
-    Body& body = bodies[std::size_t(box.body)];
-    const double du = 2.0 * get(box.half, u) / rows, dv = 2.0 * get(box.half, v) / columns, reach = 0.5 * spacing;
-    const auto place = [&](double i, double j) {
+    Face(const LatticeBox& of, int axis_, double side_, const Body& body_)
+        : box(&of),
+          body(&body_),
+          axis(axis_),
+          u((axis_ + 1) % 3),
+          v((axis_ + 2) % 3),
+          rows(of.count[std::size_t(u)]),
+          columns(of.count[std::size_t(v)]),
+          side(side_),
+          du(2.0 * get(of.half, u) / rows),
+          dv(2.0 * get(of.half, v) / columns),
+          normal(direction(axis_, side_)) {}
+
+    int size() const { return rows * columns; }
+    std::size_t at(int i, int j) const { return std::size_t(i * columns + j); }
+    /// Middle of an element.
+    Vector place(double i, double j) const {
       Vector local{};
-      set(local, axis, side * get(box.half, axis));
-      set(local, u, (i + 0.5) * du - get(box.half, u));
-      set(local, v, (j + 0.5) * dv - get(box.half, v));
-      return body.position + body.orientation(local);
-    };
-    const auto direction = [&](int along, double sign) {
+      set(local, axis, side * get(box->half, axis));
+      set(local, u, (i + 0.5) * du - get(box->half, u));
+      set(local, v, (j + 0.5) * dv - get(box->half, v));
+      return body->position + body->orientation(local);
+    }
+    Vector direction(int along, double sign) const {
       Vector local{};
       set(local, along, sign);
-      return body.orientation(local);
-    };
-    const Vector normal = direction(axis, side);
-    const std::size_t width = std::size_t(columns), all = std::size_t(rows) * width;
-    other_.assign(all, open);
-    pressure_.assign(all, 0.0);
-    bool hidden = false;
-    for (int i = 0; i < rows; ++i)
-      for (int j = 0; j < columns; ++j) {
-        const std::size_t at = std::size_t(i) * width + std::size_t(j);
-        other_[at] = covers(place(i, j) + reach * normal, box, bodies);
-        hidden = hidden || other_[at] != open;
-      }
-    if (!hidden) return;
-    const auto of_particle = [&](int i, int j) {
-      std::array<int, 3> at{};
-      at[std::size_t(axis)] = side > 0.0 ? box.count[std::size_t(axis)] - 1 : 0;
-      at[std::size_t(u)] = i, at[std::size_t(v)] = j;
-      const int k = box.particle(at);
-      const double p = solids.pressure[std::size_t(k)];
-      return p > 0.0 ? std::max(p + density * dot(gravity, place(i, j) - solids.position[std::size_t(k)]), 0.0) : 0.0;
-    };
-    // What is known of each hidden element: its weight and the sum of the given pressures around it.
-    weight_.assign(all, 0.0);
-    given_.assign(all, 0.0);
-    const std::array<std::array<int, 2>, 4> steps{{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
-    for (int i = 0; i < rows; ++i)
-      for (int j = 0; j < columns; ++j) {
-        const std::size_t at = std::size_t(i) * width + std::size_t(j);
-        if (other_[at] == open) {
-          pressure_[at] = of_particle(i, j);
-          continue;
-        }
-        for (const auto& step : steps) {
-          const int ni = i + step[0], nj = j + step[1];
-          if (ni >= 0 && ni < rows && nj >= 0 && nj < columns) {
-            weight_[at] += 1.0;
-            continue;
-          }
-          // The rim is half a step away.
-          const Vector rim = place(i + 0.5 * step[0], j + 0.5 * step[1]);
-          const Vector out = step[0] != 0 ? direction(u, step[0]) : direction(v, step[1]);
-          if (covers(rim + reach * out - 0.5 * reach * normal, box, bodies) != open) continue;
-          weight_[at] += 2.0;
-          given_[at] += 2.0 * of_particle(i, j);
-        }
-      }
-    for (int sweep = 0; sweep < sweeps; ++sweep)
+      return body->orientation(local);
+    }
+    /// Pressure of its own particle, carried to the plane of the face.
+    double pressure(int i, int j, double density, const Vector& gravity, const std::vector<double>& pressures) const {
+      std::array<int, 3> where{};
+      where[std::size_t(axis)] = side > 0.0 ? box->count[std::size_t(axis)] - 1 : 0;
+      where[std::size_t(u)] = i, where[std::size_t(v)] = j;
+      const double p = pressures[std::size_t(box->particle(where))], inwards = get(box->half, axis) / box->count[std::size_t(axis)];
+      return p > 0.0 ? std::max(p + density * inwards * dot(gravity, normal), 0.0) : 0.0;
+    }
+    template <class Work>
+    void each(const Work& work) const {
       for (int i = 0; i < rows; ++i)
-        for (int j = 0; j < columns; ++j) {
-          const std::size_t at = std::size_t(i) * width + std::size_t(j);
-          if (other_[at] == open || !(weight_[at] > 0.0)) continue;
-          double sum = given_[at];
-          if (i > 0) sum += pressure_[at - width];
-          if (i + 1 < rows) sum += pressure_[at + width];
-          if (j > 0) sum += pressure_[at - 1];
-          if (j + 1 < columns) sum += pressure_[at + 1];
-          pressure_[at] += relaxation * (sum / weight_[at] - pressure_[at]);
-        }
-    for (int i = 0; i < rows; ++i)
-      for (int j = 0; j < columns; ++j) {
-        const std::size_t at = std::size_t(i) * width + std::size_t(j);
-        if (other_[at] == open) continue;
-        // Between two boxes each of both faces gives half.
-        const double weight = other_[at] == on_plane ? 1.0 : 0.5;
-        const Vector force = (-weight * factor * std::max(pressure_[at], 0.0) * du * dv) * normal, here = place(i, j);
-        body.film += force;
-        body.film_torque += cross(here - body.position, force);
-        if (other_[at] == on_plane) continue;
-        Body& back = bodies[std::size_t(boxes[std::size_t(other_[at])].body)];
-        back.film -= force;
-        back.film_torque -= cross(here - back.position, force);
-      }
+        for (int j = 0; j < columns; ++j) work(i, j, at(i, j));
+    }
+  };
+
+  /// What is at a place: a box, a plane, or nothing; and how deep (m) the place is below that face of it that is met along a normal.
+  struct Cover {
+    int what = open;
+    double depth = 0.0;
+  };
+
+  Cover covers(const Vector& place, const Face& face, const std::vector<Body>& bodies) const {
+    for (const LatticePlane& plane : planes) {
+      const double depth = -dot(place - plane.point, plane.normal);
+      if (depth > 0.0) return {on_plane, depth};
+    }
+    for (std::size_t k = 0; k < boxes.size(); ++k) {
+      const LatticeBox& box = boxes[k];
+      if (box.body == face.box->body) continue;
+      const Body& b = bodies[std::size_t(box.body)];
+      const Rotation back = b.orientation.inverse();
+      const Vector d = back(place - b.position), n = back(face.normal);
+      if (!(std::abs(d.x) < box.half.x && std::abs(d.y) < box.half.y && std::abs(d.z) < box.half.z)) continue;
+      int faced = 0;
+      for (int i = 1; i < 3; ++i)
+        if (std::abs(get(n, i)) > std::abs(get(n, faced))) faced = i;
+      return {int(k), get(box.half, faced) + (get(n, faced) > 0.0 ? get(d, faced) : -get(d, faced))};
+    }
+    return {};
   }
 
-  std::vector<int> other_;
-  std::vector<double> pressure_, weight_, given_;
+  /// What each element faces within `reach` (m); whether any faces something.
+  bool hidden(const Face& face, double reach, const std::vector<Body>& bodies) {
+    other_.resize(std::size_t(face.size()));
+    bool any = false;
+    face.each([&](int i, int j, std::size_t at) {
+      other_[at] = covers(face.place(i, j) + reach * face.normal, face, bodies);
+      any = any || other_[at].what != open;
+    });
+    return any;
+  }
+
+  /// What is known of each hidden element: its weight, the sum of the given pressures around it, and the way to the rim.
+  void rims(const Face& face, double reach, double density, const Vector& gravity, const std::vector<double>& pressures,
+            const std::vector<Body>& bodies) {
+    const std::size_t all = std::size_t(face.size());
+    pressure_.assign(all, 0.0);
+    weight_.assign(all, 0.0);
+    given_.assign(all, 0.0);
+    way_.assign(all, std::numeric_limits<double>::infinity());
+    const std::array<std::array<int, 2>, 4> steps{{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
+    face.each([&](int i, int j, std::size_t at) {
+      const double own = face.pressure(i, j, density, gravity, pressures);
+      if (other_[at].what == open) {
+        pressure_[at] = own;
+        return;
+      }
+      for (const auto& step : steps) {
+        const int ni = i + step[0], nj = j + step[1];
+        const double half_step = 0.5 * (step[0] != 0 ? face.du : face.dv);
+        if (ni >= 0 && ni < face.rows && nj >= 0 && nj < face.columns) {
+          weight_[at] += 1.0;
+          if (other_[face.at(ni, nj)].what == open) way_[at] = std::min(way_[at], half_step);
+          continue;
+        }
+        // The rim is half a step away.
+        const Vector rim = face.place(i + 0.5 * step[0], j + 0.5 * step[1]);
+        const Vector out = step[0] != 0 ? face.direction(face.u, step[0]) : face.direction(face.v, step[1]);
+        if (covers(rim + reach * out - 0.5 * reach * face.normal, face, bodies).what != open) continue;
+        weight_[at] += 2.0;
+        given_[at] += 2.0 * own;
+        way_[at] = std::min(way_[at], half_step);
+      }
+    });
+  }
+
+  /// (1), by overrelaxation.
+  void relax(const Face& face) {
+    for (int sweep = 0; sweep < sweeps; ++sweep)
+      face.each([&](int i, int j, std::size_t at) {
+        if (other_[at].what == open || !(weight_[at] > 0.0)) return;
+        double sum = given_[at];
+        if (i > 0) sum += pressure_[face.at(i - 1, j)];
+        if (i + 1 < face.rows) sum += pressure_[face.at(i + 1, j)];
+        if (j > 0) sum += pressure_[face.at(i, j - 1)];
+        if (j + 1 < face.columns) sum += pressure_[face.at(i, j + 1)];
+        pressure_[at] += relaxation * (sum / weight_[at] - pressure_[at]);
+      });
+  }
+
+  /// Ways (m) to the rim from element to element, where they are not known yet.
+  void spread_ways(const Face& face) {
+    const auto relax_way = [&](int i, int j) {
+      double& way = way_[face.at(i, j)];
+      if (other_[face.at(i, j)].what == open) return;
+      if (i > 0) way = std::min(way, way_[face.at(i - 1, j)] + face.du);
+      if (i + 1 < face.rows) way = std::min(way, way_[face.at(i + 1, j)] + face.du);
+      if (j > 0) way = std::min(way, way_[face.at(i, j - 1)] + face.dv);
+      if (j + 1 < face.columns) way = std::min(way, way_[face.at(i, j + 1)] + face.dv);
+    };
+    for (int twice = 0; twice < 2; ++twice) {
+      face.each([&](int i, int j, std::size_t) { relax_way(i, j); });
+      face.each([&](int i, int j, std::size_t) { relax_way(face.rows - 1 - i, face.columns - 1 - j); });
+    }
+  }
+
+  /// (2), and the forces.
+  void add(const Face& face, double factor, double spacing, double density, std::vector<Body>& bodies) {
+    Body& body = bodies[std::size_t(face.box->body)];
+    face.each([&](int i, int j, std::size_t at) {
+      const Cover& other = other_[at];
+      if (other.what == open) return;
+      const Vector here = face.place(i, j);
+      Body* const back = other.what == on_plane ? nullptr : &bodies[std::size_t(boxes[std::size_t(other.what)].body)];
+      const Vector velocity = back ? back->velocity_at(here - back->position) : Vector{};
+      const double rate = dot(velocity - body.velocity_at(here - body.position), face.normal);
+      const double speed = rate > 0.0 ? rate * way_[at] / std::max(0.5 * spacing - other.depth, thin * spacing) : 0.0;
+      const double p = std::max(pressure_[at] - 0.5 * density * speed * speed, 0.0);
+      // Between two boxes each of both faces gives half.
+      const Vector force = (-(back ? 0.5 : 1.0) * factor * p * face.du * face.dv) * face.normal;
+      body.film += force;
+      body.film_torque += cross(here - body.position, force);
+      if (!back) return;
+      back->film -= force;
+      back->film_torque -= cross(here - back->position, force);
+    });
+  }
+
+  std::vector<Cover> other_;
+  std::vector<double> pressure_, weight_, given_, way_;
 };
 
 }  // namespace dembark::sph

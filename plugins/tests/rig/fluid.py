@@ -79,6 +79,19 @@ def box(**options: Any) -> Scene:
     return Scene(points[~inside], walls, dx, 20.0, (block,), None, options)
 
 
+def standing(share: float) -> Scene:
+    """Two blocks, nearly on the floor and on each other, with films of the pressure around them times `share`, that water runs against."""
+    dx, gap = 0.02, 0.004
+    lows = np.array([[0.08, 0.04, gap], [0.1, 0.05, 2 * gap + 0.06]])
+    blocks = tuple(Block(lattice(low, low + 0.06, dx), 0.2, [1.2e-4] * 3, low + 0.03, velocity)
+                   for low, velocity in zip(lows, np.array([[0.05, 0.0, 0.02], [0.0, 0.1, 0.06]]), strict=True))
+    points = lattice([0, 0, 0], [0.24, 0.14, 0.14], dx)
+    held = np.any([((points > low - 0.4 * dx) & (points < low + 0.06 + 0.4 * dx)).all(axis=1) for low in lows], axis=0)
+    points = points[~held]
+    velocity = np.stack([0.4 * (points[:, 0] < 0.08), 0.0 * points[:, 1], 0.0 * points[:, 2]], axis=1)
+    return Scene(points, tank_walls([0, 0, 0], [0.24, 0.14, 0.2], dx), dx, 20.0, blocks, velocity, {"slit_pressure": share})
+
+
 def neutral(scene: Scene, steps: int) -> tuple[SphFluid, list[SphBody]]:
     """The solver after `steps`, with the bodies."""
     down = np.zeros(scene.dimension)
@@ -86,9 +99,15 @@ def neutral(scene: Scene, steps: int) -> tuple[SphFluid, list[SphBody]]:
     fluid = SphFluid(scene.points, spacing=scene.spacing, sound_speed=scene.sound_speed, gravity=down,
                      velocity=0.0 if scene.velocity is None else scene.velocity, **scene.options)
     fluid.add_wall(scene.wall)
+    if "slit_pressure" in scene.options:
+        fluid.add_plane([0, 0, 0], [0, 0, 1])
     bodies = []
     for block in scene.blocks:
-        body = fluid.add_body(block.points, mass=block.mass, inertia=block.inertia, centre=block.centre)
+        if "slit_pressure" in scene.options:
+            ends = block.points.min(axis=0) - 0.5 * scene.spacing, block.points.max(axis=0) + 0.5 * scene.spacing
+            body = fluid.add_box(*ends, mass=block.mass, inertia=block.inertia)
+        else:
+            body = fluid.add_body(block.points, mass=block.mass, inertia=block.inertia, centre=block.centre)
         body.set_motion(block.velocity)
         bodies.append(body)
     fluid.run(steps * scene.step, scene.step)
@@ -101,7 +120,7 @@ def _three(values: Array) -> str:
 
 def _words(options: dict[str, Any]) -> str:
     """Options of the solver as keywords of the pair style."""
-    given = dict(options)
+    given = {name: value for name, value in options.items() if name != "slit_pressure"}
     words = []
     if "contact_stiffness" in given:
         words.append(f"coupling potential {given.pop('contact_stiffness')!r} {given.pop('contact_exponent')}")
@@ -130,7 +149,7 @@ def deck(scene: Scene, steps: int, *, ranks: int = 1, style: str = "hybrid granu
     if "granular" in style:
         lines += [f"set group all diameter {dx!r} density 1000", f"set group all mass {scene.mass!r}"]
     if scene.velocity is not None:
-        lines += [f"set atom {k} vx {vx!r} vy {vy!r}" for k, (vx, vy) in enumerate(scene.velocity.tolist(), 1)] if plane else []
+        lines += [f"set atom {k} vx {v[0]!r} vy {v[1]!r} vz {[*v, 0.0][2]!r}" for k, v in enumerate(scene.velocity.tolist(), 1)]
     axis = "0 -1 0" if plane else "0 0 -1"
     lines += [f"pair_style sph/coupled spacing {dx!r} sound_speed {scene.sound_speed!r} {_words(scene.options)}", "pair_coeff * *",
               f"timestep {scene.step!r}", "fix fluid g1 nve/sph/coupled", "fix wall g2 sph/wall"]
@@ -138,6 +157,11 @@ def deck(scene: Scene, steps: int, *, ranks: int = 1, style: str = "hybrid granu
         moments = " ".join(repr(float(one)) for one in np.atleast_1d(block.inertia))
         lines.append(f"fix body{number} g{number} sph/body mass {block.mass!r} inertia {moments} centre {_three(block.centre)} "
                      f"velocity {_three(block.velocity)}")
+    if "slit_pressure" in scene.options:
+        edges = np.ptp(scene.blocks[0].points, axis=0) + dx
+        boxes = " ".join(f"box body{number} {_three(edges)}" for number in range(3, 3 + len(scene.blocks)))
+        lines.append(f"fix touch all sph/contact stiffness 2e4 slit_pressure {scene.options['slit_pressure']!r} {boxes} "
+                     "plane 0 0 0 0 0 1 0.4 0.6")
     lines += [f"fix weight all gravity {scene.gravity!r} vector {axis}",
               f"dump all all custom {steps} grains.dump {COLUMNS}", f'dump_modify all sort id format "%d %d{" %.17g" * 8}"',
               *(f"variable e{k} equal f_fluid[{k}]" for k in range(1, 10)), extra,

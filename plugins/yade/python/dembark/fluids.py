@@ -79,8 +79,10 @@ def _pose_names(bodies):
     return [f"{name}_{what}" for name in bodies for what in ("x", "y", "z", "qw", "qx", "qy", "qz")]
 
 
-def _pose(state):
-    return [*state.pos, state.ori[3], state.ori[0], state.ori[1], state.ori[2]]
+def _pose(state, upright=None):
+    """Place and orientation w, x, y, z, which is none when `state.ori` is `upright`."""
+    turned = state.ori if upright is None else state.ori * upright.inverse()
+    return [*state.pos, turned[3], turned[0], turned[1], turned[2]]
 
 
 class FluidWriter(FrameWriter):
@@ -165,11 +167,12 @@ class FluidRecorder(_CaseRecorder):
 class CubesRecorder(_CaseRecorder):
     """Writes time.csv and grains.dump of a fluid in space with boxes that touch by springs, when they are due.
 
-    bodies : name -> id of a free body
+    bodies : name -> id of a free body. Orientations are written from that at this moment on: clumps may be made with half a turn.
     """
 
     def __init__(self, p, bodies):
         self._bodies = dict(bodies)
+        self._upright = {number: O.bodies[number].state.ori for number in self._bodies.values()}
         bounds = ((-p.column_length, p.downstream_length), (-0.5 * p.flume_width, 0.5 * p.flume_width), (0.0, p.flume_height))
         energies = [f"{name}_energy" for name in (*self.ENERGIES, "body", "contact")]
         super().__init__(p, bounds, [*energies, *_pose_names(self._bodies)])
@@ -181,7 +184,7 @@ class CubesRecorder(_CaseRecorder):
             # Velocities are half a step behind the forces of this one.
             moving += 0.5 * state.mass * state.vel.squaredNorm() + 0.5 * state.inertia[0] * state.angVel.squaredNorm()
             moving += state.mass * self._p.gravity * state.pos[2]
-            poses += _pose(state)
+            poses += _pose(state, self._upright[number])
         for one in O.interactions:
             # Fn is the spring's force; normalForce has the dashpot's, too.
             if one.isReal:
