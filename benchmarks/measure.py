@@ -185,10 +185,10 @@ def bed_of(count: int, ratio: float) -> tuple[Bed, dict[str, object]]:
     # As wide as it is high, but not narrower than three large ones; spheres fill 0.62 of it.
     volume = math.pi / 6.0 * bed.diameter**3 * (count - large + large * ratio**3) / 0.62
     width = round(max(volume ** (1.0 / 3.0), 0.06), 4)
-    high = 5.0 * volume / width**2 + 0.03
+    high = 4.0 * volume / width**2 + 0.03
     step = 0.004 * bed.diameter
     given = {"count": count, "large": large, "ratio": ratio, "diameter": bed.diameter, "width": width, "high": high, "top": 1.1 * high,
-             "step": step, "steps": round((math.sqrt(2.0 * high / 9.81) + 0.2) / step)}
+             "step": step, "steps": round((high / 0.3 + 0.2) / step)}
     return Bed(Path(), bed.diameter, ratio, width), given
 
 

@@ -101,7 +101,7 @@ class Slits {
           normal(direction(axis_, side_)) {}
 
     int size() const { return rows * columns; }
-    std::size_t at(int i, int j) const { return std::size_t(i * columns + j); }
+    std::size_t at(int i, int j) const { return std::size_t(i) * std::size_t(columns) + std::size_t(j); }
     /// Middle of an element.
     Vector place(double i, double j) const {
       Vector local{};
