@@ -17,17 +17,19 @@ from dembark.validation.case.folders import find
 tank = module("water_tank")
 DT, ROWS, G = 1e-3, 200, 9.81
 # Particles that are there at the start.
-COUNTS = {"still": 200, "floating": 1000, "cylinder": 400, "slot": 4000}
-WIDTHS = {"still": 1.0, "floating": 0.6, "cylinder": 4.0, "slot": 0.4}
+COUNTS = {"still": 200, "floating": 1000, "falling": 300, "cylinder": 400, "slot": 4000}
+WIDTHS = {"still": 1.0, "floating": 0.6, "falling": 0.15, "cylinder": 4.0, "slot": 0.4}
 
 
-def run(scene: str, heavier: float = 1.0, lighter: float = 1.0, lost: float = 0.0, leaked: int = 0, made: float = 0.0) -> Any:
-    """The theory of `scene`: with gravity stronger by the factor `heavier`, water `lighter` by a factor, a slot `lost` (spacings) narrower,
-    `leaked` particles in the floor, and the part `made` of the energy from nowhere."""
+def run(scene: str, heavier: float = 1.0, lighter: float = 1.0, slower: float = 1.0, lost: float = 0.0, leaked: int = 0,
+        made: float = 0.0) -> Any:
+    """The theory of `scene`, or the experiment: with gravity stronger by the factor `heavier`, water `lighter` by a factor, a fall that
+    takes `slower` times as long, a slot `lost` (spacings) narrower, `leaked` particles in the floor, the part `made` of the energy from
+    nowhere."""
     p = defaults("water_tank") | find("water_tank").variants[scene]
     dx, depth, width, count = p["size"] / p["across"], p["water_depth"], WIDTHS[scene], COUNTS[scene]
     steps = round(p["run_time"] / DT)
-    every = steps // ROWS
+    every = 2 if scene == "falling" else steps // ROWS
     steps = every * ROWS
     time, zero = DT * every * np.arange(1, ROWS + 1), np.zeros(ROWS)
     d: dict[str, Any] = {"spacing": dx, "depth": depth, "tank_right": width, "tank_top": depth, "thick": 3 * dx, "middle": 0.5 * width,
@@ -39,6 +41,9 @@ def run(scene: str, heavier: float = 1.0, lighter: float = 1.0, lost: float = 0.
         # The level follows from the draught, and the block's height from both.
         share = 0.8 / lighter + 0.05 * np.exp(-20.0 * time / p["run_time"])
         rows["body_y"] = (count * dx**2 + share * p["size"] ** 2) / width - (share - 0.5) * p["size"]
+    if scene == "falling":
+        times, heights = np.loadtxt(tank.REFERENCE, delimiter=",", skiprows=1).T
+        rows["body_y"] = depth - 0.131 + np.interp(time, slower * times, heights)
     if scene == "cylinder":
         d |= {"body_mass": 1000.0 * 200 * dx**2, "load": 20.0}
         theory = tank.added_mass(np.sqrt(200 / np.pi) * dx, width, depth) * lighter * d["body_mass"]
@@ -77,7 +82,8 @@ def study(name: str, ratio: float) -> dict[str, dict[str, Any]]:
 
 def test_theory_passes_and_is_measured_as_it_is() -> None:
     expected = {"still": {"pressure_rms": 0.0, "wall_force": 1.0, "energy_growth": 0.0, "leaked": 0.0},
-                "floating": {"displaced_volume": 0.8, "leaked": 0.0}, "cylinder": {"added_mass": 1.0, "leaked": 0.0},
+                "floating": {"displaced_volume": 0.8, "leaked": 0.0}, "falling": {"fall_time": 0.196, "leaked": 0.0},
+                "cylinder": {"added_mass": 1.0, "leaked": 0.0},
                 "slot": {"slot_width": 0.0, "energy_growth": 0.0, "leaked": 0.0}}
     for scene, values in expected.items():
         found = verdicts(scene)
@@ -121,7 +127,7 @@ def test_the_added_mass_in_a_box_is_that_of_laplaces_equation(width: float, heig
 
 
 SHORT: dict[str, dict[str, float]] = {"still": {"across": 10, "run_time": 0.6}, "floating": {"across": 8, "run_time": 0.8},
-                                      "cylinder": {"across": 8}, "slot": {"across": 3, "run_time": 0.1}}
+                                      "falling": {"run_time": 0.31}, "cylinder": {"across": 8}, "slot": {"across": 3, "run_time": 0.1}}
 
 
 @pytest.mark.parametrize("scene", SHORT)

@@ -1,14 +1,19 @@
 """Hydrostatics, Archimedes, added mass and the contraction of a jet, beside a fluid of particles."""
 
+import csv
 import math
+from pathlib import Path
 
 import numpy as np
 
+from dembark.postproc.history import reached
 from dembark.postproc.instruments.growth import Growth, ordered
 from dembark.postproc.instruments.water import common_values, pressure
 from dembark.postproc.measurement import Array, Curve, Measurement, Points, Replica, Replicas, Value, exact, profile
 from dembark.postproc.studies import measured
 
+# m, of the experiment with the falling block: the level, and the places below it between which it is timed.
+REFERENCE, LEVEL, PASSED = Path(__file__).with_name("reference") / "falling.csv", 0.131, (0.011, 0.081)
 # Of a jet behind a thin plate (Kirchhoff 1869).
 CONTRACTION = math.pi / (math.pi + 2.0)
 # The least width of a slot, over the spacing, that is judged.
@@ -49,6 +54,25 @@ def floating(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
     shown = profile("draught", "Displaced volume", "t / s", "over the block's", rows["time"], [share], reference=np.full(len(share), due),
                     reference_label="Archimedes")
     return {"displaced_volume": Value(exact(float(share[late(run, rows["time"])].mean())), exact(due))}, [shown]
+
+
+def falling(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
+    """The time between two places below the level, beside the experiment."""
+    rows, depth = run.times(), run.derived["depth"]
+    with REFERENCE.open(encoding="utf-8") as file:
+        times, heights = np.array([(float(row["time"]), float(row["height"])) for row in csv.DictReader(file)]).T
+    below = heights - LEVEL
+
+    def between(t: Array, y: Array) -> float:
+        return reached(t, -y, PASSED[1]) - reached(t, -y, PASSED[0])
+
+    # From the level on: its own place is where it begins.
+    own_t, own_y = (np.concatenate([[0.0], part]) for part in (rows["time"], rows["body_y"] - depth))
+    found = between(own_t, own_y)
+    seen = (times > 0.0) & (times <= own_t[-1])
+    shown = profile("fall", "Falling block", "t / s", "height above the level / m", times[seen], [np.interp(times[seen], own_t, own_y)],
+                    reference=below[seen], reference_label="experiment in Qiu et al. (2017)")
+    return {"fall_time": Value(exact(found), exact(between(times, below)), reason="" if found > 0.0 else "the run ends before")}, [shown]
 
 
 def added_mass(radius: float, width: float, height: float) -> float:
@@ -93,7 +117,7 @@ def slot(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
                             reference=start + due[chosen] * p["size"], reference_label="contraction 0.611")]
 
 
-SCENES = {"still": still, "floating": floating, "cylinder": cylinder, "slot": slot}
+SCENES = {"still": still, "floating": floating, "falling": falling, "cylinder": cylinder, "slot": slot}
 
 
 def outside(run: Replica, places: Array) -> Array:
@@ -115,7 +139,7 @@ def measure(replicas: Replicas) -> Measurement:
     values, curves = SCENES[p["scene"]](run)
     energy = 0.5 * p["fluid_density"] * p["gravity"] * d["tank_right"] * d["depth"] ** 2
     common = common_values(run, energy or 1.0, lambda places: outside(run, places))
-    if p["scene"] in ("floating", "cylinder"):
+    if p["scene"] in ("floating", "falling", "cylinder"):
         # A body that is free gives the water energy.
         del common["energy_growth"]
     return Measurement({**values, **common}, curves)

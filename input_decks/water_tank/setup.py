@@ -19,15 +19,16 @@ def setup(p: Parameters) -> Setup:
         right = p.size + 2.0 * whole(0.5 * (p.tank_width - p.size), dx)
     # A block begins a tenth of its side too high.
     low = whole(p.water_depth - (p.body_density / p.fluid_density - 0.1) * p.size, dx)
-    middle, body_y, half = 0.5 * right, low + 0.5 * p.size if p.scene == "floating" else 0.5 * depth, 0.5 * p.size
+    half, square = 0.5 * p.size, p.scene in ("floating", "falling")
+    middle, body_y = 0.5 * right, {"floating": low + half, "falling": depth}.get(p.scene, 0.5 * depth)
     x, y = np.meshgrid((np.arange(round(right / dx)) + 0.5) * dx - middle, (np.arange(round(depth / dx)) + 0.5) * dx - body_y)
     within = np.zeros(x.shape, bool)
-    if p.scene == "floating":
+    if square:
         within = (np.abs(x) < half) & (np.abs(y) < half)
     elif closed:
         within = x**2 + y**2 < half**2
     # The block rises above the water.
-    count = round(p.size / dx) ** 2 if p.scene == "floating" else int(within.sum())
+    count = round(p.size / dx) ** 2 if square else int(within.sum())
     mass, pushed = p.body_density * count * dx**2, p.run_time - 0.5 * p.ramp
     # Its own mass and as much of water are accelerated.
     body: dict[str, Number] = {"middle": middle, "body_y": body_y, "half": half, "body_count": count, "body_mass": mass,

@@ -11,7 +11,7 @@ closed, half = p.scene == "cylinder", p.half
 def inside(point):
     """In the block or the cylinder."""
     x, y = point[0] - p.middle, point[1] - p.body_y
-    if p.scene == "floating":
+    if p.scene in ("floating", "falling"):
         return abs(x) < half and abs(y) < half
     return closed and x * x + y * y < half * half
 
@@ -28,7 +28,7 @@ if p.scene == "slot":
     walls = [point for point in walls if point[1] > 0 or abs(point[0] - p.middle) > half]
 tank = water.addWall(walls)
 bodies = {}
-if p.scene in ("floating", "cylinder"):
+if p.scene in ("floating", "falling", "cylinder"):
     ball = sphere((p.middle, p.body_y, 0), half)
     bodies["body"] = number = O.bodies.append(ball)
     ball.state.mass, ball.state.blockedDOFs = p.body_mass, "zXYZ"
