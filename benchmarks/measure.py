@@ -138,8 +138,7 @@ def _call(words: Sequence[str], folder: Path, environment: dict[str, str]) -> su
 
 def liggghts_sample(program: Path, bed: Bed, variables: dict[str, object], environment: dict[str, str]) -> Sample:
     """Run replay.in with `variables` under `program` in a scratch folder."""
-    more = {"diameter": bed.diameter, "grown": int(bed.ratio == 1.0)}
-    given = [word for key, value in {**bed.variables, **more, **variables}.items() for word in ("-var", key, str(value))]
+    given = [word for key, value in {**bed.variables, "diameter": bed.diameter, **variables}.items() for word in ("-var", key, str(value))]
     with tempfile.TemporaryDirectory(prefix="dembark-bench-") as name:
         folder = Path(name)
         done = _call([str(program), "-in", str(HERE / "replay.in"), "-log", "log", *given], folder, environment)

@@ -114,7 +114,7 @@ HEADS = ["comparison", "models", "pair time / s", "pair ratio", "loop time / s",
 
 def markdown(rows: list[dict[str, Any]], facts: dict[str, Any]) -> str:
     """The table of all rows and what it was measured with."""
-    others = "" if facts["size_ratio"] == 1.0 else f", and such as are {facts['size_ratio']:g} times as large with half of the volume"
+    others = "" if facts["size_ratio"] == 1.0 else f", and others {facts['size_ratio']:g} times as large; each size has half of the volume"
     table = ["| " + " | ".join(HEADS) + " |", "|" + " --- |" * len(HEADS)]
     table += ["| " + " | ".join(texts(row)) + " |" for row in rows]
     return "\n".join([
@@ -146,6 +146,8 @@ def parsed(words: list[str] | None) -> argparse.Namespace:
         raise DembarkError("--redraw", "", "draws the figure of the LCP solver alone: add --only lcp")
     if not 1.0 <= given.size_ratio <= 20.0:
         raise DembarkError("--size-ratio", "", "give a number from 1 to 20")
+    if given.size_ratio != 1.0 and "wet" in (given.only or ()):
+        raise DembarkError("--size-ratio", "with --only wet", "is for dry beds: bridges of the stock model grow with the spheres")
     if min(given.rounds, given.count, given.steps, given.relax) < 1:
         raise DembarkError("--rounds, --count, --steps and --relax", "", "give whole numbers from 1 on")
     return given
@@ -162,7 +164,8 @@ def main(words: list[str] | None = None) -> int:
             return lcp.report(lcp.measure(given.out, given.rounds, given.wall_clock, say))
         cache = ROOT / "build/bench"
         cache.mkdir(parents=True, exist_ok=True)
-        wanted = given.only or ["dry", "wet", "yade", "lcp", *([] if absent(["lammps"]) else ["lammps"])]
+        wanted = given.only or ["dry", *(["wet"] if given.size_ratio == 1.0 else []), "yade", "lcp",
+                                *([] if absent(["lammps"]) else ["lammps"])]
         facts = {**collect(find("liggghts")), "date": datetime.now(UTC).isoformat(timespec="seconds"), "load": os.getloadavg()[0],
                  "grains": given.count, "size_ratio": given.size_ratio, "rounds": given.rounds, "relax": given.relax,
                  "clock": "elapsed time" if given.wall_clock else "processor time"}

@@ -66,6 +66,8 @@ def engine_rate(program: Path, deck: str, count: int, steps: int, environment: M
                               stdin=subprocess.DEVNULL, check=False)
         log = Path(name) / "log"
         text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else done.stdout + done.stderr
+        if done.returncode:
+            raise RunError(f"{program.name} ended with exit code {done.returncode} in {deck}", (text.strip().splitlines() or [""])[-1])
         sample = read_lammps(text, wall_clock=False) if deck == "sph_lammps.in" else read_log(text)
     return count**3 * steps / sample.loop
 
@@ -77,7 +79,8 @@ def pysph_rate(count: int, steps: int) -> float:
         done = subprocess.run(words, cwd=name, env=dict(os.environ) | ONE_THREAD, capture_output=True, text=True, check=False)
     if done.returncode:
         raise RunError("PySPH did not finish", (done.stderr.strip().splitlines() or ["it says nothing"])[-1])
-    return count**3 * steps / float(json.loads(done.stdout.splitlines()[-1])["seconds"])
+    found = json.loads(done.stdout.splitlines()[-1])
+    return count**3 * int(found["steps"]) / float(found["seconds"])
 
 
 def measure(count: int, steps: int, rounds: int, cache: Path, say: Callable[[str], None]) -> list[dict[str, Any]]:
@@ -90,11 +93,13 @@ def measure(count: int, steps: int, rounds: int, cache: Path, say: Callable[[str
     subjects: dict[str, Callable[[], float]] = {
         "stock LIGGGHTS": lambda: engine_rate(stock_liggghts(), "sph.in", count, steps, os.environ | clock),
         "dembark in LIGGGHTS, cubic spline, delta = 0.1": lambda: coupled(0),
-        "the same with a free body": lambda: coupled(1),
+        "dembark in LIGGGHTS with a free body": lambda: coupled(1),
         "dembark, cubic spline, delta = 0.1": lambda: dembark_rate(count, steps, kernel="cubic_spline", walls=False),
         "dembark, Wendland C2, delta = 0.1": lambda: dembark_rate(count, steps, kernel="wendland_c2", walls=False),
-        "the same at twice the step, as usual": lambda: dembark_rate(count, steps, kernel="wendland_c2", walls=False, longer=2.0),
-        "the same in a tank": lambda: dembark_rate(count, steps, kernel="wendland_c2", walls=True, longer=2.0),
+        "dembark, Wendland C2, at twice the step":
+            lambda: dembark_rate(count, steps, kernel="wendland_c2", walls=False, longer=2.0),
+        "dembark, Wendland C2, at twice the step, in a tank":
+            lambda: dembark_rate(count, steps, kernel="wendland_c2", walls=True, longer=2.0),
     }
     if not absent(["lammps"]):
         lammps = find("lammps")
@@ -127,7 +132,7 @@ def main() -> int:
         return 1
     write_json(given.out, {"side": given.side, "steps": given.steps, "goal": GOAL, "rows": rows})
     for row in rows:
-        print(f"{row['subject']:48} {row['rate'] / 1e6:6.2f} million particle-steps/s, {row['ratio']:5.2f} of stock")
+        print(f"{row['subject']:52} {row['rate'] / 1e6:6.2f} million particle-steps/s, {row['ratio']:5.2f} of stock")
     return 0
 
 

@@ -102,5 +102,7 @@ def test_beds_of_two_sizes_have_half_of_the_volume_each():
 
 
 def test_wrong_option(capsys):
+    assert main(["--only", "wet", "--size-ratio", "10"]) == 2
+    assert "is for dry beds" in capsys.readouterr().err
     assert main(["--rounds", "0"]) == 2
     assert capsys.readouterr().err.startswith("dembark: --rounds")

@@ -11,7 +11,7 @@ from benchmarks import sph
 def test_every_subject_is_measured(tmp_path):
     rows = sph.measure(8, 3, 1, tmp_path, lambda line: None)
     names = [row["subject"] for row in rows]
-    assert names[:3] == ["stock LIGGGHTS", "dembark in LIGGGHTS, cubic spline, delta = 0.1", "the same with a free body"]
+    assert names[:3] == ["stock LIGGGHTS", "dembark in LIGGGHTS, cubic spline, delta = 0.1", "dembark in LIGGGHTS with a free body"]
     assert len(names) == len(set(names)) >= 7
     assert rows[0]["ratio"] == 1.0
     assert all(row["rate"] > 0.0 for row in rows)

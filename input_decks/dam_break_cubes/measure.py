@@ -11,8 +11,10 @@ import numpy as np
 from dembark.postproc.convergence import convergence
 from dembark.postproc.history import reached
 from dembark.postproc.instruments.growth import Growth, ordered
-from dembark.postproc.measurement import Array, Measurement, Points, Replica, Replicas, Value, exact, over_replicas, profile
+from dembark.postproc.measurement import Array, Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas, profile
 from dembark.postproc.replica import once
+from dembark.postproc.statistics import replica_mean
+from dembark.postproc.studies import measured
 
 MEASURED = Path(__file__).with_name("reference") / "trajectories.csv"
 STORED = ("kinetic_energy", "potential_energy", "compression_energy", "body_energy", "contact_energy")
@@ -125,7 +127,8 @@ def moved(run: Replica) -> dict[str, float]:
         found[f"{cubes}_rms_x"] = float(np.sqrt(np.mean((np.interp(times[judged], time, x) - places[judged]) ** 2)))
     if cubes in JUDGED:
         found["half_fallen"] = reached(time, -z, -0.5 * (z[0] + 0.5 * p["edge"]))
-        if np.isnan(found["half_fallen"]) and time[-1] > half_fallen(cubes, p["edge"]) + 0.1:
+        found["standing"] = float(np.isnan(found["half_fallen"]))
+        if found["standing"] and time[-1] > half_fallen(cubes, p["edge"]) + 0.1:
             found["half_fallen"] = float(time[-1])
     return found
 
@@ -151,6 +154,11 @@ def curves(replicas: Replicas) -> list[Any]:
     return found
 
 
+def mean_of(values: list[float], noisy: bool) -> Estimate:
+    """Over runs; of a single one that is displaced by chance nothing is known of the spread."""
+    return replica_mean(values) if noisy and len(values) < 3 else over_replicas([exact(one) for one in values])
+
+
 def measure(replicas: Replicas) -> Measurement:
     """Means over replicas, whose lattices and cubes are displaced a little."""
     p = replicas[0].parameters
@@ -167,10 +175,11 @@ def measure(replicas: Replicas) -> Measurement:
             one["gap_filled"] = water(run)["gap_filled"]
     if cubes in JUDGED:
         due["half_fallen"] = half_fallen(cubes, p["edge"])
+    noisy = p["lattice_noise"] > 0.0 or p["cube_noise"] > 0.0
     values = {}
     for name in every[0]:
         # What may in no run happen is that of the worst.
-        mean = exact(max(one[name] for one in every)) if name in WORST else over_replicas([exact(one[name]) for one in every])
+        mean = exact(max(one[name] for one in every)) if name in WORST else mean_of([one[name] for one in every], noisy)
         values[name] = Value(mean, exact(due[name]) if name in due else None, reason="" if np.isfinite(mean.value) else missing[name])
     return Measurement(values, curves(replicas))
 
@@ -183,7 +192,9 @@ def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001
         growth = Growth.of(points, quantity, place)
         found, halves = growth.values.tolist(), growth.halves.tolist()
         between = exact(found[0] - found[1], float(np.hypot(halves[0], halves[1])))
-        values[f"{quantity}_converged"] = Value(between, exact(0.0))
+        # A cube that stands falls at no time.
+        stands = quantity == "half_fallen" and any(measured(point, "standing").value > 0.0 for point in points[:2])
+        values[f"{quantity}_converged"] = Value(between, exact(0.0), reason="it does not fall in all runs" if stands else "")
         shown.append(growth.curve(quantity, label, "spacing / m", f"{label} / {unit}"))
         judged = convergence(place.tolist(), found, halves)
         more = "" if judged.extrapolated is None else f", order {judged.order:.2g}, extrapolated {judged.extrapolated:.3f} {unit}"

@@ -81,7 +81,8 @@ for cube, centre in zip(cubes.values(), centres, strict=True):
     else:
         water.addBox(cube, Vector3(p.edge, p.edge, p.edge))
 if p.coupling != "potential":
-    for point, normal in (((0, 0, 0), (0, 0, 1)), ((0, -side, 0), (0, 1, 0)), ((0, side, 0), (0, -1, 0))):
+    for point, normal in (((0, 0, 0), (0, 0, 1)), ((0, -side, 0), (0, 1, 0)), ((0, side, 0), (0, -1, 0)),
+                          ((p.downstream_length, 0, 0), (-1, 0, 0))):
         water.addPlane(Vector3(*point), Vector3(*normal))
 
 record = dembark.CubesRecorder(p, cubes)

@@ -1,7 +1,6 @@
 #include "sph_films.h"
 
 #include <cmath>
-#include <cstdlib>
 
 #include "atom.h"
 #include "dembark/keyword_reader.hpp"
@@ -29,7 +28,9 @@ int SphFilms::place(const LatticeBox &box, const Vector &arm) const {
 
 void SphFilms::begin(const std::vector<FixSphBody *> &fixes, const std::vector<std::string> &names, const std::vector<Vector> &half,
                      const std::vector<LatticePlane> &planes) {
-  const double dx = PairSphCoupled::find(force)->fluid().spacing;
+  const Settings &fluid = PairSphCoupled::find(force)->fluid();
+  if (fluid.contact.on()) refuse("slit_pressure is for boxes on which the fluid acts by pressure, not by the contact potential");
+  const double dx = fluid.spacing;
   fixes_ = fixes;
   slits_.boxes.clear();
   slits_.planes = planes;

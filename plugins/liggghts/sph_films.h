@@ -18,7 +18,7 @@ class SphFilms : protected LAMMPS_NS::Pointers {
   explicit SphFilms(LAMMPS_NS::LAMMPS *lmp) : Pointers(lmp) {}
 
   /// Boxes of these bodies with half edges `half` (m), the lattices of their particles. Throws std::invalid_argument with the one clear
-  /// line about a box whose particles are none. Collective.
+  /// line about a box whose particles are not that lattice. Collective.
   void begin(const std::vector<LAMMPS_NS::FixSphBody *> &fixes, const std::vector<std::string> &names,
              const std::vector<dembark::sph::Vector> &half, const std::vector<dembark::sph::LatticePlane> &planes);
   /// Forces as they are now, at xi = `share`: loads of the bodies, which all ranks add alike. Collective.

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rig.fluid import deck as deck_of
 from rig.fluid import neutral, solved, standing
 from rig.liggghts_driver import read_dump, run_deck
 
@@ -118,13 +119,27 @@ def test_films_in_slits_are_those_of_the_solver(ranks: int, tmp_path: Path) -> N
 
 
 def test_resumes_to_the_bit_with_films(tmp_path: Path) -> None:
-    films = {"old": "friction 0.4 restitution", "new": "friction 0.4 slit_pressure 1 restitution"}
-    whole = run_deck(tmp_path / "whole", deck(run="run 500", **films))
-    run_deck(tmp_path / "parts", deck(run="run 450", **films))
-    again = run_deck(tmp_path / "parts", deck(begin=GROUPS, run="run 500 upto", rows="late", **films), name="second.in")
-    assert whole.code == again.code == 0, again.error or again.output[-1500:]
-    frames = [read_dump(tmp_path / name / "cubes.dump")[1][-1] for name in ("whole", "parts")]
+    """From step 30 on, with films that push."""
+    scene = standing(1.0)
+
+    def text(run: str) -> str:
+        load = "variable load equal f_body3[22]\n"
+        return load + deck_of(scene, 60, run="fix state all resume/exact 30 state\n" + run + '\nprint "load ${load}"')
+
+    whole = run_deck(tmp_path / "whole", text("run 60"))
+    first = run_deck(tmp_path / "parts", text("run 40"))
+    begin = text("run 60 upto")
+    groups = "".join(f"group g{number} type {number}\n" for number in (1, 2, 3, 4))
+    second = begin[:begin.index("region domain")] + "resume_state state\nneighbor 0.0052 bin\nneigh_modify delay 0 check yes\n" + groups + \
+        begin[begin.index("pair_style"):]
+    again = run_deck(tmp_path / "parts", second, name="second.in")
+    for done in (whole, first, again):
+        assert done.code == 0, done.error or done.output[-1500:]
+    assert "resumed at step 30 exactly" in again.output
+    frames = [read_dump(tmp_path / name / "grains.dump")[1][-1] for name in ("whole", "parts")]
     assert (frames[0] == frames[1]).all()
+    loads = [float(next(line for line in done.output.splitlines() if line.startswith("load ")).split()[1]) for done in (whole, again)]
+    assert loads[0] == loads[1] and abs(loads[0]) > 0.1
 
 
 def test_a_state_of_other_boxes_is_refused(tmp_path: Path) -> None:
@@ -168,3 +183,10 @@ def test_says_what_is_wrong(name: str, tmp_path: Path) -> None:
     done = run_deck(tmp_path, deck(run="run 1", old=old, new=new))
     assert done.code != 0
     assert message in done.error, done.error or done.output[-800:]
+
+
+def test_films_want_pressure(tmp_path: Path) -> None:
+    text = deck(run="run 1", old="sound_speed 20", new="sound_speed 20 boundary dynamic coupling potential 2e4 4")
+    done = run_deck(tmp_path, text.replace("friction 0.4 restitution", "friction 0.4 slit_pressure 1 restitution"))
+    assert done.code != 0
+    assert "slit_pressure is for boxes on which the fluid acts by pressure, not by the contact potential" in done.error, done.error

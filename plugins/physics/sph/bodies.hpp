@@ -44,7 +44,7 @@ struct Body {
   Vector velocity{}, spin{};                   ///< m/s, rad/s
   Rotation orientation{};                      ///< its frame is that of the principal axes
   Vector force{}, torque{};                    ///< N, N m about the centre: of the fluid
-  Vector film{}, film_torque{};                ///< of these, what films in slits give
+  Vector film{}, film_torque{};                ///< of films in slits; part of `force` in the solver
   Vector load{}, load_torque{};                ///< N, N m: of anything else but gravity
   Vector acceleration{}, spin_acceleration{};  ///< m/s^2, rad/s^2
 

@@ -11,13 +11,14 @@
 // is covered nothing flows, and where it is dry p = 0. xi = 1: the film is full and connected to the water around it; xi = 0: it is dry.
 // Neither is known of blocks that stand on each other: the difference is uncertainty of the model.
 //
-// A film that opens at the rate V lacks water. What comes through the rim has the speed V d/s at the distance d from it in a gap s, and
-// the pressure falls by what that speed takes (Bernoulli), to that of the air and not below:
+// A film that opens at the rate V lacks water. To fill it as far as the distance d from the rim, in a gap s, water must come in at V d/s;
+// the pressure there is taken to be lower by what such a speed takes, down to that of the air:
 //
 //   p <- max(p - rho/2 (V d/max(s, thin))^2, 0),  V > 0                                                                   (2)
 //
-// Without (2) a block that leaves its floor would be pushed on over half of a spacing by water that is not there. thin, spacing/50, keeps
-// V at which the pressure is gone within what time steps of the fluid resolve; in thinner films it would be gone at once.
+// That is an estimate of scale: flow that is not steady, and the profile along the film, are left out. Without (2) a block that leaves its
+// floor would be pushed on over half of a spacing by water that is not there. thin, spacing/50, keeps V at which the pressure is gone
+// within what time steps of the fluid resolve; in thinner films it would be gone at once.
 //
 // (1) is exact for pressures that are linear along the face; a box on the floor of still water feels Archimedes' force. Limits: xi = 0 is
 // no force. Units SI; in space only.

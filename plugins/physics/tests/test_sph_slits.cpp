@@ -114,7 +114,7 @@ TEST_CASE("a box that tips opens its film on one side", "[sph]") {
   CHECK(torque < -0.05 * force * 0.5 * edge);
 }
 
-TEST_CASE("films between two boxes push both alike and do no work at once with a motion of both", "[sph]") {
+TEST_CASE("films between two boxes push both alike and do not change when both move together", "[sph]") {
   Stack stack(2, 0.003, false, uniform);
   const double full = 2000.0 * edge * edge;
   CHECK(stack.film(1).z == Approx(full));
@@ -132,7 +132,7 @@ TEST_CASE("films between two boxes push both alike and do no work at once with a
 }
 
 TEST_CASE("where a neighbour covers the rim, the way to it is longer", "[sph]") {
-  // The lower box and the plane, and a box beside it that stands on the plane, too.
+  // A box and the plane, and a box beside it that stands on the plane, too.
   Stack stack(1, 0.002, true, uniform);
   Body beside;
   beside.position = {edge, 0.0, 0.5 * edge};
