@@ -69,6 +69,8 @@ def engine_rate(program: Path, deck: str, count: int, steps: int, environment: M
         if done.returncode:
             raise RunError(f"{program.name} ended with exit code {done.returncode} in {deck}", (text.strip().splitlines() or [""])[-1])
         sample = read_lammps(text, wall_clock=False) if deck == "sph_lammps.in" else read_log(text)
+    if not sample.loop > 0.0:
+        raise RunError(f"{steps} steps of {count}^3 particles are too short to be timed", "give more --steps")
     return count**3 * steps / sample.loop
 
 

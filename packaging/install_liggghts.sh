@@ -59,7 +59,7 @@ for file in "$here"/plugins/liggghts/fix_{energy_account,wall_motion}*; do
   copy "$file" "$src/$(basename "$file")"
 done
 # Fluids, walls and bodies.
-for file in "$here"/plugins/liggghts/{pair_sph_coupled,pair_sph_options,fix_nve_sph_coupled,fix_sph_body,fix_sph_contact,sph_rows,sph_loops_avx2}*; do
+for file in "$here"/plugins/liggghts/{pair_sph_coupled,pair_sph_options,fix_nve_sph_coupled,fix_sph_body,fix_sph_contact,sph_films,sph_rows,sph_loops_avx2}*; do
   copy "$file" "$src/$(basename "$file")"
 done
 # States to resume from.

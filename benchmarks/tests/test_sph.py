@@ -9,7 +9,7 @@ from benchmarks import sph
 
 @pytest.mark.skipif(shutil.which("liggghts") is None, reason="no stock LIGGGHTS")
 def test_every_subject_is_measured(tmp_path):
-    rows = sph.measure(8, 3, 1, tmp_path, lambda line: None)
+    rows = sph.measure(16, 20, 1, tmp_path, lambda line: None)
     names = [row["subject"] for row in rows]
     assert names[:3] == ["stock LIGGGHTS", "dembark in LIGGGHTS, cubic spline, delta = 0.1", "dembark in LIGGGHTS with a free body"]
     assert len(names) == len(set(names)) >= 7
