@@ -32,9 +32,14 @@ class Bed:
     width: float = 0.1
 
     @property
+    def step(self) -> float:
+        """s; it grows with the diameter, as the time of a contact does."""
+        return 0.004 * self.diameter
+
+    @property
     def variables(self) -> dict[str, object]:
-        """Of replay.in and replay_lammps.in: the step grows with the diameter, as the time of a contact does."""
-        return {"bed": self.path, "skin": 0.2 * self.diameter, "step": 0.004 * self.diameter}
+        """Of replay.in and replay_lammps.in."""
+        return {"bed": self.path, "skin": 0.2 * self.diameter, "step": self.step}
 
 
 @dataclass(frozen=True)
@@ -163,7 +168,7 @@ def yade_sample(engine: Engine, bed: Bed, law: str, relax: int, steps: int, loop
     """One timed run of yade_bed.py with contact law `law` (`stock`, `dembark`, or a pre-sliding curve of it) in an engine `loop`."""
     words = [str(engine.executable), "-j1", "-n", "-x", str(HERE / "yade_bed.py")]
     with tempfile.TemporaryDirectory(prefix="dembark-bench-") as name:
-        done = _call([*words, f"bed={bed.path}", f"width={bed.width}", f"step={0.004 * bed.diameter}", f"law={law}", f"loop={loop}",
+        done = _call([*words, f"bed={bed.path}", f"width={bed.width}", f"step={bed.step}", f"law={law}", f"loop={loop}",
                       f"relax={relax}", f"steps={steps}", "samples=1"], Path(name), engine.environment())
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
     if done.returncode or not lines:
@@ -180,15 +185,14 @@ def bed_of(count: int, ratio: float) -> tuple[Bed, dict[str, object]]:
     if ratio == 1.0:
         return Bed(Path()), {"count": count}
     large = max(1, round(count / (1.0 + ratio**3)))
-    bed = Bed(Path(), 0.02 / ratio, ratio)
+    diameter = 0.02 / ratio
     # As wide as it is high, but not narrower than three large ones; spheres fill 0.62 of it.
-    volume = math.pi / 6.0 * bed.diameter**3 * (count - large + large * ratio**3) / 0.62
+    volume = math.pi / 6.0 * diameter**3 * (count - large + large * ratio**3) / 0.62
     width = round(max(volume ** (1.0 / 3.0), 0.06), 4)
     high = 4.0 * volume / width**2 + 0.03
-    step = 0.004 * bed.diameter
-    given = {"count": count, "large": large, "ratio": ratio, "diameter": bed.diameter, "width": width, "high": high, "top": 1.1 * high,
-             "step": step, "steps": round((high / 0.3 + 0.2) / step)}
-    return Bed(Path(), bed.diameter, ratio, width), given
+    bed = Bed(Path(), diameter, ratio, width)
+    return bed, {"count": count, "large": large, "ratio": ratio, "diameter": diameter, "width": width, "high": high, "top": 1.1 * high,
+                 "step": bed.step, "steps": round((high / 0.3 + 0.2) / bed.step)}
 
 
 def settled_bed(cache: Path, count: int, say: Callable[[str], None], ratio: float = 1.0) -> Bed:

@@ -56,9 +56,11 @@ def water(run: Replica) -> dict[str, float]:
     p, times, dx = run.parameters, run.times(), run.parameters["spacing"]
     count, half = int(run.derived["cube_count"]), 0.5 * p["edge"]
     found = {"inside": 0.0, "leaked": 0.0, "gap_filled": 0.0, "floor_wetted": float("nan")}
+    fronts = [(0.0, 0.0)]  # s, and m: the foremost particle
     for frame in run.grains():
         places, now = frame.positions, frame.step * run.time_step
         row = int(np.argmin(np.abs(times["step"] - frame.step)))
+        fronts.append((now, float(places[:, 0].max())))
         outside = (places[:, 2] < -0.5 * dx) | ((places[:, 2] < p["flume_height"]) & (
             (np.abs(places[:, 1]) > 0.5 * (p["flume_width"] + dx)) | (places[:, 0] < -p["column_length"] - 0.5 * dx)
             | (places[:, 0] > p["downstream_length"] + 0.5 * dx)))
@@ -70,6 +72,8 @@ def water(run: Replica) -> dict[str, float]:
             found["gap_filled"] = max(found["gap_filled"], filled(places, [centre for centre, _ in poses[:3]], half, dx))
         if np.isnan(found["floor_wetted"]) and now >= 1.5 - 0.5 * run.derived["stride"] * run.time_step:
             found["floor_wetted"] = wetted(places, p["flume_width"], dx)
+    # Between frames; nan if it does not come.
+    found["arrival"] = reached(*np.array(fronts).T, p["distance"])
     return found
 
 
@@ -94,13 +98,6 @@ def wetted(places: Array, width: float, dx: float) -> float:
     at = at[(at < shape).all(axis=1)]
     grid[at[:, 0], at[:, 1]] = True
     return float(grid.mean())
-
-
-def arrival(run: Replica) -> float:
-    """Time (s) of the foremost particle at the first face, between frames; nan if it does not come."""
-    frames = [(frame.step * run.time_step, float(frame.positions[:, 0].max())) for frame in run.grains()]
-    times, places = np.array([(0.0, 0.0), *frames]).T
-    return reached(times, places, run.parameters["distance"])
 
 
 def prepare(run: Replica) -> None:
@@ -166,13 +163,12 @@ def measure(replicas: Replicas) -> Measurement:
     late = "the run ends before 1.5 s"
     due = {"rise": 0.0, "inside": 0.0, "leaked": 0.0, "energy_growth": 0.0, "three_rms_x": 0.0, "six_rms_x": 0.0, "floor_wetted": 1.0}
     missing = {"arrival": "the front did not come", "x_end": late, "floor_wetted": late, "half_fallen": "the run ends before"}
-    every = [{**moved(run), "arrival": arrival(run), **{name: water(run)[name] for name in ("inside", "leaked", "floor_wetted")}}
-             for run in replicas]
+    of_water = ["arrival", "inside", "leaked", "floor_wetted"]
     # Into narrower gaps no particle gets.
     if cubes == "six" and p["gap"] >= p["spacing"]:
         due["gap_filled"] = 1.0
-        for one, run in zip(every, replicas, strict=True):
-            one["gap_filled"] = water(run)["gap_filled"]
+        of_water.append("gap_filled")
+    every = [{**moved(run), **{name: water(run)[name] for name in of_water}} for run in replicas]
     if cubes in JUDGED:
         due["half_fallen"] = half_fallen(cubes, p["edge"])
     noisy = p["lattice_noise"] > 0.0 or p["cube_noise"] > 0.0

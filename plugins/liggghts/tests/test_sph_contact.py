@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rig.fluid import deck as deck_of
-from rig.fluid import neutral, solved, standing
+from rig.fluid import neutral, resumed, solved, standing
 from rig.liggghts_driver import read_dump, run_deck
 
 # Two cubes of 3 x 3 x 3 particles over a floor, turned against each other by their spins, and a little water beside them.
@@ -128,11 +128,7 @@ def test_resumes_to_the_bit_with_films(tmp_path: Path) -> None:
 
     whole = run_deck(tmp_path / "whole", text("run 60"))
     first = run_deck(tmp_path / "parts", text("run 40"))
-    begin = text("run 60 upto")
-    groups = "".join(f"group g{number} type {number}\n" for number in (1, 2, 3, 4))
-    second = begin[:begin.index("region domain")] + "resume_state state\nneighbor 0.0052 bin\nneigh_modify delay 0 check yes\n" + groups + \
-        begin[begin.index("pair_style"):]
-    again = run_deck(tmp_path / "parts", second, name="second.in")
+    again = run_deck(tmp_path / "parts", resumed(text("run 60 upto"), 4), name="second.in")
     for done in (whole, first, again):
         assert done.code == 0, done.error or done.output[-1500:]
     assert "resumed at step 30 exactly" in again.output

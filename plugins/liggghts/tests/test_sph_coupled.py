@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rig.fluid import Scene, box, dam, deck, neutral, solved
+from rig.fluid import Scene, box, dam, deck, neutral, resumed, solved
 from rig.liggghts_driver import read_dump, run_deck
 
 from dembark.physics import SphFluid
@@ -86,16 +86,12 @@ def test_resumes_to_the_bit(style: str, ranks: int, tmp_path: Path) -> None:
     whole = run_deck(tmp_path / "whole", text("run 60"), ranks=ranks)
     assert whole.code == 0, whole.error or whole.output[-1500:]
     run_deck(tmp_path / "parts", text("run 40"), ranks=ranks)
-    begin = text("run 60 upto")
-    first, last = begin.index("region domain"), begin.index("pair_style")
-    groups = "".join(f"group g{number} type {number}\n" for number in (1, 2, 3))
-    second = begin[:first] + "resume_state state\nneighbor 0.0052 bin\nneigh_modify delay 0 check yes\n" + groups + begin[last:]
-    resumed = run_deck(tmp_path / "parts", second, ranks=ranks, name="second.in")
-    assert resumed.code == 0, resumed.error or resumed.output[-1500:]
-    assert "resumed at step 30 exactly" in resumed.output, resumed.output[-3000:]
+    again = run_deck(tmp_path / "parts", resumed(text("run 60 upto"), 3), ranks=ranks, name="second.in")
+    assert again.code == 0, again.error or again.output[-1500:]
+    assert "resumed at step 30 exactly" in again.output, again.output[-3000:]
     one, two = (read_dump(tmp_path / folder / "grains.dump")[1][-1] for folder in ("whole", "parts"))
     assert (one == two).all()
-    lines = [next(line for line in run.output.splitlines() if line.startswith("energies ")) for run in (whole, resumed)]
+    lines = [next(line for line in run.output.splitlines() if line.startswith("energies ")) for run in (whole, again)]
     a, b = (np.array(line.split()[1:], float) for line in lines)
     assert_close(b, a, 1e-9)
 

@@ -174,6 +174,13 @@ def deck(scene: Scene, steps: int, *, ranks: int = 1, style: str = "hybrid granu
     return text
 
 
+def resumed(text: str, types: int) -> str:
+    """The deck `text` from the newest state on, with groups of `types` types."""
+    groups = "".join(f"group g{number} type {number}\n" for number in range(1, types + 1))
+    return (text[:text.index("region domain")] + "resume_state state\nneighbor 0.0052 bin\nneigh_modify delay 0 check yes\n" + groups
+            + text[text.index("pair_style"):])
+
+
 def solved(folder: Path, scene: Scene, steps: int, *, ranks: int = 1, **options: Any) -> tuple[Array, Array]:
     """The last frame of LIGGGHTS (n, 10), columns as COLUMNS, and the energies."""
     done = run_deck(folder, deck(scene, steps, ranks=ranks, **options), ranks=ranks)
