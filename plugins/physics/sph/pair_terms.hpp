@@ -11,10 +11,11 @@
 // Fluids 190 (2019) 346), here linear in g.x, so that water at rest stays there. Their m/rho_j is m/rho_0 here, 1 % apart at most:
 // diffusion conserves sum(rho) to round-off, but where a density is lifted to the lowest that spray may have.
 //
-//   P/rho_0^2 = c_0^2/(2 rho_0) (1 - r/q)^2 if r < q = 0.9 dx, else 0                                                  (4)
+//   P/rho_0^2 = c_0^2/(4 rho_0) (1 - r/q) if r < q = 0.9 dx, else 0                                                    (4)
 //
 // (4) is a pressure that fluid and solid particles have besides p in (2): a film one particle thick, or spray, that has lost the density
 // of rest has no pressure to keep it out of a wall, and sinks into it. Where there is pressure, particles are farther from each other.
+// Linear, because where four particles of a wall meet r is 0.71 dx: a parabola of the same value at r = q/2 stops c/23 there, this c/12.5.
 //
 // All forces are central and antisymmetric: momentum and angular momentum of a pair are conserved to round-off. Viscosity only
 // dissipates, and a rigid rotation feels none: v.r = 0. Limits: delta = 0, alpha = 0 is the conservative scheme.
@@ -32,7 +33,7 @@ struct PairCoefficients {
   double diffusion = 0.0;  ///< 2 delta h c_0 / rho_0, m^5/(kg s) (per m slope)
   double viscosity = 0.0;  ///< 2 alpha c_0 h, m^2/s
   double softening = 0.0;  ///< 0.01 h^2, m^2
-  double guard = 0.0;      ///< c_0^2/(2 rho_0), m^5/(kg s^2); 0: no guard
+  double guard = 0.0;      ///< c_0^2/(4 rho_0), m^5/(kg s^2); 0: no guard
   double reach = 1.0;      ///< q, m
 
   /// moment: lattice_moment() of the kernel, by which all sums are divided.
@@ -65,7 +66,7 @@ DEMBARK_HOT Real artificial_viscosity(const PairCoefficients& c, const Real& dis
 template <class Real>
 DEMBARK_HOT Real guard_stress(const PairCoefficients& c, const Real& distance) {
   const Real left = Real(1.0) - distance * Real(1.0 / c.reach), inside = select(left > Real(0.0), left, Real(0.0));
-  return Real(c.guard) * inside * inside;
+  return Real(c.guard) * inside;
 }
 
 /// Acceleration of i over (x_i - x_j), 1/s^2, from `stress` = p_i/rho_i^2 + p_j/rho_j^2 + Pi; j gets its negative.

@@ -75,7 +75,7 @@ inline LoopNumbers loop_numbers(const Settings& s) {
   return with_kernel(s, [&](const auto& kernel) {
     const double moment = lattice_moment(kernel, s.dimension, s.h(), s.spacing);
     PairCoefficients pair = PairCoefficients::of(s.mass(), moment, s.h(), s.state.sound_speed, s.state.density, s.alpha, s.delta);
-    if (s.boundary == Boundary::extrapolated) pair.guard = 0.5 * s.state.sound_speed * s.state.sound_speed / s.state.density;
+    if (s.boundary == Boundary::extrapolated) pair.guard = 0.25 * s.state.sound_speed * s.state.sound_speed / s.state.density;
     pair.reach = 0.9 * s.spacing;
     return LoopNumbers{pair, kernel.value(s.spacing), 0.5 * (s.state.density + s.mass() * kernel.value(0.0))};
   });

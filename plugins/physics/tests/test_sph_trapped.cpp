@@ -105,3 +105,20 @@ TEST_CASE("a film of one particle does not sink into a floor", "[sph]") {
   }
   CHECK(lowest > 0.0);
 }
+
+TEST_CASE("between four particles of a wall the guard alone stops c/16", "[sph]") {
+  Settings s;
+  s.spacing = 0.02;
+  s.state.sound_speed = 40.0;
+  const PairCoefficients pair = loop_numbers(s).pair;
+  const WendlandC2 kernel(s.dimension, s.h());
+  // The work of the four on a unit of mass, along the line that comes from afar and ends in their middle.
+  constexpr int steps = 2000;
+  double work = 0.0;
+  for (int k = 0; k < steps; ++k) {
+    const double z = s.spacing * (k + 0.5) / steps, r = std::sqrt(z * z + 0.5 * s.spacing * s.spacing);
+    work += 4.0 * acceleration_factor(pair.mass * kernel.slope(r), guard_stress(pair, r)) * z * s.spacing / steps;
+  }
+  CHECK(std::sqrt(2.0 * work) > s.state.sound_speed / 16.0);
+  CHECK(std::sqrt(2.0 * work) < s.state.sound_speed / 10.0);
+}
