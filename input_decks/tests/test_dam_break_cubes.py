@@ -14,9 +14,9 @@ from dembark.postproc.tests.scenes import frame_of
 dam = module("dam_break_cubes")
 DT, STRIDE, SPACING = 1e-3, 100, 0.025
 # One particle at 3 m/s has 0.5 % of the energy of the column; with a spacing of 0.05 m it has 1.3 %, more than `energy_growth` allows.
-TINY = {"spacing": 0.0375, "column_length": 0.4125, "column_height": 0.3, "distance": 0.3, "downstream_length": 0.7875, "flume_height": 0.525,
-        "flume_width": 0.2625, "run_time": 0.42, "frames": 3, "rows": 70, "stiffness": 5e4, "courant": 0.36,
-        # Half of this spacing is a sixth of a cube: too much for a film.
+TINY = {"spacing": 0.0375, "column_length": 0.4125, "column_height": 0.3, "distance": 0.3, "downstream_length": 0.7875,
+        "flume_height": 0.525, "flume_width": 0.2625, "run_time": 0.42, "frames": 3, "rows": 70, "stiffness": 5e4, "courant": 0.36,
+        # Half of this spacing is an eighth of a cube: too much for a film.
         "slit_pressure": 0.0, "lattice_noise": 0.0, "cube_noise": 0.0}
 
 

@@ -17,15 +17,15 @@ from dembark.validation.case.folders import find
 tank = module("water_tank")
 DT, ROWS, G = 1e-3, 200, 9.81
 # Particles that are there at the start.
-COUNTS = {"still": 200, "floating": 1000, "falling": 300, "cylinder": 400, "slot": 4000}
-WIDTHS = {"still": 1.0, "floating": 0.6, "falling": 0.15, "cylinder": 4.0, "slot": 0.4}
+COUNTS = {"still": 200, "floating": 1000, "falling": 300, "cylinder": 400, "slot": 4000, "drifting": 100}
+WIDTHS = {"still": 1.0, "floating": 0.6, "falling": 0.15, "cylinder": 4.0, "slot": 0.4, "drifting": 0.6}
 
 
 def run(scene: str, heavier: float = 1.0, lighter: float = 1.0, slower: float = 1.0, lost: float = 0.0, leaked: int = 0,
-        made: float = 0.0) -> Any:
+        made: float = 0.0, braked: float = 0.0) -> Any:
     """The theory of `scene`, or the experiment: with gravity stronger by the factor `heavier`, water `lighter` by a factor, a fall that
     takes `slower` times as long, a slot `lost` (spacings) narrower, `leaked` particles in the floor, the part `made` of the energy from
-    nowhere."""
+    nowhere, a block whose momenta vanish by the part `braked`."""
     p = defaults("water_tank") | find("water_tank").variants[scene]
     dx, depth, width, count = p["size"] / p["across"], p["water_depth"], WIDTHS[scene], COUNTS[scene]
     steps = round(p["run_time"] / DT)
@@ -48,6 +48,11 @@ def run(scene: str, heavier: float = 1.0, lighter: float = 1.0, slower: float = 
         d |= {"body_mass": 1000.0 * 200 * dx**2, "load": 20.0}
         theory = tank.added_mass(np.sqrt(200 / np.pi) * dx, width, depth) * lighter * d["body_mass"]
         rows["body_vx"] = 20.0 / (d["body_mass"] + theory) * (time - 0.5 * p["ramp"])
+    if scene == "drifting":
+        d |= {"body_mass": 80.0, "body_inertia": 80.0 * p["size"] ** 2 / 6.0, "body_y": 0.5 * depth, "middle": 0.5 * width}
+        left = np.linspace(1.0, 1.0 - braked, ROWS) * 80.0 * p["speed"]
+        rows |= {"momentum_x": left, "momentum_y": 0.5 * left,
+                 "angular_momentum": left * (p["size"] / 6.0 + 0.25 * width - 0.5 * depth)}
     # What has flown out: dV/dt = contraction times width times the square root of 2 g (depth - V/width).
     slot = (p["size"] - lost * dx) * 0.6110154703516573 * np.sqrt(2.0 * G)
 
@@ -84,7 +89,8 @@ def test_theory_passes_and_is_measured_as_it_is() -> None:
     expected = {"still": {"pressure_rms": 0.0, "wall_force": 1.0, "energy_growth": 0.0, "leaked": 0.0},
                 "floating": {"displaced_volume": 0.8, "leaked": 0.0}, "falling": {"fall_time": 0.196, "leaked": 0.0},
                 "cylinder": {"added_mass": 1.0, "leaked": 0.0},
-                "slot": {"slot_width": 0.0, "energy_growth": 0.0, "leaked": 0.0}}
+                "slot": {"slot_width": 0.0, "energy_growth": 0.0, "leaked": 0.0},
+                "drifting": {"momentum_error": 0.0, "angular_momentum_error": 0.0, "leaked": 0.0}}
     for scene, values in expected.items():
         found = verdicts(scene)
         assert set(values) <= names(found, "pass"), found
@@ -127,7 +133,8 @@ def test_the_added_mass_in_a_box_is_that_of_laplaces_equation(width: float, heig
 
 
 SHORT: dict[str, dict[str, float]] = {"still": {"across": 10, "run_time": 0.6}, "floating": {"across": 8, "run_time": 0.8},
-                                      "falling": {"run_time": 0.31}, "cylinder": {"across": 8}, "slot": {"across": 3, "run_time": 0.1}}
+                                      "falling": {"run_time": 0.31}, "cylinder": {"across": 8}, "slot": {"across": 3, "run_time": 0.1},
+                                      "drifting": {"across": 8}}
 
 
 @pytest.mark.parametrize("scene", SHORT)
@@ -138,6 +145,8 @@ def test_both_engines_have_the_same_flow(scene: str, simulate: Any) -> None:
         assert {frame.step for frame in one.grains()} == {one.derived["stride"] * k for k in range(1, 41)}
         found[engine] = judged("water_tank", tank.measure([one]))
         assert found[engine]["leaked"]["verdict"] == "pass"
+        if scene == "drifting":
+            assert {"momentum_error", "angular_momentum_error"} <= names(found[engine], "pass"), found[engine]
     for name, one in found["liggghts"].items():
         assert found["yade"][name]["value"] == pytest.approx(one["value"], abs=2e-3), name
 

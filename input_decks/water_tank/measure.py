@@ -1,4 +1,4 @@
-"""Hydrostatics, Archimedes, added mass and the contraction of a jet, beside a fluid of particles."""
+"""Hydrostatics, Archimedes, added mass, the contraction of a jet and what is conserved, beside a fluid of particles."""
 
 import csv
 import math
@@ -117,11 +117,25 @@ def slot(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
                             reference=start + due[chosen] * p["size"], reference_label="contraction 0.611")]
 
 
-SCENES = {"still": still, "floating": floating, "falling": falling, "cylinder": cylinder, "slot": slot}
+def drifting(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
+    """What momenta about the origin change, beside those of the block at the start."""
+    p, d, rows = run.parameters, run.derived, run.times()
+    # Velocities (1, 1/2) and 1/size times the speed, about the centre.
+    momentum, start = d["body_mass"] * p["speed"], d["body_inertia"] * p["speed"] / p["size"]
+    along = np.hypot(rows["momentum_x"] / momentum - 1.0, rows["momentum_y"] / momentum - 0.5) / math.hypot(1.0, 0.5)
+    about = np.abs(rows["angular_momentum"] - start - momentum * (0.5 * d["middle"] - d["body_y"])) / (momentum * d["depth"])
+    shown = profile("momentum", "Change of momentum, over that of the block at the start", "t / s", "Δ / 1", rows["time"], [along])
+    return {"momentum_error": Value(exact(float(along.max())), exact(0.0)),
+            "angular_momentum_error": Value(exact(float(about.max())), exact(0.0))}, [shown]
+
+
+SCENES = {"still": still, "floating": floating, "falling": falling, "cylinder": cylinder, "slot": slot, "drifting": drifting}
 
 
 def outside(run: Replica, places: Array) -> Array:
     """Particles (n,) of positions (n, 3) in the walls, deeper than half a spacing, or beyond them."""
+    if run.parameters["scene"] == "drifting":
+        return np.zeros(len(places), bool)
     scene, half, dx = run.parameters["scene"], run.derived["half"], run.derived["spacing"]
     x, y, right = places[:, 0], places[:, 1], run.derived["tank_right"]
     below = y < -0.5 * dx
@@ -139,7 +153,7 @@ def measure(replicas: Replicas) -> Measurement:
     values, curves = SCENES[p["scene"]](run)
     energy = 0.5 * p["fluid_density"] * p["gravity"] * d["tank_right"] * d["depth"] ** 2
     common = common_values(run, energy or 1.0, lambda places: outside(run, places))
-    if p["scene"] in ("floating", "falling", "cylinder"):
+    if p["scene"] in ("floating", "falling", "cylinder", "drifting"):
         # A body that is free gives the water energy.
         del common["energy_growth"]
     return Measurement({**values, **common}, curves)

@@ -8,6 +8,7 @@ from dembark.input_decks.common.setup import Number, Parameters, Setup
 from dembark.input_decks.common.water import fluid_setup, whole
 
 LAYERS = 3
+SQUARE = ("floating", "falling", "drifting")
 
 
 def setup(p: Parameters) -> Setup:
@@ -19,7 +20,7 @@ def setup(p: Parameters) -> Setup:
         right = p.size + 2.0 * whole(0.5 * (p.tank_width - p.size), dx)
     # A block begins a tenth of its side too high.
     low = whole(p.water_depth - (p.body_density / p.fluid_density - 0.1) * p.size, dx)
-    half, square = 0.5 * p.size, p.scene in ("floating", "falling")
+    half, square = 0.5 * p.size, p.scene in SQUARE
     middle, body_y = 0.5 * right, {"floating": low + half, "falling": depth}.get(p.scene, 0.5 * depth)
     x, y = np.meshgrid((np.arange(round(right / dx)) + 0.5) * dx - middle, (np.arange(round(depth / dx)) + 0.5) * dx - body_y)
     within = np.zeros(x.shape, bool)
@@ -32,10 +33,14 @@ def setup(p: Parameters) -> Setup:
     mass, pushed = p.body_density * count * dx**2, p.run_time - 0.5 * p.ramp
     # Its own mass and as much of water are accelerated.
     body: dict[str, Number] = {"middle": middle, "body_y": body_y, "half": half, "body_count": count, "body_mass": mass,
-                               "load": 4.0 * mass * p.moved * dx / pushed**2}
+                               "body_inertia": mass * p.size**2 / 6.0, "load": 4.0 * mass * p.moved * dx / pushed**2}
     # A jet falls until the end.
     fall = 2.0 * math.sqrt(2.0 * p.gravity * depth) * p.run_time + 0.5 * p.gravity * p.run_time**2 if p.scene == "slot" else 0.0
     thick, top = LAYERS * dx, depth if closed else depth + whole(p.headroom, dx)
+    if p.scene == "drifting":
+        room = whole(p.headroom, dx)
+        return fluid_setup(p, (-room, right + room, -room, depth + room), spacing=dx, sound_speed=p.sound_speed, depth=depth,
+                           filled_at_rest=1, tank_right=right, grain_count=x.size - int(within.sum()), **body)
     return fluid_setup(p, (-thick, right + thick, -thick - whole(fall, dx), top + (thick if closed else whole(p.headroom, dx))),
                        spacing=dx, sound_speed=p.sound_speed, depth=depth, filled_at_rest=1, tank_right=right, tank_top=top, thick=thick,
                        grain_count=x.size - int(within.sum()), **body)

@@ -145,7 +145,8 @@ class _CaseRecorder:
 class FluidRecorder(_CaseRecorder):
     """Writes time.csv and grains.dump of a fluid in the plane when they are due.
 
-    tank: number of the wall whose force is written; bodies : name -> id of a free body
+    tank: number of the wall whose force is written; None, without walls: momenta of fluid and bodies about the origin instead
+    bodies : name -> id of a free body
     """
 
     def __init__(self, p, tank, bodies=None):
@@ -153,15 +154,31 @@ class FluidRecorder(_CaseRecorder):
         poses = [f"{name}_{what}" for name in self._bodies for what in ("x", "y", "vx")]
         energies = [f"{name}_energy" for name in self.ENERGIES]
         bounds = ((p.low_x, p.high_x), (p.low_y, p.high_y), (-p.spacing, p.spacing))
-        super().__init__(p, bounds, [*energies, "tank_fx", "tank_fy", *poses])
+        self._momenta = tank is None
+        kept = ("momentum_x", "momentum_y", "angular_momentum") if self._momenta else ("tank_fx", "tank_fy")
+        super().__init__(p, bounds, [*energies, *kept, *poses])
 
     def _row(self, energies):
-        force = fluid_engine().wallForce(self._tank)
-        row = [*(energies[name] for name in self.ENERGIES), force[0], force[1]]
+        kept = self._momentum() if self._momenta else tuple(fluid_engine().wallForce(self._tank))[:2]
+        row = [*(energies[name] for name in self.ENERGIES), *kept]
         for number in self._bodies.values():
             state = O.bodies[number].state
             row += [state.pos[0], state.pos[1], state.vel[0]]
         return row
+
+    def _momentum(self):
+        """Momentum (N s) along x and y and angular momentum (N m s) about z, of a metre of depth."""
+        water, mass = fluid_engine(), fluid_engine().particleMass()
+        (x, y, _), angular = water.momentum(), 0.0
+        for place, velocity in zip(water.positions(), water.velocities(), strict=True):
+            angular += mass * (place[0] * velocity[1] - place[1] * velocity[0])
+        for number in self._bodies.values():
+            state = O.bodies[number].state
+            # Velocities are half a step behind the forces of this one.
+            moving = state.mass * state.vel + 0.5 * O.dt * water.force(number)
+            turning = state.inertia[2] * state.angVel[2] + 0.5 * O.dt * water.torque(number)[2]
+            x, y, angular = x + moving[0], y + moving[1], angular + turning + state.pos[0] * moving[1] - state.pos[1] * moving[0]
+        return [x, y, angular]
 
 
 class CubesRecorder(_CaseRecorder):
