@@ -12,7 +12,9 @@ import pytest
 
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.postproc.tests.scenes import frame_of
+from dembark.validation.case.deck import prepare
 from dembark.validation.case.folders import find
+from dembark.validation.case.resolve import resolve
 
 tank = module("water_tank")
 DT, ROWS, G = 1e-3, 200, 9.81
@@ -22,10 +24,11 @@ WIDTHS = {"still": 1.0, "floating": 0.6, "falling": 0.15, "cylinder": 4.0, "slot
 
 
 def run(scene: str, heavier: float = 1.0, lighter: float = 1.0, slower: float = 1.0, lost: float = 0.0, leaked: int = 0,
-        made: float = 0.0, braked: float = 0.0) -> Any:
+        made: float = 0.0, braked: float = 0.0, given: float = 0.1) -> Any:
     """The theory of `scene`, or the experiment: with gravity stronger by the factor `heavier`, water `lighter` by a factor, a fall that
     takes `slower` times as long, a slot `lost` (spacings) narrower, `leaked` particles in the floor, the part `made` of the energy from
-    nowhere, a block whose momenta vanish by the part `braked`."""
+    nowhere, momenta that vanish by the part `braked`, a block that gives the part
+    `given` of its momentum to the water."""
     p = defaults("water_tank") | find("water_tank").variants[scene]
     dx, depth, width, count = p["size"] / p["across"], p["water_depth"], WIDTHS[scene], COUNTS[scene]
     steps = round(p["run_time"] / DT)
@@ -51,7 +54,7 @@ def run(scene: str, heavier: float = 1.0, lighter: float = 1.0, slower: float = 
     if scene == "drifting":
         d |= {"body_mass": 80.0, "body_inertia": 80.0 * p["size"] ** 2 / 6.0, "body_y": 0.5 * depth, "middle": 0.5 * width}
         left = np.linspace(1.0, 1.0 - braked, ROWS) * 80.0 * p["speed"]
-        rows |= {"momentum_x": left, "momentum_y": 0.5 * left,
+        rows |= {"body_vx": np.linspace(1.0, 1.0 - given, ROWS), "momentum_x": left, "momentum_y": 0.5 * left,
                  "angular_momentum": left * (p["size"] / 6.0 + 0.25 * width - 0.5 * depth)}
     # What has flown out: dV/dt = contraction times width times the square root of 2 g (depth - V/width).
     slot = (p["size"] - lost * dx) * 0.6110154703516573 * np.sqrt(2.0 * G)
@@ -96,6 +99,18 @@ def test_theory_passes_and_is_measured_as_it_is() -> None:
         assert set(values) <= names(found, "pass"), found
         for name, value in values.items():
             assert found[name]["value"] == pytest.approx(value, abs=0.02 if name == "slot_width" else 2e-3), name
+
+
+def test_a_block_that_feels_no_water_says_nothing_of_momentum() -> None:
+    found = verdicts("drifting", given=0.0)
+    assert {found[name]["verdict"] for name in ("momentum_error", "angular_momentum_error")} == {"info"}
+
+
+def test_the_block_stands_on_the_lattice() -> None:
+    """Also where the particles beside it do not come out even: 35 across the width, 10 across the block."""
+    case = find("water_tank")
+    numbers = prepare(case, resolve(case, variant="drifting", changes={"across": 10, "tank_width": 0.7})).numbers
+    assert round((numbers["middle"] - numbers["half"]) / numbers["spacing"], 9) % 1.0 == 0.0
 
 
 def test_a_narrow_slot_is_shown_and_not_judged() -> None:
@@ -146,18 +161,19 @@ def test_both_engines_have_the_same_flow(scene: str, simulate: Any) -> None:
         found[engine] = judged("water_tank", tank.measure([one]))
         assert found[engine]["leaked"]["verdict"] == "pass"
         if scene == "drifting":
+            assert found[engine]["momentum_given"]["value"] > 0.05
             assert {"momentum_error", "angular_momentum_error"} <= names(found[engine], "pass"), found[engine]
     for name, one in found["liggghts"].items():
         assert found["yade"][name]["value"] == pytest.approx(one["value"], abs=2e-3), name
 
 
+@pytest.mark.parametrize(("scene", "short", "every"), [("cylinder", {"across": 8, "run_time": 0.45}, 300), ("drifting", {"across": 8}, 60)])
 @pytest.mark.parametrize("engine", ["liggghts", "yade"])
-def test_a_run_that_goes_on_is_the_same(engine: str, tmp_path: Path, decks: Any) -> None:
+def test_a_run_that_goes_on_is_the_same(engine: str, scene: str, short: Any, every: int, tmp_path: Path, decks: Any) -> None:
     """While the force on the cylinder still grows."""
-    short = {"across": 8, "run_time": 0.45}
-    whole, resumed = (decks("water_tank", engine, tmp_path / name, short, "cylinder") for name in ("whole", "resumed"))
+    whole, resumed = (decks("water_tank", engine, tmp_path / name, short, scene) for name in ("whole", "resumed"))
     for one in (whole, resumed):
-        one.run(restart_every=300)
-    assert "dembark: resumed at step" in resumed.run(restart_every=300, resume="yes")
+        one.run(restart_every=every)
+    assert "dembark: resumed at step" in resumed.run(restart_every=every, resume="yes")
     for name in ("time.csv", "grains.dump"):
         assert (whole.folder / name).read_text() == (resumed.folder / name).read_text()

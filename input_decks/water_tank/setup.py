@@ -15,9 +15,11 @@ def setup(p: Parameters) -> Setup:
     """The tank is 0 < x < tank_right, y > 0, open above but for the box of the cylinder. A slot is in the middle of the floor."""
     dx, closed = p.spacing, p.scene == "cylinder"
     right, depth = whole(p.tank_width, dx), whole(p.water_depth, dx)
-    if p.scene == "slot":
-        # As many particles on the floor left of the slot as right of it.
+    if p.scene == "slot" or p.scene in SQUARE:
+        # As many particles left of the slot or block as right of it.
         right = p.size + 2.0 * whole(0.5 * (p.tank_width - p.size), dx)
+    if p.scene == "drifting":
+        depth = p.size + 2.0 * whole(0.5 * (p.water_depth - p.size), dx)
     # A block begins a tenth of its side too high.
     low = whole(p.water_depth - (p.body_density / p.fluid_density - 0.1) * p.size, dx)
     half, square = 0.5 * p.size, p.scene in SQUARE

@@ -14,8 +14,10 @@
 //   P/rho_0^2 = c_0^2/(4 rho_0) (1 - r/q) if r < q = 0.9 dx, else 0                                                    (4)
 //
 // (4) is a pressure that fluid and solid particles have besides p in (2): a film one particle thick, or spray, that has lost the density
-// of rest has no pressure to keep it out of a wall, and sinks into it. Where there is pressure, particles are farther from each other.
-// Linear, because where four particles of a wall meet r is 0.71 dx: a parabola of the same value at r = q/2 stops c/23 there, this c/12.5.
+// of rest has no pressure to keep it out of a wall, and sinks into it. Where there is pressure, most particles are farther from each other.
+// Linear, because where four particles of a wall meet r is 0.71 dx: a parabola of the same value at r = q/2 stops c/23 there, this c/12.5
+// (Wendland's kernel in space, h = 1.3 dx; the wider the kernel, the less). Elastic: what it stores is counted as lost to the wall until it
+// comes back.
 //
 // All forces are central and antisymmetric: momentum and angular momentum of a pair are conserved to round-off. Viscosity only
 // dissipates, and a rigid rotation feels none: v.r = 0. Limits: delta = 0, alpha = 0 is the conservative scheme.
