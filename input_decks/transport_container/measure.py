@@ -1,6 +1,7 @@
 """Transport container: force, torque and pressure of its walls, the period with which the bed rings, and the onset of sliding."""
 
 import math
+from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -29,6 +30,8 @@ ALONE = "one run of a chaotic packing says nothing about its spread"
 WALLS = ("left", "right", "base")
 # Slow pulses are at least so many ring periods long.
 SLOW = 20.0
+# Diameters, from a wall, of the centres of grains that touch it.
+NEAR = 0.7
 
 
 def opening(replica: Replica) -> int:
@@ -73,18 +76,24 @@ def read(replica: Replica) -> dict[str, float]:
     return found
 
 
+def _in_box(vectors: Array, way: Any, time: float, middle: float, *, forces: bool = False) -> Array:
+    """Positions (n, 3) in the frame of the box at a time (s), which turns about the middle of its base; or forces, which only turn."""
+    turn = float(np.asarray(way.angle(time)))
+    about = np.array([middle, 0.0, 0.0])
+    own = vectors if forces else vectors - np.asarray(way.displacement(time)) - about
+    sine, cosine = math.sin(turn), math.cos(turn)
+    there = np.column_stack([own[:, 0] * cosine - own[:, 2] * sine, own[:, 1], own[:, 2] * cosine + own[:, 0] * sine])
+    return there if forces else there + about
+
+
 def _onset(replica: Replica) -> float:
     """Slope of effective gravity to the base's normal when the surface has slid by half a diameter; NaN when it has not."""
     p, way, d = replica.parameters, moving(replica), float(replica.parameters["grain_diameter"])
     frames = [frame.select(frame.types == 1) for frame in replica.grains()]
     times = replica.time_step * np.array([frame.step for frame in frames])
-    middle, length = 0.5 * replica.derived["length"], replica.derived["length"]
-    places = []
-    for frame, time in zip(frames, times, strict=True):
-        turn = float(np.asarray(way.angle(time)))
-        own = frame.positions - np.asarray(way.displacement(time)) - np.array([middle, 0.0, 0.0])
-        sine, cosine = math.sin(turn), math.cos(turn)
-        places.append(np.column_stack([own[:, 0] * cosine - own[:, 2] * sine + middle, own[:, 2] * cosine + own[:, 0] * sine]))
+    length = replica.derived["length"]
+    middle = 0.5 * length
+    places = [_in_box(frame.positions, way, time, middle)[:, ::2] for frame, time in zip(frames, times, strict=True)]
     surface = tops(places[0], d, 0.25 * length, 0.75 * length)
     way_of_surface = slid(places, surface)
     there = np.flatnonzero(np.abs(way_of_surface) > 0.5 * d)
@@ -105,7 +114,12 @@ def measure(replicas: Replicas) -> Measurement:
               "impulse_error": Value(exact(max(run["impulse_error"] for run in runs)), exact(0.0))}
     values |= {name: Value(over_replicas([Estimate(run[name], math.inf, ALONE) for run in runs])) for name in runs[0]
                if name != "impulse_error"}
-    return Measurement(values, [_history(replicas, wall) for wall in ("", "left", "right", "base")] + [_pressure(replicas, "left")])
+    curves = [_history(replicas, wall) for wall in ("", "left", "right", "base")] + [_pressure(replicas, "left")]
+    if "slide_slope" in runs[0]:
+        # For the study, which compares bed by bed.
+        curves.append(profile("slide_slopes", "Slope at which each bed slides", "bed", "slope", np.arange(1.0, len(runs) + 1.0),
+                              [np.array([run["slide_slope"] for run in runs])]))
+    return Measurement(values, curves)
 
 
 def _history(replicas: Replicas, wall: str) -> Curve:
@@ -122,22 +136,31 @@ def _history(replicas: Replicas, wall: str) -> Curve:
 
 
 def _pressure(replicas: Replicas, wall: str) -> Curve:
-    """Mean pressure on a side wall over height, while the container moves, beside that at rest."""
+    """Mean pressure on a side wall over height, without the grains on the base, while the container moves, beside that at rest."""
     d = float(replicas[0].parameters["grain_diameter"])
     edges = d * np.arange(0.0, replicas[0].parameters["bed_height"] + 1.0)
 
-    def pressure(frame: Any) -> Array:
-        near = frame.positions[:, 0] < np.median(frame.positions[:, 0])
-        push, _ = np.histogram(frame.positions[near, 2], edges, weights=np.maximum(frame.wall_forces["vessel"][near, 0], 0.0))
-        return push / (d * np.diff(edges))
+    def pressure(replica: Replica, frame: Any) -> Array:
+        way, time, middle = moving(replica), frame.step * replica.time_step, 0.5 * replica.derived["length"]
+        places = _in_box(frame.positions, way, time, middle)
+        # Grains that touch the wall and not the base, whose friction is along x as well.
+        near = (places[:, 0] < NEAR * d) & (places[:, 2] > NEAR * d)
+        push = _in_box(frame.wall_forces["vessel"], way, time, middle, forces=True)[near, 0]
+        sums, _ = np.histogram(places[near, 2], edges, weights=np.maximum(push, 0.0))
+        return sums / (d * np.diff(edges))
 
     found = []
     for replica in replicas:
         frames = [frame.select(frame.types == 1) for frame in replica.grains()]
-        found.append((np.mean([pressure(frame) for frame in frames[1:]], axis=0), pressure(frames[0])))
+        found.append((np.mean([pressure(replica, frame) for frame in frames[1:]], axis=0), pressure(replica, frames[0])))
     return profile(f"pressure_{wall}", f"Force on the {wall} wall over d²", "Pa", "z / d", 0.5 * (edges[1:] + edges[:-1]) / d,
                    [one for one, _ in found], vertical=True, reference=np.mean([one for _, one in found], axis=0),
                    reference_label="at rest")
+
+
+def _slopes(point: Mapping[str, Any]) -> Array:
+    """Of each bed, by the seed."""
+    return np.array(next(one["value"] for one in point["profiles"] if one["name"] == "slide_slopes"), float)
 
 
 def study(name: str, results: Points, along: str) -> Measurement:
@@ -147,10 +170,10 @@ def study(name: str, results: Points, along: str) -> Measurement:
     found = [measured(one, quantity) for one in results]
     values, halves = (np.array([getattr(one, part) for one in found]) for part in ("value", "half"))
     if name != "pulse":
-        tilted = float(values[1:].mean())
-        ratio = values / tilted
-        half = float(np.hypot(halves[0], np.hypot(*halves[1:]) / 2.0)) / tilted if np.isfinite(halves).all() else math.inf
-        return Measurement({"sliding_onset": Value(Estimate(float(ratio[0]), half, "the three variants"), exact(1.0))}, [
+        # The last one is tilted at the rate of the ramp.
+        ramp, tilt = (_slopes(results[k]) for k in (0, -1))
+        ratios = [Estimate(float(one / other), math.inf, ALONE) for one, other in zip(ramp, tilt, strict=False)]
+        return Measurement({"sliding_onset": Value(over_replicas(ratios), exact(1.0))}, [
             profile("onset", "Onset of sliding", "angular acceleration of tilting (rad/s²); 0: ramp", "slope of effective gravity", place,
                     [values], half=halves)])
     given = results[-1]["parameters"]
