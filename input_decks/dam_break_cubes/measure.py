@@ -23,7 +23,7 @@ FROM = {"three": 0.5, "six": 0.0, "one": 0.5}
 FLOW = (0.8, 1.2)  # s: the flow passes the cubes
 NEAR_FLOOR = 0.05  # m: gaps are looked at below this height
 BARE = (1.0, 1.7)  # m along the flume, before the cubes
-WORST = ("inside", "leaked", "energy_growth", "overlap")
+WORST = ("inside", "leaked", "overtopped", "energy_growth", "overlap")
 CONVERGING = (("x_end", "x of the top cube at 1.5 s", "m"), ("half_fallen", "Time at which the top cube is half fallen", "s"))
 # Of which arrangements there are data that agree with each other.
 JUDGED = ("three", "six")
@@ -50,21 +50,35 @@ def pose(times: Mapping[str, Array], cube: int, row: int) -> tuple[Array, Array]
             np.array([times[f"cube{cube}_{part}"][row] for part in ("qw", "qx", "qy", "qz")]))
 
 
+def outside(places: Array, velocities: Array, p: Mapping[str, Any]) -> tuple[Array, Array]:
+    """Which particles (n,) are in walls or the floor, deeper than half a spacing, or beyond them, and which have gone over the walls: back
+    in free flight to the plane of the wall they were not lower than its top."""
+    dx, (x, y, z) = p["spacing"], places.T
+    half = 0.5 * p["flume_width"]
+    beyond = np.stack([y - half, -y - half, x - p["downstream_length"], -x - p["column_length"]])
+    speed = np.stack([velocities[:, 1], -velocities[:, 1], velocities[:, 0], -velocities[:, 0]])
+    flying = (beyond > 0.0) & (speed > 0.0)
+    since = np.max(beyond / np.where(flying, speed, 1.0) * flying, axis=0)
+    crossed = z - velocities[:, 2] * since - 0.5 * p["gravity"] * since**2
+    out = (beyond > 0.5 * dx).any(axis=0)
+    over = out & (crossed >= p["flume_height"])
+    return np.asarray((out | (z < -0.5 * dx)) & ~over), np.asarray(over)
+
+
 @once
 def water(run: Replica) -> dict[str, float]:
     """What the frames of the fluid show."""
     p, times, dx = run.parameters, run.times(), run.parameters["spacing"]
     count, half = int(run.derived["cube_count"]), 0.5 * p["edge"]
-    found = {"inside": 0.0, "leaked": 0.0, "gap_filled": 0.0, "floor_wetted": float("nan")}
+    found = {"inside": 0.0, "leaked": 0.0, "overtopped": 0.0, "gap_filled": 0.0, "floor_wetted": float("nan")}
     fronts = [(0.0, 0.0)]  # s, and m: the foremost particle
     for frame in run.grains():
         places, now = frame.positions, frame.step * run.time_step
         row = int(np.argmin(np.abs(times["step"] - frame.step)))
         fronts.append((now, float(places[:, 0].max())))
-        outside = (places[:, 2] < -0.5 * dx) | ((places[:, 2] < p["flume_height"]) & (
-            (np.abs(places[:, 1]) > 0.5 * (p["flume_width"] + dx)) | (places[:, 0] < -p["column_length"] - 0.5 * dx)
-            | (places[:, 0] > p["downstream_length"] + 0.5 * dx)))
-        found["leaked"] = max(found["leaked"], float(outside.sum() + run.derived["grain_count"] - len(frame.ids)))
+        through, over = outside(places, frame.velocities, p)
+        found["leaked"] = max(found["leaked"], float(through.sum() + run.derived["grain_count"] - len(frame.ids)))
+        found["overtopped"] = max(found["overtopped"], float(over.sum()))
         poses = [pose(times, cube, row) for cube in range(1, count + 1)]
         within = sum(int((np.abs(rotated(places - centre, turn)) < half - 0.5 * dx).all(axis=1).sum()) for centre, turn in poses)
         found["inside"] = max(found["inside"], float(within))
@@ -163,7 +177,7 @@ def measure(replicas: Replicas) -> Measurement:
     late = "the run ends before 1.5 s"
     due = {"rise": 0.0, "inside": 0.0, "leaked": 0.0, "energy_growth": 0.0, "three_rms_x": 0.0, "six_rms_x": 0.0, "floor_wetted": 1.0}
     missing = {"arrival": "the front did not come", "x_end": late, "floor_wetted": late, "half_fallen": "the run ends before"}
-    of_water = ["arrival", "inside", "leaked", "floor_wetted"]
+    of_water = ["arrival", "inside", "leaked", "overtopped", "floor_wetted"]
     # Into narrower gaps no particle gets.
     if cubes == "six" and p["gap"] >= p["spacing"]:
         due["gap_filled"] = 1.0

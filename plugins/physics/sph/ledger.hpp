@@ -4,7 +4,8 @@
 //     = what it was + work - viscous - diffusive - boundary
 //
 // up to errors of the time step. `boundary` is what solid particles take through their own pressure, which no compression of theirs
-// stores, through the guard (pair_terms.hpp), which gives it back, and through viscosity; it may be negative for a while. The work is that of moved bodies and of loads. Units J.
+// stores, through the guard (pair_terms.hpp), which gives it back, and through viscosity; it may be negative for a while. The work is
+// that of moved bodies and of loads. Units J.
 #pragma once
 
 namespace dembark::sph {
