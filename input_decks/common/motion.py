@@ -5,6 +5,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace as Parameters
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dembark.common.errors import DembarkError
 from dembark.physics import WallMotion
 
@@ -29,6 +32,13 @@ def motion(p: Parameters, start: float | None = None, until: float | None = None
     window: list[Word] = [word for name, time in (("start", start), ("until", until)) if time is not None for word in (name, time)]
     words = _words(p, point, window)
     return WallMotion(" ".join(str(word) if isinstance(word, str | int) else repr(float(word)) for word in words), folder)
+
+
+def about_y(moving: WallMotion, time: float) -> NDArray[np.float64]:
+    """(3, 3), of walls turning about y: vectors (n, 3) @ this are those in the walls' frame at a time (s), @ its transpose the reverse."""
+    turn = float(np.asarray(moving.angle(time)))
+    sine, cosine = math.sin(turn), math.cos(turn)
+    return np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
 
 
 def amplitude(p: Parameters) -> float:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dembark.input_decks.common.motion import motion
+from dembark.input_decks.common.motion import about_y, motion
 from dembark.postproc.instruments.container import ring_period, slid, tops
 from dembark.postproc.instruments.growth import ordered
 from dembark.postproc.instruments.momentum import imbalance, impulses
@@ -76,14 +76,10 @@ def read(replica: Replica) -> dict[str, float]:
     return found
 
 
-def _in_box(vectors: Array, way: Any, time: float, middle: float, *, forces: bool = False) -> Array:
-    """Positions (n, 3) in the frame of the box at a time (s), which turns about the middle of its base; or forces, which only turn."""
-    turn = float(np.asarray(way.angle(time)))
+def _in_box(positions: Array, way: Any, time: float, middle: float) -> Array:
+    """Positions (n, 3) in the frame of the box at a time (s), which turns about the middle of its base."""
     about = np.array([middle, 0.0, 0.0])
-    own = vectors if forces else vectors - np.asarray(way.displacement(time)) - about
-    sine, cosine = math.sin(turn), math.cos(turn)
-    there = np.column_stack([own[:, 0] * cosine - own[:, 2] * sine, own[:, 1], own[:, 2] * cosine + own[:, 0] * sine])
-    return there if forces else there + about
+    return np.asarray((positions - np.asarray(way.displacement(time)) - about) @ about_y(way, time) + about)
 
 
 def _onset(replica: Replica) -> float:
@@ -145,7 +141,7 @@ def _pressure(replicas: Replicas, wall: str) -> Curve:
         places = _in_box(frame.positions, way, time, middle)
         # Grains that touch the wall and not the base, whose friction is along x as well.
         near = (places[:, 0] < NEAR * d) & (places[:, 2] > NEAR * d)
-        push = _in_box(frame.wall_forces["vessel"], way, time, middle, forces=True)[near, 0]
+        push = (frame.wall_forces["vessel"] @ about_y(way, time))[near, 0]
         sums, _ = np.histogram(places[near, 2], edges, weights=np.maximum(push, 0.0))
         return sums / (d * np.diff(edges))
 

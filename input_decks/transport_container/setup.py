@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.motion import motion
+from dembark.input_decks.common.motion import about_y, motion
 from dembark.input_decks.common.setup import Parameters, Setup, contacts, rectangle, time_step
+from dembark.physics import WallMotion
 
 
 def setup(p: Parameters) -> Setup:
@@ -38,10 +39,7 @@ def setup(p: Parameters) -> Setup:
     return Setup(steps, step, bodies, {**numbers, **contacts(p, skin=0.3)}, meshes, {"motion_words": moving.words})
 
 
-def _moved(moving: object, corners: packing.Array, time: float) -> packing.Array:
+def _moved(moving: WallMotion, corners: packing.Array, time: float) -> packing.Array:
     """Where the corners (n, 3) of the container are at a time (s)."""
     middle = np.array([0.5 * corners[:, 0].max(), 0.0, 0.0])
-    turn = float(np.asarray(moving.angle(time)))  # type: ignore[attr-defined]
-    sine, cosine = math.sin(turn), math.cos(turn)
-    about_y = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
-    return middle + (corners - middle) @ about_y.T + np.asarray(moving.displacement(time))  # type: ignore[attr-defined]
+    return np.asarray(middle + (corners - middle) @ about_y(moving, time).T + np.asarray(moving.displacement(time)))

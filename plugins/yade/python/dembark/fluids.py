@@ -154,12 +154,11 @@ class FluidRecorder(_CaseRecorder):
         poses = [f"{name}_{what}" for name in self._bodies for what in ("x", "y", "vx")]
         energies = [f"{name}_energy" for name in self.ENERGIES]
         bounds = ((p.low_x, p.high_x), (p.low_y, p.high_y), (-p.spacing, p.spacing))
-        self._momenta = tank is None
-        kept = ("momentum_x", "momentum_y", "angular_momentum") if self._momenta else ("tank_fx", "tank_fy")
+        kept = ("momentum_x", "momentum_y", "angular_momentum") if tank is None else ("tank_fx", "tank_fy")
         super().__init__(p, bounds, [*energies, *kept, *poses])
 
     def _row(self, energies):
-        kept = self._momentum() if self._momenta else tuple(fluid_engine().wallForce(self._tank))[:2]
+        kept = self._momentum() if self._tank is None else tuple(fluid_engine().wallForce(self._tank))[:2]
         row = [*(energies[name] for name in self.ENERGIES), *kept]
         for number in self._bodies.values():
             state = O.bodies[number].state
