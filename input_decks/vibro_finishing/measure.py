@@ -35,6 +35,7 @@ def measure(replicas: Replicas) -> Measurement:
         "circulation": over(Trough.turning, drive), "spin": over(Trough.spin, drive), "revolution": over(Trough.revolution, drive),
         "part_height": over(Trough.height, diameter), "power": over(lambda one: one.power("trough")),
         "noise": once(lambda one: one.noise("trough")), "stirring": over(Trough.stirring),
+        "agitation": over(Trough.agitation),
     }
     if p["part_diameter"] == diameter and p["part_density"] == p["grain_density"]:
         worst = max((one.likeness() for one in runs), key=abs)

@@ -55,7 +55,7 @@ def measure(replicas: Replicas) -> Measurement:
         "impact_rate": over([one.rate() for one in records]), "impact_energy": over([one.energy() for one in records], unit),
         "friction_power": over([one.friction() for one in records]), "circulation": over([one.turning() for one in runs], drive),
         "power": over([one.power(*WALLS) for one in runs]), "noise": of_run(lambda one: one.noise("trough")),
-        "stirring": over([one.stirring() for one in runs]),
+        "stirring": over([one.stirring() for one in runs]), "agitation": over([one.agitation() for one in runs]),
     }
     return Measurement(values, [machines.drifts(runs), machines.spectra(runs, "trough"), histogram(records, unit)])
 

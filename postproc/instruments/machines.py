@@ -6,7 +6,7 @@ The bed lies in the plane y = 0; gravity points along -z. Turning is positive ab
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,15 +43,15 @@ def circulation(places: Array, ways: Array, masses: Array) -> Array:
     return np.asarray(np.einsum("n,...n->...", weights, about(arm, way)) / np.einsum("n,...n->...", weights, square))
 
 
-def fluctuation(places: Array, ways: Array, masses: Array, edges: Sequence[Array]) -> float:
+def fluctuation(places: Array, ways: Array, masses: Array, edges: Sequence[Array]) -> tuple[float, float]:
     """Root mean square of `ways` (pairs, n, d) about their mean in the cell between `edges` in which they begin, at `places` (pairs, n, d),
-    over the mean size of these means; both weighted by `masses` (n,)."""
+    and the mean size of these means; both in the unit of `ways`, weighted by `masses` (n,)."""
     weights, flat = np.broadcast_to(masses, ways.shape[:2]).ravel(), ways.reshape(-1, ways.shape[-1])
     cells = tuple(np.clip(np.searchsorted(edge, column, side="right") - 1, 0, len(edge) - 2)
                   for edge, column in zip(edges, places.reshape(flat.shape).T, strict=True))
     own = binned(flat, places.reshape(flat.shape), weights, edges)[cells]
     off = np.average(((flat - own) ** 2).sum(axis=1), weights=weights)
-    return float(math.sqrt(off) / np.average(np.linalg.norm(own, axis=1), weights=weights))
+    return math.sqrt(off), float(np.average(np.linalg.norm(own, axis=1), weights=weights))
 
 
 @dataclass(frozen=True)
@@ -116,11 +116,19 @@ class Trough:
     def stirring(self) -> Estimate:
         """Fluctuation over mean speed: root mean square of the displacements in a period about the mean of their cell, over the mean size
         of the cells' means, both weighted by mass; resampled in blocks of time."""
+        return self._resampled(lambda random, mean: random / mean)
+
+    def agitation(self) -> Estimate:
+        """That root mean square over the way which the drive's highest speed makes in a period."""
+        return self._resampled(lambda random, _: random / (self.run.period * self.speed))
+
+    def _resampled(self, number: Callable[[float, float], float]) -> Estimate:
+        """`number` of fluctuation and mean size (m) of the displacements in a period."""
         edges, ways = self.cells(), self.run.displacements()[:, self.free][..., [0, 2]]
         places = self.places[:-PHASES][:, self.free][..., [0, 2]] + 0.5 * ways
         masses = self.run.frames[0].masses[self.free]
-        return jackknife(lambda keep: fluctuation(places[keep], ways[keep], masses, edges), np.arange(len(ways)) * BLOCKS // len(ways),
-                         name="time blocks")
+        return jackknife(lambda keep: number(*fluctuation(places[keep], ways[keep], masses, edges)),
+                         np.arange(len(ways)) * BLOCKS // len(ways), name="time blocks")
 
     def power(self, *walls: str) -> Estimate:
         """Power of the drive over M g V: work of the forces on the `walls`, period by period."""

@@ -75,6 +75,12 @@ def test_stirring_grows_with_what_is_random(tmp_path: Path) -> None:
     assert low < 0.5 * high
 
 
+def test_agitation_is_what_is_random_over_the_way_of_the_drive(tmp_path: Path) -> None:
+    one = trough(tmp_path, turning=0.0, noise=2e-4)
+    # PHASES steps at random along x and z, less what the mean of a cell with some 16 grains takes.
+    assert one.agitation().value == pytest.approx(2e-4 * np.sqrt(2 * PHASES * (1.0 - 1.0 / 16.0)) / (PERIOD * 0.25), rel=0.03)
+
+
 def test_power_and_force_of_the_drive(tmp_path: Path) -> None:
     one = trough(tmp_path)
     assert one.power("trough").value == pytest.approx(0.3)
