@@ -41,6 +41,9 @@ void FixSphContact::read(const std::vector<std::string> &words) {
       contacts_.radius = in.positive(of, "the radius of edges and corners (m)");
     } else if (of == "friction") {
       friction = in.number(of, "the coefficient between boxes");
+    } else if (of == "friction_speed") {
+      contacts_.friction_speed = in.number(of, "the speed (m/s) of friction, 0: Coulomb's with a spring");
+      if (!(contacts_.friction_speed >= 0.0)) dembark::keywords::refuse("friction_speed must not be negative");
     } else if (of == "restitution") {
       restitution = in.number(of, "the coefficient between boxes");
     } else if (of == "slit_pressure") {
@@ -65,7 +68,8 @@ void FixSphContact::read(const std::vector<std::string> &words) {
       contacts_.planes.push_back(plane);
     } else {
       dembark::keywords::refuse("'" + of +
-                                "' is no keyword; known are stiffness, rounding, friction, restitution, slit_pressure, box and plane");
+                                "' is no keyword; known are stiffness, rounding, friction, friction_speed, restitution, slit_pressure, box "
+                                "and plane");
     }
   }
   contacts_.between = Touch::of(restitution, friction);

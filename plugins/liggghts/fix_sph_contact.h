@@ -1,6 +1,6 @@
-// fix ID all sph/contact stiffness K [rounding R] [friction MU] [restitution E] [slit_pressure XI] box FIX A B C ... plane PX PY PZ NX NY
-// NZ MU E ...: contacts of box-shaped bodies of fix sph/body with each other and with planes, dembark/sph/box_contacts.hpp, and the films
-// of water between them, dembark/sph/slits.hpp.
+// fix ID all sph/contact stiffness K [rounding R] [friction MU] [friction_speed V] [restitution E] [slit_pressure XI] box FIX A B C ...
+// plane PX PY PZ NX NY NZ MU E ...: contacts of box-shaped bodies of fix sph/body with each other and with planes,
+// dembark/sph/box_contacts.hpp, and the films of water between them, dembark/sph/slits.hpp.
 #ifdef FIX_CLASS
 
 FixStyle(sph/contact,FixSphContact)

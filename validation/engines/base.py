@@ -26,7 +26,8 @@ _TOLD = "DEMBARK_TOLD_BY_"
 LAUNCHER = "DEMBARK_MPIRUN"
 # What a case may need of an engine beside a deck, by the names that `[needs]` of case.toml and the facts of engines use.
 CAPABILITIES = {"bridges": "liquid bridges", "carried_liquid": "liquid that grains own", "rolling_resistance": "couples against rolling",
-                "own_inertia": "moments of inertia but those of spheres"}
+                "own_inertia": "moments of inertia but those of spheres",
+                "creeping_friction": "friction of boxes that has no spring"}
 DECK_NOTE = ("Written by dembark; SI units. The numbers without a comment follow from the others: to change a parameter, write the deck "
              "anew with 'dembark deck'.")
 

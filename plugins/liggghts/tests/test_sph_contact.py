@@ -89,6 +89,22 @@ def test_cubes_fall_on_each_other_and_on_the_floor(tmp_path: Path) -> None:
     np.testing.assert_allclose(frames[1], frames[0], rtol=1e-9, atol=1e-12)
 
 
+def test_friction_without_a_spring_lets_a_cube_creep(tmp_path: Path) -> None:
+    """On a slope of 0.2 with a coefficient of 0.4, at v0 atanh(0.5)."""
+    text = deck(old="restitution 0.5 box", new="friction_speed 0.125 restitution 0.5 box")
+    for old, new in (("vector 0 0 -1", "vector 0.2 0 -1"), ("centre 0.1 0.1 0.05 spin 3 5 0", "centre 0.1 0.1 0.03"),
+                     ("region first block 0.079 0.121 0.079 0.121 0.029 0.071", "region first block 0.079 0.121 0.079 0.121 0.009 0.051"),
+                     ("centre 0.105 0.11 0.16", "centre 0.105 0.21 0.16"),
+                     ("block 0.084 0.126 0.089 0.131", "block 0.084 0.126 0.189 0.231"),
+                     ("dump cubes two custom", "dump cubes one custom")):
+        assert old in text
+        text = text.replace(old, new)
+    done = run_deck(tmp_path, text.replace("run 600", "run 1000"))
+    assert done.code == 0, done.error or done.output[-1500:]
+    _, frames = read_dump(tmp_path / "cubes.dump")
+    assert frames[-1][:, 5].mean() == pytest.approx(0.125 * np.arctanh(0.2 / 0.4), rel=0.02)
+
+
 def test_resumes_to_the_bit(tmp_path: Path) -> None:
     whole = run_deck(tmp_path / "whole", deck(run="run 500"))
     first = run_deck(tmp_path / "parts", deck(run="run 450"))
@@ -158,6 +174,7 @@ REFUSED = {
     "stiffness": ("stiffness 2e4 ", "", "stiffness (N/m) is missing"),
     "keyword": ("stiffness 2e4 ", "soft 3 ", "'soft' is no keyword; known are stiffness, rounding"),
     "restitution": ("restitution 0.5", "restitution 0.1", "restitution must be between 0.14 (critical damping) and 1"),
+    "friction_speed": ("friction 0.4 ", "friction 0.4 friction_speed -1 ", "friction_speed must not be negative"),
     "plane": ("plane 0 0 0 0 0 1 0.4 0.6", "plane 0 0 0 0 0 1 -0.4 0.6", "plane: friction must be a number >= 0"),
     "normal": ("plane 0 0 0 0 0 1", "plane 0 0 0 0 0 0", "plane: the normal must not be zero"),
     "no body": ("box two", "box water", "box: 'water' is the ID of no fix sph/body"),

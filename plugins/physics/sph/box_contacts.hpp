@@ -14,6 +14,14 @@
 // R. D. Mindlin, J. Appl. Mech. 16 (1949) 259, for a Poisson's ratio of 0.3. Crossings fade out within r of the ends of the edges, where
 // corners take over: k there is w k, and w's gradient a force along the surface, so that springs conserve energy.
 //
+// Or, with a speed v_0 of friction, no spring, and what stands on a slope creeps:
+//
+//   F_t = -mu F_n tanh(|v_t|/v_0) v_t/|v_t|                                                                               (3)
+//
+// (3) with v_0 = 1/8 m/s is the law of DualSPHysics (InteractionForcesDEM in JSphCpu.cpp of version 5), where the spring of (1) is as long
+// as one step slides and has no memory; with it the experiments on stacked cubes were simulated (R. B. Canelas et al., Comput. Phys.
+// Commun. 202 (2016) 131).
+//
 // k is no property of the material: softer than that, so that steps of the fluid resolve impacts. Units SI; in space.
 #pragma once
 
@@ -60,10 +68,11 @@ struct Push {
 
 class BoxContacts {
  public:
-  double stiffness = 1e5;    ///< k of one point, N/m
-  double radius = 0.004;     ///< r, m, less than half of the shortest edge
-  Touch between{};           ///< of two boxes
-  std::vector<Vector> half;  ///< m, half of the edges of each box, along the axes of its body's frame
+  double stiffness = 1e5;       ///< k of one point, N/m
+  double radius = 0.004;        ///< r, m, less than half of the shortest edge
+  Touch between{};              ///< of two boxes
+  double friction_speed = 0.0;  ///< v_0, m/s; 0: (1)
+  std::vector<Vector> half;     ///< m, half of the edges of each box, along the axes of its body's frame
   std::vector<ContactPlane> planes;
 
   /// xi of all points, in the order in which they are looked at: what a state has to keep.
@@ -209,12 +218,19 @@ class BoxContacts {
     const double k = weight * stiffness, c = weight * 2.0 * law.damping_ratio * std::sqrt(0.25 * stiffness * mass);
     const double closing = dot(v, normal), force = std::max(k * overlap - c * closing, 0.0);
     const Vector slide = v - closing * normal;
-    Vector stretch = xi - dot(xi, normal) * normal + dt_ * slide;
-    Vector along = -(along_normal * k) * stretch - (along_normal * c) * slide;
-    const double size = norm(along), most = law.friction * force;
-    if (size > most) {
-      along = (most / size) * along;
-      stretch = (-1.0 / (along_normal * k)) * along;
+    const double most = law.friction * force;
+    Vector stretch{}, along{};
+    if (friction_speed > 0.0) {
+      const double speed = norm(slide);
+      if (speed > 0.0) along = (-most * std::tanh(speed / friction_speed) / speed) * slide;
+    } else {
+      stretch = xi - dot(xi, normal) * normal + dt_ * slide;
+      along = -(along_normal * k) * stretch - (along_normal * c) * slide;
+      const double size = norm(along);
+      if (size > most) {
+        along = (most / size) * along;
+        stretch = (-1.0 / (along_normal * k)) * along;
+      }
     }
     if (remember_) xi = stretch;
     stored += 0.5 * k * (overlap * overlap + along_normal * dot(stretch, stretch));

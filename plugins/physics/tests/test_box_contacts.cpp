@@ -84,6 +84,23 @@ TEST_CASE("on a slope a cube sticks below the angle of friction, and slides with
   }
 }
 
+TEST_CASE("with a speed of friction a cube creeps down any slope, at v0 atanh(tan / mu) where it is not too steep", "[box_contacts]") {
+  const double mu = 0.4, slow = 0.125, tangent = 0.2;
+  World w({cube({0.0, 0.0, 0.5 * edge})});
+  w.contacts.friction_speed = slow;
+  w.floor(0.7, mu);
+  const double c = 1.0 / std::sqrt(1.0 + tangent * tangent);
+  w.gravity = {g * c * tangent, 0.0, -g * c};
+  w.run(1.0);
+  CHECK(w.bodies[0].velocity.x == Approx(slow * std::atanh(tangent / mu)).epsilon(1e-3));
+  CHECK(norm(w.contacts.stretches[0]) == 0.0);
+  // Fast, it is Coulomb's: deceleration mu g.
+  w.gravity = {0.0, 0.0, -g};
+  w.bodies[0].velocity = {2.0, 0.0, 0.0};
+  w.run(0.1);
+  CHECK((2.0 - w.bodies[0].velocity.x) / 0.1 == Approx(mu * g).epsilon(0.01));
+}
+
 TEST_CASE("three stacked cubes stand, and the lowest bears all", "[box_contacts]") {
   World w({cube({0.0, 0.0, 0.5 * edge}), cube({0.0, 0.0, 1.5 * edge}), cube({0.002, -0.001, 2.5 * edge})});
   w.floor(0.7, 0.4);
