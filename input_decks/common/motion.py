@@ -34,6 +34,12 @@ def motion(p: Parameters, start: float | None = None, until: float | None = None
     return WallMotion(" ".join(str(word) if isinstance(word, str | int) else repr(float(word)) for word in words), folder)
 
 
+def table_length(folder: Path) -> float:
+    """Time (s) from the start of a motion to the last row of the `motion.csv` of its folder, which a motion has read already."""
+    rows = [line.split("#")[0].replace(",", " ").split() for line in (folder / TABLE).read_text(encoding="utf-8").splitlines()]
+    return max(float(row[0]) for row in rows if row)
+
+
 def about_y(moving: WallMotion, time: float) -> NDArray[np.float64]:
     """(3, 3), of walls turning about y: vectors (n, 3) @ this are those in the walls' frame at a time (s), @ its transpose the reverse."""
     turn = float(np.asarray(moving.angle(time)))

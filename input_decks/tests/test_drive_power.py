@@ -16,6 +16,9 @@ from dembark.common.errors import DembarkError
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.postproc import DumpError
 from dembark.postproc.instruments.drive import LONGEST, sticking_block
+from dembark.validation.case.deck import prepare
+from dembark.validation.case.folders import find
+from dembark.validation.case.resolve import resolve
 
 drive = module("drive_power")
 ROWS, STILL, RAMP, STEADY = 128, 2, 10, 10
@@ -218,3 +221,11 @@ def test_spheres_in_a_plane_stay_in_it_and_rest_after_the_stop(engine: str, simu
 def test_decks_that_do_not_suit_the_impacts_are_refused(changes: dict[str, Any], message: str, decks: Any, tmp_path: Path) -> None:
     with pytest.raises(DembarkError, match=message):
         decks("drive_power", "liggghts", tmp_path, changes)
+
+
+@pytest.mark.parametrize("profile", ["quick", "standard"])
+@pytest.mark.parametrize("variant", sorted(find("drive_power").variants))
+def test_every_variant_can_be_set_up_in_every_profile(variant: str, profile: str) -> None:
+    """Grains of `quick` are stiff enough for 2 g only, and its window was shorter than what a plate that stops needs."""
+    case = find("drive_power")
+    assert prepare(case, resolve(case, profile, variant)).packing is not None

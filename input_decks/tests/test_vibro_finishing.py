@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from dembark.common.errors import DembarkError
 from dembark.input_decks.common.trough import sites_within
 from dembark.input_decks.common.trough import trough as trough_mesh
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
@@ -19,7 +21,9 @@ from dembark.postproc.instruments.machines import Trough, read
 from dembark.postproc.instruments.tests.test_machines import trough
 from dembark.postproc.replica import Replica
 from dembark.postproc.walls.mesh import cut, read_stl
-from dembark.validation.case.folders import find
+from dembark.validation.case.deck import prepare, stl
+from dembark.validation.case.folders import find, load
+from dembark.validation.case.resolve import resolve
 
 finishing = module("vibro_finishing")
 GRAIN = {"part_diameter": 0.005, "part_density": 2500.0}
@@ -151,3 +155,38 @@ def test_sites_lie_within_a_trough_of_any_shape() -> None:
     # They fill it.
     area = 0.5 * np.pi * 0.1**2 + 0.2 * 0.05 - np.pi * 0.02**2
     assert len(places) * (1.15 * 0.0055) ** 2 == pytest.approx(area, rel=0.15)
+
+
+@pytest.fixture
+def own_machine(tmp_path: Path) -> tuple[Path, Any]:
+    """A copy of the case that someone has put a trough and a motion of theirs into, and its set-up."""
+    folder = tmp_path / "my_machine"
+    shutil.copytree(find("vibro_finishing").folder, folder, ignore=shutil.ignore_patterns("__pycache__"))
+
+    def sizes(**changes: Any) -> Any:
+        case = load(folder / "case.toml")
+        return prepare(case, resolve(case, "quick", "recorded", changes))
+    return folder, sizes
+
+
+def test_a_table_begins_when_grains_have_settled(own_machine: tuple[Path, Any]) -> None:
+    """Its highest speed is that of the table however long they settle, and whatever separates its columns."""
+    folder, sizes = own_machine
+    first = sizes(settle_time=0.1).numbers["drive_speed"]
+    assert sizes(settle_time=3.0).numbers["drive_speed"] == pytest.approx(first, rel=1e-3)
+    table = folder / "motion.csv"
+    table.write_text(table.read_text().replace(",", " "))
+    assert sizes(settle_time=0.1).numbers["drive_speed"] == pytest.approx(first, rel=1e-12)
+    table.write_text("0,0,0,0\n1,0,0,0\n")
+    with pytest.raises(DembarkError, match=r"motion\.csv moves nothing"):
+        sizes()
+
+
+@pytest.mark.parametrize(("change", "line"), [
+    ((1.0, (0.0, 1.0, 0.0)), "trough.stl is not cut by the plane y = 0"), ((1000.0, (0.0, 0.0, 0.0)), "write the file in m")])
+def test_a_trough_of_other_places_or_units_is_refused(own_machine: tuple[Path, Any], change: Any, line: str) -> None:
+    folder, sizes = own_machine
+    triangles = change[0] * read_stl(folder / "trough.stl").triangles + np.array(change[1])
+    (folder / "trough.stl").write_bytes(stl("trough", triangles))
+    with pytest.raises(DembarkError, match=line):
+        sizes()

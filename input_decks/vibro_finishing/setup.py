@@ -7,8 +7,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from dembark.common.errors import DembarkError
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.motion import TABLE, amplitude, motion
+from dembark.input_decks.common.motion import TABLE, amplitude, motion, table_length
 from dembark.input_decks.common.setup import Parameters, Setup, contacts
 from dembark.input_decks.common.trough import sites, sites_within, trough
 from dembark.input_decks.common.vibration import fixed_phases, highest_speed, suitable_step
@@ -18,13 +19,15 @@ from dembark.postproc.walls.mesh import cut, read_stl
 FOLDER = Path(__file__).parent
 # How fast grains may be thrown, over the drive's highest speed: one that part and side pinched flew up with 5.6 times that.
 THROWN = 8.0
+# Diameters across a trough that someone may have drawn in m.
+WIDEST = 1000.0
 
 
 def setup(p: Parameters) -> Setup:
     """The part, the last body, lies amid the grains at the start."""
     still = math.ceil(p.settle_time * p.motion_frequency)
     moving = motion(drive(p), start=still / p.motion_frequency, folder=FOLDER)
-    speed, amplitude_reached = driven(p, moving)
+    speed, amplitude_reached = driven(p, moving, still / p.motion_frequency)
     step, numbers = fixed_phases(p.motion_frequency, suitable_step(p, speed), still + p.motion_ramp + p.run_in, p.periods)
     depth = max(p.part_diameter, 2.0 * p.grain_diameter)
     reach = amplitude_reached + 2.0 * p.grain_diameter
@@ -35,7 +38,14 @@ def setup(p: Parameters) -> Setup:
         depth = max(depth, -low[1], high[1])
         lowest = mesh.reshape(-1, 3)[mesh[..., 2].argmin()]
         centre = (float(0.5 * (low[0] + high[0])), float(lowest[2] + 0.5 * p.part_diameter + 2.0 * p.grain_diameter))
-        places = sites_within(p, cut(mesh), (*centre, 0.5 * p.part_diameter))
+        lines = cut(mesh)
+        if not len(lines):
+            raise DembarkError("trough.stl is not cut by the plane y = 0", f"it reaches from y = {low[1]:g} to {high[1]:g} m",
+                               "move it along y")
+        if high[0] - low[0] > WIDEST * p.grain_diameter:
+            raise DembarkError(f"trough.stl is {high[0] - low[0]:g} m wide", f"grain_diameter is {p.grain_diameter:g} m",
+                               "write the file in m")
+        places = sites_within(p, lines, (*centre, 0.5 * p.part_diameter))
         box = [(low[0] - reach, high[0] + reach), (-depth, depth), (low[2] - reach, high[2] + reach + depth + leap)]
     else:
         mesh, centre = trough(p.trough_width, p.trough_side, p.strips, 2.0 * p.grain_diameter), (0.0, -0.2 * p.trough_width)
@@ -51,12 +61,14 @@ def setup(p: Parameters) -> Setup:
                  {"motion_words": moving.words})
 
 
-def driven(p: Parameters, moving: WallMotion) -> tuple[float, float]:
-    """Highest speed (m/s) of the trough, and how far (m) it gets from its place."""
+def driven(p: Parameters, moving: WallMotion, start: float) -> tuple[float, float]:
+    """Highest speed (m/s) of the trough, and how far (m) it gets from its place, when it moves from `start` (s) on."""
     if p.motion != "table":
         return highest_speed(p), amplitude(p)
-    times = np.arange(0.0, float(np.loadtxt(FOLDER / TABLE, delimiter=",")[-1, 0]) + 1.0, 0.01 / p.motion_frequency)
+    times = start + np.arange(0.0, table_length(FOLDER) + 0.01 / p.motion_frequency, 0.01 / p.motion_frequency)
     speed, reach = (float(np.linalg.norm(found, axis=1).max()) for found in (moving.velocity(times), moving.displacement(times)))
+    if not speed > 0.0:
+        raise DembarkError(f"{TABLE} moves nothing", "the trough of this case shakes", "give rows whose displacements differ")
     return speed, reach
 
 

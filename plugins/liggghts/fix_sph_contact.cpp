@@ -112,6 +112,9 @@ void FixSphContact::post_force(int) { push(true); }
 void FixSphContact::push(bool remember) {
   const std::vector<Push> &pushes = contacts_.push(remember ? update->dt : 0.0, bodies_, remember);
   // Twice as deep, two edges have passed each other, and their springs push on.
+  if (!remember && contacts_.deepest > contacts_.radius)
+    fail("boxes overlap by " + text(contacts_.deepest) + " m, more than the rounding, " + text(contacts_.radius) +
+         " m, before they move; put their centres, edges, planes and normals right");
   if (contacts_.deepest > contacts_.radius)
     fail("at step " + std::to_string(update->ntimestep) + " boxes overlap by " + text(contacts_.deepest) + " m, more than the rounding, " +
          text(contacts_.radius) + " m; take a higher stiffness");

@@ -1,6 +1,7 @@
 #include "fix_wall_motion.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <vector>
 
@@ -57,6 +58,14 @@ void FixWallMotion::init() {
   only_verlet();
   const std::string wrong = motion_.step_error(update->dt);
   if (!wrong.empty()) fail(wrong);
+  if (static_cast<TriMesh *>(mesh_)->nMove() > 1)
+    fail("mesh '" + mesh_id_ + "' is moved by another fix, too; give all terms of a motion to one fix");
+  const Vec3<double> axis = motion_.axis();
+  const double along[3] = {axis.x, axis.y, axis.z};
+  for (int k = 0; k < 3; ++k)
+    if (motion_.turns() && domain->periodicity[k] && std::fabs(std::fabs(along[k]) - 1.0) > 1e-12)
+      fail(std::string("the motion turns mesh '") + mesh_id_ + "' out of the periodic direction " + "xyz"[k] +
+           "; only the direction along the axis may be periodic");
   state_ = motion_.at(clock_.time(update->ntimestep, update->dt));
   check_reach();
   knows_load_ = walls_tell_loads;

@@ -157,6 +157,11 @@ void PairSphCoupled::check_atoms() {
     int groups = role_[i] == SphRole::fluid;
     for (const FixSphBody *solid : solids_) groups += (atom->mask[i] & solid->groupbit) != 0;
     if (groups > 1) refuse_atom(i, "is in two groups of the fixes nve/sph/coupled, sph/wall and sph/body; it can be in one");
+    if (groups == 0 && setflag[atom->type[i]][atom->type[i]])
+      refuse_atom(
+          i, "is in no group of the fixes nve/sph/coupled, sph/wall and sph/body; give it to one, or leave its type out of pair_coeff");
+    if (groups > 0 && settings_.dimension == 2 && !(std::fabs(atom->x[i][2]) <= 1e-6 * settings_.spacing))
+      refuse_atom(i, "is at z = " + dembark::keywords::text(atom->x[i][2]) + " m; in the plane all are at z = 0, one layer of the lattice");
     if (role_[i] != SphRole::fluid) continue;
     const double mass = atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
     if (!(std::fabs(mass - due) <= 1e-6 * due))

@@ -109,6 +109,7 @@ Real radiusOf(const Body& body) {
 void IntegrationMonitor::prepare() {
 	::dembark::MonitorSettings& s = monitor.settings;
 	if (std::isnan(speed)) fail("IntegrationMonitor needs 'speed', the speed (m/s) that errors of velocities are measured by");
+	if (impacts < 0) fail("IntegrationMonitor.impacts must be 0 (none) or more, not " + std::to_string(impacts));
 	if (!::dembark::option_from_name(::dembark::monitor_action_names(), reaction, s.action))
 		fail("IntegrationMonitor.reaction '" + reaction + "' is unknown; it can be report, warn, stop, adapt");
 	if (!std::isnan(length)) {

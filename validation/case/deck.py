@@ -168,7 +168,7 @@ def _files(case: Case, engine: str, values: Mapping[str, Value], setup: Setup) -
     files = {kind.facts.deck: deck.encode()}
     if setup.packing is not None:
         files[PACKING] = setup.packing.text().encode()
-    return files | {f"{name}.stl": _stl(name, triangles) for name, triangles in setup.meshes.items()}
+    return files | {f"{name}.stl": stl(name, triangles) for name, triangles in setup.meshes.items()}
 
 
 def _meaning(case: Case, name: str) -> str:
@@ -187,7 +187,7 @@ def _plain(value: Value) -> Value:
     return math.copysign(1e300, value) if isinstance(value, float) and math.isinf(value) else value
 
 
-def _stl(name: str, triangles: Array) -> bytes:
+def stl(name: str, triangles: Array) -> bytes:
     """Triangles (n, 3, 3) as an STL text with all digits."""
     lines = [f"solid {name}"]
     for corners in np.asarray(triangles, float):

@@ -112,6 +112,9 @@ REFUSED = {
     "no mass": ("mass 6.4 ", "", "mass is missing"),
     "no inertia": ("inertia 0.009 ", "", "inertia is missing"),
     "no fluid": ("fix fluid g1 nve/sph/coupled", "group nobody type 99", "nothing moves the fluid"),
+    "no group": ("fix body3 g3", "create_atoms 2 single 0.2 0.3 0 units box\nfix body3 g3",
+                 "is in no group of the fixes nve/sph/coupled, sph/wall and sph/body"),
+    "out of plane": ("fix fluid g1", "set atom 5 z 0.001\nfix fluid g1", "atom 5 is at z = 0.001 m; in the plane all are at z = 0"),
     "two groups": ("fix body3 g3", "fix again g1 sph/wall\nfix body3 g3", "is in two groups"),
     "weight": ("fix weight all", "fix weight g2", "the group of fix gravity must hold the whole fluid"),
 }

@@ -236,3 +236,22 @@ def test_wrong_motions_are_told_in_one_line(tmp_path, motion, line):
     assert done.code != 0
     assert line in done.error, done.error or done.output[-500:]
     assert len(done.error.strip().splitlines()) <= 2 and "Traceback" not in done.error
+
+
+def test_a_mesh_that_another_fix_moves_too_is_refused_in_either_order(tmp_path):
+    other = "fix other all move/mesh mesh stl linear 0.0 0.0 0.1"
+    text = deck(tmp_path, SHAKE, "run 10")
+    for where in ("fix move all", "fix wall all"):
+        assert where in text
+        done = run_deck(tmp_path, text.replace(where, f"{other}\n{where}"))
+        assert done.code != 0 and "is moved by" in done.error, done.error or done.output[-500:]
+        assert "give all terms of a motion to one fix" in done.error
+
+
+@pytest.mark.parametrize(("boundary", "line"), [("p p f", "out of the periodic direction x"), ("f p f", "")])
+def test_a_mesh_turns_about_the_only_periodic_direction(tmp_path, boundary, line):
+    """A strip along y that turns about y."""
+    strip = rectangle((0.02, -vessel.MARGIN, 0.02), (0.0, vessel.WIDTH + 2.0 * vessel.MARGIN, 0.0), (0.02, 0.0, 0.0))
+    done = run_deck(tmp_path, deck(tmp_path, "rotation point 0.03 0 0.02 axis 0 1 0 rate 1", "run 10", boundary=boundary, triangles=strip,
+                                   gravity=(0.0, 0.0, 0.0)))
+    assert (done.code != 0 and line in done.error) if line else done.code == 0, done.error or done.output[-500:]

@@ -88,6 +88,14 @@ def _points(name: str, value: ArrayLike, dimension: int = 0) -> Floats:
     return out
 
 
+def _some(points: ArrayLike, dimension: int) -> Floats:
+    """Those of a wall or body, of which there must be some."""
+    found = _points("points", points, dimension)
+    if not len(found):
+        raise ValueError("points must not be empty: walls and bodies are made of particles")
+    return found
+
+
 def lattice(low: ArrayLike, high: ArrayLike, spacing: float) -> Floats:
     """Points (m), shape (n, d), of a square or cubic lattice that fills the box from `low` to `high`, each in the middle of its cell.
 
@@ -287,7 +295,7 @@ class SphFluid:
 
     def add_wall(self, points: ArrayLike) -> SphBody:
         """A wall of particles at `points` (m, (k, d)), at rest until its `set_motion`; torques and turns are about the origin."""
-        number = self._solver.add(_points("points", points, self._dimension), False, 0.0, [0.0] * 3, [0.0] * 3)
+        number = self._solver.add(_some(points, self._dimension), False, 0.0, [0.0] * 3, [0.0] * 3)
         return SphBody(self._solver, number, self._dimension, free=False)
 
     def add_body(self, points: ArrayLike, *, mass: float, inertia: ArrayLike, centre: ArrayLike) -> SphBody:
@@ -302,7 +310,7 @@ class SphFluid:
         if moments.shape != (() if self._dimension == 2 else (3,)):
             raise ValueError(f"inertia must be {'a number' if self._dimension == 2 else 'three numbers'} (kg m^2), not {inertia!r}")
         about = [np.inf, np.inf, float(moments)] if self._dimension == 2 else moments.tolist()
-        number = self._solver.add(np.ascontiguousarray(_points("points", points, self._dimension) - middle), True,
+        number = self._solver.add(np.ascontiguousarray(_some(points, self._dimension) - middle), True,
                                   float(numbers("mass", mass, "kg", low=0.0, low_open=True)), about, middle[0].tolist())
         return SphBody(self._solver, number, self._dimension, free=True)
 

@@ -150,6 +150,18 @@ def written():
         return {"dump": dump.read(), "rows": rows.read(), "mass": fluid.particleMass()}
 
 
+def wrong_writers():
+    """What a FluidWriter says of a box and of bodies that are none."""
+    begin((0, 0, 0))
+    said = []
+    for words in ((((0, 0, 0), (1, 1, 1)),), (((0, 1), (0, 1), (0, 1)), {"block": 99}), (((0, 1), (0, 1), (0, 1)), {"block": -1})):
+        try:
+            dembark.FluidWriter(*words)
+        except ValueError as error:
+            said.append(str(error))
+    return said
+
+
 def messages():
     def go(steps):
         for _ in range(steps):

@@ -146,7 +146,8 @@ def messages():
     """What mistakes are answered with."""
     lines = []
     for words in ({}, dict(speed=-1.0), dict(speed=1.0, every=0), dict(speed=1.0, limit=0.0), dict(speed=1.0, contactSteps=0.0),
-                  dict(speed=1.0, reaction="shout"), dict(speed=1.0, reaction="adapt"), dict(speed=1.0, length=0.0)):
+                  dict(speed=1.0, reaction="shout"), dict(speed=1.0, reaction="adapt"), dict(speed=1.0, length=0.0),
+                  dict(speed=1.0, impacts=-1)):
         scene_with([grain(0.0, 0.5)], IntegrationMonitor(**words), 1e-5)
         lines.append(_line())
     watch = scene_with([grain(0.0, 0.5)], IntegrationMonitor(speed=1.0), 1e-5)

@@ -186,12 +186,15 @@ def messages():
     def freed():
         O.bodies[0].dynamic = True
 
+    def moving(ids):
+        return refusal(lambda: (scene(SHAKE), setattr(O.engines[-2], "ids", ids), O.step()))
+
     with open("back.csv", "w", encoding="ascii") as file:
         file.write("0,0,0,0\n0.1,1e-3,0,0\n0.1,2e-3,0,0\n")
     return {"word": trial("shake 1"), "zero": trial("harmonic amplitude 0 0 1e-3 frequency 0"), "back": trial("table file back.csv"),
             "short": trial("jolts shape half_sine acceleration 1 0 0 duration 2e-5"),
             "fast": trial("harmonic amplitude 0 0 1e-3 frequency 20000"), "order": trial(change=last),
-            "free": trial(change=freed), "empty": refusal(lambda: (scene(SHAKE), setattr(O.engines[-2], "ids", []), O.step()))}
+            "free": trial(change=freed), "empty": moving([]), "strangers": [moving([body]) for body in (-1, 77, 10**6)]}
 
 
 write_results(globals())

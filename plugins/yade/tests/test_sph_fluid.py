@@ -12,8 +12,8 @@ DX, SOUND, G, STEP = 0.02, 25.0, 9.81, 3e-4
 
 @pytest.fixture(scope="module")
 def found(yade):
-    return yade.scenes("falling_plane", "falling_space", "moved", "momentum", "floats_on_substeps", "saved", "written", "messages",
-                       script="fluid_scenes.py")
+    return yade.scenes("falling_plane", "falling_space", "moved", "momentum", "floats_on_substeps", "saved", "written",
+                       "wrong_writers", "messages", script="fluid_scenes.py")
 
 
 def pool(low, high, top, **options):
@@ -121,3 +121,8 @@ def test_frames_and_rows_can_be_read(found, tmp_path):
 def test_wrong_input_is_told_in_one_line(found, name, line):
     said = found["messages"][name]
     assert said.startswith("dembark: ") and line in said and "\n" not in said
+
+
+def test_a_writer_says_what_is_no_box_and_no_body(found):
+    assert found["wrong_writers"][0].startswith("bounds must be ((xlo, xhi), (ylo, yhi), (zlo, zhi)) (m), not ((0, 0, 0)")
+    assert found["wrong_writers"][1:] == [f"bodies: there is no body {body} of YADE for 'block'" for body in (99, -1)]

@@ -107,3 +107,8 @@ def test_a_saved_scene_goes_on(found):
     ("free", "follows its forces"), ("empty", "ids is empty")])
 def test_wrong_motions_are_told_in_one_line(found, name, line):
     assert found["messages"][name].startswith("dembark: ") and line in found["messages"][name]
+
+
+def test_bodies_that_do_not_exist_are_told(found):
+    for body, said in zip((-1, 77, 10**6), found["messages"]["strangers"], strict=True):
+        assert said.startswith("dembark: ") and f"WallMotion: there is no body {body}" in said

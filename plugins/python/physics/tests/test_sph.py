@@ -206,6 +206,10 @@ def test_wrong_use_gets_one_line():
         wall.set_load([1.0, 0.0])
     with pytest.raises(ValueError, match=r"inertia must be a number \(kg m\^2\)"):
         water.add_body([[1.0, 0.0]], mass=1.0, inertia=[1, 1, 1], centre=[1, 0])
+    with pytest.raises(ValueError, match="points must not be empty: walls and bodies are made of particles"):
+        water.add_body(np.zeros((0, 2)), mass=1.0, inertia=1.0, centre=[1, 0])
+    with pytest.raises(ValueError, match="points must not be empty"):
+        water.add_wall(np.zeros((0, 2)))
     with pytest.raises(ValueError, match=r"mass must be > 0 kg and finite, not 0"):
         water.add_body([[1.0, 0.0]], mass=0.0, inertia=1.0, centre=[1, 0])
     with pytest.raises(ValueError, match=r"the time step must be > 0 and at most 0.6 h/sound_speed = 0.78"):
