@@ -104,6 +104,7 @@ void add_combinations(Models<Normal...>, Models<Rolling...>) {
 template <class Host>
 void guard_fallback(GranularCreators<Host>& creators) {
   Creator<Host>& creator = creators[{"gran", static_cast<int>(GranStyle<>::HASHCODE)}];
+  if (creator == &fallback_or_refuse<Host>) return;  // Of an instance before the command clear.
   stock_fallback<Host> = creator;
   creator = &fallback_or_refuse<Host>;
 }
@@ -111,6 +112,12 @@ void guard_fallback(GranularCreators<Host>& creators) {
 }  // namespace
 
 void register_contact_models() {
+  guard_fallback(pair_loops());
+  guard_fallback(wall_loops());
+  // The tables outlive the command clear.
+  static bool known = false;
+  if (known) return;
+  known = true;
   ContactModels::Factory& models = ContactModels::Factory::instance();
   models.addTangentialModel("finnie_rabinowicz", TANGENTIAL_FINNIE_RABINOWICZ);
   models.addCohesionModel("capillary", COHESION_CAPILLARY);
@@ -121,9 +128,6 @@ void register_contact_models() {
 #include "granular_combinations_list.h"
 #undef GRAN_MODELS
 #undef MODELS
-
-  guard_fallback(pair_loops());
-  guard_fallback(wall_loops());
 }
 
 }  // namespace dembark_liggghts

@@ -1,7 +1,8 @@
 // liggghts-dembark: stock LIGGGHTS, from its shared library, plus dembark's styles.
 //
-// The command line and everything else is LIGGGHTS's own. Before the input is read, the contact models and their combinations are
-// entered into the tables that the library looks them up in.
+// The command line and everything else is LIGGGHTS's own. Before the input is read, and after the command clear, the contact models and
+// their combinations are entered into the tables that the library looks them up in.
+#include <dlfcn.h>
 #include <mpi.h>
 
 #include <csignal>
@@ -29,6 +30,8 @@
 
 namespace {
 
+bool entered = false;  // the styles are in the library's tables
+
 template <class Style>
 LAMMPS_NS::Fix* create_fix(LAMMPS_NS::LAMMPS* lammps, int narg, char** arg) {
   return new Style(lammps, narg, arg);
@@ -46,7 +49,38 @@ void start_alone() {
   setenv("OMPI_MCA_orte_create_session_dirs", "0", 0);
 }
 
+/// The library enters its own combinations when it is made; ours come after, where its fallback can be replaced.
+void enter_styles(LAMMPS_NS::LAMMPS& host) {
+  if (!host.modify || !host.force || !host.input) return;
+  dembark_liggghts::register_contact_models();
+  auto& fixes = dembark_liggghts::fix_styles(*host.modify);
+  fixes["capillary/liquid"] = &create_fix<LAMMPS_NS::FixCapillaryLiquid>;
+  fixes["energy/account"] = &create_fix<LAMMPS_NS::FixEnergyAccount>;
+  fixes["integration/monitor"] = &create_fix<LAMMPS_NS::FixIntegrationMonitor>;
+  fixes["lcp/impact"] = &create_fix<LAMMPS_NS::FixLcpImpact>;
+  fixes["nve/sph/coupled"] = &create_fix<LAMMPS_NS::FixNveSphCoupled>;
+  fixes["resume/exact"] = &create_fix<LAMMPS_NS::FixResumeExact>;
+  fixes["sph/contact"] = &create_fix<LAMMPS_NS::FixSphContact>;
+  fixes["sph/body"] = fixes["sph/wall"] = &create_fix<LAMMPS_NS::FixSphBody>;
+  fixes["wall/motion"] = &create_fix<LAMMPS_NS::FixWallMotion>;
+  (*host.force->pair_map)["sph/coupled"] = [](LAMMPS_NS::LAMMPS* owner) -> LAMMPS_NS::Pair* {
+    return new LAMMPS_NS::PairSphCoupled(owner);
+  };
+  dembark_liggghts::commands(*host.input)["resume_state"] = [](LAMMPS_NS::LAMMPS* owner, int narg, char** arg) {
+    LAMMPS_NS::ResumeState(owner).command(narg, arg);
+  };
+  entered = true;
+}
+
 }  // namespace
+
+/// Stands in front of the library's own, which LIGGGHTS calls when all its tables are new: at the start, and after the command `clear`.
+void LAMMPS_NS::LAMMPS::post_create() {
+  typedef void (*PostCreate)(LAMMPS*);
+  static const PostCreate original = reinterpret_cast<PostCreate>(dlsym(RTLD_NEXT, "_ZN9LAMMPS_NS6LAMMPS11post_createEv"));
+  original(this);
+  enter_styles(*this);
+}
 
 int main(int argc, char** argv) {
   // The library expects its host to route signals, so that a run that is told to stop still writes what it has.
@@ -62,24 +96,8 @@ int main(int argc, char** argv) {
   start_alone();
   MPI_Init(&argc, &argv);
   LAMMPS_NS::LAMMPS* lammps = new LAMMPS_NS::LAMMPS(argc, argv, MPI_COMM_WORLD);
-  // The library enters its own combinations in this constructor; ours come after, where its fallback can be replaced.
-  dembark_liggghts::register_contact_models();
-  auto& fixes = dembark_liggghts::fix_styles(*lammps->modify);
-  fixes["capillary/liquid"] = &create_fix<LAMMPS_NS::FixCapillaryLiquid>;
-  fixes["energy/account"] = &create_fix<LAMMPS_NS::FixEnergyAccount>;
-  fixes["integration/monitor"] = &create_fix<LAMMPS_NS::FixIntegrationMonitor>;
-  fixes["lcp/impact"] = &create_fix<LAMMPS_NS::FixLcpImpact>;
-  fixes["nve/sph/coupled"] = &create_fix<LAMMPS_NS::FixNveSphCoupled>;
-  fixes["resume/exact"] = &create_fix<LAMMPS_NS::FixResumeExact>;
-  fixes["sph/contact"] = &create_fix<LAMMPS_NS::FixSphContact>;
-  fixes["sph/body"] = fixes["sph/wall"] = &create_fix<LAMMPS_NS::FixSphBody>;
-  fixes["wall/motion"] = &create_fix<LAMMPS_NS::FixWallMotion>;
-  (*lammps->force->pair_map)["sph/coupled"] = [](LAMMPS_NS::LAMMPS* host) -> LAMMPS_NS::Pair* {
-    return new LAMMPS_NS::PairSphCoupled(host);
-  };
-  dembark_liggghts::commands(*lammps->input)["resume_state"] = [](LAMMPS_NS::LAMMPS* host, int narg, char** arg) {
-    LAMMPS_NS::ResumeState(host).command(narg, arg);
-  };
+  // A library that is linked with -Bsymbolic calls its own function.
+  if (!entered) enter_styles(*lammps);
   lammps->input->file();
   delete lammps;
   MPI_Finalize();
