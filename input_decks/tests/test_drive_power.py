@@ -139,6 +139,14 @@ def test_wrong_runs_fail(run: Any, failed: set[str]) -> None:
     assert failed <= names(verdicts(run()), "fail")
 
 
+def test_power_and_dissipation_are_compared_in_the_mean_over_runs() -> None:
+    """What a bed holds at the ends of a window scatters from run to run; damping that is missing is missing in all."""
+    found = judged("drive_power", drive.measure([shaken(), spoiled(normal_viscous=0.985), shaken(), spoiled(normal_viscous=1.015)]))
+    assert "dissipation_gap" not in names(found, "fail") and abs(found["dissipation_gap"]["value"]) < 1e-3
+    found = judged("drive_power", drive.measure([spoiled(normal_viscous=0.97 + 0.001 * k) for k in range(4)]))
+    assert "dissipation_gap" in names(found, "fail")
+
+
 def test_a_bed_that_bounces_is_not_compared_with_a_block_that_sticks() -> None:
     assert not {"power", "flight"} & names(verdicts(restitution=0.9), "pass")
 
