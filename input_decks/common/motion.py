@@ -36,7 +36,8 @@ def motion(p: Parameters, start: float | None = None, until: float | None = None
 
 def table_length(folder: Path) -> float:
     """Time (s) from the start of a motion to the last row of the `motion.csv` of its folder, which a motion has read already."""
-    rows = [line.split("#")[0].replace(",", " ").split() for line in (folder / TABLE).read_text(encoding="utf-8").splitlines()]
+    text = (folder / TABLE).read_text(encoding="utf-8", errors="replace")
+    rows = [line.split("#")[0].replace(",", " ").split() for line in text.splitlines()]
     return max(float(row[0]) for row in rows if row)
 
 

@@ -19,8 +19,8 @@ from dembark.postproc.walls.mesh import cut, read_stl
 FOLDER = Path(__file__).parent
 # How fast grains may be thrown, over the drive's highest speed: one that part and side pinched flew up with 5.6 times that.
 THROWN = 8.0
-# Diameters across a trough that someone may have drawn in m.
-WIDEST = 1000.0
+# A trough that is wider (m) was drawn in mm.
+WIDEST = 20.0
 
 
 def setup(p: Parameters) -> Setup:
@@ -42,9 +42,8 @@ def setup(p: Parameters) -> Setup:
         if not len(lines):
             raise DembarkError("trough.stl is not cut by the plane y = 0", f"it reaches from y = {low[1]:g} to {high[1]:g} m",
                                "move it along y")
-        if high[0] - low[0] > WIDEST * p.grain_diameter:
-            raise DembarkError(f"trough.stl is {high[0] - low[0]:g} m wide", f"grain_diameter is {p.grain_diameter:g} m",
-                               "write the file in m")
+        if high[0] - low[0] > WIDEST:
+            raise DembarkError(f"trough.stl is {high[0] - low[0]:g} m wide", "it was drawn in mm, maybe", "write the file in m")
         places = sites_within(p, lines, (*centre, 0.5 * p.part_diameter))
         box = [(low[0] - reach, high[0] + reach), (-depth, depth), (low[2] - reach, high[2] + reach + depth + leap)]
     else:

@@ -114,7 +114,7 @@ void FixSphContact::push(bool remember) {
   // Twice as deep, two edges have passed each other, and their springs push on.
   if (!remember && contacts_.deepest > contacts_.radius)
     fail("boxes overlap by " + text(contacts_.deepest) + " m, more than the rounding, " + text(contacts_.radius) +
-         " m, before they move; put their centres, edges, planes and normals right");
+         " m, as the run begins; put their centres, edges, planes and normals right, or the rounding");
   if (contacts_.deepest > contacts_.radius)
     fail("at step " + std::to_string(update->ntimestep) + " boxes overlap by " + text(contacts_.deepest) + " m, more than the rounding, " +
          text(contacts_.radius) + " m; take a higher stiffness");

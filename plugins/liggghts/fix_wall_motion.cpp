@@ -60,12 +60,7 @@ void FixWallMotion::init() {
   if (!wrong.empty()) fail(wrong);
   if (static_cast<TriMesh *>(mesh_)->nMove() > 1)
     fail("mesh '" + mesh_id_ + "' is moved by another fix, too; give all terms of a motion to one fix");
-  const Vec3<double> axis = motion_.axis();
-  const double along[3] = {axis.x, axis.y, axis.z};
-  for (int k = 0; k < 3; ++k)
-    if (motion_.turns() && domain->periodicity[k] && std::fabs(std::fabs(along[k]) - 1.0) > 1e-12)
-      fail(std::string("the motion turns mesh '") + mesh_id_ + "' out of the periodic direction " + "xyz"[k] +
-           "; only the direction along the axis may be periodic");
+  if (motion_.turns()) check_turn();
   state_ = motion_.at(clock_.time(update->ntimestep, update->dt));
   check_reach();
   knows_load_ = walls_tell_loads;
@@ -76,6 +71,28 @@ void FixWallMotion::init() {
       if (wall->mesh_list()[m]->mesh() == mesh_ && !wall->contact_match("tangential", "finnie_rabinowicz") &&
           !wall->contact_match("cohesion", "capillary"))
         knows_load_ = false;
+  }
+}
+
+/// A mesh that goes on across a periodic border cannot turn about an axis across it. Collective.
+void FixWallMotion::check_turn() {
+  const Vec3<double> axis = motion_.axis();
+  const double along[3] = {axis.x, axis.y, axis.z};
+  auto *const mesh = static_cast<TriMesh *>(mesh_);
+  for (int k = 0; k < 3; ++k) {
+    if (!domain->periodicity[k] || std::fabs(std::fabs(along[k]) - 1.0) <= 1e-12) continue;
+    int there = 0, any = 0;
+    const double room = 1e-6 * domain->prd[k];
+    for (int i = 0; i < mesh->sizeLocal(); ++i)
+      for (int corner = 0; corner < 3; ++corner) {
+        double node[3];
+        mesh->node(i, corner, node);
+        there |= node[k] < domain->boxlo[k] + room || node[k] > domain->boxhi[k] - room;
+      }
+    MPI_Allreduce(&there, &any, 1, MPI_INT, MPI_MAX, world);
+    if (any)
+      fail(std::string("the motion turns mesh '") + mesh_id_ + "' out of the periodic direction " + "xyz"[k] +
+           ", in which it reaches the border; only the direction along the axis may be periodic there");
   }
 }
 

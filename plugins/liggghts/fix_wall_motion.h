@@ -49,6 +49,7 @@ class FixWallMotion : public dembark_family::SharedFix {
  private:
   void set_velocities(const dembark::WallStep &step);
   void check_reach();
+  void check_turn();
   dembark::WallLoad whole_load();
   void arrive(double t);
 

@@ -52,6 +52,7 @@ void start_alone() {
 /// The library enters its own combinations when it is made; ours come after, where its fallback can be replaced.
 void enter_styles(LAMMPS_NS::LAMMPS& host) {
   if (!host.modify || !host.force || !host.input) return;
+  LAMMPS_NS::ResumeState::file.clear();
   dembark_liggghts::register_contact_models();
   auto& fixes = dembark_liggghts::fix_styles(*host.modify);
   fixes["capillary/liquid"] = &create_fix<LAMMPS_NS::FixCapillaryLiquid>;

@@ -34,7 +34,25 @@ def test_styles_are_there_after_clear(tmp_path: Path) -> None:
         wall = models(law, wall="primitive type 2 zplane 0.0")
         return head() + "\n" + FALL.format(properties=properties(law), models=models(law), wall=wall, rows=rows)
 
-    done = run_deck(tmp_path, "clear\n" + once("first") + "clear\n" + once("second"))
+    fluid = "units si\npair_style sph/coupled spacing 0.02 sound_speed 35\nclear\n"
+    done = run_deck(tmp_path, "clear\n" + once("first") + "clear\n" + fluid + once("second"))
     assert done.code == 0, done.error or done.output[-1500:]
     assert (tmp_path / "second").read_text() == (tmp_path / "first").read_text()
     assert "Style collision" not in done.output
+
+
+def test_a_state_that_was_read_before_clear_is_forgotten(tmp_path: Path) -> None:
+    """One run goes on, and then, after clear, another one from its own restart file: with its own forces, not with those of the first."""
+    law = Material(static_friction=0.5, kinetic_friction=0.4, restitution=0.6, youngs_modulus=5e6)
+    text = head() + "\n" + FALL.format(properties=properties(law), models=models(law), wall=models(law, wall="primitive type 2 zplane 0.0"),
+                                       rows="rows").replace("fix watch", "fix state all resume/exact 100 state\nfix watch")
+    other = text.replace("gravity 9.81", "gravity 4.0").replace("100 state", "100 other").replace("file rows", "file whole")
+    for one in (text, other.replace("run 500", "run 600")):
+        assert run_deck(tmp_path, one).code == 0
+    made = text[text.index("region domain"):text.index("neighbor 0.002")]
+    first = text.replace(made, "resume_state state\n").replace("file rows", "file again")
+    second = other.replace(made, "read_restart other.400.restart\n").replace("file whole", "file late")
+    done = run_deck(tmp_path, first.replace("run 500", "run 500 upto") + "clear\n" + second.replace("run 500", "run 600 upto"))
+    assert done.code == 0, done.error or done.output[-1500:]
+    assert done.output.count("resumed at step 400 exactly") == 2
+    assert (tmp_path / "late").read_text().splitlines()[-1] == (tmp_path / "whole").read_text().splitlines()[-1]

@@ -171,7 +171,8 @@ def test_boxes_that_are_too_soft_end_the_run(tmp_path: Path) -> None:
 
 
 REFUSED = {
-    "start": ("plane 0 0 0 0 0 1", "plane 0 0 0 0 0 -1", "before they move; put their centres, edges, planes and normals right"),
+    "start": ("plane 0 0 0 0 0 1", "plane 0 0 0 0 0 -1",
+              "as the run begins; put their centres, edges, planes and normals right, or the rounding"),
     "stiffness": ("stiffness 2e4 ", "", "stiffness (N/m) is missing"),
     "keyword": ("stiffness 2e4 ", "soft 3 ", "'soft' is no keyword; known are stiffness, rounding"),
     "restitution": ("restitution 0.5", "restitution 0.1", "restitution must be between 0.14 (critical damping) and 1"),

@@ -248,10 +248,11 @@ def test_a_mesh_that_another_fix_moves_too_is_refused_in_either_order(tmp_path):
         assert "give all terms of a motion to one fix" in done.error
 
 
-@pytest.mark.parametrize(("boundary", "line"), [("p p f", "out of the periodic direction x"), ("f p f", "")])
-def test_a_mesh_turns_about_the_only_periodic_direction(tmp_path, boundary, line):
-    """A strip along y that turns about y."""
+@pytest.mark.parametrize(("boundary", "axis", "line"), [
+    ("f p f", "1 0 0", "out of the periodic direction y, in which it reaches the border"), ("f p f", "0 1 0", ""), ("p p f", "0 1 0", "")])
+def test_a_mesh_that_reaches_a_periodic_border_turns_about_an_axis_along_it(tmp_path, boundary, axis, line):
+    """A strip from border to border along y, and well inside along x."""
     strip = rectangle((0.02, -vessel.MARGIN, 0.02), (0.0, vessel.WIDTH + 2.0 * vessel.MARGIN, 0.0), (0.02, 0.0, 0.0))
-    done = run_deck(tmp_path, deck(tmp_path, "rotation point 0.03 0 0.02 axis 0 1 0 rate 1", "run 10", boundary=boundary, triangles=strip,
-                                   gravity=(0.0, 0.0, 0.0)))
+    motion = f"rotation point 0.03 0 0.02 axis {axis} rate 1"
+    done = run_deck(tmp_path, deck(tmp_path, motion, "run 10", boundary=boundary, triangles=strip, gravity=(0.0, 0.0, 0.0)))
     assert (done.code != 0 and line in done.error) if line else done.code == 0, done.error or done.output[-500:]

@@ -18,9 +18,9 @@
 //
 //   F_t = -mu F_n tanh(|v_t|/v_0) v_t/|v_t|                                                                               (3)
 //
-// (3) with v_0 = 1/8 m/s is the law of DualSPHysics (InteractionForcesDEM in JSphCpu.cpp of version 5), where the spring of (1) is as long
-// as one step slides and has no memory; with it the experiments on stacked cubes were simulated (R. B. Canelas et al., Comput. Phys.
-// Commun. 202 (2016) 131).
+// (3) with v_0 = 1/8 m/s bounds the friction in DualSPHysics (InteractionForcesDEM in JSphCpu.cpp of version 5): that is the lesser of (3)
+// and a spring and dashpot whose spring is as long as one step slides, and has no memory. With that code the experiments on stacked
+// cubes were simulated (R. B. Canelas et al., Comput. Phys. Commun. 202 (2016) 131).
 //
 // k is no property of the material: softer than that, so that steps of the fluid resolve impacts. Units SI; in space.
 #pragma once

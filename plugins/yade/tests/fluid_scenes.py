@@ -153,13 +153,9 @@ def written():
 def wrong_writers():
     """What a FluidWriter says of a box and of bodies that are none."""
     begin((0, 0, 0))
-    said = []
-    for words in ((((0, 0, 0), (1, 1, 1)),), (((0, 1), (0, 1), (0, 1)), {"block": 99}), (((0, 1), (0, 1), (0, 1)), {"block": -1})):
-        try:
-            dembark.FluidWriter(*words)
-        except ValueError as error:
-            said.append(str(error))
-    return said
+    box = ((0, 1), (0, 1), (0, 1))
+    return [refusal(lambda words=words: dembark.FluidWriter(*words)) for words in (
+        (((0, 0, 0), (1, 1, 1)),), (box, {"block": 99}), (box, {"block": -1}))]
 
 
 def messages():

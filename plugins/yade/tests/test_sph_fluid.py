@@ -124,5 +124,6 @@ def test_wrong_input_is_told_in_one_line(found, name, line):
 
 
 def test_a_writer_says_what_is_no_box_and_no_body(found):
-    assert found["wrong_writers"][0].startswith("bounds must be ((xlo, xhi), (ylo, yhi), (zlo, zhi)) (m), not ((0, 0, 0)")
-    assert found["wrong_writers"][1:] == [f"bodies: there is no body {body} of YADE for 'block'" for body in (99, -1)]
+    box, *bodies = found["wrong_writers"]
+    assert box.startswith("dembark: FluidWriter: bounds must be ((xlo, xhi), (ylo, yhi), (zlo, zhi)) (m), not [(0, 0, 0)")
+    assert bodies == [f"dembark: FluidWriter: there is no body {body} for 'block'" for body in (99, -1)]

@@ -96,12 +96,13 @@ class FluidWriter(FrameWriter):
     COLUMNS = "id type x y z vx vy vz radius mass density pressure"
 
     def __init__(self, bounds, bodies=None, dump="fluid.dump", history="fluid.csv"):
-        if [len(one) if hasattr(one, "__len__") else 0 for one in bounds] != [2, 2, 2]:
-            raise ValueError(f"bounds must be ((xlo, xhi), (ylo, yhi), (zlo, zhi)) (m), not {bounds!r}")
+        bounds = [tuple(one) for one in bounds]
+        if [len(one) for one in bounds] != [2, 2, 2]:
+            fail(f"FluidWriter: bounds must be ((xlo, xhi), (ylo, yhi), (zlo, zhi)) (m), not {bounds}")
         self._bodies, self._dump = dict(bodies or {}), dump
         for name, body in self._bodies.items():
             if not 0 <= body < len(O.bodies) or O.bodies[body] is None:
-                raise ValueError(f"bodies: there is no body {body} of YADE for {name!r}")
+                fail(f"FluidWriter: there is no body {body} for {name!r}")
         self._box = "".join(f"{low:.17g} {high:.17g}\n" for low, high in bounds)
         self._history = table(history, ",".join(["step", "time", *_pose_names(self._bodies), *self.ENERGIES])) if history else None
         if dump:
