@@ -103,7 +103,7 @@ def run(words: list[str], capture: pytest.CaptureFixture[str]) -> None:
         os.chdir(rest[0])
         os.environ["PWD"] = str(Path.cwd())
     elif program == "mkdir":
-        Path(rest[-1]).mkdir(parents="-p" in rest)
+        Path(rest[-1]).mkdir(parents="-p" in rest, exist_ok="-p" in rest)
     elif program == "export":
         for name, _, value in (word.partition("=") for word in rest):
             os.environ[name] = value

@@ -152,7 +152,7 @@ def test_readme_names_every_style() -> None:
     main = (ROOT / "plugins/liggghts/main.cpp").read_text(encoding="utf-8")
     headers = code("plugins/liggghts")
     styles = {f"fix {name}" for name in re.findall(r'fixes\["([\w/]+)"\]', main)}
-    styles |= set(re.findall(r'commands\(\*lammps->input\)\["(\w+)"\]', main))
+    styles |= set(re.findall(r'commands\(\*host\.input\)\["(\w+)"\]', main))
     styles |= {f"pair_style {name}" for name in re.findall(r'pair_map\)\["([\w/]+)"\]', main)}
     styles |= {f"tangential {name}" for name in re.findall(r"^TANGENTIAL_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
     styles |= {f"cohesion {name}" for name in re.findall(r"^COHESION_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}

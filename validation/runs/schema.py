@@ -85,9 +85,11 @@ def version(connection: sqlite3.Connection, path: Path) -> int:
 
 
 def rows(path: Path, sql: str, values: Sequence[Any] = ()) -> list[dict[str, Any]]:
-    """Rows of any SELECT on the file as dicts; it is opened for reading only. DembarkError when the SQL is wrong or it cannot be read."""
+    """Rows of any SELECT on the file as dicts; nothing else is run. DembarkError when the SQL is wrong or it cannot be read."""
     try:
-        with closing(sqlite3.connect(f"file:{quote(str(path.resolve()))}?mode=ro", uri=True, timeout=PATIENCE)) as connection:
+        # Not opened as read-only: a writer that was killed leaves a journal, and only who may write can take back what it had begun.
+        with closing(sqlite3.connect(f"file:{quote(str(path.resolve()))}?mode=rw", uri=True, timeout=PATIENCE)) as connection:
+            connection.execute("PRAGMA query_only = ON")
             if not version(connection, path):
                 return []  # it is being made at this moment
             connection.row_factory = sqlite3.Row

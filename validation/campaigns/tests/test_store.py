@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import sqlite3
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ from dembark.common.errors import DembarkError, RunError
 from dembark.validation import engines
 from dembark.validation.campaigns import store
 from dembark.validation.campaigns.estimate import Rates
+from dembark.validation.runs import schema
 from dembark.validation.runs.plan import Series, of_profile
 from dembark.validation.runs.schema import KEYS, TABLES, VERSION
 from dembark.validation.runs.table import Table
@@ -230,3 +233,28 @@ def test_rates_are_those_of_the_store_before_those_of_the_table(tmp_path: Path) 
     by_engine = {one.place.name: rates.of("box", one.place.name) for one in planned}
     assert by_engine["yade"].value == 100.0 and by_engine["liggghts"].value == 100.0 and "3 runs measured" in by_engine["yade"].source
     assert rates.of("silo", "yade") == none.of("silo", "yade")
+
+
+KILLED = """
+import os, sqlite3, sys
+store = sqlite3.connect(sys.argv[1], isolation_level=None)
+store.execute("PRAGMA synchronous = FULL")
+store.execute("PRAGMA cache_size = 1")
+store.execute("BEGIN IMMEDIATE")
+store.execute("UPDATE steps SET inputs = 'half'")
+store.executemany("INSERT INTO steps (campaign, name, kind, state, inputs) VALUES ('c', ?, 'k', 'running', ?)",
+                  [(f"more{k}", "x" * 4000) for k in range(200)])
+os.kill(os.getpid(), 9)
+"""
+
+
+def test_what_a_killed_writer_had_begun_is_taken_back_by_who_reads(tmp_path: Path) -> None:
+    """Its journal is on the disk, and pages of its transaction are in the file."""
+    path = tmp_path / schema.FILE
+    with schema.writing(path) as store:
+        schema.put(store, "steps", [{"campaign": "c", "name": "one", "kind": "k", "state": "waiting", "inputs": "whole"}])
+    subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False, timeout=60)
+    assert path.with_name(f"{schema.FILE}-journal").is_file()
+    assert schema.rows(path, "SELECT name, inputs FROM steps") == [{"name": "one", "inputs": "whole"}]
+    with pytest.raises(DembarkError, match="readonly database"):
+        schema.rows(path, "DELETE FROM steps")
