@@ -32,14 +32,12 @@ def measure(replicas: Replicas) -> Measurement:
     def worst(number: Callable[[Drive], float]) -> Value:
         return Value(exact(max((number(one) for one in runs), key=lambda gap: np.inf if np.isnan(gap) else abs(gap))), exact(0.0))
 
-    def mean(number: Callable[[Drive], float]) -> Value:
-        """Over the runs, with an interval where there are several."""
-        if len(runs) == 1:
-            return Value(exact(number(runs[0])), exact(0.0))
-        return Value(over(lambda one: Estimate(number(one), math.inf, ONE)), exact(0.0))
-
     def once(number: Callable[[Drive], float]) -> Value:
         return Value(over(lambda one: Estimate(number(one), math.inf, ONE)))
+
+    def mean(number: Callable[[Drive], float]) -> Value:
+        """Over the runs, with an interval where there are several."""
+        return Value(exact(number(runs[0])) if len(runs) == 1 else once(number).estimate, exact(0.0))
 
     values = {
         "energy_balance": worst(lambda one: imbalance(one.rows, PARTS)),

@@ -77,8 +77,7 @@ void TriangleSurface::prepare(double reach, const dembark::PrescribedMotion* mot
   for (int k = 0; k < 3; ++k) {
     if (!domain->periodicity[k]) continue;
     const std::string direction = std::string("direction ") + "xyz"[k];
-    if (motion && motion->turns() && std::abs(std::abs(motion->axis().*axes[k]) - 1.0) > 1e-12)
-      throw std::invalid_argument("its motion turns the surface out of the periodic " + direction);
+    if (motion && motion->turns_out_of(k)) throw std::invalid_argument("its motion turns the surface out of the periodic " + direction);
     if (domain->box_change_size || domain->box_change_shape)
       throw std::invalid_argument("the box changes its size, and its surface is periodic along " + direction);
     const std::size_t count = all.size();

@@ -1,7 +1,6 @@
 #include "fix_wall_motion.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <vector>
 
@@ -60,7 +59,7 @@ void FixWallMotion::init() {
   if (!wrong.empty()) fail(wrong);
   if (static_cast<TriMesh *>(mesh_)->nMove() > 1)
     fail("mesh '" + mesh_id_ + "' is moved by another fix, too; give all terms of a motion to one fix");
-  if (motion_.turns()) check_turn();
+  check_turn();
   state_ = motion_.at(clock_.time(update->ntimestep, update->dt));
   check_reach();
   knows_load_ = walls_tell_loads;
@@ -76,11 +75,9 @@ void FixWallMotion::init() {
 
 /// A mesh that goes on across a periodic border cannot turn about an axis across it. Collective.
 void FixWallMotion::check_turn() {
-  const Vec3<double> axis = motion_.axis();
-  const double along[3] = {axis.x, axis.y, axis.z};
   auto *const mesh = static_cast<TriMesh *>(mesh_);
   for (int k = 0; k < 3; ++k) {
-    if (!domain->periodicity[k] || std::fabs(std::fabs(along[k]) - 1.0) <= 1e-12) continue;
+    if (!domain->periodicity[k] || !motion_.turns_out_of(k)) continue;
     int there = 0, any = 0;
     const double room = 1e-6 * domain->prd[k];
     for (int i = 0; i < mesh->sizeLocal(); ++i)

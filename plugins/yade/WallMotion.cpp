@@ -60,9 +60,8 @@ Real WallMotion::now(long step) {
 }
 
 State& WallMotion::state(std::size_t k) const {
-	const bool known = ids[k] >= 0 && static_cast<std::size_t>(ids[k]) < scene->bodies->size();
-	const auto body  = known ? Body::byId(ids[k], scene) : shared_ptr<Body>();
-	if (!body) fail("WallMotion: there is no body " + std::to_string(ids[k]));
+	if (!scene->bodies->exists(ids[k])) fail("WallMotion: there is no body " + std::to_string(ids[k]));
+	const auto& body = Body::byId(ids[k], scene);
 	if (body->isDynamic())
 		fail("WallMotion: body " + std::to_string(ids[k]) + " follows its forces; hold it (fixed=True, dynamic=False)");
 	return *body->state;

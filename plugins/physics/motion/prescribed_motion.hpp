@@ -54,6 +54,11 @@ class PrescribedMotion {
     return {(1.0 / h) * (to.displacement - from.displacement), (to.angle - from.angle) / h};
   }
   bool turns() const { return norm(axis_) > 0.0; }
+  /// Whether what lies along x, y or z (along: 0, 1, 2) is turned out of that direction.
+  bool turns_out_of(int along) const {
+    const double part[3] = {axis_.x, axis_.y, axis_.z};
+    return turns() && std::fabs(std::fabs(part[along]) - 1.0) > 1e-12;
+  }
   const Vec3<double>& axis() const { return axis_; }  ///< a unit vector, or zero
   /// m: of the point on the axis that the translation moves.
   Vec3<double> centre(const WallState& state) const { return point_ + state.displacement; }
