@@ -13,12 +13,14 @@ from pathlib import Path
 import pytest
 
 from dembark.validation.case.folders import load, package_root
+from dembark.validation.case.model import Case
+from dembark.validation.case.resolve import resolve
 
 HERE = Path(__file__).parent
 FIELDS = ("unit", "evidence", "tolerance", "absolute", "agreement", "compared", "why", "source")
 
 
-def _cases() -> Iterable:
+def _cases() -> Iterable[Case]:
     return (load(path) for path in sorted(package_root().glob("*/case.toml")))
 
 
@@ -33,10 +35,9 @@ def runs() -> list[tuple[str, ...]]:
     """All runs of all profiles with their replicas, and the variants that no profile runs."""
     found = [("case", "profile", "variant", "engine", "replicas")]
     for case in _cases():
-        usual = case.parameters["replicas"].value if "replicas" in case.parameters else 1
         for profile, planned in case.runs.items():
-            count = case.profiles[profile].get("replicas", usual)
-            found += [(case.name, profile, run.variant, engine, str(run.replicas.get(engine, count)))
+            found += [(case.name, profile, run.variant, engine,
+                       str(run.replicas.get(engine, resolve(case, profile, run.variant).get("replicas", 1))))
                       for run in planned for engine in run.engines]
         found += [(case.name, "", name, "", "") for name in case.variants
                   if not any(run.variant == name for planned in case.runs.values() for run in planned)]
@@ -58,6 +59,12 @@ def test_the_cases_declare_what_they_did(name: str) -> None:
     before, now = (HERE / name).read_text(encoding="utf-8").splitlines(), text(TABLES[name]()).splitlines()
     assert not set(before) ^ set(now), "these rows are new or gone; see the head of this file"
     assert before == now
+
+
+@pytest.mark.parametrize("case", _cases(), ids=lambda case: case.name)
+def test_the_largest_profile_is_not_left_at_the_numbers_of_a_trial(case: Case) -> None:
+    if case.runs.get("full") and case.profiles["standard"]:
+        assert case.profiles["full"], "what [profiles] standard changes, full changes as well, or it is the smaller one"
 
 
 if __name__ == "__main__":

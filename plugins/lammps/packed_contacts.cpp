@@ -16,11 +16,16 @@ namespace dembark_lammps {
 
 using dembark::ContactParameters;
 
-bool PackedContacts::prepare(int freeze_bit, LAMMPS_NS::FixCapillaryLiquid* liquid) {
+bool PackedContacts::prepare(int freeze_bit, LAMMPS_NS::FixCapillaryLiquid* liquid, dembark::ContactTally* tally) {
   freeze_bit_ = freeze_bit;
   liquid_ = liquid;
   layout_ = coefficients_.layout();
   const ContactParameters& any = coefficients_(1, 1);
+  tally_.sums = tally;
+  tally_.atom = atom;
+  tally_.rings_at = layout_.rings ? layout_.rings_at() : -1;
+  tally_.angle_at = layout_.rolling ? layout_.rolling_at() : -1;
+  tally_.rolls = any.rolling.model != dembark::RollingModel::off;
   return any.normal_law == dembark::NormalLaw::hertz && !any.liquid.viscous.on();
 }
 
@@ -46,16 +51,16 @@ void PackedContacts::step(const LAMMPS_NS::NeighList& list, const NeighborHistor
   collect_laws();
   const ContactParameters& any = coefficients_(1, 1);
   // The rolling spring stands behind the rings.
-  const int rings = layout_.rings ? layout_.rings_at() : -1;
   const int more = layout_.rings || layout_.rolling ? layout_.rings_at() : -1;
   dembark::PairStep step{*this};
   dembark_family::describe_pairs(step, *atom, list);
   step.memory = this;
+  step.results = tally_.sums ? &tally_ : nullptr;
   step.laws = laws_.data();
   step.types = atom->ntypes + 1;
   step.one_law = atom->ntypes == 1;
   step.owned = force->newton_pair ? atom->nlocal + atom->nghost : atom->nlocal;
-  step.rings = rings;
+  step.rings = tally_.rings_at;
   step.more = more;
   step.more_numbers = layout_.imbalance_at() - layout_.rings_at();
   step.dt = update->dt;
@@ -64,7 +69,7 @@ void PackedContacts::step(const LAMMPS_NS::NeighList& list, const NeighborHistor
   step.tangential_damping = any.tangential_damping;
   // The scalar law knows that curve, and steps of zero length.
   step.pack_friction = any.friction.presliding != dembark::Presliding::exponential && update->dt > 0.0;
-  step.rolls = any.rolling.model != dembark::RollingModel::off;
+  step.rolls = tally_.rolls;
   step.frozen = freeze_bit_;
   step.stride = layout_.size();
   step.flags = history.firstflag;
@@ -108,6 +113,7 @@ Vec3 PackedContacts::rolling(const PairBlock& block, int k, const Vec3& normal, 
                                         spin};
   const Vec3 couple = rolling_step(law(block, k).rolling, contact, update->dt, angle);
   if (layout_.rolling) std::memcpy(history, &angle, sizeof angle);
+  tally_.note_couple(k, couple);
   return couple;
 }
 
@@ -128,6 +134,7 @@ void PackedContacts::bridges(const PairBlock& block, int first, int count, const
     double* const bridge = block.history[k] + layout_.bridge_at();
     const double before = bridge[0];
     pull[n] = bridge_step(law(block, k).liquid, atom->radius[i], atom->radius[j], gap[n], touching, bridge[0], bridge[1]);
+    tally_.note_pull(k, pull[n]);
     if (bridge[0] > 0.0) *block.flags[k] = 1;
     if (bridge[0] > 0.0 && !(before > 0.0)) check_reach(error, bridge[1], neighbor->skin);
     if (liquid_)

@@ -11,6 +11,7 @@
 #include "contact_coefficients.h"
 #include "dembark/pairs/pair_step.hpp"
 #include "neighbor_history.h"
+#include "packed_tally.h"
 
 namespace LAMMPS_NS {
 class FixCapillaryLiquid;
@@ -23,8 +24,8 @@ class PackedContacts : dembark::ScalarLaws, dembark::ScalarMemory, LAMMPS_NS::Po
  public:
   PackedContacts(LAMMPS_NS::LAMMPS* lmp, const ContactCoefficients& coefficients) : Pointers(lmp), coefficients_(coefficients) {}
 
-  /// After the last pair_coeff: whether packs know the law.
-  bool prepare(int freeze_bit, LAMMPS_NS::FixCapillaryLiquid* liquid);
+  /// After the last pair_coeff: whether packs know the law. `tally`: that of fix energy/account, or nullptr.
+  bool prepare(int freeze_bit, LAMMPS_NS::FixCapillaryLiquid* liquid, dembark::ContactTally* tally);
   /// Forces, torques and histories of a step.
   void step(const LAMMPS_NS::NeighList& list, const NeighborHistory& history);
 
@@ -50,6 +51,7 @@ class PackedContacts : dembark::ScalarLaws, dembark::ScalarMemory, LAMMPS_NS::Po
   const dembark::PairLoops packs_ = dembark::PairLoops::choose();
   const std::unique_ptr<PairBlock> block_ = std::make_unique<PairBlock>();
   std::vector<dembark::PairLaw<double>> laws_;  // of this step
+  dembark_family::PackedTally tally_;
 };
 
 }  // namespace dembark_lammps

@@ -86,8 +86,8 @@ void PairDembarkGranular::init_style() {
   liquid_ = layout_.imbalance ? dembark_lammps::find_liquid(modify) : nullptr;
   if (layout_.imbalance && !liquid_) coefficients_.fail("carried_liquid on needs the liquid: fix ID all capillary/liquid content C");
   // Lists of bonded atoms hold pairs that do not interact.
-  packed_ = packs_.prepare(freeze_bit_, liquid_) && atom->molecular == Atom::ATOMIC;
   tally_ = dembark_lammps::find_energy_tally(modify);
+  packed_ = packs_.prepare(freeze_bit_, liquid_, tally_) && atom->molecular == Atom::ATOMIC;
   find_radii();
 }
 
@@ -152,7 +152,7 @@ void PairDembarkGranular::compute(int eflag, int vflag) {
   if (history_->nlocal_neigh != atom->nlocal) error->one(FLERR, "dembark: LAMMPS's fix NEIGH_HISTORY is not what it was");
   // The forces of the set-up are those of the present state, which stays.
   const bool advance = !update->setupflag;
-  if (advance && packed_ && !tally_) {
+  if (advance && packed_) {
     // Whether the virial is asked for must not change the run by round-off: contacts advance in packs in any case.
     if (vflag_either)
       each_contact([&](int i, int j, int touched, const double* row) {

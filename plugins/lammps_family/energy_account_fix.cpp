@@ -101,7 +101,7 @@ void EnergyAccountFix::measure_powers() {
   for (int i = 0; i < atom->nlocal; ++i) {
     const EnergyBody grain = body(i);
     now_.now.add_body(grain);
-    now_.now.add_loads(grain, tally_.loads[std::size_t(i)]);
+    now_.now.add_loads(grain, tally_.loads[std::size_t(i)], tally_.present);
   }
   tally_.add_walls(now_.now);
 }

@@ -2,8 +2,8 @@
 //
 // The engine's loop hands every number from model to model through memory and decides pair by pair whether there is a contact. Here
 // the contacts of many grains are picked first and computed in packs (dembark/pairs): the same laws and the same numbers to round-off, in
-// less time than the stock friction law takes. Whatever else the engine may ask of a pair style (stored forces, rigid bodies, accounts of
-// energy, ...) is left to its own loop, step by step. The virial is not: a run must not depend on when it is asked for.
+// less time than the stock friction law takes. Whatever else the engine may ask of a pair style (stored forces, rigid bodies, ...) is
+// left to its own loop, step by step. The virial is not: a run must not depend on when it is asked for.
 #ifndef DEMBARK_DIRECT_PAIR_LOOP_H
 #define DEMBARK_DIRECT_PAIR_LOOP_H
 
@@ -29,6 +29,7 @@
 #include "fix_capillary_liquid.h"
 #include "fix_energy_account.h"
 #include "model_properties.h"
+#include "packed_tally.h"
 #include "pair_grains.h"
 #include "pair_parameters.h"
 #include "shared_fix.h"
@@ -56,20 +57,22 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   double dt_ = 0.0;            // of this step
   bool update_history_ = false;
   LAMMPS_NS::FixCapillaryLiquid* liquid_ = nullptr;  // of carried liquid
-  bool plain_settings_ = true, carried_ = false, tallied_ = false, limit_force_ = false, tangential_damping_ = true;
+  bool plain_settings_ = true, carried_ = false, limit_force_ = false, tangential_damping_ = true;
   dembark::Presliding presliding_ = dembark::Presliding::linear;
   dembark::RollingModel rolling_model_ = dembark::RollingModel::off;
   dembark::capillary::Model model_ = dembark::capillary::Model::exact;
   const dembark::PairLoops packs_ = dembark::PairLoops::choose();
   const std::unique_ptr<PairBlock> block_ = std::make_unique<PairBlock>();
   std::vector<dembark::PairLaw<double>> laws_;  // of this step
+  dembark_family::PackedTally tally_;
 
   bool plain_step(LAMMPS_NS::PairGran* pair, int addflag) const {
     const LAMMPS_NS::Atom* atom = lmp_->atom;
-    return plain_settings_ && !tallied_ && !(pair->cpl() && addflag) && pair->computeflag() && pair->listgranhistory &&
-           !pair->storeContactForces() && !pair->storeContactForcesStress() && !pair->storeSumDelta() && !pair->store_sum_normal_force() &&
-           !pair->fr_pair() && atom->rmass && lmp_->force->nktv2p == 1.0 && atom->sphere_flag && !atom->shapetype_flag &&
-           lmp_->modify->n_fixes_style("insert/stream/predefined") == 0;
+    // The state that the step of a set-up leaves is nowhere stored, but tallied.
+    return plain_settings_ && !(tally_.sums && !pair->shearupdate()) && !(pair->cpl() && addflag) && pair->computeflag() &&
+           pair->listgranhistory && !pair->storeContactForces() && !pair->storeContactForcesStress() && !pair->storeSumDelta() &&
+           !pair->store_sum_normal_force() && !pair->fr_pair() && atom->rmass && lmp_->force->nktv2p == 1.0 && atom->sphere_flag &&
+           !atom->shapetype_flag && lmp_->modify->n_fixes_style("insert/stream/predefined") == 0;
   }
 
   /// Adds up the virial of the forces that the packs are about to compute. Contacts have no potential energy in this engine.
@@ -145,6 +148,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
                                           spin};
     const Vec3 couple = rolling_step(rolling_(atom->type[i], atom->type[j]), contact, dt_, angle);
     if (update_history_ && history) store(history, angle);
+    tally_.note_couple(k, couple);
     return couple;
   }
 
@@ -170,6 +174,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
       const bool was_there = volume > 0.0;
       const dembark::Liquid& liquid = liquids_(atom->type[i], atom->type[j]);
       pull[n] = bridge_step(liquid, atom->radius[i], atom->radius[j], gap[n], touching, volume, rupture_distance);
+      tally_.note_pull(k, pull[n]);
       const bool is_there = volume > 0.0;
       const bool update = update_history_ && !(carried_ && !liquid_->collecting());
       // One that cannot break in this pass, the set-up of a run, is looked at again in the next.
@@ -223,7 +228,12 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
       if (carried_) imbalance_offset_ = Stock::get_history_offset(Bridges::imbalance_name);
       liquid_ = carried_ ? static_cast<LAMMPS_NS::FixCapillaryLiquid*>(lmp_->modify->find_fix_style("capillary/liquid", 0)) : nullptr;
     }
-    tallied_ = find_energy_tally(lmp_->modify);
+    tally_.sums = find_energy_tally(lmp_->modify);
+    tally_.atom = lmp_->atom;
+    tally_.friction_at = friction_offset_;
+    tally_.rings_at = rings_offset_;
+    tally_.angle_at = angle_offset_;
+    tally_.rolls = rolling_model_ != dembark::RollingModel::off;
     known = plain_settings_ ? this : nullptr;
   }
 
@@ -265,6 +275,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     dembark::PairStep step{*this};
     dembark_family::describe_pairs(step, atom, list);
     step.memory = this;
+    step.results = tally_.sums ? &tally_ : nullptr;
     step.laws = laws_.data();
     step.types = friction_.types() + 1;
     step.one_law = friction_.types() == 1;
@@ -278,7 +289,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     step.limit_force = limit_force_;
     step.tangential_damping = tangential_damping_;
     step.pack_friction = pack_friction;
-    step.rolls = rolling_model_ != dembark::RollingModel::off;
+    step.rolls = tally_.rolls;
     step.frozen = pair->freeze_group_bit();
     step.stride = pair->dnum();
     step.flags = histories.firstneigh;

@@ -28,8 +28,14 @@ DEMBARK_HOT double dot(const Dofs& a, const Dofs& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5];
 }
 
-DEMBARK_HOT void add(Dofs& to, const Dofs& other) {
-  for (std::size_t k = 0; k < to.size(); ++k) to[k] += other[k];
+/// Number by number: a loop would be vectorized, and wide loads of what has just been written by halves stall.
+DEMBARK_HOT void add(Dofs& to, const Vec3<double>& along, const Vec3<double>& about) {
+  to[0] += along.x;
+  to[1] += along.y;
+  to[2] += along.z;
+  to[3] += about.x;
+  to[4] += about.y;
+  to[5] += about.z;
 }
 
 /// What the force of a contact is made of.

@@ -14,6 +14,7 @@ namespace dembark {
 
 struct ContactTally {
   std::vector<std::array<Dofs, contact_part_count>> loads;  ///< on each body that this process owns
+  std::array<bool, contact_part_count> present{};           ///< the parts that any contact has had; the others are zero
   /// W and W/s, of each part on the bodies, were they moved as the wall is: with its velocity and acceleration of the moment.
   std::array<double, contact_part_count> wall_power{}, wall_rate{};
   double normal_stored = 0.0, tangential_stored = 0.0, rolling_stored = 0.0;  ///< J
@@ -22,6 +23,7 @@ struct ContactTally {
   void clear(int bodies, double dt) {
     half_step_ = 0.5 * dt;
     loads.assign(std::size_t(bodies), {});
+    present = {};
     wall_power = wall_rate = {};
     normal_stored = tangential_stored = rolling_stored = 0.0;
   }
@@ -30,8 +32,10 @@ struct ContactTally {
   void add_pair(const ContactParts& parts, const ContactLevers& levers, int i, int j) {
     const bool owned = std::size_t(j) < loads.size();
     for (std::size_t k = 0; k < parts.count; ++k) {
-      add(loads[std::size_t(i)][k], levers.on_one(k, parts.load[k]));
-      if (owned) add(loads[std::size_t(j)][k], levers.on_two(k, parts.load[k]));
+      const Vec3<double>& load = parts.load[k];
+      if (is_zero(load)) continue;
+      add_load(k, i, load, levers.one);
+      if (owned) add_load(k, j, -load, levers.two);
     }
     store(parts, owned ? 1.0 : 0.5);
   }
@@ -46,7 +50,8 @@ struct ContactTally {
     for (std::size_t k = 0; k < parts.count; ++k) {
       const bool is_force = k < force_part_count;
       const Vec3<double> load = scale * parts.load[k], &change = is_force ? wall.acceleration : wall.angular_acceleration;
-      add(loads[std::size_t(i)][k], levers.on_one(k, load));
+      if (is_zero(load)) continue;
+      add_load(k, i, load, levers.one);
       wall_power[k] += dot(load, (is_force ? wall.velocity : wall.spin) + half_step_ * change);
       wall_rate[k] += dot(load, change);
     }
@@ -64,6 +69,13 @@ struct ContactTally {
   }
 
  private:
+  DEMBARK_HOT static bool is_zero(const Vec3<double>& load) { return load.x == 0.0 && load.y == 0.0 && load.z == 0.0; }
+  /// Part k, a force at the end of the lever or a couple, on a body that this process owns.
+  DEMBARK_HOT void add_load(std::size_t k, int body, const Vec3<double>& load, const Vec3<double>& lever) {
+    if (k < force_part_count) add(loads[std::size_t(body)][k], load, cross(lever, load));
+    else add(loads[std::size_t(body)][k], {}, load);
+    present[k] = true;
+  }
   void store(const ContactParts& parts, double scale) {
     normal_stored += scale * parts.normal_stored;
     tangential_stored += scale * parts.tangential_stored;

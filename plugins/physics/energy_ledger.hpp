@@ -24,6 +24,7 @@ struct BodyMotion {
   Dofs velocity{};
 
   DEMBARK_HOT bool is_free(std::size_t k) const { return mass[k] > 0.0; }
+  DEMBARK_HOT bool is_free() const { return is_free(0) && is_free(1) && is_free(2) && is_free(3) && is_free(4) && is_free(5); }
   /// Of one of these, what belongs to the degrees of freedom that forces change, or to the others.
   DEMBARK_HOT Dofs part(Dofs of, bool free) const {
     for (std::size_t k = 0; k < of.size(); ++k)
@@ -79,12 +80,14 @@ struct Powers {
   DEMBARK_HOT void add_forces(const BodyMotion& body, const Dofs& force) {
     add(all, force, body.part(body.velocity, true), body.accelerated(force));
   }
-  /// For engines that add up the parts of contacts' forces body by body.
-  DEMBARK_HOT void add_loads(const EnergyBody& body, const std::array<Dofs, contact_part_count>& loads) {
-    const Dofs held = body.part(body.velocity, false);
+  /// For engines that add up the parts of contacts' forces body by body. Parts that are not `present` are zero.
+  DEMBARK_HOT void add_loads(const EnergyBody& body, const std::array<Dofs, contact_part_count>& loads,
+                             const std::array<bool, contact_part_count>& present) {
+    const bool is_free = body.is_free();
     for (std::size_t part = 0; part < contact_part_count; ++part) {
+      if (!present[part]) continue;
       add(part, loads[part], body.velocity, body.acceleration);
-      power[walls] -= dot(loads[part], held);
+      if (!is_free) add_held(body, loads[part]);
     }
   }
   /// For engines that know the mean motions of the bodies when they look at a contact. Returns the power (W) of the normal spring.

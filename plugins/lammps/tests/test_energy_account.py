@@ -84,6 +84,18 @@ def test_fall_on_a_floor_that_moves_balances(tmp_path: Path, material: Material)
     assert 0.0 < abs(account.step_error[-1]) < 1e-2 * account.turnover
 
 
+@pytest.mark.parametrize("material", [DRY, replace(VISCOUS, viscosity=0.0), WET], ids=["dry", "bridges", "rolling, partial slip"])
+def test_a_run_is_the_same_to_the_bit_with_the_account_and_without(tmp_path: Path, material: Material) -> None:
+    end = "write_dump all custom end.dump id x y z vx vy vz omegax omegay omegaz modify sort id format float %a"
+    text = falling(f"run 1000\n{end}", material=material)
+    found = []
+    for name, script in (("with", text), ("without", text.replace(f"{FIX}\n{THERMO}", ""))):
+        assert run_deck(tmp_path / name, script).code == 0
+        found.append((tmp_path / name / "end.dump").read_text(encoding="utf-8"))
+    assert "0x1." in found[0]
+    assert found[0] == found[1]
+
+
 def test_ranks_account_alike(tmp_path: Path) -> None:
     one, two = (Account(run_deck(tmp_path / str(ranks), falling("run 400", ranks=ranks), ranks=ranks)) for ranks in (1, 2))
     two.assert_balanced()

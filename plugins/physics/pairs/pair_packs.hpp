@@ -338,10 +338,8 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
     alignas(64) double forces[N][4], moments[N][4];
     store_rows(Quad<P>{force.x, force.y, force.z, motion.arm_1}, [&forces](int k) { return forces[k]; });
     store_rows(Quad<P>{moment.x, moment.y, moment.z, motion.arm_2}, [&moments](int k) { return moments[k]; });
-    if (!s.results) {
-      scatter<P>(s, i, j, forces, moments, count);
-      continue;
-    }
+    if (s.f) scatter<P>(s, i, j, forces, moments, count);
+    if (!s.results) continue;
     const PackVec<P> along = force - tangential;
     alignas(64) double normals[N][4], frictions[N][4];
     store_rows(Quad<P>{along.x, along.y, along.z, response.normal_stiffness}, [&normals](int k) { return normals[k]; });

@@ -66,7 +66,7 @@ struct ScalarMemory {
                                double contact_area, double& slip) = 0;
 };
 
-/// What a pack of contacts has come to, for an engine that stores it: rows of four numbers, one a contact.
+/// What a pack of contacts has come to, for an engine that stores it or sums up its works: rows of four numbers, one a contact.
 struct PackResults {
   const double (*force)[4];     ///< N, on the first grain, and its lever arm (m)
   const double (*moment)[4];    ///< N, normal x tangential force, and the lever arm (m) of the second grain
@@ -82,7 +82,7 @@ struct ResultStore {
 struct PairStep {
   ScalarLaws& scalar;
   ScalarMemory* memory = nullptr;         ///< asked with `rings` or `rolls` only
-  ResultStore* results = nullptr;         ///< takes the forces in place of `f` and `torque`, unless null
+  ResultStore* results = nullptr;         ///< gets what the contacts have come to, unless null
   const PairLaw<double>* laws = nullptr;  ///< one a pair of types, row by row
   int types = 0;                          ///< in a row
   bool one_law = false;                   ///< for all contacts that come
@@ -97,8 +97,8 @@ struct PairStep {
 
   const double *x = nullptr, *v = nullptr, *omega = nullptr, *radius = nullptr, *mass = nullptr;
   const int *type = nullptr, *mask = nullptr;
-  double *f = nullptr, *torque = nullptr;
-  int frozen = 0;  ///< bit of `mask` of grains that never move
+  double *f = nullptr, *torque = nullptr;  ///< null: forces go nowhere but to `results`
+  int frozen = 0;                          ///< bit of `mask` of grains that never move
 
   int count = 0, stride = 0;  ///< grains with neighbours; numbers of a history
   const int *grains = nullptr, *numneigh = nullptr;

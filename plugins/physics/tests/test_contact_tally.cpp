@@ -1,4 +1,5 @@
 // The tally of contacts' parts, and the words of commands.
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -46,6 +47,38 @@ TEST_CASE("a pair is tallied once, whichever processes own its bodies") {
   CHECK(first.normal_stored == 0.5 * both.normal_stored);
   CHECK(first.tangential_stored == 0.5 * both.tangential_stored);
   CHECK(first.rolling_stored == 0.5 * both.rolling_stored);
+}
+
+TEST_CASE("parts that no contact has had are told, and change no power") {
+  ContactParts dry;
+  dry[ContactPart::normal_elastic] = {0.0, 0.0, 2.0};
+  dry[ContactPart::tangential_elastic] = {0.5, 0.0, 0.0};
+  ContactTally tally;
+  tally.clear(2, 1e-5);
+  tally.add_pair(dry, levers(), 0, 1);
+  std::array<bool, contact_part_count> expected{}, every;
+  expected[std::size_t(ContactPart::normal_elastic)] = expected[std::size_t(ContactPart::tangential_elastic)] = true;
+  every.fill(true);
+  CHECK(tally.present == expected);
+
+  EnergyBody body;
+  // One that does not turn: what acts about its axes is taken by the walls.
+  body.mass = {2.0, 2.0, 2.0, 0.0, 0.0, 0.0};
+  body.velocity = {1.0, -2.0, 3.0, 40.0, 50.0, 60.0};
+  body.set_forces({0.5, 0.0, 2.0, 0.0, -5e-4, 0.0}, {});
+  Powers some, all;
+  some.add_loads(body, tally.loads[0], tally.present);
+  all.add_loads(body, tally.loads[0], every);
+  CHECK(some.power == all.power);
+  CHECK(some.rate == all.rate);
+  CHECK_THAT(some.power[std::size_t(ContactPart::normal_elastic)], WithinRel(6.0, 1e-15));
+  CHECK_THAT(some.power[std::size_t(ContactPart::tangential_elastic)], WithinRel(0.5 - 5e-4 * 50.0, 1e-14));
+  CHECK_THAT(some.power[Powers::walls], WithinRel(5e-4 * 50.0, 1e-14));
+
+  tally.clear(2, 1e-5);
+  CHECK(tally.present == std::array<bool, contact_part_count>{});
+  tally.add_wall(dry, levers(), 1, {});
+  CHECK(tally.present == expected);
 }
 
 TEST_CASE("a wall works with the velocity of the moment, and takes from the bodies what it does") {

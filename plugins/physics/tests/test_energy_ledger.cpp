@@ -42,7 +42,9 @@ Energies after_kick(EnergyBody body, const std::array<Dofs, contact_part_count>&
   const Dofs after = body.kicked(h), before = body.velocity;
   for (std::size_t k = 0; k < 6; ++k) body.velocity[k] = side > 0 ? before[k] : side < 0 ? after[k] : 0.5 * (before[k] + after[k]);
   ledger.now.add_body(body);
-  ledger.now.add_loads(body, loads);
+  std::array<bool, contact_part_count> present;
+  present.fill(true);
+  ledger.now.add_loads(body, loads, present);
   ledger.kick(h, side);
   ledger.kinetic = body.kinetic(after);
   return ledger.energies();
