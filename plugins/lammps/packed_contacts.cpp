@@ -21,12 +21,13 @@ bool PackedContacts::prepare(int freeze_bit, LAMMPS_NS::FixCapillaryLiquid* liqu
   liquid_ = liquid;
   layout_ = coefficients_.layout();
   const ContactParameters& any = coefficients_(1, 1);
+  tally_ = {};
   tally_.sums = tally;
   tally_.atom = atom;
+  tally_.frozen = freeze_bit;
   tally_.rings_at = layout_.rings ? layout_.rings_at() : -1;
   tally_.angle_at = layout_.rolling ? layout_.rolling_at() : -1;
-  tally_.rolls = any.rolling.model != dembark::RollingModel::off;
-  return any.normal_law == dembark::NormalLaw::hertz && !any.liquid.viscous.on();
+  return any.normal_law == dembark::NormalLaw::hertz && !any.liquid.viscous.on() && dembark::PairLoops::asked_lanes() != 1;
 }
 
 void PackedContacts::collect_laws() {
@@ -69,7 +70,7 @@ void PackedContacts::step(const LAMMPS_NS::NeighList& list, const NeighborHistor
   step.tangential_damping = any.tangential_damping;
   // The scalar law knows that curve, and steps of zero length.
   step.pack_friction = any.friction.presliding != dembark::Presliding::exponential && update->dt > 0.0;
-  step.rolls = tally_.rolls;
+  step.rolls = any.rolling.model != dembark::RollingModel::off;
   step.frozen = freeze_bit_;
   step.stride = layout_.size();
   step.flags = history.firstflag;
@@ -113,7 +114,7 @@ Vec3 PackedContacts::rolling(const PairBlock& block, int k, const Vec3& normal, 
                                         spin};
   const Vec3 couple = rolling_step(law(block, k).rolling, contact, update->dt, angle);
   if (layout_.rolling) std::memcpy(history, &angle, sizeof angle);
-  tally_.note_couple(k, couple);
+  tally_.note_rolling(k, law(block, k).rolling.on(), couple);
   return couple;
 }
 

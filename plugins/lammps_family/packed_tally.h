@@ -26,11 +26,14 @@ class PackedTally : public dembark::ResultStore {
   const LAMMPS_NS::Atom* atom = nullptr;
   /// Where a history has friction, the rings of partial slip and the rolling spring; -1: it has none.
   int friction_at = 0, rings_at = -1, angle_at = -1;
-  bool rolls = false;
+  int frozen = 0;  ///< bit of grains that never move: two of them have no works
 
-  /// What no row of the results has, of a contact in the block: pull of its bridge (N), couple of rolling resistance (N m).
+  /// What no row of the results has, of a contact in the block: pull of its bridge (N); couple of rolling resistance (N m), if it is on.
   void note_pull(int k, double pull) { pulls_[std::size_t(k)] = pull; }
-  void note_couple(int k, const Vec3& couple) { couples_[std::size_t(k)] = couple; }
+  void note_rolling(int k, bool on, const Vec3& couple) {
+    rolls_[std::size_t(k)] = on;
+    couples_[std::size_t(k)] = couple;
+  }
 
   void store(const PairBlock& block, int first, int count, const dembark::PackResults& results) override {
     for (int n = 0; n < count; ++n)
@@ -39,6 +42,7 @@ class PackedTally : public dembark::ResultStore {
 
  private:
   std::array<double, PairBlock::room> pulls_{};
+  std::array<bool, PairBlock::room> rolls_{};
   std::array<Vec3, PairBlock::room> couples_{};
 
   void add(const PairBlock& block, int k, const dembark::PackResults& of) {
@@ -46,7 +50,7 @@ class PackedTally : public dembark::ResultStore {
     const int i = block.grain[k], j = block.partner[k];
     const bool touches = block.pick[k] & 1;
     const double pull = pulls_[std::size_t(k)];
-    if (!touches && pull == 0.0) return;
+    if ((!touches && pull == 0.0) || (atom->mask[i] & atom->mask[j] & frozen)) return;
     const Vec3 apart = vector(atom->x[i]) - vector(atom->x[j]);
     const double distance = std::sqrt(dot(apart, apart));
     const Vec3 normal = (1.0 / distance) * apart;
@@ -59,7 +63,7 @@ class PackedTally : public dembark::ResultStore {
       if (rings_at >= 0) rings = dembark::load_rings(history + rings_at);
       split_touching(parts, normal, overlap, normal_stiffness * overlap / exponent, exponent, dot(vector(of.normal[0]), normal) + pull,
                      tangential_stiffness, vector(of.friction[0]), vector(history + friction_at), rings ? &*rings : nullptr);
-      if (rolls)
+      if (rolls_[std::size_t(k)])
         split_rolling(parts, couples_[std::size_t(k)], angle_at >= 0 ? vector(history + angle_at) : Vec3{},
                       dembark::rolling_stiffness(tangential_stiffness, dembark::reduced(atom->radius[i], atom->radius[j])));
     }

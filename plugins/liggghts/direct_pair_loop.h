@@ -61,6 +61,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   dembark::Presliding presliding_ = dembark::Presliding::linear;
   dembark::RollingModel rolling_model_ = dembark::RollingModel::off;
   dembark::capillary::Model model_ = dembark::capillary::Model::exact;
+  const bool in_packs_ = dembark::PairLoops::asked_lanes() != 1;
   const dembark::PairLoops packs_ = dembark::PairLoops::choose();
   const std::unique_ptr<PairBlock> block_ = std::make_unique<PairBlock>();
   std::vector<dembark::PairLaw<double>> laws_;  // of this step
@@ -68,15 +69,15 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
 
   bool plain_step(LAMMPS_NS::PairGran* pair, int addflag) const {
     const LAMMPS_NS::Atom* atom = lmp_->atom;
-    // The state that the step of a set-up leaves is nowhere stored, but tallied.
-    return plain_settings_ && !(tally_.sums && !pair->shearupdate()) && !(pair->cpl() && addflag) && pair->computeflag() &&
-           pair->listgranhistory && !pair->storeContactForces() && !pair->storeContactForcesStress() && !pair->storeSumDelta() &&
-           !pair->store_sum_normal_force() && !pair->fr_pair() && atom->rmass && lmp_->force->nktv2p == 1.0 && atom->sphere_flag &&
-           !atom->shapetype_flag && lmp_->modify->n_fixes_style("insert/stream/predefined") == 0;
+    return plain_settings_ && in_packs_ && !(pair->cpl() && addflag) && pair->computeflag() && pair->listgranhistory &&
+           !pair->storeContactForces() && !pair->storeContactForcesStress() && !pair->storeSumDelta() && !pair->store_sum_normal_force() &&
+           !pair->fr_pair() && atom->rmass && lmp_->force->nktv2p == 1.0 && atom->sphere_flag && !atom->shapetype_flag &&
+           lmp_->modify->n_fixes_style("insert/stream/predefined") == 0;
   }
 
-  /// Adds up the virial of the forces that the packs are about to compute. Contacts have no potential energy in this engine.
-  void tally_virial(LAMMPS_NS::PairGran& pair) const {
+  /// Calls visit(i, j, law, bodies, force, state) for each pair that acts, computed by itself and with a state that is not kept.
+  template <class Visit>
+  void each_contact(LAMMPS_NS::PairGran& pair, Visit visit) const {
     const LAMMPS_NS::Atom& atom = *lmp_->atom;
     const LAMMPS_NS::NeighList &list = *pair.list, &histories = *list.listgranhistory;
     const auto frozen = [&](int i) { return (atom.mask[i] & pair.freeze_group_bit()) != 0; };
@@ -98,11 +99,30 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
         if (angle_offset_ >= 0) state.rolling_angle = vector(history + angle_offset_);
         // Of two frozen grains the engine takes the mass of the first.
         const double mass_i = frozen(i) && !frozen(j) ? INFINITY : atom.rmass[i], mass_j = frozen(j) ? INFINITY : atom.rmass[j];
+        const dembark::ContactParameters law = parameters(atom.type[i], atom.type[j]);
         const dembark::ContactBodies b = dembark_family::grain_pair(atom, i, j, apart, mass_i, mass_j);
-        const Vec3 f = contact_step(parameters(atom.type[i], atom.type[j]), b, dt_, state).force;
-        pair.ev_tally_xyz(i, j, atom.nlocal, lmp_->force->newton_pair, 0.0, 0.0, f.x, f.y, f.z, apart.x, apart.y, apart.z);
+        const dembark::ContactForce out = contact_step(law, b, dt_, state);
+        if (out.interacting) visit(i, j, law, b, out, state);
       }
     }
+  }
+
+  /// Adds up the virial of the forces that the packs are about to compute. Contacts have no potential energy in this engine.
+  void tally_virial(LAMMPS_NS::PairGran& pair) const {
+    each_contact(pair, [&](int i, int j, const auto&, const dembark::ContactBodies& b, const dembark::ContactForce& out, const auto&) {
+      const Vec3 &f = out.force, &apart = b.separation;
+      pair.ev_tally_xyz(i, j, lmp_->atom->nlocal, lmp_->force->newton_pair, 0.0, 0.0, f.x, f.y, f.z, apart.x, apart.y, apart.z);
+    });
+  }
+
+  /// The energies of the set-up of a run, whose step leaves no state that packs could tally.
+  void tally_setup(LAMMPS_NS::PairGran& pair) const {
+    const int* const mask = lmp_->atom->mask;
+    each_contact(pair, [&](int i, int j, const auto& law, const auto& b, const dembark::ContactForce& out, const auto& state) {
+      if (mask[i] & mask[j] & tally_.frozen) return;
+      const dembark::ContactLevers levers(out.normal, relative_motion(b, out.normal, out.overlap));
+      tally_.sums->add_pair(contact_parts(law, b, out, state), levers, i, j);
+    });
   }
 
   void collect_laws() {
@@ -148,7 +168,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
                                           spin};
     const Vec3 couple = rolling_step(rolling_(atom->type[i], atom->type[j]), contact, dt_, angle);
     if (update_history_ && history) store(history, angle);
-    tally_.note_couple(k, couple);
+    tally_.note_rolling(k, rolling_(atom->type[i], atom->type[j]).on(), couple);
     return couple;
   }
 
@@ -229,11 +249,11 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
       liquid_ = carried_ ? static_cast<LAMMPS_NS::FixCapillaryLiquid*>(lmp_->modify->find_fix_style("capillary/liquid", 0)) : nullptr;
     }
     tally_.sums = find_energy_tally(lmp_->modify);
+    tally_.frozen = pair_->freeze_group_bit();
     tally_.atom = lmp_->atom;
     tally_.friction_at = friction_offset_;
     tally_.rings_at = rings_offset_;
     tally_.angle_at = angle_offset_;
-    tally_.rolls = rolling_model_ != dembark::RollingModel::off;
     known = plain_settings_ ? this : nullptr;
   }
 
@@ -262,6 +282,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     update_history_ = pair->shearupdate();
     dt_ = update_history_ ? lmp_->update->dt : 0.0;
     if (vflag) tally_virial(*pair);
+    if (tally_.sums && !update_history_) tally_setup(*pair);
     collect_laws();
     const int owned = lmp_->force->newton_pair ? atom.nlocal + atom.nghost : atom.nlocal;
     // The scalar law knows the exponential curve, and what a step of no length is.
@@ -275,7 +296,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     dembark::PairStep step{*this};
     dembark_family::describe_pairs(step, atom, list);
     step.memory = this;
-    step.results = tally_.sums ? &tally_ : nullptr;
+    step.results = tally_.sums && update_history_ ? &tally_ : nullptr;
     step.laws = laws_.data();
     step.types = friction_.types() + 1;
     step.one_law = friction_.types() == 1;
@@ -289,7 +310,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     step.limit_force = limit_force_;
     step.tangential_damping = tangential_damping_;
     step.pack_friction = pack_friction;
-    step.rolls = tally_.rolls;
+    step.rolls = rolling_model_ != dembark::RollingModel::off;
     step.frozen = pair->freeze_group_bit();
     step.stride = pair->dnum();
     step.flags = histories.firstneigh;

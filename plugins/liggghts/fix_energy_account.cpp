@@ -32,6 +32,7 @@ int FixEnergyAccount::setmask() { return PRE_INITIAL_INTEGRATE | POST_INTEGRATE 
 void FixEnergyAccount::init() {
   EnergyAccountFix::init();
   tally.atom = atom;
+  tally.frozen = static_cast<PairGran *>(force->pair)->freeze_group_bit();
   tally.driven.clear();
   for (Fix *const fix : fixes())
     if (auto *const wall = dynamic_cast<FixWallMotion *>(fix)) tally.driven.emplace_back(wall->mesh(), &wall->acceleration());

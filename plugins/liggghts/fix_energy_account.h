@@ -23,13 +23,14 @@ namespace dembark_liggghts {
 /// What the contact models tally.
 struct EnergyTally : dembark::ContactTally {
   const LAMMPS_NS::Atom *atom = nullptr;
+  int frozen = 0;  ///< bit of grains that never move: two of them have no works
   /// Meshes whose acceleration is known. Others have that of the step before: none.
   std::vector<std::pair<const LAMMPS_NS::AbstractMesh *, const dembark::WallAcceleration *>> driven;
 
   /// The parts of a contact's force, and what its springs hold; `motion` has the lever arms. Forces that move no grain are not tallied.
   DEMBARK_COLD void add(const LIGGGHTS::ContactModels::SurfacesCloseData &d, const dembark::Vec3<double> &normal,
                         const dembark::ContactParts &parts, const dembark::RelativeMotion &motion) {
-    if (!d.computeflag) return;
+    if (!d.computeflag || (!d.is_wall && atom->mask[d.i] & atom->mask[d.j] & frozen)) return;
     const dembark::ContactLevers levers(normal, motion);
     if (!d.is_wall) return add_pair(parts, levers, d.i, d.j);
     WallMotion wall{vector(d.v_j), wall_spin(d)};

@@ -41,9 +41,10 @@ def test_books_do_not_depend_on_ranks_and_order(serial, tmp_path, ranks, head):
     np.testing.assert_allclose(found[:, 1:6], serial[: len(found), 1:6], rtol=1e-6)
 
 
-def test_packs_keep_the_same_books(serial, tmp_path):
-    """With an energy account contacts are computed one by one."""
-    found = books(tmp_path, deck("fix account all energy/account\nrun 1000"))
+@pytest.mark.parametrize("account", ["", "fix account all energy/account\n"], ids=["", "with an account"])
+def test_packs_keep_the_same_books_as_single_contacts(serial, tmp_path, monkeypatch, account):
+    monkeypatch.setenv("DEMBARK_LANES", "1")
+    found = books(tmp_path, deck(f"{account}run 1000"))
     np.testing.assert_allclose(found[:, 1:6], serial[: len(found), 1:6], rtol=1e-6)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rig import liggghts_driver
+from rig.cloud import DECK, cloud
 from rig.energy_account import COLUMNS, FIX, NAMES, THERMO, Account
 from rig.liggghts_driver import models, run_deck
 from rig.packing import CREATE, STATE, packing
@@ -54,12 +55,16 @@ def test_moving_wall_and_an_output_of_contacts(tmp_path):
     assert account.walls[-1] > 0.01 * account.turnover
 
 
-def test_carried_liquid(tmp_path):
-    text = bed("run 1000", material=WET, fixes="fix liquid all capillary/liquid content 0.01")
-    text = text.replace("viscous_liquid on", "viscous_liquid on carried_liquid on")
-    account = account_bed(tmp_path, re.sub(r"fix p_bridgeVolume.*\n", "", text))
+@pytest.mark.parametrize("viscosity", [0.01, 0.0], ids=["viscous", "in packs"])
+def test_carried_liquid(tmp_path, viscosity):
+    material = replace(WET, viscosity=viscosity)
+    text = bed("run 1000", material=material, fixes="fix liquid all capillary/liquid content 0.01")
+    options = "viscous_liquid on" if viscosity else "capillary_model willett"
+    assert options in text
+    account = account_bed(tmp_path, re.sub(r"fix p_bridgeVolume.*\n", "", text.replace(options, f"{options} carried_liquid on")))
     account.assert_balanced()
-    assert max(account.bridges[-1], account.viscous[-1]) < -1e-3 * account.turnover
+    assert account.bridges[-1] < -1e-3 * account.turnover
+    assert (account.viscous[-1] < -1e-3 * account.turnover) == (viscosity > 0.0)
 
 
 def test_grains_that_come_and_go(tmp_path):
@@ -155,13 +160,46 @@ def test_restart_on_other_ranks_goes_on(tmp_path):
     np.testing.assert_allclose(second.rows[2], first.rows[12], atol=1e-3 * first.turnover)  # the set-up has other forces
 
 
-def test_without_the_fix_motion_is_the_same(tmp_path):
-    """To round-off: with the fix the engine's own loop computes the pairs."""
+@pytest.mark.parametrize("material", [DRY, replace(WET, viscosity=0.0)], ids=["dry", "bridges"])
+def test_without_the_fix_motion_is_the_same(tmp_path, material):
+    """To the bit, and with grains that touch when a run is set up."""
     frames = []
-    for name, words in (("with", bed("run 500")), ("without", packing(DRY, "run 500").replace("processors 2 1 1\n", ""))):
-        assert run_deck(tmp_path / name, words.replace("all custom 1500", "all custom 500")).code == 0
+    for name, words in (("with", bed("run 1000\nrun 500", material=material)),
+                        ("without", packing(material, "run 1000\nrun 500").replace("processors 2 1 1\n", ""))):
+        assert run_deck(tmp_path / name, words).code == 0
         frames.append(liggghts_driver.read_dump(tmp_path / name / "grains.dump")[1][-1])
-    np.testing.assert_allclose(frames[0][:, 1:7], frames[1][:, 1:7], atol=1e-10)
+    assert np.isfinite(frames[0]).all()
+    np.testing.assert_array_equal(frames[0], frames[1])
+
+
+SETTINGS = ["", "limitForce on", "tangential_damping off", "presliding exponential", "presliding partial_slip",
+            "rolling_resistance elastic_plastic"]
+
+
+@pytest.mark.parametrize("cohesion", ["", "cohesion capillary"])
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_packs_account_as_the_engines_loop_does(tmp_path, monkeypatch, settings, cohesion):
+    """In two runs, of grains of two types, some of which are stuck to the floor and to each other."""
+    text = DECK.format(cohesion=cohesion, rolling="", settings=settings).replace("stuck id 1:64", "stuck id 1:128")
+    text = text.replace("Friction peratomtypepair 2 0 0 0 0", "Friction peratomtypepair 2 0.1 0 0 0.3")
+    damping = "fix m12 all property/global coefficientRollingViscousDamping peratomtypepair 2 0.3 0 0 0.1"
+    text = text.replace("pair_style", f"{damping}\npair_style")
+    text = text.replace("thermo 100", f"{FIX}\n{THERMO}thermo 50").replace("run 1000", "run 600\nrun 600")
+    accounts = []
+    for lanes in ("8", "1"):
+        monkeypatch.setenv("DEMBARK_LANES", lanes)
+        (tmp_path / lanes).mkdir()
+        (tmp_path / lanes / "cloud.data").write_text(cloud())
+        accounts.append(Account(run_deck(tmp_path / lanes, text)))
+    packs, loop = accounts
+    packs.assert_balanced()
+    assert (packs.imposed == 0.0).all() and np.isfinite(packs.rows).all()
+    present = {"normal_damping", "tangential_spring"} | ({"bridges"} if cohesion else set()) | (
+        {"rolling_damping"} if "rolling" in settings else set())
+    for name in present:
+        assert abs(getattr(packs, name)[-1]) > 1e-8 * packs.turnover, name
+    for name, mine, other in zip(NAMES, packs.rows.T, loop.rows.T, strict=True):
+        np.testing.assert_allclose(mine, other, rtol=0.0, atol=1e-8 * np.abs(other).max() + 1e-14 * packs.turnover, err_msg=name)
 
 
 STOCK = "model hertz tangential history"

@@ -133,11 +133,15 @@ struct PairLoops {
   static PairLoops of() {
     return {pair_packs<P>, picked_packs<P>};
   }
-  /// Those for this processor, or narrower ones: the environment variable DEMBARK_LANES may hold 2, 4 or 8.
+  /// The environment variable DEMBARK_LANES may hold 2, 4 or 8, for packs of no more, or 1: contacts one by one, by the engine's own loop.
+  static int asked_lanes() {
+    const char* const asked = std::getenv("DEMBARK_LANES");
+    return asked ? std::atoi(asked) : 8;
+  }
+  /// Those for this processor, or narrower ones.
   static PairLoops choose() {
 #ifdef DEMBARK_PAIR_PACKS_X86
-    const char* const asked = std::getenv("DEMBARK_LANES");
-    const int lanes = asked ? std::atoi(asked) : 8;
+    const int lanes = asked_lanes();
     __builtin_cpu_init();
     if (lanes >= 8 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
         __builtin_cpu_supports("avx512bw"))
