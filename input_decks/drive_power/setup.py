@@ -24,7 +24,6 @@ def setup(p: Parameters) -> Setup:
     box = [(0.0, p.cell_width), (0.0, p.cell_depth), (-amplitude(p) - 2.0 * d_max, height + p.headroom)]
     grains = packing.grains(p, sites, box)
     if p.dimensions == 2:
-        # Nothing pushes them out of their common plane.
         grains = replace(grains, positions=grains.positions * [1, 0, 1] + [0, 0.5 * p.cell_depth, 0])
     plate = strip((0.0, 0.0, 0.0), (p.cell_width, 0.0, 0.0), p.cell_depth)
     more = {"begin": still * period, "held": held}

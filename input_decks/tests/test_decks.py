@@ -14,8 +14,8 @@ import pytest
 from dembark.common.errors import DembarkError
 from dembark.postproc import ContactsDump, GrainsDump, read_times
 from dembark.postproc.replica import Replica
-from dembark.validation.case.deck import derived, prepare
-from dembark.validation.case.folders import find
+from dembark.validation.case.deck import derived, prepare, write
+from dembark.validation.case.folders import discover, find
 from dembark.validation.case.resolve import resolve
 from dembark.validation.engines import names
 from dembark.validation.judge import measuring
@@ -169,6 +169,27 @@ def test_a_template_that_is_run_as_it_is_says_what_to_do(case: str, engine: str,
     shutil.copyfile(find(case).deck(engine), tmp_path / one.engine.facts.deck)
     assert one.start().wait(60) != 0
     assert f"This is a template. Write the deck with: dembark deck {case} --engine {engine}" in one.said()
+
+
+HELD = {"liggghts": "setforce NULL 0.0 NULL", "lammps": "setforce NULL 0.0 NULL", "yade": "blockedDOFs"}
+
+
+@pytest.mark.parametrize("case", sorted(set(discover()) - {"debarking_drum", "oblique_impact", "single_contact"}))
+def test_layers_of_spheres_are_held_in_their_plane(case: str, tmp_path: Path) -> None:
+    """Beds whose grains have one y; those left out have logs, or grains that meet once."""
+    one = find(case)
+    for variant in one.variants:
+        values = resolve(one, "quick", variant)
+        if values.get("part_inertia", 0.4) != 0.4:  # for one engine only
+            continue
+        packed = prepare(one, values).packing
+        if packed is None or len(packed.diameters) < 50 or np.ptp(packed.positions[:, 1]) > 0.0 or np.ptp(packed.positions[:, 2]) == 0.0:
+            continue
+        for engine in (name for name in HELD if one.deck(name).is_file()):
+            folder = tmp_path / f"{variant}-{engine}"
+            folder.mkdir()
+            write(one, engine, values, folder)
+            assert HELD[engine] in (folder / one.deck(engine).name).read_text(encoding="utf-8"), (variant, engine)
 
 
 @pytest.mark.parametrize("case", ["gravity_channel", "debarking_drum", "silo", "single_contact", "liquid_exchange"])

@@ -107,6 +107,7 @@ def test_the_vessel_moves_as_a_whole_and_keeps_its_grains(engine: str, simulate:
                                             "mixture": "intruder", "motion_frequency": 20.0})
     assert unexplained(run.times()) < 1e-10
     for frame in run.grains():
-        assert len(frame.ids) == 60 and np.ptp(frame.positions[:, 1]) < 1e-12
+        # To the bit: round-off grows, and in a minute's run grains leave their plane.
+        assert len(frame.ids) == 60 and np.ptp(frame.positions[:, 1]) == 0.0 and (frame.velocities[:, 1] == 0.0).all()
         assert (frame.positions[:, 0] > 0.9 * frame.radii).all() and (frame.positions[:, 0] < 0.05 - 0.9 * frame.radii).all()
     assert judged("vibro_mixing", mixing.measure([run]))["energy_balance"]["verdict"] == "pass"

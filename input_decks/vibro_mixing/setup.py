@@ -27,7 +27,6 @@ def setup(p: Parameters) -> Setup:
     box = [(-biggest, p.vessel_width + biggest), (0.0, p.vessel_depth), (-reach - 2.0 * biggest, top + 2.0 * biggest + reach)]
     grains = packing.grains(p, sites, box)
     if p.dimensions == 2:
-        # Nothing pushes them out of their common plane.
         grains = replace(grains, positions=grains.positions * [1, 0, 1] + [0, 0.5 * p.vessel_depth, 0])
     large = large_grains(p, grains)
     grains = replace(grains, diameters=np.where(large, p.size_ratio, 1.0) * grains.diameters)

@@ -136,7 +136,7 @@ struct PairLoops {
   /// The environment variable DEMBARK_LANES may hold 2, 4 or 8, for packs of no more, or 1: contacts one by one, by the engine's own loop.
   static int asked_lanes() {
     const char* const asked = std::getenv("DEMBARK_LANES");
-    return asked ? std::atoi(asked) : 8;
+    return asked ? int(std::strtol(asked, nullptr, 10)) : 8;
   }
   /// Those for this processor, or narrower ones.
   static PairLoops choose() {
