@@ -95,8 +95,13 @@ def mixing_rate(index: Array) -> Estimate:
 
 def wall_drift(run: Phases, low: float, high: float, diameter: float) -> Estimate:
     """Mean vertical way in a period, in mean diameters, of the grains within BESIDE diameters of the walls x = `low` and x = `high` (m),
-    less that of all grains; negative where grains go down beside the walls and up between them. Interval from blocks of time."""
+    less that of all grains; negative where grains go down beside the walls and up between them. Interval from blocks of time.
+
+    A grain that is there at one end of the period only counts half: those that are there at its beginning have a mean way also where
+    nothing circulates, when grains wander faster at some heights than at others, and of a run backwards it must be the opposite.
+    """
     ways = run.displacements()[::PHASES, :, 2] / diameter
-    starts = np.array([frame.positions[:, 0] for frame in run.frames[:-PHASES:PHASES]])
-    near = np.minimum(starts - low, high - starts) < BESIDE * diameter
-    return block_mean(np.array([way[beside].mean() - way.mean() for way, beside in zip(ways, near, strict=True)]))
+    places = np.array([frame.positions[:, 0] for frame in run.frames[::PHASES]])
+    near = np.minimum(places - low, high - places) < BESIDE * diameter
+    weights = (near[:-1].astype(float) + near[1:])[: len(ways)]
+    return block_mean((weights * ways).sum(axis=1) / weights.sum(axis=1) - ways.mean(axis=1))

@@ -94,3 +94,18 @@ def test_drift_beside_the_walls() -> None:
 def test_no_drift_is_within_its_interval() -> None:
     found = wall_drift(convection(0.0), 0.0, 30 * D, D)
     assert abs(found.value) < found.half
+
+
+def test_the_drift_of_a_run_backwards_is_the_opposite() -> None:
+    """Of grains that wander to the walls and away, the farther the higher they are."""
+    random, places, frames = np.random.default_rng(2), PLACES.copy(), []
+    for _ in range(40):
+        frames.append(SimpleNamespace(positions=np.column_stack([places[:, 0], np.zeros(len(places)), places[:, 1]])))
+        places = places + random.standard_normal(places.shape) * places[:, 1:] * [0.3, 0.2]
+
+    def drift(each: list[Any]) -> float:
+        filled = [frame for frame in each for _ in range(PHASES)][: 1 - PHASES]
+        return wall_drift(Phases(filled, np.arange(len(filled)), 0.1), 0.0, 30 * D, D).value
+
+    assert abs(drift(frames)) > 1e-3
+    assert drift(frames[::-1]) == pytest.approx(-drift(frames), rel=1e-9)
