@@ -16,6 +16,11 @@ def fluid_setup(p: Parameters, box: tuple[float, float, float, float], rows: int
     return Setup(stride * p.frames, step, None, {**numbers, **more})
 
 
+def wall_layers(p: Parameters) -> int:
+    """Layers of particles in a wall, as many as fill the support of the kernel, 2 h."""
+    return math.ceil(2.0 * p.smoothing)
+
+
 def whole(length: float, spacing: float) -> float:
     """The length (m) as a whole number of spacings."""
     return round(length / spacing) * spacing

@@ -6,6 +6,7 @@ import numpy as np
 
 from dembark.input_decks.common.packing import uniform
 from dembark.input_decks.common.setup import Parameters, Setup
+from dembark.input_decks.common.water import wall_layers
 
 
 def cubes(p: Parameters) -> list[tuple[float, float, float]]:
@@ -34,6 +35,6 @@ def setup(p: Parameters) -> Setup:
     stride = every * p.rows
     places = cubes(p)
     numbers = {name: getattr(p, name) for name in ("sound_speed", "cube_mass", "cube_inertia", "particle_mass", "grain_count")}
-    made = {"stride": stride, "every": every, "cube_count": len(places), "prime_seed": prime(p.seed)}
+    made = {"stride": stride, "every": every, "cube_count": len(places), "layers": wall_layers(p), "prime_seed": prime(p.seed)}
     return Setup(stride * p.frames, step, None, {**numbers, **made},
                  tables={f"cube_{axis}": tuple(place[k] for place in places) for k, axis in enumerate("xyz")})

@@ -73,7 +73,8 @@ column = dembark.lattice((-p.column_length, -side, 0), (0, side, p.column_height
 drawn, noise = random.Random(p.seed), p.lattice_noise * p.spacing
 water.addParticles([[c + drawn.uniform(-noise, noise) for c in point] for point in column],
                    pressures=[p.fluid_density * p.gravity * (p.column_height - z) for _, _, z in column])
-water.addWall(dembark.tank_walls((-p.column_length, -side, 0), (p.downstream_length, side, p.flume_height), p.spacing))
+water.addWall(dembark.tank_walls((-p.column_length, -side, 0), (p.downstream_length, side, p.flume_height), p.spacing,
+                                 smoothing=p.smoothing))
 for cube, centre in zip(cubes.values(), centres, strict=True):
     if p.coupling == "potential":
         half = 0.5 * p.edge

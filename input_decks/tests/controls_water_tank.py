@@ -17,7 +17,7 @@ def controls(_folder: Path) -> Iterator[Control]:
     yield Control("a block that falls a seventh slower", right["falling"], verdicts("falling", slower=1.15))
     yield Control("walls that keep water half a spacing away", right["slot"], verdicts("slot", lost=1.0))
     yield Control("a block that loses a billionth of its momentum", right["drifting"], verdicts("drifting", braked=1e-9))
-    for name in ("still", "floating", "cylinder", "slot"):
+    for name in ("still", "still_wide", "floating", "cylinder", "slot"):
         yield Control("errors that grow with finer particles", study(name, 0.5), study(name, 2.0))
     yield Control("a scheme that makes energy", right["still"], verdicts("still", made=0.05))
     for scene, one in right.items():

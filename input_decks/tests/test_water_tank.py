@@ -81,7 +81,7 @@ def verdicts(scene: str, **changes: Any) -> dict[str, dict[str, Any]]:
 def study(name: str, ratio: float) -> dict[str, dict[str, Any]]:
     """Three spacings, the error at the finest `ratio` times that at the coarsest."""
     quantity, due = {"still": ("pressure_rms", 0.0), "floating": ("displaced_volume", 0.8), "cylinder": ("added_mass", 1.0),
-                     "slot": ("slot_error", 0.0)}[name]
+                     "slot": ("slot_error", 0.0)}[name.removesuffix("_wide")]
     points = [{"parameters": {"across": across, "body_density": 800.0, "fluid_density": 1000.0},
                "quantities": [{"name": quantity, "value": due - error, "interval": None}]}
               for across, error in ((4, 0.01), (8, 0.02), (16, 0.01 * ratio))]

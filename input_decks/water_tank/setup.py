@@ -1,13 +1,12 @@
-"""Water in a tank in the plane: a lattice that fills it, less a body or with a slot in the floor, and walls of three layers."""
+"""Water in a tank in the plane: a lattice that fills it, less a body or with a slot in the floor, and walls."""
 
 import math
 
 import numpy as np
 
 from dembark.input_decks.common.setup import Number, Parameters, Setup
-from dembark.input_decks.common.water import fluid_setup, whole
+from dembark.input_decks.common.water import fluid_setup, wall_layers, whole
 
-LAYERS = 3
 SQUARE = ("floating", "falling", "drifting")
 
 
@@ -38,7 +37,7 @@ def setup(p: Parameters) -> Setup:
                                "body_inertia": mass * p.size**2 / 6.0, "load": 4.0 * mass * p.moved * dx / pushed**2}
     # A jet falls until the end.
     fall = 2.0 * math.sqrt(2.0 * p.gravity * depth) * p.run_time + 0.5 * p.gravity * p.run_time**2 if p.scene == "slot" else 0.0
-    thick, top = LAYERS * dx, depth if closed else depth + whole(p.headroom, dx)
+    thick, top = wall_layers(p) * dx, depth if closed else depth + whole(p.headroom, dx)
     if p.scene == "drifting":
         room = whole(p.headroom, dx)
         return fluid_setup(p, (-room, right + room, -room, depth + room), spacing=dx, sound_speed=p.sound_speed, depth=depth,

@@ -26,7 +26,7 @@ points = dembark.lattice((0, 0), (p.tank_right, p.depth), p.spacing)
 water = dembark.fluid(p, [point for point in points if not inside(point)], p.depth)
 tank = None
 if not free:
-    walls = dembark.tank_walls((0, 0), (p.tank_right, p.tank_top), p.spacing, open_top=not closed)
+    walls = dembark.tank_walls((0, 0), (p.tank_right, p.tank_top), p.spacing, open_top=not closed, smoothing=p.smoothing)
     if p.scene == "slot":
         walls = [point for point in walls if point[1] > 0 or abs(point[0] - p.middle) > half]
     tank = water.addWall(walls)

@@ -116,11 +116,17 @@ def lattice(low: ArrayLike, high: ArrayLike, spacing: float) -> Floats:
     return np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=1)
 
 
-def tank_walls(low: ArrayLike, high: ArrayLike, spacing: float, *, layers: int = 3, open_top: bool = True) -> Floats:
+def tank_walls(low: ArrayLike, high: ArrayLike, spacing: float, *, smoothing: float = 1.3, layers: int | None = None,
+               open_top: bool = True) -> Floats:
     """Points (m) of walls around the box from `low` to `high`, `layers` of them, of the lattice that fills the box.
 
-    Up is the last axis. Three layers fill the support of h = 1.3 spacings.
+    Up is the last axis. By default there are as many layers as fill the support of a kernel, 2 h, with h of `smoothing` spacings.
+
+    >>> [len(tank_walls([0, 0], [0.2, 0.1], 0.1, smoothing=h)) for h in (1.3, 2.0)]
+    [30, 48]
     """
+    if layers is None:
+        layers = int(np.ceil(2.0 * float(numbers("smoothing", smoothing, "", low=0.0, low_open=True))))
     dx, inside = float(numbers("spacing", spacing, "m", low=0.0, low_open=True)), lattice(low, high, spacing)
     if layers < 1:
         raise ValueError(f"layers must be 1 or more, not {layers}")

@@ -56,6 +56,20 @@ def test_every_processor_and_number_of_threads_gets_the_same_bits(options):
     assert (states[0] == states[1]).all() and (states[0] == states[2]).all()
 
 
+def test_walls_fill_the_support_of_any_kernel():
+    """With three layers a particle came as near as 0.28 spacings to a floor under h = 2.5 spacings, for which these are too few."""
+    depth = 12 * DX
+    points = lattice([0, 0], [0.4, depth], DX)
+    water = SphFluid(points, spacing=DX, sound_speed=31.0, gravity=[0, -9.81], smoothing=2.5, pressure=9810.0 * (depth - points[:, 1]))
+    tank = water.add_wall(tank_walls([0, 0], [0.4, depth + 4 * DX], DX, smoothing=2.5))
+    forces = []
+    for _ in range(10):
+        water.run(0.1)
+        forces.append(-tank.force[1] / (9810.0 * depth * 0.4))
+    assert water.positions[:, 1].min() > 0.45 * DX
+    assert np.mean(forces[5:]) == pytest.approx(1.0, abs=5e-4)
+
+
 def test_a_state_goes_on_bit_for_bit_and_is_refused_elsewhere():
     water, _ = splash()
     water.run(0.02)

@@ -1,5 +1,6 @@
 """Fluids of SphFluid: lattices of their particles, and what they write."""
 
+import math
 import os
 
 from yade import ForceResetter, NewtonIntegrator, Omega, PyRunner, SphFluid
@@ -30,11 +31,13 @@ def lattice(low, high, spacing):
     return [(x, y, z) for x in axes[0] for y in axes[1] for z in axes[2]]
 
 
-def tank_walls(low, high, spacing, layers=3, open_top=True):
+def tank_walls(low, high, spacing, layers=None, open_top=True, smoothing=1.3):
     """Points (m) of walls around the box from `low` to `high`, `layers` of them, of the lattice that fills the box. Up is the last axis.
 
-    Three layers fill the support of h = 1.3 spacings.
+    By default there are as many layers as fill the support of a kernel, 2 h, with h of `smoothing` spacings.
     """
+    if layers is None:
+        layers = math.ceil(2.0 * smoothing)
     if layers < 1:
         fail(f"tank_walls: layers {layers}: there must be 1 or more")
     thick = layers * spacing
