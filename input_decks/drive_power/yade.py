@@ -8,9 +8,7 @@ p = dembark.parameters()
 weight = (0, 0, -p.gravity)
 materials, ids = dembark.begin(p, weight, along=[0, 1])
 if p.dimensions == 2:
-    for k in ids[1]:
-        # One layer of spheres stays one: round-off across it would grow as a column buckles.
-        O.bodies[k].state.blockedDOFs = "yXZ"
+    dembark.block(ids[1])
 walls = dembark.planes(p, materials, plate=(2, 0.0, 1))
 moving = dembark.motion(p, walls, ["plate"])
 

@@ -9,9 +9,8 @@ O.dt = p.time_step
 material = O.materials.append(FrictMat(young=5e6, poisson=0.3, density=2500))
 grains = dembark.grains(material)[1]
 middles = [O.bodies[grain].state.pos[0] for grain in grains]
-for grain in grains:
-    # Free along x, or two grains would count as fixed; `move` puts them on their paths.
-    O.bodies[grain].state.blockedDOFs = "yzXYZ"
+# Free along x, or two grains would count as fixed; `move` puts them on their paths.
+dembark.block(grains, "yzXYZ")
 left = O.bodies.append(utils.wall((0, 0, 0), axis=0, sense=1, material=material))
 right = O.bodies.append(utils.wall((p.end, 0, 0), axis=0, sense=-1, material=material))
 

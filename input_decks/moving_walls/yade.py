@@ -6,9 +6,8 @@ p = dembark.parameters()
 weight = (p.gravity_x, p.gravity_y, p.gravity_z)
 materials, ids = dembark.begin(p, weight)
 if p.scene == "held":
-    for k in ids[1]:
-        # A body of which nothing is free would be a wall; without friction nothing turns it.
-        O.bodies[k].state.blockedDOFs = "xyzXZ"
+    # A body of which nothing is free would be a wall; without friction nothing turns it.
+    dembark.block(ids[1], "xyzXZ")
 walls = {"plate": dembark.mesh("plate.stl", materials[1])}
 moving = dembark.motion(p, walls, ["plate"])
 writer = dembark.FrameWriter(dembark.motion_columns(moving), gravity=weight)

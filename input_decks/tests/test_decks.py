@@ -171,7 +171,7 @@ def test_a_template_that_is_run_as_it_is_says_what_to_do(case: str, engine: str,
     assert f"This is a template. Write the deck with: dembark deck {case} --engine {engine}" in one.said()
 
 
-HELD = {"liggghts": "setforce NULL 0.0 NULL", "lammps": "setforce NULL 0.0 NULL", "yade": "blockedDOFs"}
+HELD = {"liggghts": "setforce NULL 0.0 NULL", "lammps": "setforce NULL 0.0 NULL", "yade": "dembark.block(ids[1]"}
 
 
 @pytest.mark.parametrize("case", sorted(set(discover()) - {"debarking_drum", "oblique_impact", "single_contact"}))

@@ -5,9 +5,7 @@ from yade import dembark
 p = dembark.parameters()
 weight = (0, 0, -p.gravity)
 materials, ids = dembark.begin(p, weight)
-for k in ids[1]:
-    # One layer of spheres stays one: round-off across it would grow as a column buckles.
-    O.bodies[k].state.blockedDOFs = "yXZ"
+dembark.block(ids[1])
 sides = {name: dembark.mesh(f"{name}.stl", materials[1]) for name in ("left", "right", "base")}
 walls = {"vessel": [triangle for side in sides.values() for triangle in side]}
 moving = dembark.motion(p, sides, list(sides))

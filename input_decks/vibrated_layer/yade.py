@@ -8,8 +8,7 @@ if p.floor == "strips":
 weight = (0, 0, -p.gravity)
 materials, ids = dembark.begin(p, weight, along=[0, 1])
 if p.spins == "blocked":
-    for grain in ids[1]:
-        O.bodies[grain].state.blockedDOFs = "XYZ"
+    dembark.block(ids[1], "XYZ")
 walls = dembark.planes(p, materials, plate=(2, 0.0, 1))
 moving = dembark.motion(p, walls, ["plate"])
 # Kinetic energy, the plate's work, and what the account cannot explain.

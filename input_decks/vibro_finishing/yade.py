@@ -7,9 +7,7 @@ from yade import dembark
 p = dembark.parameters()
 weight = (0, 0, -p.gravity)
 materials, ids = dembark.begin(p, weight)
-for k in ids[1]:
-    # One layer of spheres stays one: round-off across it would grow as a column buckles.
-    O.bodies[k].state.blockedDOFs = "yXZ"
+dembark.block(ids[1])
 # The last body is the part, whose density is not that of the grains' material.
 part = O.bodies[ids[1][-1]]
 part.state.mass = 4.0 / 3.0 * math.pi * part.shape.radius**3 * p.part_density

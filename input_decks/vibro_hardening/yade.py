@@ -7,9 +7,7 @@ from yade import dembark
 p = dembark.parameters()
 weight = (0, 0, -p.gravity)
 materials, ids = dembark.begin(p, weight)
-for k in ids[1]:
-    # One layer of spheres stays one: round-off across it would grow as a column buckles.
-    O.bodies[k].state.blockedDOFs = "yXZ"
+dembark.block(ids[1])
 walls = {name: dembark.mesh(f"{name}.stl", materials[1]) for name in ("trough", "part")}
 moving = dembark.motion(p, walls, ["trough", "part"])
 

@@ -6,9 +6,7 @@ p = dembark.parameters()
 weight = (0, 0, -p.gravity)
 materials, ids = dembark.begin(p, weight, along=[1])
 if p.dimensions == 2:
-    for k in ids[1]:
-        # One layer of spheres stays one: round-off across it would grow as a column buckles.
-        O.bodies[k].state.blockedDOFs = "yXZ"
+    dembark.block(ids[1])
 sides = dembark.planes(p, materials, base=(2, 0.0, 1), left=(0, 0.0, 1), right=(0, p.vessel_width, -1))
 walls = {"vessel": list(sides.values())}
 moving = dembark.motion(p, walls, ["vessel"])

@@ -13,6 +13,7 @@ from yade.dembark.report import fail, finish
 from yade.dembark.scene import (
     Recorder,
     begin,
+    block,
     box,
     contact_loop,
     engine_loop,
@@ -32,8 +33,8 @@ from yade.dembark.writers import DumpWriter, EnergyWriter, HistoryWriter, energi
 
 __all__ = [
     "Balance", "CubesRecorder", "DumpWriter", "EnergyWriter", "FluidRecorder", "FluidWriter", "FrameWriter", "HistoryWriter", "LogWriter",
-    "Recorder", "StepMeans", "TouchWriter", "account_history", "begin", "box", "contact_loop", "drum", "energies", "engine_loop", "fail",
-    "finish", "fluid", "fluid_engine", "fluid_loop", "grains", "lattice", "log", "log_loop", "log_wall", "logs", "materials", "mesh",
-    "mesh_loop", "motion", "motion_columns", "motion_values", "options", "packing", "pairs", "parameters", "periodic", "plane", "planes",
-    "run", "slab_loop", "table", "tank_walls",
+    "Recorder", "StepMeans", "TouchWriter", "account_history", "begin", "block", "box", "contact_loop", "drum", "energies", "engine_loop",
+    "fail", "finish", "fluid", "fluid_engine", "fluid_loop", "grains", "lattice", "log", "log_loop", "log_wall", "logs", "materials",
+    "mesh", "mesh_loop", "motion", "motion_columns", "motion_values", "options", "packing", "pairs", "parameters", "periodic", "plane",
+    "planes", "run", "slab_loop", "table", "tank_walls",
 ]

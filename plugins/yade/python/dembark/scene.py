@@ -104,6 +104,15 @@ def begin(p, gravity=(0, 0, 0), along=(), mask=1, held=None):
     return both, grains(both[0], gravity, mask, None if held is None else (both[1], held))
 
 
+def block(ids, dofs="yXZ"):
+    """Block the degrees of freedom `dofs` of bodies, of xyzXYZ; by default those that lead spheres out of their layer across y.
+
+    One layer of spheres stays one only so: round-off across it would grow as a column buckles.
+    """
+    for k in ids:
+        O.bodies[k].state.blockedDOFs = dofs
+
+
 def planes(p, materials, mask=1, **walls):
     """Ids of plane walls by name, each given as (axis, position, side), see `plane`."""
     return {name: plane(*place, materials[1], p.grain_diameter, mask) for name, place in walls.items()}
