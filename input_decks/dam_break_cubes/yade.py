@@ -24,7 +24,7 @@ def damping(restitution, mass):
 
 
 def material(k, c, friction):
-    """The least friction of two materials counts."""
+    """The least friction of two materials counts, so that balls have the largest, and faces that of what touches them."""
     return O.materials.append(ViscElMat(kn=k, ks=TANGENTIAL * k, cn=c, cs=TANGENTIAL * c, frictionAngle=math.atan(friction),
                                         density=p.cube_density))
 
@@ -35,8 +35,9 @@ def beside(one, both):
 
 
 k, c = 2.0 * p.stiffness, 2.0 * damping(p.restitution, 0.5 * p.cube_mass)
-cube_material = material(k, c, p.friction)
-rim_material = material(beside(k, SHARE * p.stiffness), beside(c, DAMPED * 0.5 * c), p.friction)
+largest = max(p.friction, p.floor_friction, p.wall_friction)
+face_material, corner_material = material(k, c, p.friction), material(k, c, largest)
+rim_material = material(beside(k, SHARE * p.stiffness), beside(c, DAMPED * 0.5 * c), largest)
 floor_material = material(k, beside(c, damping(p.floor_restitution, p.cube_mass)), p.floor_friction)
 glass = material(k, beside(c, damping(p.wall_restitution, p.cube_mass)), p.wall_friction)
 ends = (-inner, inner)
@@ -46,9 +47,9 @@ rims = [point for t in along for a in ends for b in ends for point in ((t, a, b)
 centres = list(zip(p.cube_x, p.cube_y, p.cube_z, strict=True))
 cubes = {}
 for number, centre in enumerate(centres, 1):
-    balls = [sphere(Vector3(*centre) + Vector3(*point), r, material=cube_material) for point in corners]
+    balls = [sphere(Vector3(*centre) + Vector3(*point), r, material=corner_material) for point in corners]
     balls += [sphere(Vector3(*centre) + Vector3(*point), r, material=rim_material) for point in rims]
-    core = box(centre, [0.5 * p.edge] * 3, material=cube_material)
+    core = box(centre, [0.5 * p.edge] * 3, material=face_material)
     # A clump takes the axes of its members' inertia. Those of a cube could be any: one that differs along x, y and z has them along its
     # edges, up to half a turn.
     core.state.mass, core.state.inertia = 1e3, Vector3(10, 20, 30)

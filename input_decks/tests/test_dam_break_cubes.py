@@ -142,6 +142,16 @@ def test_water_runs_against_cubes_in_an_engine(engine: str, simulate: Any) -> No
 
 
 @pytest.mark.parametrize("engine", ["liggghts", "yade"])
+@pytest.mark.parametrize("floor", ["rough", "smooth"])
+def test_cubes_and_floor_have_frictions_of_their_own(engine: str, floor: str, simulate: Any) -> None:
+    """In YADE cubes of less friction than the floor had slid on it with their own."""
+    rough, smooth = {"rough": (2.0, 0.0), "smooth": (0.0, 2.0)}[floor]
+    one = simulate("dam_break_cubes", engine, TINY | {"floor_friction": rough, "friction": smooth})
+    way = one.times()["cube1_x"][-1] - 0.375
+    assert way < 0.005 if floor == "rough" else way > 0.02, way
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade"])
 def test_six_cubes_stand_upright_at_first(engine: str, simulate: Any) -> None:
     """YADE may make a clump with half a turn, which is none of the cube."""
     one = simulate("dam_break_cubes", engine, TINY | {"arrangement": "six", "flume_width": 0.675, "run_time": 0.02, "frames": 2, "rows": 5,
