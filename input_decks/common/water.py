@@ -1,4 +1,4 @@
-"""Steps and numbers of a fluid of particles in the plane."""
+"""Steps and numbers of a fluid of particles in the plane, and the thickness of its walls."""
 
 import math
 

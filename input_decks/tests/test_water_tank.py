@@ -167,6 +167,16 @@ def test_both_engines_have_the_same_flow(scene: str, simulate: Any) -> None:
         assert found["yade"][name]["value"] == pytest.approx(one["value"], abs=2e-3), name
 
 
+def test_walls_of_wide_kernels_are_the_same_in_both_engines(simulate: Any) -> None:
+    """A kernel of 2.5 spacings feels five layers; with three the lowest particles sank to 0.28 of a spacing above the floor."""
+    lowest = {}
+    for engine in ("liggghts", "yade"):
+        one = simulate("water_tank", engine, {"across": 10, "run_time": 0.5, "smoothing": 2.5}, "still")
+        lowest[engine] = min(float(frame.positions[:, 1].min()) for frame in one.grains()) / one.derived["spacing"]
+        assert lowest[engine] > 0.45, lowest
+    assert lowest["yade"] == pytest.approx(lowest["liggghts"], abs=1e-3)
+
+
 @pytest.mark.parametrize(("scene", "short", "every"), [("cylinder", {"across": 8, "run_time": 0.45}, 300), ("drifting", {"across": 8}, 60)])
 @pytest.mark.parametrize("engine", ["liggghts", "yade"])
 def test_a_run_that_goes_on_is_the_same(engine: str, scene: str, short: Any, every: int, tmp_path: Path, decks: Any) -> None:

@@ -120,7 +120,8 @@ def tank_walls(low: ArrayLike, high: ArrayLike, spacing: float, *, smoothing: fl
                open_top: bool = True) -> Floats:
     """Points (m) of walls around the box from `low` to `high`, `layers` of them, of the lattice that fills the box.
 
-    Up is the last axis. By default there are as many layers as fill the support of a kernel, 2 h, with h of `smoothing` spacings.
+    Up is the last axis. By default there are as many layers as fill the support of a kernel, 2 h, with h of `smoothing`
+    spacings: give that of the fluid.
 
     >>> [len(tank_walls([0, 0], [0.2, 0.1], 0.1, smoothing=h)) for h in (1.3, 2.0)]
     [30, 48]

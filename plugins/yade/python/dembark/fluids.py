@@ -34,8 +34,10 @@ def lattice(low, high, spacing):
 def tank_walls(low, high, spacing, layers=None, open_top=True, smoothing=1.3):
     """Points (m) of walls around the box from `low` to `high`, `layers` of them, of the lattice that fills the box. Up is the last axis.
 
-    By default there are as many layers as fill the support of a kernel, 2 h, with h of `smoothing` spacings.
+    By default there are as many layers as fill the support of a kernel, 2 h, with h of `smoothing` spacings: give that of the fluid.
     """
+    if not smoothing > 0.0:
+        fail(f"tank_walls: smoothing {smoothing:g}: it must be > 0")
     if layers is None:
         layers = math.ceil(2.0 * smoothing)
     if layers < 1:
