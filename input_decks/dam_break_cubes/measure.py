@@ -70,7 +70,7 @@ def water(run: Replica) -> dict[str, float]:
     """What the frames of the fluid show."""
     p, times, dx = run.parameters, run.times(), run.parameters["spacing"]
     count, half = int(run.derived["cube_count"]), 0.5 * p["edge"]
-    found = {"inside": 0.0, "leaked": 0.0, "overtopped": 0.0, "gap_filled": 0.0, "floor_wetted": float("nan")}
+    found = {"inside": 0.0, "leaked": 0.0, "overtopped": 0.0, "gap_filled": float("nan"), "floor_wetted": float("nan")}
     fronts = [(0.0, 0.0)]  # s, and m: the foremost particle
     for frame in run.grains():
         places, now = frame.positions, frame.step * run.time_step
@@ -83,7 +83,7 @@ def water(run: Replica) -> dict[str, float]:
         within = sum(int((np.abs(rotated(places - centre, turn)) < half - 0.5 * dx).all(axis=1).sum()) for centre, turn in poses)
         found["inside"] = max(found["inside"], float(within))
         if p["arrangement"] == "six" and FLOW[0] <= now <= FLOW[1]:
-            found["gap_filled"] = max(found["gap_filled"], filled(places, [centre for centre, _ in poses[:3]], half, dx))
+            found["gap_filled"] = float(np.fmax(found["gap_filled"], filled(places, [centre for centre, _ in poses[:3]], half, dx)))
         if np.isnan(found["floor_wetted"]) and now >= 1.5 - 0.5 * run.derived["stride"] * run.time_step:
             found["floor_wetted"] = wetted(places, p["flume_width"], dx)
     # Between frames; nan if it does not come.
@@ -92,15 +92,16 @@ def water(run: Replica) -> dict[str, float]:
 
 
 def filled(places: Array, centres: list[Array], half: float, dx: float) -> float:
-    """Volume of particles between neighbours of the lowest row, over that of the gaps, where they are side by side."""
+    """Volume of particles between neighbours of the lowest row, over that of the gaps; nan unless some are side by side along half an edge:
+    a shorter gap is that of a few particles."""
     volume = water_there = 0.0
     for left, right in pairwise(centres):
         low = np.array([max(left[0], right[0]) - half, left[1] + half, 0.0])
         high = np.array([min(left[0], right[0]) + half, right[1] - half, NEAR_FLOOR])
-        if (high > low).all():
+        if high[0] - low[0] >= half and (high > low).all():
             volume += float(np.prod(high - low))
             water_there += float(((places > low) & (places < high)).all(axis=1).sum()) * dx**3
-    return water_there / volume if volume > 0.0 else 0.0
+    return water_there / volume if volume > 0.0 else float("nan")
 
 
 def wetted(places: Array, width: float, dx: float) -> float:
@@ -176,7 +177,8 @@ def measure(replicas: Replicas) -> Measurement:
     cubes = p["arrangement"]
     late = "the run ends before 1.5 s"
     due = {"rise": 0.0, "inside": 0.0, "leaked": 0.0, "energy_growth": 0.0, "three_rms_x": 0.0, "six_rms_x": 0.0, "floor_wetted": 1.0}
-    missing = {"arrival": "the front did not come", "x_end": late, "floor_wetted": late, "half_fallen": "the run ends before"}
+    missing = {"arrival": "the front did not come", "x_end": late, "floor_wetted": late, "half_fallen": "the run ends before",
+               "gap_filled": "the lowest cubes are not side by side while the flow passes"}
     of_water = ["arrival", "inside", "leaked", "overtopped", "floor_wetted"]
     # Into narrower gaps no particle gets.
     if cubes == "six" and p["gap"] >= p["spacing"]:

@@ -115,6 +115,15 @@ def test_spacings_whose_results_approach_each_other_pass() -> None:
     assert names(study(2.17, 1.0), "fail") == {"x_end_converged", "half_fallen_converged"}
 
 
+def test_cubes_that_part_have_no_gap() -> None:
+    """The outer cubes run ahead: after half an edge what is between them and the middle one tells nothing of a gap."""
+    axes = np.arange(1.65, 1.95, 0.0125), np.arange(-0.35, 0.35, 0.0125), [0.01, 0.03]
+    lattice = np.stack([part.ravel() for part in np.meshgrid(*axes, indexing="ij")], axis=1)
+    for ahead, told in ((0.0, True), (0.07, True), (0.08, False)):
+        centres = [np.array([1.775 + ahead * (k != 0), 0.2 * k, 0.075]) for k in (-1, 0, 1)]
+        assert np.isfinite(dam.filled(lattice, centres, 0.075, 0.0125)) == told
+
+
 def test_a_cube_that_stands_has_not_fallen_in_time() -> None:
     one = run("three")
     one.times()["cube3_z"][:] = 0.375
