@@ -124,6 +124,14 @@ def test_cubes_that_part_have_no_gap() -> None:
         assert np.isfinite(dam.filled(lattice, centres, 0.075, 0.0125)) == told
 
 
+def test_springs_stop_a_corner_that_lands_within_its_rounding() -> None:
+    """A cube that falls by its edge and lands with one corner, a/sqrt(2) beside its centre, feels a quarter of its mass there: I = M a^2/6.
+    With half of the stiffness runs of six ended when one landed."""
+    p = defaults("dam_break_cubes")
+    speed, mass = np.sqrt(2.0 * 9.81 * p["edge"]), 0.25 * p["cube_density"] * p["edge"] ** 3
+    assert speed * np.sqrt(mass / p["stiffness"]) < p["rounding"] < speed * np.sqrt(mass / (0.5 * p["stiffness"]))
+
+
 def test_a_cube_that_stands_has_not_fallen_in_time() -> None:
     one = run("three")
     one.times()["cube3_z"][:] = 0.375
