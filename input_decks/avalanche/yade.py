@@ -9,11 +9,8 @@ weight = (p.gravity_x, 0, p.gravity_z)
 O.dt = p.time_step
 dembark.periodic([0] * p.chute + [1] * p.slab, room=8 * p.grain_diameter)
 materials, ids = dembark.begin(p, weight, mask=GRAINS, held=WALLS)
-turns = "XYZ" if p.spin == "blocked" else "XZ"
-if not p.slab:
-    dembark.block(ids[1], "y" + turns)
-elif p.spin == "blocked":
-    dembark.block(ids[1], turns)
+if p.spin == "blocked" or not p.slab:
+    dembark.block(ids[1], ("" if p.slab else "y") + ("XYZ" if p.spin == "blocked" else "XZ"))
 glued, rest = {}, ids.get(2, [])
 for name, count in (("floor", p.floor_count), ("gate", p.gate_count), ("obstacle", p.obstacle_count)):
     if count:
