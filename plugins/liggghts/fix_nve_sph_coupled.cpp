@@ -59,7 +59,8 @@ double FixNveSphCoupled::extend_cut_ghost() {
 }
 
 void FixNveSphCoupled::setup_pre_force(int) {
-  pair_->begin();
+  pair_->begin(first_);
+  first_ = false;
   summed_ = -1;
 }
 
@@ -118,4 +119,7 @@ void FixNveSphCoupled::write_restart(FILE *file) {
   if (comm->me == 0) write_part(file, {{totals_ + 5, sizeof saved_}});
 }
 
-void FixNveSphCoupled::restart(char *buffer) { std::memcpy(saved_, buffer, sizeof saved_); }
+void FixNveSphCoupled::restart(char *buffer) {
+  std::memcpy(saved_, buffer, sizeof saved_);
+  first_ = false;
+}

@@ -36,6 +36,7 @@ class FixNveSphCoupled : public dembark_family::SharedFix {
 
   class PairSphCoupled *pair_ = nullptr;
   class FixPropertyAtom *shifts_ = nullptr;
+  bool first_ = true;     // no run was before, in this process or that of a restart file
   double saved_[3] = {};  // losses of all ranks before a restart
   double totals_[9] = {};
   bigint summed_ = -1;  // step of totals_

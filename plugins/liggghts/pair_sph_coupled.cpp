@@ -22,6 +22,7 @@
 #include "fix_nve_sph_coupled.h"
 #include "fix_sph_body.h"
 #include "dembark/keyword_reader.hpp"
+#include "dembark/sph/crowding.hpp"
 #include "pair_sph_options.h"
 
 using namespace LAMMPS_NS;
@@ -134,13 +135,14 @@ void PairSphCoupled::find_gravity() {
   settings_.gravity = gravity;
 }
 
-void PairSphCoupled::begin() {
+void PairSphCoupled::begin(bool first) {
   if (update->dt > settings_.longest_step() * (1.0 + 1e-9))
     refuse("the time step must be at most 0.6 h/sound_speed = " + dembark::keywords::text(settings_.longest_step()) + " s, not " +
            dembark::keywords::text(update->dt) + " s");
   find_gravity();
   sort_particles();
   check_atoms();
+  if (first) check_room();
   for (int i = 0; i < atom->nlocal + atom->nghost; ++i) {
     if (role_[i] != SphRole::fluid && settings_.boundary == Boundary::dynamic && atom->rho[i] < settings_.state.density)
       atom->rho[i] = settings_.state.density;
@@ -148,10 +150,22 @@ void PairSphCoupled::begin() {
   }
 }
 
+void PairSphCoupled::refuse_atom(int i, const std::string &what) {
+  error->one(FLERR, ("Pair sph/coupled: atom " + std::to_string(atom->tag[i]) + " " + what).c_str());
+}
+
+/// Whether particles overlap that were created so.
+void PairSphCoupled::check_room() {
+  const auto place = [this](int i) { return vector(atom->x[i]); };
+  Crowding crowding(settings_, std::size_t(atom->nlocal));
+  const int none = int(role_.size());
+  crowding.add(rows_.inner, none, true, place, place);
+  for (const Rows *rows : {&rows_.border, &rows_.of_fluid, &rows_.repelling_fluid}) crowding.add(*rows, none, false, place, place);
+  const int worst = crowding.worst();
+  if (worst >= 0) refuse_atom(worst, "of the fluid " + crowding.line(worst));
+}
+
 void PairSphCoupled::check_atoms() {
-  const auto refuse_atom = [this](int i, const std::string &what) {
-    error->one(FLERR, ("Pair sph/coupled: atom " + std::to_string(atom->tag[i]) + " " + what).c_str());
-  };
   const double due = settings_.mass();
   for (int i = 0; i < atom->nlocal; ++i) {
     int groups = role_[i] == SphRole::fluid;

@@ -42,8 +42,9 @@ class PairSphCoupled : public Pair {
   static PairSphCoupled *find(class Force *);
 
   const dembark::sph::Settings &fluid() const { return settings_; }
-  /// At the beginning of a run, when there are ghosts and neighbours: checks, and pressures from the densities. Collective.
-  void begin();
+  /// At the beginning of a run, when there are ghosts and neighbours: checks, and pressures from the densities. first: no run was before.
+  /// Collective.
+  void begin(bool first);
   /// Densities after dt (s), and shifts (m) if there is room for them. Collective.
   void advance(double dt, double **shifts);
   /// Of this rank: what is stored, lost since the beginning.
@@ -52,11 +53,12 @@ class PairSphCoupled : public Pair {
  private:
   [[noreturn]] void refuse(const std::string &what);
   void read(const std::vector<std::string> &words);
+  void refuse_atom(int i, const std::string &what);
   void find_gravity();
   void check_atoms();
+  void check_room();
   void sort_particles();
   void resize();
-  void densities_to_ghosts();
   dembark::sph::LoopArguments arguments(const dembark::sph::Rows &rows);
   void wall_states();
   void push(double dt);

@@ -81,19 +81,25 @@ class CubicSpline {
   double inverse_, norm_, steepness_;
 };
 
+/// Calls work(r^2) for the particles of a square or cubic lattice of this spacing (m) around one of them that the kernel reaches, itself
+/// too.
+template <class Work>
+void each_of_lattice(int dimension, double h, double spacing, const Work& work) {
+  const int reach = int(support * h / spacing) + 1, depth = dimension == 3 ? reach : 0;
+  for (int i = -reach; i <= reach; ++i)
+    for (int j = -reach; j <= reach; ++j)
+      for (int k = -depth; k <= depth; ++k) work(spacing * spacing * double(i * i + j * j + k * k));
+}
+
 /// What the sum over a square or cubic lattice of spacing dx makes of the gradient of a linear field, 1 for h much larger than dx:
 /// -1/dimension sum dx^dimension r^2 slope(r). 0.974 in the plane and 0.979 in space for Wendland's kernel with h = 1.3 dx. Sums over
 /// gradients divided by it give still water its own pressure at any h; forces stay antisymmetric.
 template <class Kernel>
 double lattice_moment(const Kernel& kernel, int dimension, double h, double spacing) {
-  const int reach = int(support * h / spacing) + 1, depth = dimension == 3 ? reach : 0;
   double sum = 0.0;
-  for (int i = -reach; i <= reach; ++i)
-    for (int j = -reach; j <= reach; ++j)
-      for (int k = -depth; k <= depth; ++k) {
-        const double squared = spacing * spacing * double(i * i + j * j + k * k);
-        if (squared > 0.0) sum -= squared * kernel.slope(std::sqrt(squared));
-      }
+  each_of_lattice(dimension, h, spacing, [&](double squared) {
+    if (squared > 0.0) sum -= squared * kernel.slope(std::sqrt(squared));
+  });
   return sum * std::pow(spacing, dimension) / dimension;
 }
 

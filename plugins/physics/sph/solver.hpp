@@ -20,6 +20,8 @@
 #include <utility>
 #include <vector>
 
+#include "../keyword_reader.hpp"
+#include "crowding.hpp"
 #include "passes.hpp"
 
 namespace dembark::sph {
@@ -109,16 +111,11 @@ class Solver {
   /// To change loads, the velocities and accelerations of bodies that are not free, and the places of those that are driven.
   Body& body(int number) { return scene_.bodies.at(std::size_t(number)); }
 
-  /// Forces of the state as it is, if no step has computed them.
+  /// Forces of the state as it is, if no step has computed them. Throws std::invalid_argument when particles overlap.
   void prepare() {
-    if (begun_) return;
-    for (Solids& set : scene_.solids) {
-      set.resize();
-      set.follow(scene_.bodies);
-    }
-    search();
-    passes_.forces(scene_, 0.0);
-    begun_ = true;
+    begin();
+    if (!judged_) check_room();
+    judged_ = true;
   }
 
   Energies energies() const {
@@ -138,20 +135,19 @@ class Solver {
   /// Everything needed to go on bit for bit; from here on this solver goes on as one that is given it.
   std::vector<double> state() {
     prepare();
-    scene_.neighbours.forget();
-    std::vector<double> out{version, double(scene_.fluid.size()), double(scene_.bodies.size()), double(scene_.solids[0].size())};
-    exchange([&](double& value) { out.push_back(value); });
-    return out;
+    return packed();
   }
   /// Goes on from a state of a solver that was made the same way. Throws std::invalid_argument.
   void restore(const std::vector<double>& numbers) {
-    const std::vector<double> due = state();
+    begin();  // without the judgement of what was given, whose place the state takes
+    const std::vector<double> due = packed();
     if (numbers.size() != due.size() || !std::equal(due.begin(), due.begin() + 4, numbers.begin()))
       throw std::invalid_argument("state: it is not of this fluid, with as many particles, walls and bodies");
     for (std::size_t i = 0; i < due.size(); ++i)
       if (!std::isfinite(numbers[i])) throw std::invalid_argument("state: number " + std::to_string(i) + " is not finite");
     std::size_t at = 4;
     exchange([&](double& value) { value = numbers[at++]; });
+    judged_ = true;
     update_pressure();
     for (Solids& set : scene_.solids) set.follow(scene_.bodies);
   }
@@ -169,6 +165,39 @@ class Solver {
     if (dt > 0.0 && dt <= most * (1.0 + 1e-9)) return;
     throw std::invalid_argument("the time step must be > 0 and at most 0.6 h/sound_speed = " + std::to_string(1e3 * most) + " ms, not " +
                                 std::to_string(1e3 * dt) + " ms");
+  }
+
+  void begin() {
+    if (begun_) return;
+    for (Solids& set : scene_.solids) {
+      set.resize();
+      set.follow(scene_.bodies);
+    }
+    search();
+    passes_.forces(scene_, 0.0);
+    begun_ = true;
+  }
+
+  std::vector<double> packed() {
+    scene_.neighbours.forget();
+    std::vector<double> out{version, double(scene_.fluid.size()), double(scene_.bodies.size()), double(scene_.solids[0].size())};
+    exchange([&](double& value) { out.push_back(value); });
+    return out;
+  }
+
+  void check_room() const {
+    const std::vector<Vector>& x = scene_.fluid.position;
+    const auto fluid = [&](int i) { return x[std::size_t(i)]; };
+    Crowding crowding(scene_.settings, x.size());
+    for (const Rows& rows : scene_.neighbours.pairs()) crowding.add(rows, int(x.size()), true, fluid, fluid);
+    for (const Solids& set : scene_.solids)
+      for (const Rows& rows : set.of_fluid)
+        crowding.add(rows, set.size(), false, fluid, [&](int k) { return set.position[std::size_t(k)]; });
+    const int worst = crowding.worst();
+    if (worst < 0) return;
+    const Vector& p = x[std::size_t(worst)];
+    throw std::invalid_argument("the particle of fluid at (" + keywords::text(p.x) + ", " + keywords::text(p.y) + ", " +
+                                keywords::text(p.z) + ") m " + crowding.line(worst));
   }
 
   void search() {
@@ -235,6 +264,7 @@ class Solver {
   double time_ = 0.0;
   long steps_ = 0;
   bool begun_ = false;
+  bool judged_ = false;  // whether particles overlap that were given
 };
 
 }  // namespace dembark::sph

@@ -314,3 +314,56 @@ TEST_CASE("SPH solver: bad input gets one line", "[sph]") {
   Solver fast(plane_settings(0.1, 20.0), x, {1000.0}, {{30.0, 0.0, 0.0}});
   CHECK_THROWS_WITH(fast.step(1e-3), Contains("faster than sound"));
 }
+
+TEST_CASE("SPH solver: particles that overlap at the beginning are told", "[sph]") {
+  const int nx = 8, ny = 8;
+  // A plate in the fluid, `wide` particles square, off the lattice by (a, b) spacings; room: fluid is left out where the plate is.
+  const auto with_plate = [&](double h, int wide, double a, double b, bool room) {
+    Settings s = plane_settings(0.02, 20.0);
+    s.smoothing = h;
+    const Vector low = s.spacing * Vector{2.0 + a, 2.0 + b, 0.0};
+    std::vector<Vector> plate = lattice(wide, wide, 0, s.spacing), x;
+    for (Vector& p : plate) p += low;
+    for (const Vector& p : lattice(nx, ny, 0, s.spacing)) {
+      const Vector d = p - low;
+      const double edge = (wide + 0.49) * s.spacing, from = -0.49 * s.spacing;
+      if (!(room && d.x > from && d.y > from && d.x < edge && d.y < edge)) x.push_back(p);
+    }
+    Solver solver(s, x, std::vector<double>(x.size(), 1000.0), std::vector<Vector>(x.size()));
+    solver.add({}, tank_walls(nx, ny, s.spacing));
+    solver.add({}, plate);
+    return solver;
+  };
+  for (const double h : {0.8, 1.3, 2.0}) {
+    const int wide = h > 1.5 ? 3 : 2;
+    for (const double a : {0.0, 0.25, 0.5})
+      for (const double b : {0.0, 0.5}) {
+        Solver solver = with_plate(h, wide, a, b, false);
+        CHECK_THROWS_WITH(solver.prepare(), Contains("the particle of fluid at (0.") && Contains("overlaps others: there are "));
+        CHECK_NOTHROW(with_plate(h, wide, a, b, true).prepare());
+      }
+  }
+  CHECK_THROWS_WITH(with_plate(1.3, 4, 0.0, 0.0, false).step(1e-4), Contains(") m overlaps others: there are 1.99 times as many"));
+  // A state takes the place of what was given: where a body has gone by then is no overlap.
+  Solver moved = with_plate(1.3, 2, 0.0, 0.0, false), kept = with_plate(1.3, 2, 0.0, 0.0, true);
+  CHECK_THROWS_WITH(moved.restore(kept.state()), Contains("not of this fluid"));
+  CHECK_THROWS_WITH(moved.prepare(), Contains("overlaps others"));
+}
+
+TEST_CASE("SPH solver: fluid is not judged by what it was given when a state goes on", "[sph]") {
+  const auto with_body_at = [](double y) {
+    Settings s = plane_settings(0.02, 20.0);
+    const std::vector<Vector> x = lattice(8, 8, 0, s.spacing);
+    Solver solver(s, x, std::vector<double>(x.size(), 1000.0), std::vector<Vector>(x.size()));
+    Body body;
+    body.driven = true;
+    body.position = {0.04, y, 0.0};
+    solver.add(body, lattice(4, 4, 0, s.spacing));
+    return solver;
+  };
+  Solver first = with_body_at(0.3), again = with_body_at(0.05);
+  const std::vector<double> state = first.state();
+  CHECK_NOTHROW(again.restore(state));
+  CHECK(again.state() == state);
+  CHECK_THROWS_WITH(with_body_at(0.05).prepare(), Contains("overlaps others"));
+}

@@ -117,12 +117,15 @@ def floats_on_substeps():
 
 
 def saved():
-    """A run that is saved in the middle of a step of the fluid, and goes on, beside the one that was saved and loaded."""
+    """A run that is saved in the middle of a step of the fluid, and goes on, beside the one that was saved and loaded.
+
+    By then the block is where fluid was at the beginning.
+    """
     found = {}
     for ending in ("xml", "yade.gz", "bin"):
         fluid = pool((0, -G, 0), (0, 0), (0.4, 0.12), 0.4, substeps=3)
         O.dt = STEP / 3
-        body = block((0.19, 0.2, 0), 8.0, (0.0133, 0.0133, 0.0133), (0.2, -1.0, 0), (0, 0, 2.0), plane=True)
+        body = block((0.19, 0.2, 0), 8.0, (0.0133, 0.0133, 0.0133), (0.2, -3.0, 0), (0, 0, 2.0), plane=True)
         fluid.addBody(body, dembark.lattice((0.14, 0.15), (0.24, 0.25), DX))
         O.run(200, True)
         O.save("fluid." + ending, quiet=True)
@@ -174,11 +177,16 @@ def messages():
     def with_newton(**words):
         return after(lambda fluid: setattr(O, "engines", [*O.engines[:-1], NewtonIntegrator(**words)]))
 
+    def put_into_the_water(fluid):
+        sunk = block((0.1, 0.05, 0), 1.0, (1, 1, 1), plane=True)
+        fluid.addBody(sunk, dembark.lattice((0.07, 0.02), (0.13, 0.08), DX))
+
     said = {
         "spacing": attribute("spacing", 0.0), "sound": attribute("soundSpeed", -1.0), "kernel": attribute("kernel", "gauss"),
         "smoothing": attribute("smoothing", 0.5), "substeps": attribute("substeps", 0), "damping": with_newton(damping=0.2),
         "order": after(lambda fluid: setattr(O, "engines", [ForceResetter(), O.engines[-1], fluid])),
         "long": after(lambda fluid: setattr(O, "dt", 2e-3), 2),
+        "overlap": after(put_into_the_water),
         "long sub-steps": after(lambda fluid: (setattr(O, "dt", 2e-4), setattr(fluid, "substeps", 10)), 11),
     }
     fluid = pool((0, -G, 0), (0, 0), (0.2, 0.1), 0.2)

@@ -117,6 +117,7 @@ def test_frames_and_rows_can_be_read(found, tmp_path):
     ("no body", "body 99 does not exist"), ("member", "belongs to the clump 2; add that"),
     ("body without particles", "body 2 has no points"), ("pressures", "pressures must be a list of 1 numbers (Pa)"),
     ("stranger", "body 2 is not in the fluid"), ("twice", "body 2 is in the fluid already"), ("late", "the fluid has begun"),
+    ("overlap", "m overlaps others: there are 1."),
     ("gravity", "NewtonIntegrator.gravity has changed"), ("no fluid", "there is no fluid"), ("blows up", "the fluid blew up at t =")])
 def test_wrong_input_is_told_in_one_line(found, name, line):
     said = found["messages"][name]

@@ -238,6 +238,21 @@ def test_wrong_use_gets_one_line():
         fast.run(1e-3)
 
 
+def test_what_is_put_into_the_fluid_is_told():
+    points = lattice([0, 0], [0.2, 0.2], DX)
+    water = SphFluid(points, spacing=DX, sound_speed=20.0)
+    water.add_body(lattice([0.06, 0.06], [0.14, 0.14], DX), mass=6.4, inertia=0.007, centre=[0.1, 0.1])
+    with pytest.raises(ValueError, match=r"^the particle of fluid at \(0\.\d+, 0\.\d+, 0\) m overlaps others: there are [12]\.\d\d times"):
+        water.run(1e-3)
+    twice = SphFluid(np.concatenate([points, points]), spacing=DX, sound_speed=20.0)
+    with pytest.raises(ValueError, match=r"overlaps others: there are 2\.00 times as many around it as in the lattice; leave out fluid"):
+        twice.run(1e-3)
+    fine = SphFluid(points, spacing=DX, sound_speed=20.0)
+    fine.add_wall(lattice([0, -0.1], [0.2, 0.0], 0.5 * DX))
+    with pytest.raises(ValueError, match="and give them its spacing"):
+        fine.run(1e-3)
+
+
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 2**31), st.sampled_from([2, 3]), st.sampled_from(SPH_KERNELS))
 def test_momentum_of_a_free_cloud_is_conserved(seed, dimension, kernel):
