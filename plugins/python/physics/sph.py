@@ -101,8 +101,8 @@ def lattice(low: ArrayLike, high: ArrayLike, spacing: float) -> Floats:
 
     The sides must be whole numbers of `spacing`, to a thousandth of it.
 
-    >>> lattice([0, 0], [0.2, 0.1], 0.1).tolist()
-    [[0.05, 0.05], [0.15, 0.05]]
+    >>> lattice([0, 0], [0.5, 0.25], 0.25).tolist()
+    [[0.125, 0.125], [0.375, 0.125]]
     """
     dx = float(numbers("spacing", spacing, "m", low=0.0, low_open=True))
     a, b = numbers("low", low, "m"), numbers("high", high, "m")
@@ -116,21 +116,16 @@ def lattice(low: ArrayLike, high: ArrayLike, spacing: float) -> Floats:
     return np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=1)
 
 
-def tank_walls(low: ArrayLike, high: ArrayLike, spacing: float, *, smoothing: float = 1.3, layers: int | None = None,
-               open_top: bool = True) -> Floats:
-    """Points (m) of walls around the box from `low` to `high`, `layers` of them, of the lattice that fills the box.
+def tank_walls(low: ArrayLike, high: ArrayLike, spacing: float, *, smoothing: float = 1.3, open_top: bool = True) -> Floats:
+    """Points (m), shape (n, d), of walls around the box from `low` to `high`, of the lattice that fills the box. Up is the last axis.
 
-    Up is the last axis. By default there are as many layers as fill the support of a kernel, 2 h, with h of `smoothing`
-    spacings: give that of the fluid.
+    There are as many layers as fill the support of a kernel, 2 h, with h of `smoothing` spacings: give that of the fluid.
 
     >>> [len(tank_walls([0, 0], [0.2, 0.1], 0.1, smoothing=h)) for h in (1.3, 2.0)]
     [30, 48]
     """
-    if layers is None:
-        layers = int(np.ceil(2.0 * float(numbers("smoothing", smoothing, "", low=0.0, low_open=True))))
+    layers = int(np.ceil(2.0 * float(numbers("smoothing", smoothing, "", low=0.0, low_open=True))))
     dx, inside = float(numbers("spacing", spacing, "m", low=0.0, low_open=True)), lattice(low, high, spacing)
-    if layers < 1:
-        raise ValueError(f"layers must be 1 or more, not {layers}")
     a, b = np.asarray(low, float), np.asarray(high, float)
     b = a + np.rint((b - a) / dx) * dx
     top = b + layers * dx

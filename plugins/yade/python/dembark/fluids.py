@@ -31,18 +31,14 @@ def lattice(low, high, spacing):
     return [(x, y, z) for x in axes[0] for y in axes[1] for z in axes[2]]
 
 
-def tank_walls(low, high, spacing, layers=None, open_top=True, smoothing=1.3):
-    """Points (m) of walls around the box from `low` to `high`, `layers` of them, of the lattice that fills the box. Up is the last axis.
+def tank_walls(low, high, spacing, open_top=True, smoothing=1.3):
+    """Points (m) of walls around the box from `low` to `high`, of the lattice that fills the box. Up is the last axis.
 
-    By default there are as many layers as fill the support of a kernel, 2 h, with h of `smoothing` spacings: give that of the fluid.
+    There are as many layers as fill the support of a kernel, 2 h, with h of `smoothing` spacings: give that of the fluid.
     """
     if not smoothing > 0.0:
         fail(f"tank_walls: smoothing {smoothing:g}: it must be > 0")
-    if layers is None:
-        layers = math.ceil(2.0 * smoothing)
-    if layers < 1:
-        fail(f"tank_walls: layers {layers}: there must be 1 or more")
-    thick = layers * spacing
+    thick = math.ceil(2.0 * smoothing) * spacing
     high = [a + spacing * round((b - a) / spacing) for a, b in zip(low, high, strict=True)]
     top = [b + thick for b in high]
     if open_top:
