@@ -224,7 +224,7 @@ void SphFluid::action() {
 			}
 		}
 	} catch (const std::invalid_argument& wrong) {
-		const std::string more = substeps > 1 ? " (" + std::to_string(substeps) + " steps of O.dt)" : "";
+		const std::string more = passed >= 0 && substeps > 1 ? " (" + std::to_string(substeps) + " steps of O.dt)" : "";
 		fail(inYade(wrong.what()) + more);
 	} catch (const std::runtime_error& error) {
 		if (std::string(error.what()).rfind("dembark: ", 0) == 0) throw;

@@ -115,7 +115,7 @@ REFUSED = {
     "no group": ("fix body3 g3", "create_atoms 2 single 0.2 0.3 0 units box\nfix body3 g3",
                  "is in no group of the fixes nve/sph/coupled, sph/wall and sph/body"),
     "out of plane": ("fix fluid g1", "set atom 5 z 0.001\nfix fluid g1", "atom 5 is at z = 0.001 m; in the plane all are at z = 0"),
-    "overlap": ("fix fluid g1", "displace_atoms g3 move -0.1 0 0 units box\nfix fluid g1", "of the fluid overlaps others: there are 1."),
+    "overlap": ("fix fluid g1", "displace_atoms g1 move 0.1 0 0 units box\nfix fluid g1", "of the fluid overlaps another: it is 0.00"),
     "two groups": ("fix body3 g3", "fix again g1 sph/wall\nfix body3 g3", "is in two groups"),
     "weight": ("fix weight all", "fix weight g2", "the group of fix gravity must hold the whole fluid"),
 }
@@ -142,7 +142,7 @@ def test_overlaps_are_told_at_the_first_run_only(ranks: int, tmp_path: Path) -> 
     again = run("later", resumed(deck(scene, 4, ranks=ranks, run=f"{states}run 4 upto"), 3))
     assert again.code == 0 and "resumed at step 2 exactly" in again.output, again.error or again.output[-1500:]
     first = run("first", deck(scene, 2, ranks=ranks, run=f"{jump}\nrun 2"))
-    assert first.code != 0 and "of the fluid overlaps others: there are" in first.error, first.error or first.output[-800:]
+    assert first.code != 0 and "of the fluid overlaps another: it is 0.00" in first.error, first.error or first.output[-800:]
 
 
 def test_a_fluid_that_blows_up_is_told(tmp_path: Path) -> None:

@@ -3,9 +3,15 @@
 //   C_i = sum_j W(|x_i - x_j|) / sum_lattice W,   j: all particles within the support, i too                             (1)
 //
 // is 1 within the lattice, less at a surface, 2 where two lattices lie in each other. A fluid that begins so is thrown apart by pressures
-// that no one asked for, and is then told as one that blew up, if at all. Where lattices meet at any angle, half a spacing each from the
-// face between them, (1) is below 1.05; particles displaced by up to 0.2 spacings along each axis have up to 1.3. A body in the fluid is
-// found at any offset between the lattices if it is two particles wide (h up to 1.3 spacings) or four (h of 3).
+// that no one asked for, and is then told as one that blew up, if at all. A start is refused if a particle of fluid has another one nearer
+// than 0.4 dx, or
+//
+//   C_i > 1.4 + 0.5 max(1.3 - h/dx, 0)                                                                                   (2)
+//
+// Starts that are right are not: where lattices meet at any angle, half a spacing each from the face between them, C is below 1.05; with
+// fluid up to a face, half a spacing from the wall's particles, 1.3 (h = 1.3 dx), 1.4 (0.8 dx), in a corner 1.6 (0.8 dx); with
+// displacements by up to 0.2 dx along each axis 1.25 (1.3 dx), 1.4 (1 dx), 1.5 (0.8 dx). By (2) a body in the fluid is found at any offset
+// between the lattices if it is two particles wide (h up to 1.3 dx) or four (h of 3 dx).
 //
 // Later states are not judged: a particle that was pressed into a wall is none that was put there.
 #pragma once
@@ -14,6 +20,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -41,31 +48,38 @@ class Crowding {
       for (int i = rows.begin; i < rows.end; ++i)
         for (int k = rows.start[i - rows.begin]; k < rows.start[i - rows.begin + 1] && rows.neighbour[k] != none; ++k) {
           const int j = rows.neighbour[k];
-          const double weight = kernel.value(norm(own(i) - other(j)));
+          const double r = norm(own(i) - other(j)), weight = kernel.value(r);
           weight_[std::size_t(i)] += weight;
           if (mutual) weight_[std::size_t(j)] += weight;
+          if (!(r < nearest_)) continue;
+          nearest_ = r;
+          of_nearest_ = i;
         }
     });
   }
 
-  /// Number of the particle with the largest sum (1), if that is more than any beginning should have; -1: there is none.
+  /// Number of a particle that overlaps others; -1: there is none.
   int worst() const {
+    if (pair_overlaps()) return of_nearest_;
     const auto most = std::max_element(weight_.begin(), weight_.end());
+    const double limit = 1.4 + 0.5 * std::max(1.3 - settings_.smoothing, 0.0);
     return most != weight_.end() && *most > limit * full_ ? int(most - weight_.begin()) : -1;
   }
   /// What the one clear line says of it.
   std::string line(int particle) const {
-    char sum[32];
-    std::snprintf(sum, sizeof sum, "%.2f", weight_[std::size_t(particle)] / full_);
-    return "overlaps others: there are " + std::string(sum) +
-           " times as many around it as in the lattice; leave out fluid where walls and bodies are, and give them its spacing";
+    char words[80];
+    if (pair_overlaps()) std::snprintf(words, sizeof words, "another: it is %.2f spacings away from it", nearest_ / settings_.spacing);
+    else
+      std::snprintf(words, sizeof words, "others: there are %.2f times as many as in the lattice", weight_[std::size_t(particle)] / full_);
+    return "overlaps " + std::string(words) + "; leave out fluid where walls and bodies are, and give them its spacing";
   }
 
  private:
-  static constexpr double limit = 1.4;
+  bool pair_overlaps() const { return nearest_ < 0.4 * settings_.spacing; }
 
   Settings settings_;
-  double full_ = 0.0;
+  double full_ = 0.0, nearest_ = std::numeric_limits<double>::infinity();
+  int of_nearest_ = -1;
   std::vector<double> weight_;
 };
 

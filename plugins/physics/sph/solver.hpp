@@ -78,7 +78,8 @@ class Solver {
     scene_.slits.planes.push_back({point, (1.0 / norm(normal)) * normal});
   }
 
-  /// One step of dt (s). Throws std::invalid_argument for a step that is not stable, std::runtime_error when the fluid blows up.
+  /// One step of dt (s). Throws std::invalid_argument for a step that is not stable and as prepare(), std::runtime_error when the fluid
+  /// blows up.
   void step(double dt) {
     check_step(dt);
     prepare();
@@ -111,11 +112,11 @@ class Solver {
   /// To change loads, the velocities and accelerations of bodies that are not free, and the places of those that are driven.
   Body& body(int number) { return scene_.bodies.at(std::size_t(number)); }
 
-  /// Forces of the state as it is, if no step has computed them. Throws std::invalid_argument when particles overlap.
+  /// Forces of the state as it is, if no step has computed them. Throws std::invalid_argument when particles overlap that were given; then
+  /// they can be given another place.
   void prepare() {
     begin();
     if (!judged_) check_room();
-    judged_ = true;
   }
 
   Energies energies() const {
@@ -132,7 +133,7 @@ class Solver {
     return e;
   }
 
-  /// Everything needed to go on bit for bit; from here on this solver goes on as one that is given it.
+  /// Everything needed to go on bit for bit; from here on this solver goes on as one that is given it. Throws as prepare().
   std::vector<double> state() {
     prepare();
     return packed();
@@ -185,7 +186,7 @@ class Solver {
     return out;
   }
 
-  void check_room() const {
+  void check_room() {
     const std::vector<Vector>& x = scene_.fluid.position;
     const auto fluid = [&](int i) { return x[std::size_t(i)]; };
     Crowding crowding(scene_.settings, x.size());
@@ -194,7 +195,9 @@ class Solver {
       for (const Rows& rows : set.of_fluid)
         crowding.add(rows, set.size(), false, fluid, [&](int k) { return set.position[std::size_t(k)]; });
     const int worst = crowding.worst();
-    if (worst < 0) return;
+    judged_ = worst < 0;
+    if (judged_) return;
+    begun_ = false;
     const Vector& p = x[std::size_t(worst)];
     throw std::invalid_argument("the particle of fluid at (" + keywords::text(p.x) + ", " + keywords::text(p.y) + ", " +
                                 keywords::text(p.z) + ") m " + crowding.line(worst));

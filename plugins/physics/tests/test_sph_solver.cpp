@@ -315,55 +315,92 @@ TEST_CASE("SPH solver: bad input gets one line", "[sph]") {
   CHECK_THROWS_WITH(fast.step(1e-3), Contains("faster than sound"));
 }
 
-TEST_CASE("SPH solver: particles that overlap at the beginning are told", "[sph]") {
-  const int nx = 8, ny = 8;
-  // A plate in the fluid, `wide` particles square, off the lattice by (a, b) spacings; room: fluid is left out where the plate is.
-  const auto with_plate = [&](double h, int wide, double a, double b, bool room) {
-    Settings s = plane_settings(0.02, 20.0);
-    s.smoothing = h;
-    const Vector low = s.spacing * Vector{2.0 + a, 2.0 + b, 0.0};
-    std::vector<Vector> plate = lattice(wide, wide, 0, s.spacing), x;
-    for (Vector& p : plate) p += low;
-    for (const Vector& p : lattice(nx, ny, 0, s.spacing)) {
-      const Vector d = p - low;
-      const double edge = (wide + 0.49) * s.spacing, from = -0.49 * s.spacing;
-      if (!(room && d.x > from && d.y > from && d.x < edge && d.y < edge)) x.push_back(p);
-    }
-    Solver solver(s, x, std::vector<double>(x.size(), 1000.0), std::vector<Vector>(x.size()));
-    solver.add({}, tank_walls(nx, ny, s.spacing));
-    solver.add({}, plate);
-    return solver;
-  };
-  for (const double h : {0.8, 1.3, 2.0}) {
-    const int wide = h > 1.5 ? 3 : 2;
-    for (const double a : {0.0, 0.25, 0.5})
-      for (const double b : {0.0, 0.5}) {
-        Solver solver = with_plate(h, wide, a, b, false);
-        CHECK_THROWS_WITH(solver.prepare(), Contains("the particle of fluid at (0.") && Contains("overlaps others: there are "));
-        CHECK_NOTHROW(with_plate(h, wide, a, b, true).prepare());
-      }
+namespace {
+
+/// Fluid with a plate in it, `wide` particles square, off the lattice by (a, b) spacings. room: spacings from the plate's particles, within
+/// which fluid is left out; < 0: nowhere.
+Solver with_plate(const Settings& s, int wide, double a, double b, double room) {
+  const Vector low = s.spacing * Vector{2.5 + a, 2.5 + b, 0.0};
+  std::vector<Vector> plate = lattice(wide, wide, 0, s.spacing), x;
+  for (Vector& p : plate) p += low - s.spacing * Vector{0.5, 0.5, 0.0};
+  const double from = -room * s.spacing, to = (wide - 1 + room) * s.spacing;
+  for (const Vector& p : lattice(8, 8, 0, s.spacing)) {
+    const Vector d = p - low;
+    if (room < 0.0 || d.x < from || d.y < from || d.x > to || d.y > to) x.push_back(p);
   }
-  CHECK_THROWS_WITH(with_plate(1.3, 4, 0.0, 0.0, false).step(1e-4), Contains(") m overlaps others: there are 1.99 times as many"));
-  // A state takes the place of what was given: where a body has gone by then is no overlap.
-  Solver moved = with_plate(1.3, 2, 0.0, 0.0, false), kept = with_plate(1.3, 2, 0.0, 0.0, true);
-  CHECK_THROWS_WITH(moved.restore(kept.state()), Contains("not of this fluid"));
-  CHECK_THROWS_WITH(moved.prepare(), Contains("overlaps others"));
+  Solver solver(s, x, std::vector<double>(x.size(), 1000.0), std::vector<Vector>(x.size()));
+  solver.add({}, tank_walls(8, 8, s.spacing));
+  Body body;
+  body.driven = true;
+  solver.add(body, plate);
+  return solver;
 }
 
-TEST_CASE("SPH solver: fluid is not judged by what it was given when a state goes on", "[sph]") {
-  const auto with_body_at = [](double y) {
-    Settings s = plane_settings(0.02, 20.0);
-    const std::vector<Vector> x = lattice(8, 8, 0, s.spacing);
-    Solver solver(s, x, std::vector<double>(x.size(), 1000.0), std::vector<Vector>(x.size()));
-    Body body;
-    body.driven = true;
-    body.position = {0.04, y, 0.0};
-    solver.add(body, lattice(4, 4, 0, s.spacing));
+}  // namespace
+
+TEST_CASE("SPH solver: what overlaps at the beginning is told", "[sph]") {
+  for (const KernelName kernel : {KernelName::wendland_c2, KernelName::cubic_spline})
+    for (const double h : {0.8, 1.0, 1.3, 2.0, 3.0}) {
+      Settings s = plane_settings(0.02, 20.0);
+      s.smoothing = h;
+      s.kernel = kernel;
+      const int wide = h > 2.5 ? 4 : h > 1.5 ? 3 : 2;
+      for (const double a : {0.0, 0.25, 0.5})
+        for (const double b : {0.0, 0.5}) {
+          INFO("h = " << h << " dx, off by " << a << ", " << b);
+          CHECK_THROWS_WITH(with_plate(s, wide, a, b, -1.0).prepare(),
+                            Contains("the particle of fluid at (0.") && Contains(") m overlaps "));
+          // Fluid up to half a spacing from the body, and a whole one.
+          for (const double room : {0.499, 0.999}) CHECK_NOTHROW(with_plate(s, wide, a, b, room).prepare());
+        }
+    }
+  // In space, a cube of two particles an edge.
+  Settings s;
+  s.spacing = 0.02;
+  s.state.sound_speed = 20.0;
+  const std::vector<Vector> x = lattice(6, 6, 6, s.spacing);
+  Solver solver(s, x, std::vector<double>(x.size(), 1000.0), std::vector<Vector>(x.size()));
+  std::vector<Vector> cube = lattice(2, 2, 2, s.spacing);
+  for (Vector& p : cube) p += s.spacing * Vector{1.5, 1.5, 1.5};
+  solver.add({}, cube);
+  CHECK_THROWS_WITH(solver.prepare(), Contains("overlaps others: there are 1."));
+}
+
+TEST_CASE("SPH solver: two particles in one place are told at any h, displaced ones are none", "[sph]") {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> u(-0.2, 0.2);
+  for (const int dimension : {2, 3})
+    for (const double h : {0.8, 1.0, 1.3, 3.0}) {
+      Settings s;
+      s.dimension = dimension;
+      s.spacing = 0.02;
+      s.smoothing = h;
+      s.state.sound_speed = 20.0;
+      std::vector<Vector> x = lattice(10, 10, dimension == 3 ? 10 : 0, s.spacing);
+      for (Vector& p : x) p += s.spacing * Vector{u(random), u(random), dimension == 3 ? u(random) : 0.0};
+      const auto prepare = [&] { Solver(s, x, std::vector<double>(x.size(), 1000.0), std::vector<Vector>(x.size())).prepare(); };
+      INFO("h = " << h << " dx");
+      CHECK_NOTHROW(prepare());
+      x.push_back(x[40] + Vector{0.39 * s.spacing, 0.0, 0.0});
+      CHECK_THROWS_WITH(prepare(), Contains("overlaps another: it is 0.") && Contains(" spacings away from it; leave out fluid"));
+    }
+}
+
+TEST_CASE("SPH solver: a state takes the place of what was given, and a body can be moved out of the way", "[sph]") {
+  const Settings s = plane_settings(0.02, 20.0);
+  const auto moved = [&](double y) {
+    Solver solver = with_plate(s, 4, 0.0, 0.0, -1.0);
+    solver.body(1).position.y = y;
     return solver;
   };
-  Solver first = with_body_at(0.3), again = with_body_at(0.05);
+  Solver first = moved(0.3), again = moved(0.0), foreign = moved(0.0), corrected = moved(0.0);
   const std::vector<double> state = first.state();
   CHECK_NOTHROW(again.restore(state));
   CHECK(again.state() == state);
-  CHECK_THROWS_WITH(with_body_at(0.05).prepare(), Contains("overlaps others"));
+  CHECK_THROWS_WITH(foreign.restore({1.0}), Contains("not of this fluid"));
+  CHECK_THROWS_WITH(foreign.step(1e-4), Contains("overlaps another"));
+  CHECK_THROWS_WITH(corrected.prepare(), Contains("overlaps another"));
+  corrected.body(1).position.y = 0.3;
+  CHECK_NOTHROW(corrected.prepare());
+  CHECK(corrected.state() == state);
 }

@@ -258,7 +258,8 @@ class SphFluid:
     skin : over h, how far beyond the support neighbours are searched
     slit_pressure : share of the pressure around it that a film has between faces of boxes or on a plane; see :meth:`add_box`
 
-    Raises ValueError for arguments out of range, RuntimeError from `run` when the fluid blows up.
+    Raises ValueError for arguments out of range and, from `run` and `state`, when particles of fluid overlap others at the beginning,
+    RuntimeError from `run` when the fluid blows up.
 
     >>> water = SphFluid(lattice([0, 0], [0.4, 0.2], 0.02), spacing=0.02, sound_speed=30.0, gravity=[0, -9.81])
     >>> floor = water.add_wall(tank_walls([0, 0], [0.4, 0.2], 0.02))

@@ -161,6 +161,17 @@ def wrong_writers():
         (((0, 0, 0), (1, 1, 1)),), (box, {"block": 99}), (box, {"block": -1}))]
 
 
+def moved_out_of_the_water():
+    fluid = pool((0, -G, 0), (0, 0), (0.2, 0.1), 0.2)
+    body = block((0.1, 0.05, 0), 1.0, (1, 1, 1), plane=True)
+    fluid.addBody(body, dembark.lattice((0.07, 0.02), (0.13, 0.08), DX))
+    said = refusal(O.step)
+    O.bodies[body].state.pos = Vector3(0.1, 0.3, 0)
+    O.step()
+    O.step()
+    return [said, fluid.steps]
+
+
 def messages():
     def go(steps):
         for _ in range(steps):
@@ -178,6 +189,7 @@ def messages():
         return after(lambda fluid: setattr(O, "engines", [*O.engines[:-1], NewtonIntegrator(**words)]))
 
     def put_into_the_water(fluid):
+        fluid.substeps = 10
         sunk = block((0.1, 0.05, 0), 1.0, (1, 1, 1), plane=True)
         fluid.addBody(sunk, dembark.lattice((0.07, 0.02), (0.13, 0.08), DX))
 

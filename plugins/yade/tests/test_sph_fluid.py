@@ -13,7 +13,7 @@ DX, SOUND, G, STEP = 0.02, 25.0, 9.81, 3e-4
 @pytest.fixture(scope="module")
 def found(yade):
     return yade.scenes("falling_plane", "falling_space", "moved", "momentum", "floats_on_substeps", "saved", "written",
-                       "wrong_writers", "messages", script="fluid_scenes.py")
+                       "wrong_writers", "messages", "moved_out_of_the_water", script="fluid_scenes.py")
 
 
 def pool(low, high, top, **options):
@@ -117,11 +117,21 @@ def test_frames_and_rows_can_be_read(found, tmp_path):
     ("no body", "body 99 does not exist"), ("member", "belongs to the clump 2; add that"),
     ("body without particles", "body 2 has no points"), ("pressures", "pressures must be a list of 1 numbers (Pa)"),
     ("stranger", "body 2 is not in the fluid"), ("twice", "body 2 is in the fluid already"), ("late", "the fluid has begun"),
-    ("overlap", "m overlaps others: there are 1."),
+    ("overlap", "m overlaps others: there are 1.92 times as many as in the lattice; leave out fluid where walls and bodies are"),
     ("gravity", "NewtonIntegrator.gravity has changed"), ("no fluid", "there is no fluid"), ("blows up", "the fluid blew up at t =")])
 def test_wrong_input_is_told_in_one_line(found, name, line):
     said = found["messages"][name]
     assert said.startswith("dembark: ") and line in said and "\n" not in said
+
+
+def test_an_overlap_has_nothing_to_do_with_steps(found):
+    assert found["messages"]["overlap"].endswith("give them its spacing")
+
+
+def test_a_body_that_was_in_the_way_can_be_moved(found):
+    """A start that was refused goes on when the body is elsewhere."""
+    said, steps = found["moved_out_of_the_water"]
+    assert "overlaps" in said and steps == 1
 
 
 def test_a_writer_says_what_is_no_box_and_no_body(found):

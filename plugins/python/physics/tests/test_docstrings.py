@@ -10,7 +10,8 @@ import pytest
 
 import dembark.physics
 
-MODULES = [module.name for module in pkgutil.walk_packages(dembark.physics.__path__, "dembark.physics.") if ".tests" not in module.name]
+MODULES = ["dembark.physics", *(module.name for module in pkgutil.walk_packages(dembark.physics.__path__, "dembark.physics.")
+                                if ".tests" not in module.name)]
 
 
 @pytest.mark.parametrize("name", MODULES)

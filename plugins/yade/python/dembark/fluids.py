@@ -31,7 +31,7 @@ def lattice(low, high, spacing):
     return [(x, y, z) for x in axes[0] for y in axes[1] for z in axes[2]]
 
 
-def tank_walls(low, high, spacing, open_top=True, smoothing=1.3):
+def tank_walls(low, high, spacing, *, open_top=True, smoothing=1.3):
     """Points (m) of walls around the box from `low` to `high`, of the lattice that fills the box. Up is the last axis.
 
     There are as many layers as fill the support of a kernel, 2 h, with h of `smoothing` spacings: give that of the fluid.
