@@ -50,15 +50,16 @@ def pose(times: Mapping[str, Array], cube: int, row: int) -> tuple[Array, Array]
             np.array([times[f"cube{cube}_{part}"][row] for part in ("qw", "qx", "qy", "qz")]))
 
 
-def outside(places: Array, velocities: Array, p: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Which particles (n,) are in walls or the floor, deeper than half a spacing, or beyond them, and which have gone over the walls: back
-    in free flight to the plane of the wall they were not lower than its top."""
+def outside(places: Array, velocities: Array, p: Mapping[str, Any], thick: float) -> tuple[Array, Array]:
+    """Which particles (n,) are in walls or the floor, deeper than half a spacing, or beyond them, and which have gone over the walls of
+    thickness `thick` (m): those that are above a wall, or were above its top, back in free flight, at its outer face. Where they were at
+    the inner face that does not tell, for particles bounce on the top."""
     dx, (x, y, z) = p["spacing"], places.T
     half = 0.5 * p["flume_width"]
     beyond = np.stack([y - half, -y - half, x - p["downstream_length"], -x - p["column_length"]])
     speed = np.stack([velocities[:, 1], -velocities[:, 1], velocities[:, 0], -velocities[:, 0]])
-    flying = (beyond > 0.0) & (speed > 0.0)
-    since = np.max(beyond / np.where(flying, speed, 1.0) * flying, axis=0)
+    flying = (beyond > thick) & (speed > 0.0)
+    since = np.max((beyond - thick) / np.where(flying, speed, 1.0) * flying, axis=0)
     crossed = z - velocities[:, 2] * since - 0.5 * p["gravity"] * since**2
     out = (beyond > 0.5 * dx).any(axis=0)
     over = out & (crossed >= p["flume_height"])
@@ -76,7 +77,7 @@ def water(run: Replica) -> dict[str, float]:
         places, now = frame.positions, frame.step * run.time_step
         row = int(np.argmin(np.abs(times["step"] - frame.step)))
         fronts.append((now, float(places[:, 0].max())))
-        through, over = outside(places, frame.velocities, p)
+        through, over = outside(places, frame.velocities, p, run.derived["layers"] * dx)
         found["leaked"] = max(found["leaked"], float(through.sum() + run.derived["grain_count"] - len(frame.ids)))
         found["overtopped"] = max(found["overtopped"], float(over.sum()))
         poses = [pose(times, cube, row) for cube in range(1, count + 1)]

@@ -57,7 +57,7 @@ def run(cubes: str, carried: float = 0.0, late: float = 0.0, jumps: float = 0.0,
         return frame_of(places, 0.5 * SPACING, {}, step=step)
 
     frames = [frame(step) for step in range(STRIDE, 1601, STRIDE)]
-    derived = {"cube_count": count, "stride": STRIDE, "grain_count": min(len(one.ids) for one in frames)}
+    derived = {"cube_count": count, "stride": STRIDE, "grain_count": min(len(one.ids) for one in frames), "layers": 3}
     return SimpleNamespace(parameters=p, derived=derived, time_step=DT, grains=lambda: frames, times=lambda: rows)
 
 
@@ -88,13 +88,25 @@ def test_a_single_run_that_is_random_decides_nothing() -> None:
 
 
 def test_what_goes_over_the_walls_has_not_leaked() -> None:
-    """From the top of a wall, 1 m high, with 2 m/s outwards and 1 m/s upwards; a millimetre lower it is through the wall."""
-    p, t = defaults("dam_break_cubes"), 0.4
+    """From the outer edge of a wall's top, 1 m high, with 2 m/s outwards and 1 m/s upwards; a millimetre lower it is through the wall."""
+    p, t, thick = defaults("dam_break_cubes"), 0.4, 0.075
     v = np.array([[0.3, 2.0, 1.0 - 9.81 * t], [-2.0, 0.3, 1.0 - 9.81 * t], [0.0, 0.0, 0.0]])
     fall = 1.0 * t - 0.5 * 9.81 * t**2
     for drop, found in ((-1e-6, [[False, False, True], [True, True, False]]), (1e-3, [[True, True, True], [False, False, False]])):
-        places = np.array([[1.0, 0.35 + 2.0 * t, 1.0 + fall - drop], [-1.5 - 2.0 * t, 0.0, 1.0 + fall - drop], [1.0, 0.3, -0.05]])
-        np.testing.assert_array_equal(dam.outside(places, v, p), found)
+        height = 1.0 + fall - drop
+        places = np.array([[1.0, 0.35 + thick + 2.0 * t, height], [-1.5 - thick - 2.0 * t, 0.0, height], [1.0, 0.3, -0.05]])
+        np.testing.assert_array_equal(dam.outside(places, v, p, thick), found)
+
+
+def test_what_bounces_on_the_top_of_a_wall_has_not_leaked() -> None:
+    """A particle of a run, above the wall and 0.1 s later: then, back in free flight, it was 0.3 m below the top at the inner face."""
+    p = defaults("dam_break_cubes")
+    places = np.array([[1.247105, 0.370131, 1.050771], [1.210368, 0.4297332, 1.056744]])
+    v = np.array([[-0.86871, 0.696412, -0.583182], [0.333574, 0.435077, 1.07171]])
+    np.testing.assert_array_equal(dam.outside(places, v, p, 0.075), [[False, False], [True, True]])
+    # In the wall, 20 mm below its top, and above the wall's inner half.
+    places = np.array([[1.0, 0.39, 0.98], [1.0, 0.37, 1.01]])
+    np.testing.assert_array_equal(dam.outside(places, 0.0 * v, p, 0.075), [[True, False], [False, True]])
 
 
 def study(last: float, fallen: float = 1.1, standing: float = 0.0) -> dict[str, dict[str, Any]]:
