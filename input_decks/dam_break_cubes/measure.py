@@ -52,15 +52,17 @@ def pose(times: Mapping[str, Array], cube: int, row: int) -> tuple[Array, Array]
 
 def outside(places: Array, velocities: Array, p: Mapping[str, Any], thick: float) -> tuple[Array, Array]:
     """Which particles (n,) are in walls or the floor, deeper than half a spacing, or beyond them, and which have gone over the walls of
-    thickness `thick` (m): those that are above a wall, or were above its top, back in free flight, at its outer face. Where they were at
-    the inner face that does not tell, for particles bounce on the top."""
+    thickness `thick` (m): those that are above a wall, or were not lower than its top, back in free flight, at one of its faces. What
+    bounces on the top was so at the outer one only."""
     dx, (x, y, z) = p["spacing"], places.T
     half = 0.5 * p["flume_width"]
     beyond = np.stack([y - half, -y - half, x - p["downstream_length"], -x - p["column_length"]])
     speed = np.stack([velocities[:, 1], -velocities[:, 1], velocities[:, 0], -velocities[:, 0]])
-    flying = (beyond > thick) & (speed > 0.0)
-    since = np.max((beyond - thick) / np.where(flying, speed, 1.0) * flying, axis=0)
-    crossed = z - velocities[:, 2] * since - 0.5 * p["gravity"] * since**2
+    crossed = np.full(len(z), -np.inf)
+    for face in (0.0, thick):
+        flying = (beyond > face) & (speed > 0.0)
+        since = np.max((beyond - face) / np.where(flying, speed, 1.0) * flying, axis=0)
+        crossed = np.fmax(crossed, z - velocities[:, 2] * since - 0.5 * p["gravity"] * since**2)
     out = (beyond > 0.5 * dx).any(axis=0)
     over = out & (crossed >= p["flume_height"])
     return np.asarray((out | (z < -0.5 * dx)) & ~over), np.asarray(over)

@@ -104,6 +104,9 @@ def test_what_bounces_on_the_top_of_a_wall_has_not_leaked() -> None:
     places = np.array([[1.247105, 0.370131, 1.050771], [1.210368, 0.4297332, 1.056744]])
     v = np.array([[-0.86871, 0.696412, -0.583182], [0.333574, 0.435077, 1.07171]])
     np.testing.assert_array_equal(dam.outside(places, v, p, 0.075), [[False, False], [True, True]])
+    # Past the inner edge of the top by 17 mm, and past the outer one below it by 0.4 mm.
+    skimmed, w = np.array([[2.61688, 0.6475215, 0.7326508]]), np.array([[-0.988949, 1.3141, -2.40614]])
+    np.testing.assert_array_equal(dam.outside(skimmed, w, p, 0.075), [[False], [True]])
     # In the wall, 20 mm below its top, and above the wall's inner half.
     places = np.array([[1.0, 0.39, 0.98], [1.0, 0.37, 1.01]])
     np.testing.assert_array_equal(dam.outside(places, 0.0 * v, p, 0.075), [[True, False], [False, True]])
