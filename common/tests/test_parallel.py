@@ -45,13 +45,15 @@ def test_what_the_function_raises_is_raised_here(count):
 
 @several_cores
 def test_processes_end_with_the_one_that_they_work_for(tmp_path):
+    # A line is one write: print() makes two where Python does not buffer, and the other process may write between them.
     (tmp_path / "script.py").write_text(
         "import os, sys, time\nfrom dembark.common.parallel import mapped\n"
-        "def wait(number):\n    print(os.getpid(), flush=True)\n    time.sleep(60)\n"
+        "def wait(number):\n    os.write(sys.stdout.fileno(), f'{os.getpid()}\\n'.encode())\n    time.sleep(60)\n"
         "if __name__ == '__main__':\n    mapped(wait, range(40))\n")
     with subprocess.Popen([sys.executable, "script.py"], cwd=tmp_path, stdout=subprocess.PIPE, text=True) as started:
-        workers = [int(started.stdout.readline()) for _ in range(2)]
+        lines = [started.stdout.readline() for _ in range(2)]
         started.send_signal(signal.SIGKILL)
+    workers = [int(line) for line in lines]
     for _ in range(100):
         left = [one for one in workers if pathlib.Path(f"/proc/{one}").exists()]
         if not left:

@@ -20,8 +20,8 @@ HERE = Path(__file__).parent
 FIELDS = ("unit", "evidence", "tolerance", "absolute", "agreement", "compared", "why", "source")
 
 
-def _cases() -> Iterable[Case]:
-    return (load(path) for path in sorted(package_root().glob("*/case.toml")))
+def _cases() -> list[Case]:
+    return [load(path) for path in sorted(package_root().glob("*/case.toml"))]
 
 
 def quantities() -> list[tuple[str, ...]]:
