@@ -13,6 +13,8 @@ import matplotlib
 import numpy as np
 from markupsafe import Markup, escape
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import text_to_path
 from matplotlib.ticker import NullLocator
 
 from dembark.postproc.pictures import saved
@@ -79,7 +81,30 @@ def subscripts(text: str) -> Markup:
     return Markup(_SUBSCRIPT.sub(r"\1<sub>\2</sub>", str(escape(text))).replace(" %", "\N{NO-BREAK SPACE}%"))
 
 
+def text_width(text: str, points: float, weight: str = "normal") -> float:
+    """Width in inches of a line in letters of `points`."""
+    width, _, _ = text_to_path.get_text_width_height_descent(text, FontProperties(size=points, weight=weight), ismath=False)
+    return float(width) / 72.0
+
+
+def text_lines(text: str, inches: float, points: float, weight: str = "normal") -> list[str]:
+    """`text` in lines that are not wider than `inches`, but for a single word that is."""
+    found: list[str] = []
+    for word in text.split():
+        longer = f"{found[-1]} {word}" if found else word
+        found[-1:] = [longer] if found and text_width(longer, points, weight) <= inches else [*found[-1:], word]
+    return found
+
+
+def shortened(text: str, inches: float, points: float, weight: str = "normal") -> str:
+    """As many words of `text` as fit into `inches`, with an ellipsis for the others."""
+    if text_width(text, points, weight) <= inches:
+        return text
+    return text_lines(text, inches - text_width(" …", points, weight), points, weight)[0] + " …"
+
+
 Curves = Mapping[str, Sequence[Mapping[str, Any]]]
+Entries = Sequence[tuple[str, Mapping[str, Any]]]
 
 
 def profile_names(profiles: Curves) -> list[str]:
@@ -89,25 +114,34 @@ def profile_names(profiles: Curves) -> list[str]:
     return sorted(ordered, key=lambda name: every[name].get("reference") is None)
 
 
+def of_name(profiles: Curves, name: str) -> Entries:
+    """The engines that have a profile of this name, with it."""
+    return [(engine, one) for engine, of_engine in profiles.items() for one in of_engine if one["name"] == name]
+
+
 def profile_figure(profiles: Curves, names: Sequence[str], columns: int = 2) -> Figure:
     """Profiles by name in one figure, the engines over the reference; `profiles` holds each engine's list."""
-    rows = math.ceil(len(names) / columns)
+    return panels_figure([of_name(profiles, name) for name in names], columns)
+
+
+def panels_figure(panels: Sequence[Entries], columns: int = 2) -> Figure:
+    """A figure with a panel for each of `panels`, which are profiles with their engines."""
+    rows = math.ceil(len(panels) / columns)
     tall = 1.95 * rows + 0.3
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, tall))
         # Fixed margins: long titles must not make the panels narrow.
         figure.subplots_adjust(left=0.09, right=0.99, bottom=0.66 / tall, top=1.0 - 0.32 / tall, wspace=0.25, hspace=0.62)
         handles: dict[str, Any] = {}
-        for number, name in enumerate(names):
-            axes = figure.add_subplot(rows, columns, number + 1)
-            _panel(axes, [(engine, one) for engine, of_engine in profiles.items() for one in of_engine if one["name"] == name], handles)
+        for number, entries in enumerate(panels):
+            _panel(figure.add_subplot(rows, columns, number + 1), entries, handles)
         # In one row, however many engines there are: a second one would lie over the panels.
         count = len(handles)
         figure.legend(handles.values(), handles.keys(), loc="lower center", ncols=max(4, count), fontsize=min(7.5, 34.0 / max(1, count)))
     return figure
 
 
-def _panel(axes: Any, entries: Sequence[tuple[str, Mapping[str, Any]]], handles: dict[str, Any]) -> None:
+def _panel(axes: Any, entries: Entries, handles: dict[str, Any]) -> None:
     first = entries[0][1]
     upward = first["vertical"]
     for number, (engine, one) in enumerate(entries):
@@ -133,18 +167,21 @@ def _panel(axes: Any, entries: Sequence[tuple[str, Mapping[str, Any]]], handles:
         below = 1.0 - number / max(1, len(entries) - 1)
         handles.setdefault(engine_name(engine),
                            line(_numbers(one["value"]), color=paint, linewidth=0.9 + 1.5 * below, alpha=0.6 if below else 1.0))
-    across, along = symbols(first["across"]), symbols(first["along"])
-    axes.set(**({"xlabel": across, "ylabel": along} if upward else {"xlabel": along, "ylabel": across}))
+    wide, high = axes.get_position().width * WIDE, axes.get_position().height * axes.figure.get_figheight()
+    beneath, aside = (first["across"], first["along"]) if upward else (first["along"], first["across"])
+    first_line, *others = text_lines(aside, high, 7.5) or [""]
+    axes.set(xlabel=symbols(shortened(beneath, wide, 7.5)),
+             ylabel=symbols("\n".join([first_line, *([shortened(" ".join(others), high, 7.5)] if others else [])])))
     labels = sorted({one["reference_label"] for _, one in entries if one.get("reference_label")})
     note = "; ".join([f"reference: {', '.join(labels)}"] * bool(labels) + [first["note"]] * bool(first.get("note")))
-    axes.set_title(_clipped(first["title"], 58), pad=10)
-    axes.text(0.0, 1.015, symbols(_clipped(note, 92)), transform=axes.transAxes, fontsize=5.8, color="#666c75", va="bottom")
+    axes.set_title(shortened(first["title"], wide, 8.5, "bold"), pad=10)
+    axes.text(0.0, 1.015, symbols(shortened(note, wide, 5.8)), transform=axes.transAxes, fontsize=5.8, color="#666c75", va="bottom")
     if upward:
         axes.set_ylim(bottom=0.0)
         axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
     else:
-        low, high = axes.get_ylim()
-        axes.set_ylim(min(0.0, low), high + 0.05 * (high - low))
+        bottom, top = axes.get_ylim()
+        axes.set_ylim(min(0.0, bottom), top + 0.05 * (top - bottom))
 
 
 def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
@@ -152,10 +189,6 @@ def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
     values, others = (_numbers(each.get("reference") or []) for each in (one, other))
     return len(values) == len(others) and bool(np.allclose(values, others, rtol=1e-3, atol=1e-3 * np.nanmax(np.abs(others)),
                                                            equal_nan=True))
-
-
-def _clipped(text: str, length: int) -> str:
-    return text if len(text) <= length else text[: length - 1].rsplit(" ", 1)[0] + " …"
 
 
 def _numbers(values: Sequence[float | None]) -> np.ndarray[Any, Any]:

@@ -16,12 +16,13 @@ from matplotlib.ticker import NullFormatter
 from dembark.postproc.statistics import Scatter, scatter
 from dembark.postproc.style import STYLE
 from dembark.validation.judge.result import QuantityRecord
-from dembark.validation.report.figures import INK, WIDE, look, symbols
+from dembark.validation.report.figures import INK, WIDE, look, shortened, symbols, text_width
 from dembark.validation.report.gather import Row
 
 KINDS = ("experiment", "theory")
 # Lines that fit on the first pages; the others are in the table beside the report.
 LINES = 24
+_LETTERS = 5.8  # points, of the lines' names
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,9 @@ def figure(found: Sequence[Point], tolerance: float = 0.10) -> Figure | None:
                     statistics([one for one in found if one.engine == engine]))
         spread = max(1.3 * tolerance, 1.15 * max(abs(one.ratio - 1.0) + one.half for one in drawn))
         right.set(xlim=(max(0.0, 1.0 - spread), 1.0 + spread), ylim=(len(shown) + 0.6, 0.4), xlabel="measured / reference", title="Ratio")
-        right.set_yticks(range(1, len(shown) + 1), [_label(number[line], line) for line in shown], fontsize=5.8)
+        # Between the panels, beside the last number of the left one's axis.
+        room = (0.76 - 0.085) * WIDE - 2.3 - 0.2
+        right.set_yticks(range(1, len(shown) + 1), [_label(number[line], line, room) for line in shown], fontsize=_LETTERS)
         right.tick_params(axis="y", length=0)
         right.hlines(range(1, len(shown) + 1), *right.get_xlim(), color="#e3e6ea", linewidth=0.4, zorder=0)
         handles = right.get_legend_handles_labels()
@@ -129,9 +132,9 @@ def kinds(found: Iterable[Point]) -> str:
     return ", ".join(f"{counts[kind]} of {kind}" for kind in KINDS if counts[kind])
 
 
-def _label(number: int, line: tuple[str, str]) -> str:
-    text = f"{line[0]}: {line[1]}"
-    return symbols(f"{text if len(text) <= 62 else text[:60].rsplit(' ', 1)[0] + ' …'}  {number}")
+def _label(number: int, line: tuple[str, str], inches: float) -> str:
+    end = f"  {number}"
+    return symbols(shortened(f"{line[0]}: {line[1]}", inches - text_width(end, _LETTERS), _LETTERS) + end)
 
 
 def _engine(left: Any, right: Any, engine: str, place: int, found: Sequence[Point], number: dict[tuple[str, str], int], engines: int,

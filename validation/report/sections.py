@@ -23,8 +23,9 @@ from dembark.validation.report.figures import engine_name
 from dembark.validation.report.gather import Gathered, Page, Row, beside
 
 # Of a case in the PDF: variants with figures, panels of a figure, and rows of one quantity before only the worst is shown. Of the first
-# variant all main figures are printed, of others and of studies one.
+# variant all main figures are printed, of others none, and of each study PANELS panels.
 VARIANTS, PANELS, ROWS = 1, 2, 4
+_PANELS_OF_STUDIES = 6  # in one figure, which is then half a page
 
 
 @dataclass(frozen=True)
@@ -130,18 +131,17 @@ def sections(gathered: Gathered, folder: Path) -> list[Section]:
     for page, (shown, wrong) in zip(gathered.pages, drawn, strict=True):
         page.missing += wrong
         of_case.setdefault(page.case, []).append((page, shown))
-    return [_section(gathered, case, of_page) for case, of_page in of_case.items()]
+    return [_section(gathered, case, of_page, folder) for case, of_page in of_case.items()]
 
 
-def _section(gathered: Gathered, name: str, of_page: list[tuple[Page, list[Shown]]]) -> Section:
+def _section(gathered: Gathered, name: str, of_page: list[tuple[Page, list[Shown]]], folder: Path) -> Section:
     pages = [page for page, _ in of_page]
     rows = [row for page in pages for row in page.rows()]
     known = gathered.cases.get(name)
     parts = [_part(page, pages, shown) for page, shown in of_page]
     variants = [part for part in parts if not part.page.is_study]
-    printed = [[one for one in part.figures if one.printed]
-               for part in (*variants[:VARIANTS], *(part for part in parts if part.page.is_study))]
-    main = [one for number, found in enumerate(printed) for one in (found[:1] if number else found)]
+    main = [one for part in variants[:VARIANTS] for one in part.figures if one.printed]
+    main += _studies(name, [page for page in pages if page.is_study], folder)
     engines, others = ([row for row in rows if isinstance(row.record, ComparedRecord) is compared] for compared in (True, False))
     kinds = {kind: [row for row in others if row.record.evidence == kind] for kind in ("identity", "code")}
     lines = [line(kinds["identity"], "Identities"), line(engines, "Comparison of the engines"), line(kinds["code"], "Other codes")]
@@ -184,11 +184,10 @@ def _figures(page: Page, folder: Path) -> tuple[list[Shown], list[str]]:
 
 def _profiles(page: Page, folder: Path) -> list[Shown]:
     """The profiles of a page as figures of PANELS panels; the first is a main one. Their data are written beside the report."""
-    curves = {engine: one.profiles for engine, one in sorted(page.results.items()) if one.profiles}
+    curves = _curves(page)
     names = figures.profile_names(curves)
     for name in names:
-        of_engine = {engine: one for engine, found in curves.items() for one in found if one["name"] == name}
-        figures.write_csv(folder / f"{page.anchor}-{name}.csv", *figures.profile_table(of_engine))
+        figures.write_csv(folder / f"{page.anchor}-{name}.csv", *figures.profile_table(dict(figures.of_name(curves, name))))
     found = []
     for start in range(0, len(names), PANELS):
         chosen = names[start : start + PANELS]
@@ -197,6 +196,23 @@ def _profiles(page: Page, folder: Path) -> list[Shown]:
                            f"{page.name}: engines over the reference; bands: 95 % intervals over replicas, where there are several.",
                            [f"{page.anchor}-{name}.csv" for name in chosen], main=not start))
     return found
+
+
+def _studies(case: str, pages: Iterable[Page], folder: Path) -> list[Shown]:
+    """The first PANELS profiles of each study of a case in one figure, for the PDF."""
+    panels = []
+    for page in pages:
+        curves, study = _curves(page), page.words.removeprefix("study ")
+        panels += [[(engine, {**one, "title": f"{study}: {one['title']}"}) for engine, one in figures.of_name(curves, name)]
+                   for name in figures.profile_names(curves)[:PANELS]]
+    together = [panels[start : start + _PANELS_OF_STUDIES] for start in range(0, len(panels), _PANELS_OF_STUDIES)]
+    return [embed(figures.panels_figure(some), folder, f"{case}-studies-{number}",
+                  f"{case.replace('_', ' ')}, studies; bands: 95 % intervals over replicas, where there are several.")
+            for number, some in enumerate(together, start=1)]
+
+
+def _curves(page: Page) -> figures.Curves:
+    return {engine: one.profiles for engine, one in sorted(page.results.items()) if one.profiles}
 
 
 def _look(engine: str) -> Look:
