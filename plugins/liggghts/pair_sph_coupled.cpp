@@ -357,10 +357,6 @@ void PairSphCoupled::repel() {
   const double mass = settings_.mass(), solid = mass / settings_.state.density;
   lost_.contact = 0.0;
   with_kernel(settings_, [&](const auto &kernel) {
-    const auto each = [&](const Rows &rows, const auto &work) {
-      for (int i = rows.begin; i < rows.end; ++i)
-        for (int k = rows.start[i]; k < rows.start[i + 1] && rows.neighbour[k] != none; ++k) work(i, rows.neighbour[k]);
-    };
     // Of the fluid particle.
     const auto acceleration = [&](int fluid, int other, double &r, double &volumes) {
       const Vector d = vector(atom->x[fluid]) - vector(atom->x[other]);
@@ -369,12 +365,12 @@ void PairSphCoupled::repel() {
       return (contact_factor(settings_.contact, kernel, r, volumes, numbers_.at_spacing) / mass) * d;
     };
     double r, volumes;
-    each(rows_.repelling_fluid, [&](int i, int j) {
+    rows_.repelling_fluid.each(none, [&](int i, int j) {
       const Vector a = acceleration(i, j, r, volumes);
       sum_[i] = {sum_[i].x + a.x, sum_[i].y + a.y, sum_[i].z + a.z, 0.0};
       lost_.contact += contact_energy(settings_.contact, kernel, r, volumes, numbers_.at_spacing);
     });
-    each(rows_.fluid_of_repelling, [&](int j, int i) {
+    rows_.fluid_of_repelling.each(none, [&](int j, int i) {
       const Vector a = acceleration(i, j, r, volumes);
       sum_[j] = {sum_[j].x - a.x, sum_[j].y - a.y, sum_[j].z - a.z, 0.0};
     });

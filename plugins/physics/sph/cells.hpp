@@ -126,6 +126,12 @@ struct Rows {
     while (neighbour.size() % 4 != 0) neighbour.push_back(none);
     start.push_back(int(neighbour.size()));
   }
+  /// Calls work(i, j) for each particle i and each of its neighbours j; none: what the rows were filled up with.
+  template <class Work>
+  void each(int none, const Work& work) const {
+    for (int i = begin; i < end; ++i)
+      for (int k = start[i - begin]; k < start[i - begin + 1] && neighbour[k] != none; ++k) work(i, neighbour[k]);
+  }
 };
 
 /// Appends those of points[from] ... points[to - 1] that lie within the reach of p; map, if any: their numbers.

@@ -45,16 +45,14 @@ class Crowding {
   template <class Own, class Other>
   void add(const Rows& rows, int none, bool mutual, const Own& own, const Other& other) {
     with_kernel(settings_, [&](const auto& kernel) {
-      for (int i = rows.begin; i < rows.end; ++i)
-        for (int k = rows.start[i - rows.begin]; k < rows.start[i - rows.begin + 1] && rows.neighbour[k] != none; ++k) {
-          const int j = rows.neighbour[k];
-          const double r = norm(own(i) - other(j)), weight = kernel.value(r);
-          weight_[std::size_t(i)] += weight;
-          if (mutual) weight_[std::size_t(j)] += weight;
-          if (!(r < nearest_)) continue;
-          nearest_ = r;
-          of_nearest_ = i;
-        }
+      rows.each(none, [&](int i, int j) {
+        const double r = norm(own(i) - other(j)), weight = kernel.value(r);
+        weight_[std::size_t(i)] += weight;
+        if (mutual) weight_[std::size_t(j)] += weight;
+        if (!(r < nearest_)) return;
+        nearest_ = r;
+        of_nearest_ = i;
+      });
     });
   }
 

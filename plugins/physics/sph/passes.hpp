@@ -213,27 +213,22 @@ class Passes {
     const double mass = s.mass(), solid = mass / s.state.density;
     parts_.assign(set.of_fluid.size(), 0.0);
     parallel_for(int(set.of_fluid.size()), s.threads, [&](int b) {
-      const Rows& rows = set.of_fluid[b];
-      for (int i = rows.begin; i < rows.end; ++i)
-        for (int k = rows.start[i - rows.begin]; k < rows.start[i - rows.begin + 1] && rows.neighbour[k] < set.size(); ++k) {
-          const Vector d = fluid.position[i] - set.position[rows.neighbour[k]];
-          const double r = norm(d), volumes = solid * mass / fluid.density[i];
-          const Vector a = (contact_factor(s.contact, kernel, r, volumes, numbers_.at_spacing) / mass) * d;
-          sum_[i] = {sum_[i].x + a.x, sum_[i].y + a.y, sum_[i].z + a.z, 0.0};
-          parts_[b] += contact_energy(s.contact, kernel, r, volumes, numbers_.at_spacing);
-        }
+      set.of_fluid[b].each(set.size(), [&](int i, int j) {
+        const Vector d = fluid.position[i] - set.position[j];
+        const double r = norm(d), volumes = solid * mass / fluid.density[i];
+        const Vector a = (contact_factor(s.contact, kernel, r, volumes, numbers_.at_spacing) / mass) * d;
+        sum_[i] = {sum_[i].x + a.x, sum_[i].y + a.y, sum_[i].z + a.z, 0.0};
+        parts_[b] += contact_energy(s.contact, kernel, r, volumes, numbers_.at_spacing);
+      });
     });
     set.sum.assign(set.sum.size(), Quad{});
     parallel_for(int(set.near_fluid.size()), s.threads, [&](int b) {
-      const Rows& rows = set.near_fluid[b];
-      for (int j = rows.begin; j < rows.end; ++j)
-        for (int k = rows.start[j - rows.begin]; k < rows.start[j - rows.begin + 1] && rows.neighbour[k] < fluid.size(); ++k) {
-          const int i = rows.neighbour[k];
-          const Vector d = fluid.position[i] - set.position[j];
-          const double volumes = solid * mass / fluid.density[i];
-          const Vector a = (contact_factor(s.contact, kernel, norm(d), volumes, numbers_.at_spacing) / mass) * d;
-          set.sum[j] = {set.sum[j].x - a.x, set.sum[j].y - a.y, set.sum[j].z - a.z, 0.0};
-        }
+      set.near_fluid[b].each(fluid.size(), [&](int j, int i) {
+        const Vector d = fluid.position[i] - set.position[j];
+        const double volumes = solid * mass / fluid.density[i];
+        const Vector a = (contact_factor(s.contact, kernel, norm(d), volumes, numbers_.at_spacing) / mass) * d;
+        set.sum[j] = {set.sum[j].x - a.x, set.sum[j].y - a.y, set.sum[j].z - a.z, 0.0};
+      });
     });
     return added(set.of_fluid.size());
   }
