@@ -63,7 +63,7 @@ PairSphCoupled::~PairSphCoupled() {
 
 PairSphCoupled *PairSphCoupled::find(Force *force) { return dynamic_cast<PairSphCoupled *>(force->pair_match("sph/coupled", 1)); }
 
-void PairSphCoupled::refuse(const std::string &what) {
+void PairSphCoupled::refuse(const std::string &what) const {
   error->all(FLERR, ("Pair sph/coupled: " + what).c_str());
   std::abort();  // all() does not return
 }
@@ -128,9 +128,10 @@ void PairSphCoupled::find_gravity() {
     double g[3];
     found->get_gravity(g);
     gravity = vector(g);
+    bool outside = false;
     for (int i = 0; i < atom->nlocal; ++i)
-      if ((atom->mask[i] & fluid_fix_->groupbit) && !(atom->mask[i] & found->groupbit))
-        error->one(FLERR, "Pair sph/coupled: the group of fix gravity must hold the whole fluid");
+      outside = outside || ((atom->mask[i] & fluid_fix_->groupbit) && !(atom->mask[i] & found->groupbit));
+    refuse_if_any(outside ? "the group of fix gravity must hold the whole fluid" : "");
   }
   settings_.gravity = gravity;
 }
@@ -141,8 +142,8 @@ void PairSphCoupled::begin(bool first) {
            dembark::keywords::text(update->dt) + " s");
   find_gravity();
   sort_particles();
-  check_atoms();
-  if (first) check_room();
+  refuse_if_any(wrong_atom());
+  if (first) refuse_if_any(overlap());
   for (int i = 0; i < atom->nlocal + atom->nghost; ++i) {
     if (role_[i] != SphRole::fluid && settings_.boundary == Boundary::dynamic && atom->rho[i] < settings_.state.density)
       atom->rho[i] = settings_.state.density;
@@ -150,41 +151,53 @@ void PairSphCoupled::begin(bool first) {
   }
 }
 
-void PairSphCoupled::refuse_atom(int i, const std::string &what) {
-  error->one(FLERR, ("Pair sph/coupled: atom " + std::to_string(atom->tag[i]) + " " + what).c_str());
+/// Ends the run with the line of the lowest rank that has one. Collective: what one rank prints alone may land within a line of another.
+void PairSphCoupled::refuse_if_any(const std::string &line) const {
+  int first = line.empty() ? comm->nprocs : comm->me;
+  MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_INT, MPI_MIN, world);
+  if (first == comm->nprocs) return;
+  char shown[512] = {};
+  if (comm->me == first) snprintf(shown, sizeof shown, "%s", line.c_str());
+  MPI_Bcast(shown, sizeof shown, MPI_CHAR, first, world);
+  refuse(shown);
 }
 
-/// Whether particles overlap that were created so.
-void PairSphCoupled::check_room() {
+/// What is wrong with the first atom of which something is; "": nothing.
+std::string PairSphCoupled::wrong_atom() const {
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (const std::string wrong = wrong_with(i); !wrong.empty()) return "atom " + std::to_string(atom->tag[i]) + " " + wrong;
+  return "";
+}
+
+std::string PairSphCoupled::wrong_with(int i) const {
+  using dembark::keywords::text;
+  const double due = settings_.mass();
+  int groups = role_[i] == SphRole::fluid;
+  for (const FixSphBody *solid : solids_) groups += (atom->mask[i] & solid->groupbit) != 0;
+  if (groups > 1) return "is in two groups of the fixes nve/sph/coupled, sph/wall and sph/body; it can be in one";
+  if (groups == 0 && setflag[atom->type[i]][atom->type[i]])
+    return "is in no group of the fixes nve/sph/coupled, sph/wall and sph/body; give it to one, or leave its type out of pair_coeff";
+  if (groups > 0 && settings_.dimension == 2 && !(std::fabs(atom->x[i][2]) <= 1e-6 * settings_.spacing))
+    return "is at z = " + text(atom->x[i][2]) + " m; in the plane all are at z = 0, one layer of the lattice";
+  if (role_[i] != SphRole::fluid) return "";
+  const double mass = atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
+  if (!(std::fabs(mass - due) <= 1e-6 * due))
+    return "of the fluid has the mass " + text(mass) + " kg where density * spacing^" + std::to_string(settings_.dimension) + " is " +
+           text(due) + " kg" + (atom->rmass ? "; set it by set group ... mass" : "; set it by mass TYPE ...");
+  if (!(atom->rho[i] > 0.0) || std::isinf(atom->rho[i]))
+    return "of the fluid has the density " + text(atom->rho[i]) + " kg/m^3; set it by set group ... meso_rho";
+  return "";
+}
+
+/// Which particle overlaps others that were created so; "": none.
+std::string PairSphCoupled::overlap() const {
   const auto place = [this](int i) { return vector(atom->x[i]); };
   Crowding crowding(settings_, std::size_t(atom->nlocal));
   const int none = int(role_.size());
   crowding.add(rows_.inner, none, true, place, place);
   for (const Rows *rows : {&rows_.border, &rows_.of_fluid, &rows_.repelling_fluid}) crowding.add(*rows, none, false, place, place);
   const int worst = crowding.worst();
-  if (worst >= 0) refuse_atom(worst, "of the fluid " + crowding.line(worst));
-}
-
-void PairSphCoupled::check_atoms() {
-  const double due = settings_.mass();
-  for (int i = 0; i < atom->nlocal; ++i) {
-    int groups = role_[i] == SphRole::fluid;
-    for (const FixSphBody *solid : solids_) groups += (atom->mask[i] & solid->groupbit) != 0;
-    if (groups > 1) refuse_atom(i, "is in two groups of the fixes nve/sph/coupled, sph/wall and sph/body; it can be in one");
-    if (groups == 0 && setflag[atom->type[i]][atom->type[i]])
-      refuse_atom(
-          i, "is in no group of the fixes nve/sph/coupled, sph/wall and sph/body; give it to one, or leave its type out of pair_coeff");
-    if (groups > 0 && settings_.dimension == 2 && !(std::fabs(atom->x[i][2]) <= 1e-6 * settings_.spacing))
-      refuse_atom(i, "is at z = " + dembark::keywords::text(atom->x[i][2]) + " m; in the plane all are at z = 0, one layer of the lattice");
-    if (role_[i] != SphRole::fluid) continue;
-    const double mass = atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
-    if (!(std::fabs(mass - due) <= 1e-6 * due))
-      refuse_atom(i, "of the fluid has the mass " + dembark::keywords::text(mass) + " kg where density * spacing^" +
-                         std::to_string(settings_.dimension) + " is " + dembark::keywords::text(due) + " kg" +
-                         (atom->rmass ? "; set it by set group ... mass" : "; set it by mass TYPE ..."));
-    if (!(atom->rho[i] > 0.0) || std::isinf(atom->rho[i]))
-      refuse_atom(i, "of the fluid has the density " + dembark::keywords::text(atom->rho[i]) + " kg/m^3; set it by set group ... meso_rho");
-  }
+  return worst < 0 ? "" : "atom " + std::to_string(atom->tag[worst]) + " of the fluid " + crowding.line(worst);
 }
 
 /// After each search of neighbours.

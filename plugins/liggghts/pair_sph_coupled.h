@@ -51,12 +51,13 @@ class PairSphCoupled : public Pair {
   dembark::sph::Energies energies() const;
 
  private:
-  [[noreturn]] void refuse(const std::string &what);
+  [[noreturn]] void refuse(const std::string &what) const;
   void read(const std::vector<std::string> &words);
-  void refuse_atom(int i, const std::string &what);
+  void refuse_if_any(const std::string &line) const;
   void find_gravity();
-  void check_atoms();
-  void check_room();
+  std::string wrong_atom() const;
+  std::string wrong_with(int i) const;
+  std::string overlap() const;
   void sort_particles();
   void resize();
   dembark::sph::LoopArguments arguments(const dembark::sph::Rows &rows);

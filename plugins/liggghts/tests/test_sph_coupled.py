@@ -128,6 +128,16 @@ def test_says_what_is_wrong(name: str, tmp_path: Path) -> None:
     assert done.code != 0 and message in done.error, done.error or done.output[-800:]
 
 
+@pytest.mark.parametrize("name", ["mass", "two groups", "weight", "overlap"])
+def test_what_one_rank_finds_wrong_is_a_line_of_its_own(name: str, tmp_path: Path) -> None:
+    """Which lands within a line of another rank, and after it the words of the launcher, if that rank ends the run by itself."""
+    old, new, message = REFUSED[name]
+    done = run_deck(tmp_path, deck(SCENES["dam"], 2, ranks=2, changes=((old, new),)), ranks=2)
+    lines = [line for line in done.output.splitlines() if message in line]
+    assert len(lines) == 1 and lines[0].startswith("ERROR: Pair sph/coupled: "), done.output[-800:]
+    assert done.code != 0 and "MPI_ABORT" not in done.output + done.error
+
+
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_overlaps_are_told_at_the_first_run_only(ranks: int, tmp_path: Path) -> None:
     """Fluid that was put on a block is refused; states that the fluid has reached are not: a later run, and one from a state file."""
