@@ -20,6 +20,9 @@ _DUMPS = {"grains": "ATOMS", "contacts": "ENTRIES"}
 # Signals by which a user, a scheduler or the system ends what is sound; the others are faults of the engine.
 _STOPPED = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGXCPU)
 
+# It may stand anywhere in a line, for ranks write as they like.
+_OF_ONE_RANK = re.compile(r"ERROR on proc \d+: ")
+
 
 def check_room(run: Run, folder: Path) -> None:
     """RunError when the disk of `folder` has less room than the output of `run` will need by a rough estimate."""
@@ -44,9 +47,11 @@ def _tail(log: Path, size: int = 20000) -> list[str]:
 
 def reason(lines: list[str]) -> str:
     """The engine's message about what went wrong: the last line that looks like an error, else its last line."""
-    told = re.compile(r"^\s*(?:dembark: (?!steps|finished|resumed|integration)|ERROR|\w*(?:Error|Exception)\b.*|.*[Nn]o space left)")
+    told = re.compile(r"^(?:dembark: (?!steps|finished|resumed|integration)|ERROR|\w*(?:Error|Exception)\b.*|.*[Nn]o space left)"
+                      f"|{_OF_ONE_RANK.pattern}")
     spoken = [line.strip() for line in lines if line.strip()]
-    return next((line for line in reversed(spoken) if told.match(line)), f"its last line: {spoken[-1]}" if spoken else "it printed nothing")
+    found = ((told.search(line), line) for line in reversed(spoken))
+    return next((line[one.start():] for one, line in found if one), f"its last line: {spoken[-1]}" if spoken else "it printed nothing")
 
 
 def judge(run: Run, code: int, parser: OutputParser, work: Path) -> None:
@@ -62,7 +67,9 @@ def judge(run: Run, code: int, parser: OutputParser, work: Path) -> None:
         hint = "by hand or because memory ran out" if number == signal.SIGKILL else ""
         kind = Killed if number in _STOPPED else RunError
         raise kind(f"the engine was killed by {signal.Signals(number).name} {where}", hint)
-    if stop_message and not parser.finished and any(line.startswith(stop_message) for line in lines):
+    # With an error of one rank the launcher sends the others the signal to stop.
+    faulty = any(_OF_ONE_RANK.search(line) for line in lines)
+    if stop_message and not parser.finished and not faulty and any(stop_message in line for line in lines):
         raise Killed(f"the engine was asked to stop {where}")
     if code:
         raise RunError(f"the engine ended with exit code {code} {where}", reason(lines))

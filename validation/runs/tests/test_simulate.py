@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
 
-from dembark.common.errors import DembarkError, Interrupted, RunError
+from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import read_json
 from dembark.validation import engines
 from dembark.validation.case import deck, folders
@@ -117,6 +117,7 @@ def test_a_finished_run_is_not_repeated_unless_an_input_changes(tmp_path: Path, 
 
 @pytest.mark.parametrize(("behaviour", "words"), [
     ("exit", ["exit code 1", "at step 50 of 100", "Lost atoms"]),
+    ("abort", ["exit code 1", "at step 50 of 100", ", ERROR on proc 1: atoms 3 and 4 have the same centre"]),
     ("kill", ["killed by SIGKILL", "at step 50"]),
     ("full", ["disk is full"]),
     ("truncate", ["grains.dump is truncated"]),
@@ -131,6 +132,7 @@ def test_failures_are_told_in_one_line_and_leave_earlier_results(tmp_path: Path,
     with pytest.raises(RunError) as caught:
         run(out, behaviour=behaviour)
     message, log = str(caught.value), out / "failed" / "replica-1.log"
+    assert isinstance(caught.value, Killed) == (behaviour == "kill")
     assert "\n" not in message and str(log) in message and message.startswith("box dry liggghts 1 failed")
     for word in words:
         assert word in message
