@@ -162,7 +162,7 @@ void PairSphCoupled::refuse_if_any(const std::string &line) const {
   refuse(shown);
 }
 
-/// What is wrong with the first atom of which something is; "": nothing.
+/// What is wrong with the first faulty atom of this rank; "": nothing.
 std::string PairSphCoupled::wrong_atom() const {
   for (int i = 0; i < atom->nlocal; ++i)
     if (const std::string wrong = wrong_with(i); !wrong.empty()) return "atom " + std::to_string(atom->tag[i]) + " " + wrong;
@@ -189,7 +189,7 @@ std::string PairSphCoupled::wrong_with(int i) const {
   return "";
 }
 
-/// Which particle overlaps others that were created so; "": none.
+/// Which particle of this rank was created where others are; "": none.
 std::string PairSphCoupled::overlap() const {
   const auto place = [this](int i) { return vector(atom->x[i]); };
   Crowding crowding(settings_, std::size_t(atom->nlocal));

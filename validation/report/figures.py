@@ -82,9 +82,10 @@ def subscripts(text: str) -> Markup:
 
 
 def text_width(text: str, points: float, weight: str = "normal") -> float:
-    """Width in inches of a line in letters of `points`."""
+    """Width in inches of a line in letters of `points`; symbols() makes it no wider."""
     width, _, _ = text_to_path.get_text_width_height_descent(text, FontProperties(size=points, weight=weight), ismath=False)
-    return float(width) / 72.0
+    # Small letters that are fitted to dots are up to a hundredth wider.
+    return 1.02 * float(width) / 72.0
 
 
 def text_lines(text: str, inches: float, points: float, weight: str = "normal") -> list[str]:
@@ -97,10 +98,11 @@ def text_lines(text: str, inches: float, points: float, weight: str = "normal") 
 
 
 def shortened(text: str, inches: float, points: float, weight: str = "normal") -> str:
-    """As many words of `text` as fit into `inches`, with an ellipsis for the others."""
+    """As many words of `text` as fit into `inches`, but one at least, with an ellipsis for the others."""
     if text_width(text, points, weight) <= inches:
         return text
-    return text_lines(text, inches - text_width(" …", points, weight), points, weight)[0] + " …"
+    first, *others = text_lines(text, inches - text_width(" …", points, weight), points, weight)
+    return f"{first} …" if others else text
 
 
 Curves = Mapping[str, Sequence[Mapping[str, Any]]]
@@ -131,7 +133,7 @@ def panels_figure(panels: Sequence[Entries], columns: int = 2) -> Figure:
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, tall))
         # Fixed margins: long titles must not make the panels narrow.
-        figure.subplots_adjust(left=0.09, right=0.99, bottom=0.66 / tall, top=1.0 - 0.32 / tall, wspace=0.25, hspace=0.62)
+        figure.subplots_adjust(left=0.115, right=0.99, bottom=0.66 / tall, top=1.0 - 0.32 / tall, wspace=0.3, hspace=0.62)
         handles: dict[str, Any] = {}
         for number, entries in enumerate(panels):
             _panel(figure.add_subplot(rows, columns, number + 1), entries, handles)
@@ -153,8 +155,8 @@ def _panel(axes: Any, entries: Entries, handles: dict[str, Any]) -> None:
         if one.get("reference") is not None:
             same = all(_same(other, one) for _, other in entries)
             if not same or not number:
-                shown = "reference" if same else f"reference ({engine_name(engine)})"
                 measured, ink = one.get("reference_low") is not None, INK if same else paint
+                shown = ("reference with interval" if measured else "reference") + ("" if same else f" ({engine_name(engine)})")
                 style = {"marker": "o", "markersize": 2.5, "linestyle": "none"} if measured else {"linestyle": DASHES[number % 3]}
                 handles.setdefault(shown, line(_numbers(one["reference"]), color=ink, linewidth=0.9, zorder=3, **style))
                 if measured:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -25,7 +26,7 @@ from dembark.validation.report.gather import Gathered, Page, Row, beside
 # Of a case in the PDF: variants with figures, panels of a figure, and rows of one quantity before only the worst is shown. Of the first
 # variant all main figures are printed, of others none, and of each study PANELS panels.
 VARIANTS, PANELS, ROWS = 1, 2, 4
-_PANELS_OF_STUDIES = 6  # in one figure, which is then half a page
+_PANELS_OF_STUDIES = 6  # at most in one figure
 
 
 @dataclass(frozen=True)
@@ -131,17 +132,17 @@ def sections(gathered: Gathered, folder: Path) -> list[Section]:
     for page, (shown, wrong) in zip(gathered.pages, drawn, strict=True):
         page.missing += wrong
         of_case.setdefault(page.case, []).append((page, shown))
-    return [_section(gathered, case, of_page, folder) for case, of_page in of_case.items()]
+    studies = mapped(_studies, [[page for page, _ in of_page if page.is_study] for of_page in of_case.values()])
+    return [_section(gathered, case, of_page, printed) for (case, of_page), printed in zip(of_case.items(), studies, strict=True)]
 
 
-def _section(gathered: Gathered, name: str, of_page: list[tuple[Page, list[Shown]]], folder: Path) -> Section:
+def _section(gathered: Gathered, name: str, of_page: list[tuple[Page, list[Shown]]], studies: list[Shown]) -> Section:
     pages = [page for page, _ in of_page]
     rows = [row for page in pages for row in page.rows()]
     known = gathered.cases.get(name)
     parts = [_part(page, pages, shown) for page, shown in of_page]
     variants = [part for part in parts if not part.page.is_study]
-    main = [one for part in variants[:VARIANTS] for one in part.figures if one.printed]
-    main += _studies(name, [page for page in pages if page.is_study], folder)
+    main = [*(one for part in variants[:VARIANTS] for one in part.figures if one.printed), *studies]
     engines, others = ([row for row in rows if isinstance(row.record, ComparedRecord) is compared] for compared in (True, False))
     kinds = {kind: [row for row in others if row.record.evidence == kind] for kind in ("identity", "code")}
     lines = [line(kinds["identity"], "Identities"), line(engines, "Comparison of the engines"), line(kinds["code"], "Other codes")]
@@ -198,17 +199,20 @@ def _profiles(page: Page, folder: Path) -> list[Shown]:
     return found
 
 
-def _studies(case: str, pages: Iterable[Page], folder: Path) -> list[Shown]:
-    """The first PANELS profiles of each study of a case in one figure, for the PDF."""
+def _studies(pages: Sequence[Page]) -> list[Shown]:
+    """The first PANELS profiles of each study of a case side by side, for the PDF; in the HTML each stands by itself."""
     panels = []
     for page in pages:
         curves, study = _curves(page), page.words.removeprefix("study ")
         panels += [[(engine, {**one, "title": f"{study}: {one['title']}"}) for engine, one in figures.of_name(curves, name)]
                    for name in figures.profile_names(curves)[:PANELS]]
-    together = [panels[start : start + _PANELS_OF_STUDIES] for start in range(0, len(panels), _PANELS_OF_STUDIES)]
-    return [embed(figures.panels_figure(some), folder, f"{case}-studies-{number}",
-                  f"{case.replace('_', ' ')}, studies; bands: 95 % intervals over replicas, where there are several.")
-            for number, some in enumerate(together, start=1)]
+    if not panels:
+        return []
+    # As many in each figure, and no panel alone in its row but the last.
+    count = 2 * math.ceil(len(panels) / (2 * math.ceil(len(panels) / _PANELS_OF_STUDIES)))
+    return [Shown(Markup(""), f"{pages[0].case.replace('_', ' ').capitalize()}, studies; bands: 95 % intervals over replicas, where there "
+                  "are several.", printed=_image(figures.png(figures.panels_figure(panels[start : start + count])), "png", "studies"))
+            for start in range(0, len(panels), count)]
 
 
 def _curves(page: Page) -> figures.Curves:

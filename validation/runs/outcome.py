@@ -20,7 +20,7 @@ _DUMPS = {"grains": "ATOMS", "contacts": "ENTRIES"}
 # Signals by which a user, a scheduler or the system ends what is sound; the others are faults of the engine.
 _STOPPED = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGXCPU)
 
-# It may stand anywhere in a line, for ranks write as they like.
+# What one rank says; it may begin in the middle of a line, because the output of ranks is interleaved.
 _OF_ONE_RANK = re.compile(r"ERROR on proc \d+: ")
 
 
@@ -63,12 +63,12 @@ def judge(run: Run, code: int, parser: OutputParser, work: Path) -> None:
     relayed = re.search(r"exited on signal (\d+)", "\n".join(lines)) if code else None
     # srun tells of a signal as shells do, by 128 and its number.
     number = -code if code < 0 else int(relayed.group(1)) if relayed else code - 128 if code - 128 in _STOPPED else 0
-    if number:
+    # With an error of one rank the launcher ends the others by a signal.
+    faulty = any(_OF_ONE_RANK.search(line) for line in lines)
+    if number and not (faulty and number in _STOPPED):
         hint = "by hand or because memory ran out" if number == signal.SIGKILL else ""
         kind = Killed if number in _STOPPED else RunError
         raise kind(f"the engine was killed by {signal.Signals(number).name} {where}", hint)
-    # With an error of one rank the launcher sends the others the signal to stop.
-    faulty = any(_OF_ONE_RANK.search(line) for line in lines)
     if stop_message and not parser.finished and not faulty and any(stop_message in line for line in lines):
         raise Killed(f"the engine was asked to stop {where}")
     if code:

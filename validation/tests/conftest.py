@@ -69,7 +69,7 @@ doc = "strength"
 [parameters.behaviour]
 value = "ok"
 type = "choice"
-values = ["ok", "exit", "abort", "kill", "kill approximate", "hang", "full", "truncate", "short", "unstable", "silent"]
+values = ["ok", "exit", "abort", "abort by signal", "kill", "kill approximate", "hang", "full", "truncate", "short", "unstable", "silent"]
 doc = "what the stand-in engine does"
 
 [parameters.pause]

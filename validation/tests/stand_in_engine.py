@@ -61,12 +61,12 @@ for step in range(begin, 101, 10):
         if behaviour == "exit":
             print("ERROR: Lost atoms: original 10 current 9 (thermo.cpp:389)")
             sys.exit(1)
-        if behaviour == "abort":
+        if behaviour in ("abort", "abort by signal"):
             # As with several ranks: the words of the one at fault lie within a line of another, which the launcher then ends by a signal.
             print("      6ERROR on proc 1: atoms 3 and 4 have the same centre (pair.cpp:9)\n0 0.6\n"
                   "SIGINT/SIGTERM caught - Writing restart on next occasion and quitting after that.\n"
                   "MPI_ABORT was invoked on rank 1 in communicator MPI_COMM_WORLD")
-            sys.exit(1)
+            sys.exit(1 if behaviour == "abort" else 143)
         if behaviour in ("kill", "kill approximate"):
             os.kill(os.getpid(), signal.SIGKILL)
         if behaviour == "hang":

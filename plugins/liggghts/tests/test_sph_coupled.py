@@ -130,7 +130,7 @@ def test_says_what_is_wrong(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["mass", "two groups", "weight", "overlap"])
 def test_what_one_rank_finds_wrong_is_a_line_of_its_own(name: str, tmp_path: Path) -> None:
-    """Which lands within a line of another rank, and after it the words of the launcher, if that rank ends the run by itself."""
+    """If that rank ended the run by itself, its message could begin in the middle of another's line, with the launcher's words after it."""
     old, new, message = REFUSED[name]
     done = run_deck(tmp_path, deck(SCENES["dam"], 2, ranks=2, changes=((old, new),)), ranks=2)
     lines = [line for line in done.output.splitlines() if message in line]

@@ -118,6 +118,7 @@ def test_a_finished_run_is_not_repeated_unless_an_input_changes(tmp_path: Path, 
 @pytest.mark.parametrize(("behaviour", "words"), [
     ("exit", ["exit code 1", "at step 50 of 100", "Lost atoms"]),
     ("abort", ["exit code 1", "at step 50 of 100", ", ERROR on proc 1: atoms 3 and 4 have the same centre"]),
+    ("abort by signal", ["exit code 143", ", ERROR on proc 1: atoms 3 and 4 have the same centre"]),
     ("kill", ["killed by SIGKILL", "at step 50"]),
     ("full", ["disk is full"]),
     ("truncate", ["grains.dump is truncated"]),
