@@ -7,7 +7,7 @@ import numpy as np
 
 from dembark.postproc import GrainFrame
 from dembark.postproc.history import reached
-from dembark.postproc.instruments.avalanche import Slope, front_law, layers, profile_power
+from dembark.postproc.instruments.avalanche import Slope, front_law, layers, mean_power
 from dembark.postproc.instruments.growth import Growth, ordered
 from dembark.postproc.instruments.heaps import at_rest
 from dembark.postproc.instruments.momentum import imbalance, impulses, left_to, walls_of
@@ -192,11 +192,11 @@ def _chute(replicas: Replicas) -> Measurement:
         depths.append(Estimate(depth / d, math.inf, ALONE))
         sums = [layers(frame, d) for frame in frames]
         count = max(len(mass) for mass, _ in sums)
-        mass, momentum = (np.sum([np.pad(one[k], (0, count - len(one[k]))) for one in sums], axis=0) for k in (0, 1))
+        mass, momentum = (np.array([np.pad(one[k], (0, count - len(one[k]))) for one in sums]) for k in (0, 1))
         middles = d * (np.arange(count) + 0.5)
-        inside = (middles < 0.95 * depth) & (mass > 0.0)
-        u = momentum[inside] / mass[inside] / unit
-        powers.append(Estimate(profile_power(middles[inside] / depth, u), math.inf, ALONE))
+        inside = (middles < 0.95 * depth) & (mass.sum(axis=0) > 0.0)
+        u = momentum.sum(axis=0)[inside] / mass.sum(axis=0)[inside] / unit
+        powers.append(mean_power(middles[inside] / depth, mass[:, inside], momentum[:, inside]))
         curves.append(profile(f"speed_{len(curves) + 1}", "Velocity profile", "speed over √(g d)", "z / H", middles[inside] / depth, [u],
                               vertical=True))
     values = {"bed_depth": Value(over_replicas(depths)), "mean_speed": Value(over_replicas(means))}
@@ -204,7 +204,7 @@ def _chute(replicas: Replicas) -> Measurement:
         last = max(abs(one.value) for one in means)
         values["rest_speed"] = Value(exact(last), exact(0.0))
         return Measurement(values, curves)
-    values["profile_power"] = Value(exact(over_replicas(powers).value), exact(1.0 if p["slope_angle"] <= SLOW else 1.5))
+    values["profile_power"] = Value(over_replicas(powers), exact(1.0 if p["slope_angle"] <= SLOW else 1.5))
     return Measurement(values, curves)
 
 

@@ -6,14 +6,16 @@ The toe of the slope is the origin. s: distance along the floor, negative on the
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.instruments.heaps import EDGE
-from dembark.postproc.measurement import Array
+from dembark.postproc.measurement import Array, Estimate
+from dembark.postproc.statistics import jackknife, time_blocks
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,22 @@ def profile_power(height: Array, speed: Array) -> float:
         solution = np.linalg.lstsq(design, speed, rcond=None)[0]
         return float(((design @ solution - speed) ** 2).sum())
 
-    return float(powers[int(np.argmin([residual(power) for power in powers]))])
+    best = float(powers[int(np.argmin([residual(power) for power in powers]))])
+    return float(minimize_scalar(residual, bounds=(best - 0.01, best + 0.01), method="bounded").x)
+
+
+def mean_power(height: Array, masses: Array, momenta: Array) -> Estimate:
+    """`profile_power` of the mean profile of a window, from masses (kg) and momenta (N s) of the layers at `height` (n,) in its frames
+    (frames, n); its interval is that of a jackknife over blocks of time."""
+
+    def power(keep: NDArray[np.bool_]) -> float:
+        mass = masses[keep].sum(axis=0)
+        there = mass > 0.0
+        return profile_power(height[there], momenta[keep].sum(axis=0)[there] / mass[there])
+
+    blocks = time_blocks(momenta.sum(axis=1) / masses.sum(axis=1))
+    found = jackknife(power, blocks.groups, name="time blocks")
+    return replace(found, half=blocks.widening * found.half)
 
 
 def layers(frame: GrainFrame, diameter: float) -> tuple[Array, Array]:
