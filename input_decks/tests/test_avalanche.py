@@ -237,6 +237,13 @@ def test_a_small_avalanche(engine: str, spin: str, simulate: Any) -> None:
 
 
 @pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
+def test_grains_that_turn_on_strips_do_not_push_the_gate_out_of_the_plane(engine: str, simulate: Any) -> None:
+    frames = list(simulate("avalanche", engine, {"flow_time": 0.2, "frames": 11}, "smooth").grains())
+    assert {np.abs(frame.positions[:, 1]).max() for frame in frames} == {0.0}
+    assert {len(frame.positions) for frame in frames} == {len(frames[0].positions)}
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
 @pytest.mark.parametrize("kind", ["slides", "rolls", "stops"])
 def test_single_grains_in_the_engines(engine: str, kind: str, simulate: Any) -> None:
     found = judged("avalanche", avalanche.measure([simulate("avalanche", engine, {}, kind)]))
