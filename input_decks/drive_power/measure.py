@@ -22,7 +22,9 @@ RISE = {2: 1.4, 3: 1.0}
 def measure(replicas: Replicas) -> Measurement:
     """Values, curves and remarks from all replicas of a series."""
     runs, p = [read(replica) for replica in replicas], replicas[0].parameters
-    block = sticking_block(acceleration(p)) if p["restitution"] <= STICKS else None
+    # A window in which the plate stops is not that of a steady drive.
+    steady = not p["rest_periods"]
+    block = sticking_block(acceleration(p)) if steady and p["restitution"] <= STICKS else None
     diameter = p["grain_diameter"]
 
     def over(number: Callable[[Drive], Estimate], scale: float = 1.0) -> Estimate:
@@ -42,7 +44,7 @@ def measure(replicas: Replicas) -> Measurement:
     values = {
         "energy_balance": worst(lambda one: imbalance(one.rows, PARTS)),
         "power_gap": worst(Drive.power_gap),
-        "dissipation_gap": mean(Drive.dissipation_gap),
+        **({"dissipation_gap": mean(Drive.dissipation_gap)} if steady else {}),
         "power": Value(over(Drive.power), exact(block.power) if block else None),
         "force_power": Value(over(lambda one: one.power("plate_work"))),
         "flight": Value(over(Drive.flight), exact(block.flight) if block else None),
@@ -53,7 +55,7 @@ def measure(replicas: Replicas) -> Measurement:
         "acceleration": Value(exact(acceleration(p))),
         "speed": Value(exact(runs[0].speed / math.sqrt(p["gravity"] * diameter))),
     }
-    if p["rest_periods"]:
+    if not steady:
         values["compaction"] = once(lambda one: one.compaction() or 0.0)
     return Measurement(values, [*transients(runs), phases(runs, block)])
 
