@@ -171,9 +171,9 @@ def _panel(axes: Any, entries: Entries, handles: dict[str, Any]) -> None:
                            line(_numbers(one["value"]), color=paint, linewidth=0.9 + 1.5 * below, alpha=0.6 if below else 1.0))
     wide, high = axes.get_position().width * WIDE, axes.get_position().height * axes.figure.get_figheight()
     beneath, aside = (first["across"], first["along"]) if upward else (first["along"], first["across"])
-    first_line, *others = text_lines(aside, high, 7.5) or [""]
-    axes.set(xlabel=symbols(shortened(beneath, wide, 7.5)),
-             ylabel=symbols("\n".join([first_line, *([shortened(" ".join(others), high, 7.5)] if others else [])])))
+    upper, *others = text_lines(aside, high, 7.5) or [""]
+    lower = shortened(" ".join(others), high, 7.5)
+    axes.set(xlabel=symbols(shortened(beneath, wide, 7.5)), ylabel=symbols(f"{upper}\n{lower}" if lower else upper))
     labels = sorted({one["reference_label"] for _, one in entries if one.get("reference_label")})
     note = "; ".join([f"reference: {', '.join(labels)}"] * bool(labels) + [first["note"]] * bool(first.get("note")))
     axes.set_title(shortened(first["title"], wide, 8.5, "bold"), pad=10)

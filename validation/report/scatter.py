@@ -117,7 +117,7 @@ def figure(found: Sequence[Point], tolerance: float = 0.10) -> Figure | None:
         spread = max(1.3 * tolerance, 1.15 * max(abs(one.ratio - 1.0) + one.half for one in drawn))
         right.set(xlim=(max(0.0, 1.0 - spread), 1.0 + spread), ylim=(len(shown) + 0.6, 0.4), xlabel="measured / reference", title="Ratio")
         # Between the panels, beside the last number of the left one's axis.
-        room = (0.76 - 0.085) * WIDE - 2.3 - 0.2
+        room = (right.get_position().x0 - left.get_position().x1) * WIDE - 0.2
         right.set_yticks(range(1, len(shown) + 1), [_label(number[line], line, room) for line in shown], fontsize=_LETTERS)
         right.tick_params(axis="y", length=0)
         right.hlines(range(1, len(shown) + 1), *right.get_xlim(), color="#e3e6ea", linewidth=0.4, zorder=0)
