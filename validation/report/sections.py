@@ -31,12 +31,14 @@ _PANELS_OF_STUDIES = 6  # at most in one figure
 
 @dataclass(frozen=True)
 class Shown:
-    """A figure: its image in the HTML, its caption, the files with its data, and its image in the PDF, '' when that leaves it out."""
+    """A figure: its image in the HTML, its caption, the files with its data, its image in the PDF, '' when that leaves it out, and whether
+    the HTML shows it at once."""
 
     image: Markup
     caption: str
     files: Sequence[str] = ()
     printed: Markup | str = ""
+    main: bool = False
 
 
 @dataclass(frozen=True)
@@ -78,12 +80,13 @@ class Section:
     parts: list[Part] = field(default_factory=list)
 
 
-def embed(figure: Figure, folder: Path, name: str, caption: str, files: Sequence[str] = (), main: bool = True) -> Shown:
-    """The figure inside the document, in the PDF if `main`, and as a file `name`.svg beside its data."""
+def embed(figure: Figure, folder: Path, name: str, caption: str, files: Sequence[str] = (), main: bool = True,
+          printed: bool = True) -> Shown:
+    """The figure inside the document, in the PDF if `main` and `printed`, and as a file `name`.svg beside its data."""
     data = figures.svg(figure)
     (folder / f"{name}.svg").write_bytes(data)
     return Shown(_image(data, "svg+xml", name), caption[:1].upper() + caption[1:], [f"figures/{file}" for file in files],
-                 _image(figures.png(figure), "png", name) if main else "")
+                 _image(figures.png(figure), "png", name) if main and printed else "", main)
 
 
 def _image(data: bytes, kind: str, alt: str) -> Markup:
@@ -142,7 +145,7 @@ def _section(gathered: Gathered, name: str, of_page: list[tuple[Page, list[Shown
     known = gathered.cases.get(name)
     parts = [_part(page, pages, shown) for page, shown in of_page]
     variants = [part for part in parts if not part.page.is_study]
-    main = [*(one for part in variants[:VARIANTS] for one in part.figures if one.printed), *studies]
+    main = [*(one for part in variants[:VARIANTS] for one in part.figures if one.main), *studies]
     engines, others = ([row for row in rows if isinstance(row.record, ComparedRecord) is compared] for compared in (True, False))
     kinds = {kind: [row for row in others if row.record.evidence == kind] for kind in ("identity", "code")}
     lines = [line(kinds["identity"], "Identities"), line(engines, "Comparison of the engines"), line(kinds["code"], "Other codes")]
@@ -195,7 +198,7 @@ def _profiles(page: Page, folder: Path) -> list[Shown]:
         stem = f"{page.anchor}-profiles" + (f"-{start // PANELS + 1}" if start else "")
         found.append(embed(figures.profile_figure(curves, chosen), folder, stem,
                            f"{page.name}: engines over the reference; bands: 95 % intervals over replicas, where there are several.",
-                           [f"{page.anchor}-{name}.csv" for name in chosen], main=not start))
+                           [f"{page.anchor}-{name}.csv" for name in chosen], main=not start, printed=not page.is_study))
     return found
 
 
