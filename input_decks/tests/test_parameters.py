@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import pytest
 from dembark.common.choices import Value
 from dembark.validation import engines
 from dembark.validation.case import deck
-from dembark.validation.case.folders import find
+from dembark.validation.case.folders import discover, find, package_root
 from dembark.validation.case.model import Case, Parameter
 from dembark.validation.case.resolve import merged, portable
 
@@ -71,3 +72,19 @@ def test_every_parameter_changes_the_input(case: str, engine: str, tmp_path: Pat
         if found.lacks(engine, changed):
             continue  # refused, see the tests of engines
         assert inputs(found, engine, changed, tmp_path) != before, name
+
+
+@pytest.mark.parametrize("name", [one.name for one in discover().values() if {"liggghts", "lammps"} & set(one.engines)])
+def test_every_text_that_a_deck_includes_is_an_input(name):
+    """Otherwise a run would be kept that another text had made."""
+    case, common = find(name), package_root() / "common"
+    for engine in {"liggghts", "lammps"} & set(case.engines):
+        folders, known = [case.folder, common / engine, common], deck.sources(case, engine).values()
+        waiting, read = [case.deck(engine)], set()
+        while waiting:
+            path = waiting.pop()
+            assert hashlib.sha256(path.read_bytes()).hexdigest() in known, f"{engine}: {path.relative_to(package_root())}"
+            read.add(path)
+            for included in re.findall(r'{%\s*include\s+"([^"]+)"', path.read_text(encoding="utf-8")):
+                waiting += {next(one / included for one in folders if (one / included).is_file())} - read
+        assert len(read) > 1
