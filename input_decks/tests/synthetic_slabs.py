@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.input_decks.tests.synthetic import BESIDE, DENSITY, DIAMETER, FRAMES, GRAVITY, Written
+from dembark.input_decks.tests.synthetic import BESIDE, DENSITY, DIAMETER, FLOW_FRAMES, FRAMES, GRAVITY, Written
 
 STEP = 1e-5
 
@@ -78,7 +78,7 @@ def gravity_channel(results: Path, *, cells: int = 20, variant: str = "w20", rep
     radii = np.full(len(place), 0.5 * DIAMETER)
     mass = DENSITY * 4.0 / 3.0 * np.pi * radii**3
     weight = mass.sum() * GRAVITY
-    steps = 100000 + 2000 * np.arange(FRAMES)
+    steps = 100000 + 2000 * np.arange(FLOW_FRAMES)
     # The period does not begin at zero: its middle stays when it shrinks.
     run = Written(results, "gravity_channel", variant, "liggghts", replica, ((-1.0, 1.0), (0.0, depth), (0.02, 0.02 + length)), "ff pp pp")
     sides = {"left": from_wall < 0.6, "right": from_wall < 0.6}

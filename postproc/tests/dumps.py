@@ -20,7 +20,8 @@ def _head(step: int, count: int, what: str, box: Any, flags: str, columns: str) 
 def _lines(table: Any) -> str:
     # Tests write a hundred million numbers: what is the same in all rows is formatted once.
     same = (table == table[:1]).all(axis=0)
-    row = " ".join("%.12g" % table[0, column] if same[column] else "%.12g" for column in range(table.shape[1])) + "\n" if len(table) else ""
+    words = [f"{value:.12g}" if alike else "%.12g" for value, alike in zip(table[0], same, strict=True)] if len(table) else []
+    row = " ".join(words) + "\n"
     return "".join([row % tuple(numbers) for numbers in table[:, ~same].tolist()])
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from dembark.common.tests import cores
 from dembark.validation.engines import Engine, call, find
 from rig import input_script
 from rig.motion import Motion
@@ -41,7 +42,8 @@ def run_deck(folder: Path, deck: str, *, ranks: int = 1, name: str = "case.in") 
     (folder / name).write_text(deck)
     # Ranks that wait must not keep the others from the processors of a machine that is busy.
     environment = engine().environment() | {"OMPI_MCA_mpi_yield_when_idle": "1"}
-    done = call(engine().command(folder / name, {}, ranks), folder, environment)
+    with cores.alone(ranks):
+        done = call(engine().command(folder / name, {}, ranks), folder, environment)
     return Run(done.returncode, done.stdout + done.stderr, folder)
 
 
