@@ -197,7 +197,7 @@ def _chute(replicas: Replicas) -> Measurement:
         inside = (middles < 0.95 * depth) & (mass.sum(axis=0) > 0.0)
         u = momentum.sum(axis=0)[inside] / mass.sum(axis=0)[inside] / unit
         powers.append(mean_power(middles[inside] / depth, mass[:, inside], momentum[:, inside]))
-        curves.append(profile(f"speed_{len(curves) + 1}", "Velocity profile", "speed over √(g d)", "z / H", middles[inside] / depth, [u],
+        curves.append(profile(f"speed_{len(curves) + 1}", "Velocity profile", "z / H", "speed over √(g d)", middles[inside] / depth, [u],
                               vertical=True))
     values = {"bed_depth": Value(over_replicas(depths)), "mean_speed": Value(over_replicas(means))}
     if p["slope_angle"] <= REST:

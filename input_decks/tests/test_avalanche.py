@@ -15,6 +15,7 @@ from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.input_decks.tests.synthetic import account
 from dembark.postproc.instruments.avalanche import Slope, front_law, mean_power, profile_power
 from dembark.postproc.instruments.momentum import imbalance
+from dembark.postproc.measurement import Measurement
 from dembark.postproc.tests.scenes import frame_of
 
 avalanche = module("avalanche")
@@ -95,15 +96,20 @@ def single(kind: str, *, friction: float = 0.5, inertia: float = 0.4) -> Verdict
     return judged("avalanche", avalanche.measure([run]))
 
 
-def bed(power: float, speed: float, angle: float) -> Verdicts:
-    """What is measured of a bed 20 d deep on a chute of this angle (rad) whose velocity is `speed` (√(g d)) [1 − (1 − z/H)^`power`]."""
+def flowing(power: float, speed: float, angle: float) -> Measurement:
+    """A bed 20 d deep on a chute of this angle (rad) whose velocity is `speed` (√(g d)) [1 − (1 − z/H)^`power`]."""
     z = D * (np.arange(20.0) + 0.5)
     places = np.array([(x, 0.0, height) for x in D * np.arange(20.0) for height in z])
     u = speed * math.sqrt(G * D) * (1.0 - (1.0 - places[:, 2] / (20.0 * D)) ** power)
     frames = [replace(frame_of(places, 0.5 * D, step=1000 * k), velocities=np.column_stack([u, 0.0 * u, 0.0 * u])) for k in range(20)]
     run = SimpleNamespace(parameters=defaults("avalanche", bed_height=20.0, slope_angle=angle), derived={}, time_step=DT, times=history,
                           grains=lambda: frames)
-    return judged("avalanche", avalanche.measure([run]))
+    return avalanche.measure([run])
+
+
+def bed(power: float, speed: float, angle: float) -> Verdicts:
+    """What is measured of a bed that is `flowing`."""
+    return judged("avalanche", flowing(power, speed, angle))
 
 
 def depths(power: float) -> Verdicts:
@@ -149,6 +155,11 @@ def test_single_grains_move_as_mechanics_says(kind: str) -> None:
 def test_profiles_of_the_regimes(power: float, angle: float, verdict: str) -> None:
     one = bed(power, 3.0, angle)["profile_power"]
     assert one["value"] == pytest.approx(min(power, 3.99), abs=0.06 * power) and one["verdict"] == verdict
+
+
+def test_profiles_have_the_height_upward() -> None:
+    (shown,) = flowing(1.5, 3.0, 0.4).profiles
+    assert shown["vertical"] and (shown["along"], shown["across"]) == ("z / H", "speed over √(g d)")
 
 
 def test_a_bed_at_rest() -> None:

@@ -136,6 +136,7 @@ def test_the_pressure_on_a_wall_is_that_of_its_grains_in_its_own_frame(motion: d
         # Column by column, five high: the first stands at the wall, and all grains on the base feel friction.
         push[:5], push[::5] = [2.0 * math.cos(turn), 0.0, -2.0 * math.sin(turn)], [7.0 * math.cos(turn), 0.0, -7.0 * math.sin(turn)]
     shown = next(one for one in container.measure([one]).profiles if one["name"] == "pressure_left")
+    assert shown["vertical"] and (shown["along"], shown["across"]) == ("z / d", "Pa")
     np.testing.assert_allclose(np.asarray(shown["value"]) * D**2, [0.0, 2.0, 2.0, 2.0, 2.0, *[0.0] * (len(shown["value"]) - 5)], atol=1e-9)
 
 

@@ -149,7 +149,7 @@ def _pressure(replicas: Replicas, wall: str) -> Curve:
     for replica in replicas:
         frames = [frame.select(frame.types == 1) for frame in replica.grains()]
         found.append((np.mean([pressure(replica, frame) for frame in frames[1:]], axis=0), pressure(replica, frames[0])))
-    return profile(f"pressure_{wall}", f"Force on the {wall} wall over d²", "Pa", "z / d", 0.5 * (edges[1:] + edges[:-1]) / d,
+    return profile(f"pressure_{wall}", f"Force on the {wall} wall over d²", "z / d", "Pa", 0.5 * (edges[1:] + edges[:-1]) / d,
                    [one for one, _ in found], vertical=True, reference=np.mean([one for _, one in found], axis=0),
                    reference_label="at rest")
 
