@@ -117,7 +117,8 @@ wheel: $(VENV)/.complete | system ## build the wheel of a release into build/dis
 	  --wheel-dir $(BUILD)/dist .
 
 test: all $(BUILD)/.physics-tests ## run all tests
-	@$(BUILD)/bin/physics-tests
+	@printf '%s\n' $(basename $(notdir $(wildcard plugins/physics/tests/test_*.cpp))) \
+	 | xargs -P $(TEST_JOBS) -I NAME $(BUILD)/bin/physics-tests --reporter compact --filenames-as-tags "[#NAME]"
 	@$(BIN)/python -m pytest --numprocesses $(TEST_JOBS) --dist loadscope --durations 20 $(PYTEST_ARGS)
 
 validate: all ## run the cases in their engines and write the report (PROFILE=quick|standard|full)
