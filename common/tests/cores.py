@@ -1,4 +1,4 @@
-"""Processors of a small machine, shared by the tests that run at the same time.
+"""Processors of a small machine, shared by a user's tests that run at the same time.
 
 Ranks of MPI wait for each other in circles. If another test has one of the processors that they need, each message waits until the
 kernel takes it away again: a run of 2.6 s takes 15 s. So ranks that want most of the machine have it for themselves.
@@ -13,13 +13,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-# The lock that this process holds while it runs a test; none without pytest-xdist.
+# The lock that this process holds while it runs a test; none without other workers of pytest-xdist.
 _held: list[int] = []
 
 
 def _folder() -> Path | None:
-    run = os.environ.get("PYTEST_XDIST_TESTRUNUID")
-    return Path(tempfile.gettempdir(), f"dembark-cores-{run}") if run else None
+    return Path(tempfile.gettempdir(), f"dembark-cores-{os.getuid()}") if "PYTEST_XDIST_WORKER" in os.environ else None
 
 
 @contextmanager
@@ -32,8 +31,9 @@ def _locked(folder: Path, kind: int) -> Iterator[int]:
         fcntl.flock(gate, fcntl.LOCK_UN)
         yield place
     finally:
-        os.close(gate)
-        os.close(place)
+        for lock in (place, gate):
+            fcntl.flock(lock, fcntl.LOCK_UN)  # by itself: processes that were forked meanwhile have it open, too
+            os.close(lock)
 
 
 @contextmanager

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import select
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -15,19 +17,29 @@ import pytest
 from dembark.common.tests import cores
 
 OTHER = """
-import sys
+import os, sys
 from dembark.common.tests import cores
 with cores.shared():
-    print("in", flush=True)
+    os.write(1, b"in\\n")
     sys.stdin.read()
-    print("out", flush=True)
+    os.write(1, b"out\\n")
+"""
+# It leaves a process behind that was forked while it ran.
+FORKS = """
+import os, time
+from dembark.common.tests import cores
+with cores.shared():
+    if os.fork() == 0:
+        time.sleep(60)
+        os._exit(0)
+os._exit(0)
 """
 
 
 @pytest.fixture
 def other(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[[], tuple[IO[bytes], IO[bytes]]]]:
     """Starts another process that runs a test until its input is closed; its input and output."""
-    monkeypatch.setenv("PYTEST_XDIST_TESTRUNUID", "a-run")
+    monkeypatch.setenv("PYTEST_XDIST_WORKER", "gw0")
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", None)
     monkeypatch.setattr(cores, "_held", [])
@@ -61,8 +73,18 @@ def test_tests_run_beside_each_other_and_ranks_alone(other: Callable[[], tuple[I
         assert later.read(3) == b"in\n"
 
 
+def test_what_a_test_forked_does_not_hold_up_others(other: Callable[[], tuple[IO[bytes], IO[bytes]]]) -> None:
+    with cores.shared(), subprocess.Popen([sys.executable, "-c", FORKS], start_new_session=True, stdout=subprocess.DEVNULL) as one:
+        try:
+            one.wait(30)
+            with cores.alone(2):
+                pass
+        finally:
+            os.killpg(one.pid, signal.SIGKILL)
+
+
 def test_without_other_workers_nothing_is_locked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("PYTEST_XDIST_TESTRUNUID", raising=False)
+    monkeypatch.delenv("PYTEST_XDIST_WORKER", raising=False)
     monkeypatch.setattr(cores, "_held", [])
     with cores.shared(), cores.alone(64):
         assert not cores._held
