@@ -29,6 +29,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 @pytest.hookimpl(hookwrapper=True)
-def pytest_runtest_protocol() -> Iterator[None]:
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    if "slow" in item.keywords:  # minutes, for which nobody can wait
+        yield
+        return
     with cores.shared():
         yield
+
+
+def pytest_sessionfinish() -> None:
+    cores.forget()

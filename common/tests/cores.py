@@ -1,4 +1,4 @@
-"""Processors of a small machine, shared by a user's tests that run at the same time.
+"""Processors of a small machine, shared by the tests that run at the same time.
 
 Ranks of MPI wait for each other in circles. If another test has one of the processors that they need, each message waits until the
 kernel takes it away again: a run of 2.6 s takes 15 s. So ranks that want most of the machine have it for themselves.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,7 +19,15 @@ _held: list[int] = []
 
 
 def _folder() -> Path | None:
-    return Path(tempfile.gettempdir(), f"dembark-cores-{os.getuid()}") if "PYTEST_XDIST_WORKER" in os.environ else None
+    run = os.environ.get("PYTEST_XDIST_TESTRUNUID")
+    return Path(tempfile.gettempdir(), f"dembark-cores-{run}") if run else None
+
+
+def forget() -> None:
+    """At the end of a worker: those that go on lock new files."""
+    folder = _folder()
+    if folder is not None:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 @contextmanager
@@ -49,20 +58,22 @@ def shared() -> Iterator[None]:
         try:
             yield
         finally:
-            _held.remove(place)
+            _held.clear()
 
 
 @contextmanager
 def alone(ranks: int) -> Iterator[None]:
-    """A run of `ranks` within a test, while no other test runs if there are less than twice as many processors."""
+    """A run of `ranks` within a test, while no other test runs unless there are more than twice as many processors."""
     folder = _folder()
-    if ranks == 1 or folder is None or not _held or 2 * ranks <= (os.cpu_count() or 1):
+    if ranks == 1 or folder is None or not _held or 2 * ranks < len(os.sched_getaffinity(0)):
         yield
         return
-    fcntl.flock(_held[-1], fcntl.LOCK_UN)
+    place = _held.pop()
+    fcntl.flock(place, fcntl.LOCK_UN)
     try:
         with _locked(folder, fcntl.LOCK_EX):
             yield
     finally:
         with _locked(folder, fcntl.LOCK_SH):  # through the gate, and only then
-            fcntl.flock(_held[-1], fcntl.LOCK_SH)
+            fcntl.flock(place, fcntl.LOCK_SH)
+        _held.append(place)

@@ -29,9 +29,11 @@ FORKS = """
 import os, time
 from dembark.common.tests import cores
 with cores.shared():
-    if os.fork() == 0:
+    forked = os.fork()
+    if forked == 0:
         time.sleep(60)
         os._exit(0)
+os.write(1, f"{forked}\\n".encode())
 os._exit(0)
 """
 
@@ -39,11 +41,11 @@ os._exit(0)
 @pytest.fixture
 def other(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[[], tuple[IO[bytes], IO[bytes]]]]:
     """Starts another process that runs a test until its input is closed; its input and output."""
-    monkeypatch.setenv("PYTEST_XDIST_WORKER", "gw0")
+    monkeypatch.setenv("PYTEST_XDIST_TESTRUNUID", "a-run")
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", None)
     monkeypatch.setattr(cores, "_held", [])
-    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 1})
     with ExitStack() as ended:
         def start() -> tuple[IO[bytes], IO[bytes]]:
             one = subprocess.Popen([sys.executable, "-c", OTHER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)
@@ -74,17 +76,18 @@ def test_tests_run_beside_each_other_and_ranks_alone(other: Callable[[], tuple[I
 
 
 def test_what_a_test_forked_does_not_hold_up_others(other: Callable[[], tuple[IO[bytes], IO[bytes]]]) -> None:
-    with cores.shared(), subprocess.Popen([sys.executable, "-c", FORKS], start_new_session=True, stdout=subprocess.DEVNULL) as one:
+    with cores.shared(), subprocess.Popen([sys.executable, "-c", FORKS], stdout=subprocess.PIPE, bufsize=0) as one:
+        assert one.stdout
+        forked = int(one.stdout.read(20))
         try:
-            one.wait(30)
-            with cores.alone(2):
-                pass
+            with cores.alone(2), cores.alone(2):
+                assert Path(f"/proc/{forked}/cmdline").read_bytes()  # it still sleeps
         finally:
-            os.killpg(one.pid, signal.SIGKILL)
+            os.kill(forked, signal.SIGKILL)
 
 
 def test_without_other_workers_nothing_is_locked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("PYTEST_XDIST_WORKER", raising=False)
+    monkeypatch.delenv("PYTEST_XDIST_TESTRUNUID", raising=False)
     monkeypatch.setattr(cores, "_held", [])
     with cores.shared(), cores.alone(64):
         assert not cores._held

@@ -76,7 +76,7 @@ def test_every_parameter_changes_the_input(case: str, engine: str, tmp_path: Pat
 
 @pytest.mark.parametrize("name", [one.name for one in discover().values() if {"liggghts", "lammps"} & set(one.engines)])
 def test_every_text_that_a_deck_includes_is_an_input(name):
-    """Otherwise a run would be kept that another text had made."""
+    """Otherwise runs made with an older text would be kept."""
     case, common = find(name), package_root() / "common"
     for engine in {"liggghts", "lammps"} & set(case.engines):
         folders, known = [case.folder, common / engine, common], deck.sources(case, engine).values()

@@ -137,7 +137,8 @@ def shifts(**shift: float) -> dict[str, Any]:
 
 
 def test_shifts_beyond_their_interval_are_seen() -> None:
-    found = shifts(sweep_smooth=-0.2, sweep_wet=0.06)
+    joint = 0.05 * math.sqrt(2.0)
+    found = shifts(sweep_smooth=-0.2, sweep_wet=1.25 * joint, sweep_two=-1.25 * joint)  # of five: not beyond 1.31 of it
     assert found["shifts_seen"]["value"] == 1 and found["shifts_seen"]["verdict"] == "pass"
     assert found["onset_shift_no_friction"]["value"] == pytest.approx(-0.2) and "no friction" in found["shifts_seen"]["detail"]
     assert shifts()["shifts_seen"]["verdict"] == "fail"

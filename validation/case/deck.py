@@ -127,7 +127,8 @@ def sources(case: Case, engine: str) -> dict[str, str]:
     files = {path.name: path for path in (case.deck(engine), case.folder / "setup.py") if path.is_file()} | _companions(case)
     # A setup.py may read what was measured, too.
     files |= {f"reference/{path.name}": path for path in (case.folder / "reference").glob("*.csv")}
-    files |= {f"common/{path.relative_to(shared)}": path for pattern in ("*.py", "*.in", f"{engine}/*") for path in shared.glob(pattern)}
+    patterns = ("*.py", f"*{case.deck(engine).suffix}", f"{engine}/*")
+    files |= {f"common/{path.relative_to(shared)}": path for pattern in patterns for path in shared.glob(pattern)}
     found = {name: _check_sum(path, path.stat().st_mtime_ns) for name, path in sorted(files.items())}
     return found | {f"derived {name}": expression.text for name, expression in case.derived.items()}
 

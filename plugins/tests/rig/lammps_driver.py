@@ -33,7 +33,7 @@ def run_deck(folder: Path, deck: str, *, ranks: int = 1, name: str = "case.in") 
     environment = os.environ | {"OMP_NUM_THREADS": "1", "MPIR_CVAR_POLLS_BEFORE_YIELD": "1"}
     with cores.alone(ranks):
         done = subprocess.run([*launcher, engine(), "-in", name, "-log", "none"], cwd=folder, env=environment, capture_output=True,
-                              text=True, check=False, stdin=subprocess.DEVNULL)
+                              text=True, check=False, stdin=subprocess.DEVNULL, timeout=120)
     return Run(done.returncode, done.stdout + done.stderr, folder)
 
 

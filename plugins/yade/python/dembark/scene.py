@@ -124,8 +124,8 @@ def plane(axis, position, side, material, diameter, mask=1):
     `Wall` is unbounded, which a periodic collider cannot sort; a fixed box that reaches far beyond the cell, and all that grains travel,
     does the same. After a restart YADE's collider looks for pairs along x, from a body's lower end to its upper one, within one period.
     So the ends of the box must almost meet there, with a gap that no grain fits into; or a grain just above it would never be found.
-    Along a period that shrinks the collider sorts the ends of the box once through all bounds for each period by which they move. So the
-    box reaches no farther than grains travel: 10^5 diameters, ten times what a grain of 5 mm falls in 3 s.
+    In a direction whose period shrinks, the collider sorts the ends of the box past all bounds once for each period that they move. So
+    the box reaches no farther than grains travel: 10^5 diameters, ten times what a grain of 5 mm falls in 3 s.
     """
     extents = [1e5 * diameter] * 3
     extents[0] = 0.5 * (2001 * O.cell.size[0] - 0.5 * diameter)
