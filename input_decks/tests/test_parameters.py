@@ -88,3 +88,10 @@ def test_every_text_that_a_deck_includes_is_an_input(name):
             for included in re.findall(r'{%\s*include\s+"([^"]+)"', path.read_text(encoding="utf-8")):
                 waiting += {next(one / included for one in folders if (one / included).is_file())} - read
         assert len(read) > 1
+
+
+@pytest.mark.parametrize(("name", "module"), [("vibrated_layer", "postproc/instruments/layer.py"),
+                                              ("vibro_finishing", "postproc/walls/mesh.py")])
+def test_what_a_setup_shares_with_the_measurement_is_an_input(name, module):
+    content = (package_root().parent / module).read_bytes()
+    assert hashlib.sha256(content).hexdigest() in deck.sources(find(name), "liggghts").values()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import importlib.util
 import math
@@ -125,12 +126,25 @@ def sources(case: Case, engine: str) -> dict[str, str]:
     """What makes the deck of `engine` beside the parameters: checksums of the files by name, and the expressions of derived numbers."""
     shared = package_root() / "common"
     files = {path.name: path for path in (case.deck(engine), case.folder / "setup.py") if path.is_file()} | _companions(case)
+    if (case.folder / "setup.py").is_file():
+        files |= _shared_with_postproc(case.folder / "setup.py")
     # A setup.py may read what was measured, too.
     files |= {f"reference/{path.name}": path for path in (case.folder / "reference").glob("*.csv")}
     patterns = ("*.py", f"*{case.deck(engine).suffix}", f"{engine}/*")
     files |= {f"common/{path.relative_to(shared)}": path for pattern in patterns for path in shared.glob(pattern)}
     found = {name: _check_sum(path, path.stat().st_mtime_ns) for name, path in sorted(files.items())}
     return found | {f"derived {name}": expression.text for name, expression in case.derived.items()}
+
+
+def _shared_with_postproc(setup: Path) -> dict[str, Path]:
+    """Files of the modules of `dembark.postproc` that a `setup.py` imports, because runs and measurements need the same rule."""
+    try:
+        nodes = ast.walk(ast.parse(setup.read_bytes()))
+    except SyntaxError:  # is told when it is loaded
+        return {}
+    imports = (node.module or "" for node in nodes if isinstance(node, ast.ImportFrom))
+    names = {name.removeprefix("dembark.") for name in imports if name.startswith("dembark.postproc.")}
+    return {name: path for name in names if (path := (package_root().parent / name.replace(".", "/")).with_suffix(".py")).is_file()}
 
 
 def _companions(case: Case) -> dict[str, Path]:
