@@ -1,12 +1,8 @@
 """`--slow`: tests that build whole engines run only when asked for; what all tests share."""
 
-from collections.abc import Iterator
-
 # Before pytest takes the folder packaging/ for this library.
 import packaging.version  # noqa: F401
 import pytest
-
-from dembark.common.tests import cores
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -26,16 +22,3 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if "slow" in item.keywords:
             item.add_marker(skip)
-
-
-@pytest.hookimpl(hookwrapper=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
-    if "slow" in item.keywords:  # minutes, for which nobody can wait
-        yield
-        return
-    with cores.shared():
-        yield
-
-
-def pytest_sessionfinish() -> None:
-    cores.forget()

@@ -10,7 +10,6 @@ import pytest
 from blocks import ROOT, Block, blocks, logical_lines
 
 from dembark.common.errors import DembarkError
-from dembark.common.tests import cores
 from dembark.validation import engines
 
 HEAD = """
@@ -67,8 +66,7 @@ def liggghts() -> engines.Engine:
 def run(engine: engines.Engine, text: str, folder: Path, ranks: int = 1, **values: str) -> str:
     """What the engine prints for a deck; AssertionError when it stops."""
     (folder / "deck.in").write_text(text)
-    with cores.alone(ranks):
-        done = engines.call(engine.command(Path("deck.in"), values, ranks), folder, engine.environment(), timeout=120)
+    done = engines.call(engine.command(Path("deck.in"), values, ranks), folder, engine.environment(), timeout=120)
     assert done.returncode == 0, done.stdout[-1500:] + done.stderr
     return done.stdout
 

@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 from dembark.common.errors import DembarkError
-from dembark.common.tests import cores
 from dembark.postproc.replica import Replica
 from dembark.validation import engines
 from dembark.validation.case import deck
@@ -44,12 +43,11 @@ class Deck:
 
     def run(self, ranks: int = 1, **words: Any) -> str:
         """To the end; what the engine said."""
-        with cores.alone(ranks):
-            process = self.start(ranks, **words)
-            try:
-                code = process.wait(300)
-            finally:
-                process.kill()
+        process = self.start(ranks, **words)
+        try:
+            code = process.wait(300)
+        finally:
+            process.kill()
         assert code == 0 and "dembark: finished" in self.said(), self.said()[-2000:]
         return self.said()
 

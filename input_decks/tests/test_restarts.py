@@ -16,7 +16,6 @@ import pytest
 
 from dembark.common.errors import DembarkError, Killed
 from dembark.common.files import check_times, count_frames, read_json
-from dembark.common.tests import cores
 from dembark.postproc import ContactsDump, GrainsDump, read_times
 from dembark.validation import engines
 from dembark.validation.case.folders import find
@@ -62,12 +61,11 @@ class Run:
 
     def kill_after(self, step: int) -> int:
         """SIGKILL to a run as soon as it has a state of `step` or later; the step of its newest state."""
-        with cores.alone(self.ranks):
-            process = self.deck.start(self.ranks, restart_every=self.every)
-            while process.poll() is None and (self.newest() or -1) < step:
-                time.sleep(0.005)
-            process.kill()
-            assert process.wait() == -signal.SIGKILL, "the run was over before it could be killed"
+        process = self.deck.start(self.ranks, restart_every=self.every)
+        while process.poll() is None and (self.newest() or -1) < step:
+            time.sleep(0.005)
+        process.kill()
+        assert process.wait() == -signal.SIGKILL, "the run was over before it could be killed"
         found = self.newest()
         assert found is not None
         return found

@@ -11,7 +11,6 @@ import pytest
 
 from dembark.common.errors import Interrupted, RunError
 from dembark.common.files import read_json
-from dembark.common.tests import cores
 from dembark.validation import engines, provenance
 from dembark.validation.case import folders
 from dembark.validation.case.folders import find
@@ -171,8 +170,7 @@ def test_both_engines_get_the_parameters_and_fall_as_they_say(tmp_path: Path, en
 
 
 def test_two_mpi_ranks(tmp_path: Path) -> None:
-    with cores.alone(2):
-        simulate(plan("liggghts"), tmp_path / "out", threading.Event(), Resources(ranks=2))
+    simulate(plan("liggghts"), tmp_path / "out", threading.Event(), Resources(ranks=2))
     folder = tmp_path / "out/replica-1"
     assert read_json(folder / "run.json")["provenance"]["ranks"] == 2
     assert "2 by 1 by 1" in (folder / "engine.log").read_text() or "1 by 2" in (folder / "engine.log").read_text()

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.common.tests import cores
 from dembark.validation.engines import Engine, call, find
 from rig import input_script
 from rig.motion import Motion
@@ -42,8 +41,7 @@ def run_deck(folder: Path, deck: str, *, ranks: int = 1, name: str = "case.in") 
     (folder / name).write_text(deck)
     # Ranks that wait must not keep the others from the processors of a machine that is busy.
     environment = engine().environment() | {"OMPI_MCA_mpi_yield_when_idle": "1"}
-    with cores.alone(ranks):
-        done = call(engine().command(folder / name, {}, ranks), folder, environment)
+    done = call(engine().command(folder / name, {}, ranks), folder, environment)
     return Run(done.returncode, done.stdout + done.stderr, folder)
 
 
