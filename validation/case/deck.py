@@ -126,8 +126,8 @@ def sources(case: Case, engine: str) -> dict[str, str]:
     """What makes the deck of `engine` beside the parameters: checksums of the files by name, and the expressions of derived numbers."""
     shared = package_root() / "common"
     files = {path.name: path for path in (case.deck(engine), case.folder / "setup.py") if path.is_file()} | _companions(case)
-    if (case.folder / "setup.py").is_file():
-        files |= _shared_with_postproc(case.folder / "setup.py")
+    if setup := files.get("setup.py"):
+        files |= _shared_with_postproc(setup, setup.stat().st_mtime_ns)
     # A setup.py may read what was measured, too.
     files |= {f"reference/{path.name}": path for path in (case.folder / "reference").glob("*.csv")}
     patterns = ("*.py", f"*{case.deck(engine).suffix}", f"{engine}/*")
@@ -136,7 +136,8 @@ def sources(case: Case, engine: str) -> dict[str, str]:
     return found | {f"derived {name}": expression.text for name, expression in case.derived.items()}
 
 
-def _shared_with_postproc(setup: Path) -> dict[str, Path]:
+@cache
+def _shared_with_postproc(setup: Path, _changed: int) -> dict[str, Path]:
     """Files of the modules of `dembark.postproc` that a `setup.py` imports, because runs and measurements need the same rule."""
     try:
         nodes = ast.walk(ast.parse(setup.read_bytes()))

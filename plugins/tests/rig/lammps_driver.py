@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 
 from dembark.common.errors import DembarkError
+from dembark.validation.engines import call
 from rig import input_script
 from rig.liggghts_driver import COLUMNS, Run
 from rig.motion import Motion
@@ -30,8 +30,7 @@ def run_deck(folder: Path, deck: str, *, ranks: int = 1, name: str = "case.in") 
     launcher = [BIN / "lammps-mpiexec", "-n", str(ranks)] if ranks > 1 else []
     # Ranks that wait must not keep the others from the processors of a machine that is busy.
     environment = os.environ | {"OMP_NUM_THREADS": "1", "MPIR_CVAR_POLLS_BEFORE_YIELD": "1"}
-    done = subprocess.run([*launcher, engine(), "-in", name, "-log", "none"], cwd=folder, env=environment, capture_output=True, text=True,
-                          check=False, stdin=subprocess.DEVNULL, timeout=120)
+    done = call([*launcher, engine(), "-in", name, "-log", "none"], folder, environment)
     return Run(done.returncode, done.stdout + done.stderr, folder)
 
 
