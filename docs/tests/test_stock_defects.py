@@ -219,14 +219,15 @@ run 1
     assert run(tmp_path, deck, "-screen", "none").returncode < 0
 
 
-def bed(steps: str) -> str:
-    """Grains in disorder that fall on each other; positions and velocities at the end go to end.dump."""
-    radius = 0.0025
+def bed(steps: str, shift: float = 0.0) -> str:
+    """Grains in disorder that fall on each other; positions and velocities at the end go to end.dump. A `shift` (m) along x takes some of
+    them across the border, which is periodic."""
+    radius, side = 0.0025, 0.05
     rng = np.random.default_rng(1)
-    lines = [f"create_atoms 1 single {x!r} {y!r} {z!r} units box" for x, y, z in
+    lines = [f"create_atoms 1 single {(x + shift + 0.5 * side) % side - 0.5 * side!r} {y!r} {z!r} units box" for x, y, z in
              (np.array([[i, j, k] for i in range(3) for j in range(3) for k in range(3)]) * 0.00495 - 0.005
               + rng.uniform(-1e-5, 1e-5, (27, 3))).tolist()]
-    return scene(radius) + "\n".join(lines) + f"""
+    return scene(radius, "p f f" if shift else "f f f") + "\n".join(lines) + f"""
 set group all density 2500 diameter {2 * radius}
 {MATERIAL}
 pair_style gran model hertz tangential history
@@ -240,8 +241,8 @@ write_dump all custom end.dump id x y z vx vy vz modify sort id format "%d %.17g
 """
 
 
-def end_state(folder: Path, steps: str) -> np.ndarray:
-    result = run(folder, bed(steps))
+def end_state(folder: Path, steps: str, **words: float) -> np.ndarray:
+    result = run(folder, bed(steps, **words))
     assert result.returncode == 0, result.stdout[-2000:]
     return np.loadtxt(folder / "end.dump", skiprows=9)
 
@@ -250,6 +251,15 @@ def test_two_runs_are_not_one(tmp_path: Path) -> None:
     whole, parts, joined = (end_state(tmp_path, steps) for steps in ("run 200", "run 100\nrun 100", "run 100\nrun 100 pre no"))
     assert np.array_equal(whole, joined)
     assert np.abs(whole - parts).max() > 1e-9
+
+
+def test_atoms_created_between_runs_take_histories_away(tmp_path: Path) -> None:
+    new = "".join(f"create_atoms 1 single {0.006 * k} {0.006 * j} 0.022 units box\nset atom {34 + 4 * j + k} diameter 0.005 density 2500\n"
+                  for j in range(-1, 2) for k in range(-2, 2))
+    left, added, stored = (end_state(tmp_path, f"run 60\n{between}run 40", shift=0.025)[:27]
+                           for between in ("", new, f"write_restart state\n{new}"))
+    assert np.array_equal(left, stored)
+    assert np.abs(left - added).max() > 1e-9
 
 
 def printed(folder: Path, body: str, name: str) -> float:

@@ -9,6 +9,7 @@
 // The library's headers depend on this order.
 #include "fix_insert_stream.h"
 #include "error.h"
+#include "force.h"
 #include "lammps.h"
 #include "contact_models.h"
 #include "style_surface_model.h"
@@ -59,10 +60,11 @@ using Creator = typename GranularCreators<Host>::mapped_type;
 template <class Host>
 Creator<Host> stock_fallback = nullptr;
 
+bool ours(std::int64_t hash) { return ((hash >> 6) & 63) == TANGENTIAL_FINNIE_RABINOWICZ || ((hash >> 12) & 63) == COHESION_CAPILLARY; }
+
 template <class Host>
 Host* fallback_or_refuse(LAMMPS* lammps, typename Host::ParentType* parent, std::int64_t hash) {
-  const int tangential = (hash >> 6) & 63, cohesion = (hash >> 12) & 63;
-  if (tangential == TANGENTIAL_FINNIE_RABINOWICZ || cohesion == COHESION_CAPILLARY) {
+  if (ours(hash)) {
     const std::string line = "this combination of contact models is not compiled; there is " + available();
     lammps->error->all(FLERR, line.c_str());
   }
@@ -110,6 +112,11 @@ void guard_fallback(GranularCreators<Host>& creators) {
 }
 
 }  // namespace
+
+bool has_our_models(LAMMPS_NS::Force& force) {
+  LAMMPS_NS::PairGran* const pair = dynamic_cast<LAMMPS_NS::PairGran*>(force.pair_match("gran", 0));
+  return pair && ours(pair->hashcode());
+}
 
 void register_contact_models() {
   guard_fallback(pair_loops());

@@ -8,7 +8,10 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
+#include <utility>
 
+#include "fix_contact_history.h"
 #include "force.h"
 #include "input.h"
 #include "lammps.h"
@@ -31,6 +34,7 @@
 namespace {
 
 bool entered = false;  // the styles are in the library's tables
+dembark_liggghts::CommandCreator stock_run = nullptr;
 
 template <class Style>
 LAMMPS_NS::Fix* create_fix(LAMMPS_NS::LAMMPS* lammps, int narg, char** arg) {
@@ -47,6 +51,16 @@ void start_alone() {
   setenv("OMPI_MCA_btl", "self", 0);
   // Its folder for such daemons is the same for all that are started alone: one that ends takes it away while another begins.
   setenv("OMPI_MCA_orte_create_session_dirs", "0", 0);
+}
+
+/// Contact histories stay in the neighbor list after a run, where ghost atoms are partners, until the next run or restart file takes them
+/// out. Atoms that a script creates in between overwrite the ghosts, and contacts across borders would lose their histories. Runs of stock
+/// models stay as they are in stock LIGGGHTS.
+void run_and_keep_histories(LAMMPS_NS::LAMMPS* host, int narg, char** arg) {
+  stock_run(host, narg, arg);
+  if (!dembark_liggghts::has_our_models(*host->force)) return;
+  for (int i = 0; i < host->modify->nfix; ++i)
+    if (!std::strcmp(host->modify->fix[i]->style, "contacthistory")) host->modify->fix[i]->setup_pre_exchange();
 }
 
 /// The library enters its own combinations when it is made; ours come after, where its fallback can be replaced.
@@ -67,6 +81,8 @@ void enter_styles(LAMMPS_NS::LAMMPS& host) {
   (*host.force->pair_map)["sph/coupled"] = [](LAMMPS_NS::LAMMPS* owner) -> LAMMPS_NS::Pair* {
     return new LAMMPS_NS::PairSphCoupled(owner);
   };
+  auto& run = dembark_liggghts::commands(*host.input)["run"];
+  if (run != &run_and_keep_histories) stock_run = std::exchange(run, &run_and_keep_histories);
   dembark_liggghts::commands(*host.input)["resume_state"] = [](LAMMPS_NS::LAMMPS* owner, int narg, char** arg) {
     LAMMPS_NS::ResumeState(owner).command(narg, arg);
   };

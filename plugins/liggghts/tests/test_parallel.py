@@ -113,6 +113,16 @@ def test_grains_deleted_beside_bridges(tmp_path, ranks):
     assert len(last(tmp_path)) == 61
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_grains_created_between_runs_leave_the_others_as_they_are(tmp_path, ranks):
+    """Contacts across borders keep their histories: in stock LIGGGHTS a new atom takes the place of the ghost that held one."""
+    new = "create_atoms 1 single 0.003 0.003 0.05 units box\nset group all vz 0.0\nset atom 65 diameter 0.005 density 2500\n"
+    for name, between in (("with", new), ("without", "set group all vz 0.0\n")):
+        run(tmp_path / name, bed(f"run 2000\n{between}run 500", ranks=ranks), ranks)
+    assert_same_grains(last(tmp_path / "without"), last(tmp_path / "with")[:64], 1e-12)
+    assert_same_contacts(contacts(tmp_path / "without"), contacts(tmp_path / "with"), 1e-12)
+
+
 @pytest.mark.parametrize("ranks", [(1, 1), (2, 2), (1, 2), (2, 1)])
 def test_restart_keeps_every_value(tmp_path, ranks):
     """read_restart, also on another number of ranks: what the pairs held at the last build of the lists comes back to the bit."""
