@@ -295,6 +295,78 @@ TEST_CASE("SPH bodies: free fall, a torque-free top, points that turn", "[sph]")
   CHECK_THAT(wheel.acceleration_at({0.5, 0.0, 0.0}).x, WithinRel(-4.5, 1e-15));
 }
 
+namespace {
+
+/// A free body, under a torque that turns with it and one that stands in space.
+struct Gyroscope {
+  Body body;
+  Vector own{}, fixed{};  // N m
+
+  explicit Gyroscope(const Vector& inertia) {
+    body.free = true;
+    body.mass = 0.2;
+    body.inertia = inertia;
+    body.spin = {std::isinf(inertia.x) ? 0.0 : 0.01, 20.0, std::isinf(inertia.z) ? 0.0 : 0.02};
+  }
+  void push() {
+    body.load_torque = fixed + body.orientation(own);
+    body.accelerate({});
+  }
+  void run(double time, double dt) {
+    push();
+    for (long k = std::lround(time / dt); k > 0; --k) {
+      body.kick(0.5 * dt);
+      body.drift(dt);
+      push();
+      body.kick(0.5 * dt);
+    }
+  }
+  Vector angular_momentum() const {
+    const Vector w = body.orientation.inverse()(body.spin);
+    return body.orientation({body.inertia.x * w.x, body.inertia.y * w.y, body.inertia.z * w.z});
+  }
+};
+
+}  // namespace
+
+TEST_CASE("SPH bodies turn to second order in the step, with and without torques", "[sph]") {
+  // Unequal moments about the middle axis, which flips; a symmetric top; and a body that an axis is held of.
+  for (const Vector& inertia : {Vector{1e-4, 2e-4, 3e-4}, Vector{3e-4, 1e-4, 2e-4}, Vector{2e-4, 2e-4, 1e-4}, Vector{INFINITY, 2e-4, 3e-4}})
+    for (const double torque : {0.0, 1e-3}) {
+      const auto after = [&](double dt) {
+        Gyroscope g(inertia);
+        g.own = {0.3 * torque, torque, -0.5 * torque};
+        g.fixed = {torque, 0.2 * torque, torque};
+        g.run(0.8, dt);
+        return g;
+      };
+      const Gyroscope exact = after(1.25e-6);
+      const auto error = [&](double dt) {
+        const Gyroscope g = after(dt);
+        return norm(g.body.spin - exact.body.spin) +
+               20.0 * norm(g.body.orientation({1.0, 0.0, 0.0}) - exact.body.orientation({1.0, 0.0, 0.0}));
+      };
+      const double coarse = error(4e-4), fine = error(2e-4);
+      CAPTURE(inertia.x, inertia.y, torque, coarse, fine);
+      CHECK((coarse < 1e-9 || (coarse / fine > 3.3 && coarse / fine < 4.7)));
+    }
+}
+
+TEST_CASE("SPH bodies: a torque-free spin keeps its angular momentum, and its energy over many flips", "[sph]") {
+  for (const double dt : {8e-4, 4e-4}) {
+    Gyroscope g({1e-4, 2e-4, 3e-4});
+    const Vector before = g.angular_momentum();
+    const double energy = g.body.kinetic_energy();
+    double most = 0.0;
+    for (int part = 0; part < 200; ++part) {
+      g.run(0.1, dt);
+      most = std::max(most, std::abs(g.body.kinetic_energy() / energy - 1.0));
+    }
+    CHECK(norm(g.angular_momentum() - before) < 1e-10 * norm(before));
+    CHECK(most < (dt > 5e-4 ? 4e-5 : 1e-5));
+  }
+}
+
 TEST_CASE("SPH solver: bad input gets one line", "[sph]") {
   const std::vector<Vector> x{{0.0, 0.0, 0.0}};
   const auto with = [&](auto change) {
