@@ -5,6 +5,7 @@
 #include "modify.h"
 
 #include "dembark/contact_tally.hpp"
+#include "dembark/motion/wall_work.hpp"
 
 namespace dembark_lammps {
 
@@ -16,11 +17,13 @@ struct EnergyTally : dembark::ContactTally {
     add_pair(parts_of(p, b, out, state, advance), levers(b, out), i, j);
   }
 
-  /// A contact of grain i with a wall, whose surface has the velocities in `b`, and these accelerations (m/s^2 at the contact, rad/s^2).
+  /// A contact of grain i at x (m) with a wall, which has the velocities in `b` and this acceleration.
   DEMBARK_COLD void add(const dembark::ContactParameters& p, const dembark::ContactBodies& b, const dembark::ContactForce& out,
-                        const dembark::ContactState& state, bool advance, int i, const dembark::Vec3<double>& acceleration,
-                        const dembark::Vec3<double>& angular_acceleration) {
-    add_wall(parts_of(p, b, out, state, advance), levers(b, out), i, {b.velocity_2, b.wall_spin, acceleration, angular_acceleration});
+                        const dembark::ContactState& state, bool advance, int i, const dembark::Vec3<double>& x,
+                        const dembark::WallAcceleration& acceleration) {
+    const dembark::ContactLevers arms = levers(b, out);
+    add_wall(parts_of(p, b, out, state, advance), arms, i,
+             {b.velocity_2 + cross(b.wall_spin, arms.two), b.wall_spin, acceleration.at(x + arms.one), acceleration.angular});
   }
 
  private:

@@ -153,12 +153,13 @@ void FixWallDembark::act_on(int i, bool advance) {
     if (history) layout_.load(history, state);
     const double volume = state.bridge_volume;
     const dembark::ContactForce out = contact_step(p, b, update->dt, state, advance);
+    dembark_lammps::check_normal(error, atom->tag, out.normal, i, -1);
     const bool touching = out.overlap > 0.0;
     if (advance && !(volume > 0.0) && (state.bridge_volume > 0.0 || (liquid_ && touching)))
       dembark_lammps::check_time_step(error, p.liquid, b, update->dt);
     if (!out.interacting && !(volume > 0.0)) continue;
     if (next == end) fail_alone("a grain touches more than " + std::to_string(slots_) + " parts of a wall");
-    if (tally_ && out.interacting) tally_->add(p, b, out, state, advance, i, acceleration_.at(x - b.separation), acceleration_.angular);
+    if (tally_ && out.interacting) tally_->add(p, b, out, state, advance, i, x, acceleration_);
     if (advance) {
       next[0] = contact.surface + 1;
       layout_.store(next + 1, state);

@@ -86,9 +86,7 @@ const ContactParameters& PackedContacts::law(const PairBlock& block, int k) cons
 Vec3 PackedContacts::friction(const PairBlock& block, int k, const Vec3& normal, double twist,
                               const dembark::NormalResponse<double>& response, const Vec3& velocity) {
   // What is no number neither sticks nor slips in a pack: pairs without a normal end up here.
-  if (!(normal.x == normal.x))
-    error->one(FLERR, "pair_style dembark/granular: grains {} and {} are at the same place", atom->tag[block.grain[k]],
-               atom->tag[block.partner[k]]);
+  check_normal(error, atom->tag, normal, block.grain[k], block.partner[k]);
   double* const history = block.history[k];
   dembark::FrictionState<double> state = dembark::load_friction(history);
   dembark::SlipRings rings;

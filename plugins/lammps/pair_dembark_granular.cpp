@@ -128,7 +128,7 @@ template <class Visit>
 void PairDembarkGranular::each_contact(Visit visit) {
   double** const x = atom->x;
   const double* const radius = atom->radius;
-  const int *const mask = atom->mask, size = layout_.size();
+  const int size = layout_.size();
   for (int ii = 0; ii < list->inum; ++ii) {
     const int i = list->ilist[ii];
     int* const touches = history_->firstflag[i];
@@ -136,7 +136,7 @@ void PairDembarkGranular::each_contact(Visit visit) {
       const int listed = list->firstneigh[i][jj], j = listed & NEIGHMASK;
       const double dx = x[i][0] - x[j][0], dy = x[i][1] - x[j][1], dz = x[i][2] - x[j][2], sum = radius[i] + radius[j];
       if (dx * dx + dy * dy + dz * dz >= sum * sum && !touches[jj]) continue;
-      if (force->special_lj[sbmask(listed)] == 0.0 || (mask[i] & mask[j] & freeze_bit_)) continue;
+      if (force->special_lj[sbmask(listed)] == 0.0) continue;
       visit(i, j, touches[jj], history_->firstvalue[i] + size * jj);
     }
   }
@@ -174,6 +174,7 @@ void PairDembarkGranular::compute(int eflag, int vflag) {
     if (touched) layout_.load(row, state);
     const bool was_bridged = state.bridge_volume > 0.0;
     const ContactForce out = contact_step(p, b, update->dt, state, advance);
+    dembark_lammps::check_normal(error, atom->tag, out.normal, i, j);
     if (advance) {
       if (state.bridge_volume > 0.0 && !was_bridged) {
         dembark_lammps::check_time_step(error, p.liquid, b, update->dt);
@@ -190,7 +191,8 @@ void PairDembarkGranular::compute(int eflag, int vflag) {
       }
     }
     if (!out.interacting) return;
-    if (tally_) tally_->add(p, b, out, state, advance, i, j);
+    // Two frozen grains have no works.
+    if (tally_ && !(atom->mask[i] & atom->mask[j] & freeze_bit_)) tally_->add(p, b, out, state, advance, i, j);
     add(f[i], out.force);
     add(torque[i], out.torque_1);
     if (force->newton_pair || j < atom->nlocal) {
@@ -218,8 +220,7 @@ double PairDembarkGranular::single(int i, int j, int itype, int jtype, double rs
   }
   const ContactBodies b = bodies(i, j);
   std::fill_n(svector, single_numbers, 0.0);
-  const bool frozen = atom->mask[i] & atom->mask[j] & freeze_bit_;
-  const ContactForce out = frozen ? ContactForce() : contact_step(coefficients_(itype, jtype), b, update->dt, state, false);
+  const ContactForce out = contact_step(coefficients_(itype, jtype), b, update->dt, state, false);
   const dembark_lammps::Vec3 tangential = out.tangential + out.viscous_tangential;
   add(svector, out.force);
   add(svector + 3, tangential);

@@ -24,22 +24,10 @@ typedef dembark::Vec3<double> Vec3;
 
 using dembark_family::vector;
 
-/// The two bodies but for their masses, which the models do not ask for.
-inline dembark::ContactBodies bodies(const LIGGGHTS::ContactModels::SurfacesCloseData& d, double* const* omega) {
-  dembark::ContactBodies b;
-  b.velocity_1 = vector(d.v_i);
-  b.velocity_2 = vector(d.v_j);
-  b.angular_velocity_1 = vector(omega[d.i]);
-  b.radius_1 = d.radi;
-  if (d.is_wall) return b;
-  b.angular_velocity_2 = vector(omega[d.j]);
-  b.radius_2 = d.radj;
-  return b;
-}
-
-/// How a wall turns (rad/s), of a mesh that is rotated by the velocities of its triangle's corners; others do not turn.
+/// How a wall turns (rad/s), by the velocities of its triangle's corners: of a mesh that is rotated, or whose surface turns in its place
+/// (`surface_ang_vel`). Others do not turn.
 inline Vec3 wall_spin(const LIGGGHTS::ContactModels::SurfacesCloseData& d) {
-  if (!d.mesh || !d.mesh->isRotating()) return {};
+  if (!d.mesh || !(d.mesh->isRotating() || (d.fix_mesh && d.fix_mesh->surfaceVel()))) return {};
   auto* const velocities = d.mesh->prop().getElementProperty<LAMMPS_NS::MultiVectorContainer<double, 3, 3>>("v");
   if (!velocities) return {};
   double corner[3][3];
@@ -49,9 +37,20 @@ inline Vec3 wall_spin(const LIGGGHTS::ContactModels::SurfacesCloseData& d) {
   return dembark::triangle_spin(from_first(corner, 1), from_first(corner, 2), from_first(v, 1), from_first(v, 2));
 }
 
-/// Relative spin (rad/s) of the two bodies.
-inline Vec3 relative_spin(const LIGGGHTS::ContactModels::SurfacesCloseData& d) {
-  return vector(d.omega_i) - (d.is_wall ? wall_spin(d) : vector(d.omega_j));
+/// The two bodies but for their masses, which the models do not ask for.
+inline dembark::ContactBodies bodies(const LIGGGHTS::ContactModels::SurfacesCloseData& d, double* const* omega) {
+  dembark::ContactBodies b;
+  b.velocity_1 = vector(d.v_i);
+  b.velocity_2 = vector(d.v_j);
+  b.angular_velocity_1 = vector(omega[d.i]);
+  b.radius_1 = d.radi;
+  if (d.is_wall) {
+    b.wall_spin = wall_spin(d);
+    return b;
+  }
+  b.angular_velocity_2 = vector(omega[d.j]);
+  b.radius_2 = d.radj;
+  return b;
 }
 
 /// Adds an assembled force to what acts on the two bodies.

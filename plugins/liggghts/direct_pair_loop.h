@@ -97,8 +97,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
         state.friction = load_friction(history + friction_offset_);
         if (rings_offset_ >= 0) state.rings = load_rings(history + rings_offset_);
         if (angle_offset_ >= 0) state.rolling_angle = vector(history + angle_offset_);
-        // Of two frozen grains the engine takes the mass of the first.
-        const double mass_i = frozen(i) && !frozen(j) ? INFINITY : atom.rmass[i], mass_j = frozen(j) ? INFINITY : atom.rmass[j];
+        const double mass_i = frozen(i) ? INFINITY : atom.rmass[i], mass_j = frozen(j) ? INFINITY : atom.rmass[j];
         const dembark::ContactParameters law = parameters(atom.type[i], atom.type[j]);
         const dembark::ContactBodies b = dembark_family::grain_pair(atom, i, j, apart, mass_i, mass_j);
         const dembark::ContactForce out = contact_step(law, b, dt_, state);
@@ -142,7 +141,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     const LAMMPS_NS::Atom* const atom = lmp_->atom;
     const int i = block.grain[k], j = block.partner[k];
     // What is no number neither sticks nor slips in a pack: pairs without a normal end up here.
-    if (!(normal.x == normal.x)) refuse_coincidence(lmp_->error, atom->tag, i, j);
+    if (dembark::has_no_direction(normal)) refuse_coincidence(lmp_->error, atom->tag, i, j);
     double* const history = block.history[k] + friction_offset_;
     dembark::FrictionState<double> state = load_friction(history);
     dembark::SlipRings rings;

@@ -33,10 +33,12 @@ struct EnergyTally : dembark::ContactTally {
     if (!d.computeflag || (!d.is_wall && atom->mask[d.i] & atom->mask[d.j] & frozen)) return;
     const dembark::ContactLevers levers(normal, motion);
     if (!d.is_wall) return add_pair(parts, levers, d.i, d.j);
-    WallMotion wall{vector(d.v_j), wall_spin(d)};
+    // Where the force acts, from the surface.
+    const dembark::Vec3<double> spin = wall_spin(d), within = vector(d.delta) + levers.one;
+    WallMotion wall{vector(d.v_j) + cross(spin, within), spin};
     for (const auto &[mesh, acceleration] : driven)
       if (mesh == d.mesh) {
-        wall.acceleration = acceleration->at(vector(atom->x[d.i]) - vector(d.delta));
+        wall.acceleration = acceleration->at(vector(atom->x[d.i]) + levers.one);
         wall.angular_acceleration = acceleration->angular;
       }
     add_wall(parts, levers, d.i, wall, d.area_ratio);

@@ -99,7 +99,6 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     if (d.contact_flags) *d.contact_flags |= CONTACT_TANGENTIAL_MODEL;
     const bool update_history = d.computeflag && d.shearupdate;
     const double dt = update_history ? update->dt : 0.0, radius = d.is_wall ? d.radi : d.radi * d.radj / d.radsum;
-    const dembark::RelativeMotion motion{d.vn, {d.vtr1, d.vtr2, d.vtr3}, d.cri, d.is_wall ? 0.0 : d.crj};
     const dembark::NormalResponse<double> response{d.Fn, d.kt, d.gammat, dembark::pi * radius * d.deltan, d.kn};
     double* const history = d.contact_history + offset_;
     dembark::FrictionState<double> state = dembark_liggghts::load_friction(history);
@@ -107,7 +106,11 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     if (rings_ >= 0) rings = dembark_liggghts::load_rings(d.contact_history + rings_);
     dembark::ContactForce out;
     out.normal = vector(d.en);
-    const double twist = contact_twist(out.normal, vector(d.omega_i), d.is_wall ? dembark::Vec3<double>{} : vector(d.omega_j), dt);
+    const dembark::Vec3<double> spin_i = vector(d.omega_i), spin_j = d.is_wall ? dembark_liggghts::wall_spin(d) : vector(d.omega_j);
+    const double twist = contact_twist(out.normal, spin_i, spin_j, dt);
+    dembark::RelativeMotion motion{d.vn, {d.vtr1, d.vtr2, d.vtr3}, d.cri, d.is_wall ? -0.5 * d.deltan : d.crj};
+    // The engine takes the velocity of a wall at its surface.
+    if (d.is_wall) motion.tangential_velocity -= cross(motion.arm_2 * spin_j, out.normal);
     out.tangential = contact_friction(laws_(d.itype, d.jtype), out.normal, twist, response, motion.tangential_velocity, dt, state, &rings);
     assemble(motion, out);
     dembark::Vec3<double> angle;
@@ -116,7 +119,7 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
       if (angle_ >= 0) angle = vector(d.contact_history + angle_);
       const double inertia = d.is_wall ? dembark::relative_inertia(d.mi, d.radi, INFINITY, INFINITY)
                                        : dembark_liggghts::pair_inertia(*atom, *pair_, d.i, d.mi, d.j, d.mj);
-      const dembark::RollingContact contact{out.normal, twist, radius, inertia, d.Fn, d.kt, dembark_liggghts::relative_spin(d)};
+      const dembark::RollingContact contact{out.normal, twist, radius, inertia, d.Fn, d.kt, spin_i - spin_j};
       add_couple(rolling_step(rolling_(d.itype, d.jtype), contact, dt, angle), out);
     }
     if (update_history) store(d.contact_history, state, rings, angle);

@@ -6,8 +6,9 @@
 // bridge_resistance(), assemble(), rolling_step() and add_couple().
 //
 // Conventions: the unit normal points from body 2 to body 1; forces are those on body 1. A wall is body 2 with an infinite radius
-// and an infinite mass; its velocity is that of its surface at the contact. Lever arms reach to the middle of the overlap,
-// r - delta/2 (LIGGGHTS-PUBLIC 3.8.0, `surface default`), and to the middle of the gap of a bridge that resists sliding.
+// and an infinite mass; its position and velocity are those of its surface at the contact, and it turns by `wall_spin`. Lever arms reach
+// to the middle of the overlap, r - delta/2 (LIGGGHTS-PUBLIC 3.8.0, `surface default`), -delta/2 from the surface of a wall, and to the
+// middle of the gap of a bridge that resists sliding.
 #pragma once
 
 #include <algorithm>
@@ -57,11 +58,16 @@ struct ContactParameters {
   Liquid liquid{};
   RollingResistance rolling{};
 
-  /// The normal law, as it is without the switches above.
+  /// The normal law, as it is without the switches above. Two held bodies, whose effective mass is infinite, have no impact that damping or
+  /// Hooke's stiffness could follow from: between them there is Hertz's spring alone.
   NormalResponse<double> respond(double effective_radius, double effective_mass, double overlap, double normal_velocity) const {
-    if (normal_law == NormalLaw::hertz) return hertz(elasticity, effective_radius, effective_mass, overlap, normal_velocity);
+    const bool held = std::isinf(effective_mass);
+    if (normal_law == NormalLaw::hertz || held)
+      return hertz(elasticity, effective_radius, held ? 0.0 : effective_mass, overlap, normal_velocity);
     return hooke(elasticity, characteristic_velocity, effective_radius, effective_mass, overlap, normal_velocity);
   }
+  /// The spring's force grows with this power of the overlap.
+  double spring_exponent(double effective_mass) const { return normal_law == NormalLaw::hertz || std::isinf(effective_mass) ? 1.5 : 1.0; }
 };
 
 /// What an engine stores per contact, from touching to the end of contact and bridge.
@@ -81,11 +87,12 @@ struct ContactBodies {
   Vec3<double> angular_velocity_1{}, angular_velocity_2{};
   double radius_1 = 0.0, radius_2 = INFINITY;
   double mass_1 = 0.0, mass_2 = INFINITY;
-  Vec3<double> wall_spin{};  ///< rad/s, how a wall turns, which body 1 rolls against
+  Vec3<double> wall_spin{};  ///< rad/s, how a wall turns that is body 2
 
   double effective_radius() const { return reduced(radius_1, radius_2); }
   double effective_mass() const { return reduced(mass_1, mass_2); }
-  Vec3<double> relative_spin() const { return angular_velocity_1 - angular_velocity_2 - wall_spin; }
+  Vec3<double> spin_2() const { return angular_velocity_2 + wall_spin; }
+  Vec3<double> relative_spin() const { return angular_velocity_1 - spin_2(); }
 };
 
 struct ContactForce {
@@ -99,15 +106,15 @@ struct ContactForce {
   double viscous_normal = 0.0;                                ///< N, of the liquid, on body 1 along the normal
   Vec3<double> viscous_tangential{};                          ///< N, of the liquid, on body 1
   Vec3<double> force{};                                       ///< N, on body 1, everything; body 2 gets its negative
-  Vec3<double> torque_1{}, torque_2{};                        ///< N m
+  Vec3<double> torque_1{}, torque_2{};                        ///< N m, about the centres; of a wall about its surface at the contact
   Vec3<double> rolling{};                                     ///< N m, couple of rolling resistance on body 1, a part of its torque
 };
 
 typedef SurfaceMotion<double> RelativeMotion;
 
 inline RelativeMotion relative_motion(const ContactBodies& b, const Vec3<double>& normal, double overlap) {
-  const double arm_1 = b.radius_1 - 0.5 * overlap, arm_2 = std::isinf(b.radius_2) ? 0.0 : b.radius_2 - 0.5 * overlap;
-  return surface_motion(normal, b.velocity_1 - b.velocity_2, arm_1, b.angular_velocity_1, arm_2, b.angular_velocity_2);
+  const double arm_1 = b.radius_1 - 0.5 * overlap, arm_2 = (std::isinf(b.radius_2) ? 0.0 : b.radius_2) - 0.5 * overlap;
+  return surface_motion(normal, b.velocity_1 - b.velocity_2, arm_1, b.angular_velocity_1, arm_2, b.spin_2());
 }
 
 /// Friction of touching surfaces (N, on body 1): the spring turns with the pair by `twist` (rad, of contact_twist), then it sticks or
@@ -160,13 +167,13 @@ inline void add_couple(const Vec3<double>& couple, ContactForce& out) {
   out.torque_2 -= couple;
 }
 
-/// One step of one contact. `dt` in s.
+/// One step of one contact. `dt` in s. Coincident centres, and a centre on a wall, have no normal: it and the force are no numbers, and an
+/// engine ends its run.
 inline ContactForce contact_step(const ContactParameters& p, const ContactBodies& b, double dt, ContactState& state) {
   ContactForce out;
   const double distance = norm(b.separation);
   out.overlap = b.radius_1 + (std::isinf(b.radius_2) ? 0.0 : b.radius_2) - distance;
-  // Coincident centres have no direction; any will do to drive them apart.
-  out.normal = distance > 0.0 ? b.separation * (1.0 / distance) : Vec3<double>{0.0, 0.0, 1.0};
+  out.normal = b.separation * (1.0 / distance);
 
   const bool touching = out.overlap > 0.0;
   out.capillary_force = bridge_step(p.liquid, b.radius_1, b.radius_2, -out.overlap, touching, state.bridge_volume, state.rupture_distance);
@@ -179,7 +186,7 @@ inline ContactForce contact_step(const ContactParameters& p, const ContactBodies
   if (touching) {
     const NormalResponse<double> response = adjusted(
         p.respond(b.effective_radius(), b.effective_mass(), out.overlap, motion.normal_velocity), p.limit_force, p.tangential_damping);
-    const double twist = contact_twist(out.normal, b.angular_velocity_1, b.angular_velocity_2, dt);
+    const double twist = contact_twist(out.normal, b.angular_velocity_1, b.spin_2(), dt);
     out.normal_force = response.force;
     out.normal_stiffness = response.normal_stiffness;
     out.tangential_stiffness = response.tangential_stiffness;

@@ -122,7 +122,7 @@ inline ContactParts contact_parts(const ContactParameters& p, const ContactBodie
 
   // At rest there is no damping: what is left of the law is its spring.
   const NormalResponse<double> spring = p.respond(bodies.effective_radius(), bodies.effective_mass(), force.overlap, 0.0);
-  split_touching(parts, force.normal, force.overlap, spring.force, p.normal_law == NormalLaw::hertz ? 1.5 : 1.0, force.normal_force,
+  split_touching(parts, force.normal, force.overlap, spring.force, p.spring_exponent(bodies.effective_mass()), force.normal_force,
                  spring.tangential_stiffness, force.tangential, state.friction.displacement,
                  p.friction.presliding == Presliding::partial_slip ? &state.rings : nullptr);
   if (p.rolling.on())

@@ -5,15 +5,18 @@
 
 namespace dembark {
 
+/// Whether this "normal" is that of coincident centres: any direction would be a guess.
+inline bool has_no_direction(const Vec3<double>& normal) { return !(norm(normal) < 2.0); }
+
 /// Motion of body 1 against body 2 at the contact.
 template <class Real>
 struct SurfaceMotion {
   Real normal_velocity{};            ///< m/s, > 0 when parting
   Vec3<Real> tangential_velocity{};  ///< m/s, of the surfaces
-  Real arm_1{}, arm_2{};             ///< m, from the centres to the middle of overlap or gap; 0 for a wall
+  Real arm_1{}, arm_2{};             ///< m, from the centres, or the surface of a wall, to the middle of overlap or gap
 };
 
-/// `normal`: unit, from body 2 to body 1; `relative`: velocity of the centre of 1 relative to that of 2 (a wall: to its surface), m/s;
+/// `normal`: unit, from body 2 to body 1; `relative`: velocity of the centre of 1 relative to that of 2 (a wall: of its surface), m/s;
 /// `spin_1`, `spin_2`: angular velocities, rad/s.
 template <class Real>
 DEMBARK_HOT SurfaceMotion<Real> surface_motion(const Vec3<Real>& normal, const Vec3<Real>& relative, Real arm_1, const Vec3<Real>& spin_1,
@@ -22,9 +25,10 @@ DEMBARK_HOT SurfaceMotion<Real> surface_motion(const Vec3<Real>& normal, const V
   return {along, relative - along * normal - cross(arm_1 * spin_1 + arm_2 * spin_2, normal), arm_1, arm_2};
 }
 
-/// Angle (rad) by which the tangential spring turns about the normal in dt (s): that of the mean spin of the two bodies. A sphere that
-/// spins on a wall at rest carries the spring half as far as it turns: of the two equally soft halves of a contact one turns with the
-/// sphere, the other stays with the wall, and the spring is the difference of the two.
+/// Angle (rad) by which the tangential spring turns about the normal in dt (s): that of the mean spin of the two bodies, of which a wall is
+/// one, so that a contact that turns as a rigid body takes its spring along. A sphere that spins on a wall at rest carries the spring half
+/// as far as it turns: of the two equally soft halves of a contact one turns with the sphere, the other stays with the wall, and the spring
+/// is the difference of the two.
 template <class Real>
 DEMBARK_HOT Real contact_twist(const Vec3<Real>& normal, const Vec3<Real>& spin_1, const Vec3<Real>& spin_2, Real dt) {
   return 0.5 * dt * dot(spin_1 + spin_2, normal);

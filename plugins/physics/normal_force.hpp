@@ -11,7 +11,7 @@
 // 71 (1992) 239; k_t: Mindlin, J. Appl. Mech. 16 (1949) 259.
 //
 // Units SI. delta overlap (m, > 0), v_n relative normal velocity (m/s, > 0 when separating), R* = Ri Rj / (Ri + Rj) (wall: Ri),
-// m* likewise. In the limit e = 1 both are elastic.
+// m* likewise, finite (contact.hpp has two held bodies). In the limit e = 1 both are elastic.
 #pragma once
 
 #include <cmath>
@@ -39,7 +39,7 @@ inline double effective_shear_modulus(double youngs_1, double poisson_1, double 
   return 1.0 / (2.0 * (2.0 - poisson_1) * (1.0 + poisson_1) / youngs_1 + 2.0 * (2.0 - poisson_2) * (1.0 + poisson_2) / youngs_2);
 }
 
-/// R* or m* of two bodies; an infinite partner (a wall) leaves the other's value.
+/// R* or m* of two bodies; an infinite partner (a wall) leaves the other's value. Infinite if both are.
 template <class Real>
 inline Real reduced(Real a, Real b) {
   using std::isinf;

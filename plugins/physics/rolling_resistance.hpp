@@ -65,7 +65,7 @@ struct RollingContact {
   Vec3<double> normal{};              ///< unit, from 2 to 1
   double twist = 0.0;                 ///< rad, see contact_twist()
   double effective_radius = 0.0;      ///< R*, m
-  double inertia = 0.0;               ///< I, kg m^2
+  double inertia = 0.0;               ///< I, kg m^2; infinite between two held bodies
   double normal_force = 0.0;          ///< N, N; negative values count as 0
   double tangential_stiffness = 0.0;  ///< k_t, N/m
   Vec3<double> spin{};                ///< relative spin, rad/s, twisting included
@@ -86,7 +86,9 @@ inline Vec3<double> rolling_step(const RollingResistance& law, const RollingCont
   angle = rotate_to_plane(angle, c.normal, c.twist) + dt * rolling;
   const double held = stiffness * norm(angle);
   if (held > most) angle *= most / held;
-  const Vec3<double> spring = -stiffness * angle, dashpot = -2.0 * law.damping_ratio * std::sqrt(3.5 * c.inertia * stiffness) * rolling;
+  // Two held bodies do not swing: there is nothing to damp.
+  const double damping = std::isinf(c.inertia) ? 0.0 : 2.0 * law.damping_ratio * std::sqrt(3.5 * c.inertia * stiffness);
+  const Vec3<double> spring = -stiffness * angle, dashpot = -damping * rolling;
   // The largest part of the dashpot with which the couple keeps the limit: |spring + part dashpot| = most.
   const double size = dot(dashpot, dashpot), along = dot(spring, dashpot), left = std::max(most * most - dot(spring, spring), 0.0);
   if (!(size + 2.0 * along > left)) return spring + dashpot;

@@ -273,7 +273,7 @@ void EnergyAccount::recordContact(Contact& c, const Interaction& interaction) co
 	c.two             = view.swapped() ? id1 : id2;
 	c.parts           = ::dembark::contact_parts(phys.contact, bodies, force, phys.state());
 	c.levers          = {force.normal, motion};
-	if (phys.wallBody) c.levers.two = vec(view.surface);
+	if (phys.wallBody) c.levers.two += vec(view.surface);
 	c.half = 0.5 * scene->dt * dot(c.parts[::dembark::ContactPart::normal_elastic], force.normal) * motion.normal_velocity;
 }
 

@@ -322,9 +322,9 @@ void Law2::reportBridge(Phys& phys, const Interaction& interaction, const ::demb
 	scene->forces.addForce(second, -force);
 	if (out.overlap > 0.0 || viscous) {
 		scene->forces.addTorque(first, vec(out.torque_1));
-		if (phys.wallBody == 0) scene->forces.addTorque(second, vec(out.torque_2));
+		scene->forces.addTorque(second, vec(out.torque_2));
 	}
-	if (phys.wallBody) scene->forces.addTorque(second, -view.surface.cross(force) - vec(out.rolling));
+	if (phys.wallBody) scene->forces.addTorque(second, -view.surface.cross(force));
 	return out;
 }
 

@@ -259,7 +259,9 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
       const auto is_frozen = [&s](const int* grain) {
         return collect<P>([&s, grain](int k) { return s.mask[grain[k]] & s.frozen ? 1.0 : 0.0; }) > 0.0;
       };
-      reduced_mass = select(is_frozen(j), mass_i, select(is_frozen(i), mass_j, reduced_mass));
+      // Between two held grains there is no damping (ContactParameters::respond).
+      const auto held_i = is_frozen(i), held_j = is_frozen(j);
+      reduced_mass = select(held_i & held_j, P(0.0), select(held_j, mass_i, select(held_i, mass_j, reduced_mass)));
     }
     const PackVec<P> omega_i = rows3<P>(s.omega, i), omega_j = rows3<P>(s.omega, j);
     const SurfaceMotion<P> motion =

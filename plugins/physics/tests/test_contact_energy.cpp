@@ -181,3 +181,37 @@ TEST_CASE("what the normal spring took is what it holds, with an error of second
   CHECK_THAT(std::log2(coarse / fine), WithinAbs(2.0, 0.2));
   CHECK_THAT(std::log2(fine / finest), WithinAbs(2.0, 0.2));
 }
+
+TEST_CASE("held bodies: springs without damping, finite forces and parts, whatever the law") {
+  for (const bool wall : {true, false})
+    for (const NormalLaw law : {NormalLaw::hertz, NormalLaw::hooke})
+      for (const Presliding path : {Presliding::linear, Presliding::exponential, Presliding::partial_slip})
+        for (const RollingModel rolling : {RollingModel::off, RollingModel::constant_torque, RollingModel::elastic_plastic})
+          for (const double viscosity : {-1.0, 0.0, 0.01})
+            for (const double speed : {0.0, 0.1}) {
+              ContactParameters p = parameters(0.5, 0.5, viscosity >= 0.0, viscosity);
+              p.normal_law = law;
+              p.friction.presliding = path;
+              p.rolling = {rolling, 0.1, 0.3};
+              ContactBodies b;
+              b.radius_1 = 2e-3;
+              b.mass_1 = b.mass_2 = INFINITY;
+              if (!wall) b.radius_2 = 3e-3;
+              b.separation = {0.0, 0.0, wall ? 1.99e-3 : 4.99e-3};
+              b.velocity_1 = {0.3 * speed, 0.0, -speed};
+              b.angular_velocity_1 = {10.0 * speed, 0.0, 20.0 * speed};
+              for (const double dt : {0.0, 1e-6}) {
+                ContactState state;
+                const ContactForce f = contact_step(p, b, dt, state);
+                const ContactParts parts = contact_parts(p, b, f, state);
+                const double spring = hertz(p.elasticity, b.effective_radius(), 0.0, 1e-5, 0.0).force;
+                CHECK(std::abs(f.normal_force - spring) < 1e-12 * spring);
+                CHECK(norm(parts[ContactPart::normal_viscous]) < 1e-12 * spring);
+                CHECK(std::isfinite(norm(f.force) + norm(f.torque_1) + norm(f.torque_2) + norm(f.rolling)));
+                CHECK(std::isfinite(norm(state.friction.displacement) + state.friction.slip + norm(state.rolling_angle)));
+                for (const Vec3<double>& load : parts.load) CHECK(std::isfinite(norm(load)));
+                CHECK(std::abs(parts.normal_stored - 0.4 * spring * 1e-5) < 1e-12 * spring);
+                CHECK(p.liquid.stable_time_step(b.effective_radius(), b.effective_mass()) == INFINITY);
+              }
+            }
+}
