@@ -16,8 +16,9 @@
 //   automatic  energy on small islands. On large ones a chain: sweeps of projected Gauss-Seidel find which z are positive, conjugate
 //              gradients how large they are (sparse M), and where these would take longer than a factor, block ends it.
 // Islands (connected components of the graph of M) are solved apart, but for pgs. All other methods end with a residual that is rounding;
-// where a factor was needed, z has been refined iteratively, for scaled condition numbers up to some 1e14. What is rounding is told by
-// s_i = |q_i| + sum_j |M_ij z_j|, so the units of single rows do not matter.
+// where a factor was needed, z has been refined iteratively, for scaled condition numbers up to some 1e14. What is rounding follows from
+// s_i = |q_i| + sum_j |M_ij z_j|, so the units of single rows do not matter. q is brought to the size of 1 by a power of two: the squares
+// that are compared neither vanish nor overflow, and the same problem in other units has the same steps and digits.
 #pragma once
 
 #include "lcp/active_set.hpp"
@@ -79,7 +80,7 @@ class LcpSolver {
     }
     order_.resize(std::size_t(block.n));
     std::iota(order_.begin(), order_.end(), 0);
-    load(q, start);
+    load(block, q, start);
     result_.islands = block.n > 0;
     lcp::DefiniteMargin alone;
     if (block.n > 0) solve_block(block, 0, alone, options, start);
@@ -118,10 +119,14 @@ class LcpSolver {
     return left.empty();
   }
 
-  /// What is given, in the order of the islands.
-  void load(const Eigen::VectorXd& q, const std::vector<char>* start) {
+  /// What is given, in the order of the islands, as m is.
+  void load(const lcp::Matrix& m, const Eigen::VectorXd& q, const std::vector<char>* start) {
     result_ = LcpResult();
     q_ = q(order_);
+    double largest = 0.0;
+    for (Index i = 0; i < m.n; ++i) largest = std::max(largest, std::fabs(q_[i]) / std::sqrt(m.diagonal(i)));
+    exponent_ = largest > 0.0 && std::isfinite(largest) ? std::ilogb(largest) : 0;
+    for (double& value : q_) value = std::ldexp(value, -exponent_);
     z_.setZero(q.size());
     active_.assign(order_.size(), 0);
     if (start) std::transform(order_.begin(), order_.end(), active_.begin(), [start](int i) { return (*start)[std::size_t(i)] != 0; });
@@ -132,7 +137,7 @@ class LcpSolver {
     const bool fill_reducing = options.method == LcpMethod::automatic || options.method == LcpMethod::block;
     if (islands_.take(outer, inner, value, q.size(), fill_reducing, small_island)) margins_.assign(std::size_t(islands_.count()), {});
     order_ = islands_.order();
-    load(q, start);
+    load(islands_.whole(), q, start);
     result_.islands = islands_.count();
     // The certificate is that of the whole, so what stops at a tolerance of it cannot go island by island.
     if (options.method == LcpMethod::pgs && q.size() > 0) solve_block(islands_.whole(), 0, margins_[0], options, start);
@@ -216,15 +221,21 @@ class LcpSolver {
       if (active_[std::size_t(i)] || std::fabs(unknowns_.w[i]) <= fraction * unknowns_.s[i]) unknowns_.w[i] = 0.0;
     result_.z.resize(m.n);
     result_.w.resize(m.n);
-    result_.z(order_) = z_;
-    result_.w(order_) = unknowns_.w;
+    for (Index i = 0; i < m.n; ++i) {
+      const int at = order_[std::size_t(i)];
+      result_.z[at] = std::ldexp(z_[i], exponent_);
+      result_.w[at] = std::ldexp(unknowns_.w[i], exponent_);
+      if (std::isinf(result_.z[at]) && std::isfinite(z_[i]))
+        lcp::fail("z[", at, "] is beyond the largest number; multiply M by a factor, or q");
+    }
     return result_;
   }
 
   LcpResult result_;
   lcp::Islands islands_;
   std::vector<int> order_;  ///< the unknowns, island after island; so do the next three go
-  Eigen::ArrayXd q_, z_;
+  Eigen::ArrayXd q_, z_;     ///< over 2^exponent_
+  int exponent_ = 0;
   std::vector<char> active_;
   lcp::Unknowns unknowns_;  ///< of one island
   lcp::SinglePivots singles_;

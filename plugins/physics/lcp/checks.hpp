@@ -36,8 +36,12 @@ inline void check_finite(const double* q, Index n) {
     if (!std::isfinite(q[i])) fail("q[", i, "] is ", q[i], "; every entry must be a finite number");
 }
 
+/// Below it, entries of a matrix have lost digits to the end of the range of numbers, or their products will.
+constexpr double least_diagonal = 1e-290;
+
 inline void check_diagonal(Index i, double value) {
   if (!(value > 0.0)) fail("M is not positive definite: M[", i, ",", i, "] = ", value, " must be > 0");
+  if (value < least_diagonal) fail("M[", i, ",", i, "] = ", value, " must be at least ", least_diagonal, "; multiply M and q by a factor");
 }
 
 [[noreturn]] inline void fail_symmetry(Index i, Index j, double a, double b) {
@@ -84,7 +88,7 @@ inline void check_dense(const double* m, Index n) {
   constexpr Index tile = 32;
   const Eigen::Map<const Eigen::ArrayXXd> matrix(m, n, n);
   const Eigen::ArrayXd root = matrix.matrix().diagonal().array().sqrt();
-  bool good = (root > 0.0).all();
+  bool good = (root >= std::sqrt(least_diagonal)).all();
   for (Index a = 0; a < n && good; a += tile)
     for (Index b = 0; b <= a && good; b += tile) {
       const Index rows = std::min(tile, n - a), columns = std::min(tile, n - b);

@@ -252,6 +252,38 @@ TEST_CASE("bad input is refused with one line that names the entry") {
   }
 }
 
+TEST_CASE("a factor on M, on q or on both changes neither the steps nor a digit of the answer, or it is refused") {
+  Problems p;
+  for (const int n : {1, 2, 12, 60}) {
+    const Matrix M = n == 60 ? band(n, 3, p) : p.definite(n, 0.1);
+    const Vector q = p.vector(n);
+    for (const LcpMethod method : {LcpMethod::automatic, LcpMethod::energy, LcpMethod::block, LcpMethod::murty, LcpMethod::pgs}) {
+      LcpOptions options;
+      options.method = method;
+      LcpSolver solver;
+      const LcpResult plain = solver.solve(M, q, options);
+      // All such powers that leave numbers with all their digits.
+      for (const int on_m : {-940, -600, 0, 600, 980})
+        for (const int on_q : {-1000, -600, -20, 0, 600, 1000}) {
+          if (std::abs(on_q - on_m) > 1000) continue;
+          const LcpResult r = solver.solve(M * std::ldexp(1.0, on_m), q * std::ldexp(1.0, on_q), options);
+          CAPTURE(n, int(method), on_m, on_q);
+          CHECK(r.z * std::ldexp(1.0, on_m - on_q) == plain.z);
+          CHECK(r.w * std::ldexp(1.0, -on_q) == plain.w);
+          CHECK(r.pivots == plain.pivots);
+          CHECK(r.certificate.worst() == plain.certificate.worst());
+          CHECK(r.certificate.worst() < 1e-11);
+        }
+    }
+  }
+  using Catch::Contains;
+  LcpSolver solver;
+  const Matrix one = Matrix::Identity(2, 2);
+  const Vector q = Vector::Constant(2, -1.0);
+  CHECK_THROWS_WITH(solver.solve(1e-300 * one, q), Contains("M[0,0] = 1e-300") && Contains("must be at least 1e-290"));
+  CHECK_THROWS_WITH(solver.solve(1e-280 * one, 1e100 * q), Contains("z[0]") && Contains("beyond"));
+}
+
 TEST_CASE("no unknowns and one") {
   LcpSolver solver;
   for (const LcpMethod method : exact) {
