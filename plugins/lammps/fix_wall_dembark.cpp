@@ -44,7 +44,8 @@ FixWallDembark::FixWallDembark(LAMMPS* lmp, int narg, char** arg) : RowsFix(lmp,
   checked([&] {
     if (kind == "region") surface_ = std::make_unique<dembark_lammps::RegionSurface>(lmp, word(4));
     else surface_ = std::make_unique<dembark_lammps::TriangleSurface>(lmp, word(4));
-    if (narg > 7) motion_ = std::make_unique<dembark::PrescribedMotion>(std::vector<std::string>(arg + 8, arg + narg));
+    for (int k = 8; k < narg; ++k) words_ += (k > 8 ? " " : "") + std::string(arg[k]);
+    if (narg > 7) motion_ = std::make_unique<dembark::PrescribedMotion>(words_);
   });
   layout_ = pair_->coefficients().layout();
   slots_ = surface_->slots();
@@ -77,6 +78,10 @@ void FixWallDembark::init() {
     fail("pair_style or region have changed; define the fix again");
   if (!motion_) return;
   if (const std::string wrong = motion_->step_error(update->dt); !wrong.empty()) fail(wrong);
+  if (update->whichflag == 2) fail("a wall with a motion is for 'run', not for 'minimize', whose steps take no time");
+  // Displacements are from where the surface stands when the motion is run first; a restart file has the time of that.
+  clock_.begin(update->atime, long(update->atimestep), long(update->ntimestep), update->dt);
+  checked([&] { motion_->begin(clock_.begun); });
   const double now = clock_.time(update->ntimestep, update->dt);
   Vec3 back, forth;
   motion_->reach(now, now + double(update->laststep - update->ntimestep) * update->dt, back, forth);
@@ -87,9 +92,10 @@ void FixWallDembark::init() {
 
 /// Takes up where the wall is now.
 void FixWallDembark::move() {
-  const double dt = update->dt, now = clock_.time(update->ntimestep, dt);
+  // The clock first sees the beginning of the step, from which on a time step may be a new one.
+  const double dt = update->dt, before = clock_.time(update->ntimestep - 1, dt), now = clock_.time(update->ntimestep, dt);
   state_ = motion_->at(now);
-  step_ = motion_->step(clock_.time(update->ntimestep - 1, dt), dt);
+  step_ = motion_->step(before, dt);
   frame_ = dembark::WallFrame(*motion_, state_);
   if (tally_) acceleration_ = wall_acceleration(*motion_, now, dt);
 }
@@ -233,10 +239,11 @@ void FixWallDembark::write_restart(FILE* file) {
   Region* const region = surface_->region();
   int length = 0;
   if (region) region->length_restart_string(length);
-  length += int(sizeof clock_ + sizeof sums_);
+  length += int(sizeof clock_ + sizeof sums_ + words_.size() + 1);
   fwrite(&length, sizeof(int), 1, file);
   fwrite(&clock_, sizeof clock_, 1, file);
   fwrite(&sums_, sizeof sums_, 1, file);
+  fwrite(words_.c_str(), 1, words_.size() + 1, file);
   if (region) region->write_restart(file);
 }
 
@@ -244,7 +251,11 @@ void FixWallDembark::restart(char* buffer) {
   std::memcpy(static_cast<void*>(&clock_), buffer, sizeof clock_);
   std::memcpy(static_cast<void*>(&sums_), buffer + sizeof clock_, sizeof sums_);
   resumed_ = sums_.begun > 0.0;
-  int read = int(sizeof clock_ + sizeof sums_);
+  const std::string before = buffer + sizeof clock_ + sizeof sums_;
+  if (before != words_)
+    fail("in the restart file its motion is '" + before +
+         "'; take that, or give the fix another ID: a motion that is new begins where the " + "surface stands in its file");
+  int read = int(sizeof clock_ + sizeof sums_ + before.size() + 1);
   if (Region* const region = surface_->region(); region && !region->restart(buffer, read))
     fail("the restart file was written with another region");
 }

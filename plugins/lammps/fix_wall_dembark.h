@@ -56,6 +56,7 @@ class FixWallDembark : public dembark_lammps::RowsFix<dembark_family::SharedFix>
   int wall_type_ = 0;
   std::unique_ptr<dembark_lammps::WallSurface> surface_;
   std::unique_ptr<dembark::PrescribedMotion> motion_;
+  std::string words_;  // of the motion
   class PairDembarkGranular* pair_ = nullptr;
   class FixCapillaryLiquid* liquid_ = nullptr;
   dembark::HistoryLayout layout_;

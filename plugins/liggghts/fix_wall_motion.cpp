@@ -34,7 +34,8 @@ FixWallMotion::FixWallMotion(LAMMPS *lmp, int narg, char **arg) : SharedFix(lmp,
   mesh_ = fix->mesh();
   if (mesh_->isMoving()) fail("mesh '" + mesh_id_ + "' is moved by another fix already; give all terms of a motion to one fix");
   if (fix->surfaceVel()) fail("mesh '" + mesh_id_ + "' has a surface velocity, and cannot be moved too");
-  motion_ = checked([&] { return dembark::PrescribedMotion(std::vector<std::string>(arg + 5, arg + narg)); });
+  for (int k = 5; k < narg; ++k) words_ += (k > 5 ? " " : "") + std::string(arg[k]);
+  motion_ = checked([&] { return dembark::PrescribedMotion(words_); });
   restart_global = time_depend = 1;
   nevery = global_freq = 1;
   vector_flag = 1;
@@ -57,6 +58,9 @@ void FixWallMotion::init() {
   only_verlet();
   const std::string wrong = motion_.step_error(update->dt);
   if (!wrong.empty()) fail(wrong);
+  // Displacements are from where the mesh stands when the motion is run first; a restart file has the time of that.
+  clock_.begin(update->atime, long(update->atimestep), long(update->ntimestep), update->dt);
+  checked([&] { motion_.begin(clock_.begun); });
   if (static_cast<TriMesh *>(mesh_)->nMove() > 1)
     fail("mesh '" + mesh_id_ + "' is moved by another fix, too; give all terms of a motion to one fix");
   check_turn();
@@ -233,12 +237,16 @@ double FixWallMotion::compute_vector(int n) {
 }
 
 void FixWallMotion::write_restart(FILE *file) {
-  if (comm->me == 0) write_part(file, {{&clock_, sizeof clock_}, {&sums_, sizeof sums_}});
+  if (comm->me == 0) write_part(file, {{&clock_, sizeof clock_}, {&sums_, sizeof sums_}, {words_.c_str(), words_.size() + 1}});
 }
 
 void FixWallMotion::restart(char *buffer) {
   std::memcpy(static_cast<void *>(&clock_), buffer, sizeof clock_);
   std::memcpy(static_cast<void *>(&sums_), buffer + sizeof clock_, sizeof sums_);
+  if (const std::string before = buffer + sizeof clock_ + sizeof sums_; before != words_)
+    fail("in the restart file its motion is '" + before +
+         "'; take that, or give the fix another ID: a motion that is new begins where the "
+         "mesh stands");
   resumed_ = true;
 }
 

@@ -53,7 +53,7 @@ class FixWallMotion : public dembark_family::SharedFix {
   dembark::WallLoad whole_load();
   void arrive(double t);
 
-  std::string mesh_id_;
+  std::string mesh_id_, words_;
   class AbstractMesh *mesh_ = nullptr;
   dembark::PrescribedMotion motion_;
   dembark::MotionClock clock_;

@@ -18,6 +18,7 @@ void bind_motion(nb::module_& m) {
   nb::class_<PrescribedMotion>(m, "PrescribedMotion")
       .def(nb::init<>())
       .def(nb::init<const std::string&>(), "words"_a)
+      .def("begin", &PrescribedMotion::begin, "now"_a)
       // Rows of displacement, angle, velocity, rate, acceleration and angular acceleration at these times (s).
       .def(
           "at",

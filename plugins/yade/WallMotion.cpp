@@ -1,5 +1,6 @@
 #include "WallMotion.hpp"
 
+#include <cmath>
 #include <stdexcept>
 
 #include <core/Body.hpp>
@@ -34,6 +35,8 @@ void WallMotion::postLoad(WallMotion&) {
 	} catch (const std::invalid_argument& wrong) {
 		fail(std::string("WallMotion: ") + wrong.what());
 	}
+	// Of a saved scene.
+	if (begun >= 0 && motion == begunMotion) take();
 }
 
 void WallMotion::check() const {
@@ -53,10 +56,46 @@ void WallMotion::check() const {
 
 /// Time at the beginning of a step.
 Real WallMotion::now(long step) {
-	::dembark::MotionClock known{clock[0], clock[1], clock[2]};
+	::dembark::MotionClock known{clock[0], clock[1], clock[2], begun, 1.0};
 	const Real             time = known.time(step, scene->dt);
 	clock                       = Vector3r(known.origin, known.step, known.length);
 	return time;
+}
+
+/// The motion begins where the bodies stand: when it is run first, or has become another one.
+void WallMotion::begin() {
+	const bool changed = motion != begunMotion || ids != begunIds;
+	if (begun >= 0 && !changed) {
+		// start() and measure() may have come in an earlier step.
+		if (lastStep < 0 ? scene->iter == begunStep : scene->iter == lastStep || scene->iter == lastStep + 1) return;
+		if (lastStep >= 0)
+			fail("WallMotion moved its bodies last in step " + std::to_string(lastStep) + " and is now in step " +
+			     std::to_string(scene->iter) +
+			     ": they are not where its motion has them; make a new WallMotion, which begins where they stand");
+	}
+	// The scene's own time is a sum, which rounds.
+	const Real             counted = scene->iter * scene->dt;
+	const bool             exact   = std::abs(counted - scene->time) < 1e-3 * scene->dt;
+	::dembark::MotionClock fresh;
+	if (exact) fresh.begin(0.0, 0, scene->iter, scene->dt);
+	else fresh.begin(scene->time, scene->iter, scene->iter, scene->dt);
+	clock       = Vector3r(fresh.origin, fresh.step, fresh.length);
+	begun       = fresh.begun;
+	begunStep   = scene->iter;
+	begunMotion = motion;
+	begunIds    = ids;
+	lastStep    = -1;
+	places.clear();
+	take();
+}
+
+/// The motion as it began.
+void WallMotion::take() {
+	try {
+		prescribed.begin(begun);
+	} catch (const std::invalid_argument& wrong) {
+		fail(std::string("WallMotion: ") + wrong.what());
+	}
 }
 
 State& WallMotion::state(std::size_t k) const {
@@ -84,6 +123,7 @@ void WallMotion::refer(const WallState& here) {
 
 void WallMotion::start() {
 	check();
+	begin();
 	const Real      t      = now(scene->iter);
 	const WallState here   = prescribed.at(t);
 	const WallStep  before = prescribed.step(t - scene->dt, scene->dt);
@@ -97,6 +137,7 @@ void WallMotion::start() {
 }
 
 void WallMotion::measure() {
+	begin();
 	if (measured == scene->iter) return;
 	const WallState here   = prescribed.at(now(scene->iter));
 	const Vector3r  centre = vec(prescribed.centre(here));
@@ -116,7 +157,6 @@ void WallMotion::measure() {
 	torque              = vec(load.torque);
 	power               = wall_power(load, here, prescribed.axis());
 	::dembark::WallSums sums{work, vec(impulse), lastPower, vec(lastForce), 1.0};
-	// Steps in which the engine did not run are not in the sums.
 	if (measured >= 0 && measured + 1 == scene->iter) sums.step(scene->dt, power, load.force);
 	work      = sums.work;
 	impulse   = vec(sums.impulse);

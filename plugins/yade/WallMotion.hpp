@@ -26,7 +26,7 @@ public:
 	// clang-format off
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(WallMotion,GlobalEngine,"Moves held bodies (facets, boxes, walls, spheres) together by a prescribed motion: a sum of terms whose place, velocity and acceleration are known at any time, and which no force changes. Stands after :yref:`InteractionLoop` and :yref:`EnergyAccount`, and before :yref:`NewtonIntegrator`. Contact laws see [x(n) - x(n-1)] / dt, the velocity of the half step of which the grains' velocities are. Attributes hold the motion and what the bodies do to the others at the step that measure() or the last step took.",
 		((std::vector<int>,ids,,,"Bodies that move"))
-		((std::string,motion,"",Attr::triggerPostLoad,"Terms, e.g. 'harmonic amplitude 0 0 1e-3 frequency 20': harmonic, circular, rocking, rotation, uniform, jolts, table; SI units"))
+		((std::string,motion,"",Attr::triggerPostLoad,"Terms, e.g. 'harmonic amplitude 0 0 1e-3 frequency 20': harmonic, circular, rocking, rotation, uniform, jolts, table; SI units. It begins where the bodies stand; so does one that is set later"))
 		((Vector3r,displacement,Vector3r::Zero(),Attr::readonly,"[m]"))
 		((Vector3r,velocity,Vector3r::Zero(),Attr::readonly,"Exact derivative of the displacement [m/s]"))
 		((Vector3r,acceleration,Vector3r::Zero(),Attr::readonly,"[m/s2]"))
@@ -42,6 +42,10 @@ public:
 		((long,measured,-1,Attr::readonly,"Step whose forces the attributes hold; -1 = none"))
 		((Vector3r,lastForce,Vector3r::Zero(),Attr::hidden,"Force of the step before"))
 		((Real,lastPower,0,Attr::hidden,"Power of the step before"))
+		((Real,begun,-1,Attr::readonly,"Time at which the motion began, from where the bodies stood: that of the first step, or of start(); -1 = not yet [s]"))
+		((long,begunStep,-1,Attr::hidden,"Step of that time"))
+		((std::string,begunMotion,"",Attr::hidden,"What began then"))
+		((std::vector<int>,begunIds,,Attr::hidden,"Bodies of which it began"))
 		((Vector3r,clock,Vector3r::Zero(),Attr::hidden,"Time, step and length of a step from there on"))
 		((std::vector<Vector3r>,places,,Attr::hidden,"Of the bodies without the motion [m], from the point"))
 		((std::vector<Real>,orientations,,Attr::hidden,"Of the bodies without the motion: x y z w of each"))
@@ -54,6 +58,8 @@ public:
 
 private:
 	void   check() const;
+	void   begin();
+	void   take();
 	Real   now(long step);
 	State& state(std::size_t k) const;
 	void   refer(const ::dembark::WallState&);

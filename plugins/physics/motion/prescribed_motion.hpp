@@ -7,6 +7,9 @@
 //   uniform velocity X Y Z [acceleration X Y Z]                       table file NAME
 //   jolts shape half_sine|constant|rising acceleration X Y Z duration D [interval I] [count N] [signs +--+]
 // each with [start T], all but jolts and table with [until T], the first three with [ramp N], in periods, 10 unless given.
+//
+// A motion begins at the time at which it is given to a wall, from where the wall stands: there its displacement and angle are zero. A term
+// without `start` starts then; one that started before goes on as it would have, from that place.
 #pragma once
 
 #include <algorithm>
@@ -32,20 +35,30 @@ class PrescribedMotion {
  public:
   /// At rest.
   PrescribedMotion() = default;
-  /// From its words. Throws std::invalid_argument with one line about what is wrong.
+  /// From its words; it begins at t = 0. Throws std::invalid_argument with one line about what is wrong.
   explicit PrescribedMotion(const std::vector<std::string>& words) {
     std::size_t at = 0;
     do read(words, at);
     while (at < words.size());
+    begin(0.0);
   }
   explicit PrescribedMotion(const std::string& line) : PrescribedMotion(motion::split(line)) {}
 
+  /// Begins at the time `now` (s) instead. Throws std::invalid_argument for a term that ends before.
+  void begin(double now) {
+    each_term(*this, [now](auto& term) { term.window.begin(now); });
+    first_place_ = {};
+    first_angle_ = 0.0;
+    const WallState first = at(now);
+    first_place_ = first.displacement;
+    first_angle_ = first.angle;
+  }
+
   WallState at(double t) const {
     WallState state;
-    for (const auto& term : oscillations_) term.add(t, state);
-    for (const auto& term : uniform_) term.add(t, state);
-    for (const auto& term : jolts_) term.add(t, state);
-    for (const auto& term : tables_) term.add(t, state);
+    each_term(*this, [&](const auto& term) { term.add(t, state); });
+    state.displacement -= first_place_;
+    state.angle -= first_angle_;
     return state;
   }
   /// Over the step of `h` s from `t` (s) on: [x(t + h) - x(t)] / h.
@@ -98,6 +111,14 @@ class PrescribedMotion {
   }
 
  private:
+  template <class Motion, class Visit>
+  static void each_term(Motion& motion, Visit visit) {
+    for (auto& term : motion.oscillations_) visit(term);
+    for (auto& term : motion.uniform_) visit(term);
+    for (auto& term : motion.jolts_) visit(term);
+    for (auto& term : motion.tables_) visit(term);
+  }
+
   void read(const std::vector<std::string>& words, std::size_t& at) {
     using motion::Keyword;
     static const Keyword start{"start", 1, false}, until{"until", 1, false}, frequency{"frequency", 1, true}, phase{"phase", 1, false},
@@ -136,28 +157,22 @@ class PrescribedMotion {
     if (given.has("axis")) set_axis(given);
   }
 
+  static motion::Window window(const motion::Given& given, double ramps = 0.0) {
+    return {given.kind(), given.number_or("start", 0.0), given.has("start"), given.number_or("until", motion::never), ramps};
+  }
+
   void add_oscillation(const motion::Given& given, const motion::Direction& sine, const motion::Direction& cosine) {
-    motion::Oscillation term{sine,
-                             cosine,
-                             given.positive("frequency"),
-                             given.number_or("phase", 0.0),
-                             0.0,
-                             given.number_or("start", 0.0),
-                             given.number_or("until", motion::never)};
+    motion::Oscillation term{sine, cosine, given.positive("frequency"), given.number_or("phase", 0.0), 0.0, {}};
     const double periods = given.number_or("ramp", 10.0);
     if (!(periods >= 0.0)) given.refuse("ramp " + motion::text(periods) + " must be >= 0 periods");
     term.ramp = periods / term.frequency;
-    if (term.until < term.start + 2.0 * term.ramp || !(term.until > term.start))
-      given.refuse("until " + motion::text(term.until) + " s must be later than start " + motion::text(term.start) + " s by both ramps, " +
-                   motion::text(2.0 * term.ramp) + " s");
+    term.window = window(given, 2.0 * term.ramp);
     if (norm(sine.along) + norm(cosine.along) + std::abs(sine.about) == 0.0) given.refuse("its amplitude is zero");
     oscillations_.push_back(term);
   }
 
   void add_uniform(const motion::Given& given, const motion::Direction& velocity, const motion::Direction& acceleration) {
-    const motion::Uniform term{velocity, acceleration, given.number_or("start", -motion::never), given.number_or("until", motion::never)};
-    if (!(term.until > term.start))
-      given.refuse("until " + motion::text(term.until) + " s must be later than start " + motion::text(term.start) + " s");
+    const motion::Uniform term{velocity, acceleration, window(given)};
     uniform_.push_back(term);
   }
 
@@ -171,7 +186,7 @@ class PrescribedMotion {
     term.acceleration.along = given.vector("acceleration");
     term.duration = given.positive("duration");
     term.interval = given.number_or("interval", term.duration);
-    term.start = given.number_or("start", 0.0);
+    term.window = window(given);
     if (term.interval < term.duration)
       given.refuse("interval " + motion::text(term.interval) + " s must be at least the duration, " + motion::text(term.duration) + " s");
     const std::string signs = given.has("signs") ? given.word("signs") : "+";
@@ -187,7 +202,6 @@ class PrescribedMotion {
   /// Rows of time (s) and displacement (m), four numbers separated by blanks or commas; lines that begin with # are comments.
   void add_table(const motion::Given& given) {
     const std::string& name = given.word("file");
-    const double start = given.number_or("start", 0.0);
     std::ifstream file(name);
     if (!file) given.refuse("file '" + name + "' cannot be read");
     std::vector<motion::TableRow> rows;
@@ -205,11 +219,12 @@ class PrescribedMotion {
         good = !*end && std::isfinite(row[k]);
       }
       if (!good) given.refuse(where + "it must have four numbers, time (s) and displacement x y z (m)");
-      if (!rows.empty() && !(row[0] + start > rows.back().time)) given.refuse(where + "the times do not ascend");
-      rows.push_back({row[0] + start, {row[1], row[2], row[3]}});
+      if (!rows.empty() && !(row[0] > rows.back().time)) given.refuse(where + "the times do not ascend");
+      rows.push_back({row[0], {row[1], row[2], row[3]}});
     }
     if (rows.size() < 2) given.refuse("file '" + name + "' has fewer than two rows");
     tables_.emplace_back(std::move(rows));
+    tables_.back().window = window(given);
   }
 
   void set_axis(const motion::Given& given) {
@@ -228,6 +243,8 @@ class PrescribedMotion {
   std::vector<motion::Jolts> jolts_;
   std::vector<motion::Table> tables_;
   Vec3<double> axis_{}, point_{};
+  Vec3<double> first_place_{};  ///< m and rad, of the sum of the terms when the motion began
+  double first_angle_ = 0.0;
 };
 
 }  // namespace dembark

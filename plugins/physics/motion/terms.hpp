@@ -5,14 +5,17 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "../vec3.hpp"
+#include "words.hpp"
 
 namespace dembark {
 
-/// Where a wall is, against its place before the motion: translation, and rotation about an axis that moves with the translation.
+/// Where a wall is, from its place when the motion began: translation, and rotation about an axis that moves with the translation.
 struct WallState {
   Vec3<double> displacement{}, velocity{}, acceleration{};     ///< m, m/s, m/s^2
   double angle = 0.0, rate = 0.0, angular_acceleration = 0.0;  ///< rad, rad/s, rad/s^2
@@ -56,28 +59,47 @@ inline Jet smooth_step(double t, double duration) {
           60.0 * s * left * (1.0 - 2.0 * s) / (duration * duration)};
 }
 
+/// From when to when (s) a term acts. Without a start of its own it starts when the motion begins.
+struct Window {
+  std::string kind;  ///< of the term, for messages
+  double start = 0.0;
+  bool given = false;
+  double until = never;
+  double ramps = 0.0;  ///< s, both
+
+  /// The motion begins. Throws std::invalid_argument for a term that ends before it starts.
+  void begin(double now) {
+    if (!given) start = now;
+    if (until > start && !(until < start + ramps)) return;
+    std::string line = "motion " + kind + ": until " + text(until) + " s must be later than start " + text(start) + " s";
+    if (ramps > 0.0) line += " by both ramps, " + text(ramps) + " s";
+    throw std::invalid_argument(line);
+  }
+};
+
 /// r(t) [sine sin(w (t - start) + phase) + cosine cos(w (t - start) + phase)], with the envelope r that rises in `ramp` s from `start` on
 /// and falls as it rose up to `until`. Without a ramp the term is zero before `start`, begins at its place with its full speed, and stays
 /// where it is from `until` on.
 struct Oscillation {
   Direction sine, cosine;
-  double frequency = 0.0, phase = 0.0, ramp = 0.0, start = 0.0, until = never;
+  double frequency = 0.0, phase = 0.0, ramp = 0.0;
+  Window window;
 
   void add(double t, WallState& to) const {
     if (ramp > 0.0) {
-      const Jet down = until < never ? smooth_step(until - t, ramp) : Jet{1.0, 0.0, 0.0};
-      add(t, smooth_step(t - start, ramp) * Jet{down.value, -down.first, down.second}, to);
+      const Jet down = window.until < never ? smooth_step(window.until - t, ramp) : Jet{1.0, 0.0, 0.0};
+      add(t, smooth_step(t - window.start, ramp) * Jet{down.value, -down.first, down.second}, to);
       return;
     }
-    if (t < start) return;
-    if (t < until) add(t, {1.0, 0.0, 0.0}, to);
-    else hold(until, 1.0, to);
-    hold(start, -1.0, to);
+    if (t < window.start) return;
+    if (t < window.until) add(t, {1.0, 0.0, 0.0}, to);
+    else hold(window.until, 1.0, to);
+    hold(window.start, -1.0, to);
   }
 
  private:
   Jet wave(double t, double ahead) const {
-    const double w = two_pi * frequency, x = w * (t - start) + phase;
+    const double w = two_pi * frequency, x = w * (t - window.start) + phase;
     const double s = ahead == 0.0 ? std::sin(x) : std::cos(x), c = ahead == 0.0 ? std::cos(x) : -std::sin(x);
     return {s, w * c, -w * w * s};
   }
@@ -91,15 +113,15 @@ struct Oscillation {
   }
 };
 
-/// velocity s + acceleration s^2/2 with s = t - start, from `start` to `until`; an infinite `start` means always, with s = t.
+/// velocity s + acceleration s^2/2 with s = t - start, up to `until`; before a start that is given at rest, before another as behind it.
 struct Uniform {
   Direction velocity, acceleration;  ///< a second
-  double start = -never, until = never;
+  Window window;
 
   void add(double t, WallState& to) const {
-    if (t < start) return;
-    const double origin = start > -never ? start : 0.0, s = std::min(t, until) - origin;
-    const bool moves = t < until;
+    if (window.given && t < window.start) return;
+    const double s = std::min(t, window.until) - window.start;
+    const bool moves = t < window.until;
     velocity.add({s, moves ? 1.0 : 0.0, 0.0}, to);
     acceleration.add({0.5 * s * s, moves ? s : 0.0, moves ? 1.0 : 0.0}, to);
   }
@@ -111,7 +133,8 @@ enum class PulseShape { half_sine, constant, rising };
 struct Jolts {
   Direction acceleration;  ///< the largest, a second squared
   PulseShape shape = PulseShape::half_sine;
-  double duration = 0.0, interval = 0.0, start = 0.0;
+  double duration = 0.0, interval = 0.0;
+  Window window;
   std::vector<double> signs;  ///< one of each pulse
 
   /// After the other members: position and speed, over the largest acceleration, where each pulse begins.
@@ -125,9 +148,10 @@ struct Jolts {
     }
   }
   void add(double t, WallState& to) const {
-    if (t < start) return;
-    const std::size_t k = std::min(std::size_t(std::min((t - start) / interval, 1e9)), signs.size());
-    const double s = t - start - double(k) * interval;
+    if (t < window.start) return;
+    const double since_start = t - window.start;
+    const std::size_t k = std::min(std::size_t(std::min(since_start / interval, 1e9)), signs.size());
+    const double s = since_start - double(k) * interval;
     const Jet pulse = k < signs.size() ? since(s) : Jet{};
     const double sign = k < signs.size() ? signs[k] : 0.0;
     acceleration.add({position_[k] + speed_[k] * s + sign * pulse.value, speed_[k] + sign * pulse.first, sign * pulse.second}, to);
@@ -152,7 +176,7 @@ struct Jolts {
   std::vector<double> position_, speed_;
 };
 
-/// A row of a table: time (s) and displacement (m).
+/// A row of a table: time (s) from the start on, and displacement (m).
 struct TableRow {
   double time = 0.0;
   Vec3<double> displacement{};
@@ -161,6 +185,8 @@ struct TableRow {
 /// The cubic spline through the rows, at rest in its ends, before and after; from the place of the first row.
 class Table {
  public:
+  Window window;
+
   Table() = default;
   /// At least two rows, their times ascending.
   explicit Table(std::vector<TableRow> rows) : rows_(std::move(rows)), slopes_(rows_.size()) {
@@ -178,8 +204,9 @@ class Table {
     for (std::size_t k = n - 1; k-- > 1;) slopes_[k] -= upper[k] * slopes_[k + 1];
   }
 
-  void add(double t, WallState& to) const {
+  void add(double time, WallState& to) const {
     if (rows_.empty()) return;
+    const double t = time - window.start;
     const double now = std::clamp(t, rows_.front().time, rows_.back().time);
     const auto next = std::upper_bound(rows_.begin() + 1, rows_.end() - 1, now, [](double x, const TableRow& row) { return x < row.time; });
     const std::size_t k = std::size_t(next - rows_.begin());

@@ -6,18 +6,26 @@
 
 namespace dembark {
 
-/// Time of a step: step times time step, so that it is exact to the last digit however long the run; across changes of the time step too.
+/// The time of an engine's steps, from when a motion begins: step times time step, so that it is exact to the last digit however long the
+/// run; across changes of the time step too. Plain numbers, for restarts.
 struct MotionClock {
   double origin = 0.0, step = 0.0, length = 0.0;  ///< s, at this step, and s of the steps from there on
+  double begun = 0.0;                             ///< s, when the motion began: where the wall stood then, its displacement is zero
+  double running = 0.0;                           ///< 1: it has begun
 
+  /// A motion begins at step `n`, unless it has; the engine's own clock had `time` (s) at step `at`, and runs by `h` (s) a step.
+  void begin(double time, long at, long n, double h) {
+    if (running > 0.0) return;
+    *this = {time, double(at), h, 0.0, 1.0};
+    begun = this->time(n, h);
+  }
   /// s, at the beginning of step `n`, which and the next ones are of `h` s.
   double time(long n, double h) {
-    // When it is asked first, the steps before were as long as those to come.
-    if (length > 0.0 && h != length) {
+    if (h != length) {
       origin += (double(n) - step) * length;
       step = double(n);
+      length = h;
     }
-    length = h;
     return origin + (double(n) - step) * length;
   }
 };

@@ -68,6 +68,7 @@ class Given {
       if (k.required && !has(k.name)) refuse(k.name + " is missing; it has " + grammar.known());
   }
 
+  const std::string& kind() const { return kind_; }
   bool has(const std::string& name) const { return values_.count(name) > 0; }
   const std::string& word(const std::string& name) const { return values_.at(name)[0]; }
   double number(const std::string& name, std::size_t k = 0) const {

@@ -129,6 +129,47 @@ TEST_CASE("wall motion: the steps of an engine add up to the displacement", "[mo
   }
 }
 
+TEST_CASE("wall motion: it begins from where the wall stands, at any time", "[motion]") {
+  const std::string name = "test_wall_motion_begin.csv";
+  std::ofstream(name) << "0 0 0 0\n0.1 1e-2 0 -0.02\n0.3 2e-2 0 0\n";
+  std::vector<std::string> all(std::begin(terms), std::end(terms));
+  for (const std::string& more :
+       {"table file " + name, std::string(terms[0]) + " table file " + name,
+        std::string("harmonic amplitude 0 0 1e-3 frequency 20 ramp 0 uniform velocity 0.01 0 0 rotation point 1 2 3 "
+                    "axis 0 0 1 rate 5 acceleration 2")})
+    all.push_back(more);
+  for (const std::string& words : all)
+    for (const double now : {0.1125, 0.25}) {
+      INFO(words);
+      const PrescribedMotion early{words};
+      PrescribedMotion late{words};
+      late.begin(now);
+      CHECK(norm(late.at(now).displacement) == 0.0);
+      CHECK(late.at(now).angle == 0.0);
+      Vec3<double> low, high;
+      late.reach(now, now + 1.0, low, high);
+      const bool given = words.find("start") != std::string::npos;
+      const WallState from = early.at(now);
+      for (double s = 0.0; s < 1.0; s += 0.0171) {
+        // Without a start of their own terms start then, others go on as they would have.
+        const WallState here = late.at(now + s), same = early.at(given ? now + s : s);
+        CHECK(norm(here.displacement - (same.displacement - (given ? 1.0 : 0.0) * from.displacement)) < 1e-14);
+        CHECK(std::abs(here.angle - (same.angle - (given ? from.angle : 0.0))) < 1e-13);
+        CHECK(norm(here.velocity - same.velocity) < 1e-12);
+        CHECK(std::abs(here.rate - same.rate) < 1e-12);
+        CHECK((here.displacement.x > low.x - 1e-3 && here.displacement.z < high.z + 1e-3));
+      }
+      // The speed of the half step before: what has no start has always been going on, oscillations begin.
+      CHECK(norm(late.step(now - 1e-6, 1e-6).velocity - early.step(given ? now - 1e-6 : -1e-6, 1e-6).velocity) < 1e-9);
+      // Once more from the beginning, as after a restart.
+      late.begin(now);
+      CHECK(norm(late.at(now).displacement) == 0.0);
+    }
+  std::remove(name.c_str());
+  PrescribedMotion ends{std::string("uniform velocity 0 0 1 until 0.1")};
+  CHECK_THROWS_WITH(ends.begin(0.2), "motion uniform: until 0.1 s must be later than start 0.2 s");
+}
+
 TEST_CASE("wall motion: what is wrong is told in one line", "[motion]") {
   CHECK(message("").find("there is no motion ''; it is harmonic") == 0);
   CHECK(message("harmonic frequency 2") == "motion harmonic: amplitude is missing; it has amplitude, frequency, phase, ramp, start, until");
@@ -155,10 +196,19 @@ TEST_CASE("wall motion: what is wrong is told in one line", "[motion]") {
 
 TEST_CASE("wall motion: a clock is exact to the step, and goes on when the step changes", "[motion]") {
   MotionClock clock;
+  clock.begin(0.0, 0, 1000000, 1e-5);
+  CHECK(clock.begun == 1000000 * 1e-5);
   CHECK(clock.time(1000000, 1e-5) == 1000000 * 1e-5);
   CHECK(clock.time(1000001, 1e-5) == 1000001 * 1e-5);
   CHECK_THAT(clock.time(1000001, 2e-5), WithinAbs(10.00001, 1e-14));
   CHECK_THAT(clock.time(1000003, 2e-5), WithinAbs(10.00005, 1e-14));
+  // What has begun does not begin again; an engine whose step was another one before has a time of its own.
+  clock.begin(0.0, 0, 1000003, 2e-5);
+  CHECK(clock.begun == 1000000 * 1e-5);
+  MotionClock late;
+  late.begin(0.1, 10000, 12000, 5e-6);
+  CHECK_THAT(late.begun, WithinAbs(0.11, 1e-15));
+  CHECK_THAT(late.time(14000, 5e-6), WithinAbs(0.12, 1e-15));
 }
 
 TEST_CASE("wall motion: power is that of forces and torques, and the surface's acceleration turns the mean velocities of steps",

@@ -20,19 +20,26 @@ class WallMotion:
         keywords (SI units, rad; `docs/moving_walls.md` has all of them); nothing: at rest. Raises ValueError with one line about what is
         wrong.
     folder : where the files of tables lie; by default the working directory
+    begin : s, when the wall is given the motion: the time of the first step of a `fix wall/motion` or `WallMotion`. Terms without `start`
+        start then
 
-    Displacements are from the place that the wall has before the motion, angles about its axis, which moves with the translation.
+    Displacements are from the place that the wall has at `begin`, angles about its axis, which moves with the translation.
 
     >>> shaken = WallMotion("harmonic amplitude 0 0 1e-3 frequency 20 ramp 0")
     >>> bool(abs(shaken.velocity(0.0)[2] - 1e-3 * 2 * np.pi * 20) < 1e-15)
     True
+    >>> WallMotion("uniform velocity 0 0 0.5", begin=2.0).displacement(3.0).tolist()
+    [0.0, 0.0, 0.5]
     """
 
-    def __init__(self, words: str, folder: Path | None = None) -> None:
+    def __init__(self, words: str, folder: Path | None = None, begin: float = 0.0) -> None:
         self.text = " ".join(words.split())
+        self._motion = self._read(folder)
+        self._motion.begin(float(numbers("begin", begin, "s")))
+
+    def _read(self, folder: Path | None) -> _physics.PrescribedMotion:
         if folder is None or "file" not in self.words:
-            self._motion = _physics.PrescribedMotion(self.text) if self.text else _physics.PrescribedMotion()
-            return
+            return _physics.PrescribedMotion(self.text) if self.text else _physics.PrescribedMotion()
         # A path may have blanks in it, which words have not: the files are read from a place without.
         with TemporaryDirectory() as place:
             given = list(self.words)
@@ -41,7 +48,7 @@ class WallMotion:
                     shutil.copyfile(folder / given[k], Path(place) / given[k])
                 given[k] = f"{place}/{given[k]}"
             try:
-                self._motion = _physics.PrescribedMotion(" ".join(given))
+                return _physics.PrescribedMotion(" ".join(given))
             except ValueError as error:
                 raise ValueError(str(error).replace(place, str(folder))) from None
 
