@@ -8,11 +8,11 @@
 //   F_n = k d + c d' >= 0,  F_t = -k_t xi - c_t v_t with |F_t| <= mu F_n,  xi' = v_t                                       (1)
 //   c = 2 zeta sqrt(k m/4),  ln e = -zeta (pi - 2 asin zeta)/sqrt(1 - zeta^2),  k_t = 0.82 k,  c_t = 0.82 c                 (2)
 //
-// (1): P. A. Cundall & O. D. L. Strack, Geotechnique 29 (1979) 47. xi begins with the contact and is cut back where it slides. (2): e
-// of a contact that does not pull, T. Schwager & T. Poeschel, Granul. Matter 9 (2007) 465. m is the reduced mass; of a face that lands
-// flat each of four corners has a quarter of it, and about so much is the effective mass of one corner of a cube that lands on it. k_t/k:
-// R. D. Mindlin, J. Appl. Mech. 16 (1949) 259, for a Poisson's ratio of 0.3. Crossings fade out within r of the ends of the edges, where
-// corners take over: k there is w k, and w's gradient a force along the surface, so that springs conserve energy.
+// (1): P. A. Cundall & O. D. L. Strack, Geotechnique 29 (1979) 47. xi begins with the contact, turns with the boxes and is cut back where
+// it slides. (2): e of a contact that does not pull, T. Schwager & T. Poeschel, Granul. Matter 9 (2007) 465. m is the reduced mass; of a
+// face that lands flat each of four corners has a quarter of it, and about so much is the effective mass of one corner of a cube that lands
+// on it. k_t/k: R. D. Mindlin, J. Appl. Mech. 16 (1949) 259, for a Poisson's ratio of 0.3. Crossings fade out within r of the ends of the
+// edges, where corners take over: k there is w k, and w's gradient a force along the surface, so that springs conserve energy.
 //
 // Or, with a speed v_0 of friction, no spring, and what stands on a slope creeps:
 //
@@ -31,6 +31,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "../finnie_rabinowicz.hpp"  // rotate_to_plane
+#include "../kinematics.hpp"
 #include "bodies.hpp"
 
 namespace dembark::sph {
@@ -224,7 +226,8 @@ class BoxContacts {
       const double speed = norm(slide);
       if (speed > 0.0) along = (-most * std::tanh(speed / friction_speed) / speed) * slide;
     } else {
-      stretch = xi - dot(xi, normal) * normal + dt_ * slide;
+      const double twist = contact_twist(normal, one.spin, other ? other->spin : Vector{}, dt_);
+      stretch = rotate_to_plane(xi, normal, twist) + dt_ * slide;
       along = -(along_normal * k) * stretch - (along_normal * c) * slide;
       const double size = norm(along);
       if (size > most) {

@@ -58,6 +58,37 @@ struct World {
 
 }  // namespace
 
+TEST_CASE("springs turn with boxes that turn together, and stay where nothing turns", "[box_contacts]") {
+  for (const bool pair : {true, false}) {
+    World w(pair ? std::vector<Body>{cube({0.0, 0.0, 1.5 * edge - 2e-5}), cube({0.0, 0.0, 0.5 * edge})}
+                 : std::vector<Body>{cube({0.0, 0.0, 0.5 * edge - 1e-5})});
+    w.contacts.between = Touch::of(1.0, 100.0);
+    if (!pair) w.floor(1.0, 100.0);
+    std::vector<const Body*> all;
+    for (const Body& b : w.bodies) all.push_back(&b);
+    const auto sideways = [&](double step) {
+      const Push& push = w.contacts.push(step, all, true)[0];
+      return Vector{push.force.x, push.force.y, 0.0};
+    };
+    w.bodies[0].velocity = {0.1, 0.0, 0.0};
+    const Vector first = sideways(1e-5);
+    w.bodies[0].velocity = {};
+    constexpr int steps = 1000;
+    const double rate = 0.5 * 3.141592653589793 / (steps * 1e-5);
+    Vector last{};
+    for (int k = 0; k < steps; ++k) {
+      for (Body& b : w.bodies) {
+        b.spin = {0.0, 0.0, pair ? rate : 0.0};
+        b.orientation = b.orientation.turned(1e-5 * b.spin);
+      }
+      last = sideways(1e-5);
+    }
+    REQUIRE(norm(first) > 0.0);
+    const Vector expected = pair ? Vector{-first.y, first.x, 0.0} : first;
+    CHECK(norm(last - expected) < 1e-2 * norm(first));
+  }
+}
+
 TEST_CASE("a cube that lands flat comes back with the restitution it was given", "[box_contacts]") {
   for (const double e : {0.3, 0.7, 1.0}) {
     World w({cube({0.0, 0.0, 0.5 * edge + 1e-5})});
