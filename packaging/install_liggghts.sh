@@ -63,7 +63,7 @@ for file in "$here"/plugins/liggghts/{pair_sph_coupled,pair_sph_options,fix_nve_
   copy "$file" "$src/$(basename "$file")"
 done
 # States to resume from.
-for file in "$here"/plugins/liggghts/fix_resume_exact*; do
+for file in "$here"/plugins/liggghts/{fix_resume_exact*,per_instance.h}; do
   copy "$file" "$src/$(basename "$file")"
 done
 # The fix for impacts of logs solves its equations with Eigen, a library of headers; without it LIGGGHTS would not compile any more.

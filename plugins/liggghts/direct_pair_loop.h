@@ -210,7 +210,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
 
  public:
   DirectPairLoop(LAMMPS_NS::LAMMPS* lmp, LAMMPS_NS::PairGran* parent, std::int64_t hash)
-      : Stock(lmp, parent, hash), lmp_(lmp), pair_(parent) {}
+      : Stock(lmp, parent, hash), PairParameters(lmp), lmp_(lmp), pair_(parent) {}
 
   void settings(int count, char** words, LIGGGHTS::IContactHistorySetup* history) override {
     Stock::settings(count, words, history);
@@ -253,7 +253,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     tally_.friction_at = friction_offset_;
     tally_.rings_at = rings_offset_;
     tally_.angle_at = angle_offset_;
-    known = plain_settings_ ? this : nullptr;
+    make_known(plain_settings_);
   }
 
   dembark::ContactParameters parameters(int i, int j) const override {

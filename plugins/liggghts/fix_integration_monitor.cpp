@@ -65,11 +65,11 @@ double FixIntegrationMonitor::stiffness(int type_i, int type_j, double radius, d
 }
 
 dembark::ContactParameters FixIntegrationMonitor::parameters(int type_i, int type_j) const {
-  return PairParameters::known->parameters(type_i, type_j);
+  return PairParameters::of(lmp)->parameters(type_i, type_j);
 }
 
 void FixIntegrationMonitor::setup_pre_force(int) {
-  if (!PairParameters::known)
+  if (!PairParameters::of(lmp))
     fail("impacts are integrated anew for pair_style gran model hertz tangential finnie_rabinowicz only, without viscous liquid");
   if (atom->map_style == 0) fail("impacts needs 'atom_modify map array'");
 }

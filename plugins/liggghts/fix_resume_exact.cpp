@@ -190,7 +190,7 @@ bool FixResumeExact::append_parts(const std::string &path) {
 
 /// This rank's part of the state whose parts have these lengths. Returns why there is none. Collective.
 std::string FixResumeExact::read_parts(const double *lengths) {
-  const std::string path = ResumeState::file.empty() ? dembark::restart::state_name(base_, update->ntimestep) : ResumeState::file;
+  const std::string path = ResumeState::file[lmp].empty() ? dembark::restart::state_name(base_, update->ntimestep) : ResumeState::file[lmp];
   int whole = 1;
   if (comm->me == 0) {
     const double all = std::accumulate(lengths, lengths + comm->nprocs, 0.0);
@@ -236,7 +236,7 @@ void ResumeState::command(int narg, char **arg) {
   if (narg != 1) error->all(FLERR, "resume_state: it must have the form resume_state BASE");
   const dembark::restart::State state = dembark_family::find_state(arg[0], *comm, world);
   if (state.step < 0) error->all(FLERR, dembark_family::no_state(arg[0]).c_str());
-  file = dembark::restart::state_name(arg[0], state.step);
-  char *words[] = {&file[0]};
+  file[lmp] = dembark::restart::state_name(arg[0], state.step);
+  char *words[] = {&file[lmp][0]};
   ReadRestart(lmp).command(1, words);
 }

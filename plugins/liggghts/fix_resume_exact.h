@@ -16,6 +16,7 @@ CommandStyle(resume_state,ResumeState)
 #include <string>
 #include <vector>
 
+#include "per_instance.h"
 #include "resume_fix.h"
 
 namespace LAMMPS_NS {
@@ -48,7 +49,7 @@ class ResumeState : protected Pointers {
   explicit ResumeState(class LAMMPS *lmp) : Pointers(lmp) {}
   void command(int, char **);
 
-  inline static std::string file;  // that was read, for the fix, which is made afterwards; empty: none
+  inline static dembark_liggghts::PerInstance<std::string> file;  // that was read, for the fix, which is made afterwards; empty: none
 };
 
 }  // namespace LAMMPS_NS

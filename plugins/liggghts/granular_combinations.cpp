@@ -5,9 +5,11 @@
 #include <cstring>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 // The library's headers depend on this order.
 #include "fix_insert_stream.h"
+#include "comm.h"
 #include "error.h"
 #include "force.h"
 #include "lammps.h"
@@ -76,6 +78,29 @@ Host* create(LAMMPS* lammps, typename Host::ParentType* parent, std::int64_t has
   return new Type(lammps, parent, hash);
 }
 
+/// The engine's loop, with one line for who could have the faster one.
+template <class Style>
+class RollingPairLoop : public PairStyles::Granular<ContactModel<Style>> {
+  LAMMPS* lammps_;
+
+ public:
+  RollingPairLoop(LAMMPS* lammps, LAMMPS_NS::PairGran* parent, std::int64_t hash)
+      : PairStyles::Granular<ContactModel<Style>>(lammps, parent, hash), lammps_(lammps) {}
+
+  void init_granular() override {
+    PairStyles::Granular<ContactModel<Style>>::init_granular();
+    if (lammps_->comm->me != 0 || std::exchange(warned_, true)) return;
+    constexpr bool constant = Style::ROLLING == ROLLING_CDT;
+    const std::string line = std::string("pair_style gran: with rolling_friction ") + (constant ? "cdt" : "epsd2") +
+                             " pairs are computed one by one, which takes longer than with stock models; 'rolling_resistance " +
+                             (constant ? "constant_torque" : "elastic_plastic") + "' behind the models is computed in packs";
+    lammps_->error->warning(FLERR, line.c_str());
+  }
+
+ private:
+  bool warned_ = false;
+};
+
 // The class that runs the pair loop of a style: the engine's, unless there is a faster one.
 template <class Style>
 struct PairLoop {
@@ -84,6 +109,11 @@ struct PairLoop {
 template <int Cohesion>
 struct PairLoop<GranStyle<HERTZ, TANGENTIAL_FINNIE_RABINOWICZ, Cohesion, ROLLING_OFF, SURFACE_DEFAULT>> {
   typedef DirectPairLoop<GranStyle<HERTZ, TANGENTIAL_FINNIE_RABINOWICZ, Cohesion, ROLLING_OFF, SURFACE_DEFAULT>> type;
+};
+
+template <int Cohesion, int Rolling>
+struct PairLoop<GranStyle<HERTZ, TANGENTIAL_FINNIE_RABINOWICZ, Cohesion, Rolling, SURFACE_DEFAULT>> {
+  typedef RollingPairLoop<GranStyle<HERTZ, TANGENTIAL_FINNIE_RABINOWICZ, Cohesion, Rolling, SURFACE_DEFAULT>> type;
 };
 
 template <int Normal, int Tangential, int Cohesion, int Rolling, int Surface>

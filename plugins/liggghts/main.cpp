@@ -66,7 +66,7 @@ void run_and_keep_histories(LAMMPS_NS::LAMMPS* host, int narg, char** arg) {
 /// The library enters its own combinations when it is made; ours come after, where its fallback can be replaced.
 void enter_styles(LAMMPS_NS::LAMMPS& host) {
   if (!host.modify || !host.force || !host.input) return;
-  LAMMPS_NS::ResumeState::file.clear();
+  LAMMPS_NS::ResumeState::file.forget(&host);
   dembark_liggghts::register_contact_models();
   auto& fixes = dembark_liggghts::fix_styles(*host.modify);
   fixes["capillary/liquid"] = &create_fix<LAMMPS_NS::FixCapillaryLiquid>;

@@ -3,20 +3,31 @@
 #define DEMBARK_PAIR_PARAMETERS_H
 
 #include "dembark/contact.hpp"
+#include "per_instance.h"
 
 namespace dembark_liggghts {
 
 class PairParameters {
  public:
-  PairParameters() = default;
+  explicit PairParameters(const LAMMPS_NS::LAMMPS* engine) : engine_(engine) {}
   PairParameters(const PairParameters&) = delete;
   PairParameters& operator=(const PairParameters&) = delete;
-  virtual ~PairParameters() {
-    if (known == this) known = nullptr;
-  }
+  virtual ~PairParameters() { make_known(false); }
   virtual dembark::ContactParameters parameters(int type_1, int type_2) const = 0;
 
-  inline static const PairParameters* known = nullptr;  ///< of the pair style; null: of another combination of models
+  /// Of the pair style of an engine; null: of another combination of models.
+  static const PairParameters* of(const LAMMPS_NS::LAMMPS* engine) { return known_[engine]; }
+
+ protected:
+  void make_known(bool known) {
+    const PairParameters*& mine = known_[engine_];
+    if (known) mine = this;
+    else if (mine == this) mine = nullptr;
+  }
+
+ private:
+  inline static PerInstance<const PairParameters*> known_;
+  const LAMMPS_NS::LAMMPS* engine_;
 };
 
 }  // namespace dembark_liggghts

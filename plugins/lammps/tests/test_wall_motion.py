@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig import vessel
+from rig import late_motion, vessel
 from rig.lammps_driver import coefficients, head, run_deck, settings
 from rig.liggghts_driver import Run, read_dump
 from rig.meshes import patch
 from rig.scenarios import Material
 from rig.vessel import STEP
-from rig.wall_balance import Told, assert_walls_move_the_grains
+from rig.wall_balance import ELASTIC, Told, assert_begins_where_it_stands, assert_walls_move_the_grains
 from rig.walls import stl
 
 from dembark.physics import effective_youngs_modulus
@@ -196,3 +196,61 @@ def test_wrong_surfaces_are_told_in_one_line(tmp_path, old, new, line):
     done = run_deck(tmp_path, deck(tmp_path, "", "run 10").replace(old, new))
     assert done.code != 0
     assert "fix move wall/dembark" in done.error and line in done.error, done.error or done.output[-500:]
+
+
+def late_deck(then: str, *, create: str = "", motions: list[str] = late_motion.MOTIONS) -> str:
+    """Plates that get motions late, all of one place, below one held grain; `create`: how a state is read again."""
+    late = late_motion
+    place = " ".join(map(repr, late.GRAIN))
+    walls = "".join(f"fix w{k} all wall/dembark stl plate.stl type 2 motion {words}\n" for k, words in enumerate(motions))
+    before = "" if create else (f"timestep {late.STEPS[0]!r}\nrun {late.COUNTS[0]}\ntimestep {late.STEPS[1]!r}\nrun {late.COUNTS[1]}\n")
+    columns = " ".join(f"f_w{k}[{n}]" for k in range(len(motions)) for n in (9, 10, 11, 12, 3))
+    return f"""\
+{head()}
+{create or "region domain block -0.02 0.02 -0.02 0.02 -0.02 0.02 units box"}
+{"" if create else f"create_box 2 domain{chr(10)}create_atoms 1 single {place} units box"}
+{"" if create else f"set group all diameter {2 * late.RADIUS!r} density 2500.0"}
+neighbor 0.002 bin
+pair_style dembark/granular {settings(ELASTIC)}
+pair_coeff * * {coefficients(ELASTIC)}
+thermo 100000
+{before}timestep {late.STEPS[1]!r}
+{walls}variable now equal time
+fix out all ave/time {late.EVERY} 1 {late.EVERY} v_now {columns} file {"again" if create else "wall"}.txt format " %.17g"
+{then}
+"""
+
+
+def test_motions_that_are_given_late_begin_where_the_wall_stands(tmp_path):
+    """After steps of two lengths, `run 0` first, over several runs and a restart: no jump, and the same to the bit."""
+    late = late_motion
+    (tmp_path / "plate.stl").write_text(stl(late.PLATE))
+    (tmp_path / "late.csv").write_text(late.TABLE)
+    done = run_deck(tmp_path, late_deck(f"run 0\nrun {late.PART}\nwrite_restart half.state\nrun {late.PART}"))
+    assert done.code == 0, done.error or done.output[-2000:]
+    table = np.unique(np.loadtxt(tmp_path / "wall.txt"), axis=0)
+    assert len(table) == 2 * late.PART // late.EVERY + 1
+    for k, words in enumerate(late.MOTIONS):
+        mine = table[:, 2 + 5 * k:7 + 5 * k]
+        assert_begins_where_it_stands(tmp_path, words, table[:, 1], mine[:, :3], mine[:, 3], mine[:, 4])
+    again = run_deck(tmp_path, late_deck(f"run {late.PART}", create="read_restart half.state"), name="again.in")
+    assert again.code == 0, again.error or again.output[-2000:]
+    # The first row is that of a set-up, whose velocities it takes; places are the same.
+    np.testing.assert_array_equal(np.loadtxt(tmp_path / "again.txt")[1:], table[late.PART // late.EVERY + 1:])
+
+
+@pytest.mark.parametrize(("change", "line"), [
+    (("0 0 1e-4 frequency 50", "0 0 2e-4 frequency 50"), "in the restart file its motion is 'harmonic amplitude 0 0 1e-4"),
+    (("frequency 50 ramp 0", "frequency 50 ramp 0 until 0.009"), "until 0.009 s must be later than start 0.01 s")])
+def test_motions_that_cannot_begin_are_refused_in_one_line(tmp_path, change, line):
+    late = late_motion
+    (tmp_path / "plate.stl").write_text(stl(late.PLATE))
+    text = late_deck("run 1\nwrite_restart half.state", motions=late.MOTIONS[:1])
+    if "until" in change[1]:
+        done = run_deck(tmp_path, text.replace(*change))
+    else:
+        assert run_deck(tmp_path, text).code == 0
+        other = late_deck("run 1", create="read_restart half.state", motions=late.MOTIONS[:1])
+        done = run_deck(tmp_path, other.replace(*change), name="again.in")
+    assert done.code != 0 and line in done.error, done.error or done.output[-500:]
+    assert len(done.error.strip().splitlines()) <= 2

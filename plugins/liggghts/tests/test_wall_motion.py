@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig import vessel
+from rig import late_motion, vessel
 from rig.energy_account import FIX, THERMO, Account
 from rig.liggghts_driver import Run, head, models, properties, read_dump, run_deck
 from rig.scenarios import Material
 from rig.vessel import STEP, rectangle
-from rig.wall_balance import Told, assert_walls_move_the_grains
+from rig.wall_balance import ELASTIC, Told, assert_begins_where_it_stands, assert_walls_move_the_grains
 from rig.walls import stl
 
 DRY = Material(static_friction=0.5, kinetic_friction=0.4, restitution=0.6, youngs_modulus=vessel.MODULUS)
@@ -256,3 +256,50 @@ def test_a_mesh_that_reaches_a_periodic_border_turns_about_an_axis_along_it(tmp_
     motion = f"rotation point 0.03 0 0.02 axis {axis} rate 1"
     done = run_deck(tmp_path, deck(tmp_path, motion, "run 10", boundary=boundary, triangles=strip, gravity=(0.0, 0.0, 0.0)))
     assert (done.code != 0 and line in done.error) if line else done.code == 0, done.error or done.output[-500:]
+
+
+def late_deck(then: str, *, create: str = "", motions: list[str] = late_motion.MOTIONS) -> str:
+    """Plates that get motions late, all of one place, below one held grain; `create`: how a state is read again."""
+    late = late_motion
+    meshes = [f"m{k}" for k in range(len(motions))]
+    box = (f"region domain block -0.02 0.02 -0.02 0.02 -0.02 0.02 units box\ncreate_box 2 domain\n"
+           f"create_atoms 1 single {' '.join(map(repr, late.GRAIN))} units box\nset group all diameter {2 * late.RADIUS!r} density 2500.0")
+    walls = "".join(f"fix {mesh} all mesh/surface file plate.stl type 2\n" for mesh in meshes)
+    moves = "".join(f"fix w{k} all wall/motion mesh m{k} {words}\n" for k, words in enumerate(motions))
+    before = "" if create else f"timestep {late.STEPS[0]!r}\nrun {late.COUNTS[0]}\ntimestep {late.STEPS[1]!r}\nrun {late.COUNTS[1]}\n"
+    numbers = [f"f_w{k}[{n}]" for k in range(len(motions)) for n in (1, 2, 3, 4, 15)]
+    given = "".join(f"variable v{k} equal {number}\n" for k, number in enumerate(numbers))
+    shown = " ".join(f"${{v{k}}}" for k in range(len(numbers)))
+    return f"""\
+{head()}
+{create or box}
+neighbor 0.002 bin
+neigh_modify delay 0
+{properties(ELASTIC)}
+pair_style gran {models(ELASTIC)}
+pair_coeff * *
+{walls}fix wall all wall/gran {models(ELASTIC, wall=f"mesh n_meshes {len(meshes)} meshes {' '.join(meshes)}")}
+fix held all nve/noforce
+thermo 100000
+{before}timestep {late.STEPS[1]!r}
+{moves}variable now equal time
+{given}fix out all print {late.EVERY} "${{now}} {shown}" file {"again" if create else "wall"}.txt screen no title "#"
+{then}
+"""
+
+
+def test_motions_that_are_given_late_begin_where_the_wall_stands(tmp_path):
+    """After steps of two lengths, `run 0` first, over several runs and a restart: the meshes are where the fixes have them."""
+    late = late_motion
+    (tmp_path / "plate.stl").write_text(stl(late.PLATE))
+    (tmp_path / "late.csv").write_text(late.TABLE)
+    done = run_deck(tmp_path, late_deck(f"run 0\nrun {late.PART}\nwrite_restart half.state\nrun {late.PART}"))
+    assert done.code == 0, done.error or done.output[-2000:]
+    table = np.loadtxt(tmp_path / "wall.txt")
+    times = late.BEGUN + late.STEPS[1] * late.EVERY * np.arange(1, 2 * late.PART // late.EVERY + 1)
+    for k, words in enumerate(late.MOTIONS):
+        mine = table[:, 1 + 5 * k:6 + 5 * k]
+        assert_begins_where_it_stands(tmp_path, words, times, mine[:, :3], mine[:, 3], mine[:, 4])
+    again = run_deck(tmp_path, late_deck(f"run {late.PART}", create="read_restart half.state"), name="again.in")
+    assert again.code == 0, again.error or again.output[-2000:]
+    np.testing.assert_array_equal(np.loadtxt(tmp_path / "again.txt"), table[late.PART // late.EVERY:])

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.physics import WallMotion
+from dembark.physics import WallMotion, effective_youngs_modulus
 from rig import vessel
+from rig.late_motion import BEGUN, OVERLAP, RADIUS
+from rig.scenarios import Material
 
 Array = NDArray[np.float64]
+ELASTIC = Material(static_friction=0.0, kinetic_friction=0.0, restitution=1.0, youngs_modulus=vessel.MODULUS)
 
 
 @dataclass(frozen=True)
@@ -41,3 +45,19 @@ def assert_walls_move_the_grains(told: Told, grains: Array, motion: str) -> None
     # All forces that are not between grains are those of the wall.
     forces = grains[1:, :, 7:10].sum(axis=1) + weight
     assert np.abs(told.force - forces).max() < 1e-12 * np.abs(forces).max()
+
+
+def assert_begins_where_it_stands(folder: Path, words: str, times: Array, displacement: Array, angle: Array, force: Array) -> None:
+    """The plate is where the motion that begins at BEGUN has it, in what the engine says and by the elastic force on the grain.
+
+    folder : with `late.csv`; times : (n,) s
+    displacement : (n, 3) m and angle : (n,) rad of the plate; force : (n,) N, upwards on the grain
+    """
+    motion = WallMotion(words, folder, begin=BEGUN)
+    np.testing.assert_allclose(displacement, motion.displacement(times), atol=1e-13, err_msg=words)
+    np.testing.assert_allclose(angle, motion.angle(times), atol=1e-11, err_msg=words)
+    if "rocking" in words:
+        return
+    modulus = effective_youngs_modulus(ELASTIC.youngs_modulus, ELASTIC.poisson_ratio, ELASTIC.youngs_modulus, ELASTIC.poisson_ratio)
+    overlap = OVERLAP + motion.displacement(times)[:, 2]
+    np.testing.assert_allclose(force, 4.0 / 3.0 * modulus * np.sqrt(RADIUS * overlap) * overlap, rtol=1e-8, err_msg=words)

@@ -9,7 +9,7 @@ from yade import utils
 
 sys.path.insert(0, str(Path(sys.argv[0] if sys.argv[0].endswith(".py") else __file__).resolve().parents[2] / "tests"))
 
-from rig import vessel
+from rig import late_motion, vessel
 
 SHAKE = "harmonic amplitude 1e-3 0 2e-3 frequency 50 ramp 2"
 ROCK = "rocking point 0.01 0.01 0.01 axis 0 1 0 angle 0.2 frequency 40 ramp 1"
@@ -170,6 +170,70 @@ def reloaded():
     found.append(result())
     os.unlink("motion.yade.gz")
     return found
+
+
+def late():
+    """Plates that get motions late, all of one place, below a held grain: rows of displacement, angle, force and `begun` of each."""
+    late = late_motion
+    Path("late.csv").write_text(late.TABLE, encoding="ascii")
+    O.reset()
+    O.dt = late.STEPS[0]
+    material = O.materials.append(FrictMat(young=vessel.MODULUS, poisson=0.3, density=vessel.DENSITY, frictionAngle=0))
+    # A grain that may turn: of two held bodies no force would be computed.
+    grain = utils.sphere(late.GRAIN, late.RADIUS, material=material)
+    grain.state.blockedDOFs = "xyzXY"
+    O.bodies.append(grain)
+    plates = [O.bodies.append([utils.facet(three, fixed=True, material=material) for three in late.PLATE]) for _ in late.MOTIONS]
+    # The engine's own contacts with facets: to a surface of facets the plates would be one.
+    O.engines = [
+        ForceResetter(), InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Facet_Aabb()], verletDist=0.001),
+        InteractionLoop([Ig2_Facet_Sphere_ScGeom()],
+                        [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(restitution=1.0, criticalSlipDistance=1e-5, **SMOOTH)],
+                        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz()]),
+        NewtonIntegrator(damping=0)]
+    advance(late.COUNTS[0])
+    O.dt = late.STEPS[1]
+    advance(late.COUNTS[1])
+    moves = [WallMotion(ids=plate, motion=words) for plate, words in zip(plates, late.MOTIONS, strict=True)]
+    O.engines = [*O.engines[:-1], *moves, O.engines[-1]]
+    advance(1)
+    rows = [[] for _ in moves]
+    for part in range(2):
+        for _ in range(late.PART // late.EVERY):
+            advance(late.EVERY)
+            # A scene that was loaded has engines of its own.
+            now = [engine for engine in O.engines if isinstance(engine, WallMotion)]
+            for engine, table in zip(now, rows, strict=True):
+                table.append([*engine.displacement, engine.angle, engine.force[2], engine.begun])
+        if not part:
+            O.save("late.yade.gz", quiet=True)
+            O.load("late.yade.gz", quiet=True)
+    os.unlink("late.yade.gz")
+    return rows
+
+
+def again():
+    """Heights of a plate: its motion, another one, and what is said of one that did not run or whose scene's time is reset."""
+    _, moves, _ = scene("uniform velocity 0 0 0.1", [], triangles=vessel.rectangle((0, 0, 0), (0.02, 0, 0), (0, 0.02, 0)))
+    height = lambda: (O.bodies[0].state.pos + O.bodies[0].state.ori * O.bodies[0].shape.vertices[0])[2]
+    found = []
+    for words in ("uniform velocity 0 0 0.1", "uniform velocity 0 0 -0.2", "harmonic amplitude 0 0 1e-3 frequency 50 ramp 0"):
+        moves.motion = words
+        advance(50)
+        found.append([O.iter * O.dt, moves.begun, height()])
+
+    def dead():
+        moves.dead = True
+        advance(3)
+        moves.dead = False
+        O.step()
+
+    said = [refusal(dead)]
+    _, moves, _ = scene("uniform velocity 0 0 0.1", [], triangles=vessel.rectangle((0, 0, 0), (0.02, 0, 0), (0, 0.02, 0)))
+    advance(5)
+    O.resetTime()
+    said.append(refusal(O.step))
+    return {"heights": found, "said": said}
 
 
 def messages():

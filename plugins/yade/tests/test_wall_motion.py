@@ -9,14 +9,16 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 
-from rig import vessel
+from rig import late_motion, vessel
+from rig.wall_balance import assert_begins_where_it_stands
 
 from dembark.physics import WallMotion
 
 
 @pytest.fixture(scope="module")
 def found(yade):
-    return yade.scenes("place", "velocity", "frames", "shaken", "pushed", "bounce", "reloaded", "messages", script="motion_scenes.py")
+    return yade.scenes("place", "velocity", "frames", "shaken", "pushed", "bounce", "reloaded", "messages", "late", "again",
+                       script="motion_scenes.py")
 
 
 def test_wall_is_where_it_is_prescribed_to_be(found):
@@ -98,6 +100,31 @@ def test_a_saved_scene_goes_on(found):
     assert one["walls"] == other["walls"]
     np.testing.assert_allclose(other["sums"], one["sums"], rtol=1e-7)
     np.testing.assert_allclose(other["grains"], one["grains"], atol=1e-9)
+
+
+def test_motions_that_are_given_late_begin_where_the_wall_stands(found, tmp_path):
+    """After steps of two lengths, over a saved scene."""
+    late = late_motion
+    (tmp_path / "late.csv").write_text(late.TABLE)
+    times = late.BEGUN + late.STEPS[1] * late.EVERY * np.arange(1, 2 * late.PART // late.EVERY + 1)
+    for words, rows in zip(late.MOTIONS, np.array(found["late"]), strict=True):
+        np.testing.assert_allclose(rows[:, 5], late.BEGUN, rtol=1e-12)
+        assert_begins_where_it_stands(tmp_path, words, times, rows[:, :3], rows[:, 3], rows[:, 4])
+
+
+def test_another_motion_begins_where_the_wall_stands(found):
+    height, before = 0.0, 0.0
+    for words, (time, begun, now) in zip(("uniform velocity 0 0 0.1", "uniform velocity 0 0 -0.2",
+                                          "harmonic amplitude 0 0 1e-3 frequency 50 ramp 0"), found["again"]["heights"], strict=True):
+        assert begun == pytest.approx(before, abs=1e-15)
+        height += WallMotion(words, begin=begun).displacement(time)[2]
+        assert now == pytest.approx(height, abs=1e-15)
+        before = time
+
+
+def test_a_motion_that_was_left_out_for_steps_ends_the_run(found):
+    for said, now in zip(found["again"]["said"], (53, 0), strict=True):
+        assert said.startswith("dembark: WallMotion moved its bodies last in step") and f"is now in step {now}" in said
 
 
 @pytest.mark.parametrize(("name", "line"), [
