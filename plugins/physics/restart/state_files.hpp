@@ -7,22 +7,17 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
-#include <fcntl.h>
-#include <unistd.h>
+#include "output_files.hpp"
 
 namespace dembark::restart {
-
-namespace fs = std::filesystem;
 
 struct State {
   long long step = -1;  ///< -1: there is none
@@ -33,20 +28,8 @@ inline constexpr const char *state_end = ".restart", *mark_end = ".crc";
 
 inline std::string state_name(const std::string& base, long long step) { return base + "." + std::to_string(step) + state_end; }
 
-[[noreturn]] inline void fail_file(const fs::path& path, const char* what, const std::error_code& why = {errno, std::generic_category()}) {
-  throw std::runtime_error("file " + path.string() + " cannot be " + what + ": " + why.message());
-}
-
 /// The whole number that `text` begins with; 0 where it begins with none.
 inline long long leading_number(const std::string& text) { return std::strtoll(text.c_str(), nullptr, 10); }
-
-/// Flush what `path` holds to the disk.
-inline void sync_file(const std::string& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY);
-  if (descriptor < 0) return;
-  fsync(descriptor);
-  ::close(descriptor);
-}
 
 inline std::string mark_text(long long bytes, std::uint32_t crc) {
   char text[40];
@@ -94,28 +77,6 @@ inline std::vector<long long> all_states(const std::string& base) {
   return steps;
 }
 
-/// Where the part of a table or a dump to keep ends: after the last whole row or frame at or before `step`.
-inline std::streamoff end_of_kept(std::ifstream& file, long long step) {
-  std::string line;
-  const auto next = [&] { return std::getline(file, line) && !file.eof(); };  // a line with its end
-  std::streamoff end = 0;
-  for (bool first = true; next(); first = false) {
-    if (line == "ITEM: TIMESTEP") {
-      if (!next() || leading_number(line) > step) break;
-      if (!next()) break;  // "ITEM: NUMBER OF ..."
-      if (!next()) break;
-      long long rows = leading_number(line) + 5;  // and the box, and the names of the columns
-      while (rows > 0 && next()) --rows;
-      if (rows > 0) break;
-    } else if (!first) {  // that is the header of a table
-      char* rest = nullptr;
-      if (std::strtoll(line.c_str(), &rest, 10) > step || rest == line.c_str()) break;
-    }
-    end = file.tellg();
-  }
-  return end;
-}
-
 /// The newest state that is whole.
 inline State newest_state(const std::string& base) {
   for (const long long step : all_states(base)) {
@@ -155,18 +116,6 @@ inline void keep_state(const std::string& part, const std::string& base, const S
   delete_states(base, 2);
 } catch (const fs::filesystem_error& error) {
   fail_file(error.path2().empty() ? error.path1() : error.path2(), "written", error.code());
-}
-
-/// Cut `path` after the last frame (of a dump) or row (of a table that begins with the step) at or before `step`. A file that does not
-/// exist is left alone.
-inline void cut_output(const std::string& path, long long step) {
-  std::fflush(nullptr);  // of whatever stream writes to the file
-  if (!fs::exists(path)) return;
-  std::ifstream file(path);
-  if (!file) fail_file(path, "read");
-  std::error_code wrong;
-  fs::resize_file(path, std::uintmax_t(end_of_kept(file, step)), wrong);
-  if (wrong) fail_file(path, "cut", wrong);
 }
 
 }  // namespace dembark::restart
