@@ -21,7 +21,10 @@ namespace dembark_family {
 class OrderHash {
  public:
   OrderHash(const LAMMPS_NS::Atom& atom, const LAMMPS_NS::NeighList* list);
-  void mix(std::int64_t v) { hash_ = (hash_ ^ static_cast<std::uint32_t>(v)) * 1099511628211u; }  // FNV-1a, 32 bits at a time
+  void mix(std::uint64_t v) {  // FNV-1a, 32 bits at a time
+    hash_ = (hash_ ^ static_cast<std::uint32_t>(v)) * 1099511628211u;
+    if (v >> 32) hash_ = (hash_ ^ (v >> 32)) * 1099511628211u;
+  }
   double high() const { return double(hash_ >> 32); }
   double low() const { return double(hash_ & 0xffffffffu); }
 
