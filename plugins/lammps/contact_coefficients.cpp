@@ -22,7 +22,7 @@ std::string types(int i, int j) { return "types " + std::to_string(i) + "-" + st
 
 }  // namespace
 
-const std::array<ContactCoefficients::Keyword, 11> ContactCoefficients::keywords = {{
+const std::array<ContactCoefficients::Keyword, 12> ContactCoefficients::keywords = {{
     {"youngs_modulus", &Given::youngs_modulus},
     {"poissons_ratio", &Given::poissons_ratio},
     {"restitution", &Given::restitution},
@@ -34,6 +34,7 @@ const std::array<ContactCoefficients::Keyword, 11> ContactCoefficients::keywords
     {"rolling_damping_ratio", &Given::rolling_damping_ratio},
     {"bridge_volume", &Given::bridge_volume},
     {"contact_angle", &Given::contact_angle},
+    {"largest_radius", &Given::largest_radius},
 }};
 
 void ContactCoefficients::fail(const std::string& what) const { error->all(FLERR, std::string("pair_style ") + style_name + ": " + what); }
@@ -112,7 +113,8 @@ std::vector<std::array<int, 2>> ContactCoefficients::coeff(int narg, char** arg)
     }
     if (k + 1 == narg) fail("pair_coeff: " + name + " needs a value");
     const double value = number("pair_coeff: " + name, arg[k + 1]);
-    if (one_pair && (known->value == &Given::youngs_modulus || known->value == &Given::poissons_ratio))
+    if (known->value == &Given::largest_radius && !(value >= 0.0 && value < INFINITY)) fail("largest_radius must be >= 0 and finite");
+    if (one_pair && of_one_type(known->value))
       fail(name + " belongs to one type; give it with pair_coeff " + arg[0] + " " + arg[0] + " and pair_coeff " + arg[1] + " " + arg[1]);
     for (const auto& [i, j] : pairs) given_(i, j).*known->value = given_(j, i).*known->value = value;
   }
@@ -129,7 +131,31 @@ double ContactCoefficients::needed(int i, int j, double Given::* value) const {
   return found;
 }
 
-ContactParameters ContactCoefficients::combine(int i, int j) const {
+ContactParameters ContactCoefficients::common() const {
+  ContactParameters p;
+  p.normal_law = settings_.normal_law;
+  p.characteristic_velocity = settings_.characteristic_velocity;
+  p.tangential_damping = settings_.tangential_damping;
+  p.limit_force = settings_.limit_force;
+  p.friction.healing_time = settings_.healing_time;
+  p.friction.presliding = settings_.presliding;
+  p.rolling.model = settings_.rolling_model;
+  p.liquid.surface_tension = settings_.surface_tension;
+  p.liquid.viscous = settings_.viscous;
+  return p;
+}
+
+void ContactCoefficients::begin() {
+  const int count = atom->ntypes;
+  if (given_.types() != count) given_ = dembark::PairTable<Given>(count);
+  parameters_ = dembark::PairTable<ContactParameters>(count);
+  complete_ = dembark::PairTable<char>(count);
+  const ContactParameters all = common();
+  for (int i = 1; i <= count; ++i)
+    for (int j = 1; j <= count; ++j) parameters_(i, j) = all;
+}
+
+void ContactCoefficients::complete(int i, int j) {
   const Given& given = given_(i, j);
   const std::string pair = " (" + types(i, j) + ")";
   const double youngs[2] = {needed(i, i, &Given::youngs_modulus), needed(j, j, &Given::youngs_modulus)};
@@ -141,13 +167,9 @@ ContactParameters ContactCoefficients::combine(int i, int j) const {
   const double restitution = needed(i, j, &Given::restitution);
   if (!(restitution > 0.0 && restitution <= 1.0)) fail("restitution must be > 0 and <= 1" + pair);
 
-  ContactParameters p;
-  p.normal_law = settings_.normal_law;
+  ContactParameters p = common();
   p.elasticity = {dembark::effective_youngs_modulus(youngs[0], poisson[0], youngs[1], poisson[1]),
                   dembark::effective_shear_modulus(youngs[0], poisson[0], youngs[1], poisson[1]), restitution};
-  p.characteristic_velocity = settings_.characteristic_velocity;
-  p.tangential_damping = settings_.tangential_damping;
-  p.limit_force = settings_.limit_force;
   p.friction = {needed(i, j, &Given::static_friction),
                 needed(i, j, &Given::kinetic_friction),
                 needed(i, j, &Given::critical_slip_distance),
@@ -158,23 +180,17 @@ ContactParameters ContactCoefficients::combine(int i, int j) const {
   if (settings_.rolling_model != dembark::RollingModel::off)
     p.rolling = {settings_.rolling_model, needed(i, j, &Given::rolling_friction), given.rolling_damping_ratio};
   if (const char* wrong = p.rolling.error()) fail(wrong + pair);
-  if (!settings_.wet) return p;
-  if (settings_.carried && given.bridge_volume > 0.0)
-    fail("bridge_volume is given, but with carried_liquid on a bridge takes its volume from the grains; leave one of them out" + pair);
-  const double volume = settings_.carried ? 0.0 : needed(i, j, &Given::bridge_volume), angle = needed(i, j, &Given::contact_angle);
-  if (!(volume >= 0.0 && volume < INFINITY)) fail("bridge_volume (m^3) must be >= 0 and finite" + pair);
-  if (!(angle >= 0.0 && angle <= 0.5 * dembark::pi)) fail("contact_angle is in radians and must lie in 0...pi/2 (1.5708)" + pair);
-  p.liquid = {&dembark::capillary::shared_bridge_force(settings_.capillary_model, angle), settings_.surface_tension, volume,
-              settings_.viscous};
-  return p;
-}
-
-void ContactCoefficients::complete() {
-  const int count = atom->ntypes;
-  if (given_.types() != count) given_ = dembark::PairTable<Given>(count);
-  parameters_ = dembark::PairTable<ContactParameters>(count);
-  for (int i = 1; i <= count; ++i)
-    for (int j = i; j <= count; ++j) parameters_(i, j) = parameters_(j, i) = combine(i, j);
+  if (settings_.wet) {
+    if (settings_.carried && given.bridge_volume > 0.0)
+      fail("bridge_volume is given, but with carried_liquid on a bridge takes its volume from the grains; leave one of them out" + pair);
+    const double volume = settings_.carried ? 0.0 : needed(i, j, &Given::bridge_volume), angle = needed(i, j, &Given::contact_angle);
+    if (!(volume >= 0.0 && volume < INFINITY)) fail("bridge_volume (m^3) must be >= 0 and finite" + pair);
+    if (!(angle >= 0.0 && angle <= 0.5 * dembark::pi)) fail("contact_angle is in radians and must lie in 0...pi/2 (1.5708)" + pair);
+    p.liquid = {&dembark::capillary::shared_bridge_force(settings_.capillary_model, angle), settings_.surface_tension, volume,
+                settings_.viscous};
+  }
+  parameters_(i, j) = parameters_(j, i) = p;
+  complete_(i, j) = complete_(j, i) = 1;
 }
 
 }  // namespace dembark_lammps

@@ -22,12 +22,13 @@ class ContactCoefficients : protected LAMMPS_NS::Pointers {
     double interface_shear_strength = dembark::unlimited_strength;
     double rolling_friction = NAN, rolling_damping_ratio = 0.0;
     double bridge_volume = NAN, contact_angle = NAN;
+    double largest_radius = 0.0;  // of a type: what it may grow to in a run
   };
   struct Keyword {
     const char* name;
     double Given::* value;
   };
-  static const std::array<Keyword, 11> keywords;
+  static const std::array<Keyword, 12> keywords;
 
   /// Given by pair_style.
   struct Settings {
@@ -41,12 +42,17 @@ class ContactCoefficients : protected LAMMPS_NS::Pointers {
   } settings_;
   dembark::PairTable<Given> given_;
   dembark::PairTable<dembark::ContactParameters> parameters_;
+  dembark::PairTable<char> complete_;
 
   double number(const std::string& keyword, const char* text) const;
   template <class Option>
   void choose(const std::string& keyword, const std::string& word, const std::vector<std::string>& names, Option& option) const;
+  static bool of_one_type(double Given::* value) {
+    return value == &Given::youngs_modulus || value == &Given::poissons_ratio || value == &Given::largest_radius;
+  }
   double needed(int i, int j, double Given::* value) const;
-  dembark::ContactParameters combine(int i, int j) const;
+  /// What pair_style says of all pairs.
+  dembark::ContactParameters common() const;
 
  public:
   static constexpr const char* style_name = "dembark/granular";
@@ -59,10 +65,16 @@ class ContactCoefficients : protected LAMMPS_NS::Pointers {
   void settings(int narg, char** arg);
   /// The words after `pair_coeff`; returns the pairs of types (i <= j) that they are about.
   std::vector<std::array<int, 2>> coeff(int narg, char** arg);
-  /// After the last pair_coeff: the parameters of all pairs. What is missing or wrong ends the run with one line.
-  void complete();
+  /// After the last pair_coeff: no pair has parameters yet.
+  void begin();
+  /// The parameters of a pair of types that this style computes. What is missing or wrong ends the run with one line.
+  void complete(int i, int j);
+  bool is_complete(int i, int j) const { return complete_(i, j); }
 
+  /// Of a pair that is not complete: what pair_style says of all.
   const dembark::ContactParameters& operator()(int i, int j) const { return parameters_(i, j); }
+  /// m, that grains of a type may grow to; 0 unless given.
+  double largest_radius(int type) const { return given_(type, type).largest_radius; }
   bool wet() const { return settings_.wet; }
   dembark::HistoryLayout layout() const {
     return {settings_.wet, settings_.presliding == dembark::Presliding::partial_slip,

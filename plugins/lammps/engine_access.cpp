@@ -16,7 +16,26 @@ struct BeginnersOfSteps {
 };
 template struct Access<BeginnersOfSteps, &LAMMPS_NS::Modify::list_initial_integrate>;
 
+struct RestartedFixes {
+  typedef char** LAMMPS_NS::Modify::* Member;
+  friend Member access(RestartedFixes);
+};
+template struct Access<RestartedFixes, &LAMMPS_NS::Modify::id_restart_peratom>;
+struct TakenUp {
+  typedef int* LAMMPS_NS::Modify::* Member;
+  friend Member access(TakenUp);
+};
+template struct Access<TakenUp, &LAMMPS_NS::Modify::used_restart_peratom>;
+
 }  // namespace
+
+bool left_in_restart_file(const LAMMPS_NS::Modify* modify, const std::string& prefix) {
+  char** const ids = modify->*access(RestartedFixes());
+  const int* const taken = modify->*access(TakenUp());
+  for (int k = 0; k < modify->nfix_restart_peratom; ++k)
+    if (!taken[k] && std::string(ids[k]).rfind(prefix, 0) == 0) return true;
+  return false;
+}
 
 void begin_steps_first(LAMMPS_NS::Modify* modify, const LAMMPS_NS::Fix* fix) {
   int *const first = modify->*access(BeginnersOfSteps()), *const end = first + modify->n_initial_integrate;

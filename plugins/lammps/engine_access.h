@@ -2,6 +2,8 @@
 #ifndef DEMBARK_ENGINE_ACCESS_H
 #define DEMBARK_ENGINE_ACCESS_H
 
+#include <string>
+
 #include "fix.h"
 #include "modify.h"
 
@@ -11,6 +13,10 @@ namespace dembark_lammps {
 /// anything of the next: LAMMPS calls no fix there by itself. Called in the set-up; the fix that is last to call it is the first. The lists
 /// of Modify are protected.
 void begin_steps_first(LAMMPS_NS::Modify* modify, const LAMMPS_NS::Fix* fix);
+
+/// Whether the restart file that was read has numbers of atoms of a fix whose name begins so, and no fix has taken them: LAMMPS drops them
+/// with the first run. What Modify keeps of the file is protected.
+bool left_in_restart_file(const LAMMPS_NS::Modify* modify, const std::string& prefix);
 
 }  // namespace dembark_lammps
 

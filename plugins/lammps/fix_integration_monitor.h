@@ -20,7 +20,7 @@ class FixIntegrationMonitor : public dembark_lammps::RowsFix<dembark_family::Mon
   void take_walls() override;
   double stiffness(int type_i, int type_j, double radius, double mass, double overlap) const override;
   dembark::ContactParameters parameters(int type_i, int type_j) const override;
-  double* history(int i) override { return rows_[i]; }
+  double* history(int i) override { return row(i).data(); }
   void clear_histories() override;
 
   class PairDembarkGranular* pair_ = nullptr;

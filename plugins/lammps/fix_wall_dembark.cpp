@@ -48,8 +48,6 @@ FixWallDembark::FixWallDembark(LAMMPS* lmp, int narg, char** arg) : RowsFix(lmp,
     if (narg > 7) motion_ = std::make_unique<dembark::PrescribedMotion>(words_);
   });
   layout_ = pair_->coefficients().layout();
-  slots_ = surface_->slots();
-  before_.resize(std::size_t(row_size()));
   restart_global = 1;
   vector_flag = peratom_flag = 1;
   size_vector = int(totals_.size()) + (motion_ ? motion_numbers : 0);
@@ -57,7 +55,7 @@ FixWallDembark::FixWallDembark(LAMMPS* lmp, int narg, char** arg) : RowsFix(lmp,
   nevery = global_freq = peratom_freq = 1;
   extvector = 1;
   time_depend = motion_ ? 1 : 0;
-  make_rows(row_size());
+  make_rows(0);
 }
 
 FixWallDembark::~FixWallDembark() { memory->destroy(force_); }
@@ -74,8 +72,8 @@ void FixWallDembark::init() {
   liquid_ = layout_.imbalance ? dembark_lammps::find_liquid(modify) : nullptr;
   tally_ = dembark_lammps::find_energy_tally(modify);
   checked([&] { surface_->prepare(pair_->largest_radius() + (layout_.bridge ? neighbor->skin : 0.0), motion_.get()); });
-  if (pair_->coefficients().layout().size() != layout_.size() || surface_->slots() != slots_)
-    fail("pair_style or region have changed; define the fix again");
+  if (pair_->coefficients().layout().code() != layout_.code()) fail("pair_style has other options than before; define the fix again");
+  check_types();
   if (!motion_) return;
   if (const std::string wrong = motion_->step_error(update->dt); !wrong.empty()) fail(wrong);
   if (update->whichflag == 2) fail("a wall with a motion is for 'run', not for 'minimize', whose steps take no time");
@@ -88,6 +86,22 @@ void FixWallDembark::init() {
   // A gate may leave, but grains cannot follow.
   if (const std::string gone = surface_->outside(back, forth); !gone.empty())
     warn("the motion takes its surface " + gone + ": grains that it takes along are lost");
+}
+
+/// Of grains with `pair_style hybrid` some may belong to another style.
+void FixWallDembark::check_types() {
+  std::vector<int> there(std::size_t(atom->ntypes + 1), 0);
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (atom->mask[i] & groupbit) there[std::size_t(atom->type[i])] = 1;
+  MPI_Allreduce(MPI_IN_PLACE, there.data(), int(there.size()), MPI_INT, MPI_MAX, world);
+  for (int type = 1; type <= atom->ntypes; ++type)
+    if (there[std::size_t(type)] && !pair_->coefficients().is_complete(type, wall_type_)) fail(not_for(type));
+}
+
+std::string FixWallDembark::not_for(int type) const {
+  const std::string other = std::to_string(type), its = std::to_string(wall_type_);
+  return "its group has grains of type " + other + ", and pair_coeff gives types " + other + " and " + its +
+         " no dembark/granular; give it, or take a group without them";
 }
 
 /// Takes up where the wall is now.
@@ -108,11 +122,11 @@ void FixWallDembark::setup(int vflag) {
 
 /// The history that a contact goes on with, or nullptr.
 const double* FixWallDembark::history_of(const dembark_lammps::WallContact& contact, const Vec3& centre, double radius) const {
-  const double* const end = before_.data() + row_size();
-  for (const double* row = before_.data(); row < end; row += slot_size())
-    if (row[0] == contact.surface + 1) return row + 1;
-  for (const double* row = before_.data(); row < end; row += slot_size())
-    if (row[0] != 0.0 && surface_->goes_on(int(row[0]) - 1, contact, centre, radius)) return row + 1;
+  const double* const end = before_.data() + before_.size();
+  for (const double* slot = before_.data(); slot < end; slot += slot_size())
+    if (slot[0] == contact.surface + 1) return slot + 1;
+  for (const double* slot = before_.data(); slot < end; slot += slot_size())
+    if (surface_->goes_on(int(slot[0]) - 1, contact, centre, radius)) return slot + 1;
   return nullptr;
 }
 
@@ -132,14 +146,17 @@ void FixWallDembark::post_force(int) {
 }
 
 void FixWallDembark::act_on(int i, bool advance) {
-  double *const rows = rows_[i], *const end = rows + row_size();
+  std::vector<double>& slots = row(i);
   double reach = 0.0;  // of its longest bridge
-  for (const double* row = rows; layout_.bridge && row < end; row += slot_size()) reach = std::max(reach, row[1 + layout_.bridge_at() + 1]);
+  for (std::size_t k = 0; layout_.bridge && k < slots.size(); k += std::size_t(slot_size()))
+    reach = std::max(reach, slots[k + 1 + std::size_t(layout_.bridge_at()) + 1]);
   const Vec3 x = vector(atom->x[i]), centre = frame_.inside(x);
   const std::vector<dembark_lammps::WallContact>& contacts = surface_->contacts(centre, atom->radius[i], reach);
-  std::copy(rows, end, before_.begin());
-  if (advance) std::fill(rows, end, 0.0);
-  double* next = rows;
+  before_ = slots;
+  if (advance) slots.clear();
+  // Until the end of the step the liquid holds on to where bridges stand.
+  slots.reserve(contacts.size() * std::size_t(slot_size()));
+  if (!contacts.empty() && !pair_->coefficients().is_complete(atom->type[i], wall_type_)) fail_alone(not_for(atom->type[i]));
   for (const dembark_lammps::WallContact& contact : contacts) {
     const dembark::ContactParameters& p = pair_->coefficients()(atom->type[i], wall_type_);
     dembark::ContactBodies b;
@@ -164,9 +181,10 @@ void FixWallDembark::act_on(int i, bool advance) {
     if (advance && !(volume > 0.0) && (state.bridge_volume > 0.0 || (liquid_ && touching)))
       dembark_lammps::check_time_step(error, p.liquid, b, update->dt);
     if (!out.interacting && !(volume > 0.0)) continue;
-    if (next == end) fail_alone("a grain touches more than " + std::to_string(slots_) + " parts of a wall");
     if (tally_ && out.interacting) tally_->add(p, b, out, state, advance, i, x, acceleration_);
     if (advance) {
+      slots.resize(slots.size() + std::size_t(slot_size()));
+      double* const next = slots.data() + slots.size() - slot_size();
       next[0] = contact.surface + 1;
       layout_.store(next + 1, state);
       if (liquid_) {
@@ -175,7 +193,6 @@ void FixWallDembark::act_on(int i, bool advance) {
         liquid_->report({i, liquid_->wall_number(this), true}, atom->radius[i], INFINITY, p.liquid, touching, volume,
                         next + 1 + layout_.bridge_at(), imbalance);
       }
-      next += slot_size();
     }
     add(atom->f[i], out.force);
     add(atom->torque[i], out.torque_1);
@@ -185,6 +202,7 @@ void FixWallDembark::act_on(int i, bool advance) {
     totals_[6] += touching;
     totals_[7] += state.bridge_volume > 0.0;
   }
+  make_room(i);
 }
 
 const std::vector<double>& FixWallDembark::overlaps(int i) {
@@ -232,6 +250,19 @@ void FixWallDembark::copy_arrays(int from, int to, int mode) {
 void FixWallDembark::set_arrays(int i) {
   RowsFix::set_arrays(i);
   std::fill_n(force_[i], 3, 0.0);
+}
+
+int FixWallDembark::pack_restart(int i, double* buffer) {
+  buffer[0] = size_restart(i);
+  buffer[1] = layout_key();
+  std::copy(row(i).begin(), row(i).end(), buffer + 2);
+  return size_restart(i);
+}
+
+void FixWallDembark::unpack_restart(int i, int nth) {
+  const double* const saved = restart_row(i, nth);
+  if (saved[1] != layout_key()) fail_alone("the restart file was written with other options of pair_style, whose histories differ");
+  row(i).assign(saved + 2, saved + int(saved[0]));
 }
 
 void FixWallDembark::write_restart(FILE* file) {

@@ -37,6 +37,9 @@ class FixWallDembark : public dembark_lammps::RowsFix<dembark_family::SharedFix>
   void grow_arrays(int count) override;
   void copy_arrays(int from, int to, int) override;
   void set_arrays(int i) override;
+  int pack_restart(int i, double* buffer) override;
+  void unpack_restart(int i, int nth) override;
+  int size_restart(int i) override { return 1 + RowsFix::size_restart(i); }
   // How a moving region moved in the last step; time and work of a motion.
   void write_restart(FILE* file) override;
   void restart(char* buffer) override;
@@ -48,8 +51,9 @@ class FixWallDembark : public dembark_lammps::RowsFix<dembark_family::SharedFix>
   /// Calls visit(volume, imbalance) for each bridge of grain i, which may change them.
   template <class Visit>
   void each_bridge(int i, Visit visit) {
-    for (double* row = rows_[i]; row < rows_[i] + row_size(); row += slot_size())
-      if (row[0] != 0.0 && row[1 + layout_.bridge_at()] > 0.0) visit(row[1 + layout_.bridge_at()], row[1 + layout_.imbalance_at()]);
+    double* const end = row(i).data() + row(i).size();
+    for (double* slot = row(i).data(); slot < end; slot += slot_size())
+      if (slot[1 + layout_.bridge_at()] > 0.0) visit(slot[1 + layout_.bridge_at()], slot[1 + layout_.imbalance_at()]);
   }
 
  private:
@@ -60,10 +64,9 @@ class FixWallDembark : public dembark_lammps::RowsFix<dembark_family::SharedFix>
   class PairDembarkGranular* pair_ = nullptr;
   class FixCapillaryLiquid* liquid_ = nullptr;
   dembark::HistoryLayout layout_;
-  int slots_ = 0;  // contacts that a grain can have with the wall
-  // A row has of each slot the number of the part of the surface plus one (0: free), and the history.
+  // A row has of each contact the number of the part of the surface plus one, and the history.
   double** force_ = nullptr;    // of each grain: of the wall on it, N
-  std::vector<double> before_;  // the rows of the grain in work before this step
+  std::vector<double> before_;  // the row of the grain in work before this step
   std::vector<double> overlaps_;
   std::array<double, 8> totals_{}, all_totals_{};  // on this process, and on all at the step `summed_`
   bigint summed_ = -1;
@@ -78,8 +81,11 @@ class FixWallDembark : public dembark_lammps::RowsFix<dembark_family::SharedFix>
   bool resumed_ = false;                    // the last step of `sums_` is that of a restart file
 
   int slot_size() const { return 1 + layout_.size(); }
-  int row_size() const { return slots_ * slot_size(); }
+  /// In restart files before a row: negative, as no part of a surface is.
+  double layout_key() const { return -1.0 - layout_.code(); }
   void find_pair();
+  void check_types();
+  std::string not_for(int type) const;
   void move();
   void act_on(int i, bool advance);
   const double* history_of(const dembark_lammps::WallContact& contact, const dembark::Vec3<double>& centre, double radius) const;

@@ -47,7 +47,7 @@ void PackedContacts::collect_laws() {
     }
 }
 
-void PackedContacts::step(const LAMMPS_NS::NeighList& list, const NeighborHistory& history) {
+void PackedContacts::step(const LAMMPS_NS::NeighList& list, const NeighborHistory& history, const double* masses) {
   if (list.inum == 0) return;
   collect_laws();
   const ContactParameters& any = coefficients_(1, 1);
@@ -55,6 +55,7 @@ void PackedContacts::step(const LAMMPS_NS::NeighList& list, const NeighborHistor
   const int more = layout_.rings || layout_.rolling ? layout_.rings_at() : -1;
   dembark::PairStep step{*this};
   dembark_family::describe_pairs(step, *atom, list);
+  step.mass = masses_ = masses;
   step.memory = this;
   step.results = tally_.sums ? &tally_ : nullptr;
   step.laws = laws_.data();
@@ -100,7 +101,7 @@ Vec3 PackedContacts::friction(const PairBlock& block, int k, const Vec3& normal,
 Vec3 PackedContacts::rolling(const PairBlock& block, int k, const Vec3& normal, double twist, double normal_force,
                              double tangential_stiffness, const Vec3& spin) {
   const int i = block.grain[k], j = block.partner[k];
-  const auto mass = [&](int grain) { return atom->mask[grain] & freeze_bit_ ? INFINITY : atom->rmass[grain]; };
+  const auto mass = [&](int grain) { return atom->mask[grain] & freeze_bit_ ? INFINITY : masses_[grain]; };
   double* const history = block.history[k] + layout_.rolling_at();
   Vec3 angle = layout_.rolling ? vector(history) : Vec3{};
   const dembark::RollingContact contact{normal,

@@ -26,8 +26,8 @@ class PackedContacts : dembark::ScalarLaws, dembark::ScalarMemory, LAMMPS_NS::Po
 
   /// After the last pair_coeff: whether packs know the law. `tally`: that of fix energy/account, or nullptr.
   bool prepare(int freeze_bit, LAMMPS_NS::FixCapillaryLiquid* liquid, dembark::ContactTally* tally);
-  /// Forces, torques and histories of a step.
-  void step(const LAMMPS_NS::NeighList& list, const NeighborHistory& history);
+  /// Forces, torques and histories of a step. `masses`: kg, of what the grains move with.
+  void step(const LAMMPS_NS::NeighList& list, const NeighborHistory& history, const double* masses);
 
  private:
   typedef dembark::Vec3<double> Vec3;
@@ -47,6 +47,7 @@ class PackedContacts : dembark::ScalarLaws, dembark::ScalarMemory, LAMMPS_NS::Po
   const ContactCoefficients& coefficients_;
   dembark::HistoryLayout layout_;
   int freeze_bit_ = 0;
+  const double* masses_ = nullptr;
   LAMMPS_NS::FixCapillaryLiquid* liquid_ = nullptr;
   const dembark::PairLoops packs_ = dembark::PairLoops::choose();
   const std::unique_ptr<PairBlock> block_ = std::make_unique<PairBlock>();

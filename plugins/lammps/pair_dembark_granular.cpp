@@ -16,6 +16,7 @@
 #include "update.h"
 
 #include "contact_call.h"
+#include "engine_access.h"
 #include "fix_capillary_liquid.h"
 
 using namespace LAMMPS_NS;
@@ -35,23 +36,30 @@ PairDembarkGranular::PairDembarkGranular(LAMMPS* lmp) : Pair(lmp), coefficients_
   single_extra = single_numbers;
   svector = new double[single_numbers]();
   // Histories come before the fixes that the script defines: they are put in their place later, when their size is known.
-  modify->add_fix(history_id() + "_PLACE all DUMMY");
+  comm_forward = 1;
+  // Restart files know histories by this name: it counts the styles that are there, not all that ever were.
+  const auto taken = [this](const std::string& name) {
+    const auto& fixes = modify->get_fix_list();
+    return std::any_of(fixes.begin(), fixes.end(), [&](const Fix* fix) { return std::string(fix->id).rfind(name, 0) == 0; });
+  };
+  int number = 1;
+  do history_name_ = "NEIGH_HISTORY_DEMBARK_" + std::to_string(number++) + "_";
+  while (taken(history_name_));
+  modify->add_fix(history_name_ + "PLACE all DUMMY", 0);
 }
 
 PairDembarkGranular::~PairDembarkGranular() {
   delete[] svector;
-  if (modify->nfix) modify->delete_fix(history_ ? history_id() : history_id() + "_PLACE");
+  if (modify->nfix) modify->delete_fix(history_ ? std::string(history_->id) : history_name_ + "PLACE");
   if (!allocated) return;
   memory->destroy(setflag);
   memory->destroy(cutsq);
 }
 
-std::string PairDembarkGranular::history_id() const { return "NEIGH_HISTORY_DEMBARK_" + std::to_string(instance_me); }
-
 void PairDembarkGranular::settings(int narg, char** arg) {
   coefficients_.settings(narg, arg);
-  if (history_ && coefficients_.layout().size() != layout_.size())
-    coefficients_.fail("other options than before need histories of another size; write 'pair_style none' first");
+  if (history_ && coefficients_.layout().code() != layout_.code())
+    coefficients_.fail("other options than before need other histories; write 'pair_style none' first");
   layout_ = coefficients_.layout();
 }
 
@@ -70,11 +78,18 @@ void PairDembarkGranular::init_style() {
   if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag || !atom->torque_flag)
     coefficients_.fail("the atoms need atom_style sphere");
   if (!comm->ghost_velocity) coefficients_.fail("ghost atoms need velocities: comm_modify vel yes");
-  coefficients_.complete();
+  check_run();
+  coefficients_.begin();
   neighbor->add_request(this, NeighConst::REQ_SIZE | NeighConst::REQ_HISTORY);
   if (!history_) {
-    Fix* const made =
-        modify->replace_fix(history_id() + "_PLACE", history_id() + " all NEIGH_HISTORY " + std::to_string(layout_.size()), 1);
+    // Without the suffix of an accelerator: that fix would be of another class.
+    Fix* const made = modify->replace_fix(
+        history_name_ + "PLACE",
+        history_name_ + "LAYOUT" + std::to_string(layout_.code()) + " all NEIGH_HISTORY " + std::to_string(layout_.size()), 0);
+    if (dembark_lammps::left_in_restart_file(modify, history_name_))
+      coefficients_.fail(
+          "the restart file has histories of contacts that were computed with other options; take the same options, or begin without "
+          "histories: from a data file");
     if (!std::strstr(typeid(*made).name(), "FixNeighHistory")) error->all(FLERR, "dembark: LAMMPS's fix NEIGH_HISTORY is not what it was");
     history_ = static_cast<dembark_lammps::NeighborHistory*>(made);
     history_->pair = this;
@@ -87,29 +102,80 @@ void PairDembarkGranular::init_style() {
   if (layout_.imbalance && !liquid_) coefficients_.fail("carried_liquid on needs the liquid: fix ID all capillary/liquid content C");
   // Lists of bonded atoms hold pairs that do not interact.
   tally_ = dembark_lammps::find_energy_tally(modify);
+  rigid_.clear();
+  for (Fix* const fix : modify->get_fix_list())
+    if (fix->rigid_flag) rigid_.push_back(fix);
   packed_ = packs_.prepare(freeze_bit_, liquid_, tally_) && atom->molecular == Atom::ATOMIC;
   find_radii();
+  history_->force_reneighbor = grains_grow_;
+  history_->next_reneighbor = -1;
+}
+
+void PairDembarkGranular::check_run() {
+  if (!dembark_family::has_coherent_units(*force))
+    coefficients_.fail(std::string("in units ") + update->unit_style +
+                       " force is not mass times acceleration, and the law needs that; use units si, cgs, micro, nano or lj");
+  if (!dembark_family::is_verlet(*update))
+    coefficients_.fail(std::string("contacts follow one time step, and run_style ") + update->integrate_style +
+                       " has several; use run_style verlet");
+  if (update->whichflag == 2)
+    coefficients_.fail(
+        "contacts have no energy that minimize could lower; let grains come to rest in a run, with fix viscous or nve/limit");
 }
 
 void PairDembarkGranular::find_radii() {
   largest_radius_.assign(std::size_t(atom->ntypes + 1), 0.0);
-  for (int i = 0; i < atom->nlocal; ++i) {
-    double& largest = largest_radius_[std::size_t(atom->type[i])];
-    largest = std::max(largest, atom->radius[i]);
-  }
+  const auto take = [this](int type, double radius) {
+    double& largest = largest_radius_[std::size_t(type)];
+    largest = std::max(largest, radius);
+  };
+  for (int i = 0; i < atom->nlocal; ++i) take(atom->type[i], atom->radius[i]);
   MPI_Allreduce(MPI_IN_PLACE, largest_radius_.data(), atom->ntypes + 1, MPI_DOUBLE, MPI_MAX, world);
-  for (Fix* const fix : modify->get_fix_by_style("^(pour|deposit)"))
+  grains_grow_ = false;
+  for (Fix* const fix : modify->get_fix_list()) {
+    grains_grow_ |= fix->diam_flag != 0;
+    // Fixes that insert grains answer with the largest radius of a type.
     for (int type = 1; type <= atom->ntypes; ++type) {
       int asked = type;
-      if (const void* const radius = fix->extract("radius", asked))
-        largest_radius_[std::size_t(type)] = std::max(largest_radius_[std::size_t(type)], *static_cast<const double*>(radius));
+      const void* const radius = fix->extract("radius", asked);
+      if (radius && (asked == 0 || asked == type)) take(type, *static_cast<const double*>(radius));
     }
+  }
+  for (int type = 1; type <= atom->ntypes; ++type) take(type, coefficients_.largest_radius(type));
+}
+
+/// When the pairs are listed: the lists look no further than for grains of the radii that were known before the run.
+void PairDembarkGranular::check_radii() {
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (atom->radius[i] > largest_radius_[std::size_t(atom->type[i])]) {
+      const int type = atom->type[i];
+      error->one(
+          FLERR,
+          "pair_style dembark/granular: the radius of grain {} is {:.6g}, and the lists of pairs of this run look for grains of type "
+          "{} up to {:.6g}; say before the run how large they become: pair_coeff {} {} largest_radius R",
+          atom->tag[i], atom->radius[i], type, largest_radius_[std::size_t(type)], type, type);
+    }
+}
+
+/// Where grains grow: lists are made anew before two of them can meet that are in none. LAMMPS looks at displacements only.
+void PairDembarkGranular::watch_growth() {
+  if (neighbor->ago == 0) {
+    listed_.resize(std::size_t(atom->nlocal));
+    for (int i = 0; i < atom->nlocal; ++i) listed_[std::size_t(i)] = {vector(atom->x[i]), atom->radius[i]};
+  }
+  double most = 0.0;
+  for (std::size_t i = 0; i < listed_.size(); ++i)
+    most = std::max(most, norm(vector(atom->x[i]) - listed_[i].place) + atom->radius[i] - listed_[i].radius);
+  MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPI_DOUBLE, MPI_MAX, world);
+  // Half of what may be gone, for it is the next step that makes them.
+  if (most > 0.25 * neighbor->skin) history_->next_reneighbor = update->ntimestep + 1;
 }
 
 double PairDembarkGranular::largest_radius() const { return *std::max_element(largest_radius_.begin(), largest_radius_.end()); }
 
 double PairDembarkGranular::init_one(int i, int j) {
   if (!setflag[i][j]) coefficients_.fail("pair_coeff " + std::to_string(i) + " " + std::to_string(j) + " is missing");
+  coefficients_.complete(i, j);
   // No bridge is longer than the skin, and what lists pairs looks no further than this.
   const double reach = coefficients_.wet() ? neighbor->skin : 0.0;
   return largest_radius_[std::size_t(i)] + largest_radius_[std::size_t(j)] + reach;
@@ -117,7 +183,33 @@ double PairDembarkGranular::init_one(int i, int j) {
 
 void PairDembarkGranular::transfer_history(double* from, double* to, int, int) { layout_.swap_bodies(from, to); }
 
-double PairDembarkGranular::mass(int i) const { return atom->mask[i] & freeze_bit_ ? INFINITY : atom->rmass[i]; }
+/// What a force on a grain moves is its rigid body. Collective.
+void PairDembarkGranular::take_body_masses() {
+  masses_.assign(std::size_t(atom->nlocal + atom->nghost), 0.0);
+  std::copy_n(atom->rmass, atom->nlocal, masses_.begin());
+  for (Fix* const fix : rigid_) {
+    int dimension = 0;
+    const int* const body = static_cast<const int*>(fix->extract("body", dimension));
+    const double* const mass = static_cast<const double*>(fix->extract("masstotal", dimension));
+    for (int i = 0; i < atom->nlocal; ++i) {
+      if (!(atom->mask[i] & fix->groupbit)) continue;
+      if (!body)
+        error->one(FLERR, "pair_style dembark/granular: fix {} ({}) does not say the masses of its bodies, and damping needs them", fix->id,
+                   fix->style);
+      if (body[i] >= 0) masses_[std::size_t(i)] = mass[body[i]];
+    }
+  }
+  comm->forward_comm(this);
+}
+
+int PairDembarkGranular::pack_forward_comm(int count, int* grains, double* buffer, int, int*) {
+  for (int k = 0; k < count; ++k) buffer[k] = masses_[std::size_t(grains[k])];
+  return count;
+}
+
+void PairDembarkGranular::unpack_forward_comm(int count, int first, double* buffer) { std::copy_n(buffer, count, masses_.begin() + first); }
+
+double PairDembarkGranular::mass(int i) const { return atom->mask[i] & freeze_bit_ ? INFINITY : masses()[i]; }
 
 ContactBodies PairDembarkGranular::bodies(int i, int j) const {
   return dembark_family::grain_pair(*atom, i, j, vector(atom->x[i]) - vector(atom->x[j]), mass(i), mass(j));
@@ -150,6 +242,11 @@ void PairDembarkGranular::tally(int i, int j, const ContactBodies& b, const Cont
 void PairDembarkGranular::compute(int eflag, int vflag) {
   ev_init(eflag, vflag);
   if (history_->nlocal_neigh != atom->nlocal) error->one(FLERR, "dembark: LAMMPS's fix NEIGH_HISTORY is not what it was");
+  if (neighbor->ago == 0) {
+    check_radii();
+    if (!rigid_.empty()) take_body_masses();
+  }
+  if (grains_grow_) watch_growth();
   // The forces of the set-up are those of the present state, which stays.
   const bool advance = !update->setupflag;
   if (advance && packed_) {
@@ -162,7 +259,7 @@ void PairDembarkGranular::compute(int eflag, int vflag) {
         const ContactForce out = contact_step(coefficients_(atom->type[i], atom->type[j]), b, update->dt, state, true);
         if (out.interacting) tally(i, j, b, out);
       });
-    packs_.step(*list, *history_);
+    packs_.step(*list, *history_, masses());
     return;
   }
   double **const f = atom->f, **const torque = atom->torque;

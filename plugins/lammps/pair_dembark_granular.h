@@ -6,8 +6,10 @@
 #ifndef DEMBARK_PAIR_DEMBARK_GRANULAR_H
 #define DEMBARK_PAIR_DEMBARK_GRANULAR_H
 
+#include <string>
 #include <vector>
 
+#include "atom.h"
 #include "pair.h"
 
 #include "contact_coefficients.h"
@@ -28,10 +30,12 @@ class PairDembarkGranular : public Pair {
   void compute(int eflag, int vflag) override;
   double single(int i, int j, int itype, int jtype, double rsq, double factor_coul, double factor_lj, double& fforce) override;
   void transfer_history(double* from, double* to, int, int) override;
+  int pack_forward_comm(int count, int* grains, double* buffer, int, int*) override;
+  void unpack_forward_comm(int count, int first, double* buffer) override;
 
   const dembark_lammps::ContactCoefficients& coefficients() const { return coefficients_; }
   const dembark_lammps::NeighborHistory& history() const { return *history_; }
-  /// kg; infinite for an atom of fix freeze.
+  /// kg, of a grain or its rigid body; infinite for an atom of fix freeze.
   double mass(int i) const;
   /// m, of all grains, those that fixes will insert included.
   double largest_radius() const;
@@ -42,18 +46,31 @@ class PairDembarkGranular : public Pair {
   dembark_lammps::PackedContacts packs_;
   bool packed_ = false;  // packs know the law
   class FixCapillaryLiquid* liquid_ = nullptr;
+  std::string history_name_;  // begins the name of the fix
   dembark_lammps::NeighborHistory* history_ = nullptr;
   dembark::HistoryLayout layout_;
   dembark_lammps::EnergyTally* tally_ = nullptr;
   int freeze_bit_ = 0;
-  std::vector<double> largest_radius_;  // m, of each type
+  std::vector<double> largest_radius_;  // m, of each type, for which lists are made
+  bool grains_grow_ = false;            // during a run
+  struct Listed {
+    dembark::Vec3<double> place;
+    double radius;
+  };
+  std::vector<class Fix*> rigid_;
+  std::vector<double> masses_;  // kg, of grains, or of the rigid bodies that they belong to, when there are such
+  std::vector<Listed> listed_;  // of own grains that grow, when the lists were made
 
-  std::string history_id() const;
   dembark::ContactBodies bodies(int i, int j) const;
   template <class Visit>
   void each_contact(Visit visit);
   void tally(int i, int j, const dembark::ContactBodies& bodies, const dembark::ContactForce& out);
+  const double* masses() const { return rigid_.empty() ? atom->rmass : masses_.data(); }
+  void take_body_masses();
+  void check_run();
   void find_radii();
+  void check_radii();
+  void watch_growth();
 };
 
 }  // namespace LAMMPS_NS

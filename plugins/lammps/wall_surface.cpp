@@ -31,8 +31,6 @@ void RegionSurface::find() {
   if (!region_) throw std::invalid_argument("there is no region " + id_);
 }
 
-int RegionSurface::slots() const { return region_->tmax; }
-
 void RegionSurface::prepare(double, const dembark::PrescribedMotion* motion) {
   find();
   if (region_->dynamic_check() && motion)

@@ -31,8 +31,6 @@ class WallSurface : protected LAMMPS_NS::Pointers {
  public:
   explicit WallSurface(LAMMPS_NS::LAMMPS* lmp) : Pointers(lmp) {}
 
-  /// The most contacts that a sphere can have.
-  virtual int slots() const = 0;
   /// Before a run; `reach`: m, from a sphere's centre to whatever can act on it; `motion`: of the whole surface, or nullptr.
   virtual void prepare(double reach, const dembark::PrescribedMotion* motion) = 0;
   virtual void begin_step() {}
@@ -56,7 +54,6 @@ class WallSurface : protected LAMMPS_NS::Pointers {
 class RegionSurface : public WallSurface {
  public:
   RegionSurface(LAMMPS_NS::LAMMPS* lmp, const std::string& id);
-  int slots() const override;
   void prepare(double reach, const dembark::PrescribedMotion* motion) override;
   void begin_step() override;
   const std::vector<WallContact>& contacts(const dembark::Vec3<double>& centre, double radius, double reach) override;
@@ -76,7 +73,6 @@ class RegionSurface : public WallSurface {
 class TriangleSurface : public WallSurface {
  public:
   TriangleSurface(LAMMPS_NS::LAMMPS* lmp, const std::string& file);
-  int slots() const override { return 8; }
   void prepare(double reach, const dembark::PrescribedMotion* motion) override;
   const std::vector<WallContact>& contacts(const dembark::Vec3<double>& centre, double radius, double reach) override;
   bool goes_on(int before, const WallContact& now, const dembark::Vec3<double>& centre, double radius) const override;

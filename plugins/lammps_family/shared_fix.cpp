@@ -26,7 +26,7 @@ void SharedFix::only_one() const {
 }
 
 void SharedFix::only_verlet() const {
-  if (std::strcmp(update->integrate_style, "verlet") != 0) fail("only run_style verlet is supported");
+  if (!is_verlet(*update)) fail("only run_style verlet is supported");
 }
 
 void SharedFix::write_part(FILE* file, const std::vector<std::pair<const void*, std::size_t>>& pieces) {

@@ -40,6 +40,12 @@ inline dembark::ContactBodies grain_pair(const LAMMPS_NS::Atom& atom, int i, int
   return b;
 }
 
+/// J, kg, m and s are the engine's units, or those of a system like theirs.
+inline bool has_coherent_units(const LAMMPS_NS::Force& force) { return force.ftm2v == 1.0 && force.mvv2e == 1.0; }
+
+/// Steps have one length. Accelerators have their own names behind `verlet`.
+inline bool is_verlet(const LAMMPS_NS::Update& update) { return std::string(update.integrate_style).rfind("verlet", 0) == 0; }
+
 class SharedFix : public dembark_engine::EngineFix {
  public:
   using EngineFix::EngineFix;
@@ -53,8 +59,7 @@ class SharedFix : public dembark_engine::EngineFix {
   Fix* fix_of_style(const char* style) const;
   void only_one() const;
   void only_verlet() const;
-  /// J, kg, m and s are the engine's units, or those of a system like theirs.
-  bool has_coherent_units() const { return force->ftm2v == 1.0 && force->mvv2e == 1.0; }
+  bool has_coherent_units() const { return dembark_family::has_coherent_units(*force); }
 
   /// What `work` returns; what it throws ends the run with its line.
   template <class Work>

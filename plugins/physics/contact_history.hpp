@@ -31,6 +31,9 @@ struct HistoryLayout {
   bool bridge = false, rings = false, rolling = false;
   bool imbalance = false;  ///< of carried liquid (capillary/liquid.hpp), which load() and store() leave alone
 
+  /// Another number for each layout.
+  int code() const { return bridge + 2 * rings + 4 * rolling + 8 * imbalance; }
+
   int bridge_at() const { return 5; }
   int rings_at() const { return bridge_at() + (bridge ? 2 : 0); }
   int rolling_at() const { return rings_at() + (rings ? ring_numbers : 0); }
