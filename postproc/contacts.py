@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.dumps.frames import Array, ColumnsError, RawFrame, integers, less_edges, numbered, take
+from dembark.postproc.dumps.frames import NO_FLAGS, Array, ColumnsError, RawFrame, integers, less_edges, numbered, take
 from dembark.postproc.dumps.opening import Trajectory, open_dump
 from dembark.postproc.dumps.typed import TypedDump
+from dembark.postproc.dumps.units import KEPT_UNITS, unit_style
 
 Column = int | str | Sequence[int | str]
 
@@ -18,6 +20,7 @@ _WIDTHS = {"first": 3, "second": 3, "branch": 3, "ids": 2, "forces": 3}
 # What dembark's decks write: x1 y1 z1 x2 y2 z2 id1 id2 periodic fx fy fz, whatever the header calls them.
 _DECK: Mapping[str, Column] = {"first": (1, 2, 3), "second": (4, 5, 6), "ids": (7, 8), "forces": (10, 11, 12)}
 _DECK_COLUMNS = 12
+_NUMBERED = re.compile(r"\w+\[(\d+)\]")
 # What local/gran/vtk writes.
 _LINES: Mapping[str, Column] = {
     "first": ("x1", "y1", "z1"),
@@ -53,7 +56,8 @@ class ContactsDump(TypedDump[ContactFrame]):
     """Contacts as a sequence of ContactFrame, read one at a time."""
 
     def __init__(
-        self, path: Trajectory, *, skip_truncated: bool = False, stream: bool = False, columns: Mapping[str, Column] | None = None
+        self, path: Trajectory, *, skip_truncated: bool = False, stream: bool = False, columns: Mapping[str, Column] | None = None,
+        units: str = "",
     ) -> None:
         """Open; DumpError for a missing, foreign or truncated file (see open_dump).
 
@@ -61,9 +65,9 @@ class ContactsDump(TypedDump[ContactFrame]):
         says which column, by its number from 1 or its name, is what: `first`, `second` (position of grain 2; or `branch`), `forces`,
         `ids`, and under any other name what is to be in `extra`, (m,) or (m, k). For `compute ... pair/gran/local pos id force`, all
         dumped in order, that is {"first": (1, 2, 3), "second": (4, 5, 6), "ids": (7, 8), "forces": (10, 11, 12)}. Columns without a
-        name given are in `extra` under that of the dump.
+        name given are in `extra` under that of the dump. `units` is the unit style of a dump that does not name it.
         """
-        super().__init__(open_dump(path, skip_truncated, stream=stream))
+        super().__init__(open_dump(path, skip_truncated, stream=stream, units=units))
         self._columns = columns
         if columns is not None:
             lacking = [name for name in ("first", "forces", "ids") if name not in columns]
@@ -72,22 +76,38 @@ class ContactsDump(TypedDump[ContactFrame]):
 
     def _frame(self, raw: RawFrame) -> ContactFrame:
         where = f"{self.path}, step {raw.step}"
+        if not raw.flagged:
+            self._say(raw.step, NO_FLAGS)
+        if not raw.columns and not len(raw.values):
+            # A file without contacts that names no columns.
+            nothing = np.empty((0, 3))
+            return ContactFrame(raw.step, nothing, nothing, nothing, np.empty((0, 2), np.int64))
         given = _schema(raw, where) if self._columns is None else self._columns
         index = {name: _indices(raw, name, column, where) for name, column in given.items()}
         parts = {name: take(raw.values, columns) for name, columns in index.items()}
         used = {column for columns in index.values() for column in columns} | (_DECK_LEFT_OUT if given is _DECK else set())
         extra = {name: take(raw.values, [column]) for column, name in enumerate(raw.columns) if column not in used}
-        branch = parts["branch"] if "branch" in parts else less_edges(parts["second"] - parts["first"], raw, np.round)
+        branch = parts["branch"] if "branch" in parts else less_edges(parts["second"] - parts["first"], raw)
         extra |= {name: values for name, values in parts.items() if name not in _WIDTHS}
-        return ContactFrame(raw.step, parts["first"], branch, parts["forces"], integers(parts["ids"], f"{where}: ids"), extra)
+        style = unit_style(raw.units, where)
+        factors = {name: style.factor(name) for name in extra}
+        if style != unit_style("si", where):
+            if kept := [name for name, factor in factors.items() if factor is None]:
+                self._say(raw.step, KEPT_UNITS.format(", ".join(kept), raw.units))
+            extra = {name: values * (factors[name] or 1.0) for name, values in extra.items()}
+        return ContactFrame(raw.step, style.length * parts["first"], style.length * branch, style.force * parts["forces"],
+                            integers(parts["ids"], f"{where}: ids"), extra)
 
 
 def _schema(raw: RawFrame, where: str) -> Mapping[str, Column]:
     if {"id1", "id2", "x1", "x2", "force[1]"} <= set(raw.columns):
         return _LINES
+    advice = "say by columns= which are first, second, ids, forces"
     if len(raw.columns) != _DECK_COLUMNS:
-        advice = "say by columns= which are first, second, ids, forces"
         raise ContactColumnsError(f"{where}: has {len(raw.columns)} columns instead of {_DECK_COLUMNS}; {advice}")
+    numbers = [int(match.group(1)) for name in raw.columns if (match := _NUMBERED.fullmatch(name))]
+    if sorted(numbers) == list(range(1, _DECK_COLUMNS + 1)) != numbers:
+        raise ContactColumnsError(f"{where}: the numbers of its {_DECK_COLUMNS} columns are not in their order; {advice}")
     return _DECK
 
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.dumps.frames import Array, DumpError, RawFrame, cell, integers, less_edges, numbered, take
+from dembark.postproc.dumps.frames import NO_FLAGS, Array, DumpError, RawFrame, cell, folded, integers, numbered, take
 from dembark.postproc.dumps.opening import Trajectory, open_dump
 from dembark.postproc.dumps.typed import TypedDump
+from dembark.postproc.dumps.units import KEPT_UNITS, in_si
 from dembark.postproc.spheres import volume
 
 Column = TypeVar("Column")
@@ -21,6 +23,9 @@ _VECTORS = ("vx", "vy", "vz"), ("omegax", "omegay", "omegaz"), ("fx", "fy", "fz"
 _WRAPPED, _UNWRAPPED, _IMAGES = ("x", "y", "z"), ("xu", "yu", "zu"), ("ix", "iy", "iz")
 _SCALED, _SCALED_UNWRAPPED = ("xs", "ys", "zs"), ("xsu", "ysu", "zsu")
 _WALL = re.compile(r"f_force_(\w+)\[([123])\]")
+# Columns of a frame without grains whose file names none.
+_EVERY = ("id", "type", *_WRAPPED, *(name for names in _VECTORS for name in names), "radius", "mass")
+_SHAPE = ("shape", "blockiness", "c_shape")  # columns of superquadrics and ellipsoids
 
 
 class AbsentColumnError(DumpError, AttributeError):
@@ -54,7 +59,8 @@ class _Held(Generic[Column]):
 class GrainFrame:
     """All n grains at one step, sorted by id; SI units.
 
-    `positions` (m) are unwrapped where the dump has image flags, `wrapped` are those inside the box; `velocities` (m/s),
+    `time` (s) is what the dump says by `ITEM: TIME`, or None. `positions` (m) are unwrapped where the dump has image flags, `wrapped` are
+    those inside the box; `velocities` (m/s),
     `omegas` (rad/s), `forces` (N, all contacts and gravity) are (n, 3); `radii` (m), `masses` (kg), `ids`, `types` are (n,);
     `wall_forces[name]` (n, 3) is the force of that wall on each grain (N). `low`, `high` (m) and `periodic` describe the box, which
     `tilt` = (xy, xz, yz) (m) shears: its edges are (Lx, 0, 0), (xy, Ly, 0), (xz, yz, Lz). `extra` holds every other column (n,) by
@@ -79,9 +85,14 @@ class GrainFrame:
     tilt: Array = field(default_factory=lambda: np.zeros(3))
     extra: Mapping[str, Array] = field(default_factory=dict)
     where: str = ""
+    time: float | None = None
 
     def __repr__(self) -> str:
         return f"GrainFrame(step={self.step}, {len(self.ids)} grains)"
+
+    def time_by(self, time_step: float) -> float:
+        """The time (s) of the frame, by its step and `time_step` (s) where the dump has none."""
+        return self.step * time_step if self.time is None else self.time
 
     def has(self, name: str) -> bool:
         """Whether the dump held `name`: velocities, omegas, forces or types."""
@@ -130,7 +141,10 @@ class _Table:
         return integers(self(name), f"{self.where}: column {name}")
 
 
-def _positions(table: _Table) -> tuple[Array, Array]:
+Say = Callable[[str], object]
+
+
+def _positions(table: _Table, say: Say) -> tuple[Array, Array]:
     """Unwrapped positions, and those inside the box."""
     raw = table.raw
     edges = cell(raw.low, raw.high, raw.tilt)
@@ -147,36 +161,61 @@ def _positions(table: _Table) -> tuple[Array, Array]:
     if wrapped is None:
         if unwrapped is None:
             raise DumpError(f"{table.where}: column x, y, z is missing, and so are xu, xs and xsu; there are {' '.join(raw.columns)}")
-        wrapped = raw.low + less_edges(unwrapped - raw.low, raw, np.floor)
+        wrapped = folded(unwrapped, raw.low, raw.high, raw.tilt, raw.periodic)
     elif unwrapped is None:
-        unwrapped = wrapped + table(*_IMAGES) @ np.where(raw.periodic[:, None], edges, 0.0) if table.has(_IMAGES) else wrapped.copy()
+        unwrapped = wrapped + _images(table, say) @ edges if table.has(_IMAGES) else wrapped.copy()
     table.taken.update(_IMAGES)
     return unwrapped, wrapped
 
 
-def _masses(table: _Table, radii: Array, density: float | None) -> Array:
-    if density is not None:
-        table.taken.add("mass")
-        return density * volume(radii)
-    if table.has(["mass"]):
-        return table("mass")
-    if table.has(["density"]):
-        return table("density") * volume(radii)
-    raise DumpError(f"{table.where}: column mass is missing; give density= (kg/m^3), or dump mass")
+def _images(table: _Table, say: Say) -> Array:
+    """How many periods each grain has gone along each axis. Where the file does not say which axes are periodic, those that have such
+    numbers are."""
+    images, raw = table(*_IMAGES), table.raw
+    unused = [axis for axis in range(3) if raw.flagged and not raw.periodic[axis] and images[:, axis].any()]
+    if unused:
+        say(f"image flags along {', '.join('xyz'[axis] for axis in unused)}, not periodic, are not used")
+        images[:, unused] = 0.0
+    return images
 
 
-def grain_frame(raw: RawFrame, where: str, density: float | None = None) -> GrainFrame:
-    """The grains of a raw frame; `density` (kg/m^3) makes the masses of solid spheres. `where` begins the messages of DumpError."""
-    if raw.units not in ("", "si"):
-        raise DumpError(f"{where}: its units are {raw.units}, but they must be si")
+def _masses(table: _Table, radii: Array, density: float | None, say: Say) -> Array:
+    held = [name for name in ("mass", "density") if table.has([name])]
+    if held and density is not None:
+        say(f"the given density is not used, for the dump has a column {held[0]}")
+    if held:
+        return table("mass") if held[0] == "mass" else table("density") * volume(radii)
+    if density is None:
+        raise DumpError(f"{table.where}: column mass is missing; give density= (kg/m^3), or dump mass")
+    if table.has(["type"]) and len(kinds := np.unique(table("type"))) > 1:
+        say(f"all grains have the given density, though there are {len(kinds)} types")
+    return density * volume(radii)
+
+
+def grain_frame(raw: RawFrame, where: str, density: float | None = None, say: Say = str) -> GrainFrame:
+    """The grains of a raw frame; `density` (kg/m^3) makes the masses of solid spheres where there are none. `where` begins the messages of
+    DumpError; `say` takes lines about what is odd."""
+    units = raw.units
+    if not raw.flagged:
+        say(NO_FLAGS)
+    raw, kept = in_si(raw, where)
+    if kept:
+        say(KEPT_UNITS.format(", ".join(kept), units))
+    if any(name.startswith(_SHAPE) for name in raw.columns):
+        say("grains are taken as spheres of their radius, though the dump has columns of a shape")
+    if not raw.columns and not len(raw.values):
+        raw = replace(raw, columns=_EVERY, values=np.empty((0, len(_EVERY))))
     table = _Table(raw, where)
     if not table.has(["radius"]) and table.has(["diameter"]):
         radii = 0.5 * table("diameter")
     else:
         radii = table("radius")
     walls = dict.fromkeys(match.group(1) for name in raw.columns if (match := _WALL.fullmatch(name)) and table.has(_wall(match.group(1))))
-    positions, wrapped = _positions(table)
-    masses, wall_forces = _masses(table, radii, density), {wall: table(*_wall(wall)) for wall in walls}
+    positions, wrapped = _positions(table, say)
+    masses, wall_forces = _masses(table, radii, density, say), {wall: table(*_wall(wall)) for wall in walls}
+    for name, values in (("radius", radii), ("mass", masses)):
+        if values.min(initial=0.0) < 0.0:
+            raise DumpError(f"{where}: grain {table.ids[values.argmin()]} has a {name} of {values.min():.9g}, which cannot be negative")
     types = table.integers("type") if table.has(["type"]) else None
     velocities, omegas, forces = (table(*names) if table.has(names) else None for names in _VECTORS)
     # Last: what none of the others has taken.
@@ -184,7 +223,7 @@ def grain_frame(raw: RawFrame, where: str, density: float | None = None) -> Grai
     return GrainFrame(
         step=raw.step, low=raw.low, high=raw.high, periodic=raw.periodic, tilt=raw.tilt, ids=table.ids, types=types, positions=positions,
         wrapped=wrapped, velocities=velocities, omegas=omegas, forces=forces, radii=radii, masses=masses, wall_forces=wall_forces,
-        extra=extra, where=where,
+        extra=extra, where=where, time=raw.time,
     )
 
 
@@ -203,12 +242,14 @@ class GrainsDump(TypedDump[GrainFrame]):
         stream: bool = False,
         columns: Sequence[str] | None = None,
         density: float | None = None,
+        units: str = "",
     ) -> None:
         """Open; DumpError for a missing, foreign or truncated file (see open_dump).
 
-        `density` (kg/m^3) is that of solid grains where the dump has no masses, `columns` are those of a binary dump.
+        `density` (kg/m^3) is that of solid grains where the dump has no masses, `columns` are those of a binary dump, `units` is the unit
+        style of a dump that does not name it.
         """
-        super().__init__(open_dump(path, skip_truncated, stream=stream, columns=columns))
+        super().__init__(open_dump(path, skip_truncated, stream=stream, columns=columns, units=units))
         self._density = density
 
     def raw(self, number: int, columns: Sequence[str]) -> RawFrame:
@@ -216,4 +257,4 @@ class GrainsDump(TypedDump[GrainFrame]):
         return self._dump.frame(number, columns)
 
     def _frame(self, raw: RawFrame) -> GrainFrame:
-        return grain_frame(raw, f"{self.path}, step {raw.step}", self._density)
+        return grain_frame(raw, f"{self.path}, step {raw.step}", self._density, partial(self._say, raw.step))

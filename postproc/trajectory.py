@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from dembark.postproc.dumps.frames import Array, DumpError, cell
 from dembark.postproc.grains import GrainFrame, GrainsDump
 
-_KEPT = ("columns", "density", "skip_truncated", "varying")
+_KEPT = ("columns", "density", "skip_truncated", "units", "varying")
 
 
 class _Grains:
@@ -112,15 +112,18 @@ class GrainsReader(ReaderBase):
 
     @store_init_arguments
     def __init__(self, filename: str | Path, time_step: float = 1.0, wrapped: bool = False, **kwargs: Any) -> None:
-        """`time_step` (s) of the simulation turns steps into `ts.time`; `wrapped` asks for the positions inside the box.
+        """`time_step` (s) of the simulation turns steps into `ts.time` where the dump has no times of its own; `wrapped` asks for the
+        positions inside the box.
 
-        Further: `columns`, `density`, `skip_truncated` of GrainsDump; `varying` says that grains come and go though their number stays.
+        Further: `columns`, `density`, `skip_truncated`, `units` of GrainsDump; `varying` says that grains come and go though their number
+        stays.
         """
         self._grains = _take(filename, kwargs)
-        steps = self._grains.dump.steps
-        kwargs.setdefault("dt", float(steps[1] - steps[0]) * time_step if len(steps) > 1 else time_step)
+        steps, times = self._grains.dump.steps, self._grains.dump.times
+        self._times = times if np.isfinite(times).all() else steps * time_step
+        kwargs.setdefault("dt", float(self._times[1] - self._times[0]) if len(steps) > 1 else time_step)
         super().__init__(filename, **{name: value for name, value in kwargs.items() if name not in _KEPT})
-        self._time_step, self._wrapped = time_step, wrapped
+        self._wrapped = wrapped
         self._ids = self._grains.roster["ids"]
         self.n_atoms = len(self._ids)
         self.n_frames = len(steps)
@@ -145,7 +148,7 @@ class GrainsReader(ReaderBase):
         edges = cell(grains.low, grains.high, grains.tilt)
         ts.dimensions = triclinic_box(*edges) if grains.tilt.any() else [*np.diag(edges), 90.0, 90.0, 90.0]
         ts.data["step"] = grains.step
-        ts.data["time"] = grains.step * self._time_step
+        ts.data["time"] = float(self._times[frame])
         ts.data["frame"] = grains
         ts.data["present"] = present
         return ts

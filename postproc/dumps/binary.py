@@ -17,6 +17,8 @@ from dembark.postproc.dumps.source import Handle, Source
 _START, _TILT, _END = struct.Struct("=qqi6i6d"), struct.Struct("=3d"), struct.Struct("=2i")
 _BLOCK = struct.Struct("=i")
 _FACES = range(4)
+# Newer versions of LAMMPS begin with a name and its length, negative.
+_OF_LAMMPS = (b"DUMPCUSTOM", b"DUMPATOM")
 
 
 @dataclass(frozen=True)
@@ -32,9 +34,13 @@ class _Header:
 class BinaryDump(Dump):
     """The frames of a binary dump; see Dump. It holds numbers only: `columns` names them in the order of the deck's `dump` command."""
 
-    def __init__(self, path: str | Path, *, columns: Sequence[str] | None, skip_truncated: bool = False, stream: bool = False) -> None:
+    def __init__(
+        self, path: str | Path, *, columns: Sequence[str] | None, skip_truncated: bool = False, stream: bool = False, units: str = ""
+    ) -> None:
         """Open; DumpError for a missing, foreign or truncated file, or when the columns are not as many as are in it."""
         self._source = Source(Path(path))
+        if any(self._source.begins_with(struct.pack("=q", -len(name)) + name) for name in _OF_LAMMPS):
+            raise DumpError(f"{path} is a binary dump of LAMMPS, of which only text dumps are read")
         try:
             with self._source.at(0) as handle:
                 head = self._header(handle)
@@ -46,7 +52,7 @@ class BinaryDump(Dump):
             advice = "give columns=, the words of the deck's dump command"
             raise ColumnsError(f"{path} is binary and does not name its {head.width} columns; {advice}")
         self._columns = tuple(columns)
-        super().__init__(Path(path), skip_truncated=skip_truncated, stream=stream)
+        super().__init__(Path(path), skip_truncated=skip_truncated, stream=stream, units=units)
 
     def _words(self, handle: Handle, form: struct.Struct) -> tuple[Any, ...] | None:
         room = bytearray(form.size)

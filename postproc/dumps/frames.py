@@ -5,8 +5,8 @@ from __future__ import annotations
 import itertools
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 HINT = "skip_truncated=True leaves it out"
+NO_FLAGS = "the file does not say which axes are periodic (ITEM: BOX BOUNDS pp pp ff); none is taken to be"
 
 
 class DumpError(ValueError):
@@ -49,8 +50,9 @@ class RawFrame:
     """One frame: `step`, the box in the file's length unit, column names and `values` (rows, columns).
 
     `low`, `high` (3,) are the corners of the box before it is tilted by `tilt` = (xy, xz, yz): its edges are (Lx, 0, 0), (xy, Ly, 0)
-    and (xz, yz, Lz) with L = high - low. `periodic` (3,) holds the flags of its axes. `time` and `units` are what the file says, or
-    None and "". Columns named `element` hold words that say what `type` says; they are left out.
+    and (xz, yz, Lz) with L = high - low. `periodic` (3,) holds the flags of its axes, all false where the file has none (`flagged`).
+    `time`, in the file's unit, is what the frame says, or None; `units` are those of the file (or of its series), or "". Columns named
+    `element` or `typelabel` hold words that say what `type` says; they are left out.
     """
 
     step: int
@@ -62,13 +64,15 @@ class RawFrame:
     tilt: Array = field(default_factory=lambda: np.zeros(3))
     time: float | None = None
     units: str = ""
+    flagged: bool = True
 
 
 @dataclass(frozen=True)
 class Entry:
     """A frame in the index: its first byte and line, its length in bytes, which it is in the file (from 1), its step and rows.
 
-    `fault` says what is wrong with it, or "". `file` counts the files of a series.
+    `fault` says what is wrong with it, or "". `file` counts the files of a series. `time` and `units` are what its header says, or None
+    and "".
     """
 
     place: int
@@ -79,6 +83,8 @@ class Entry:
     count: int
     fault: str = ""
     file: int = 0
+    time: float | None = None
+    units: str = ""
 
 
 def kept_entries(entries: Sequence[Entry]) -> tuple[list[Entry], str]:
@@ -86,7 +92,7 @@ def kept_entries(entries: Sequence[Entry]) -> tuple[list[Entry], str]:
     back = [other for one, other in itertools.pairwise(entries) if other.step <= one.step]
     if not back:
         return list(entries), ""
-    kept = {entry.step: entry for entry in sorted(entries, key=lambda entry: (entry.step, entry.number))}
+    kept = {entry.step: entry for entry in sorted(entries, key=lambda entry: (entry.step, entry.file, entry.number))}
     dropped = len(entries) - len(kept)
     said = f"steps go back in frame {back[0].number}; frames were put in the order of their steps"
     if dropped:
@@ -101,12 +107,15 @@ class Dump(ABC):
     frame that was cut off is refused, or left out with `skip_truncated=True`; `truncated` then says so in one line. `remarks` holds all
     such lines. With `stream=True` nothing is searched beforehand: iterating yields the first frame at once and refuses steps that go
     back; whatever else is asked for makes the index then.
+
+    `ITEM: UNITS` stands once in a file, or once in a series of files, and holds for all frames; `units` are those of a file without it.
     """
 
-    def __init__(self, path: Path, *, skip_truncated: bool, stream: bool) -> None:
+    def __init__(self, path: Path, *, skip_truncated: bool, stream: bool, units: str = "") -> None:
         """Make the index unless `stream`."""
         self.path = path
         self.skip_truncated = skip_truncated
+        self._given = self._units = units
         self.truncated = ""
         self.remarks: tuple[str, ...] = ()
         self._index: list[Entry] | None = None
@@ -120,16 +129,39 @@ class Dump(ABC):
     def _search(self) -> list[Entry]:
         """The frames to be read; sets what is said about the others."""
         found = list(self._find())
+        self._units = self._agreed_units(found)
         again = {entry.step for entry in found if not entry.fault}
         faulty = [entry for entry in found if entry.fault and entry.step not in again]
         self.truncated, self.remarks = "", ()
         for entry in faulty:
             self._cut_off(f"{self._where(entry)}: {entry.fault}")
         kept, said = kept_entries([entry for entry in found if not entry.fault])
+        self._check_times(found, kept)
         if said:
             self.remarks += (f"{self.path}: {said}",)
             warnings.warn(self.remarks[-1], DumpWarning, stacklevel=3)
+        if 0 < (without := sum(entry.time is None for entry in kept)) < len(kept):
+            self.remarks += (f"{self.path}: {without} of {len(kept)} frames have no ITEM: TIME",)
+            warnings.warn(self.remarks[-1], DumpWarning, stacklevel=3)
         return kept
+
+    def _agreed_units(self, found: Sequence[Entry]) -> str:
+        """The units of all frames; DumpError when two of them name different ones, or others than were given."""
+        named = [entry for entry in found if entry.units]
+        units, source = (self._given, "the option units") if self._given or not named else (named[0].units, self._where(named[0]))
+        for entry in named:
+            if entry.units != units:
+                raise DumpError(f"{self._where(entry)}: its units are {entry.units}, but {source} says {units}; all frames have the same")
+        return units
+
+    def _check_times(self, found: Sequence[Entry], kept: Sequence[Entry]) -> None:
+        """DumpError when times do not go with steps."""
+        for order in (found, kept):
+            timed = [(entry, entry.time) for entry in order if entry.time is not None and not entry.fault]
+            for (one, before), (other, time) in itertools.pairwise(timed):
+                if (other.step - one.step) * (time - before) < 0.0:
+                    raise DumpError(f"{self._where(other)}: its step is {other.step} at time {time:.9g}, after step {one.step} at time "
+                                    f"{before:.9g}; write what follows a reset of the steps into a file of its own")
 
     def _where(self, entry: Entry) -> str:
         return f"{self.path}, frame {entry.number}"
@@ -154,6 +186,17 @@ class Dump(ABC):
         return np.array([entry.step for entry in self._entries], np.int64)
 
     @property
+    def times(self) -> Array:
+        """The time of every frame in the unit of the file, NaN where it has none."""
+        return np.array([np.nan if entry.time is None else entry.time for entry in self._entries])
+
+    @property
+    def units(self) -> str:
+        """The unit style that the file names, or that was given, or ""."""
+        _ = self._entries
+        return self._units
+
+    @property
     def counts(self) -> NDArray[np.int64]:
         """The number of rows of every frame; only VTK files are read for it."""
         return np.array([entry.count if entry.count >= 0 else len(self._read(entry, None).values) for entry in self._entries], np.int64)
@@ -172,14 +215,23 @@ class Dump(ABC):
         """Frame `number` (from 0) with all columns, or only with these; DumpError when it is not whole, IndexError when there is none."""
         if not 0 <= number < len(self._entries):
             raise IndexError(number)
-        return self._read(self._entries[number], columns)
+        entry = self._entries[number]
+        return replace(self._read(entry, columns), units=self._units)
 
     def _forward(self) -> Iterator[RawFrame]:
         last: RawFrame | None = None
+        units = self._given
         for number, frame in enumerate(self._stream(), 1):
+            where = f"{self.path}, frame {number}"
             if last is not None and frame.step <= last.step:
-                raise DumpError(f"{self.path}, frame {number}: step {frame.step} comes after step {last.step}; open it without stream=True")
-            yield frame
+                raise DumpError(f"{where}: step {frame.step} comes after step {last.step}; open it without stream=True")
+            units = units or (frame.units if last is None else "")
+            if last is not None and frame.time is not None and last.time is not None and frame.time < last.time:
+                raise DumpError(f"{where}: time {frame.time:.9g} comes after time {last.time:.9g}, though the step is later")
+            if frame.units not in ("", units):
+                raise DumpError(f"{where}: its units are {frame.units}, but those before are {units or 'not named'}; "
+                                "open it without stream=True")
+            yield replace(frame, units=units)
             last = frame
 
     @abstractmethod
@@ -215,10 +267,23 @@ def take(values: Array, columns: Sequence[int]) -> Array:
 
 
 def integers(values: Array, where: str) -> NDArray[np.int64]:
-    """Whole numbers that were read as doubles; DumpError, begun by `where`, beyond 2^53, where doubles do not tell all of them apart."""
-    if values.size and np.abs(values).max() > 2.0**53:
+    """Integers that were read as doubles; DumpError, begun by `where`, for fractions, for numbers beyond 2^53, where doubles do not tell
+    all integers apart, and for those that were written with six digits."""
+    if not values.size:
+        return values.astype(np.int64)
+    largest = np.abs(values).max()
+    if largest > 2.0**53:
         raise DumpError(f"{where} holds numbers beyond 2^53, which double precision does not tell apart")
-    return values.astype(np.int64)
+    whole = values.astype(np.int64)
+    if not np.array_equal(whole, values):
+        wrong = values[whole != values][0]
+        raise DumpError(f"{where} holds {wrong:.9g}, which is no integer")
+    if largest >= 1e6:
+        # %g, the format of `dump local` by default, makes 1234567 to 1.23457e+06.
+        large = whole[np.abs(whole) >= 1e6]
+        if len(large) > 2 and not (large % 10).any():
+            raise DumpError(f"{where} holds large numbers that all end in 0: they were rounded to six digits; set the format of the dump")
+    return whole
 
 
 def cell(low: Array, high: Array, tilt: Array) -> Array:
@@ -235,10 +300,22 @@ def before_tilt(low: Array, high: Array, tilt: Array) -> tuple[Array, Array]:
     return low - np.array(least), high - np.array(most)
 
 
-def less_edges(vectors: Array, raw: RawFrame, whole: Callable[[Array], Array]) -> Array:
-    """The vectors (m, 3) less whole edges of the box along its periodic axes: as many as `whole` makes of their components along them."""
+def less_edges(vectors: Array, raw: RawFrame) -> Array:
+    """The vectors (m, 3) less whole edges of the box along its periodic axes: between nearest images."""
     edges, result = cell(raw.low, raw.high, raw.tilt), vectors.copy()
     for axis in (2, 1, 0):
         if raw.periodic[axis]:
-            result -= whole(result[:, axis] / edges[axis, axis])[:, None] * edges[axis]
+            result -= np.round(result[:, axis] / edges[axis, axis])[:, None] * edges[axis]
     return result
+
+
+def folded(places: Array, low: Array, high: Array, tilt: Array, periodic: NDArray[np.bool_]) -> Array:
+    """The places (n, 3) moved by whole edges of its periodic axes into the box, which may be tilted."""
+    if not periodic.any():
+        return places
+    edges = cell(low, high, tilt)
+    if not tilt.any():
+        lengths = np.where(periodic, high - low, 1.0)
+        return places - np.where(periodic, np.floor((places - low) / lengths), 0.0) * lengths
+    share = np.linalg.solve(edges.T, (places - low).T).T
+    return places - np.where(periodic, np.floor(share), 0.0) @ edges

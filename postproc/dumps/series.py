@@ -5,10 +5,14 @@ from __future__ import annotations
 import glob
 import re
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 
-from dembark.postproc.dumps.frames import CutOffError, Dump, DumpError, Entry, RawFrame
+import numpy as np
+
+from dembark.postproc.dumps.frames import HINT, CutOffError, Dump, DumpError, Entry, RawFrame
 from dembark.postproc.dumps.vtk import BOX
 
 
@@ -37,26 +41,54 @@ class SeriesDump(Dump):
     """The frames of several files as one trajectory; see Dump. `open_one` opens a file without making its index."""
 
     def __init__(
-        self, files: Sequence[Path], open_one: Callable[[Path], Dump], *, skip_truncated: bool = False, stream: bool = False
+        self, files: Sequence[Path], open_one: Callable[[Path], Dump], *, skip_truncated: bool = False, stream: bool = False,
+        units: str = "",
     ) -> None:
         """Open; DumpError for a missing, foreign or truncated file."""
         self._files, self._open_one = files, open_one
-        super().__init__(files[0], skip_truncated=skip_truncated, stream=stream)
+        super().__init__(files[0], skip_truncated=skip_truncated, stream=stream, units=units)
 
     def _where(self, entry: Entry) -> str:
         return f"{self._files[entry.file]}, frame {entry.number}"
 
     def _find(self) -> Iterator[Entry]:
+        files: dict[tuple[int, ...], Path] = {}
         for number, path in enumerate(self._files):
-            one = self._open_one(path)
+            try:
+                one, steps = self._open_one(path), []
+            except CutOffError:
+                yield Entry(0, 1, 0, 1, -1, 0, f"empty ({HINT})", number)
+                continue
             for entry in one._find():
                 # Only by reading it all is it known that a file of VTK is whole.
                 unknown = entry.count < 0 and not entry.fault and number == len(self._files) - 1
+                steps.append(entry.step)
                 yield replace(entry, file=number, fault=_fault(one, entry) if unknown else entry.fault)
+            if steps and files.setdefault(tuple(steps), path) != path:
+                raise DumpError(f"{path} and {files[tuple(steps)]} hold the same steps: they are copies, or parts that different processes "
+                                "wrote (% in the name of the dump), which are not joined; name files of different steps")
 
     def _read(self, entry: Entry, columns: Sequence[str] | None) -> RawFrame:
-        return self._open_one(self._files[entry.file])._read(entry, columns)
+        return self._filled(self._open_one(self._files[entry.file])._read(entry, columns), columns)
 
     def _stream(self) -> Iterator[RawFrame]:
         for path in self._files:
-            yield from self._open_one(path)._stream()
+            for raw in self._open_one(path)._stream():
+                yield self._filled(raw, None)
+
+    def _filled(self, raw: RawFrame, columns: Sequence[str] | None) -> RawFrame:
+        """The frame; one without rows whose file names no columns has those of the others."""
+        if raw.columns or len(raw.values):
+            return raw
+        names = self._columns if columns is None else tuple(columns)
+        return replace(raw, columns=names, values=np.empty((0, len(names))))
+
+    @cached_property
+    def _columns(self) -> tuple[str, ...]:
+        """The columns of the first file that names them; () when none does."""
+        for path in self._files:
+            with suppress(CutOffError):
+                for raw in self._open_one(path)._stream():
+                    if raw.columns:
+                        return raw.columns
+        return ()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import io
 import os
+import re
 import sys
 import weakref
 import zlib
@@ -14,14 +15,17 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.postproc.dumps.frames import DumpError
+from dembark.postproc.dumps.frames import CutOffError, DumpError
 
 Handle = io.FileIO | gzip.GzipFile
 
 _WINDOW = 1 << 22
 # So much text is kept behind the place of reading, to find in it the start of a frame that a restarted run wrote into a cut-off line.
 _BEHIND = 512
-_FRAME = b"ITEM: TIMESTEP"
+_ITEMS = rb"ITEM: (?:UNITS|TIME|TIMESTEP)\r?\n"
+_FRAME = re.compile(rb"(?:" + _ITEMS + rb"[^\n]*\n)*" + _ITEMS)
+_MARK = b"\xef\xbb\xbf"  # of UTF-8, which some editors put first
+_FOREIGN = {b"(\xb5/\xfd": "zstd", b"BZh": "bzip2", b"\xfd7zXZ": "xz", b"PK\x03\x04": "zip"}
 
 
 class Source:
@@ -32,13 +36,16 @@ class Source:
         self.path = path
         try:
             with path.open("rb") as handle:
-                start = handle.read(2)
+                start = handle.read(8)
         except OSError as error:
-            raise DumpError(f"{path} does not exist or is empty" if isinstance(error, FileNotFoundError) else
+            raise DumpError(f"{path} does not exist" if isinstance(error, FileNotFoundError) else
                             f"{path} cannot be read: {error.strerror}") from None
         if not start:
-            raise DumpError(f"{path} does not exist or is empty")
-        self.compressed = start == b"\x1f\x8b"
+            raise CutOffError(f"{path} is empty")
+        for magic, name in _FOREIGN.items():
+            if start.startswith(magic):
+                raise DumpError(f"{path} is compressed by {name}; unpack it first, or compress it by gzip")
+        self.compressed = start.startswith(b"\x1f\x8b")
         self._gzip: gzip.GzipFile | None = None
         self._spare: list[bytearray] = []
 
@@ -46,6 +53,12 @@ class Source:
         """Whether these are its first bytes."""
         with self.at(0) as handle:
             return Window(self, handle, bytearray(len(start) + 1)).peek(len(start)) == start
+
+    def is_text(self) -> bool:
+        """Whether it begins as a text dump does, after lines that say nothing."""
+        with self.at(0) as handle:
+            window = Window(self, handle, bytearray(_BEHIND))
+            return window.pass_blank() and window.peek(6) == b"ITEM: "
 
     @contextmanager
     def window(self, place: int = 0, line: int = 1, size: int | None = None) -> Iterator[Window]:
@@ -142,16 +155,35 @@ class Window:
         self.end += read
         return read > 0
 
-    def line(self) -> bytes | None:
-        """The next whole line without its end, or None when there is none any more."""
+    def _line_end(self) -> int:
+        """Where in `data` the next whole line ends, or -1 when there is none any more."""
         looked = 0
         while (found := self._text.find(b"\n", self.begin + looked, self.end)) < 0:
             looked = self.end - self.begin
             if not self.more():
-                return None
+                return -1
+        return found
+
+    def line(self) -> bytes | None:
+        """The next whole line without its end, or None when there is none any more."""
+        found = self._line_end()
+        if found < 0:
+            return None
         text = bytes(self._text[self.begin : found])
         self.pass_over(found + 1, 1)
         return text.rstrip(b"\r")
+
+    def pass_blank(self) -> bool:
+        """Pass over lines that are empty or begin with #, which some tools put between frames; whether anything follows."""
+        if self.place == 0 and self.peek(len(_MARK)) == _MARK:
+            self.begin += len(_MARK)
+        while self.peek(1) in (b"\n", b"\r", b" ", b"\t", b"#"):
+            found = self._line_end()
+            text = self._text[self.begin : self.end if found < 0 else found].strip()
+            if text and not text.startswith(b"#"):
+                break
+            self.pass_over(self.end if found < 0 else found + 1, 1)
+        return self.begin < self.end
 
     def pass_over(self, begin: int, lines: int) -> None:
         """Go on to `begin` in `data`, so many lines further."""
@@ -160,7 +192,8 @@ class Window:
 
     def back_to_frame(self, floor: int) -> bool:
         """Where a cut-off line ran into the header of the next frame, go back to that header unless it lies before `floor`."""
-        found = self._text.rfind(_FRAME, max(0, self.begin - _BEHIND, floor - self._offset), self.begin)
+        start = max(0, self.begin - _BEHIND, floor - self._offset)
+        found = max((match.start() + start for match in _FRAME.finditer(self._text[start : self.begin])), default=-1)
         if found < 0:
             return False
         self.pass_over(found, -self._text.count(b"\n", found, self.begin))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,8 +17,10 @@ from dembark.postproc.dumps.source import Source, Window
 _ITEM = b"ITEM: "
 # Faults of a line, as the parser numbers them; the last begins the next frame.
 _FEW, _MANY, _WORD, _HEADER = 1, 2, 3, 5
-_STARTS = (b"ITEM: TIME", b"ITEM: UNIT")
-_SKIPPED = ("element",)
+_SKIPPED = ("element", "typelabel")
+_FLAGS = re.compile(rb"[pfsm]{2}")
+# Numbers in a line of the box, by what stands before its flags.
+_BOXES = {(): 2, (b"xy", b"xz", b"yz"): 3, (b"abc", b"origin"): 4}
 
 
 class _HeaderError(DumpError):
@@ -31,27 +34,41 @@ class _Header:
     step: int = -1
     count: int = -1
     label: bytes = b""
-    bounds: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    box: tuple[Array, Array, Array] = field(default_factory=lambda: (np.zeros(3), np.zeros(3), np.zeros(3)))
     periodic: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(3, bool))
+    flagged: bool = False
     columns: tuple[str, ...] = ()
     time: float | None = None
     units: str = ""
 
 
 def _read_box(head: _Header, words: list[bytes], lines: list[list[bytes]]) -> None:
-    tilted = words[:3] == [b"xy", b"xz", b"yz"]
-    head.periodic = np.array([word == b"pp" for word in words[-3:]]) if len(words) >= 3 else np.zeros(3, bool)
-    for axis, line in enumerate(lines):
-        if len(line) != 2 + tilted:
-            raise ValueError
-        head.bounds[axis, : 2 + tilted] = [float(word) for word in line]
-    if not np.isfinite(head.bounds).all():
+    flags = [word for word in words if _FLAGS.fullmatch(word)]
+    width = _BOXES.get(tuple(words[: len(words) - len(flags)]))
+    table = np.array([[float(word) for word in line] for line in lines])
+    if len(flags) not in (0, 3) or table.shape != (3, width) or not np.isfinite(table).all():
         raise ValueError
+    head.flagged, head.periodic = bool(flags), np.array([flag == b"pp" for flag in flags] or [False] * 3)
+    low, high = table[:, 0], table[:, 1]
+    if width == 4:
+        head.box = _restricted(table[:, :3], table[:, 3])
+    elif width == 3:
+        head.box = (*before_tilt(low, high, table[:, 2]), table[:, 2])
+    else:
+        head.box = low, high, np.zeros(3)
 
 
-def _read_header(window: Window) -> _Header:
-    """The header at the window's place; ValueError when it is none."""
-    head = _Header()
+def _restricted(edges: Array, origin: Array) -> tuple[Array, Array, Array]:
+    """Corners and tilt of a box by its edges (3, 3) and its origin; DumpError when it is turned, as its vectors then are."""
+    beyond, lengths = edges[[0, 0, 1], [1, 2, 2]], np.diag(edges)
+    if np.abs(beyond).max() > 1e-12 * np.abs(edges).max() or not (lengths > 0.0).all():
+        raise DumpError("its box is general triclinic, with a not along x or b not in the plane of x and y; "
+                        "write the dump without triclinic/general")
+    return origin, origin + lengths, edges[[1, 2, 2], [0, 0, 1]]
+
+
+def _read_header(window: Window, head: _Header) -> None:
+    """Read the header at the window's place into `head`; ValueError when it is none."""
 
     def line() -> bytes:
         text = window.line()
@@ -60,12 +77,13 @@ def _read_header(window: Window) -> _Header:
         return text
 
     while True:
+        window.pass_blank()
         text = line()
         name = text[len(_ITEM) :].split()
         if not text.startswith(_ITEM) or not name:
             raise ValueError
         if name == [b"UNITS"]:
-            head.units = line().decode("ascii").strip()
+            head.units = line().decode("ascii").strip().lower()
         elif name == [b"TIME"]:
             head.time = float(line())
         elif name == [b"TIMESTEP"]:
@@ -79,34 +97,37 @@ def _read_header(window: Window) -> _Header:
             break
         else:
             raise ValueError
-    if head.step < 0 or head.count < 0 or not head.columns or "ITEM:" in " ".join(head.columns):
+    known = head.time is None or np.isfinite(head.time)
+    if head.step < 0 or head.count < 0 or not head.columns or not known or "ITEM:" in " ".join(head.columns):
         raise ValueError
-    return head
 
 
 class TextDump(Dump):
     """The frames of a text dump, gzipped or not; see Dump. A file may be larger than memory: one frame at a time is in it."""
 
-    def __init__(self, path: str | Path, *, skip_truncated: bool = False, stream: bool = False) -> None:
-        """Open; DumpError for a missing, foreign or truncated file."""
+    def __init__(self, path: str | Path, *, skip_truncated: bool = False, stream: bool = False, units: str = "") -> None:
+        """Open; DumpError for a missing, foreign or truncated file. `units` is the unit style of a file that names none."""
         self._source = Source(Path(path))
-        if not self._source.begins_with(_ITEM):
+        if not self._source.is_text():
             raise DumpError(f"{path} does not begin with 'ITEM: TIMESTEP'")
-        super().__init__(Path(path), skip_truncated=skip_truncated, stream=stream)
+        super().__init__(Path(path), skip_truncated=skip_truncated, stream=stream, units=units)
 
-    def _header(self, window: Window, number: int) -> _Header:
-        where = f"{self.path}, frame {number}"
+    def _header(self, window: Window, number: int, into: _Header | None = None) -> _Header:
+        """The header at the window's place; `into` takes what there is of one that is cut off."""
+        where, head = f"{self.path}, frame {number}", _Header() if into is None else into
         try:
-            return _read_header(window)
+            _read_header(window, head)
         except CutOffError:
             raise CutOffError(f"{where}: truncated in its header ({HINT})") from None
-        except ValueError:
-            raise _HeaderError(f"{where}: header cannot be read") from None
+        except ValueError as error:
+            why = str(error) if isinstance(error, DumpError) else "header cannot be read"
+            raise _HeaderError(f"{where}: {why}") from None
+        return head
 
     def _find(self) -> Iterator[Entry]:
         with self._source.window() as window:
             number = 1
-            while window.peek(1):
+            while window.pass_blank():
                 entry = self._pass(window, number)
                 yield entry
                 if entry.fault and window.peek(len(_ITEM)) != _ITEM:
@@ -116,15 +137,16 @@ class TextDump(Dump):
     def _pass(self, window: Window, number: int) -> Entry:
         """Pass over a frame. A run that was killed and restarted may have left a part of one before the next."""
         place, line, step, count = window.place, window.line_number, -1, 0
-        fault = f"truncated in its header ({HINT})"
+        fault, head = f"truncated in its header ({HINT})", _Header()
         try:
-            head = self._header(window, number)
+            self._header(window, number, head)
             step, count, body = head.step, head.count, window.line_number
             floor = window.place
             self._skip(window, count)
-            if window.peek(1) and not window.peek(len(_ITEM) + 4).startswith(_STARTS):
-                window.back_to_frame(floor)
+            window.back_to_frame(floor)
             rows = window.line_number - body
+            if rows == count:
+                window.pass_blank()
             if rows == count and window.peek(len(_ITEM)) not in (b"", _ITEM[: len(window.peek(len(_ITEM)))]):
                 raise DumpError(f"{self.path}, line {window.line_number}: frame {number} has more than its {count} lines")
             fault = "" if rows == count else f"truncated, {rows} of {count} lines are there ({HINT})"
@@ -133,7 +155,7 @@ class TextDump(Dump):
         except _HeaderError:
             if not window.back_to_frame(place + 1):
                 raise
-        return Entry(place, line, window.place - place, number, step, count, fault)
+        return Entry(place, line, window.place - place, number, step, count, fault, time=head.time, units=head.units)
 
     def _skip(self, window: Window, count: int) -> None:
         """Pass over `count` lines, fewer where a header or the end comes."""
@@ -170,9 +192,8 @@ class TextDump(Dump):
                 raise CutOffError(f"{where}: truncated, {rows} of {head.count} lines are there ({HINT})")
             if fault:
                 raise DumpError(self._message(window, where, fault, column, head.columns))
-        tilt = head.bounds[:, 2]
-        low, high = before_tilt(head.bounds[:, 0], head.bounds[:, 1], tilt)
-        return RawFrame(head.step, low, high, head.periodic, names, values, tilt, head.time, head.units)
+        low, high, tilt = head.box
+        return RawFrame(head.step, low, high, head.periodic, names, values, tilt, head.time, head.units, head.flagged)
 
     def _message(self, window: Window, where: str, fault: int, column: int, columns: tuple[str, ...]) -> str:
         where = f"{where}, line {window.line_number}"
@@ -185,7 +206,7 @@ class TextDump(Dump):
     def _stream(self) -> Iterator[RawFrame]:
         with self._source.window() as window:
             number = 1
-            while window.peek(1):
+            while window.pass_blank():
                 try:
                     frame = self._rows(window, self._header(window, number), number)
                 except CutOffError as error:

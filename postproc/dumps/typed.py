@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +11,8 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.dumps.frames import Dump, RawFrame
+from dembark.postproc.dumps.frames import Array, Dump, DumpWarning, RawFrame
+from dembark.postproc.dumps.units import unit_style
 
 Frame = TypeVar("Frame")
 
@@ -20,6 +22,7 @@ class TypedDump(ABC, Generic[Frame]):
 
     def __init__(self, dump: Dump) -> None:
         self._dump = dump
+        self._said: dict[str, str] = {}
 
     @property
     def path(self) -> Path:
@@ -33,8 +36,19 @@ class TypedDump(ABC, Generic[Frame]):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Lines about what was left out or put in order."""
-        return self._dump.remarks
+        """Lines about what was left out or put in order, and about what was found in the frames that were read."""
+        return (*self._dump.remarks, *self._said.values())
+
+    def _say(self, step: int, line: str) -> None:
+        """Note `line` about a frame, as a DumpWarning and in `remarks`, unless that was done for an earlier one."""
+        if line not in self._said:
+            self._said[line] = f"{self.path}, from step {step} on: {line}"
+            warnings.warn(self._said[line], DumpWarning, stacklevel=4)
+
+    @property
+    def times(self) -> Array:
+        """The time of every frame in s, NaN where the file does not say it."""
+        return self._dump.times * unit_style(self._dump.units, str(self.path)).time
 
     @property
     def steps(self) -> NDArray[np.int64]:

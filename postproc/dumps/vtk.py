@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.dumps.frames import HINT, Array, CutOffError, Dump, DumpError, Entry, RawFrame, numbered
+from dembark.postproc.dumps.frames import HINT, Array, CutOffError, Dump, DumpError, DumpWarning, Entry, RawFrame, numbered
 from dembark.postproc.dumps.source import Source
 
 BOX = "boundingBox_"
@@ -57,8 +58,11 @@ def _table(data: Any, where: str) -> dict[str, Array]:
 
     points = plain(data.GetPoints().GetData()).astype(float) if data.GetNumberOfPoints() else np.empty((0, 3))
     columns: dict[str, Array] = {}
+    if not len(points):
+        # Written when no grain or contact was there. What its columns would be is in other files, which may be of another kind than this.
+        return columns
     if data.GetCellData().GetArray("id1") is not None or data.GetPointData().GetNumberOfArrays() == 0:
-        ends = points.reshape(-1, 6) if len(points) else np.empty((0, 6))
+        ends = points.reshape(-1, 6)
         held = arrays(data.GetCellData())
         if any(len(values) != len(ends) for values in held.values()):
             raise DumpError(f"{where}: its lines do not have two ends each")
@@ -80,10 +84,10 @@ def _table(data: Any, where: str) -> dict[str, Array]:
 
 
 def _box(path: Path, columns: dict[str, Array]) -> tuple[Array, Array, Array]:
-    """Corners and tilt of the box from the file that the engine writes beside, else the grains' extent."""
+    """Corners and tilt of the box from the file that the engine writes with it, else the grains' extent."""
     head, step, _ = _split(path)
-    # The box of a .vtp lies in a .vtu.
-    for beside in (path.with_name(f"{head}{BOX}{step}{suffix}") for suffix in (path.suffix, ".vtu")):
+    # The box of a .vtp or .vtu lies in a .vtr, or in a .vtu when it is tilted.
+    for beside in (path.with_name(f"{head}{BOX}{step}{suffix}") for suffix in (path.suffix, ".vtu", ".vtr")):
         if not beside.is_file():
             continue
         data = read_vtk(beside)
@@ -93,10 +97,14 @@ def _box(path: Path, columns: dict[str, Array]) -> tuple[Array, Array, Array]:
             return corner[0], corner[0] + (a[0], b[1], c[2]), np.array([b[0], c[0], c[1]])
         bounds = np.array(data.GetBounds()).reshape(3, 2)
         return bounds[:, 0], bounds[:, 1], np.zeros(3)
-    places = [columns[axis if axis in columns else f"{axis}1"] for axis in _AXES]
+    places = [columns.get(axis, columns.get(f"{axis}1", np.zeros(0))) for axis in _AXES]
     reach = columns.get("radius", np.zeros(1)).max(initial=0.0)
     if not len(places[0]):
         return np.zeros(3), np.zeros(3), np.zeros(3)
+    if any(columns[name].any() for name in ("ix", "iy", "iz") if name in columns):
+        said = f"{path.parent}: without a file {head}{BOX}*, which holds the box, image flags are not used"
+        warnings.warn(said, DumpWarning, stacklevel=2)
+        columns |= {name: np.zeros(len(places[0])) for name in ("ix", "iy", "iz")}
     return np.array([place.min() - reach for place in places]), np.array([place.max() + reach for place in places]), np.zeros(3)
 
 
@@ -114,25 +122,25 @@ class VtkFile(Dump):
     The box is read from the file ...boundingBox_... that the engine writes beside; no axis is called periodic, for no file says it.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, units: str = "") -> None:
         """The step; the file is read when its frame is."""
         self._step = int(_split(path)[1])
-        super().__init__(path, skip_truncated=False, stream=True)
+        super().__init__(path, skip_truncated=False, stream=True, units=units)
 
     def _find(self) -> Iterator[Entry]:
         yield Entry(0, 0, 0, 1, self._step, -1)
 
     def _read(self, entry: Entry, columns: Sequence[str] | None) -> RawFrame:
         table = _table(read_vtk(self.path), str(self.path))
-        names = tuple(table) if columns is None else tuple(columns)
+        names = tuple(table) if columns is None or not table else tuple(columns)
         numbered(tuple(table), names, str(self.path))
+        low, high, tilt = _box(self.path, table)
         values = np.column_stack([table[name] for name in names]) if names else np.empty((0, 0))
         bad = np.argwhere(~np.isfinite(values))
         if len(bad):
             row, column = bad[0]
             raise DumpError(f"{self.path}, row {row + 1}: array {names[column]} holds a number that is not finite, '{values[row, column]}'")
-        low, high, tilt = _box(self.path, table)
-        return RawFrame(self._step, low, high, np.zeros(3, bool), names, values, tilt)
+        return RawFrame(self._step, low, high, np.zeros(3, bool), names, values, tilt, flagged=False)
 
     def _stream(self) -> Iterator[RawFrame]:
         yield self._read(Entry(0, 0, 0, 1, self._step, -1), None)

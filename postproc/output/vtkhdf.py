@@ -234,10 +234,11 @@ def write_vtkhdf(path: str | Path, fields: Labelled | Iterable[tuple[float, Labe
 
 def write_vtkhdf_grains(path: str | Path, frames: Iterable[GrainFrame], time_step: float = 1.0,
                         attributes: Attributes | None = None) -> Path:
-    """Write grains as VTKHDF points, one frame at a time; `time_step` (s) turns steps into times. Returns the path."""
+    """Write grains as VTKHDF points, one frame at a time; `time_step` (s) turns steps into times of frames that have
+    none. Returns the path."""
     with GrainsVtkhdf(path, attributes) as file:
         for frame in frames:
-            file.add(frame, frame.step * time_step)
+            file.add(frame, frame.time_by(time_step))
     return Path(path)
 
 

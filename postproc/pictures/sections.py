@@ -94,7 +94,7 @@ def scene(folder: Path, cross_section: str, drum_radius: float = 0.0, drum_speed
     return Section(
         np.array([frame.wrapped[:, axes] for frame in frames_shown]), frames_shown[0].radii,
         np.array([np.linalg.norm(frame.velocities, axis=1) / scale for frame in frames_shown]),
-        np.array([frame.step for frame in frames_shown]) * float(record.get("time_step", 1.0)), drum_radius, drum_speed, label, links,
+        np.array([frame.time_by(float(record.get("time_step", 1.0))) for frame in frames_shown]), drum_radius, drum_speed, label, links,
         forces, _walls(folder, [frame.step for frame in frames_shown]) if axes == [0, 2] else np.zeros((0, 0, 2, 2)), pixels)
 
 

@@ -240,7 +240,7 @@ def test_what_cannot_be_read_is_told_with_its_line(write, rows, message, stream)
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (plain(0) + "\n" + plain(10), "line 13: frame 1 has more than its 3 lines"),
+        (plain(0) + "7\n" + plain(10), "line 13: frame 1 has more than its 3 lines"),
         (frame(0, [(1, 2, 3)] * 4, count=3), "frame 1 has more than its 3 lines"),
         (plain(0).replace("ITEM: TIMESTEP\n0\n", "ITEM: TIMESTEP\nzero\n"), "frame 1: header cannot be read"),
         (plain(0).replace("0 2", "0 two"), "frame 1: header cannot be read"),

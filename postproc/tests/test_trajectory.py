@@ -104,10 +104,3 @@ def test_ids_that_tell_no_grains_apart(tmp_path, lines, message):
     path.write_text(head + lines)
     with pytest.raises(DumpError, match=message):
         GrainsDump(path)[0]
-
-
-def test_other_units_than_si_are_refused(tmp_path):
-    path = tmp_path / "grains.dump"
-    path.write_text("ITEM: UNITS\ncgs\n" + grains_text(0, PLACES, RADII))
-    with pytest.raises(DumpError, match="its units are cgs, but they must be si"):
-        GrainsDump(path)[0]

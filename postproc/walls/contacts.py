@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.dumps.frames import cell
+from dembark.postproc.dumps.frames import folded
 from dembark.postproc.dumptext import DumpError
 from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.postproc.grains import GrainFrame
@@ -16,11 +16,7 @@ Array = NDArray[np.float64]
 
 def into_box(frame: GrainFrame) -> Array:
     """Positions (n, 3) in m inside the box on periodic axes: engines let grains drift a little out of it between neighbour lists."""
-    if not frame.periodic.any():
-        return frame.wrapped
-    edges = cell(frame.low, frame.high, frame.tilt)
-    share = np.linalg.solve(edges.T, (frame.wrapped - frame.low).T).T
-    return frame.wrapped - np.where(frame.periodic, np.floor(share), 0.0) @ edges
+    return folded(frame.wrapped, frame.low, frame.high, frame.tilt, frame.periodic)
 
 
 def touching(frame: GrainFrame, name: str) -> tuple[NDArray[np.bool_], Array]:

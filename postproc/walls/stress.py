@@ -157,11 +157,11 @@ def wall_stress(frames: Iterable[GrainFrame], wall: Wall | Inclusion, patches: P
                 contacts: Iterable[ContactFrame] | None = None, keep_series: bool = True) -> WallStress:
     """Load of `wall` on its `patches` over `frames`, read one at a time.
 
-    `time_step` (s) turns steps into times; an Inclusion needs the `contacts` of the same steps. DumpError when the dump lacks the wall's
-    forces, or contacts and frames do not belong together.
+    `time_step` (s) turns steps into times of frames that have none; an Inclusion needs the `contacts` of the same steps. DumpError when
+    the dump lacks the wall's forces, or contacts and frames do not belong together.
     """
     recorder = WallRecorder(wall, patches, keep_series=keep_series)
     beside = iter(contacts) if contacts is not None else None
     for frame in frames:
-        recorder.add(frame, next(beside, None) if beside is not None else None, frame.step * time_step)
+        recorder.add(frame, next(beside, None) if beside is not None else None, frame.time_by(time_step))
     return recorder.result()
