@@ -6,6 +6,7 @@ import math
 import signal
 import sys
 import time as clock
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -19,7 +20,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 
 from dembark.common.errors import DembarkError, Interrupted
 from dembark.postproc.contacts import ContactColumnsError
-from dembark.postproc.dumps.frames import ColumnsError, DumpError
+from dembark.postproc.dumps.frames import ColumnsError, DensityError, DumpError, DumpWarning
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False,
                   context_settings={"help_option_names": ["-h", "--help"]})
@@ -33,6 +34,7 @@ Density = Annotated[str | None, typer.Option(help="Density of the grains' materi
 Columns = Annotated[str | None, typer.Option(help="Names of the columns of a binary dump of grains: 'id type x y z ...'.")]
 ContactColumns = Annotated[str | None, typer.Option(help=(
     "Columns of a foreign dump of contacts: 'first=1,2,3 second=4,5,6 ids=7,8 forces=10,11,12'."))]
+Units = Annotated[str | None, typer.Option(help="Unit style of dumps that do not name it (ITEM: UNITS): si, cgs, micro, ...; default: si.")]
 Walls = Annotated[list[str] | None, typer.Option("--wall", metavar="NAME:KIND[:KEY=VALUE...]", help=(
     "A wall, by the name of its columns f_force_NAME[1..3]; repeat for more. side:cylinder:radius=25mm, base:plane:normal=z, "
     "lid:mesh:file=lid.stl:unit=mm, stone:inclusion:ids=1,5-9. Default: the walls of a case of dembark."))]
@@ -43,10 +45,16 @@ def run(words: Sequence[str]) -> int:
     """Run one of the commands with its `words` (the first is its name); returns the exit code. DembarkError for the user's mistakes."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        code = app(args=list(words), prog_name="dembark", standalone_mode=False)
+        with warnings.catch_warnings():
+            # The summary says what was odd in the files.
+            warnings.simplefilter("ignore", DumpWarning)
+            code = app(args=list(words), prog_name="dembark", standalone_mode=False)
+    except MemoryError:
+        raise DembarkError("there is not enough memory", "", "take larger cells or patches, or fewer frames at a time") from None
     except ColumnsError as error:
         # The readers name their own parameter; here it is an option.
-        raise DembarkError(error.named("--contact-columns" if isinstance(error, ContactColumnsError) else "--columns")) from None
+        options = {ContactColumnsError: "--contact-columns", DensityError: "--density", ColumnsError: "--columns"}
+        raise DembarkError(error.named(options[type(error)])) from None
     except DumpError as error:
         raise DembarkError(str(error)) from None
     finally:
@@ -82,16 +90,17 @@ def fields(
     density: Density = None,
     columns: Columns = None,
     contact_columns: ContactColumns = None,
+    units: Units = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Threads; default: all cores. The result does not depend on it.")] = None,
 ) -> None:
     """Stress, velocity, strain rate and more on a grid, from grains and contacts, by coarse graining or by cell averages."""
     from dembark.postproc.fields.run import FieldJob, Words
     from dembark.postproc.words import reading
 
-    how = reading(time_step, density, columns, contact_columns)
+    how = reading(time_step, density, columns, contact_columns, units)
     words = Words(source, how, contacts, kernel, width, grid, spacing, box, frames, average, wall or [], cells, least_contacts, only,
                   out, vtkhdf, grains, plot, threads)
-    job = FieldJob.plan(words)
+    job = FieldJob.plan(words, progress)
     with progress("fields", len(job.numbers)) as advance:
         job.run(advance, _provenance("fields", source))
     _say(job.summary())
@@ -112,12 +121,13 @@ def walls(
     density: Density = None,
     columns: Columns = None,
     contact_columns: ContactColumns = None,
+    units: Units = None,
 ) -> None:
     """Normal and shear stress on walls and inclusions: distribution, time series, fluctuations, peaks."""
     from dembark.postproc.walls.run import WallJob
     from dembark.postproc.words import reading
 
-    how = reading(time_step, density, columns, contact_columns)
+    how = reading(time_step, density, columns, contact_columns, units)
     job = WallJob.plan(source, contacts, wall or [], patch, frames, out, vtkhdf, plot, how)
     with progress("walls", len(job.numbers)) as advance:
         job.run(advance, _provenance("walls", source))

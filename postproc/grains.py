@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.dumps.frames import NO_FLAGS, Array, DumpError, RawFrame, cell, folded, integers, numbered, take
+from dembark.postproc.dumps.frames import NO_FLAGS, Array, DensityError, DumpError, RawFrame, cell, folded, integers, numbered, take
 from dembark.postproc.dumps.opening import Trajectory, open_dump
 from dembark.postproc.dumps.typed import TypedDump
 from dembark.postproc.dumps.units import KEPT_UNITS, in_si
@@ -186,7 +186,7 @@ def _masses(table: _Table, radii: Array, density: float | None, say: Say) -> Arr
     if held:
         return table("mass") if held[0] == "mass" else table("density") * volume(radii)
     if density is None:
-        raise DumpError(f"{table.where}: column mass is missing; give density= (kg/m^3), or dump mass")
+        raise DensityError(f"{table.where}: column mass is missing; give density= (kg/m^3), or dump mass")
     if table.has(["type"]) and len(kinds := np.unique(table("type"))) > 1:
         say(f"all grains have the given density, though there are {len(kinds)} types")
     return density * volume(radii)

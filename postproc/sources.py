@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
 from dembark.postproc.contacts import ContactFrame, ContactsDump
@@ -18,7 +20,10 @@ from dembark.postproc.walls import CylinderWall, Motion, PlaneWall, Wall
 
 @dataclass(frozen=True)
 class Source:
-    """Frames to be averaged: `grains`, `contacts` (None: there are none), `time_step` (s; NaN: unknown), `record` of the run or {}."""
+    """Frames to be averaged: `grains`, `contacts` (None: there are none), `time_step` (s; NaN: unknown), `record` of the run or {}.
+
+    Times are those of the dump where it has them (`ITEM: TIME`): the step may change during a run.
+    """
 
     path: Path
     grains: GrainsDump
@@ -28,12 +33,28 @@ class Source:
 
     @property
     def notes(self) -> list[str]:
-        """Lines about what of the files was left out or put in order."""
-        return [line for one in (self.grains, self.contacts) if one is not None for line in one.remarks]
+        """Lines about what of the files was left out or put in order, and about what is odd in them."""
+        lines = [line for one in (self.grains, self.contacts) if one is not None for line in one.remarks]
+        known = np.isfinite(self.grains.times)
+        apart = np.abs(self.grains.times - self.grains.steps * self.time_step)[known]
+        if (apart > 1e-6 * np.abs(self.grains.times[known]).max(initial=0.0)).any():
+            lines.append(f"the times are those of the dump, not its steps times {self.time_step:.6g} s")
+        return lines
 
-    def time(self, step: int) -> float:
-        """Simulated time (s) of a step; the step itself where the time step is unknown."""
-        return step if math.isnan(self.time_step) else step * self.time_step
+    @property
+    def timed(self) -> bool:
+        """Whether the times are known in s."""
+        return not math.isnan(self.time_step) or bool(np.isfinite(self.grains.times).all())
+
+    def time(self, frame: GrainFrame) -> float:
+        """Simulated time (s) of a frame; its step where no time is known. DumpError where only other frames of the dump have a time."""
+        if frame.time is not None:
+            return frame.time
+        if not math.isnan(self.time_step):
+            return frame.step * self.time_step
+        if np.isfinite(self.grains.times).any():
+            raise DumpError(f"{frame.where}: the frame has no ITEM: TIME, but others have; give the time step")
+        return frame.step
 
     def frames(self, numbers: Sequence[int]) -> Iterator[tuple[GrainFrame, ContactFrame | None]]:
         """Frames by their numbers, one at a time, each with the contacts of its step; DumpError when those are not there."""
@@ -64,12 +85,13 @@ class _ByStep:
 @dataclass(frozen=True)
 class Reading:
     """How files are to be read that do not say it themselves: `time_step` (s), `density` (kg/m3) of grains without masses, names of the
-    `columns` of a binary dump, and what the columns of a foreign dump of contacts are (see ContactsDump)."""
+    `columns` of a binary dump, what the columns of a foreign dump of contacts are (see ContactsDump), and the unit style."""
 
     time_step: float | None = None
     density: float | None = None
     columns: Sequence[str] | None = None
     contact_columns: Mapping[str, Sequence[int | str]] | None = None
+    units: str = ""
 
 
 def open_source(path: Path, contacts: Path | None = None, reading: Reading | None = None) -> Source:
@@ -84,10 +106,10 @@ def open_source(path: Path, contacts: Path | None = None, reading: Reading | Non
     if contacts is None and folder and (folder / "contacts.dump").is_file():
         contacts = folder / "contacts.dump"
     time_step = how.time_step if how.time_step is not None else float(record.get("time_step", math.nan))
-    grains = GrainsDump(file, skip_truncated=True, columns=how.columns, density=how.density)
+    grains = GrainsDump(file, skip_truncated=True, columns=how.columns, density=how.density, units=how.units)
     if not len(grains):
         raise DumpError(f"{file} has no whole frame")
-    beside = ContactsDump(contacts, skip_truncated=True, columns=how.contact_columns) if contacts else None
+    beside = ContactsDump(contacts, skip_truncated=True, columns=how.contact_columns, units=how.units) if contacts else None
     return Source(path, grains, beside, time_step, record)
 
 

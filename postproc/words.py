@@ -9,14 +9,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from dembark.common.errors import DembarkError
 from dembark.common.units import finite, to_si
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.sources import Reading
 from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, Motion, PlaneWall, Wall
-from dembark.postproc.walls.patches import Patches, box_patches, cylinder_patches, inclusion_patches, mesh_patches, plane_patches
+from dembark.postproc.walls.patches import (
+    Patches,
+    borders,
+    box_patches,
+    count_of,
+    cylinder_patches,
+    inclusion_patches,
+    mesh_patches,
+    plane_patches,
+)
 
 _DIAMETERS = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*d\s*")
 _KINDS: Mapping[str, tuple[str, ...]] = {
@@ -25,6 +32,7 @@ _KINDS: Mapping[str, tuple[str, ...]] = {
     "mesh": ("file", "unit", "velocity", "since", "by"),
     "inclusion": ("ids", "surface", "radius", "axis", "around", "along", "patch"),
 }
+_MOST_IDS = 10_000_000  # of an inclusion
 # Units of length that STL files come in, in m.
 STL_UNITS = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 
@@ -83,7 +91,9 @@ def frame_numbers(text: str, count: int) -> list[int]:
     return found
 
 
-def reading(time_step: str | None, density: str | None, columns: str | None, contact_columns: str | None) -> Reading:
+def reading(
+    time_step: str | None, density: str | None, columns: str | None, contact_columns: str | None, units: str | None = None
+) -> Reading:
     """How the files are to be read, from the options of these names."""
     of_contacts: dict[str, list[int | str]] = {}
     for part in (contact_columns or "").split():
@@ -93,7 +103,7 @@ def reading(time_step: str | None, density: str | None, columns: str | None, con
                                "write first=1,2,3 second=4,5,6 ids=7,8 forces=10,11,12")
         of_contacts[name] = [int(word) if word.isdecimal() else word for word in words.split(",")]
     return Reading(_positive(time_step, "s", "--time-step"), _positive(density, "kg/m^3", "--density"),
-                   columns.split() if columns else None, of_contacts or None)
+                   columns.split() if columns else None, of_contacts or None, units or "")
 
 
 def _positive(text: str | None, unit: str, option: str) -> float | None:
@@ -213,7 +223,10 @@ class _Builder:
             match = re.fullmatch(r"(\d+)(?:-(\d+))?", part.strip())
             if not match or (match.group(2) and int(match.group(2)) < int(match.group(1))):
                 raise DembarkError(f"{part!r} names no grains", f"in {self.where}, ids", "give numbers and ranges, such as 1,5-9")
-            ids += range(int(match.group(1)), int(match.group(2) or match.group(1)) + 1)
+            first, last = int(match.group(1)), int(match.group(2) or match.group(1))
+            if len(ids) + last - first >= _MOST_IDS:
+                raise DembarkError(f"{part!r} names too many grains", f"in {self.where}, ids", f"an inclusion has at most {_MOST_IDS}")
+            ids += range(first, last + 1)
         radius = length(self.options["radius"], self.diameter, f"{self.where}, radius") if "radius" in self.options else None
         return Inclusion(self.name, tuple(ids), self.options.get("surface", "sphere"), radius, self._vector("axis", "1", (0.0, 0.0, 1.0)))
 
@@ -225,7 +238,7 @@ def _patches(wall: Wall | Inclusion, frame: GrainFrame, size: float, spans: Mapp
     usual = box_patches(wall, frame, size)
     if isinstance(wall, Inclusion):
         return inclusion_patches(wall, wall.size(frame), numbers.get("around", usual.shape[0]), numbers.get("along", usual.shape[1]))
-    edges = [np.linspace(*spans[name], max(1, round((spans[name][1] - spans[name][0]) / size)) + 1) if name in spans else usual.edges[axis]
+    edges = [borders(*spans[name], count_of(spans[name][1] - spans[name][0], size)) if name in spans else usual.edges[axis]
              for axis, name in enumerate(usual.names)]
     if isinstance(wall, PlaneWall):
         return plane_patches(wall, *edges)

@@ -33,6 +33,12 @@ class ColumnsError(DumpError):
         return str(self).replace(self.parameter, parameter)
 
 
+class DensityError(ColumnsError):
+    """The parameter `density` is needed."""
+
+    parameter = "density="
+
+
 class CutOffError(DumpError):
     """A frame that ends too early."""
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dembark import _fields
 from dembark.common.errors import DembarkError
+from dembark.common.memory import check_memory
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.fields import sums as column
 from dembark.postproc.fields.carried import Contacts, Grains
@@ -22,6 +23,7 @@ from dembark.postproc.grains import GrainFrame
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+_IMAGE = 200.0  # bytes of a grain or contact, and of each of its periodic images, while it is spread
 _TOUCHING = 1e-6  # gap over the sum of the radii up to which spheres touch: what six digits of a dump leave
 
 
@@ -64,6 +66,8 @@ def coarse_grain(
     """
     phi = Kernel(kernel, float(width))
     check_periods(grid, grains)
+    check_branches(contacts, grains)
+    _check_room(grid, phi, grains, contacts)
     spreader = Spreader(grid, phi, grains, closed, threads, backend)
     workers = spreader.workers
     _check_finite(grains.wrapped, "positions", grains.step, workers)
@@ -98,6 +102,37 @@ def coarse_grain(
     for wall in walls:
         _add_wall(wall, sums, spreader)
     return sums
+
+
+def check_branches(contacts: ContactFrame | None, grains: GrainFrame) -> None:
+    """DembarkError when the branch of a contact reaches over half of the box: it is not that of the nearest image, for the dump of the
+    contacts does not say that the axis is periodic."""
+    if contacts is None or not len(contacts.branch):
+        return
+    size = np.asarray(grains.high, float) - grains.low
+    for axis in np.flatnonzero((np.abs(contacts.branch).max(axis=0) > 0.5 * size * (1.0 + 1e-9)) & (size > 0.0)):
+        row = int(np.abs(contacts.branch[:, axis]).argmax())
+        length = float(np.linalg.norm(contacts.branch[row]))
+        # A box that is not periodic may be no larger than a few grains.
+        if grains.periodic[axis] or length > 4.0 * grains.radii.max(initial=0.0):
+            one, two = contacts.ids[row]
+            raise DembarkError(f"the contact of grains {one} and {two} is {1e3 * length:.4g} mm long, over half of the box along "
+                               f"{'xyz'[axis]}", f"step {contacts.step}",
+                               "where that is periodic, the dump of contacts must say so (ITEM: BOX BOUNDS pp)")
+
+
+def _check_room(grid: Grid, kernel: Kernel, grains: GrainFrame, contacts: ContactFrame | None) -> None:
+    """DembarkError when the sums, and the copies of the grid or of the grains beyond periodic borders, take more memory than there is."""
+    bytes_of = 8.0 * (column.GRAIN_COLUMNS + column.CONTACT_COLUMNS + 3) * grid.cells
+    size = np.where(grains.periodic, grains.high - grains.low, np.inf)
+    if kernel.name == "gaussian" and not np.any(grains.tilt):
+        beyond = np.where(grid.periodic, np.ceil(kernel.reach / grid.spacing), 0.0)
+        bytes_of += 8.0 * column.GRAIN_COLUMNS * float(np.prod(grid.shape + 2.0 * beyond)) * bool(beyond.any())
+        size = np.where(grid.periodic, np.inf, size)
+    images = np.prod(1.0 + np.floor((grid.high - grid.low + 2.0 * kernel.reach) / size))
+    bytes_of += _IMAGE * float(images) * max(len(grains.radii), 0 if contacts is None else len(contacts.ids))
+    what = f"{' × '.join(map(str, grid.shape))} cells with a kernel of {1e3 * kernel.width:.4g} mm"
+    check_memory(bytes_of, what, "take fewer cells or a narrower kernel")
 
 
 def _add_wall(wall: WallContacts, sums: FieldSums, spreader: Spreader) -> None:

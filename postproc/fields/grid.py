@@ -14,6 +14,8 @@ from dembark.postproc.grains import GrainFrame
 
 Array = NDArray[np.float64]
 
+_MOST_CELLS = 1e15  # no memory holds them; their number is still exact
+
 
 @dataclass(frozen=True, eq=False)
 class Grid:
@@ -48,19 +50,12 @@ class Grid:
         the kernel's reach (see Kernel.reach) nothing of any grain is lost.
         """
         wanted = np.broadcast_to(np.asarray(spacing, float), 3)
-        if not (np.isfinite(wanted).all() and (wanted > 0.0).all() and margin >= 0.0):
+        if not (np.isfinite(wanted).all() and (wanted > 0.0).all() and 0.0 <= margin < np.inf):
             raise DembarkError(f"cells of {spacing} m, margin of {margin} m", "grid", "give a positive size and a margin of at least 0")
-        periodic = np.asarray(frame.periodic, bool)
-        if len(frame.radii) == 0 and not periodic.all():
+        low, high, periodic = extent(frame, margin)
+        if not np.isfinite([low, high]).all():
             raise DembarkError("no grains", f"step {frame.step}", "a grid around them needs at least one, or a periodic box")
-        low, high = np.array(frame.low, float), np.array(frame.high, float)
-        if not periodic.all():
-            reach = np.asarray(frame.radii)[:, None] + margin
-            low = np.where(periodic, low, (frame.wrapped - reach).min(axis=0))
-            high = np.where(periodic, high, (frame.wrapped + reach).max(axis=0))
-        # A share of 1e-9 keeps a length that is a whole multiple of the spacing from getting one cell more by round-off.
-        count = np.maximum(1, np.ceil((high - low) / wanted * (1.0 - 1e-9))).astype(int)
-        return cls(low, high, tuple(count.tolist()), tuple(periodic.tolist()))
+        return cls(low, high, cell_counts(low, high, wanted), (bool(periodic[0]), bool(periodic[1]), bool(periodic[2])))
 
     @property
     def spacing(self) -> Array:
@@ -98,6 +93,24 @@ class Grid:
             and np.array_equal(self.low, other.low)
             and np.array_equal(self.high, other.high)
         )
+
+
+def extent(frame: GrainFrame, margin: float = 0.0) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Corners (3,) in m of the region around all grains of `frame` and `margin` (m) beyond their surfaces, and its periodic axes, on which
+    it is that of the box; infinite, the lower one above the upper, where there is no grain."""
+    periodic, reach = np.asarray(frame.periodic, bool), np.asarray(frame.radii)[:, None] + margin
+    low = np.where(periodic, frame.low, (frame.wrapped - reach).min(axis=0, initial=np.inf))
+    high = np.where(periodic, frame.high, (frame.wrapped + reach).max(axis=0, initial=-np.inf))
+    return low, high, periodic
+
+
+def cell_counts(low: Array, high: Array, spacing: float | Array) -> tuple[int, int, int]:
+    """Numbers of cells of at most `spacing` (m; one number or three) between two corners (3,) in m; DembarkError for too many to count."""
+    # A share of 1e-9 keeps a length that is an integer multiple of the spacing from getting one cell more by round-off.
+    count = np.maximum(1.0, np.ceil((high - low) / spacing * (1.0 - 1e-9)))
+    if not (count < _MOST_CELLS).all() or not count.prod() < _MOST_CELLS:
+        raise DembarkError(f"{' × '.join(f'{one:.3g}' for one in count)} cells", "grid", "take larger ones")
+    return int(count[0]), int(count[1]), int(count[2])
 
 
 def periodic_images(low: Array, high: Array, reach: float, grid: Grid, frame: GrainFrame) -> tuple[NDArray[np.int64], Array]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field
 from functools import reduce
 from itertools import islice
@@ -14,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
+from dembark.common.memory import check_memory
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.fields.cells import CellAverage, cell_grid, cell_totals
 from dembark.postproc.fields.coarse_graining import WallContacts, coarse_grain
-from dembark.postproc.fields.grid import Grid
+from dembark.postproc.fields.grid import Grid, cell_counts, extent
 from dembark.postproc.fields.kernels import Kernel
 from dembark.postproc.fields.sums import MASS, MOMENTUM, Fields
 from dembark.postproc.grains import GrainFrame
@@ -45,8 +47,11 @@ Array = NDArray[np.float64]
 Frame = tuple[GrainFrame, ContactFrame | None]
 Attributes = Mapping[str, str | float | int]
 
+Show = Callable[[str, int], AbstractContextManager[Callable[[], None]]]
+
 _PATCH = 2.0  # size of a wall's patches in mean diameters
-_MOST_CELLS = 5e7
+# Most memory (bytes) that a cell takes: with averages by cell or without, of several frames or of one.
+_BYTES = {(True, False): 700.0, (True, True): 800.0, (False, False): 1250.0, (False, True): 1700.0}
 
 
 @dataclass(frozen=True)
@@ -91,9 +96,9 @@ class _Sample:
 class FieldJob:
     """Fields that were planned and can be computed: frames in groups to be averaged, grid, kernel (None: averages by cell), walls.
 
-    `unplaced` are walls of the dump whose place is not known; `only` are the fields to write, [] for all. What `run` leaves: loads of
-    walls, files, mass in the fields and of the grains in each group (kg), largest error of the momentum over the sum of m |v|, and the
-    share of cells that are not masked.
+    `only` are the fields to write, [] for all. What `run` leaves: loads of walls, files, mass in the fields and of the grains in each group
+    (kg), largest error of the momentum over the sum of m |v|, the share of cells that are not masked, the walls of the frames whose place
+    is not known (`unplaced`), and whether any frame had a wall (`walled`) or an axis that is not periodic (`bounded`).
     """
 
     words: Words
@@ -104,13 +109,15 @@ class FieldJob:
     grid: Grid
     kernel: Kernel | None
     walls: list[WallWord]
-    unplaced: list[str]
     only: list[str]
     loads: list[WallStress] = field(default_factory=list)
     written: list[Path] = field(default_factory=list)
     masses: list[tuple[float, float]] = field(default_factory=list)
     momentum_error: float = 0.0
     seen: float = 1.0
+    unplaced: list[str] = field(default_factory=list)
+    walled: bool = False
+    bounded: bool = False
 
     @property
     def numbers(self) -> list[int]:
@@ -118,8 +125,8 @@ class FieldJob:
         return [number for group in self.groups for number in group]
 
     @classmethod
-    def plan(cls, words: Words) -> FieldJob:
-        """Check everything the user wrote; DembarkError or DumpError before any work is done."""
+    def plan(cls, words: Words, show: Show | None = None) -> FieldJob:
+        """Check everything the user wrote; DembarkError or DumpError before any work is done. `show` tells how far the reading is."""
         files = (words.out, words.vtkhdf, words.grains)
         if not any((*files, words.plot)):
             raise DembarkError("there is nothing to write", "", "name a file with --out or --vtkhdf, or a folder with --plot")
@@ -135,10 +142,8 @@ class FieldJob:
         check_meshes(walls, source, first)
         if words.cells and source.contacts is None:
             raise DembarkError("cell averages need contacts", f"{words.source} has none", "name their dump with --contacts")
-        grid = _grid([first, source.grains[numbers[-1]]], words, diameter, kernel.reach if kernel else 0.0)
-        placed = [one.wall.name for one in walls]
-        unplaced = [name for name in first.wall_forces if name not in placed]
-        return cls(words, source, groups, rest, diameter, grid, kernel, walls, unplaced, only)
+        grid = _grid(source, numbers[: len(numbers) - rest], words, diameter, kernel.reach if kernel else 0.0, show)
+        return cls(words, source, groups, rest, diameter, grid, kernel, walls, only)
 
     def run(self, advance: Callable[[], None], provenance: Attributes) -> None:
         """Compute and write; `advance` is called after each frame."""
@@ -177,8 +182,12 @@ class FieldJob:
     def _sampled(self, frames: Iterable[Frame], sample: _Sample, seen: Callable[[GrainFrame, ContactFrame | None, float], None]
                  ) -> Iterator[tuple[GrainFrame, ContactFrame | None, list[WallContacts]]]:
         """The frames with the contacts of their walls; each is noted in `sample` and `seen` once it was used."""
+        placed = [one.wall.name for one in self.walls]
         for grains, contacts in frames:
-            time = self.source.time(grains.step)
+            time = self.source.time(grains)
+            self.unplaced += [name for name in grains.wall_forces if name not in (*placed, *self.unplaced)]
+            self.walled |= bool(grains.wall_forces)
+            self.bounded |= not grains.periodic.all()
             yield grains, contacts, [wall_contacts(grains, one.wall, time) for one in self.walls if not isinstance(one.wall, Inclusion)]
             sample.add(grains, time)
             seen(grains, contacts, time)
@@ -227,11 +236,16 @@ class FieldJob:
         lines.append(f"{' × '.join(map(str, self.grid.shape))} cells of {size} mm, {how}; {many}")
         if self.source.contacts is None:
             lines.append("note: without contacts there is no contact stress; name their dump with --contacts")
+        elif self.bounded and not self.walled:
+            lines.append("note: the dump has no forces of walls (columns f_force_NAME[1..3]); their part of the stress is missing, which "
+                         "fades to 0 next to a wall")
         if self.unplaced:
             lines.append(f"note: where the wall {', '.join(self.unplaced)} is, is not known; its part of the stress is missing, add --wall")
         inside, there = max(self.masses, key=lambda one: abs(one[0] - one[1]))
-        lines.append(f"mass: {inside:.9g} kg in the fields, {there:.9g} kg of grains, difference {abs(inside / there - 1.0):.1e}; "
-                     f"momentum: difference {self.momentum_error:.1e} of the sum of m |v|")
+        lines.append(f"mass: {inside:.9g} kg in the fields, {there:.9g} kg of grains, difference {abs(inside - there) / (there or 1.0):.1e}"
+                     f"; momentum: difference {self.momentum_error:.1e} of the sum of m |v|")
+        if there - inside > 1e-6 * there:
+            lines.append(f"note: {100.0 * (1.0 - inside / there):.3g} % of the mass lie outside the region of --box")
         for one in self.loads:
             lines += wall_lines(one, self.source)
         return [*lines, *(f"written: {path}" for path in self.written)]
@@ -257,27 +271,60 @@ def _groups(numbers: list[int], average: str) -> tuple[list[list[int]], int]:
     return [numbers[start : start + size] for start in range(0, whole, size)], len(numbers) - whole
 
 
-def _grid(frames: Sequence[GrainFrame], words: Words, diameter: float, margin: float) -> Grid:
-    """Cells over the region the user wrote, or around the grains of all `frames` and as far as the kernel reaches, `margin` (m)."""
-    size = diameter
-    if words.spacing:
-        size = length(words.spacing, diameter, "--spacing")
-    elif words.cells:
-        size = float(cell_grid(frames[0]).spacing.max())
-    around = [Grid.around(frame, size, margin) for frame in frames if len(frame.radii)]
-    low, high = np.array([one.low for one in around]).min(axis=0), np.array([one.high for one in around]).max(axis=0)
-    periodic = around[0].periodic
+def _grid(source: Source, numbers: Sequence[int], words: Words, diameter: float, margin: float, show: Show | None) -> Grid:
+    """Cells over the region the user wrote, or around the grains of all frames and as far as the kernel reaches, `margin` (m)."""
+    size = length(words.spacing, diameter, "--spacing") if words.spacing else diameter
+    measured = words.cells and not words.spacing and not words.grid
+    if words.box is None or measured:
+        region = _Region(margin, measured)
+        with show("region", len(numbers)) if show else nullcontext() as advance:
+            for number in numbers:
+                region.add(source.grains[number])
+                if advance:
+                    advance()
+        low, high, periodic, size = region.low, region.high, region.periodic, min(size if not measured else np.inf, region.size)
     if words.box is not None:
         parts = words.box.split(",")
         if len(parts) != 6:
             raise DembarkError(f"{words.box!r} is no region", "in --box", "give x0,x1,y0,y1,z0,z1")
         spans = np.array([span(",".join(parts[2 * axis : 2 * axis + 2]), diameter, "--box") for axis in range(3)])
-        # Only a grid over the whole period goes on at its other side.
-        whole = np.abs(spans - np.column_stack([low, high])).max(axis=1) <= 1e-9 * (high - low)
-        periodic = (periodic[0] and bool(whole[0]), periodic[1] and bool(whole[1]), periodic[2] and bool(whole[2]))
+        # Only a grid over all of the period goes on at its other side.
+        first = source.grains[numbers[0]]
         low, high = spans.T
-    shape = counts(words.grid) if words.grid else tuple(np.maximum(1.0, np.ceil((high - low) / size * (1.0 - 1e-9))).tolist())
-    if np.prod(np.array(shape, float)) > _MOST_CELLS:
-        raise DembarkError(f"{' × '.join(f'{one:.0f}' for one in shape)} cells are too many", "",
-                           "take fewer with --grid, or larger ones with --spacing")
-    return Grid(low, high, (int(shape[0]), int(shape[1]), int(shape[2])), periodic)
+        same = np.abs(spans - np.column_stack([first.low, first.high])).max(axis=1) <= 1e-9 * (first.high - first.low)
+        periodic = first.periodic & same
+    where = " × ".join(f"{1e3 * one:.4g}" for one in high - low)
+    shape = counts(words.grid) if words.grid else cell_counts(low, high, size)
+    per_cell = _BYTES[words.cells, len(numbers) > 1]
+    check_memory(per_cell * math.prod(map(float, shape)), f"{' × '.join(map(str, shape))} cells over {where} mm",
+                 "take fewer with --grid, larger ones with --spacing, a smaller region with --box, or a narrower kernel with --width")
+    return Grid(low, high, shape, (bool(periodic[0]), bool(periodic[1]), bool(periodic[2])))
+
+
+class _Region:
+    """What the grains of all frames take up, with `margin` (m); and the smallest `size` (m) of cells about them, when it is `measured`."""
+
+    def __init__(self, margin: float, measured: bool) -> None:
+        self._margin, self._measured = margin, measured
+        self.low, self.high, self.periodic = np.full(3, np.inf), np.full(3, -np.inf), np.zeros(3, bool)
+        self.size = np.inf
+        self._first: GrainFrame | None = None
+
+    def add(self, frame: GrainFrame) -> None:
+        """Take the next frame; DembarkError where its box has other periods than that of the first."""
+        if not len(frame.radii):
+            return
+        low, high, periodic = extent(frame, self._margin)
+        if self._first is None:
+            self._first, self.periodic = frame, periodic
+        first = self._first
+        period = first.high - first.low
+        changed = (periodic != self.periodic) | periodic & (np.abs([low - first.low, high - first.high]).max(axis=0) > 1e-9 * period)
+        if changed.any():
+            axis = int(np.argmax(changed))
+            ends = [f"{one.low[axis]:.6g} to {one.high[axis]:.6g} m at step {one.step}" for one in (first, frame)]
+            raise DembarkError(f"the periodic box changes along {'xyz'[axis]}", ", ".join(ends),
+                               "choose frames of one box with --frames, or a part of it with --box")
+        self.low, self.high = np.minimum(self.low, low), np.maximum(self.high, high)
+        if self._measured:
+            self.size = min(self.size, float(cell_grid(frame).spacing.max()))

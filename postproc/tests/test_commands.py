@@ -318,7 +318,7 @@ def test_foreign_contacts_are_told_apart_by_an_option(run, capsys):
     path.write_text("\n".join(lines).replace("c_contacts[1] ", "") + "\n")
     assert main(["fields", "run", "--out", "f.nc"]) == 2
     assert "11 columns" in (error := capsys.readouterr().err) and "--contact-columns" in error
-    assert main(["fields", "run", "--out", "f.nc", "--contact-columns", "first=1,1,2 second=3,4,5 ids=6,7 forces=9,10,11"]) == 0
+    assert main(["fields", "run", "--out", "f.nc", "--contact-columns", "first=3,1,2 second=3,4,5 ids=6,7 forces=9,10,11"]) == 0
 
 
 def test_an_interruption_leaves_nothing(run, capsys, monkeypatch):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
+from dembark.common.memory import check_memory
 from dembark.postproc.dumps.frames import cell
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, PlaneWall, Wall
@@ -20,6 +21,8 @@ _OfTwo = Callable[[Array, Array], Array]
 _TURN = 2.0 * np.pi
 # Curved patches are drawn as flat polygons of at most this angle.
 _FACET = np.radians(7.5)
+_MOST = 1e7  # patches along one coordinate
+_BYTES = 2000.0  # of a patch and the load on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +85,27 @@ def _finer(edges: Array, most: float) -> tuple[Array, Integers]:
     return np.append(np.concatenate(pieces), edges[-1]), np.repeat(np.arange(len(parts)), parts)
 
 
+def count_of(extent: float, size: float) -> int:
+    """How many patches of about `size` (m) cover `extent` (m); DembarkError when these are too many."""
+    return _affordable(max(1.0, float(np.round(extent / size))) if size > extent / _MOST else np.inf)
+
+
+def _affordable(count: float) -> int:
+    if not count <= _MOST:
+        raise DembarkError(f"more than {_MOST:.0f} patches along one coordinate", "", "take larger ones")
+    return int(count)
+
+
+def borders(low: float, high: float, count: int) -> Array:
+    """Equidistant borders of `count` patches from `low` to `high`; DembarkError when these are too many."""
+    return np.linspace(low, high, _affordable(count) + 1)
+
+
 def _rectangular(edges: tuple[Array, Array], area: _OfTwo, surface: _OfTwo, normal: _OfTwo, names: tuple[str, str], units: tuple[str, str],
                  facets: tuple[float, float]) -> Patches:
     edges = _rising(edges[0], names[0]), _rising(edges[1], names[1])
+    count = (len(edges[0]) - 1) * (len(edges[1]) - 1)
+    check_memory(_BYTES * count, f"{count} patches", "take larger ones")
     middle = np.meshgrid(*(0.5 * (one[1:] + one[:-1]) for one in edges), indexing="ij")
     (first, of_first), (second, of_second) = (_finer(one, most) for one, most in zip(edges, facets, strict=True))
     vertices = surface(*np.meshgrid(first, second, indexing="ij")).reshape(-1, 3)
@@ -106,7 +127,7 @@ def cylinder_patches(wall: CylinderWall, around: int, height: Array) -> Patches:
     if around < 1:
         raise DembarkError(f"wall {wall.name}: {around} patches around", "", "it must be at least one")
     sign = -1.0 if wall.inward else 1.0
-    return _rectangular((np.linspace(0.0, _TURN, around + 1), height), lambda a, b: wall.radius * np.outer(np.diff(a), np.diff(b)),
+    return _rectangular((borders(0.0, _TURN, around), height), lambda a, b: wall.radius * np.outer(np.diff(a), np.diff(b)),
                         wall.points, lambda a, _: sign * wall.outward(a), ("angle", "height"), ("rad", "m"), (_FACET, np.inf))
 
 
@@ -136,11 +157,11 @@ def inclusion_patches(inclusion: Inclusion, radius: float, around: int, along: i
     On a sphere `along` is the number of bands of equal area (or borders of the angle from the axis, rad); on a cylinder the borders of
     the height from the centre (m), or a number of bands between -radius and radius.
     """
-    turn = np.linspace(0.0, _TURN, around + 1)
+    turn = borders(0.0, _TURN, around)
     body = CylinderWall(inclusion.name, radius, inclusion.axis, inward=False)
     if inclusion.surface == "cylinder":
-        return cylinder_patches(body, around, np.linspace(-radius, radius, along + 1) if isinstance(along, int) else along)
-    polar = np.arccos(np.linspace(1.0, -1.0, along + 1)) if isinstance(along, int) else along
+        return cylinder_patches(body, around, borders(-radius, radius, along) if isinstance(along, int) else along)
+    polar = np.arccos(borders(1.0, -1.0, along)) if isinstance(along, int) else along
 
     def radial(angle: Array, tilt: Array) -> Array:
         return np.sin(tilt)[..., None] * body.outward(angle) + np.cos(tilt)[..., None] * body.axes[0]
@@ -157,14 +178,14 @@ def box_patches(wall: Wall | Inclusion, frame: GrainFrame, size: float) -> Patch
         return mesh_patches(wall)
     if isinstance(wall, Inclusion):
         radius = wall.size(frame)
-        around = max(1, round(_TURN * radius / size))
-        return inclusion_patches(wall, radius, around, max(1, round((np.pi if wall.surface == "sphere" else 2.0) * radius / size)))
+        around = count_of(_TURN * radius, size)
+        return inclusion_patches(wall, radius, around, count_of((np.pi if wall.surface == "sphere" else 2.0) * radius, size))
     coordinates = wall.places(_corners(frame)).coordinates
     spans = [_steps(low, high, size) for low, high in zip(coordinates.min(axis=0), coordinates.max(axis=0), strict=True)]
     if isinstance(wall, PlaneWall):
         return plane_patches(wall, *spans)
     assert isinstance(wall, CylinderWall)
-    return cylinder_patches(wall, max(1, round(_TURN * wall.radius / size)), spans[1])
+    return cylinder_patches(wall, count_of(_TURN * wall.radius, size), spans[1])
 
 
 def _corners(frame: GrainFrame) -> Array:
@@ -172,4 +193,4 @@ def _corners(frame: GrainFrame) -> Array:
 
 
 def _steps(low: float, high: float, size: float) -> Array:
-    return np.linspace(low, high, max(1, round((high - low) / size)) + 1)
+    return borders(low, high, count_of(high - low, size))

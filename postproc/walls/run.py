@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -69,7 +68,7 @@ class WallJob:
         recorders = recorders_of(self.walls, self.source, self.numbers, self.patch)
         for grains, contacts in checked_frames(self.walls, self.source, self.numbers):
             for recorder in recorders:
-                recorder.add(grains, contacts, self.source.time(grains.step))
+                recorder.add(grains, contacts, self.source.time(grains))
             advance()
         self.results = [recorder.result() for recorder in recorders]
         if self.out:
@@ -89,13 +88,20 @@ class WallJob:
 
 
 def begin(path: Path, contacts: Path | None, frames: str, how: Reading) -> tuple[Source, list[int], GrainFrame, float]:
-    """The source, the chosen frames' numbers, the first of them, and its mean diameter (m)."""
+    """The source, the chosen frames' numbers, the first of them that has grains, and its mean diameter (m)."""
     source = open_source(path, contacts, how)
     numbers = frame_numbers(frames, len(source.grains))
-    first = source.grains[numbers[0]]
-    if not len(first.radii):
-        raise DembarkError(f"there are no grains in frame {numbers[0]}", "the first that is chosen", "choose later ones with --frames")
+    first = first_with_grains(source, numbers)
     return source, numbers, first, 2.0 * float(first.radii.mean())
+
+
+def first_with_grains(source: Source, numbers: Sequence[int]) -> GrainFrame:
+    """The first of the frames that has grains, which a run that begins to pour has not; DembarkError when there is none."""
+    for number in numbers:
+        if len((frame := source.grains[number]).radii):
+            return frame
+    raise DembarkError(f"there are no grains in frames {numbers[0]} to {numbers[-1]}", "those that are chosen",
+                       "choose others with --frames")
 
 
 def choose_walls(texts: Sequence[str], source: Source, frame: GrainFrame, diameter: float) -> list[WallWord]:
@@ -126,7 +132,7 @@ def check_meshes(words: Iterable[WallWord], source: Source, frame: GrainFrame) -
 
     Returns the meshes that no grain feels yet, of which only the size was looked at.
     """
-    time, unfelt = source.time(frame.step), []
+    time, unfelt = source.time(frame), []
     for word in words:
         if not isinstance(word.wall, MeshWall):
             continue
@@ -154,7 +160,7 @@ def checked_frames(words: Iterable[WallWord], source: Source, numbers: Sequence[
 
 def mesh_notes(words: Iterable[WallWord], source: Source, numbers: Sequence[int]) -> list[str]:
     """A line for each mesh that is much larger than the box of the grains."""
-    frame = source.grains[numbers[0]]
+    frame = first_with_grains(source, numbers)
     sizes = {word.wall.name: float(np.ptp(word.wall.triangles.reshape(-1, 3), axis=0).max())
              for word in words if isinstance(word.wall, MeshWall)}
     return [f"note: the mesh {name} is {1e3 * size:.4g} mm wide, the box of the grains {1e3 * _room(frame):.4g} mm; is unit= its file's?"
@@ -194,7 +200,7 @@ def check_outputs(*files: Path | None, plot: Path | None) -> None:
 
 def recorders_of(words: Sequence[WallWord], source: Source, numbers: Sequence[int], patch: float) -> list[WallRecorder]:
     """A recorder for each wall, with the patches of the first frame."""
-    first, found = source.grains[numbers[0]], []
+    first, found = first_with_grains(source, numbers), []
     for word in words:
         patches = word.patches(first, patch)
         found.append(WallRecorder(word.wall, patches, keep_series=24 * len(patches) * len(numbers) <= _SERIES_LIMIT))
@@ -211,8 +217,8 @@ def write_wall_files(path: Path, results: Sequence[WallStress], provenance: Attr
 def source_lines(source: Source, numbers: Sequence[int], diameter: float) -> list[str]:
     """What was read."""
     first, last = (int(source.grains.steps[number]) for number in (numbers[0], numbers[-1]))
-    known = not math.isnan(source.time_step)
-    when = f"{source.time(first):.6g} to {source.time(last):.6g} s" if known else "times are steps: give --time-step"
+    begin, end = (source.time(source.grains[number]) for number in (numbers[0], numbers[-1]))
+    when = f"{begin:.6g} to {end:.6g} s" if source.timed else "times are steps: give --time-step"
     count = f"frame {numbers[0]}" if len(numbers) == 1 else f"{len(numbers)} frames, {numbers[0]} to {numbers[-1]}"
     return [*(f"note: {one}" for one in source.notes),
             f"{count} of {len(source.grains)}; steps {first} to {last}, {when}; mean diameter d = {1e3 * diameter:.4g} mm"]
@@ -226,6 +232,8 @@ def wall_lines(one: WallStress, source: Source) -> list[str]:
               f"{1e6 * one.patches.areas.mean():.4g} mm2; the patches' sum differs from it by {one.imbalance():.1e}"),
              (f"  normal stress: largest mean {_pressure(one.mean[largest, 0])} ± {_pressure(one.half[largest, 0])} at "
               f"({', '.join(f'{1e3 * place:.4g}' for place in one.patches.centres[largest])}) mm")]
+    if not one.contacts.any() and not one.outside.any():
+        lines.append("  note: no grain feels this wall in these frames")
     if one.outside.any():
         share = np.abs(one.outside).sum() / max(np.abs(one.force).sum(), 1e-300)
         lines.append(f"  note: {100.0 * share:.2g} % of the force acts outside the patches")

@@ -1,0 +1,243 @@
+"""What a command takes for granted holds for all frames: the region of the fields, the walls, the box, the time; and what it would need."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from dumps import contacts_text, grains_text
+from packings import grain_frame
+
+from dembark.common import memory
+from dembark.common.errors import DembarkError
+from dembark.postproc import ContactFrame
+from dembark.postproc.fields.cells import cell_totals
+from dembark.postproc.fields.coarse_graining import coarse_grain
+from dembark.postproc.fields.grid import Grid
+from dembark.postproc.walls import CylinderWall, Inclusion, PlaneWall
+from dembark.postproc.walls.patches import box_patches, cylinder_patches, inclusion_patches, plane_patches
+from dembark.validation.cli import main
+
+PLACES = np.array([[0.1, 0.1, 0.1], [0.12, 0.1, 0.1], [0.1, 0.13, 0.1], [0.1, 0.1, 0.14]])
+RADII, BOX = np.full(4, 0.01), ((0.0, 1.0),) * 3
+FAR = PLACES + np.array([0.2, 0.3, 0.1])
+
+
+def frame(step, places=PLACES, radii=RADII, **options):
+    """Grains of 0.5 kg."""
+    return grains_text(step, places, radii, masses=np.full(len(places), 0.5), **{"box": BOX} | options)
+
+
+def pairs(step, places=PLACES, flags="ff ff ff"):
+    """A contact of the first two grains."""
+    return contacts_text(step, places[:1], places[1:2], [[1, 2]], [[-1.0, 0.0, 0.0]], box=BOX, flags=flags)
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def fields(grains, *options, contacts=None):
+    """Run `dembark fields` on frames; the exit code."""
+    Path("g.dump").write_text("".join(grains), encoding="ascii")
+    words = ["fields", "g.dump", "--width", "1d", "--out", "f.nc", *(["--fields", "density"] if contacts is None else []), *options]
+    if not {"--grid", "--spacing", "--cells", "--width", "--box"} & set(options):
+        words += ["--grid", "9"]
+    if contacts is not None:
+        Path("c.dump").write_text("".join(contacts), encoding="ascii")
+        words += ["--contacts", "c.dump"]
+    return main(words)
+
+
+def masses():
+    """Mass (kg) in the fields at each time."""
+    with xarray.open_dataset("f.nc") as found:
+        volume = math.prod(float(np.diff(found[f"{axis}_bounds"].values[0])[0]) for axis in "xyz")
+        return (found.density.sum(["x", "y", "z"]) * volume).values
+
+
+JUMPS = {"between": [PLACES, FAR, PLACES], "at the end": [PLACES, PLACES, FAR], "at the start": [FAR, PLACES, PLACES],
+         "and are fewer": [PLACES, FAR[:2], PLACES[:3]], "out of an empty box": [PLACES[:0], FAR, PLACES]}
+
+
+HOW = [["--average", "1"], ["--kernel", "lucy"], ["--spacing", "4d"], ["--cells"]]
+
+
+@pytest.mark.parametrize(("places", "options"), [*((one, []) for one in JUMPS.values()),
+                                                 *((JUMPS["between"], how) for how in HOW)])
+def test_grains_of_every_frame_are_in_the_region(here, capsys, places, options):
+    contacts = [pairs(step, one) if len(one) > 1 else contacts_text(step, [], [], [], [], box=BOX) for step, one in enumerate(places)]
+    assert fields([frame(step, one, RADII[: len(one)]) for step, one in enumerate(places)], *options,
+                  *(["--least-contacts", "0"] if "--cells" in options else []), contacts=contacts) == 0
+    held = 0.5 * np.array([len(one) for one in places])
+    np.testing.assert_allclose(masses(), held if "--average" in options else held.mean(), rtol=1e-9)
+    assert "note: the last" not in capsys.readouterr().out
+
+
+def test_what_lies_outside_a_region_that_was_given_is_told(here, capsys):
+    assert fields([frame(0), frame(1, FAR)], "--box", "0,0.3,0,0.3,0,0.3") == 0
+    assert "note: 50 % of the mass lie outside the region of --box" in capsys.readouterr().out
+    assert masses() == pytest.approx([1.0])
+
+
+@pytest.mark.parametrize(("box", "code"), [(BOX, 0), (((0.0, 1.0), (0.0, 1.0), (0.0, 2.0)), 0), (((0.0, 1.1), *BOX[1:]), 2),
+                                           (((0.1, 1.1), *BOX[1:]), 2)])
+def test_a_periodic_box_that_changes_is_refused_before_the_work(here, capsys, box, code):
+    frames = [frame(0, flags="pp pp ff"), frame(1, box=box, flags="pp pp ff"), frame(2)]
+    assert fields(frames, "--frames", ":2", "--grid", "9") == code
+    if code:
+        assert re.search(r"the periodic box changes along x, 0 to 1 m at step 0, .* at step 1, choose frames", capsys.readouterr().err)
+        assert not (here / "f.nc").exists()
+    else:
+        assert fields(frames, "--grid", "9") == 2
+        assert "the periodic box changes along x" in capsys.readouterr().err
+
+
+# --- what is missing ------------------------------------------------------------------------------------------------------
+
+def test_a_dump_without_forces_of_walls_says_so(here, capsys):
+    wall = {"walls": {"base": np.ones((4, 3))}}
+    for grains, flags, said in (([frame(0)], "ff ff ff", True), ([frame(0, flags="pp pp pp")], "pp pp pp", False),
+                                ([frame(0, **wall)], "ff ff ff", False)):
+        assert fields(grains, contacts=[pairs(0, flags=flags)]) == 0
+        assert ("has no forces of walls (columns f_force_NAME[1..3])" in capsys.readouterr().out) == said
+    # A wall whose columns come later.
+    assert fields([frame(0), frame(1, **wall)], contacts=[pairs(0), pairs(1)]) == 0
+    assert "where the wall base is, is not known" in capsys.readouterr().out
+    assert main(["walls", "g.dump", "--frames", "1", "--wall", "base:plane", "--out", "w.nc"]) == 0
+    assert fields([frame(0, walls={"base": np.zeros((4, 3))})]) == 0
+    assert main(["walls", "g.dump", "--wall", "base:plane", "--out", "w.nc"]) == 0
+    assert "note: no grain feels this wall in these frames" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("column", "message"), [("radius", "column radius is missing"), ("mass", "column mass is missing; give --density"),
+                                                 ("vx", "velocities are not known, the dump has no vx vy vz"), ("z", "column x, y, z is"),
+                                                 ("id", "column id is missing")])
+def test_a_missing_column_gets_one_line(here, capsys, column, message):
+    for grains in ([frame(0), frame(1)], [frame(0)], [frame(1)]):
+        renamed = [re.sub(rf"(ITEM: ATOMS.*) {column} ", r"\1 other ", one) for one in grains]
+        assert fields(grains[:1] * (len(grains) > 1) + renamed[-1:]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and message in error
+        assert not (here / "f.nc").exists()
+
+
+def test_dumps_say_what_is_odd_in_the_summary(here, capsys, recwarn):
+    text = frame(0).replace(" ff ff ff", "")
+    assert fields([text], "--density", "2500 kg/m^3", contacts=[pairs(0)]) == 0
+    said = capsys.readouterr()
+    assert "note: g.dump, from step 0 on: the file does not say which axes are periodic" in said.out
+    assert "note: g.dump, from step 0 on: the given density is not used, for the dump has a column mass" in said.out
+    assert not said.err and not [one for one in recwarn if "density" in str(one.message)]
+
+
+def test_times_are_those_of_the_dump(here, capsys):
+    timed = [frame(step).replace("ITEM: NUM", f"ITEM: TIME\n{time}\nITEM: NUM", 1) for step, time in ((0, 0.0), (100, 1e-3), (200, 1.5e-3))]
+    for option, note in ((["--time-step", "1e-5"], True), ([], False), (["--frames", ":2", "--time-step", "1e-5"], True)):
+        assert fields(timed, "--average", "1", *option) == 0
+        said = capsys.readouterr().out
+        assert ("the times are those of the dump, not its steps times 1e-05 s" in said) == note and "times are steps" not in said
+        with xarray.open_dataset("f.nc") as found:
+            assert found.time.values == pytest.approx([0.0, 1e-3, 1.5e-3][: len(found.time)])
+    assert fields([*timed[:2], frame(200)]) == 2
+    assert "the frame has no ITEM: TIME, but others have" in capsys.readouterr().err
+
+
+def test_units_of_dumps_that_name_none_are_given(here, capsys):
+    assert fields([frame(0), frame(1)], "--units", "cgs") == 0
+    assert "mean diameter d = 0.2 mm" in capsys.readouterr().out
+    assert fields(["ITEM: UNITS\nsi\n" + frame(0)], "--units", "cgs") == 2
+    assert "its units are si, but the option units says cgs" in capsys.readouterr().err
+    assert fields([frame(0)], "--units", "lj") == 2
+    assert "its units are lj, which have no size in SI" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("flags", ["ff ff ff", "pp ff ff"])
+def test_contacts_across_a_border_that_their_dump_does_not_know_are_refused(here, capsys, flags):
+    places = np.array([[0.005, 0.5, 0.5], [0.99, 0.5, 0.5]])
+    for options in ([], ["--cells"]):
+        code = fields([frame(0, places, RADII[:2], flags="pp ff ff")], *options, contacts=[pairs(0, places, flags=flags)])
+        assert code == (2 if flags == "ff ff ff" else 0)
+        if code:
+            assert "the contact of grains 1 and 2 is 985 mm long" in (error := capsys.readouterr().err) and error.count("\n") == 1
+    # Two grains fill a box without periodic axes.
+    chain = grain_frame([[0.0, 0.0, 0.0], [0.019, 0.0, 0.0]], radii=0.01, low=(-0.01,) * 3, high=(0.029, 0.01, 0.01))
+    pair = ContactFrame(0, np.zeros((1, 3)), np.array([[0.019, 0.0, 0.0]]), np.zeros((1, 3)), np.array([chain.ids]))
+    coarse_grain(chain, pair, Grid.around(chain, 0.01), width=0.01)
+
+
+# --- what would not fit ---------------------------------------------------------------------------------------------------
+
+@pytest.fixture
+def small(monkeypatch):
+    """A machine with 1 GB of free memory, so that no test can take more than that."""
+    monkeypatch.setattr(memory, "free_memory", lambda: 1e9)
+
+
+HUGE = [(["--width", "3"], "of memory"), (["--grid", "100000"], "of memory"),
+        (["--grid", "99999999999999999999"], "of memory"), (["--spacing", "1e-9"], "--spacing|larger ones"),
+        (["--spacing", "1e-300"], "larger ones"), (["--spacing", "0.001d"], "of memory"), (["--box", "0,1e9,0,1,0,1"], "of memory"),
+        (["--box", "0,nan,0,1,0,1"], "finite"), (["--width", "-1"], "no length"), (["--spacing", "0"], "no length"),
+        (["--grid", "0,1,1"], "no grid"), (["--grid", "-5"], "no grid"), (["--average", "0"], "--average")]
+
+
+@pytest.mark.parametrize(("options", "message", "flags"), [
+    *((*one, "ff ff ff") for one in HUGE), (["--width", "3"], "of memory", "pp pp pp"),
+    (["--width", "99d", "--box", "0,1,0,1,0,1"], "of memory", "pp pp pp")])
+def test_grids_that_do_not_fit_are_refused_in_one_line(here, capsys, small, options, message, flags):
+    code = fields([frame(0, flags=flags), frame(1, flags=flags)], *options)
+    error = capsys.readouterr().err
+    assert code == 2 and error.count("\n") == 1 and re.search(message, error), error
+    assert not (here / "f.nc").exists()
+
+
+PATCHES = [(["--wall", "base:plane", "--patch", "1e-9"], "larger ones"), (["--wall", "base:plane", "--patch", "0.01d"], "of memory"),
+           (["--wall", "base:plane", "--patch", "1e-300"], "larger ones"), (["--wall", "base:plane:u=0,1e9"], "larger ones"),
+           (["--wall", "base:cylinder:radius=1:around=9999999999"], "larger ones"),
+           (["--wall", "stone:inclusion:ids=1:around=1:along=9999999999"], "larger ones"),
+           (["--wall", "stone:inclusion:ids=1-99999999999"], "too many grains"), (["--wall", "base:plane", "--patch", "nan"], "finite")]
+
+
+@pytest.mark.parametrize(("options", "message"), PATCHES, ids=[" ".join(words) for words, _ in PATCHES])
+def test_patches_that_do_not_fit_are_refused_in_one_line(here, capsys, small, options, message):
+    (here / "g.dump").write_text(frame(0, walls={"base": np.ones((4, 3))}))
+    (here / "c.dump").write_text(pairs(0))
+    assert main(["walls", "g.dump", "--contacts", "c.dump", "--out", "w.nc", *options]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and message in error and not (here / "w.nc").exists()
+
+
+GRAINS = grain_frame(PLACES, radii=0.01, high=(1.0,) * 3)
+PERIODIC = grain_frame(PLACES, radii=0.01, high=(1.0,) * 3, periodic=(True,) * 3)
+CALLS = {
+    "grid": lambda: coarse_grain(GRAINS, None, Grid((0, 0, 0), (1, 1, 1), (10000, 10000, 1)), width=0.01),
+    "kernel": lambda: coarse_grain(PERIODIC, None, Grid((0, 0, 0), (1, 1, 1), (9, 9, 9), (True,) * 3), width=30.0),
+    "images": lambda: coarse_grain(PERIODIC, None, Grid((0, 0, 0), (1, 1, 1), (9, 9, 9), (True,) * 3), width=300.0, kernel="lucy"),
+    "cells": lambda: cell_totals(GRAINS, None, Grid((0, 0, 0), (1, 1, 1), (10000, 10000, 1))),
+    "spacing": lambda: Grid.around(GRAINS, 1e-30),
+    "margin": lambda: Grid.around(GRAINS, 0.1, math.inf),
+    "plane": lambda: plane_patches(PlaneWall("a"), np.linspace(0, 1, 10000), np.linspace(0, 1, 10000)),
+    "cylinder": lambda: cylinder_patches(CylinderWall("a", 1.0), 10**10, np.array([0.0, 1.0])),
+    "sphere": lambda: inclusion_patches(Inclusion("a", (1,)), 1.0, 10, 10**10),
+    "box": lambda: box_patches(PlaneWall("a"), GRAINS, 1e-320),
+}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_functions_refuse_what_does_not_fit(small, name):
+    with pytest.raises(DembarkError, match=r"of memory|larger ones|margin|more than") as caught:
+        CALLS[name]()
+    assert "\n" not in str(caught.value)
+
+
+def test_free_memory_is_that_of_the_machine():
+    assert 1e6 < memory.free_memory() < 1e14
+    memory.check_memory(1e7, "a few cells", "")
+    with pytest.raises(DembarkError, match=r"cells are too many: they take 1e\+\d+ GB of memory, .* GB are free, take fewer"):
+        memory.check_memory(1e18, "cells", "take fewer")
