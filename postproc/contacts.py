@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.dumps.frames import NO_FLAGS, Array, ColumnsError, RawFrame, integers, less_edges, numbered, take
+from dembark.postproc.dumps.frames import NO_FLAGS, Array, ColumnsError, DumpError, RawFrame, integers, less_edges, numbered, take
 from dembark.postproc.dumps.opening import Trajectory, open_dump
 from dembark.postproc.dumps.typed import TypedDump
 from dembark.postproc.dumps.units import KEPT_UNITS, unit_style
@@ -73,6 +73,13 @@ class ContactsDump(TypedDump[ContactFrame]):
             lacking = [name for name in ("first", "forces", "ids") if name not in columns]
             if lacking or ("second" in columns) == ("branch" in columns):
                 raise ContactColumnsError(f"{self.path}: columns= must name {', '.join(lacking) or 'either second or branch'}")
+
+    def at_step(self, step: int) -> ContactFrame:
+        """The contacts of a step; DumpError when the dump has none."""
+        number = int(np.searchsorted(self.steps, step))
+        if number == len(self.steps) or self.steps[number] != step:
+            raise DumpError(f"{self.path} has no frame of step {step}, as the grains have; write both at the same steps")
+        return self[number]
 
     def _frame(self, raw: RawFrame) -> ContactFrame:
         where = f"{self.path}, step {raw.step}"

@@ -58,28 +58,13 @@ class Source:
 
     def frames(self, numbers: Sequence[int]) -> Iterator[tuple[GrainFrame, ContactFrame | None]]:
         """Frames by their numbers, one at a time, each with the contacts of its step; DumpError when those are not there."""
-        beside = _ByStep(self.contacts) if self.contacts is not None else None
         for number in numbers:
             grains = self.grains[number]
-            yield grains, beside.of(number, grains.step) if beside else None
+            yield grains, self.contacts.at_step(grains.step) if self.contacts is not None else None
 
     def walls(self, names: Sequence[str]) -> list[Wall]:
         """The walls of a case of dembark that carry one of `names`, told from its parameters; [] for other files."""
         return _walls_of(self.record.get("parameters", {}), self.time_step, names)
-
-
-class _ByStep:
-    """Contacts of given steps."""
-
-    def __init__(self, dump: ContactsDump) -> None:
-        self._dump = dump
-        self._numbers = {int(step): number for number, step in enumerate(dump.steps)}
-
-    def of(self, number: int, step: int) -> ContactFrame:
-        if step not in self._numbers:
-            raise DumpError(f"{self._dump.path} has no frame of step {step}, which is frame {number} of the grains; "
-                            "write both at the same steps")
-        return self._dump[self._numbers[step]]
 
 
 @dataclass(frozen=True)

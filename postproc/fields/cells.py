@@ -21,7 +21,7 @@ from dembark.common.errors import DembarkError
 from dembark.common.memory import check_memory
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.dumps.frames import cell
-from dembark.postproc.fields.coarse_graining import WallContacts, check_branches
+from dembark.postproc.fields.coarse_graining import WallContacts, check_contacts
 from dembark.postproc.fields.grid import Grid, check_periods
 from dembark.postproc.fields.sums import full_tensor, ratio, symmetric_parts
 from dembark.postproc.grains import GrainFrame
@@ -131,7 +131,7 @@ class CellTotals:
 def cell_totals(grains: GrainFrame, contacts: ContactFrame | None, grid: Grid, walls: Sequence[WallContacts] = ()) -> CellTotals:
     """Sums of one frame; a contact with a wall has the branch from the grain's centre to the wall."""
     check_periods(grid, grains)
-    check_branches(contacts, grains)
+    check_contacts(contacts, grains)
     check_memory(_BYTES * grid.cells, f"{' × '.join(map(str, grid.shape))} cells", "take fewer")
     starts = [wall.positions for wall in walls]
     branches = [wall.points - wall.positions for wall in walls]

@@ -66,7 +66,7 @@ def coarse_grain(
     """
     phi = Kernel(kernel, float(width))
     check_periods(grid, grains)
-    check_branches(contacts, grains)
+    check_contacts(contacts, grains)
     _check_room(grid, phi, grains, contacts)
     spreader = Spreader(grid, phi, grains, closed, threads, backend)
     workers = spreader.workers
@@ -104,11 +104,13 @@ def coarse_grain(
     return sums
 
 
-def check_branches(contacts: ContactFrame | None, grains: GrainFrame) -> None:
-    """DembarkError when the branch of a contact reaches over half of the box: it is not that of the nearest image, for the dump of the
-    contacts does not say that the axis is periodic."""
+def check_contacts(contacts: ContactFrame | None, grains: GrainFrame) -> None:
+    """DembarkError when the contacts are of another step, or when the branch of one reaches over half of the box: it is not that of the
+    nearest image, for the dump of the contacts does not say that the axis is periodic."""
     if contacts is None or not len(contacts.branch):
         return
+    if contacts.step != grains.step:
+        raise DembarkError(f"contacts of step {contacts.step} and grains of step {grains.step}", "", "give both of the same step")
     size = np.asarray(grains.high, float) - grains.low
     for axis in np.flatnonzero((np.abs(contacts.branch).max(axis=0) > 0.5 * size * (1.0 + 1e-9)) & (size > 0.0)):
         row = int(np.abs(contacts.branch[:, axis]).argmax())

@@ -35,6 +35,7 @@ from dembark.postproc.walls.run import (
     check_outputs,
     checked_frames,
     choose_walls,
+    mean_diameter,
     mesh_notes,
     recorders_of,
     source_lines,
@@ -98,7 +99,8 @@ class FieldJob:
 
     `only` are the fields to write, [] for all. What `run` leaves: loads of walls, files, mass in the fields and of the grains in each group
     (kg), largest error of the momentum over the sum of m |v|, the share of cells that are not masked, the walls of the frames whose place
-    is not known (`unplaced`), and whether any frame had a wall (`walled`) or an axis that is not periodic (`bounded`).
+    is not known (`unplaced`), whether any frame had a wall (`walled`) or an axis that is not periodic (`bounded`), and the mean diameter of
+    each frame (m).
     """
 
     words: Words
@@ -116,6 +118,7 @@ class FieldJob:
     momentum_error: float = 0.0
     seen: float = 1.0
     unplaced: list[str] = field(default_factory=list)
+    diameters: list[float] = field(default_factory=list)
     walled: bool = False
     bounded: bool = False
 
@@ -190,6 +193,7 @@ class FieldJob:
             self.bounded |= not grains.periodic.all()
             yield grains, contacts, [wall_contacts(grains, one.wall, time) for one in self.walls if not isinstance(one.wall, Inclusion)]
             sample.add(grains, time)
+            self.diameters += mean_diameter(grains)
             seen(grains, contacts, time)
 
     def _average(self, frames: Iterator[tuple[GrainFrame, ContactFrame | None, list[WallContacts]]], sample: _Sample) -> Labelled:
@@ -225,7 +229,8 @@ class FieldJob:
 
     def summary(self) -> list[str]:
         """What was computed, checked and written, in lines."""
-        lines = [*source_lines(self.source, self.numbers, self.diameter), *mesh_notes(self.walls, self.source, self.numbers)]
+        lines = source_lines(self.source, self.numbers, self.diameter, self.diameters)
+        lines += mesh_notes(self.walls, self.source, self.numbers)
         if self.left_over:
             lines.append(f"note: the last {self.left_over} frames fill no group of their own and were left out")
         size = " × ".join(f"{1e3 * one:.4g}" for one in self.grid.spacing)

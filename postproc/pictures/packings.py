@@ -35,7 +35,7 @@ def scene(folder: Path, colour_by: str, scale: float, cut: bool = False, radius:
     if colour_by == "velocity":
         values, label = -frame.velocities[:, 2] / scale, "downward velocity v / v₀"
     else:
-        contacts = ContactsDump(folder / "contacts.dump")[len(grains) - 1]
+        contacts = ContactsDump(folder / "contacts.dump").at_step(frame.step)
         if colour_by == "stress":
             walls = [wall_contacts(frame, wall) for wall in (CylinderWall("side", radius), PlaneWall("base"))] if radius else []
             values = grain_pressure(frame, contacts, walls) / scale

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from dembark.common.files import read_json
-from dembark.postproc import GrainFrame, GrainsDump
+from dembark.postproc import DumpError, GrainFrame, GrainsDump
 from dembark.postproc.dumptext import TextDump
 from dembark.postproc.history import read_times
 from dembark.postproc.pictures import saved
@@ -87,6 +87,8 @@ def scene(folder: Path, cross_section: str, drum_radius: float = 0.0, drum_speed
     count = len(dump) - first
     shown = np.unique(np.linspace(first, len(dump) - 1, frames if 1 < frames < count else count).round().astype(int))
     frames_shown = [dump[int(number)] for number in shown]
+    if changed := [frame for frame in frames_shown if not np.array_equal(frame.ids, frames_shown[0].ids)]:
+        raise DumpError(f"{changed[0].where}: its grains are not those of step {frames_shown[0].step}, as a section needs")
     record = read_json(folder / "run.json") or {}
     scale = speed or abs(drum_speed) * drum_radius or 1.0
     label = "speed / speed of the rim" if not speed and drum_radius else "speed / (m/s)" if scale == 1.0 else f"speed / ({scale:g} m/s)"

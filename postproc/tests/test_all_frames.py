@@ -149,6 +149,23 @@ def test_times_are_those_of_the_dump(here, capsys):
     assert "the frame has no ITEM: TIME, but others have" in capsys.readouterr().err
 
 
+def test_a_mean_diameter_that_changes_is_told(here, capsys):
+    for later, said in ((RADII, False), (2.0 * RADII, True)):
+        assert fields([frame(0), frame(1, radii=later, walls={"base": np.ones((4, 3))})]) == 0
+        assert ("the mean diameter of the frames is 20 to 40 mm; d is that of the first" in capsys.readouterr().out) == said
+    assert main(["walls", "g.dump", "--frames", "1", "--wall", "base:plane", "--out", "w.nc"]) == 0
+    assert "mean diameter of the frames" not in capsys.readouterr().out
+
+
+def test_contacts_of_another_step_are_not_taken_for_those_of_the_grains():
+    grains = grain_frame(PLACES, radii=0.01, high=(1.0,) * 3)
+    pair = ContactFrame(8, PLACES[:1], PLACES[1:2] - PLACES[:1], np.ones((1, 3)), grains.ids[None, :2])
+    grid = Grid.around(grains, 0.05)
+    for average in (lambda: coarse_grain(grains, pair, grid, width=0.01), lambda: cell_totals(grains, pair, grid)):
+        with pytest.raises(DembarkError, match="contacts of step 8 and grains of step 7, give both of the same step"):
+            average()
+
+
 def test_units_of_dumps_that_name_none_are_given(here, capsys):
     assert fields([frame(0), frame(1)], "--units", "cgs") == 0
     assert "mean diameter d = 0.2 mm" in capsys.readouterr().out
@@ -168,7 +185,7 @@ def test_contacts_across_a_border_that_their_dump_does_not_know_are_refused(here
             assert "the contact of grains 1 and 2 is 985 mm long" in (error := capsys.readouterr().err) and error.count("\n") == 1
     # Two grains fill a box without periodic axes.
     chain = grain_frame([[0.0, 0.0, 0.0], [0.019, 0.0, 0.0]], radii=0.01, low=(-0.01,) * 3, high=(0.029, 0.01, 0.01))
-    pair = ContactFrame(0, np.zeros((1, 3)), np.array([[0.019, 0.0, 0.0]]), np.zeros((1, 3)), np.array([chain.ids]))
+    pair = ContactFrame(chain.step, np.zeros((1, 3)), np.array([[0.019, 0.0, 0.0]]), np.zeros((1, 3)), np.array([chain.ids]))
     coarse_grain(chain, pair, Grid.around(chain, 0.01), width=0.01)
 
 

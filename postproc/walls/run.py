@@ -47,6 +47,7 @@ class WallJob:
     vtkhdf: Path | None
     plot: Path | None
     results: list[WallStress] = field(default_factory=list)
+    diameters: list[float] = field(default_factory=list)
     written: list[Path] = field(default_factory=list)
 
     @classmethod
@@ -69,6 +70,7 @@ class WallJob:
         for grains, contacts in checked_frames(self.walls, self.source, self.numbers):
             for recorder in recorders:
                 recorder.add(grains, contacts, self.source.time(grains))
+            self.diameters += mean_diameter(grains)
             advance()
         self.results = [recorder.result() for recorder in recorders]
         if self.out:
@@ -81,7 +83,8 @@ class WallJob:
 
     def summary(self) -> list[str]:
         """What was measured, checked and written, in lines."""
-        lines = [*source_lines(self.source, self.numbers, self.diameter), *mesh_notes(self.walls, self.source, self.numbers)]
+        lines = source_lines(self.source, self.numbers, self.diameter, self.diameters)
+        lines += mesh_notes(self.walls, self.source, self.numbers)
         for one in self.results:
             lines += wall_lines(one, self.source)
         return [*lines, *(f"written: {path}" for path in self.written)]
@@ -92,7 +95,7 @@ def begin(path: Path, contacts: Path | None, frames: str, how: Reading) -> tuple
     source = open_source(path, contacts, how)
     numbers = frame_numbers(frames, len(source.grains))
     first = first_with_grains(source, numbers)
-    return source, numbers, first, 2.0 * float(first.radii.mean())
+    return source, numbers, first, mean_diameter(first)[0]
 
 
 def first_with_grains(source: Source, numbers: Sequence[int]) -> GrainFrame:
@@ -214,13 +217,20 @@ def write_wall_files(path: Path, results: Sequence[WallStress], provenance: Attr
             for one in results]
 
 
-def source_lines(source: Source, numbers: Sequence[int], diameter: float) -> list[str]:
-    """What was read."""
+def mean_diameter(frame: GrainFrame) -> list[float]:
+    """The mean diameter (m) of the grains of a frame, [] of none."""
+    return [2.0 * float(frame.radii.mean())] if len(frame.radii) else []
+
+
+def source_lines(source: Source, numbers: Sequence[int], diameter: float, diameters: Sequence[float]) -> list[str]:
+    """What was read; `diameters` (m) are those of the frames, `diameter` is what d means."""
     first, last = (int(source.grains.steps[number]) for number in (numbers[0], numbers[-1]))
     begin, end = (source.time(source.grains[number]) for number in (numbers[0], numbers[-1]))
     when = f"{begin:.6g} to {end:.6g} s" if source.timed else "times are steps: give --time-step"
     count = f"frame {numbers[0]}" if len(numbers) == 1 else f"{len(numbers)} frames, {numbers[0]} to {numbers[-1]}"
-    return [*(f"note: {one}" for one in source.notes),
+    low, high = 1e3 * min(diameters, default=diameter), 1e3 * max(diameters, default=diameter)
+    changes = f"the mean diameter of the frames is {low:.4g} to {high:.4g} mm; d is that of the first with grains"
+    return [*(f"note: {one}" for one in (*source.notes, *([changes] if high > 1.01 * low else []))),
             f"{count} of {len(source.grains)}; steps {first} to {last}, {when}; mean diameter d = {1e3 * diameter:.4g} mm"]
 
 
