@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from dembark.input_decks.common.levels import acceleration
 from dembark.postproc.instruments.layer import unexplained
 from dembark.postproc.instruments.mixing import (
     Kinds,
@@ -18,7 +19,7 @@ from dembark.postproc.instruments.mixing import (
     segregation,
     wall_drift,
 )
-from dembark.postproc.instruments.phases import Phases, acceleration, read_phases
+from dembark.postproc.instruments.phases import Phases, read_phases
 from dembark.postproc.measurement import (
     Array,
     Curve,

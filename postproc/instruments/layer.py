@@ -8,31 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dembark.input_decks.common.levels import Level, levels
 from dembark.postproc import DumpError
-from dembark.postproc.instruments.phases import PHASES, acceleration, read_phases
+from dembark.postproc.instruments.phases import PHASES, read_phases
 from dembark.postproc.instruments.standing_waves import Waves, amplitude, onset, surface_levels
-from dembark.postproc.measurement import Array, Estimate, Numbers, Replica, block_mean
+from dembark.postproc.measurement import Array, Estimate, Replica, block_mean
 from dembark.postproc.replica import once
 
 # Power at f/2 over that of noise from which a level counts as one with waves.
 SEEN = 4.0
-
-
-@dataclass(frozen=True)
-class Level:
-    """A level of the drive: its acceleration `gamma` in g, and the period `start` of the motion with which its measuring window begins."""
-
-    gamma: float
-    start: int
-
-
-def levels(p: Numbers) -> list[Level]:
-    """The levels of a run with the parameters `p`: from motion_gamma to last_gamma, and back where that is asked for."""
-    first = acceleration(p)
-    there = [first] if p["levels"] == 1 else list(np.linspace(first, p["last_gamma"], p["levels"]))
-    every = there + (there[-2::-1] if p["back"] == "yes" else [])
-    length = p["level_ramp"] + p["run_in"] + p["periods"]
-    return [Level(float(one), math.ceil(p["motion_ramp"]) + p["run_in"] + k * length) for k, one in enumerate(every)]
 
 
 def unexplained(rows: Mapping[str, Array]) -> float:

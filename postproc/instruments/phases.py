@@ -6,7 +6,6 @@ grains do within a period cancels in their displacements from period to period.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -15,16 +14,10 @@ from numpy.typing import NDArray
 
 from dembark.postproc.dumptext import DumpError
 from dembark.postproc.grains import GrainFrame
-from dembark.postproc.measurement import Array, Numbers
+from dembark.postproc.measurement import Array
 
 # Frames a period.
 PHASES = 8
-
-
-def acceleration(p: Numbers) -> float:
-    """Largest acceleration of the wall over g: as given, or from the amplitude."""
-    given = p["motion_gamma"]
-    return float(p["motion_amplitude"] * (2.0 * math.pi * p["motion_frequency"]) ** 2 / p["gravity"] if given is None else given)
 
 
 @dataclass(frozen=True)

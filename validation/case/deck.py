@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ast
-import hashlib
 import importlib.util
 import math
 import shutil
@@ -21,6 +19,7 @@ import numpy as np
 from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
+from dembark.validation.case import imports
 from dembark.validation.case.folders import package_root
 
 if TYPE_CHECKING:
@@ -87,11 +86,6 @@ def write(case: Case, engine: str, values: Mapping[str, Value], folder: Path) ->
     return setup
 
 
-@cache
-def _check_sum(path: Path, _changed: int) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
 def require_steps(case: Case, values: Mapping[str, Value]) -> None:
     """DembarkError when neither a setup.py nor [derived] gives the steps of a run with the parameters `values`."""
     known = {} if (case.folder / "setup.py").is_file() else case.with_derived(values)
@@ -123,29 +117,25 @@ def derived(setup: Setup) -> dict[str, Value]:
 
 
 def sources(case: Case, engine: str) -> dict[str, str]:
-    """What makes the deck of `engine` beside the parameters: checksums of the files by name, and the expressions of derived numbers."""
-    shared = package_root() / "common"
-    files = {path.name: path for path in (case.deck(engine), case.folder / "setup.py") if path.is_file()} | _companions(case)
-    if setup := files.get("setup.py"):
-        files |= _shared_with_postproc(setup, setup.stat().st_mtime_ns)
-    # A setup.py may read what was measured, too.
-    files |= {f"reference/{path.name}": path for path in (case.folder / "reference").glob("*.csv")}
-    patterns = ("*.py", f"*{case.deck(engine).suffix}", f"{engine}/*")
-    files |= {f"common/{path.relative_to(shared)}": path for pattern in patterns for path in shared.glob(pattern)}
-    found = {name: _check_sum(path, path.stat().st_mtime_ns) for name, path in sorted(files.items())}
-    return found | {f"derived {name}": expression.text for name, expression in case.derived.items()}
+    """What makes the deck of `engine` apart from the parameters: checksums of the files by name, and the expressions of derived numbers.
+
+    Files of the folder `reference` are for measurements. They count here only where setup.py reads them, so names that folder.
+    """
+    shared, setup = package_root() / "common", case.folder / "setup.py"
+    files = {path.name: path for path in (case.deck(engine),) if path.is_file()} | _companions(case)
+    if setup.is_file():
+        files |= imports.dependencies(setup).files
+        files |= reference_files(case) if imports.names(setup, "reference") else {}
+    if case.deck(engine).suffix == ".in":
+        files |= {f"common/{path.relative_to(shared)}": path for pattern in ("*.in", f"{engine}/*") for path in shared.glob(pattern)}
+    found = {name: imports.check_sum(path) for name, path in sorted(files.items())}
+    return found | {f"derived {name}": expression.text for name, expression in case.derived.items()} | {"outputs": " ".join(case.outputs)}
 
 
-@cache
-def _shared_with_postproc(setup: Path, _changed: int) -> dict[str, Path]:
-    """Files of the modules of `dembark.postproc` that a `setup.py` imports, because runs and measurements need the same rule."""
-    try:
-        nodes = ast.walk(ast.parse(setup.read_bytes()))
-    except SyntaxError:  # is told when it is loaded
-        return {}
-    imports = (node.module or "" for node in nodes if isinstance(node, ast.ImportFrom))
-    names = {name.removeprefix("dembark.") for name in imports if name.startswith("dembark.postproc.")}
-    return {name: path for name in names if (path := (package_root().parent / name.replace(".", "/")).with_suffix(".py")).is_file()}
+def reference_files(case: Case) -> dict[str, Path]:
+    """What the case is compared with, in its folder `reference`: data by their names in the case folder, without what only people read."""
+    return {str(path.relative_to(case.folder)): path for path in sorted((case.folder / "reference").rglob("*"))
+            if path.is_file() and path.suffix != ".md" and not path.name.startswith(".")}
 
 
 def _companions(case: Case) -> dict[str, Path]:

@@ -1,0 +1,170 @@
+"""Which files a Python file depends on: the modules of this package that it imports, directly or through others, and files that they name.
+
+Dependencies are read from the source, so that nothing has to be imported for it.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+
+import dembark
+
+_PACKAGE = "dembark"
+_COMPILED = (".so", ".pyd")
+
+
+@dataclass(frozen=True)
+class _Names:
+    """What the source of a module names: `modules` (`a.b.c`) that it may import, and other `words` of its text constants."""
+
+    modules: frozenset[str]
+    words: frozenset[str]
+
+
+@dataclass(frozen=True)
+class Dependencies:
+    """Files by names that do not depend on where they are installed, and the libraries of others, by their import names."""
+
+    files: Mapping[str, Path]
+    libraries: frozenset[str]
+
+    def digest(self) -> str:
+        """Hash of the contents of all files and of the versions of all libraries."""
+        facts = {"files": {name: check_sum(path) for name, path in sorted(self.files.items())},
+                 "libraries": {name: _version(name) for name in sorted(self.libraries)}}
+        return hashlib.sha256(json.dumps(facts).encode()).hexdigest()
+
+
+def check_sum(path: Path) -> str:
+    """SHA-256 of a file, computed once until it changes."""
+    facts = path.stat()
+    return _check_sum(path, facts.st_mtime_ns, facts.st_ctime_ns, facts.st_size)
+
+
+@cache
+def _check_sum(path: Path, *_changed: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def dependencies(*roots: Path) -> Dependencies:
+    """What the Python files `roots` depend on, themselves among it.
+
+    Imports within functions count, those under TYPE_CHECKING do not. Of a package only what is imported from it counts. A module that names
+    a file in its own folder depends on that file. A file that cannot be parsed counts alone: it is reported when it is loaded.
+    """
+    files: dict[str, Path] = {}
+    libraries: set[str] = set()
+    waiting = [(path.name, path) for path in roots]
+    while waiting:
+        name, path = waiting.pop()
+        if name in files:
+            continue
+        files[name] = path
+        if path.suffix != ".py":
+            continue
+        found = _named(path)
+        for module in found.modules:
+            if module.split(".")[0] != _PACKAGE:
+                libraries.add(module.split(".")[0])
+            elif place := module_file(module):
+                waiting.append((_label(module, place), place))
+        waiting += [(f"{name.rpartition('/')[0]}/{word}".lstrip("/"), path.parent / word) for word in found.words
+                    if _is_beside(path.parent, word)]
+    return Dependencies(files, frozenset(libraries - sys.stdlib_module_names))
+
+
+def names(path: Path, word: str) -> bool:
+    """Whether a text constant of the Python file `path` is `word`, or a relative path that begins with it."""
+    return any(one == word or one.startswith(f"{word}/") for one in _named(path).words)
+
+
+def _named(path: Path) -> _Names:
+    facts = path.stat()
+    return _read(path, facts.st_mtime_ns, facts.st_ctime_ns, facts.st_size)
+
+
+@cache
+def _read(path: Path, *_changed: int) -> _Names:
+    try:
+        tree = ast.parse(path.read_bytes())
+    except (SyntaxError, ValueError):
+        return _Names(frozenset(), frozenset())
+    modules, words = set[str](), set[str]()
+    for node in _nodes(tree):
+        match node:
+            case ast.Import(names=found):
+                modules |= {one.name for one in found}
+            case ast.ImportFrom(module=module, names=found, level=0) if module:
+                modules |= {f"{module}.{one.name}" for one in found}
+            case ast.ImportFrom(module=module, names=found, level=level):
+                modules |= {f"{_own_package(path, level)}.{module + '.' if module else ''}{one.name}" for one in found}
+            case ast.Constant(value=str(word)) if word.startswith(f"{_PACKAGE}.") and word.replace(".", "").isidentifier():
+                modules.add(word)  # for import_module
+            case ast.Constant(value=str(word)):
+                words.add(word)
+    return _Names(frozenset(modules), frozenset(words))
+
+
+def _nodes(tree: ast.AST) -> Iterator[ast.AST]:
+    """All nodes but those that only type checkers see."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+            yield from (inner for other in node.orelse for inner in (other, *_nodes(other)))
+            continue
+        yield node
+        yield from _nodes(node)
+
+
+def _own_package(path: Path, level: int) -> str:
+    folder = path.parents[level - 1]
+    parts: list[str] = []
+    while (folder / "__init__.py").is_file():
+        parts.insert(0, folder.name)
+        folder = folder.parent
+    return ".".join([_PACKAGE, *parts])
+
+
+@cache
+def module_file(name: str) -> Path | None:
+    """File of the module `name` of this package, or of the one that defines the name after its last point; None when there is none."""
+    _, *parts = name.split(".")
+    for count in range(len(parts), 0, -1):
+        for root in map(Path, dembark.__path__):
+            place = root.joinpath(*parts[:count])
+            for path in (place.with_name(f"{place.name}.py"), place / "__init__.py", *_compiled(place)):
+                if path.is_file():
+                    return path
+    return None
+
+
+def _compiled(place: Path) -> Iterable[Path]:
+    return (path for path in place.parent.glob(f"{place.name}.*") if path.suffix in _COMPILED) if place.parent.is_dir() else ()
+
+
+def _label(module: str, place: Path) -> str:
+    """The place within the package, the same in every installation."""
+    for root in map(Path, dembark.__path__):
+        if place.is_relative_to(root):
+            # The ending of a compiled module says for which Python it is.
+            return str(place.relative_to(root)) if place.suffix == ".py" else str(place.relative_to(root).parent / place.name.split(".")[0])
+    raise AssertionError(module)
+
+
+def _is_beside(folder: Path, word: str) -> bool:
+    return 0 < len(word) < 100 and "." in word and "/" not in word and "\0" not in word and (folder / word).is_file()
+
+
+@cache
+def _version(library: str) -> str:
+    try:
+        return metadata.version(library)
+    except metadata.PackageNotFoundError:
+        return ""
