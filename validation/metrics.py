@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from statistics import fmean
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from dembark.common.errors import RunError
 from dembark.common.files import read_json
@@ -15,11 +16,8 @@ from dembark.validation import analysis, engines, provenance
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
 from dembark.validation.case.model import Case, Study
-from dembark.validation.judge import measuring
+from dembark.validation.judge import inputs, measured, measuring
 from dembark.validation.judge.result import METRICS, Result, as_json, read
-
-if TYPE_CHECKING:
-    import xarray
 
 
 class Early:
@@ -58,8 +56,8 @@ def _whole(record: dict[str, Any]) -> dict[str, Any]:
 
 
 def measure(folder: Path, wanted: int | None = None, early: Early | None = None) -> Result:
-    """Measure the replicas in `folder`, of which there are to be `wanted`, and write their `fields.nc`; what `early` has read is not read
-    again.
+    """Measure the replicas in `folder`, of which there are to be `wanted`, and judge what was measured; `measurement.json` keeps it, and
+    `fields.nc` its fields. What was measured before, or `early` has read, of the same inputs is neither measured nor read again.
 
     RunError when there is no finished replica, or one of their files cannot be read: a result is whole or not there.
     """
@@ -68,22 +66,34 @@ def measure(folder: Path, wanted: int | None = None, early: Early | None = None)
     if not runs:
         raise RunError(f"nothing to measure in {folder}", "it has no finished replica-*/run.json")
     first, case = runs[0].record, find(runs[0].record["case"])
-    with analysis.warnings_kept() as warnings:
-        found = measuring.measure(case, runs)
-        if found.fields is not None:
-            _write_fields(folder, found.fields)
-        quantities = measuring.quantities(case, found)
+    made_of = inputs.of_measurement(case, [one.folder / "run.json" for one in runs])
+    kept = measured.read(folder, made_of) or _measure(folder, case, runs, early, made_of)
     parameters = {key: value for key, value in first["parameters"].items() if key != "seed"}
     if wanted is not None and "replicas" in parameters:
         # Those of an earlier request for fewer or more are kept, and know its number.
         parameters["replicas"] = wanted
     numbers = {int(one.record["replica"]) for one in runs}
     return Result(
-        case.name, first["variant"], first["engine"], quantities, first["profile"], parameters=parameters, profiles=tuple(found.profiles),
-        remarks=(*_remarks(case, found), *dict.fromkeys([*early.warnings, *warnings])), picture=measuring.picture(case, first),
-        references=measuring.references(case), provenance=_provenance(runs), measured=provenance.measured(),
+        case.name, first["variant"], first["engine"], measuring.quantities(case, kept.found), first["profile"], parameters=parameters,
+        profiles=tuple(kept.found.profiles), remarks=_remarks(case, kept.found), picture=measuring.picture(case, first),
+        references=measuring.references(case), provenance=_provenance(runs), measured=kept.facts,
         inputs=tuple(one.record["inputs"] for one in runs if "inputs" in one.record),
         replicas_missing=tuple(number for number in range(1, (wanted or 0) + 1) if number not in numbers))
+
+
+def _measure(folder: Path, case: Case, runs: Sequence[Replica], early: Early, made_of: str) -> measured.Measured:
+    (folder / measured.FILE).unlink(missing_ok=True)
+    fields = ""
+    with analysis.warnings_kept() as warnings:
+        found = measuring.measure(case, runs)
+        if found.fields is not None:
+            # Labelled arrays take a second to import, which commands that measure nothing need not wait for.
+            from dembark.postproc import figures, labelled
+
+            fields = figures.FILE
+            labelled.write(folder / fields, found.fields)
+    noted = replace(found, remarks=[*found.remarks, *dict.fromkeys([*early.warnings, *warnings])], fields=None)
+    return measured.write(folder, measured.Measured(made_of, noted, provenance.measured(), fields))
 
 
 def picture(folder: Path) -> Mapping[str, Any] | None:
@@ -94,13 +104,6 @@ def picture(folder: Path) -> Mapping[str, Any] | None:
 
 def _remarks(case: Case, found: Measurement) -> tuple[str, ...]:
     return *found.remarks, *measuring.statements(case)
-
-
-def _write_fields(folder: Path, fields: xarray.Dataset) -> None:
-    # Labelled arrays take a second to import, which commands that measure nothing need not wait for.
-    from dembark.postproc import figures, labelled
-
-    labelled.write(folder / figures.FILE, fields)
 
 
 def study(planned: Study, folders: Sequence[Path]) -> Result:

@@ -44,13 +44,19 @@ class Dependencies:
 
 
 def check_sum(path: Path) -> str:
-    """SHA-256 of a file, computed once until it changes."""
+    """SHA-256 of a file, computed once until it changes; of a module of this package once, for a process goes on with what it imported."""
+    return _check_sum(path, *_state(path))
+
+
+def _state(path: Path) -> tuple[int, ...]:
+    if any(path.is_relative_to(root) for root in dembark.__path__):
+        return ()
     facts = path.stat()
-    return _check_sum(path, facts.st_mtime_ns, facts.st_ctime_ns, facts.st_size)
+    return facts.st_mtime_ns, facts.st_ctime_ns, facts.st_size
 
 
 @cache
-def _check_sum(path: Path, *_changed: int) -> str:
+def _check_sum(path: Path, *_state: int) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
@@ -62,7 +68,7 @@ def dependencies(*roots: Path) -> Dependencies:
     """
     files: dict[str, Path] = {}
     libraries: set[str] = set()
-    waiting = [(path.name, path) for path in roots]
+    waiting = [(_label(path), path) for path in roots]
     while waiting:
         name, path = waiting.pop()
         if name in files:
@@ -75,7 +81,7 @@ def dependencies(*roots: Path) -> Dependencies:
             if module.split(".")[0] != _PACKAGE:
                 libraries.add(module.split(".")[0])
             elif place := module_file(module):
-                waiting.append((_label(module, place), place))
+                waiting.append((_label(place), place))
         waiting += [(f"{name.rpartition('/')[0]}/{word}".lstrip("/"), path.parent / word) for word in found.words
                     if _is_beside(path.parent, word)]
     return Dependencies(files, frozenset(libraries - sys.stdlib_module_names))
@@ -87,12 +93,11 @@ def names(path: Path, word: str) -> bool:
 
 
 def _named(path: Path) -> _Names:
-    facts = path.stat()
-    return _read(path, facts.st_mtime_ns, facts.st_ctime_ns, facts.st_size)
+    return _read(path, *_state(path))
 
 
 @cache
-def _read(path: Path, *_changed: int) -> _Names:
+def _read(path: Path, *_state: int) -> _Names:
     try:
         tree = ast.parse(path.read_bytes())
     except (SyntaxError, ValueError):
@@ -149,13 +154,14 @@ def _compiled(place: Path) -> Iterable[Path]:
     return (path for path in place.parent.glob(f"{place.name}.*") if path.suffix in _COMPILED) if place.parent.is_dir() else ()
 
 
-def _label(module: str, place: Path) -> str:
-    """The place within the package, the same in every installation."""
+def _label(path: Path) -> str:
+    """The place within the package, the same in every installation; the name of a file of another place."""
     for root in map(Path, dembark.__path__):
-        if place.is_relative_to(root):
+        if path.is_relative_to(root):
+            place = path.relative_to(root)
             # The ending of a compiled module says for which Python it is.
-            return str(place.relative_to(root)) if place.suffix == ".py" else str(place.relative_to(root).parent / place.name.split(".")[0])
-    raise AssertionError(module)
+            return str(place.with_name(place.name.split(".")[0]) if path.suffix in _COMPILED else place)
+    return path.name
 
 
 def _is_beside(folder: Path, word: str) -> bool:

@@ -97,7 +97,8 @@ class Result:
     """The replicas of one case, variant and engine, measured and judged; or a study of several variants, with a `title` of its own.
 
     `profiles`: curves as `postproc.resampling.profile` makes them; `picture`: how to show the packing; `references`: cited works;
-    `measured`: when and by which commit; `inputs`: hash of each replica's inputs; `replicas_missing`: numbers of those that did not finish.
+    `measured`: when and by which commit; `inputs`: hash of each replica's inputs; `replicas_missing`: numbers of those that did not finish;
+    `made_of`: hash of all that it is made of, see `inputs`.
     """
 
     case: str
@@ -116,6 +117,7 @@ class Result:
     measured: Mapping[str, Any] = field(default_factory=dict)
     inputs: tuple[str, ...] = ()
     replicas_missing: tuple[int, ...] = ()
+    made_of: str = ""
 
     def find(self, name: str) -> QuantityRecord | None:
         """The quantity of that name; None when there is none."""
@@ -134,6 +136,7 @@ class Comparison:
     cap: float = 0.10
     measured: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    made_of: str = ""
 
 
 def as_json(value: QuantityRecord | Result | Comparison) -> dict[str, Any]:
@@ -213,13 +216,18 @@ def _value(content: Mapping[str, Any], kind: type[Kind], where: str, notes: dict
     return kind(**given)
 
 
+def result_files(folder: Path) -> list[Path]:
+    """The files of all results and comparisons below a results folder, in the order of their places."""
+    return sorted(path for name in (f"*/*/*/{METRICS}", f"*/*/{COMPARISON}") for path in folder.glob(name)
+                  if "superseded" not in path.relative_to(folder).parts)
+
+
 def results(folder: Path) -> tuple[list[Result], list[Comparison], list[str]]:
     """All results and comparisons below a results folder in the order of their places, and a line for each file that cannot be read."""
     found: list[Result] = []
     compared: list[Comparison] = []
     problems: list[str] = []
-    for path in sorted(path for name in (f"*/*/*/{METRICS}", f"*/*/{COMPARISON}") for path in folder.glob(name)
-                       if "superseded" not in path.parts):
+    for path in result_files(folder):
         try:
             if path.name == METRICS:
                 found.append(read(path))

@@ -192,13 +192,15 @@ class Executor:
     def _start_step(self, step: Step) -> None:
         if step.kind == "report":
             self._before()
-        inputs, state = step.inputs(), self._table.state(step.name)
-        if state.state == "finished":
-            if state.inputs == inputs and step.target.is_file():
-                self._open.discard(step.name)
-                return
+        finished = self._table.state(step.name).state == "finished"
+        if step.up_to_date():
+            if not finished:
+                self._table.transition(step.name, "finished")
+            self._open.discard(step.name)
+            return
+        if finished:
             self._table.transition(step.name, "waiting")
-        self._table.transition(step.name, "running", inputs=inputs, host=socket.gethostname())
+        self._table.transition(step.name, "running", host=socket.gethostname())
         elsewhere = self._backend.start_step(step)
         self._under_way[elsewhere or self._workers.start(step)] = _Work(step, Resources(), elsewhere is None)
 

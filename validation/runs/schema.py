@@ -14,7 +14,7 @@ from dembark.common.files import disk_error
 
 FILE = "store.sqlite"
 # A change of the tables below is a new version.
-VERSION = 4
+VERSION = 5
 PATIENCE = 60.0
 
 _PLACE = {"campaign": "TEXT NOT NULL", "case_name": "TEXT NOT NULL", "variant": "TEXT NOT NULL"}
@@ -35,7 +35,7 @@ TABLES: dict[str, dict[str, str]] = {
         "threads": "INTEGER", "particles": "INTEGER", "steps": "INTEGER", "time_step": "REAL", "estimated_time": "REAL",
         "wall_time": "REAL", "particle_steps_per_second": "REAL", "commit_hash": "TEXT",
         "dirty": "INTEGER", "cpu": "TEXT", "started": "TEXT", "folder": "TEXT"},
-    "steps": {"campaign": "TEXT NOT NULL", "name": "TEXT NOT NULL", "kind": "TEXT NOT NULL", **_STATE, "inputs": "TEXT"},
+    "steps": {"campaign": "TEXT NOT NULL", "name": "TEXT NOT NULL", "kind": "TEXT NOT NULL", **_STATE},
     "quantities": {
         **_PLACE, "engine": "TEXT NOT NULL", **_VALUE, "basis": "TEXT", "deviation_half_width": "REAL", "compared": "INTEGER",
         "agreement": "REAL", "replicas": "INTEGER", "parameters_json": "TEXT", **_MEASURED, "engine_version": "TEXT NOT NULL",

@@ -130,6 +130,8 @@ def _run_into(run: Run, target: Path, progress: Progress, cancel: threading.Even
         outcome.check_room(run, target.parent)
         step, computed = restarts.begin(run, work), True
         setup = deck.write(run.case, run.engine.name, run.values, work) if step is None else deck.prepare(run.case, run.values)
+        if replace(run).inputs != run.inputs:
+            raise RunError("its deck was changed since this was planned", f"in {run.case.folder}", "start again")
         record = _execute(run, work, step, progress, ended, used) | {"derived": deck.derived(setup)}
         restarts.clear(run, work)
         deck.archive(run.case, work)

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dembark import common, postproc, validation
 from dembark.common.errors import DembarkError, RunError
-from dembark.common.files import retire
+from dembark.common.files import read_json, retire, write_json, write_whole
 from dembark.postproc import pictures
 from dembark.validation import analysis, provenance
-from dembark.validation.judge.result import COMPARISON, METRICS, Result, write
+from dembark.validation.case.folders import files
+from dembark.validation.judge import inputs
+from dembark.validation.judge.result import COMPARISON, METRICS, Result, result_files, write
 from dembark.validation.runs.plan import Plan, PlannedStudy, Run, finished, studies, variants
 
 if TYPE_CHECKING:
@@ -24,15 +24,16 @@ if TYPE_CHECKING:
 
 # A campaign's folder holds a copy of its file.
 CAMPAIGN_FILE = "campaign.toml"
-_REPORTING = {"report", "verification", "figures"}
-_ELSEWHERE = {"runs", "campaigns", "tests"}
+_DRAWN = "pictures.json"
+# What draws and lays out reports, and the code that verifies the instruments for them.
+_REPORTING = ("validation/report", "validation/campaigns/report", "validation/verification", "postproc/figures")
 
 
 @dataclass(frozen=True)
 class Step:
-    """`call(*arguments)` makes `target` of `sources`, after all runs and steps called `needs` have ended; `place` is its folder.
+    """`call(*arguments)` makes `target`, after all runs and steps called `needs` have ended; `place` is its folder.
 
-    `wanted`: hash of the inputs of runs, which tells a result that is to be measured from one of earlier inputs.
+    `inputs` gives the hash of what the target is to be made of; the target holds that of which it was made.
     """
 
     name: str
@@ -40,53 +41,64 @@ class Step:
     place: Path
     needs: tuple[str, ...]
     target: Path
-    sources: tuple[Path, ...]
+    inputs: Callable[[], str]
     call: Callable[..., object]
     arguments: tuple[Any, ...]
-    wanted: str = ""
 
-    def inputs(self) -> str:
-        """Hash of the contents of its sources, and of the code that reads them."""
-        total = hashlib.sha256((_code(self.kind == "report") + self.wanted).encode())
-        for path in self.sources:
-            total.update(path.read_bytes() if path.is_file() else b"missing")
-        return total.hexdigest()
-
-
-@cache
-def _code(reporting: bool) -> str:
-    total = hashlib.sha256()
-    for folder in (Path(place) for package in (common, validation, postproc) for place in package.__path__):
-        for path in sorted(folder.rglob("*.*")):
-            parts = set(path.relative_to(folder).parts)
-            wanted = parts & _REPORTING and not parts & {"tests"} if reporting else not parts & (_REPORTING | _ELSEWHERE)
-            if path.suffix in (".py", ".toml", ".j2", ".css") and wanted:
-                total.update(path.read_bytes())
-    return total.hexdigest()
+    def up_to_date(self) -> bool:
+        """Whether the target is there and made of what is there now."""
+        return self.target.is_file() and inputs.stored(self.target) == self.inputs()
 
 
 def steps(plan: Plan, results: Path) -> list[Step]:
     """All steps after the runs of `plan`, each after those that it needs."""
     found = []
     for one in plan.series:
-        folder, own = results / one.place, one.runs[0].case.folder / "measure.py"
+        folder = results / one.place
         found.append(Step(name("measure", one.place), "measure", one.place, tuple(run.name for run in one.runs), folder / METRICS,
-                          (own, *(folder / run.folder_name / "run.json" for run in one.runs)), measure_series, (folder, one.runs),
-                          "".join(run.inputs for run in one.runs)))
+                          partial(of_series, folder, one.runs), measure_series, (folder, one.runs)))
     for planned in studies(plan.series):
-        parts = tuple(results / one.place / METRICS for one in planned.series)
-        found.append(Step(name("study", planned.place), "study", planned.place, tuple(name("measure", one.place) for one in planned.series),
-                          results / planned.place / METRICS, parts, measure_study, (results, planned)))
+        needs = tuple(name("measure", one.place) for one in planned.series)
+        found.append(Step(name("study", planned.place), "study", planned.place, needs, results / planned.place / METRICS,
+                          partial(of_study, results, planned), measure_study, (results, planned)))
     for place, group in variants(plan.series).items():
         if len(group) > 1:
-            kinds = tuple(name("study" if isinstance(one, PlannedStudy) else "measure", one.place) for one in group)
+            needs = tuple(name("study" if isinstance(one, PlannedStudy) else "measure", one.place) for one in group)
             sources = tuple(results / one.place / METRICS for one in group)
-            found.append(Step(name("compare", place), "compare", place, kinds, results / place / COMPARISON, sources,
-                              compare_engines, (results / place, sources)))
-    sources = (results / "runs.json", results / CAMPAIGN_FILE, *(step.target for step in found))
-    found.append(Step("report", "report", Path(), tuple(step.name for step in found), results / "report.html", sources, build_report,
-                      (results,)))
+            found.append(Step(name("compare", place), "compare", place, needs, results / place / COMPARISON,
+                              partial(of_comparison, sources), compare_engines, (results / place, sources)))
+    found.append(Step("report", "report", Path(), tuple(step.name for step in found), results / "report.html",
+                      partial(of_report, results), build_report, (results,)))
     return found
+
+
+def of_series(folder: Path, runs: Iterable[Run]) -> str:
+    """What the results of a series are made of: measurement, verdicts and pictures of the finished ones of `runs`."""
+    runs = list(runs)
+    case = runs[0].case
+    records = [path for run in runs if finished((path := folder / run.folder_name / "run.json").parent, run)]
+    return inputs.digest([run.inputs for run in runs], inputs.of_measurement(case, records), inputs.of_verdicts(case),
+                         inputs.of_pictures(case, records))
+
+
+def of_study(results: Path, planned: PlannedStudy) -> str:
+    """What a study is made of."""
+    case = planned.series[0].runs[0].case
+    return inputs.digest(asdict(planned.study) | {"formal_order": planned.study.formal_order.text},
+                         inputs.of_study(case, [results / one.place / METRICS for one in planned.series]))
+
+
+def of_comparison(metrics: Iterable[Path]) -> str:
+    """What a comparison of engines is made of."""
+    return inputs.digest(inputs.of_code("validation/judge/compare.py"), [inputs.content(path) for path in metrics])
+
+
+def of_report(results: Path) -> str:
+    """What a report is made of: results, what was to be run, what the cases say of themselves, and the code that lays it out."""
+    read = (results / "runs.json", results / CAMPAIGN_FILE, *result_files(results))
+    kept = {str(path.relative_to(results)): inputs.content(path) for path in read}
+    cases = {path.parent.name: inputs.content(path) for path in files() if path.parent.name in {name.split("/")[0] for name in kept}}
+    return inputs.digest(kept, cases, inputs.of_code(*_REPORTING))
 
 
 def name(kind: str, place: Path) -> str:
@@ -113,7 +125,8 @@ def draw(folder: Path) -> list[str]:
 
 
 def measure_series(folder: Path, runs: Iterable[Run], drawn: Future[list[str]] | None = None, early: Early | None = None) -> Result:
-    """Measure the finished ones of `runs` and write `folder/metrics.json`; results of other inputs are put aside first.
+    """Measure and judge the finished ones of `runs` and write `folder/metrics.json`; results of other inputs are put aside first. What was
+    measured or drawn of the same inputs is kept.
 
     `drawn`: what `draw` returns, where the pictures are being drawn already; `early`: what was read already. Raises RunError when none is
     finished or the measurement fails; then there is no metrics.json, rather than an old one.
@@ -127,32 +140,47 @@ def measure_series(folder: Path, runs: Iterable[Run], drawn: Future[list[str]] |
     if not done:
         retire(target)
         raise RunError(f"nothing to measure in {folder}", "none of its runs is finished")
+    made_of = of_series(folder, wanted.values())
     target.unlink(missing_ok=True)
     with _told(f"{folder} could not be measured", lambda error: analysis.reasons(folder, error, done[0].case)):
         from dembark.validation.metrics import measure
 
         # A process of its own draws, which measuring need not wait for.
         with ThreadPoolExecutor(1) as beside:
-            drawn = drawn or beside.submit(draw, folder)
+            drawing = beside.submit(_drawn, folder, done, drawn)
             found = measure(folder, len(wanted), early)
-        return write(target, replace(found, remarks=(*found.remarks, *drawn.result())))
+        return write(target, replace(found, remarks=(*found.remarks, *drawing.result()), made_of=made_of))
+
+
+def _drawn(folder: Path, runs: Sequence[Run], drawn: Future[list[str]] | None) -> list[str]:
+    """Remarks on the pictures of `runs`, which are drawn unless those in `folder` are of the same inputs."""
+    record = folder / _DRAWN
+    made_of = inputs.of_pictures(runs[0].case, [folder / run.folder_name / "run.json" for run in runs])
+    kept = read_json(record) or {}
+    if drawn is None and kept.get(inputs.KEY) == made_of and all((folder / name).is_file() for name in kept["files"]):
+        return list(kept["remarks"])
+    record.unlink(missing_ok=True)
+    remarks = drawn.result() if drawn else draw(folder)
+    there = [name for name in (pictures.PICTURE, pictures.ANIMATION) if (folder / name).is_file()]
+    write_json(record, {inputs.KEY: made_of, "files": there, "remarks": remarks})
+    return remarks
 
 
 def measure_study(results: Path, planned: PlannedStudy) -> None:
     """Write `metrics.json` of a study from those of its variants; RunError when one of them is missing or the study fails."""
-    target = results / planned.place / METRICS
+    target, made_of = results / planned.place / METRICS, of_study(results, planned)
     target.parent.mkdir(parents=True, exist_ok=True)
     target.unlink(missing_ok=True)
     with _told(f"{results / planned.place} could not be measured"):
         from dembark.validation.metrics import study
 
-        write(target, study(planned.study, [results / one.place for one in planned.series]))
+        write(target, replace(study(planned.study, [results / one.place for one in planned.series]), made_of=made_of))
 
 
 def compare_engines(folder: Path, metrics: Sequence[Path]) -> None:
     """Write `folder/comparison.json` (folder = results/<profile>/<case>/<variant>) when two of `metrics` or more are there; an old one goes
     aside otherwise. RunError when the comparison fails."""
-    target = folder / COMPARISON
+    target, made_of = folder / COMPARISON, of_comparison(metrics)
     if sum(path.is_file() for path in metrics) < 2:
         retire(target)
         return
@@ -160,12 +188,13 @@ def compare_engines(folder: Path, metrics: Sequence[Path]) -> None:
     with _told(f"{folder} could not be compared"):
         from dembark.validation.judge.compare import compare
 
-        write(target, replace(compare(folder), measured=provenance.measured()))
+        write(target, replace(compare(folder), measured=provenance.measured(), made_of=made_of))
 
 
 def build_report(results: Path) -> None:
     """Write report.html and report.pdf into `results` (results/<profile> or a campaign's folder); RunError when that fails."""
     build: Callable[[Path], Path]
+    made_of = of_report(results)
     if (results / CAMPAIGN_FILE).is_file():
         from dembark.validation.campaigns.report.build import build
     else:
@@ -175,6 +204,8 @@ def build_report(results: Path) -> None:
         # The report of a profile includes the verification of the instruments.
         verification.write(results)
     # Better none than one of other results.
-    (results / "report.html").unlink(missing_ok=True)
+    report = results / "report.html"
+    report.unlink(missing_ok=True)
     with _told(f"the report of {results} could not be built"):
         build(results)
+        write_whole(report, inputs.stamp(report.read_text(encoding="utf-8"), made_of).encode())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import threading
@@ -9,12 +10,16 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import pytest
 from harness import decks, stand_in  # noqa: F401
 
 from dembark.common.errors import Interrupted, Killed, RunError
+from dembark.common.files import write_json
+from dembark.validation.judge.inputs import KEY, content, digest, stored
+from dembark.validation.runs import schema
 from dembark.validation.runs.executor import Executor, Local, Task
 from dembark.validation.runs.plan import Resources, Run, of_profile
 from dembark.validation.runs.simulate import Progress
@@ -57,8 +62,12 @@ def tasks(folder: Path) -> list[Task]:
     return [Task(run, folder / one.place, Resources()) for one in of_profile("quick") for run in one.runs]
 
 
-def write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
+def write(path: Path, sources: Sequence[Path]) -> None:
+    write_json(path, {KEY: of(sources)})
+
+
+def of(sources: Sequence[Path]) -> str:
+    return digest([content(path) for path in sources])
 
 
 def fail(text: str) -> None:
@@ -74,8 +83,8 @@ def die(once: Path) -> None:
 
 def step(name: str, folder: Path, needs: Sequence[str], call: Callable[..., object] | None = None, *arguments: object,
          sources: Sequence[Path] = ()) -> Step:
-    target = folder / name
-    return Step(name, "measure", Path(), tuple(needs), target, tuple(sources), call or write, arguments or (target, name))
+    target = folder / f"{name}.json"
+    return Step(name, "measure", Path(), tuple(needs), target, partial(of, sources), call or write, arguments or (target, sources))
 
 
 def executor(folder: Path, backend: object, work: Sequence[Task], steps: Sequence[Step], retries: int = 2,
@@ -97,25 +106,29 @@ def test_what_was_killed_is_started_again_and_what_failed_is_not(tmp_path: Path)
     assert backend.started[:2] == [one, two]
     states = {state.name: (state.state, state.message) for state in table.states()}
     assert states == {one: ("finished", ""), two: ("failed", "it blew up"), three: ("failed", "x"), "m": ("finished", "")}
-    assert list(made.errors) == [two, three] and (tmp_path / "m").read_text() == "m"
+    assert list(made.errors) == [two, three] and stored(tmp_path / "m.json")
     assert max(backend.busy) <= 2
 
 
 def test_steps_are_made_again_when_what_they_read_has_changed(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.write_text("1")
-    first, second = step("a", tmp_path, [], sources=[source]), step("b", tmp_path, ["a"], sources=[tmp_path / "a"])
+    first, second = step("a", tmp_path, [], sources=[source]), step("b", tmp_path, ["a"], sources=[tmp_path / "a.json"])
 
     def made() -> set[str]:
-        before = {name: (tmp_path / name).stat().st_mtime_ns for name in "ab" if (tmp_path / name).exists()}
+        before = {name: (tmp_path / f"{name}.json").stat().st_mtime_ns for name in "ab" if (tmp_path / f"{name}.json").exists()}
         executor(tmp_path, Scripted(), [], [first, second])
-        return {name for name in "ab" if (tmp_path / name).stat().st_mtime_ns != before.get(name)}
+        return {name for name in "ab" if (tmp_path / f"{name}.json").stat().st_mtime_ns != before.get(name)}
 
     assert made() == {"a", "b"} and made() == set()
-    (tmp_path / "b").unlink()
+    (tmp_path / "b.json").unlink()
     assert made() == {"b"}
     source.write_text("2")
-    assert made() == {"a"}  # which wrote the same, so that nothing follows from it
+    assert made() == {"a", "b"}
+    (tmp_path / schema.FILE).unlink()  # the files say what they were made of, not the store
+    assert made() == set()
+    (tmp_path / "a.json").write_text(json.dumps({KEY: "other"}))
+    assert made() == {"a"}  # which was made as before, so that nothing follows from it
 
 
 def test_a_step_that_fails_stops_only_what_is_made_of_it(tmp_path: Path) -> None:

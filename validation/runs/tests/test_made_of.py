@@ -1,0 +1,238 @@
+"""Each result says of what it was made: what changes is made anew, with all that follows from it, and nothing else is."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from harness import decks, dembark, environment, stand_in  # noqa: F401
+
+import dembark as package
+from dembark.common.errors import RunError
+from dembark.common.files import read_json
+from dembark.validation import engines
+from dembark.validation.case import folders, imports
+from dembark.validation.runs.plan import Series, of_profile
+from dembark.validation.runs.simulate import simulate
+from dembark.validation.runs.steps import Step, measure_series, steps
+
+pytestmark = pytest.mark.usefixtures("decks", "stand_in")
+
+QUANTITIES = """
+[quantities.height]
+label = "height"
+unit = "m"
+evidence = "theory"
+tolerance = 0.1
+why = "as it is"
+detail = "a detail"
+source = "a source"
+
+[controls]
+"other physics" = ["height"]
+"""
+MEASURE = """
+from pathlib import Path
+
+from dembark.helper_a import value
+from dembark.postproc.measurement import Measurement, number
+
+COUNT = Path(__file__).parents[2] / "measured"
+
+
+def measure(replicas):
+    COUNT.write_text(COUNT.read_text() + "x" if COUNT.exists() else "x")
+    reference = float(Path(__file__).with_name("reference").joinpath("curve.csv").read_text())
+    return Measurement({"height": number(value(), reference)})
+"""
+
+
+@pytest.fixture
+def box(decks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The case `box`, in LIGGGHTS alone, measured with a module of the package that imports another one; a third is there that it does not
+    import."""
+    root = tmp_path / "package"
+    root.mkdir()
+    (root / "helper_a.py").write_text("def value():\n    from dembark import helper_b\n    return helper_b.VALUE\n")
+    (root / "helper_b.py").write_text("VALUE = 1.05\n")
+    (root / "helper_c.py").write_text("VALUE = 3\n")
+    monkeypatch.setattr(package, "__path__", [str(root), *package.__path__])
+    case = decks / "box"
+    text = (case / "case.toml").read_text().replace('engines = ["liggghts", "yade"]', 'engines = ["liggghts"]')
+    (case / "case.toml").write_text(text.replace('{variant = "wet", engines = ["liggghts"]}', "") + QUANTITIES)
+    (case / "measure.py").write_text(MEASURE)
+    (case / "reference").mkdir()
+    (case / "reference" / "curve.csv").write_text("1.0\n")
+    return case
+
+
+class Chain:
+    """The steps of the case `box` as a process that is started anew sees them."""
+
+    def __init__(self, tmp_path: Path) -> None:
+        self.results, self.count = tmp_path / "results", tmp_path / "measured"
+        self.runs = 0
+
+    def planned(self) -> tuple[Series, Step]:
+        for cache in (folders.load, engines.find, imports._check_sum, imports._read, imports.module_file):
+            cache.cache_clear()
+        (one,) = of_profile("quick")
+
+        class Plan:
+            series = (one,)
+
+        return one, steps(Plan, self.results)[0]  # type: ignore[arg-type]
+
+    def __call__(self) -> tuple[int, int, bool]:
+        """How many runs and measurements were made, and whether anything was."""
+        one, step = self.planned()
+        before, ran = len(self.count.read_text()) if self.count.exists() else 0, 0
+        for run in one.runs:
+            ran += simulate(run, self.results / one.place, threading.Event())
+        done = step.up_to_date()
+        if not done:
+            measure_series(self.results / one.place, one.runs)
+            assert step.up_to_date()
+        return ran, len(self.count.read_text()) - before, not done
+
+    @property
+    def result(self) -> dict[str, object]:
+        (path,) = self.results.glob("box/dry/*/metrics.json")
+        return json.loads(path.read_text())["quantities"][0]
+
+
+@pytest.fixture
+def chain(box: Path, tmp_path: Path) -> Chain:
+    made = Chain(tmp_path)
+    assert made() == (1, 1, True) and made() == (0, 0, False)
+    assert made.result["verdict"] == "pass"
+    return made
+
+
+def edit(path: Path, before: str, after: str) -> None:
+    assert before in path.read_text(encoding="utf-8")
+    path.write_text(path.read_text(encoding="utf-8").replace(before, after), encoding="utf-8")
+
+
+@pytest.mark.parametrize(("before", "after", "key", "expected"), [
+    ("tolerance = 0.1", "tolerance = 0.01", "verdict", "fail"),
+    ("as it is", "as it was", "detail", "a detail"),
+    ('label = "height"', 'label = "depth"', "label", "depth"),
+    ('evidence = "theory"', 'evidence = "experiment"', "evidence", "experiment"),
+    ("a detail", "another", "detail", "another"),
+    ("a source", "another", "source", "another"),
+    ('"other physics"', '"wrong physics"', "control", "wrong physics"),
+    ('[controls]\n"other physics" = ["height"]\n', "", "control", ""),
+    ('why = "as it is"', 'why = "as it is"\nabsolute = true', "deviation_kind", "absolute"),
+])
+def test_what_only_judging_reads_is_judged_anew_and_nothing_is_measured(
+        chain: Chain, box: Path, before: str, after: str, key: str, expected: object) -> None:
+    edit(box / "case.toml", before, after)
+    assert chain() == (0, 0, True) and chain.result[key] == expected
+    assert chain() == (0, 0, False)
+
+
+@pytest.mark.parametrize(("file", "before", "after", "verdict"), [
+    ("reference/curve.csv", "1.0", "2.0", "fail"), ("reference/other.csv", "", "3", "pass"),
+    ("measure.py", "number(value(), reference)", "number(value() + 1.0, reference)", "fail"),
+    ("../../package/helper_a.py", "return helper_b", "return 1.0 * helper_b", "pass"),
+    ("../../package/helper_b.py", "1.05", "1.02", "pass"),
+])
+def test_what_only_measuring_reads_is_measured_anew_and_nothing_runs(
+        chain: Chain, box: Path, file: str, before: str, after: str, verdict: str) -> None:
+    (box / file).touch()
+    edit(box / file, before, after)
+    assert chain() == (0, 1, True) and chain.result["verdict"] == verdict
+    assert chain() == (0, 0, False)
+
+
+def test_other_modules_files_and_clocks_change_nothing(chain: Chain, box: Path, tmp_path: Path) -> None:
+    edit(tmp_path / "package" / "helper_c.py", "3", "4")
+    (box / "README.md").write_text("A box.\n")
+    (box / "reference" / "README.md").write_text("A source.\n")
+    for path in [*box.rglob("*"), *chain.results.rglob("*")]:
+        path.touch()
+    assert chain() == (0, 0, False)
+    chain.results = chain.results.rename(tmp_path / "elsewhere")
+    assert chain() == (0, 0, False)
+
+
+@pytest.mark.parametrize(("file", "before", "after"), [
+    ("liggghts.in", "# A deck", "# The deck"), ("table.txt", "", "1 2 3"), ("case.toml", 'steps = "100"', 'steps = "100 + 0"'),
+    ("case.toml", "value = 0.005", "value = 0.006"), ("../../engine/bin/stand-in", "Stands in", "Stands  in"),
+])
+def test_what_a_run_is_made_of_runs_anew(chain: Chain, box: Path, file: str, before: str, after: str) -> None:
+    (box / file).touch()
+    edit(box / file, before, after)
+    assert chain() == (1, 1, True) and chain() == (0, 0, False)
+
+
+def test_a_reference_that_the_set_up_reads_is_an_input_of_the_run(box: Path, tmp_path: Path) -> None:
+    (box / "setup.py").write_text('from pathlib import Path\nfrom dembark.input_decks.common.setup import Setup\n\n\ndef setup(p):\n'
+                                  '    Path(__file__).with_name("reference").joinpath("curve.csv").read_text()\n'
+                                  "    return Setup(100, 1e-5, None, {})\n")
+    chain = Chain(tmp_path)
+    assert chain() == (1, 1, True)
+    (box / "reference" / "curve.csv").write_text("1.01\n")
+    assert chain() == (1, 1, True)
+
+
+@pytest.mark.parametrize("damage", [
+    lambda folder: (folder / "metrics.json").unlink(),
+    lambda folder: (folder / "metrics.json").write_text("{"),
+    lambda folder: edit(folder / "metrics.json", '"made_of"', '"made"'),
+])
+def test_a_result_that_is_lost_or_damaged_is_judged_anew(chain: Chain, damage: Callable[[Path], None]) -> None:
+    (folder,) = chain.results.glob("box/dry/*")
+    damage(folder)
+    assert chain() == (0, 0, True)
+
+
+@pytest.mark.parametrize("damage", [lambda folder: (folder / "measurement.json").unlink(),
+                                    lambda folder: (folder / "measurement.json").write_text('{"made_of"')])
+def test_a_measurement_that_is_lost_is_made_when_it_is_needed(chain: Chain, box: Path, damage: Callable[[Path], None]) -> None:
+    (folder,) = chain.results.glob("box/dry/*")
+    damage(folder)
+    assert chain() == (0, 0, False)
+    edit(box / "case.toml", "tolerance = 0.1", "tolerance = 0.01")
+    assert chain() == (0, 1, True) and chain.result["verdict"] == "fail"
+
+
+def test_a_record_that_is_edited_is_measured_anew_and_a_run_that_is_deleted_runs(chain: Chain) -> None:
+    (record,) = chain.results.glob("box/dry/*/replica-1/run.json")
+    edit(record, '"time_step": 1e-05', '"time_step": 2e-05')
+    assert chain() == (0, 1, True)
+    record.unlink()
+    assert chain() == (1, 1, True)
+
+
+def test_a_deck_that_is_edited_while_its_run_waits_is_not_run(box: Path, tmp_path: Path) -> None:
+    (one,) = of_profile("quick")
+    assert one.runs[0].inputs
+    edit(box / "liggghts.in", "# A deck", "# The deck")
+    with pytest.raises(RunError, match="its deck was changed since this was planned"):
+        simulate(one.runs[0], tmp_path / "out", threading.Event())
+    assert not list((tmp_path / "out").glob("replica-*"))
+
+
+def test_a_report_is_built_anew_when_a_verdict_changes_and_kept_otherwise(
+        box: Path, tmp_path: Path, environment: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    edit(box / "measure.py", "from dembark.helper_a import value\n", "")
+    edit(box / "measure.py", "value()", "1.05")
+    here = environment | {"STAND_INS": "verification report"}
+    report, facts = tmp_path / "results/quick/report.html", []
+    for after in (None, None, "tolerance = 0.01", "store"):
+        if after == "store":
+            (tmp_path / "results/quick/store.sqlite").unlink()
+        elif after:
+            edit(box / "case.toml", "tolerance = 0.1", after)
+        code, out, error = dembark(tmp_path, here, "validate")
+        assert code == 0, error
+        facts.append((report.stat().st_mtime_ns, "1 FAILED" in out, error.count("1: finished in"), (tmp_path / "measured").read_text()))
+    times = [one[0] for one in facts]
+    assert times[0] == times[1] < times[2] == times[3]
+    assert [one[1:] for one in facts] == [(False, 1, "x"), (False, 0, "x"), (True, 0, "x"), (True, 0, "x")]
+    assert read_json(tmp_path / "results/quick/box/dry/liggghts/metrics.json")["made_of"]
