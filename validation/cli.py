@@ -165,9 +165,12 @@ def make_report(
 ) -> None:
     """Build the report again from existing results. They are those of a profile, or of a campaign's folder."""
     from dembark.validation import show
-    from dembark.validation.runs.steps import build_report
+    from dembark.validation.campaigns.folder import restore
+    from dembark.validation.runs.steps import CAMPAIGN_FILE, build_report
 
     folder = directory.resolve() if directory else results.resolve() / profile
+    if (folder / CAMPAIGN_FILE).is_file():
+        restore(folder)
     if not any(folder.glob("*/*/*/metrics.json")):
         raise DembarkError(f"no results in {folder}", "", "give a campaign's folder; single runs have metrics.json" if directory else
                            f"run 'dembark validate --profile {profile}' first, or give --results")

@@ -18,7 +18,7 @@ from dembark.common.lock import held
 from dembark.validation import engines, provenance
 from dembark.validation.campaigns.estimate import wall_clock
 from dembark.validation.campaigns.spec import read
-from dembark.validation.case.folders import shipped_root
+from dembark.validation.case.folders import INSTEAD, VARIABLE, add_own_root, shipped_root, variables
 from dembark.validation.judge.tally import Tally, of_folder
 from dembark.validation.runs import table
 from dembark.validation.runs.perform import LOCK
@@ -87,14 +87,20 @@ def options(folder: Path) -> Options:
 
 def _variables() -> list[str]:
     """What else says which engines and cases are meant; `resume` takes it over where the shell says nothing."""
-    return [*(variable for name in engines.names() for variable in engines.facts(name).variables), "DEMBARK_DECKS",
+    return [*(variable for name in engines.names() for variable in engines.facts(name).variables), INSTEAD, VARIABLE,
             *dict.fromkeys(engines.facts(name).launcher for name in engines.names())]
 
 
 def restore(folder: Path) -> None:
-    """Set the variables for engines and cases as they were at the last submission, unless they are set."""
+    """Set the variables for engines and cases as they were at the last submission, unless they are set; its folders of own cases are added
+    to those that are named now. DembarkError when one of these is gone."""
     for name, value in _last(folder, "environment").items():
-        if name in _variables():
+        if name == VARIABLE:
+            for root in map(Path, filter(None, value.split(os.pathsep))):
+                if not root.is_dir():
+                    raise DembarkError(f"{root} is gone", f"the campaign in {folder} has its own cases there", "bring it back")
+                add_own_root(root)
+        elif name in _variables():
             os.environ.setdefault(name, value)
 
 
@@ -107,10 +113,15 @@ def enter(folder: Path, file: Path, plan: Plan, chosen: Options) -> None:
     submission: dict[str, Any] = {
         "at": datetime.now(UTC).isoformat(timespec="seconds"), "file": str(file), "sha256": hashlib.sha256(text).hexdigest(),
         "options": asdict(chosen), "host": socket.gethostname(), "user": _user(), "decks": str(shipped_root()),
-        "environment": {name: os.environ[name] for name in _variables() if name in os.environ},
+        "environment": {name: _absolute(os.environ[name]) for name in _variables() if name in os.environ} | variables(),
         **provenance.commit(), "versions": {"dembark": provenance.package_version("dembark"), **used}}
     write_json(folder / FACTS, {"name": plan.label, "description": plan.facts["description"],
                                 "submissions": [*facts.get("submissions", []), submission]})
+
+
+def _absolute(value: str) -> str:
+    """A path as it is from every folder; another text as it is."""
+    return str(Path(value).absolute()) if Path(value).exists() else value
 
 
 def _user() -> str:

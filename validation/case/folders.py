@@ -47,6 +47,12 @@ def add_own_root(root: Path) -> None:
     os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*named, str(root.resolve())]))
 
 
+def variables() -> dict[str, str]:
+    """The environment variables that say where cases are, as they stand, with absolute paths: those that are set."""
+    named = {VARIABLE: os.pathsep.join(map(str, own_roots())), INSTEAD: str(shipped_root()) if os.environ.get(INSTEAD) else ""}
+    return {name: value for name, value in named.items() if value}
+
+
 def files() -> Iterator[Path]:
     """The case.toml of all cases, own ones last; DembarkError when two cases have one name."""
     seen: dict[str, Path] = {}

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import read_json, write_whole
+from dembark.validation.case.folders import variables
 from dembark.validation.runs.plan import Plan, Resources, Run, finished
 from dembark.validation.runs.simulate import Progress, no_progress
 from dembark.validation.runs.site import Row, Site, word
@@ -177,7 +178,9 @@ class Queue:
         job.report.unlink(missing_ok=True)
         script, log = self._results / ".jobs" / f"{job.name}.sh", self._results / ".jobs" / f"{job.name}.log"
         call = shlex.join([sys.executable, "-m", "dembark.validation.runs.job", *job.words])
-        write_whole(script, f"#!/bin/bash\n{self._site.preamble}\nexec {call}\n".encode())
+        # Sites may start jobs without the environment of the submitter.
+        cases = "".join(f"export {name}={shlex.quote(value)}\n" for name, value in variables().items())
+        write_whole(script, f"#!/bin/bash\n{cases}{self._site.preamble}\nexec {call}\n".encode())
         script.chmod(0o755)
         done = self._site.ask("submit", name=job.name, title=shlex.quote(job.title.replace(" ", "_")), log=log, script=script,
                               **self._site.asked(job.used))

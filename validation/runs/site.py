@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import getpass
 import math
-import os
 import re
 import shlex
 import shutil
@@ -54,10 +53,8 @@ class Site:
 
     def environment(self) -> dict[str, str]:
         """This process's environment after the preamble; DembarkError when that fails."""
-        if not self.preamble.strip():
-            return dict(os.environ)
-        # What it prints must not get into the list of variables.
-        script = f"set -e\n{{ {self.preamble}\n}} >&2\nenv -0"
+        # What it prints must not get into the list of variables; one of comments alone needs a command.
+        script = f"set -e\n{{ :\n{self.preamble}\n}} >&2\nenv -0"
         done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL,
                               timeout=120, check=False)
         if done.returncode:

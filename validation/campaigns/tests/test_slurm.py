@@ -63,6 +63,15 @@ def test_the_preamble_sets_the_environment(tmp_path: Path) -> None:
         written(tmp_path, "preamble = 'module load nothing'\n" + QUICK).environment()
 
 
+@pytest.mark.parametrize("preamble", [None, "", "   ", "# nothing", "\n# one\n\n# two\n", "true # a remark", "export A=1"])
+def test_a_preamble_may_be_empty_or_hold_remarks_alone(tmp_path: Path, preamble: str | None) -> None:
+    """None: the template, filled in as its page says."""
+    text = (site.SHIPPED / "site.toml").read_text().replace("<partition>", "main").replace("<account>", "me")
+    if preamble is not None:
+        text = QUICK if preamble == "" else f"preamble = {preamble!r}\n{QUICK}".replace("'", '"')
+    assert written(tmp_path, text).environment()["PATH"]
+
+
 def test_a_launcher_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     for key, value in {"SLURM_JOB_ID": "1", "SLURM_NODELIST": "n1", "PMI_RANK": "0", "SLURM_CONF": "/c"}.items():
         monkeypatch.setenv(key, value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -109,6 +110,37 @@ def test_faults_are_tried_again_and_a_changed_file_repeats_nothing(tmp_path: Pat
     assert (results / "campaign.toml").read_text() == changed and len(facts["submissions"]) == 2
     assert facts["name"] == "boxes" and facts["submissions"][0]["file"] == str(tmp_path / "c.toml")
     assert look(results).complete and str(results / "report.html") in out
+
+
+OWN = """
+[campaign]
+name = "crates"
+profile = "quick"
+engines = ["liggghts"]
+[[sweeps]]
+case = "crate"
+[sweeps.grid]
+grain_diameter = ["4 mm", "5 mm"]
+"""
+
+
+@pytest.mark.parametrize("how", ["option", "relative variable"])
+def test_a_campaign_of_own_cases_goes_on_from_anywhere(tmp_path: Path, decks: Path, environment: dict[str, str], how: str) -> None:
+    own, elsewhere = tmp_path / "own", tmp_path / "elsewhere"
+    shutil.copytree(decks / "box", own / "crate")
+    elsewhere.mkdir()
+    (own / "crate" / "case.toml").write_text((own / "crate" / "case.toml").read_text().replace('name = "box"\n', ""))
+    (tmp_path / "c.toml").write_text(OWN)
+    words = ["--cases", "own"] if how == "option" else []
+    first = environment | ({} if words else {"DEMBARK_CASES": "own"})
+    code, _, error = dembark(tmp_path, first, *words, "submit", "c.toml", "--out", "done")
+    assert code == 0, error
+    shutil.rmtree(next((tmp_path / "done").glob("crate/*/liggghts/replica-1")))
+    code, out, error = dembark(elsewhere, environment, "resume", str(tmp_path / "done"))
+    assert code == 0 and "2 of 2 runs finished" in out and error.count("already finished; reusing") == 1, error
+    own.rename(tmp_path / "gone")
+    code, _, error = dembark(elsewhere, environment, "resume", str(tmp_path / "done"))
+    assert code == 2 and "own is gone" in error and error.count("\n") == 1
 
 
 def test_a_folder_with_other_things_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -117,7 +116,7 @@ def edit(path: Path, before: str, after: str) -> None:
     path.write_text(path.read_text(encoding="utf-8").replace(before, after), encoding="utf-8")
 
 
-@pytest.mark.parametrize(("before", "after", "key", "expected"), [
+JUDGED = [
     ("tolerance = 0.1", "tolerance = 0.01", "verdict", "fail"),
     ("as it is", "as it was", "detail", "a detail"),
     ('label = "height"', 'label = "depth"', "label", "depth"),
@@ -127,25 +126,33 @@ def edit(path: Path, before: str, after: str) -> None:
     ('"other physics"', '"wrong physics"', "control", "wrong physics"),
     ('[controls]\n"other physics" = ["height"]\n', "", "control", ""),
     ('why = "as it is"', 'why = "as it is"\nabsolute = true', "deviation_kind", "absolute"),
-])
-def test_what_only_judging_reads_is_judged_anew_and_nothing_is_measured(
-        chain: Chain, box: Path, before: str, after: str, key: str, expected: object) -> None:
-    edit(box / "case.toml", before, after)
-    assert chain() == (0, 0, True) and chain.result[key] == expected
-    assert chain() == (0, 0, False)
+]
 
 
-@pytest.mark.parametrize(("file", "before", "after", "verdict"), [
-    ("reference/curve.csv", "1.0", "2.0", "fail"), ("reference/other.csv", "", "3", "pass"),
+def test_what_only_judging_reads_is_judged_anew_and_nothing_is_measured(chain: Chain, box: Path) -> None:
+    declared = (box / "case.toml").read_text(encoding="utf-8")
+    for before, after, key, expected in JUDGED:
+        edit(box / "case.toml", before, after)
+        assert chain() == (0, 0, True), after
+        assert chain.result[key] == expected
+        (box / "case.toml").write_text(declared)
+    assert chain() == (0, 0, True) and chain() == (0, 0, False)
+
+
+MEASURED = [
+    ("reference/curve.csv", "1.0", "2.0", "fail"), ("reference/other.csv", "", "3", "fail"), ("reference/curve.csv", "2.0", "1.0", "pass"),
     ("measure.py", "number(value(), reference)", "number(value() + 1.0, reference)", "fail"),
-    ("../../package/helper_a.py", "return helper_b", "return 1.0 * helper_b", "pass"),
-    ("../../package/helper_b.py", "1.05", "1.02", "pass"),
-])
-def test_what_only_measuring_reads_is_measured_anew_and_nothing_runs(
-        chain: Chain, box: Path, file: str, before: str, after: str, verdict: str) -> None:
-    (box / file).touch()
-    edit(box / file, before, after)
-    assert chain() == (0, 1, True) and chain.result["verdict"] == verdict
+    ("../../package/helper_a.py", "return helper_b", "return 1.0 * helper_b", "fail"),
+    ("../../package/helper_b.py", "1.05", "1.02", "fail"),
+]
+
+
+def test_what_only_measuring_reads_is_measured_anew_and_nothing_runs(chain: Chain, box: Path) -> None:
+    for file, before, after, verdict in MEASURED:
+        (box / file).touch()
+        edit(box / file, before, after)
+        assert chain() == (0, 1, True), file
+        assert chain.result["verdict"] == verdict, file
     assert chain() == (0, 0, False)
 
 
@@ -160,14 +167,18 @@ def test_other_modules_files_and_clocks_change_nothing(chain: Chain, box: Path, 
     assert chain() == (0, 0, False)
 
 
-@pytest.mark.parametrize(("file", "before", "after"), [
+MADE = [
     ("liggghts.in", "# A deck", "# The deck"), ("table.txt", "", "1 2 3"), ("case.toml", 'steps = "100"', 'steps = "100 + 0"'),
     ("case.toml", "value = 0.005", "value = 0.006"), ("../../engine/bin/stand-in", "Stands in", "Stands  in"),
-])
-def test_what_a_run_is_made_of_runs_anew(chain: Chain, box: Path, file: str, before: str, after: str) -> None:
-    (box / file).touch()
-    edit(box / file, before, after)
-    assert chain() == (1, 1, True) and chain() == (0, 0, False)
+]
+
+
+def test_what_a_run_is_made_of_runs_anew(chain: Chain, box: Path) -> None:
+    for file, before, after in MADE:
+        (box / file).touch()
+        edit(box / file, before, after)
+        assert chain() == (1, 1, True), file
+    assert chain() == (0, 0, False)
 
 
 def test_a_reference_that_the_set_up_reads_is_an_input_of_the_run(box: Path, tmp_path: Path) -> None:
@@ -180,25 +191,17 @@ def test_a_reference_that_the_set_up_reads_is_an_input_of_the_run(box: Path, tmp
     assert chain() == (1, 1, True)
 
 
-@pytest.mark.parametrize("damage", [
-    lambda folder: (folder / "metrics.json").unlink(),
-    lambda folder: (folder / "metrics.json").write_text("{"),
-    lambda folder: edit(folder / "metrics.json", '"made_of"', '"made"'),
-])
-def test_a_result_that_is_lost_or_damaged_is_judged_anew(chain: Chain, damage: Callable[[Path], None]) -> None:
-    (folder,) = chain.results.glob("box/dry/*")
-    damage(folder)
-    assert chain() == (0, 0, True)
-
-
-@pytest.mark.parametrize("damage", [lambda folder: (folder / "measurement.json").unlink(),
-                                    lambda folder: (folder / "measurement.json").write_text('{"made_of"')])
-def test_a_measurement_that_is_lost_is_made_when_it_is_needed(chain: Chain, box: Path, damage: Callable[[Path], None]) -> None:
-    (folder,) = chain.results.glob("box/dry/*")
-    damage(folder)
-    assert chain() == (0, 0, False)
-    edit(box / "case.toml", "tolerance = 0.1", "tolerance = 0.01")
-    assert chain() == (0, 1, True) and chain.result["verdict"] == "fail"
+def test_a_result_that_is_lost_or_damaged_is_made_anew_when_it_is_needed(chain: Chain, box: Path) -> None:
+    (path,) = chain.results.glob("box/dry/*/metrics.json")
+    for damage in (path.unlink, lambda: path.write_text("{"), lambda: edit(path, '"made_of"', '"made"')):
+        damage()
+        assert chain() == (0, 0, True)
+    kept = path.with_name("measurement.json")
+    for number, damage in enumerate((kept.unlink, lambda: kept.write_text('{"made_of"'), lambda: kept.write_text('{"made_of": 1}')), start=1):
+        damage()
+        assert chain() == (0, 0, False)
+        edit(box / "case.toml", f"tolerance = 0.{number}", f"tolerance = 0.{number + 1}")
+        assert chain() == (0, 1, True)
 
 
 def test_a_record_that_is_edited_is_measured_anew_and_a_run_that_is_deleted_runs(chain: Chain) -> None:
