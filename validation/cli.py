@@ -114,7 +114,7 @@ def run(
     used = Resources(ranks, threads, restart_interval=interval)
     result = perform_series(planned, folder, cancelled_by_signal(), used, jobs, force)
     console = show.console()
-    console.print(show.quantity_table(result))
+    console.print(show.quantity_table(result, console.width))
     for line in show.open_lines(result):
         console.print(line, markup=False, soft_wrap=True)
     told = [quantity.name for quantity in result.quantities]

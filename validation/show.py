@@ -6,9 +6,11 @@ import os
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from rich.cells import cell_len
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from dembark.common.errors import RunError
 from dembark.validation.case.model import Case
@@ -21,6 +23,11 @@ if TYPE_CHECKING:
 
 _SHOWN = {"passed": "[green]pass[/]", "failed": "[bold red]FAIL[/]", "open": "[yellow]open[/]", "information": "",
           "uncontrolled": "not counted"}
+# Columns of the table of quantities that a narrow terminal does without, in this order, and the least width of the names there.
+_NARROW = ("reference interval", "evidence", "95 % interval", "unit", "tolerance")
+_LEAST = 20
+# Columns of other tables that are names and numbers.
+_UNBROKEN = ("case", "key", "value", "unit", "state")
 
 
 def console() -> Console:
@@ -32,7 +39,7 @@ def console() -> Console:
 def _plain(*columns: str, title: str = "") -> Table:
     table = Table(title=escape(title) or None, title_justify="left", box=None, pad_edge=False)
     for column in columns:
-        table.add_column(column, overflow="fold")
+        table.add_column(column, overflow="fold", no_wrap=column in _UNBROKEN)
     return table
 
 
@@ -87,13 +94,32 @@ def finding_table(findings: Iterable[Finding]) -> Table:
     return table
 
 
-def quantity_table(result: Result) -> Table:
-    """One row a quantity: value with interval, reference, deviation, tolerance, kind of evidence and verdict."""
-    table = _plain("quantity", "value", "95 % interval", "unit", "reference", "reference interval", "deviation", "tolerance", "evidence",
-                   "verdict", title=f"{result.case} {result.variant} {result.engine} ({result.profile})")
+def quantity_table(result: Result, width: int = 200) -> Table:
+    """One row a quantity: value with interval, reference, deviation, tolerance, kind of evidence and verdict.
+
+    Numbers are never split. Where `width` characters are too few for all columns, some are left out, which the title says.
+    """
+    columns: dict[str, list[str]] = {name: [] for name in ("quantity", "value", "95 % interval", "unit", "reference", "reference interval",
+                                                           "deviation", "tolerance", "evidence", "verdict")}
     for one in result.quantities:
-        table.add_row(escape(one.title), number(one.value), interval(one.interval), escape(one.unit), number(one.reference),
-                      interval(one.reference_interval), number(one.deviation), number(one.tolerance), one.evidence, _SHOWN[one.standing])
+        cells = (escape(one.title), number(one.value), interval(one.interval), escape(one.unit), number(one.reference),
+                 interval(one.reference_interval), number(one.deviation), number(one.tolerance), one.evidence, _SHOWN[one.standing])
+        for cell, column in zip(cells, columns.values(), strict=True):
+            column.append(cell)
+    needed = {name: max(map(cell_len, (name, *(Text.from_markup(cell).plain for cell in cells)))) for name, cells in columns.items()}
+    needed["quantity"] = min(_LEAST, needed["quantity"])
+    left_out = []
+    for name in _NARROW:
+        if sum(needed[kept] for kept in columns) + 2 * (len(columns) - 1) > width:
+            del columns[name]
+            left_out.append(name)
+    title = f"{result.case} {result.variant} {result.engine} ({result.profile})"
+    more = f"; a wider window also shows {', '.join(left_out)}" if left_out else ""
+    table = Table(title=escape(title + more), title_justify="left", box=None, pad_edge=False)
+    for name in columns:
+        table.add_column(name, overflow="fold", no_wrap=name != "quantity", min_width=None if name == "quantity" else needed[name])
+    for row in zip(*columns.values(), strict=True):
+        table.add_row(*row)
     return table
 
 

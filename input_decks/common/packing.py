@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from types import SimpleNamespace as Parameters
 
@@ -13,6 +14,8 @@ from dembark.common.errors import DembarkError
 Array = NDArray[np.float64]
 # Multiplication by a prime modulo the number of sites is a permutation.
 _PRIME = 15485863
+# Sites of a lattice, and bodies of a packing: about 1 GB while it is made.
+MOST_SITES = 1e7
 
 
 @dataclass(frozen=True)
@@ -62,14 +65,23 @@ def uniform(numbers: NDArray[np.int64], seed: int, use: int) -> Array:
     return x - np.floor(x)
 
 
+def require_room(sites: float, spacing: float) -> None:
+    """DembarkError when a lattice of this `spacing` (m) would have more `sites` than a packing may have, before any memory is used."""
+    if not sites <= MOST_SITES:
+        raise DembarkError(f"bodies {spacing:.3g} m apart fill a lattice of about {sites:.2g} sites",
+                           f"a packing may have {MOST_SITES:.0e}", "take larger bodies, a smaller vessel or fewer bodies")
+
+
 def lattice(counts: tuple[int, int, int], cell: tuple[float, float, float], origin: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Array:
     """Middles (n, 3) in m of the cells of a lattice, x fastest."""
+    require_room(math.prod(counts), min(cell))
     k, j, i = np.meshgrid(*(np.arange(count) for count in reversed(counts)), indexing="ij")
     return np.asarray(origin) + (np.column_stack((i.ravel(), j.ravel(), k.ravel())) + 0.5) * np.asarray(cell)
 
 
 def cylinder(radius: float, spacing: float, low: float, layers: int) -> Array:
     """Points (n, 3) in m of a cubic lattice of `spacing` (m) within `radius` (m) of the z axis, in `layers` from z = `low` (m) on."""
+    require_room(math.pi * (radius / spacing) ** 2 * layers, spacing)
     reach = int(np.ceil(radius / spacing))
     side = spacing * np.arange(-reach, reach + 1)
     y, x = np.meshgrid(side, side, indexing="ij")

@@ -53,7 +53,6 @@ def deck(
     values = portable(resolve(one, profile, variant or next(iter(one.variants)), settings(change or ())))
     _empty(out)
     try:
-        out.mkdir(parents=True, exist_ok=True)
         setup = write(one, engine, values, out)
     except OSError as error:
         raise DembarkError(f"cannot write to {out}", error.strerror or str(error)) from None

@@ -58,9 +58,12 @@ def _setup_module(path: Path) -> ModuleType:
 def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
     """Derived numbers, packing and meshes of a run with the parameters `values`; DembarkError with file and line when they cannot be
     made."""
+    from dembark.input_decks.common.packing import MOST_SITES
     from dembark.input_decks.common.setup import Setup
 
     path = case.folder / "setup.py"
+    if (count := case.particle_count(values) or 0) > MOST_SITES:
+        raise DembarkError(f"case {case.name} would have {count:.2g} bodies", f"a packing may have {MOST_SITES:.0e}", "take fewer")
     known = case.with_derived(values)
     if not path.is_file():
         require_steps(case, values)
@@ -70,6 +73,9 @@ def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
         return _setup_module(path).setup(SimpleNamespace(**known))
     except DembarkError:
         raise
+    except MemoryError as error:
+        raise DembarkError(f"the packing of case {case.name} needs more memory than there is", str(error),
+                           "take fewer or larger bodies, or a smaller vessel") from None
     except Exception as error:  # noqa: BLE001 - as above
         raise failed(path, error) from None
 
@@ -78,6 +84,7 @@ def write(case: Case, engine: str, values: Mapping[str, Value], folder: Path) ->
     """Write everything that `engine` needs for a run with the parameters `values` into `folder`; returns what was derived."""
     require_capable(case, engine, values)
     setup = prepare(case, values)
+    folder.mkdir(parents=True, exist_ok=True)
     for name, path in _companions(case).items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(path, folder / name)

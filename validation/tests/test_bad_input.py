@@ -151,3 +151,18 @@ def test_version_and_help_tell_what_a_first_user_needs(capsys: pytest.CaptureFix
     assert capsys.readouterr().out.startswith("dembark 0.")
     assert main(["--help"]) == 0
     assert "DEMBARK_CASES" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("case", "setting", "words"), [
+    ("silo", "grain_diameter=1 um", "a packing may have 1e+07, take larger bodies, a smaller vessel or fewer bodies"),
+    ("silo", "grain_diameter=10 nm", "fill a lattice of about"),
+    ("silo", "cylinder_radius=100 m", "fill a lattice of about"),
+    ("silo", "grain_count=100000000", "case silo would have 1e+08 bodies"),
+    ("gravity_channel", "channel_width=1 km", "case gravity_channel would have 1.1e+07 bodies"),
+    ("debarking_drum", "log_count=1000000000", "case debarking_drum would have 1e+09 bodies"),
+    ("rotating_drum", "grain_diameter=0.3 um", "would have"),
+])
+def test_a_packing_without_end_is_refused_at_once(case: str, setting: str, words: str, tmp_path: Path,
+                                                  capsys: pytest.CaptureFixture[str]) -> None:
+    refused(("deck", case, "--engine", "liggghts", "--set", setting, "--out", str(tmp_path / "deck")), words, capsys)
+    assert not (tmp_path / "deck").exists()

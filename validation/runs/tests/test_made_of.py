@@ -197,7 +197,8 @@ def test_a_result_that_is_lost_or_damaged_is_made_anew_when_it_is_needed(chain: 
         damage()
         assert chain() == (0, 0, True)
     kept = path.with_name("measurement.json")
-    for number, damage in enumerate((kept.unlink, lambda: kept.write_text('{"made_of"'), lambda: kept.write_text('{"made_of": 1}')), start=1):
+    damages = (kept.unlink, lambda: kept.write_text('{"made_of"'), lambda: kept.write_text('{"made_of": 1}'))
+    for number, damage in enumerate(damages, start=1):
         damage()
         assert chain() == (0, 0, False)
         edit(box / "case.toml", f"tolerance = 0.{number}", f"tolerance = 0.{number + 1}")
