@@ -10,12 +10,13 @@ from typing import Any
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
 from dembark.validation import verification
-from dembark.validation.case.folders import discover
+from dembark.validation.case.folders import files, load
 from dembark.validation.case.model import STUDY_PREFIX, Case
 from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result, results
 from dembark.validation.report.figures import engine_name
 from dembark.validation.verification.item import Item
 
+_SINGLE = "Single runs: what else a profile would run is not listed here."
 # What comparisons of variants leave out: they are due to differ, or say how long and often a run is repeated.
 _REPEATS = ("seed", "replicas", "frames", "grain_count", "settle_time", "measure_time")
 
@@ -110,18 +111,19 @@ class Gathered:
 
 
 def gather(folder: Path) -> Gathered:
-    """Everything that `runs.json` or else the case files expect in a results folder, and everything that is there."""
-    cases = _cases()
+    """Everything that `runs.json` expects in a results folder, and everything that is there; without it, nothing is known to be missing."""
+    cases, unread = _cases()
     pages: dict[tuple[str, str], Page] = {}
 
     def page(case: str, variant: str) -> Page:
         return pages.setdefault((case, variant), Page(case, variant, folder / case / variant))
 
-    summary = read_json(folder / "runs.json") or {}
-    expected = list(_expected(folder, cases, summary))
+    summary = read_json(folder / "runs.json") or {"description": _SINGLE}
+    expected = list(_expected(folder, summary))
     for case, variant, _, line in expected:
         page(case, variant).missing += [line] if line else []
-    measured, compared, unread = results(folder)
+    measured, compared, damaged = results(folder)
+    unread += damaged
     for found in measured:
         one = page(found.case, found.variant)
         one.results[found.engine] = found
@@ -142,26 +144,27 @@ def gather(folder: Path) -> Gathered:
     return Gathered(folder, ordered, verification.read(folder), cases, unread, summary)
 
 
-def _cases() -> Mapping[str, Case]:
-    # A report of old results must not fail because a case file has gone or is being edited.
-    try:
-        return discover()
-    except DembarkError:
-        return {}
+def _cases() -> tuple[dict[str, Case], list[str]]:
+    """The cases by name, and a line for each that cannot be read: a report of old results must not fail because a case is being edited."""
+    found: dict[str, Case] = {}
+    unread: list[str] = []
+    for path in files():
+        try:
+            found[path.parent.name] = load(path)
+        except DembarkError as error:
+            unread.append(f"case {path.parent.name}: {error}")
+    return found, unread
 
 
-def _expected(folder: Path, cases: Mapping[str, Case], summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str]]:
+def _expected(folder: Path, summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str]]:
     """(case, variant, engine, why it is missing or '') of every run that should be there."""
     for run in summary.get("runs", ()):
         told = run.get("message") or run["state"]
-        reason = "" if run["state"] == "finished" else f"{engine_name(run['engine'])}, replica {run['replica']}: {told}"
+        if run["state"] == "finished" and run.get("inputs") and (read_json(folder / run["folder"] / "run.json") or {}).get(
+                "inputs") != run["inputs"]:
+            told = "its result is no longer there"
+        reason = "" if told == "finished" else f"{engine_name(run['engine'])}, replica {run['replica']}: {told}"
         yield run["case"], run["variant"], run["engine"], reason
-    if not summary:
-        for case in cases.values():
-            for planned in case.runs.get(folder.name, ()):
-                for engine in planned.engines:
-                    there = (folder / case.name / planned.variant / engine / "metrics.json").is_file()
-                    yield case.name, planned.variant, engine, "" if there else f"{engine_name(engine)}: not run"
 
 
 @dataclass(frozen=True)

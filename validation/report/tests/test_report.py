@@ -164,10 +164,30 @@ def test_of_many_variants_the_worst_is_shown_and_every_failure_counts():
     assert sections.decided([row(0), row(3, tolerance=None, verdict="info")]) == []
 
 
-def test_runs_that_a_profile_expects_are_missing_without_a_list_of_runs(tmp_path):
-    (tmp_path / "quick").mkdir()
-    found = gather(tmp_path / "quick")
-    assert any("single contact, test 1: YADE: not run" in line for line in found.missing)
+def test_without_a_list_of_runs_nothing_of_other_cases_is_missing(tmp_path):
+    folder = full_size.write(tmp_path / "quick", ("silo",), variants=1, quantities=2, profiles=0)
+    (folder / "runs.json").unlink()
+    found = gather(folder)
+    assert [page.case for page in found.pages] == ["silo"] and found.missing == [] and "Single runs" in found.summary["description"]
+
+
+def test_a_finished_run_that_was_deleted_is_missing(tmp_path):
+    folder = full_size.write(tmp_path / "quick", ("silo",), variants=1, quantities=2, profiles=0)
+    record = {"case": "silo", "variant": "variant_0", "engine": "yade", "replica": 1, "state": "finished", "inputs": "a",
+              "folder": "silo/variant_0/yade/replica-1"}
+    (folder / "runs.json").write_text(json.dumps({"runs": [record]}))
+    assert gather(folder).missing == ["silo, variant 0: YADE, replica 1: its result is no longer there"]
+    (folder / record["folder"]).mkdir(parents=True)
+    (folder / record["folder"] / "run.json").write_text('{"inputs": "a"}')
+    assert gather(folder).missing == []
+
+
+def test_a_case_that_cannot_be_read_is_named_and_the_others_keep_their_titles(tmp_path, monkeypatch):
+    (tmp_path / "own" / "broken").mkdir(parents=True)
+    (tmp_path / "own" / "broken" / "case.toml").write_text("[case]\n")
+    monkeypatch.setenv("DEMBARK_CASES", str(tmp_path / "own"))
+    found = gather(full_size.write(tmp_path / "quick", ("silo",), variants=1, quantities=2, profiles=0))
+    assert "silo" in found.cases and len(found.missing) == 1 and "case broken: title is missing" in found.missing[0]
 
 
 @pytest.mark.parametrize(
