@@ -100,14 +100,23 @@ while IFS= read -r line; do
   fi
 done < <(while IFS= read -r line; do combinations "$line"; done < <(grep '^GRAN_MODELS' "$here/plugins/liggghts/granular_combinations_list.h"))
 
+# As published in 2017, two lines are no C++17: a stream that converts to its base, and a pointer compared with a number.
+mend() {  # mend FILE OLD NEW
+  if grep -F -- "$2" "$src/$1" 2>/dev/null | grep -qv '^ *//'; then
+    sed -i "/^ *\/\//! s|$(printf '%s' "$2" | sed 's/[][\.*^$|]/\\&/g')|$3|" "$src/$1"
+    changed=$((changed + 1))
+    echo "dembark: mended $src/$1 for C++17"
+  fi
+}
+mend utils.h 'static_cast< std::ostringstream & >(( std::ostringstream() << std::dec << a ) ).str()' 'std::to_string(a)'
+mend finish.cpp 'neighbor->lists[m]->numneigh > 0' 'neighbor->lists[m]->numneigh'
+
 if [ "$changed" = 0 ]; then echo "dembark: $src is up to date"; else echo "dembark: installed into $src"; fi
-if grep -q 'static_cast< std::ostringstream' "$src/utils.h"; then
-  echo "Note: as published, LIGGGHTS 3.8.0 does not compile as C++17; utils.h and finish.cpp need the mending that Debian and others apply."
-fi
 cat <<END
 Next, in that folder: build LIGGGHTS as you always do, with C++17 (g++ 9 or newer; a -std=c++11 in CCFLAGS has to become -std=c++17)${eigen:+
 and $eigen in CCFLAGS}, e.g.
   make auto
 and use  pair_style gran model hertz tangential finnie_rabinowicz [cohesion capillary]  or  fix ... lcp/impact  in your input, as in
-liggghts-dembark.
+liggghts-dembark. The laws are the same, but two things are in liggghts-dembark alone: the loop that computes contacts in packs, in about half
+the time, and  fix integration/monitor.
 END

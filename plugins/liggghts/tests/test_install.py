@@ -89,6 +89,19 @@ def test_wrong_folders(tmp_path):
     assert not (taken / "dembark").exists()
 
 
+def test_lines_that_are_no_cpp17_are_mended_once(tmp_path):
+    source = stand_in(tmp_path / "src")
+    (source / "utils.h").write_text("  // numbers\n  return static_cast< std::ostringstream & >(( std::ostringstream() << std::dec << a ) ).str();\n")
+    (source / "finish.cpp").write_text("  if (neighbor->lists[m]->numneigh > 0) {\n  if (neighbor->lists[m]->inum > 0)\n")
+    done = install(source)
+    assert done.returncode == 0 and done.stdout.count("mended") == 2, done.stderr
+    assert (source / "utils.h").read_text() == "  // numbers\n  return std::to_string(a);\n"
+    assert (source / "finish.cpp").read_text() == "  if (neighbor->lists[m]->numneigh) {\n  if (neighbor->lists[m]->inum > 0)\n"
+    assert "integration/monitor" in done.stdout and "packs" in done.stdout
+    (source / "utils.h").write_text("  // static_cast< std::ostringstream & >(( std::ostringstream() << std::dec << a ) ).str()\n")
+    assert "up to date" in install(source).stdout
+
+
 def fetch(folder: Path) -> Path:
     """The published source, through apt with lists of its own; skips when this machine's apt has no Debian 12 mirror."""
     tarball = folder / TARBALL
@@ -116,13 +129,7 @@ def fetch(folder: Path) -> Path:
 
 
 def mend(source: Path) -> None:
-    """What any build of the source of 2017 as C++17 without VTK needs."""
-    for name, old, new in (
-        ("utils.h", "static_cast< std::ostringstream & >(( std::ostringstream() << std::dec << a ) ).str()", "std::to_string(a)"),
-        ("finish.cpp", "neighbor->lists[m]->numneigh > 0", "neighbor->lists[m]->numneigh"),
-    ):
-        path = source / name
-        path.write_text(path.read_text().replace(old, new))
+    """What a build without VTK needs."""
     for path in source.glob("dump_mesh_vtk.*"):
         path.unlink()
 
