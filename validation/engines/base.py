@@ -24,6 +24,8 @@ from dembark.common.errors import DembarkError
 _TOLD = "DEMBARK_TOLD_BY_"
 # Where the start of MPI programs is named, for engines without a launcher of their own.
 LAUNCHER = "DEMBARK_MPIRUN"
+# What dembark's part of the engines reads in the environment: how many contacts it computes at a time.
+SWITCHES = ("DEMBARK_LANES",)
 # What a case may need of an engine beside a deck, by the names that `[needs]` of case.toml and the facts of engines use.
 CAPABILITIES = {"bridges": "liquid bridges", "carried_liquid": "liquid that grains own", "rolling_resistance": "couples against rolling",
                 "own_inertia": "moments of inertia but those of spheres",
@@ -162,8 +164,17 @@ class Engine(ABC):
         return self.facts.name
 
     def own_files(self) -> Iterable[Path]:
-        """The files that decide how it computes: the program and dembark's part of it."""
-        return [self.executable]
+        """The files that decide how it computes: the program, the engine's library and dembark's part of it."""
+        return [self.executable, *self.libraries(self.executable)]
+
+    def libraries(self, program: Path) -> list[Path]:
+        """The shared libraries of `program` that carry the engine's name; none of a script."""
+        done = subprocess.run(["ldd", str(program)], capture_output=True, text=True, env=self.environment(), check=False)
+        return [Path(path) for path in re.findall(rf"(/\S*/lib{re.escape(self.name)}[^/\s]*) \(", done.stdout)]
+
+    def switches(self) -> dict[str, str]:
+        """Environment variables by which a user changes how it computes, those that are set."""
+        return {name: os.environ[name] for name in SWITCHES if name in os.environ}
 
     def build_folders(self) -> Iterable[Path]:
         """Folders where the CMake cache of the build of dembark's part may lie, the most likely first."""

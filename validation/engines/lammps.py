@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -23,8 +24,11 @@ class Lammps(InputScript):
         return [str(self.executable.with_name("lammps-mpiexec")), "-n", str(ranks)]
 
     def own_files(self) -> Iterable[Path]:
-        """The launcher of LAMMPS and the plugin that it loads."""
-        return [self.executable, *self.executable.parent.parent.glob("lammps/plugin/*.so")]
+        """The launcher of LAMMPS, the program that it starts with its library, and the plugin that it loads."""
+        started = re.findall(rb'^exec "(/[^"]+)"', self.executable.read_bytes(), re.MULTILINE)
+        programs = [path for text in started if (path := Path(os.fsdecode(text))).is_file()]
+        return [*super().own_files(), *programs, *(library for program in programs for library in self.libraries(program)),
+                *self.executable.parent.parent.glob("lammps/plugin/*.so")]
 
     def build_folders(self) -> Iterable[Path]:
         """The plugin is built in `lammps` beside the folder of the program."""

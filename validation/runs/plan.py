@@ -63,7 +63,7 @@ class Run:
         """Hash of what decides the outcome: parameters, deck and engine, but not where, on how many cores or beside how many replicas."""
         parameters = {key: value for key, value in self.values.items() if key != "replicas"}
         facts = {"parameters": parameters, "deck": sources(self.case, self.engine.name),
-                 "engine": [self.engine.name, self.engine.version, self.engine.identity]}
+                 "engine": [self.engine.name, self.engine.version, self.engine.identity, self.engine.switches()]}
         return hashlib.sha256(json.dumps(facts, sort_keys=True, allow_nan=False).encode()).hexdigest()
 
 

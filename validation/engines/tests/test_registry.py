@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import io
 import re
+import subprocess
 import tokenize
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -17,7 +18,8 @@ from dembark.common.errors import DembarkError
 from dembark.validation import doctor, engines
 from dembark.validation.case import folders
 from dembark.validation.cli import main
-from dembark.validation.engines import DeckNumber, Engine, EngineFacts
+from dembark.validation.engines import DeckNumber, Engine, EngineFacts, registered
+from dembark.validation.engines.base import digest
 
 NAMED = re.compile("liggghts|yade|lammps", re.IGNORECASE)
 # The list of publications names what it cites.
@@ -113,6 +115,28 @@ def test_a_registered_engine_fulfils_the_protocol(engine: type[Engine], tmp_path
         program.chmod(0o755)
         monkeypatch.setenv(variable, str(program))
         assert engine.locate() == program
+
+
+def test_the_engine_itself_counts_and_not_its_launcher_alone(tmp_path: Path) -> None:
+    """A script that starts a program, as that of LAMMPS, and a program with the engine in a library, as that of LIGGGHTS."""
+    program, launcher = tmp_path / "lmp", tmp_path / "bin" / "lammps-dembark"
+    launcher.parent.mkdir()
+    launcher.write_text(f'#!/bin/sh\nexec "{program}" "$@"\n')
+    kinds = {"lammps": launcher, "liggghts": tmp_path / "liggghts-dembark"}
+    (tmp_path / "library.c").write_text("int answer(void) { return ANSWER; }\n")
+    (tmp_path / "main.c").write_text("int answer(void);\nint main(void) { return answer(); }\n")
+
+    def build(answer: int) -> dict[str, str]:
+        for name, linked in (("lammps", program), ("liggghts", kinds["liggghts"])):
+            library = tmp_path / f"lib{name}.so"
+            subprocess.run(["gcc", "-shared", "-fPIC", f"-DANSWER={answer}", "-o", library, tmp_path / "library.c"], check=True)
+            if not linked.exists():
+                subprocess.run(["gcc", "-o", linked, tmp_path / "main.c", library, f"-Wl,-rpath,{tmp_path}"], check=True)
+        return {name: digest(registered(name)(path, "1", "").own_files()) for name, path in kinds.items()}
+
+    before, after = build(1), build(2)
+    assert before["lammps"] != after["lammps"] and before["liggghts"] != after["liggghts"]
+    assert build(1) == before
 
 
 def test_engines_are_told_apart() -> None:

@@ -173,12 +173,14 @@ MADE = [
 ]
 
 
-def test_what_a_run_is_made_of_runs_anew(chain: Chain, box: Path) -> None:
+def test_what_a_run_is_made_of_runs_anew(chain: Chain, box: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for file, before, after in MADE:
         (box / file).touch()
         edit(box / file, before, after)
         assert chain() == (1, 1, True), file
     assert chain() == (0, 0, False)
+    monkeypatch.setenv("DEMBARK_LANES", "1")
+    assert chain() == (1, 1, True)
 
 
 def test_a_reference_that_the_set_up_reads_is_an_input_of_the_run(box: Path, tmp_path: Path) -> None:
