@@ -38,6 +38,9 @@ def own_roots() -> list[Path]:
     for root in named:
         if not root.is_dir():
             raise DembarkError(f"{root} is no folder", f"in {VARIABLE} or --cases", "name the folder that holds your case folders")
+        if (root / "case.toml").is_file():
+            raise DembarkError(f"{root} is a case itself", f"in {VARIABLE} or --cases",
+                               f"name the folder above it, {root.resolve().parent}")
     return [root.resolve() for root in named]
 
 

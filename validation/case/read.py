@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from dembark.common.choices import Value
+from dembark.common.errors import DembarkError
 from dembark.common.units import known_unit, si_unit
 from dembark.validation import engines
 from dembark.validation.case.expressions import Expression
@@ -33,6 +35,18 @@ def _groups() -> dict[str, Any]:
     return load_toml(package_root() / "common" / "groups.toml")
 
 
+# Keys of [picture]: of a cross-section, and of a packing in perspective.
+_NUMBER: Types = (int, float, str)
+_SECTION: dict[str, Types] = {"cross_section": str, "drum_radius": _NUMBER, "drum_speed": _NUMBER, "speed": _NUMBER, "frames": int,
+                              "chains": bool, "last": int, "pixels": int}
+_PACKING: dict[str, Types] = {"colour_by": str, "scale": _NUMBER, "cut": bool, "radius": _NUMBER}
+
+
+@cache
+def _citations() -> dict[str, Any]:
+    return load_toml(Path(__file__).parents[1] / "judge" / "references.toml")
+
+
 def _full(entry: Mapping[str, Any]) -> dict[str, Any]:
     """The entry of a parameter with its type, and `above` and `below` as limits that are excluded."""
     kind = "choice" if "values" in entry else "int" if isinstance(entry.get("value"), int) else "float"
@@ -55,6 +69,11 @@ class CaseReader(TableReader):
         keys = {"name": str, "title": str, "description": str, "source": list, "engines": list, "outputs": list, "particles": str,
                 "groups": list, "references": list}
         self.table(head, "case", keys, ("title",))
+        for key in (key for key, kind in keys.items() if kind is list):
+            if any(not isinstance(one, str) for one in head.get(key, ())):
+                raise self.fail("case", f"{key} = {head[key]}", "a list of texts", key)
+        for name in head.get("references", ()):
+            self.pick(name, _citations(), "reference", "case")
         if head.get("name", self.path.parent.name) != self.path.parent.name:
             raise self.fail("case", f"name = {head['name']!r}", f"the name of its folder, {self.path.parent.name!r}")
         decks = [name for name in engines.names() if (self.path.parent / engines.facts(name).deck).is_file()]
@@ -91,8 +110,24 @@ class CaseReader(TableReader):
             quantities={name: self.quantity(name, entry, [wrong for wrong, seen in controls.items() if name in seen])
                         for name, entry in quantities.items()},
             controls=controls,
-            references=tuple(head.get("references", ())), picture=data.get("picture", {}), needs=needs)
+            references=tuple(head.get("references", ())), picture=self.picture(data.get("picture", {})), needs=needs)
         return replace(one, runs=self.runs(data.get("runs", {}), one))
+
+    def picture(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        """[picture]: how a run is drawn, see `postproc.pictures`; numbers may be expressions, also in what a setup.py derives."""
+        if not data:
+            return {}
+        section = "cross_section" in data
+        self.table(data, "picture", _SECTION if section else _PACKING, ("cross_section",) if section else ("colour_by", "scale"))
+        key, known = ("cross_section", ("xz", "xy")) if section else ("colour_by", ("velocity", "force", "stress"))
+        self.pick(data[key], known, key, "picture")
+        for one in data.keys() - {key}:
+            if isinstance(data[one], str):
+                try:
+                    Expression(data[one])
+                except DembarkError as error:
+                    raise self.fail("picture", str(error), key=one) from None
+        return dict(data)
 
     def merged(self, table: str, own: Mapping[str, Any], groups: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         """The entries of all `groups`, then those of the case; where both have one, the case's keys replace single keys of the group's."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -42,9 +43,25 @@ class TableReader:
         """A table of the file, for an error line."""
         return f"[{table}] of {self.path}"
 
-    def fail(self, table: str, what: str, right: str = "") -> DembarkError:
-        """The error to raise for a mistake in `table`."""
-        return DembarkError(what, self.where(table), right)
+    def fail(self, table: str, what: str, right: str = "", key: str = "") -> DembarkError:
+        """The error to raise for a mistake in `table`, in the line of `key` where that is found."""
+        line = self.line(table, key) if key else None
+        return DembarkError(what, self.where(table) + (f", line {line}" if line else ""), right)
+
+    def line(self, table: str, key: str) -> int | None:
+        """The first line that holds `key` in `table`, which may stand in one line of the table above it; None when it is not found."""
+        parts = [] if table == "top level" else table.split(".")
+        start = r"\s*[\"']?{}[\"']?\s*[.=]"
+        here, above = start.format(re.escape(key)), start.format(re.escape(parts[-1] if parts else "")) + rf".*\b{re.escape(key)}\s*="
+        header: list[str] = []
+        for number, text in enumerate(self.path.read_text(encoding="utf-8").splitlines(), start=1):
+            found = re.fullmatch(r"\s*\[+\s*([^\[\]]+?)\s*\]+\s*(?:#.*)?", text)
+            if found:
+                header = [part.strip(" \"'") for part in found.group(1).split(".")]
+            if ((found and [*parts, key] == header[:len(parts) + 1]) or (header == parts and re.match(here, text))
+                    or (parts and header == parts[:-1] and re.match(above, text))):
+                return number
+        return None
 
     def pick(self, name: str, known: Iterable[str], what: str, table: str) -> str:
         """`name` if it is among `known`, else DembarkError naming near matches."""
@@ -77,9 +94,9 @@ class TableReader:
             raise self.fail(name, f"{data!r} is no table", "write it as { key = value, ... }")
         for key, value in data.items():
             if key not in keys:
-                raise self.fail(name, f"unknown key {key!r}", nearest(key, keys))
+                raise self.fail(name, f"unknown key {key!r}", nearest(key, keys), key)
             if not isinstance(value, keys[key]) or (isinstance(value, bool) and keys[key] is not bool):
-                raise self.fail(name, f"{key} = {value!r} has the wrong type", f"wanted is {wanted(keys[key])}")
+                raise self.fail(name, f"{key} = {value!r} has the wrong type", f"wanted is {wanted(keys[key])}", key)
         for key in required:
             if key not in data:
                 raise self.fail(name, f"{key} is missing", f"wanted is {wanted(keys[key])}")

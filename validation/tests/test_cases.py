@@ -181,6 +181,12 @@ variants = ["dry", "wet", "large"]
     ("[runs]", STUDY.replace("along", "alone") + "[runs]", ["studies.size", "alone"]),
     ("[runs]", '[quantities.k]\nlabel = "K"\nevidence = "theory"\ntolerance = 0.1\n[runs]', ["quantities.k", "a tolerance without why"]),
     ("[derived]\n", '[derived]\nrows = "cel(grain_count / 2)"\n', ["cel()", "did you mean ceil?"]),
+    ("[runs]", '[picture]\ncolour_by = "velocity"\nscael = 1.0\n[runs]', ["did you mean scale", "[picture]"]),
+    ("[runs]", '[picture]\ncolour_by = "velocity"\n[runs]', ["scale is missing", "[picture]"]),
+    ("[runs]", '[picture]\ncolour_by = "speed"\nscale = 1\n[runs]', ["unknown colour_by 'speed'"]),
+    ("[runs]", '[picture]\ncross_section = "xz"\nspeed = "sqrt(9.81"\n[runs]', ["is no expression", "[picture]"]),
+    ('source = ["nobody"]', 'source = ["nobody"]\nreferences = ["janssen_1985"]', ["unknown reference 'janssen_1985'", "[case]"]),
+    ('source = ["nobody"]', "source = [1]", ["source = [1]", "a list of texts"]),
 ])
 def test_mistakes_in_a_case_file_are_told(decks: Path, old: str, new: str, words: list[str]) -> None:
     path = edited(decks, old, new)
@@ -188,6 +194,24 @@ def test_mistakes_in_a_case_file_are_told(decks: Path, old: str, new: str, words
         load(path)
     for word in [*words, "case.toml"]:
         assert word in str(caught.value)
+
+
+@pytest.mark.parametrize(("old", "new", "key"), [
+    ("exclusive_min = true", "exclusiv_min = true", "exclusiv_min"), ('title = "A box"', 'titel = "A box"', "titel"),
+    ("[runs]", "[rnus]", "[rnus]"), ("[runs]", '[quantities]\nk = { label = "K", evidense = "theory" }\n[runs]', "evidense"),
+    ("[runs]", "[quantities.k]\nlabel = 3\n[runs]", "label = 3"), ("[runs]", '[quantities.k]\n"labl" = "K"\n[runs]', "labl"),
+])
+def test_a_wrong_key_is_told_with_its_line(decks: Path, old: str, new: str, key: str) -> None:
+    path = edited(decks, old, new)
+    (line,) = (number for number, text in enumerate(path.read_text().splitlines(), start=1) if key in text)
+    with pytest.raises(DembarkError, match=f"{path}, line {line}(,|$)"):
+        load(path)
+
+
+def test_a_folder_of_cases_is_not_a_case(decks: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DEMBARK_CASES", str(decks / "box"))
+    with pytest.raises(DembarkError, match=f"is a case itself.*name the folder above it, {decks}"):
+        find("box")
 
 
 def test_seeds_of_replicas_differ_and_the_first_is_the_decks_own(decks: Path) -> None:
