@@ -5,9 +5,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dembark.input_decks.common.levels import acceleration
 from dembark.postproc.instruments.drive import PARTS, Drive, phases, read, sticking_block, transients
 from dembark.postproc.instruments.growth import Growth, ordered
+from dembark.postproc.instruments.levels import acceleration
 from dembark.postproc.instruments.momentum import imbalance
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, over_replicas, profile
 from dembark.postproc.studies import measured

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.input_decks.common.levels import levels
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.postproc.instruments.layer import read, unexplained
+from dembark.postproc.instruments.levels import levels
 from dembark.postproc.instruments.phases import PHASES
 
 layer = module("vibrated_layer")

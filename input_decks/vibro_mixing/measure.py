@@ -6,8 +6,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.input_decks.common.levels import acceleration
 from dembark.postproc.instruments.layer import unexplained
+from dembark.postproc.instruments.levels import acceleration
 from dembark.postproc.instruments.mixing import (
     Kinds,
     cells,

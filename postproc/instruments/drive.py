@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from dembark.input_decks.common.levels import acceleration
 from dembark.postproc import DumpError
+from dembark.postproc.instruments.levels import acceleration
 from dembark.postproc.measurement import Array, Curve, Estimate, Replica, block_mean, profile
 
 # Parts of the contact forces in the energy account, and those of them that take energy for good with what springs hold.

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dembark.input_decks.common.levels import Level, levels
 from dembark.postproc import DumpError
+from dembark.postproc.instruments.levels import Level, levels
 from dembark.postproc.instruments.phases import PHASES, read_phases
 from dembark.postproc.instruments.standing_waves import Waves, amplitude, onset, surface_levels
 from dembark.postproc.measurement import Array, Estimate, Replica, block_mean

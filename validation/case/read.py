@@ -43,8 +43,9 @@ _PACKING: dict[str, Types] = {"colour_by": str, "scale": _NUMBER, "cut": bool, "
 
 
 @cache
-def _citations() -> dict[str, Any]:
-    return load_toml(Path(__file__).parents[1] / "judge" / "references.toml")
+def citations() -> dict[str, Any]:
+    """The publications that cases may name, by their keys."""
+    return load_toml(Path(__file__).with_name("references.toml"))
 
 
 def _full(entry: Mapping[str, Any]) -> dict[str, Any]:
@@ -73,7 +74,7 @@ class CaseReader(TableReader):
             if any(not isinstance(one, str) for one in head.get(key, ())):
                 raise self.fail("case", f"{key} = {head[key]}", "a list of texts", key)
         for name in head.get("references", ()):
-            self.pick(name, _citations(), "reference", "case")
+            self.pick(name, citations(), "reference", "case")
         if head.get("name", self.path.parent.name) != self.path.parent.name:
             raise self.fail("case", f"name = {head['name']!r}", f"the name of its folder, {self.path.parent.name!r}")
         decks = [name for name in engines.names() if (self.path.parent / engines.facts(name).deck).is_file()]

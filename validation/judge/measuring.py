@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
@@ -12,7 +11,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from dembark.common.choices import pick
 from dembark.common.errors import DembarkError, RunError
 from dembark.postproc import DumpError
 from dembark.postproc.measurement import Measurement, Value
@@ -20,6 +18,7 @@ from dembark.postproc.statistics import Estimate, beyond
 from dembark.validation.case import deck
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.model import Case, Declared, Study
+from dembark.validation.case.read import citations
 from dembark.validation.judge.result import QuantityRecord
 
 if TYPE_CHECKING:
@@ -156,15 +155,9 @@ def picture(case: Case, record: Mapping[str, Any]) -> dict[str, Any] | None:
     return {key: Expression(value)(known) if key in _NUMBERS and isinstance(value, str) else value for key, value in case.picture.items()}
 
 
-@cache
-def _citations() -> dict[str, dict[str, str]]:
-    return tomllib.loads(Path(__file__).with_name("references.toml").read_text(encoding="utf-8"))
-
-
 def references(case: Case) -> tuple[dict[str, str], ...]:
     """The publications that the case names."""
-    known = _citations()
-    return tuple(known[pick(name, known, "reference", f"[case] of {case.folder / 'case.toml'}")] for name in case.references)
+    return tuple(citations()[name] for name in case.references)
 
 
 def statements(case: Case) -> list[str]:
