@@ -41,6 +41,16 @@ def _engine(name: str) -> str:
     return f"{engine.version} ({engine.executable})"
 
 
+def _parts(facts: engines.EngineFacts) -> list[Finding]:
+    """What the engine lacks that its users may know from other builds; nothing where it is not installed."""
+    try:
+        lacking = ", ".join(engines.find(facts.name).lacking())
+    except DembarkError:
+        return []
+    advice = f"built without {lacking}; no case needs them; {facts.own_build}"
+    return [Finding(f"parts of {facts.title}", None, False, advice)] if lacking else []
+
+
 def _decks() -> str:
     found, roots = folders.discover(), [folders.shipped_root(), *folders.own_roots()]
     where = " and ".join(map(str, roots))
@@ -59,7 +69,8 @@ def examine() -> list[Finding]:
         Finding("Python", platform.python_version() if sys.version_info >= (3, 11) else None, advice="Python 3.11 or newer is needed"),
         Finding("Python packages", None if absent else ", ".join(f"{name} {version}" for name, version in packages.items()),
                 advice=f"{', '.join(absent)} missing: run 'make'"),
-        *(_asked(facts.program, partial(_engine, facts.name), not facts.optional) for facts in map(engines.facts, engines.names())),
+        *(finding for facts in map(engines.facts, engines.names())
+          for finding in (_asked(facts.program, partial(_engine, facts.name), not facts.optional), *_parts(facts))),
         _asked("cases", _decks),
         Finding("mpirun", mpirun, False, "install openmpi-bin to use --ranks"),
         Finding("Slurm", shutil.which("sbatch"), False, "only on clusters; campaigns run here without it"),

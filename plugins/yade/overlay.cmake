@@ -26,7 +26,15 @@ if(patched STREQUAL script)
 endif()
 # A user's mistake is one line, not a trace.
 string(REPLACE "\t\t\t\texcept: # all other exceptions\n"
-"\t\t\t\texcept RuntimeError as error:
+"\t\t\t\texcept (NameError,ImportError) as error: # of a part that this build of YADE lacks
+\t\t\t\t\tfrom yade.dembark.features import missing
+\t\t\t\t\tline=missing(error)
+\t\t\t\t\tif not line:
+\t\t\t\t\t\timport traceback
+\t\t\t\t\t\ttraceback.print_exc()
+\t\t\t\t\telse: print(line,file=sys.stderr,flush=True)
+\t\t\t\t\tif yade.runtime.opts.exitAfter: sys.exit(2 if line else 1)
+\t\t\t\texcept (RuntimeError,AttributeError,KeyError) as error:
 \t\t\t\t\tline,code,logged=getattr(sys,'dembark_failure',('',2,False))
 \t\t\t\t\tif not line or line not in str(error): line,code,logged=str(error),2,False # a PyRunner quotes the line
 \t\t\t\t\tif line.startswith('dembark: ') and yade.runtime.opts.exitAfter:

@@ -67,6 +67,8 @@ class EngineFacts:
     executable: str = ""
     built: str = ""
     target: str = ""
+    # What brings parts that the program found may lack.
+    own_build: str = ""
     on_path: bool = False
     # What makes the ids in its impact files count from 1.
     impact_id_offset: int = 0
@@ -175,6 +177,10 @@ class Engine(ABC):
     def switches(self) -> dict[str, str]:
         """Environment variables by which a user changes how it computes, those that are set."""
         return {name: os.environ[name] for name in SWITCHES if name in os.environ}
+
+    def lacking(self) -> Iterable[str]:
+        """Parts that other builds of the program have, and what needs them: for users' own scripts, no case needs them."""
+        return ()
 
     def build_folders(self) -> Iterable[Path]:
         """Folders where the CMake cache of the build of dembark's part may lie, the most likely first."""

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
 from dembark.validation.engines.base import DECK_NOTE, DeckNumber, Engine, EngineFacts, texts
+
+# Features of YADE's build, and what needs them.
+_FEATURES = {"VTK": "VTKRecorder", "QT5": "yade.qt, SnapshotEngine", "GTS": "pack.gtsSurface2Facets", "CGAL": "TesselationWrapper",
+             "PFVFLOW": "FlowEngine"}
 
 
 class Yade(Engine):
@@ -45,6 +50,12 @@ class Yade(Engine):
         # The overlay consists of links to YADE's own files; what is no link, or carries our name, is dembark's.
         return [self.executable, *(path for suffix in ("*.so", "*.py") for path in (self.prefix / "lib").rglob(suffix)
                                    if path.is_file() and (not path.is_symlink() or "dembark" in path.name))]
+
+    def lacking(self) -> Iterable[str]:
+        """See Engine; its start script names the features."""
+        script = self.executable.read_text(encoding="utf-8", errors="replace")
+        named = re.search(r"(?m)^features,version,debugbuild='([^']*)'", script)
+        return [f"{name} ({needed_by})" for name, needed_by in _FEATURES.items() if named and name not in named[1].split()]
 
     def build_folders(self) -> Iterable[Path]:
         """The plugin is built in `yade` beside the overlay."""
