@@ -7,6 +7,8 @@
 #include <pkg/common/NormShearPhys.hpp>
 #include <pkg/common/Sphere.hpp>
 
+#include "attributes.hpp"
+
 namespace yade {
 
 class DembarkSnapshot : public Serializable {
@@ -19,7 +21,7 @@ public:
 	boost::python::list wallForces() const;
 	// clang-format off
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(DembarkSnapshot,Serializable,"Rows for dump files, and sums, of the present scene. To be used between :yref:`InteractionLoop` and :yref:`NewtonIntegrator`: positions and forces are then of one time, and velocities, which YADE keeps half a step earlier, are moved on by v + dt/2 a to the same.",
-		((vector<int>,types,,,"For each body its type in the dump, 1 = moving grain, 0 = not in the dump"))
+		((vector<int>,types,,,"For each body its type in the dump, 1 = moving grain, 0 = not in the dump; -1, and bodies beyond the list: 1 for a sphere that moves, 2 for one that is held, 0 for others"))
 		((vector<int>,columns,,,"For each body the number of the wall to whose force on the grains it contributes, -1 = none"))
 		((int,wallCount,0,,"Number of walls"))
 		((Vector3r,gravity,Vector3r::Zero(),,"Acceleration [m/s^2] that :yref:`NewtonIntegrator` adds"))
@@ -28,6 +30,7 @@ public:
 		((Vector3i,periodic,Vector3i::Zero(),,"1 for each axis along which positions are wrapped into the box"))
 		, /*ctor*/
 		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
 		.def("grainRows",&DembarkSnapshot::grainRows,"Lines 'id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass' and three forces for each wall.")
 		.def("contactRows",&DembarkSnapshot::contactRows,"Lines 'x1 y1 z1 x2 y2 z2 id1 id2 periodic fx fy fz' of all contacts and bridges between bodies of the dump.")
 		.def("kineticEnergy",&DembarkSnapshot::kineticEnergy,"Translational kinetic energy [J] of the grains (type 1).")
@@ -36,6 +39,7 @@ public:
 	);
 	// clang-format on
 private:
+	int      typeOf(const Body& body) const;
 	Vector3i image(const Vector3r& position) const;
 	Vector3r wrapped(const Vector3r& position) const { return position - image(position).cast<Real>().cwiseProduct(high - low); }
 };
@@ -76,6 +80,11 @@ Motion motion(const Body& body, Scene& scene, const Vector3r& gravity) {
 
 }  // namespace
 
+int DembarkSnapshot::typeOf(const Body& body) const {
+	const int given = at(types, body.getId(), -1);
+	return given >= 0 ? given : !dynamic_cast<const Sphere*>(body.shape.get()) ? 0 : body.isDynamic() ? 1 : 2;
+}
+
 Vector3i DembarkSnapshot::image(const Vector3r& position) const {
 	Vector3i cell = Vector3i::Zero();
 	for (int i = 0; i < 3; ++i)
@@ -103,7 +112,7 @@ std::string DembarkSnapshot::grainRows() const {
 	std::string text;
 	for (const auto& body : *scene.bodies) {
 		if (!body) continue;
-		const int   type   = at(types, body->getId(), 0);
+		const int   type   = typeOf(*body);
 		const auto* sphere = type > 0 ? dynamic_cast<const Sphere*>(body->shape.get()) : nullptr;
 		if (!sphere) continue;
 		const Motion now = motion(*body, scene, gravity);
@@ -124,10 +133,10 @@ std::string DembarkSnapshot::contactRows() const {
 	for (const auto& interaction : *scene.interactions) {
 		if (!interaction->isReal()) continue;
 		const Body::id_t id1 = interaction->getId1(), id2 = interaction->getId2();
-		if (at(types, id1, 0) <= 0 || at(types, id2, 0) <= 0) continue;
-		const auto* phys  = dynamic_cast<const NormShearPhys*>(interaction->phys.get());
-		const auto &body1 = Body::byId(id1, &scene), &body2 = Body::byId(id2, &scene);
+		const auto*      phys  = dynamic_cast<const NormShearPhys*>(interaction->phys.get());
+		const auto &     body1 = Body::byId(id1, &scene), &body2 = Body::byId(id2, &scene);
 		if (!phys || !body1 || !body2 || !(body1->isDynamic() || body2->isDynamic())) continue;
+		if (typeOf(*body1) <= 0 || typeOf(*body2) <= 0) continue;
 		const Vector3i apart  = interaction->cellDist + image(body2->state->pos) - image(body1->state->pos);
 		const bool     across = !apart.cwiseProduct(periodic).isZero();
 		add(text, "%.10g ", wrapped(body1->state->pos));
@@ -144,7 +153,7 @@ Vector3r DembarkSnapshot::momentum() const {
 	scene.forces.sync();
 	Vector3r sum = Vector3r::Zero();
 	for (const auto& body : *scene.bodies)
-		if (body && at(types, body->getId(), 0) == 1) sum += body->state->mass * motion(*body, scene, gravity).velocity;
+		if (body && typeOf(*body) == 1) sum += body->state->mass * motion(*body, scene, gravity).velocity;
 	return sum;
 }
 
@@ -164,8 +173,7 @@ Real DembarkSnapshot::kineticEnergy() const {
 	scene.forces.sync();
 	Real sum = 0.0;
 	for (const auto& body : *scene.bodies)
-		if (body && at(types, body->getId(), 0) == 1)
-			sum += 0.5 * body->state->mass * motion(*body, scene, gravity).velocity.squaredNorm();
+		if (body && typeOf(*body) == 1) sum += 0.5 * body->state->mass * motion(*body, scene, gravity).velocity.squaredNorm();
 	return sum;
 }
 

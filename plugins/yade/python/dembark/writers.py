@@ -3,7 +3,7 @@
 A writer must run between InteractionLoop and NewtonIntegrator, where positions and forces are of the same time.
 """
 
-from yade import CapillaryLiquid, DembarkSnapshot, EnergyAccount, Omega, Sphere
+from yade import CapillaryLiquid, DembarkSnapshot, EnergyAccount, Omega
 from yade.dembark.moving import motion_columns, motion_values
 from yade.dembark.report import fail
 from yade.dembark.states import options, table
@@ -29,10 +29,7 @@ class _Snapshot:
         if len(O.bodies) == self.bodies:
             return self.shot
         self.bodies = len(O.bodies)
-        columns, types = [-1] * self.bodies, [0] * self.bodies
-        for body in O.bodies:
-            if isinstance(body.shape, Sphere):
-                types[body.id] = 1 if body.dynamic else 2
+        columns, types = [-1] * self.bodies, [-1] * self.bodies
         for body, kind in (self.types or {}).items():
             types[body] = kind
         for number, name in enumerate(self.names):
