@@ -7,6 +7,7 @@
 #include <core/Body.hpp>
 #include <core/GlobalEngine.hpp>
 
+#include "attributes.hpp"
 #include "dembark/capillary/liquid_ledger.hpp"
 
 namespace yade {
@@ -71,6 +72,7 @@ public:
 		((string,saved,,Attr::hidden,"The ledger, while the scene is saved and loaded"))
 		, /*ctor*/
 		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
 		.add_property("pools",&CapillaryLiquid::getPools,"Liquid [m^3] of each wall")
 		.add_property("wallShares",&CapillaryLiquid::getWallShares,"Part of its liquid that each wall gives to a bridge")
 		.add_property("wallParts",&CapillaryLiquid::getWallParts,"Part of a broken bridge that stays on each wall")

@@ -5,6 +5,7 @@
 #include <pkg/common/Sphere.hpp>
 
 #include "WallContact.hpp"
+#include "attributes.hpp"
 
 namespace yade {
 
@@ -13,10 +14,12 @@ public:
 	virtual ~CylinderWall() = default;
 	void postLoad(CylinderWall&);
 	// clang-format off
-	YADE_CLASS_BASE_DOC_ATTRS_CTOR(CylinderWall,Shape,"Inside of an infinite circular cylinder through :yref:`State.pos`, spheres are within. The orientation of the body is disregarded. Velocity and angular velocity of the body are those of the wall's surface: a wall that moves along or about its axis keeps its shape, so it may drift along it.",
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(CylinderWall,Shape,"Inside of an infinite circular cylinder through :yref:`State.pos`, spheres are within. The orientation of the body is disregarded. Velocity and angular velocity of the body are those of the wall's surface: a wall that moves along or about its axis keeps its shape, so it may drift along it.",
 		((Real,radius,NaN,Attr::triggerPostLoad,"Radius [m]"))
 		((Vector3r,axis,Vector3r(0,0,1),Attr::triggerPostLoad,"Direction of the axis; made a unit vector")),
 		createIndex();
+		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
 	);
 	// clang-format on
 	REGISTER_CLASS_INDEX(CylinderWall, Shape);

@@ -16,6 +16,7 @@
 #include "ContactView.hpp"
 #include "FinnieRabinowicz.hpp"
 #include "WallMotion.hpp"
+#include "attributes.hpp"
 #include "dembark/energy_ledger.hpp"
 #include "engine_order.hpp"
 #include "report.hpp"
@@ -40,6 +41,7 @@ public:
 		((long,step,-1,Attr::readonly,"Last step whose works are in the sums; -1 = none"))
 		, /*ctor*/
 		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
 		.def("keys",&EnergyAccount::keys,"Names of the energies.")
 		.def("items",&EnergyAccount::items,"Tuples (name, energy [J]).")
 		.def("__getitem__",&EnergyAccount::get,(boost::python::arg("name")),"One of the energies [J] by its name.")
@@ -248,7 +250,7 @@ void EnergyAccount::recordContact(Contact& c, const Interaction& interaction) co
 	const auto& phys  = static_cast<const FinnieRabinowiczPhys&>(data);
 	const Body &body1 = *Body::byId(id1, scene), &body2 = *Body::byId(id2, scene);
 	// Without a law that has seen it, or between two held bodies, a contact has no force.
-	if (phys.preparedBy < 0 || !((phys.wallBody != 1 && body1.isDynamic()) || (phys.wallBody != 2 && body2.isDynamic()))) return;
+	if (!phys.prepared() || !((phys.wallBody != 1 && body1.isDynamic()) || (phys.wallBody != 2 && body2.isDynamic()))) return;
 
 	dembark_yade::ContactView view(phys.wallBody, *static_cast<const ScGeom*>(interaction.geom.get()), body1, body2,
 	                               dembark_yade::imageShift(*scene, interaction.cellDist));
@@ -346,8 +348,7 @@ Real EnergyAccount::get(const std::string& name) {
 	if (std::find(energy_names.begin(), energy_names.end(), name) == energy_names.end()) {
 		std::string all;
 		for (const char* each : energy_names) all += (all.empty() ? "" : ", ") + std::string(each);
-		PyErr_SetString(PyExc_KeyError, ("dembark: EnergyAccount has no energy '" + name + "'; it has " + all).c_str());
-		boost::python::throw_error_already_set();
+		dembark_yade::failAs(PyExc_KeyError, "EnergyAccount has no energy '" + name + "'; it has " + all);
 	}
 	return boost::python::extract<Real>(energies()[name]);
 }

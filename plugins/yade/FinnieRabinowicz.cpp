@@ -3,6 +3,7 @@
 #include <tuple>
 #include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <cstring>
 #include <type_traits>
 #include <vector>
@@ -10,6 +11,9 @@
 #include <core/Omega.hpp>
 #include <core/Scene.hpp>
 #include <pkg/common/Sphere.hpp>
+#include <pkg/dem/FrictPhys.hpp>
+#include <pkg/dem/GlobalStiffnessTimeStepper.hpp>
+#include <pkg/dem/NewtonIntegrator.hpp>
 
 #include "ContactView.hpp"
 #include "report.hpp"
@@ -35,8 +39,16 @@ using Law2 = Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz;
 constexpr std::size_t ringNumbers = sizeof(::dembark::SlipRings) / sizeof(double);
 static_assert(std::is_trivially_copyable<::dembark::SlipRings>::value, "numbers only");
 
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Winvalid-offsetof"
+static_assert(offsetof(Phys, preparedBy) == offsetof(FrictPhys, tangensOfFrictionAngle), "what YADE writes there has to be seen");
+#pragma GCC diagnostic pop
+
 const std::string ip2  = "Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.";
 const std::string law2 = "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz.";
+
+const char* const useSetFriction =
+	"; change staticFriction and kineticFriction, of all contacts and of those to come: dembark.set_friction()";
 
 std::string pairName(const Material& a, const Material& b) { return "materials " + std::to_string(a.id) + " and " + std::to_string(b.id); }
 std::string pairName(const Body& a, const Body& b) { return "bodies " + std::to_string(a.getId()) + " and " + std::to_string(b.getId()); }
@@ -142,11 +154,30 @@ void Phys::setState(const ::dembark::ContactState& now) {
 	std::memcpy(slipRings.data(), &now.rings, sizeof now.rings);
 }
 
+/// Refuses what of a material the law would disregard in silence.
+void Ip2::check(const FrictMat& material) {
+	const std::string name = "material " + std::to_string(material.id) + (material.label.empty() ? "" : " '" + material.label + "'");
+	if (typeid(material) != typeid(FrictMat))
+		fail(name + " is a " + material.getClassName() +
+		     ", of which this law knows no more than young and poisson; give the body a FrictMat, and " + ip2 +
+		     "... what the pair has");
+	if (material.id < 0) return;  // of a single body: nothing says which one it was before
+	const std::lock_guard<std::mutex> lock(guard);
+	if (frictionAngles.size() <= std::size_t(material.id)) frictionAngles.resize(material.id + 1, NaN);
+	Real& known = frictionAngles[material.id];
+	if (std::isnan(known)) known = material.frictionAngle;
+	if (known == material.frictionAngle) return;
+	fail("FrictMat.frictionAngle of " + name + " changed from " + text(known) + " to " + text(material.frictionAngle) +
+	     " rad, but this law does not use it" + useSetFriction);
+}
+
 void Ip2::go(const shared_ptr<Material>& material1, const shared_ptr<Material>& material2, const shared_ptr<Interaction>& interaction) try {
 	if (interaction->phys) return;
 	const FrictMat& a    = *YADE_CAST<FrictMat*>(material1.get());
 	const FrictMat& b    = *YADE_CAST<FrictMat*>(material2.get());
 	const auto      phys = shared_ptr<Phys>(new Phys());
+	check(a);
+	check(b);
 
 	if (!(a.young > 0.0 && b.young > 0.0 && a.young < INFINITY && b.young < INFINITY))
 		fail("FrictMat.young of " + pairName(a, b) + " must be > 0 Pa and finite");
@@ -211,7 +242,7 @@ void Law2::postLoad(Law2&) {
 	limited = limitForce;
 	// In this order: a contact that is prepared meanwhile has a kind of the new table, or is prepared again.
 	kinds.clear();
-	revision = ++revisions;
+	revision = -static_cast<double>(++revisions);
 }
 
 std::vector<::dembark::PairLaw<double>> Law2::forPacks(::dembark::PairStep& step) {
@@ -221,8 +252,44 @@ std::vector<::dembark::PairLaw<double>> Law2::forPacks(::dembark::PairStep& step
 	return kinds.laws(step.dt);
 }
 
-void Law2::prepare(Phys& phys, const ScGeom& geom, const Body& body1, const Body& body2) {
-	const long current = revision;
+/// Once a step with new contacts: engines of the scene that take contacts for those of another law, and what adds to this law, or leaves it
+/// out, without being a mistake.
+void Law2::checkScene() {
+	if (checked.exchange(scene->iter) == scene->iter) return;
+	static const char* const foreign[] = {"Law2_ScGeom_CapillaryPhys_Capillarity", "CapillarityEngine", "ElasticContactLaw",
+	                                      "CohesiveFrictionalContactLaw"};
+	const auto               refuse    = [this](const std::string& what) {
+		checked = -1;  // the step may be tried again
+		fail(what);
+	};
+	std::string line;
+	for (const auto& engine : scene->engines) {
+		if (engine->dead) continue;
+		const std::string name = engine->getClassName();
+		if (std::find(std::begin(foreign), std::end(foreign), name) != std::end(foreign))
+			refuse(name +
+			       " in O.engines takes every contact for one of its own law and writes into it; leave it out: liquid here "
+			       "is " +
+			       law2 + "capillaryModel and " + ip2 + "bridgeVolume");
+		if (const auto* stepper = dynamic_cast<const GlobalStiffnessTimeStepper*>(engine.get()); stepper && stepper->viscEl)
+			refuse("GlobalStiffnessTimeStepper.viscEl takes every contact for a ViscElPhys; set it to False");
+		if (const auto* newton = dynamic_cast<const NewtonIntegrator*>(engine.get()); newton && newton->damping != 0.0)
+			line = "NewtonIntegrator.damping is " + text(newton->damping) +
+			       " (YADE's default is 0.2): it takes energy in addition to the restitution of this law; damping=0 leaves it "
+			       "off";
+	}
+	if (scene->trackEnergy)
+		line += (line.empty() ? "" : ". ") +
+		        std::string("O.trackEnergy: O.energy holds nothing of this law's contacts; EnergyAccount does");
+	if (!line.empty() && !warned.exchange(true)) dembark_yade::warn(line);
+}
+
+void Law2::prepare(Phys& phys, const Body& body1, const Body& body2) {
+	const double current = revision;
+	if (!(phys.preparedBy < 0.0))
+		fail("setContactFriction(), or an engine of YADE that does the same, set the friction coefficient of " +
+		     pairName(body1, body2) + " to " + text(phys.preparedBy) + ", but this law does not use it" + useSetFriction);
+	checkScene();
 	const bool sphere1 = dynamic_cast<const Sphere*>(body1.shape.get()), sphere2 = dynamic_cast<const Sphere*>(body2.shape.get());
 	if (!sphere1 && !sphere2)
 		fail(pairName(body1, body2) +
@@ -265,11 +332,6 @@ void Law2::prepare(Phys& phys, const ScGeom& geom, const Body& body1, const Body
 	}
 	if (!p.liquid.viscous.on()) phys.viscousShearForce = Vector3r::Zero();
 
-	const ContactView view(phys.wallBody, geom, body1, body2, Vector3r::Zero());
-	const double      limit = p.liquid.stable_time_step(view.bodies.effective_radius(), view.bodies.effective_mass());
-	if (scene->dt > limit)
-		fail(pairName(body1, body2) + ": their viscous bridge needs O.dt <= " + text(limit) + " s, not " + text(scene->dt) +
-		     " s, or a larger minimumGap");
 	if (normal == ::dembark::NormalLaw::hooke && !(characteristicVelocity > 0.0))
 		fail(law2 + "characteristicVelocity must be > 0 m/s for normalLaw='hooke'");
 	phys.preparedBy = current;
@@ -293,6 +355,14 @@ void Law2::reportBridge(Phys& phys, const Interaction& interaction, const ::demb
 ::dembark::ContactForce Law2::act(Phys& phys, const Interaction& interaction, const ContactView& view) {
 	const Body::id_t id1 = interaction.getId1(), id2 = interaction.getId2();
 	const double     volumeBefore = phys.bridgeVolume;
+	const bool       viscous      = phys.contact.liquid.viscous.on();
+	// In every step: engines that choose the time step lengthen it, and grains grow.
+	if (viscous) {
+		const double limit = phys.contact.liquid.stable_time_step(view.bodies.effective_radius(), view.bodies.effective_mass());
+		if (scene->dt > limit)
+			fail(pairName(*Body::byId(id1, scene), *Body::byId(id2, scene)) + ": their viscous bridge needs O.dt <= " +
+			     text(limit) + " s, not " + text(scene->dt) + " s, or a larger minimumGap");
+	}
 	// Kept: eight rings of zeros in every step would cost more than the friction.
 	static thread_local ::dembark::ContactState state;
 	phys.get(state);
@@ -309,7 +379,6 @@ void Law2::reportBridge(Phys& phys, const Interaction& interaction, const ::demb
 
 	const Vector3r force      = vec(out.force);
 	const Vector3r tangential = vec(out.tangential + out.viscous_tangential);
-	const bool     viscous    = phys.contact.liquid.viscous.on();
 	phys.shearForce           = view.sign() * tangential;
 	phys.normalForce          = view.sign() * (force - tangential);
 	if (viscous) phys.viscousShearForce = view.sign() * vec(out.viscous_tangential);
@@ -337,7 +406,7 @@ bool Law2::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* i
 	const Body&      body2  = *Body::byId(id2, scene);
 	const State&     state1 = *body1.state;
 	const State&     state2 = *body2.state;
-	if (phys.preparedBy != revision) prepare(phys, geom, body1, body2);
+	if (phys.preparedBy != revision) prepare(phys, body1, body2);
 
 	ContactView view(phys.wallBody, geom, body1, body2, dembark_yade::imageShift(*scene, interaction->cellDist));
 

@@ -16,6 +16,7 @@
 
 #include "CapillaryLiquid.hpp"
 #include "SavedFormat.hpp"
+#include "attributes.hpp"
 #include "dembark/contact.hpp"
 #include "dembark/pairs/pair_step.hpp"
 
@@ -56,12 +57,16 @@ public:
 	// What a dry contact takes and leaves in a step stands in the first so many bytes: from kn to dissipatedEnergy.
 	static constexpr std::size_t ofEveryStep = 192;
 
-	// Valid for the law of this revision.
-	long preparedBy = -1;
-	int  wallBody   = 0;   // 1 or 2: this body of the interaction is a wall; 0: two spheres
-	int  kind       = -1;  // of the law's kinds; -1: not for packs
+	// The revision of the law that this contact is valid for, a whole number below zero. Here FrictPhys keeps tangensOfFrictionAngle:
+	// setContactFriction() and the triaxial engines of YADE take every contact for a FrictPhys and write their coefficient, which is
+	// not below zero, into it.
+	static constexpr double unprepared = -0.5;
+	double                  preparedBy = unprepared;
+	int                     wallBody   = 0;   // 1 or 2: this body of the interaction is a wall; 0: two spheres
+	int                     kind       = -1;  // of the law's kinds; -1: not for packs
 
-	void                    postLoad(FinnieRabinowiczPhys&) { preparedBy = -1; }
+	void                    postLoad(FinnieRabinowiczPhys&) { preparedBy = unprepared; }
+	bool                    prepared() const { return preparedBy <= -1.0; }
 	::dembark::ContactState state() const;
 	void                    get(::dembark::ContactState& now) const;  // its rings only under partial slip
 	void                    setState(const ::dembark::ContactState& now);
@@ -73,7 +78,7 @@ public:
 	}
 
 	// clang-format off
-	YADE_CLASS_BASE_DOC_ATTRS_CTOR(FinnieRabinowiczPhys,NormShearPhys,"Contact of :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz`. :yref:`NormPhys.normalForce` holds the force along the normal with damping and bridge, so that it and :yref:`NormShearPhys.shearForce` are the whole force.",
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(FinnieRabinowiczPhys,NormShearPhys,"Contact of :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz`. :yref:`NormPhys.normalForce` holds the force along the normal with damping and bridge, so that it and :yref:`NormShearPhys.shearForce` are the whole force.",
 		((Vector3r,elasticDisplacement,Vector3r::Zero(),,"Elastic tangential displacement [m] of the sphere (of body 1, of two spheres), in the plane of contact"))
 		((Real,slip,0,,"Slip [m] since the contact last stuck"))
 		((std::vector<Real>,slipRings,,Attr::readonly,"State of a contact with ``presliding='partial_slip'``: displacements [m] of eight rings along an axis and across it, the axis, the radius [m] of the first ring and of the contact"))
@@ -81,11 +86,11 @@ public:
 		((Real,bridgeVolume,0,,"Volume [m^3] of the liquid bridge that is there; 0 = no bridge"))
 		((Real,ruptureDistance,0,,"Gap [m] beyond which that bridge breaks"))
 		((Real,bridgeImbalance,0,,"Volume [m^3] that body 1 (the sphere, of a sphere and a wall) gets back when a bridge of carried liquid breaks, less that of the other"))
-		((Real,capillaryForce,0,,"Force [N] of the bridge, positive = attractive"))
-		((Real,viscousForce,0,,"Force [N] along the normal by which the liquid resists, positive = repulsive"))
-		((Vector3r,viscousShearForce,Vector3r::Zero(),,"Force [N] in the plane of contact by which the liquid resists; it is part of :yref:`NormShearPhys.shearForce`"))
+		((Real,capillaryForce,0,Attr::readonly,"Force [N] of the bridge, positive = attractive"))
+		((Real,viscousForce,0,Attr::readonly,"Force [N] along the normal by which the liquid resists, positive = repulsive"))
+		((Vector3r,viscousShearForce,Vector3r::Zero(),Attr::readonly,"Force [N] in the plane of contact by which the liquid resists; it is part of :yref:`NormShearPhys.shearForce`"))
 		((Vector3r,rollingAngle,Vector3r::Zero(),,"State of a contact with ``rollingResistance='elastic_plastic'``: angle [rad] of the rolling spring, of the sphere (of body 1, of two spheres)"))
-		((Vector3r,rollingTorque,Vector3r::Zero(),,"Couple [N m] of rolling resistance on body 2"))
+		((Vector3r,rollingTorque,Vector3r::Zero(),Attr::readonly,"Couple [N m] of rolling resistance on body 2"))
 		((Real,effectiveYoungsModulus,0,Attr::triggerPostLoad,"E* [Pa], 1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2"))
 		((Real,effectiveShearModulus,0,Attr::triggerPostLoad,"G* [Pa], 1/G* = (2-nu1)/G1 + (2-nu2)/G2"))
 		((Real,restitution,1,Attr::triggerPostLoad,"Coefficient of restitution"))
@@ -104,6 +109,12 @@ public:
 		((Real,liquidViscosity,0,Attr::triggerPostLoad,"Viscosity [Pa s] of the liquid; 0 = no viscous force"))
 		((Real,minimumGap,0,Attr::triggerPostLoad,"Gap [m] below which viscous forces do not grow")),
 		createIndex();
+		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
+		.add_property("kn",+[](const FinnieRabinowiczPhys& c) { return c.kn; },"Normal stiffness [N/m] of the spring")
+		.add_property("ks",+[](const FinnieRabinowiczPhys& c) { return c.ks; },"Tangential stiffness [N/m] of the spring")
+		.add_property("normalForce",+[](const FinnieRabinowiczPhys& c) { return c.normalForce; },"Force [N] on body 2 along the normal, with damping and bridge")
+		.add_property("shearForce",+[](const FinnieRabinowiczPhys& c) { return c.shearForce; },"Force [N] on body 2 in the plane of contact")
 	);
 	// clang-format on
 	REGISTER_CLASS_INDEX(FinnieRabinowiczPhys, NormShearPhys);
@@ -116,12 +127,13 @@ REGISTER_SERIALIZABLE(FinnieRabinowiczPhys);
 class Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys : public IPhysFunctor {
 public:
 	void go(const shared_ptr<Material>&, const shared_ptr<Material>&, const shared_ptr<Interaction>&) override;
+	void postLoad(Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys&) { frictionAngles.clear(); }
 	FUNCTOR2D(FrictMat, FrictMat);
 	// clang-format off
-	YADE_CLASS_BASE_DOC_ATTRS(Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys,IPhysFunctor,"Creates :yref:`FinnieRabinowiczPhys`. Elastic constants come from the materials; :yref:`FrictMat.frictionAngle` is not used. All pair parameters are :yref:`MatchMaker` objects by material id and may be given as plain numbers.",
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys,IPhysFunctor,"Creates :yref:`FinnieRabinowiczPhys`. Elastic constants come from the materials; :yref:`FrictMat.frictionAngle` is not used, and must not change while the scene runs; materials of a derived class, whose further attributes would do nothing, are refused. All pair parameters are :yref:`MatchMaker` objects by material id and may be given as plain numbers.",
 		((shared_ptr<MatchMaker>,restitution,,,"Coefficient of restitution, > 0 and <= 1. Required."))
-		((shared_ptr<MatchMaker>,staticFriction,,,"Static friction coefficient, >= 0. Required."))
-		((shared_ptr<MatchMaker>,kineticFriction,,,"Kinetic friction coefficient, >= 0 and not above the static one. Required."))
+		((shared_ptr<MatchMaker>,staticFriction,,Attr::triggerPostLoad,"Static friction coefficient, >= 0. Required."))
+		((shared_ptr<MatchMaker>,kineticFriction,,Attr::triggerPostLoad,"Kinetic friction coefficient, >= 0 and not above the static one. Required."))
 		((shared_ptr<MatchMaker>,criticalSlipDistance,,,"Slip [m] over which friction falls from its static to its kinetic value, >= 0. Required."))
 		((shared_ptr<MatchMaker>,interfaceShearStrength,,,"Shear strength [Pa] of the interface, > 0; not given, or 1e30 and more = unlimited."))
 		((shared_ptr<MatchMaker>,rollingFriction,,,"Coefficient of rolling resistance, >= 0: the largest couple over the normal force and the effective radius. Required with a :yref:`rollingResistance<Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz.rollingResistance>`."))
@@ -132,8 +144,17 @@ public:
 		((Real,liquidViscosity,0,,"Viscosity [Pa s] of the liquid, >= 0; 0 = no viscous force."))
 		((Real,minimumGap,0,,"Gap [m], > 0, below which viscous forces do not grow: the roughness of the surfaces. Required with a viscosity."))
 		((Real,healingTime,0,,"Time constant [s] in which slip is forgotten while a contact sticks; 0 = at once."))
+		, /*ctor*/
+		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
 	);
 	// clang-format on
+
+private:
+	void check(const FrictMat&);
+
+	std::vector<Real> frictionAngles;  // of each material by id when it was first seen since friction was set; NaN: not yet
+	std::mutex        guard;
 };
 REGISTER_SERIALIZABLE(Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys);
 
@@ -162,6 +183,7 @@ public:
 		((OpenMPAccumulator<Real>,endedDissipation,,Attr::hidden,"Energy [J] that contacts which have ended had lost"))
 		, /*ctor*/
 		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
 		.def("dissipatedEnergy",&Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::getDissipatedEnergy,"Energy [J] lost by slip and tangential damping in all contacts since the start.")
 		.def("bridgeCount",&Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::bridgeCount,"Number of liquid bridges.")
 		.def("contactCount",&Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz::contactCount,"Number of pairs of bodies that touch.")
@@ -171,7 +193,8 @@ public:
 private:
 	friend class SphereContactLoop;
 
-	void prepare(FinnieRabinowiczPhys&, const ScGeom&, const Body&, const Body&);
+	void prepare(FinnieRabinowiczPhys&, const Body&, const Body&);
+	void checkScene();
 	/// A step of the contact seen in `view`: its forces, into `scene->forces`, and its state. What it gives says whether there is one.
 	::dembark::ContactForce act(FinnieRabinowiczPhys&, const Interaction&, const dembark_yade::ContactView& view);
 	void reportBridge(FinnieRabinowiczPhys&, const Interaction&, const ::dembark::ContactBodies&, double overlap, double volumeBefore);
@@ -182,8 +205,10 @@ private:
 	bool                        wet     = false;
 	::dembark::capillary::Model model   = ::dembark::capillary::Model::exact;
 	bool                        damped = true, limited = false;
-	std::atomic<long>           revision{0};
-	dembark_yade::LawKinds      kinds;  // of this revision
+	std::atomic<double>         revision{0};
+	std::atomic<bool>           warned{false};
+	std::atomic<long>           checked{-1};  // last step of checkScene()
+	dembark_yade::LawKinds      kinds;        // of this revision
 };
 REGISTER_SERIALIZABLE(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz);
 

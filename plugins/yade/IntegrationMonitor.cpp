@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <iostream>
 #include <typeinfo>
 #include <vector>
 
@@ -15,6 +14,7 @@
 
 #include "ContactView.hpp"
 #include "FinnieRabinowicz.hpp"
+#include "attributes.hpp"
 #include "dembark/integration/monitor.hpp"
 #include "dembark/integration/shadow_impact.hpp"
 #include "engine_order.hpp"
@@ -45,6 +45,7 @@ public:
 		((long,step,-1,Attr::readonly,"Last step that was seen; -1 = none"))
 		, /*ctor*/
 		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
 		.def("figures",&IntegrationMonitor::figures,"All figures by name.")
 		.def("reset",&IntegrationMonitor::reset,"Forget all that was seen.")
 		.add_property("nextRow",&IntegrationMonitor::nextRow,"With 'adapt': step at which the next row ends")
@@ -197,7 +198,7 @@ void IntegrationMonitor::takeContacts() {
 		Real stiffness = phys->kn;
 		int  wall      = 0;
 		if (const auto* const ours = dynamic_cast<const FinnieRabinowiczPhys*>(phys)) {
-			if (ours->preparedBy < 0) continue;
+			if (!ours->prepared()) continue;
 			wall              = ours->wallBody;
 			const Real radius = wall == 1   ? geom->radius2
 			                    : wall == 2 ? geom->radius1
@@ -264,7 +265,7 @@ void IntegrationMonitor::act() {
 		const std::string line = "IntegrationMonitor: at step " + std::to_string(scene->iter) + ' ' +
 		                         finding_text(monitor.row, monitor.settings, kind, "body");
 		if (monitor.settings.action == MonitorAction::stop) fail(line, 1);
-		std::cerr << "WARNING: dembark: " << line << std::endl;
+		dembark_yade::warn(line);
 	}
 }
 

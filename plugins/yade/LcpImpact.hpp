@@ -8,6 +8,7 @@
 #include <pkg/dem/NewtonIntegrator.hpp>
 
 #include "SavedFormat.hpp"
+#include "attributes.hpp"
 #include "dembark/impact/impact_file.hpp"
 #include "dembark/impact/system.hpp"
 #include "dembark/impact/geometry.hpp"
@@ -30,6 +31,7 @@ public:
 		((vector<Real>,frictionRows,,Attr::hidden,"Friction against all materials, empty = that of the engine"))
 		, /*ctor*/
 		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
 		.add_property("friction",&LogWall::getFriction,&LogWall::setFriction,"Friction of logs on this wall: a number or a dict, as :yref:`LcpImpact.friction`; None = that of the engine.")
 	);
 	// clang-format on
@@ -89,6 +91,7 @@ public:
 		((string,savedState,"",Attr::hidden,"State of the contacts and of the file of impacts, filled in before saving"))
 		, /*ctor*/
 		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
 		.add_property("stiffness",&LcpImpact::getStiffness,&LcpImpact::setStiffness,"Stiffness [N/m] of the logs' boundaries, > 0: a number, or a dict by id or label of the material. Required.")
 		.add_property("damping",&LcpImpact::getDamping,&LcpImpact::setDamping,"Damping [N s/m] of a body's motion while it is in contact, >= 0: a number, or a dict by id or label of the material.")
 		.add_property("friction",&LcpImpact::getFriction,&LcpImpact::setFriction,"Friction: a Coulomb coefficient; or a dict of 'static', 'kinetic', 'slip' (m), 'strength' (Pa), 'healing' (s), 'area' (m^2); or a dict of such values by pairs of materials (id or label).")

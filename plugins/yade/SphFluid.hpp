@@ -9,6 +9,7 @@
 #include <core/GlobalEngine.hpp>
 
 #include "SavedFormat.hpp"
+#include "attributes.hpp"
 #include "dembark/sph/solver.hpp"
 
 namespace yade {
@@ -80,6 +81,7 @@ public:
 		((string,savedState,"",Attr::hidden,"State of the fluid, filled in before saving"))
 		, /*ctor*/
 		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
 		.def("addParticles",&SphFluid::addParticles,(boost::python::arg("points"),boost::python::arg("velocity")=boost::python::object(),boost::python::arg("pressures")=boost::python::object()),"Add particles of fluid at points [m], of one velocity [m/s] (None: at rest), with pressures [Pa] (a list; None: 0); returns how many there are now. Before the first step.")
 		.def("addWall",&SphFluid::addWall,(boost::python::arg("points")),"Add a wall at rest, of particles at points [m]; returns its number. Before the first step.")
 		.def("addBody",&SphFluid::addBody,(boost::python::arg("id"),boost::python::arg("points")),"Give the body id, a clump or a single one, particles at points [m], where it is now; returns its number. Before the first step.")

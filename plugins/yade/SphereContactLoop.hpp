@@ -5,6 +5,7 @@
 #include <core/InteractionLoop.hpp>
 
 #include "ContactPacks.hpp"
+#include "attributes.hpp"
 
 namespace yade {
 
@@ -12,9 +13,12 @@ class SphereContactLoop : public InteractionLoop {
 public:
 	void action() override;
 	// clang-format off
-	YADE_CLASS_BASE_DOC_ATTRS(SphereContactLoop,InteractionLoop,":yref:`InteractionLoop`, faster where :yref:`spheres<Sphere>` meet under :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz` with :yref:`Ig2_Sphere_Sphere_ScGeom`; same arguments, and on one thread the same trajectories to the last bit. All other interactions are dispatched as there. Of the geometry of the pairs that take the short way the normal, the point of contact, the depth and the radii are kept up; :yref:`ScGeom.shearInc` and the axes of rotation, which this law does not use, are not.",
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(SphereContactLoop,InteractionLoop,":yref:`InteractionLoop`, faster where :yref:`spheres<Sphere>` meet under :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz` with :yref:`Ig2_Sphere_Sphere_ScGeom`; same arguments, and on one thread the same trajectories to the last bit. All other interactions are dispatched as there. Of the geometry of the pairs that take the short way the normal, the point of contact, the depth and the radii are kept up; :yref:`ScGeom.shearInc` and the axes of rotation, which this law does not use, are not.",
 		((long,shortWay,0,Attr::readonly,"Contacts of the last step that took the short way"))
 		((long,packed,0,(Attr::readonly|Attr::noSave),"Those of them that were computed in packs"))
+		, /*ctor*/
+		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
 	);
 	// clang-format on
 

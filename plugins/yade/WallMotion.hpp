@@ -5,6 +5,7 @@
 
 #include <core/GlobalEngine.hpp>
 
+#include "attributes.hpp"
 #include "dembark/energy_ledger.hpp"
 #include "dembark/motion/prescribed_motion.hpp"
 #include "dembark/motion/wall_work.hpp"
@@ -51,6 +52,7 @@ public:
 		((std::vector<Real>,orientations,,Attr::hidden,"Of the bodies without the motion: x y z w of each"))
 		, /*ctor*/
 		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
 		.def("start",&WallMotion::start,"Give the bodies the velocity that they have before the present step; for walls that move from the beginning on.")
 		.def("measure",&WallMotion::measure,"Take up motion and forces of the present step, from an engine between :yref:`InteractionLoop` and this one.")
 	);

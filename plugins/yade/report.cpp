@@ -5,9 +5,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdio>
+#include <cstdlib>
+#include <iostream>
 #include <mutex>
 #include <utility>
 #include <vector>
+
+#include <boost/python/errors.hpp>
 
 #include <core/Engine.hpp>
 #include <core/Scene.hpp>
@@ -34,14 +38,19 @@ bool parallel() {
 #endif
 }
 
+/// Leaves the line where the start script reads it; with the interpreter.
+void announce(const std::string& line, int code, bool logged) {
+	PyObject* said = Py_BuildValue("(siO)", line.c_str(), code, logged ? Py_True : Py_False);
+	PySys_SetObject("dembark_failure", said);
+	Py_XDECREF(said);
+}
+
 [[noreturn]] void raise(const std::string& line, int code) {
 	// In YADE's own thread the interpreter is only free once the main thread waits for the run: O.wait overlooks one that ends before.
 	// YADE writes what ends that thread into its log; the start script need not say it again.
 	const bool             logged = !PyGILState_Check();
 	const PyGILState_STATE held   = PyGILState_Ensure();
-	PyObject*              said   = Py_BuildValue("(siO)", line.c_str(), code, logged ? Py_True : Py_False);
-	PySys_SetObject("dembark_failure", said);
-	Py_XDECREF(said);
+	announce(line, code, logged);
 	PyGILState_Release(held);
 	throw std::runtime_error(line);
 }
@@ -76,6 +85,16 @@ void fail(const std::string& line, int code) {
 	if (parallel()) throw Failure("dembark: " + line, code);
 	raise("dembark: " + line, code);
 }
+
+void failAs(PyObject* kind, const std::string& line) {
+	const std::string said = "dembark: " + line;
+	announce(said, 2, false);
+	PyErr_SetString(kind, said.c_str());
+	boost::python::throw_error_already_set();
+	std::abort();  // never reached
+}
+
+void warn(const std::string& line) { std::cerr << "WARNING: dembark: " << line << std::endl; }
 
 void postpone(Scene& scene, const std::exception& error, bool inCollider) {
 	if (!parallel()) throw;

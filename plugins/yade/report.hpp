@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <string>
 
+struct _object;  // PyObject
+
 namespace yade {
 
 class Scene;
@@ -14,6 +16,10 @@ namespace dembark_yade {
 /// wrong input and 1 for a run that failed. From a loop that YADE runs with OpenMP no exception can leave: what YADE calls there
 /// must catch it and postpone() it.
 [[noreturn]] void fail(const std::string& line, int code = 2);
+/// The same by the exception of Python `kind`, for what a script does outside of a run.
+[[noreturn]] void failAs(_object* kind, const std::string& line);
+/// Writes "WARNING: dembark: " and the line to stderr.
+void warn(const std::string& line);
 
 /// In a catch block: lets the engine after the present one throw what was caught in a parallel loop; outside of one throws it on.
 void postpone(Scene& scene, const std::exception& error, bool inCollider = false);

@@ -6,6 +6,7 @@ The files have the schema of the LIGGGHTS decks. Standard library only; SI units
 from yade.dembark.balance import Balance
 from yade.dembark.fluids import CubesRecorder, FluidRecorder, FluidWriter, fluid, fluid_engine, fluid_loop, lattice, tank_walls
 from yade.dembark.frames import FrameWriter, StepMeans
+from yade.dembark.friction import set_friction
 from yade.dembark.logs import LogWriter, drum, log, log_loop, log_wall, logs
 from yade.dembark.machines import TouchWriter, account_history
 from yade.dembark.moving import mesh, motion, motion_columns, motion_values
@@ -36,5 +37,5 @@ __all__ = [
     "Recorder", "StepMeans", "TouchWriter", "account_history", "begin", "block", "box", "contact_loop", "drum", "energies", "engine_loop",
     "fail", "finish", "fluid", "fluid_engine", "fluid_loop", "grains", "lattice", "log", "log_loop", "log_wall", "logs", "materials",
     "mesh", "mesh_loop", "motion", "motion_columns", "motion_values", "options", "packing", "pairs", "parameters", "periodic", "plane",
-    "planes", "run", "slab_loop", "table", "tank_walls",
+    "planes", "run", "set_friction", "slab_loop", "table", "tank_walls",
 ]
