@@ -52,6 +52,8 @@ void ContactCoefficients::choose(const std::string& keyword, const std::string& 
 
 void ContactCoefficients::settings(int narg, char** arg) {
   settings_ = {};
+  words_.clear();
+  for (int k = 0; k < narg; ++k) words_ += std::string(arg[k]) + " ";
   const std::vector<std::string> off_on = {"off", "on"};
   for (int k = 0; k < narg;) {
     const std::string keyword = arg[k++];
@@ -90,6 +92,14 @@ void ContactCoefficients::settings(int narg, char** arg) {
   if (!settings_.wet && (!std::isnan(settings_.surface_tension) || settings_.viscous.on()))
     fail("surface_tension and viscous_liquid need a capillary_model");
   if (!settings_.wet && settings_.carried) fail("carried_liquid needs a capillary_model");
+}
+
+std::string ContactCoefficients::given() const {
+  std::string text = words_;
+  for (int i = 1; i <= given_.types(); ++i)
+    for (int j = i; j <= given_.types(); ++j)
+      for (const Keyword& each : keywords) text += fmt::format("{:.17g} ", given_(i, j).*each.value);
+  return text;
 }
 
 std::vector<std::array<int, 2>> ContactCoefficients::coeff(int narg, char** arg) {

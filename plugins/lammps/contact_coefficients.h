@@ -40,6 +40,7 @@ class ContactCoefficients : protected LAMMPS_NS::Pointers {
     dembark::capillary::Model capillary_model = dembark::capillary::Model::exact;
     dembark::capillary::ViscousLiquid viscous{};
   } settings_;
+  std::string words_;  // of the settings
   dembark::PairTable<Given> given_;
   dembark::PairTable<dembark::ContactParameters> parameters_;
   dembark::PairTable<char> complete_;
@@ -75,6 +76,8 @@ class ContactCoefficients : protected LAMMPS_NS::Pointers {
   const dembark::ContactParameters& operator()(int i, int j) const { return parameters_(i, j); }
   /// m, that grains of a type may grow to; 0 unless given.
   double largest_radius(int type) const { return given_(type, type).largest_radius; }
+  /// All words and numbers that were given, as a text.
+  std::string given() const;
   bool wet() const { return settings_.wet; }
   dembark::HistoryLayout layout() const {
     return {settings_.wet, settings_.presliding == dembark::Presliding::partial_slip,

@@ -15,6 +15,11 @@ struct BeginnersOfSteps {
   friend Member access(BeginnersOfSteps);
 };
 template struct Access<BeginnersOfSteps, &LAMMPS_NS::Modify::list_initial_integrate>;
+struct VariableTexts {
+  typedef char*** LAMMPS_NS::Variable::* Member;
+  friend Member access(VariableTexts);
+};
+template struct Access<VariableTexts, &LAMMPS_NS::Variable::data>;
 
 struct RestartedFixes {
   typedef char** LAMMPS_NS::Modify::* Member;
@@ -41,6 +46,14 @@ void begin_steps_first(LAMMPS_NS::Modify* modify, const LAMMPS_NS::Fix* fix) {
   int *const first = modify->*access(BeginnersOfSteps()), *const end = first + modify->n_initial_integrate;
   const auto own = std::find_if(first, end, [&](int k) { return modify->fix[k] == fix; });
   if (own != end) std::rotate(first, own, own + 1);
+}
+
+std::vector<std::pair<std::string, std::string>> formulas(LAMMPS_NS::Variable* variables) {
+  std::vector<std::pair<std::string, std::string>> all;
+  for (int k = 0; k < variables->nvar; ++k)
+    if (variables->equalstyle(k) || variables->atomstyle(k) || variables->vectorstyle(k))
+      all.emplace_back(variables->names[k], (variables->*access(VariableTexts()))[k][0]);
+  return all;
 }
 
 }  // namespace dembark_lammps

@@ -3,9 +3,12 @@
 #define DEMBARK_ENGINE_ACCESS_H
 
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "fix.h"
 #include "modify.h"
+#include "variable.h"
 
 namespace dembark_lammps {
 
@@ -17,6 +20,8 @@ void begin_steps_first(LAMMPS_NS::Modify* modify, const LAMMPS_NS::Fix* fix);
 /// Whether the restart file that was read has numbers of atoms of a fix whose name begins so, and no fix has taken them: LAMMPS drops them
 /// with the first run. What Modify keeps of the file is protected.
 bool left_in_restart_file(const LAMMPS_NS::Modify* modify, const std::string& prefix);
+/// Names and formulas of variables of styles equal, atom and vector. Their texts are private.
+std::vector<std::pair<std::string, std::string>> formulas(LAMMPS_NS::Variable* variables);
 
 }  // namespace dembark_lammps
 

@@ -1,19 +1,20 @@
 #include "fix_resume_exact.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <cstring>
-#include <filesystem>
 
 #include "atom.h"
 #include "comm.h"
 #include "error.h"
 #include "force.h"
+#include "input.h"
 #include "pair.h"
 #include "update.h"
-#include "utils.h"
 
 #include "engine_access.h"
+#include "exact_fixes.h"
+#include "fix_arguments.h"
+#include "pair_dembark_granular.h"
 #include "restart_commands.h"
 
 using namespace LAMMPS_NS;
@@ -21,7 +22,7 @@ using namespace FixConst;
 
 namespace {
 
-constexpr double format = 1.0;
+constexpr double format = 2.0;
 enum Head { head_format, head_ranks, head_time, head_time_step, head_next_sort, head_size };
 
 }  // namespace
@@ -69,14 +70,10 @@ void FixResumeExact::put_back() {
     if (atom->torque) std::copy_n(forces_[std::size_t(i)].data() + 3, 3, atom->torque[i]);
   }
   atom->nextsort = next_sort_;
-  skip_dumps();
-  std::fflush(nullptr);
-  std::error_code wrong;
-  for (const auto& [path, size] : kept_)
-    if (std::filesystem::resize_file(path, size, wrong); wrong) fail_alone("file " + path + ": " + wrong.message());
-  utils::logmesg(lmp, "dembark: resumed at step " + std::to_string(update->ntimestep) + " exactly\n");
+  const std::string why = why_approximate(record());
+  resume_outputs(why.empty());
+  say("dembark: resumed at step " + std::to_string(update->ntimestep) + (why.empty() ? " exactly" : " approximately: ") + why + "\n");
   forces_ = {};
-  kept_ = {};
   state_step_ = -1;
 }
 
@@ -86,11 +83,13 @@ void FixResumeExact::setup(int) {
 }
 
 void FixResumeExact::write_state() {
+  record_ = record().text();
   const Facts own = facts();
   facts_.resize(std::size_t(comm->nprocs));
   MPI_Gather(own.data(), int(own.size()), MPI_DOUBLE, facts_.data(), int(own.size()), MPI_DOUBLE, 0, world);
   dembark_lammps::write_restart_file(lmp, part_path());
   facts_ = {};
+  record_.clear();
   if (comm->me == 0) keep_state();
 }
 
@@ -103,7 +102,7 @@ void FixResumeExact::write_restart(FILE* file) {
   head[head_time] = update->atime;
   head[head_time_step] = double(update->atimestep);
   head[head_next_sort] = double(atom->nextsort);
-  write_part(file, {{head, sizeof head}, {facts_.data(), facts_.size() * sizeof(Facts)}});
+  write_part(file, {{head, sizeof head}, {facts_.data(), facts_.size() * sizeof(Facts)}, {record_.c_str(), record_.size() + 1}});
 }
 
 void FixResumeExact::restart(char* buffer) {
@@ -119,10 +118,26 @@ void FixResumeExact::restart(char* buffer) {
   time_ = head[head_time];
   time_step_ = bigint(head[head_time_step]);
   next_sort_ = bigint(head[head_next_sort]);
-  if (comm->me != 0) return;
-  cut_outputs();
-  for (const std::string& path : outputs_)
-    if (std::filesystem::exists(path)) kept_.emplace_back(path, std::filesystem::file_size(path));
+  saved_ = dembark::restart::RunRecord::read(buffer + sizeof head + std::size_t(saved_ranks_) * sizeof(Facts));
+  if (comm->me == 0) keep_unappendable();
+}
+
+std::string FixResumeExact::inexact_fix(Fix& fix, bigint step) const {
+  const auto known = std::find_if(std::begin(dembark_lammps::exact_fixes), std::end(dembark_lammps::exact_fixes),
+                                  [&](const auto& exact) { return is(fix, exact.style); });
+  if (known == std::end(dembark_lammps::exact_fixes)) return "begins anew or differently";
+  const auto has = [&](const char* word) { return dembark_lammps::may_have_argument(lmp, fix, word); };
+  if (is(fix, "wall/gran") && has("wiggle")) return "counts its time anew";
+  if (!is(fix, "ave/time")) return "";
+  if (has("running") || has("window")) return "averages over more than one interval";
+  return step % fix.global_freq == 0 ? "" : "is within an interval at step " + std::to_string(step);
+}
+
+std::vector<std::pair<std::string, std::string>> FixResumeExact::formulas() const { return dembark_lammps::formulas(input->variable); }
+
+void FixResumeExact::add_facts(dembark::restart::RunRecord& run) const {
+  const auto* const pair = dynamic_cast<PairDembarkGranular*>(force->pair_match(dembark_lammps::ContactCoefficients::style_name, 1));
+  if (pair) run.facts.emplace_back("coefficients of the pair style", dembark::restart::hashed(pair->coefficients().given()));
 }
 
 int FixResumeExact::pack_restart(int i, double* buffer) {

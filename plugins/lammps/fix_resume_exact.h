@@ -38,15 +38,18 @@ class FixResumeExact : public dembark_family::ResumeFix {
 
   bool keeps_order() const override { return state_step_ >= 0; }
   void write_state() override;
+  std::string inexact_fix(Fix& fix, bigint step) const override;
+  std::vector<std::pair<std::string, std::string>> formulas() const override;
+  void add_facts(dembark::restart::RunRecord& run) const override;
   Facts facts() const;
   void check_state() const;
   void put_back();
 
-  std::vector<std::pair<std::string, std::uintmax_t>> kept_;  // outputs, and how much of them is before the state
-  std::vector<Facts> facts_;                                  // of all ranks, in a state; on the first one
-  Facts own_facts_{};                                         // of this rank, in the state that was read
-  std::vector<std::array<double, 6>> forces_;                 // of the state that was read: N, N m
-  double time_ = 0.0;                                         // s, of the step `time_step_`, from which the run counts it
+  std::vector<Facts> facts_;                   // of all ranks, in a state; on the first one
+  std::string record_;                         // of the run that writes a state
+  Facts own_facts_{};                          // of this rank, in the state that was read
+  std::vector<std::array<double, 6>> forces_;  // of the state that was read: N, N m
+  double time_ = 0.0;                          // s, of the step `time_step_`, from which the run counts it
   bigint time_step_ = 0, next_sort_ = 0;
   int saved_ranks_ = 0;
   bool known_format_ = true;

@@ -7,6 +7,7 @@
 #include "error.h"
 #include "lammps.h"
 
+#include "fix_arguments.h"
 #include "fix_capillary_liquid.h"
 #include "fix_energy_account.h"
 #include "fix_integration_monitor.h"
@@ -68,4 +69,5 @@ void lammpsplugin_init(void* host, void* handle, void* register_style) {
   add("command", "resume_state", "read the newest of these states");
   style.creator.fix = &create_fix<LAMMPS_NS::FixLcpImpact>;
   add("fix", "lcp/impact", "impacts of logs by a linear complementarity problem a step");
+  dembark_lammps::watch_fixes(lammps);
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <utility>
 
 #include "output.h"
 
@@ -36,12 +37,12 @@ ResumeFix::ResumeFix(LAMMPS* lmp, int narg, char** arg) : SharedFix(lmp, narg, a
 void ResumeFix::init() {
   only_verlet();
   if (!begun_ && state_step_ < 0 && every_ > 0) refuse_other_states();
+  if (!begun_ && every_ > 0) announce_approximate();
   begun_ = true;
   if (every_ > 0) next_reneighbor = (update->ntimestep / every_ + 1) * every_;
-  const int acting = PRE_FORCE | POST_FORCE | INITIAL_INTEGRATE | FINAL_INTEGRATE;
   bool before = false;
   for (int k = 0; k < modify->nfix; ++k) {
-    if (before && modify->fmask[k] & acting)
+    if (before && modify->fmask[k] & acting_stages)
       fail(std::string("it must come after fix ") + modify->fix[k]->id + ", whose set-up it has to undo");
     before = before || modify->fix[k] == this;
   }
@@ -60,6 +61,15 @@ void ResumeFix::refuse_other_states() const {
          "; go on from it by resume_state, move it away, or give the states another name than " + base_);
 }
 
+/// A run says beforehand that its states are not enough for all of its fixes.
+void ResumeFix::announce_approximate() const {
+  const std::vector<std::string> reasons = inexact((update->ntimestep / every_ + 1) * every_);
+  if (reasons.empty()) return;
+  std::string all;
+  for (const std::string& reason : reasons) all += (all.empty() ? "" : "; ") + reason;
+  warn("a run goes on from these states approximately: " + all);
+}
+
 // The set-up would sort the atoms out of turn.
 void ResumeFix::setup_pre_exchange() {
   sort_frequency_ = atom->sortfreq;
@@ -68,6 +78,7 @@ void ResumeFix::setup_pre_exchange() {
 
 /// The list of candidates was built anew for the step that has ended: here its output is written, and nothing of the next was done.
 void ResumeFix::begin_step() {
+  if (cut_step_ >= 0) cut_outputs();
   if (every_ == 0 || update->ntimestep != next_reneighbor + 1) return;
   --update->ntimestep;
   write_state();
@@ -85,16 +96,43 @@ void ResumeFix::keep_state() const {
   }
 }
 
-void ResumeFix::cut_outputs() const {
+void ResumeFix::resume_outputs(bool exact) {
+  for (int k = 0; k < output->ndump; ++k) output->last_dump[k] = update->ntimestep;
+  cut_step_ = update->ntimestep;
+  cut_exactly_ = exact;
+}
+
+void ResumeFix::keep_unappendable() const {
   try {
-    for (const std::string& path : outputs_) states::cut_output(path, update->ntimestep);
+    for (const std::string& path : outputs_)
+      if (const std::string what = states::keep_unappendable(path, saved_.files, update->ntimestep); !what.empty())
+        say("dembark: " + what + "\n");
   } catch (const std::exception& wrong) {
     fail_alone(wrong.what());
   }
 }
 
-void ResumeFix::skip_dumps() const {
-  for (int k = 0; k < output->ndump; ++k) output->last_dump[k] = update->ntimestep;
+/// When the set-up has written its output, such as the titles of files that are appended to, and the first step has not begun.
+void ResumeFix::cut_outputs() {
+  const bigint step = std::exchange(cut_step_, -1);
+  std::fflush(nullptr);
+  if (comm->me != 0) return;
+  try {
+    for (const std::string& path : outputs_) {
+      if (!states::can_append(path)) continue;
+      const auto known = std::find_if(saved_.files.begin(), saved_.files.end(), [&](const auto& file) { return file.path == path; });
+      const std::string what =
+          known == saved_.files.end() ? states::cut_output(path, step) : states::cut_output(*known, step, !cut_exactly_);
+      if (!what.empty()) say("dembark: " + what + "\n");
+    }
+  } catch (const std::exception& wrong) {
+    fail_alone(wrong.what());
+  }
+}
+
+void ResumeFix::say(const std::string& line) const {
+  for (FILE* const to : {screen, logfile})
+    if (comm->me == 0 && to) std::fputs(line.c_str(), to);
 }
 
 states::State find_state(const std::string& base, Comm& comm, MPI_Comm world) {

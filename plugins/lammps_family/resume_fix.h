@@ -13,9 +13,15 @@
 
 #include "shared_fix.h"
 
+#include "dembark/restart/run_record.hpp"
 #include "dembark/restart/state_files.hpp"
 
 namespace dembark_family {
+
+/// A fix style that goes on exactly from a state, and why.
+struct ExactFix {
+  const char *style, *why;
+};
 
 /// Which atoms in which order, and their candidates for contacts in which order.
 class OrderHash {
@@ -47,22 +53,42 @@ class ResumeFix : public SharedFix {
   std::string part_path() const { return base_ + ".part"; }
   /// Makes it to a state of this step. On the first rank.
   void keep_state() const;
-  /// The outputs up to the step of a state that was read. On the first rank.
-  void cut_outputs() const;
-  /// Output of the step of the state was written before the state.
-  void skip_dumps() const;
+  /// What is compared between a state and the run that goes on from it. Collective; complete on the first rank.
+  dembark::restart::RunRecord record() const;
+  /// Why a run that goes on from the state that was read is not exact, or nothing. On the first rank.
+  std::string why_approximate(const dembark::restart::RunRecord& run) const;
+  /// Output of the step of the state was written before the state. `exact`: what comes behind the step will be the same again.
+  void resume_outputs(bool exact);
+  /// The engine cannot append to binary and compressed files: those of the run before keep what they have, under another name. On the first
+  /// rank, before dumps open their files.
+  void keep_unappendable() const;
+  void say(const std::string& line) const;
 
   LAMMPS_NS::bigint every_ = 0, state_step_ = -1;  // the step of the state that the run goes on from, -1: none
   std::string base_;
   std::vector<std::string> outputs_;
+  dembark::restart::RunRecord saved_;  // of the state that was read
 
  private:
+  static constexpr int acting_stages = LAMMPS_NS::FixConst::PRE_FORCE | LAMMPS_NS::FixConst::POST_FORCE |
+                                       LAMMPS_NS::FixConst::INITIAL_INTEGRATE | LAMMPS_NS::FixConst::FINAL_INTEGRATE;
+
   virtual void write_state() = 0;        ///< Collective.
   virtual bool keeps_order() const = 0;  ///< a state waits to be put back, and the set-up is not to sort the atoms
+  /// Why `fix` does not go on exactly from a state of `step`; nothing if it does.
+  virtual std::string inexact_fix(Fix& fix, LAMMPS_NS::bigint step) const = 0;
+  /// Names and formulas of the variables of the script.
+  virtual std::vector<std::pair<std::string, std::string>> formulas() const = 0;
+  virtual void add_facts(dembark::restart::RunRecord&) const {}
+  std::vector<std::string> inexact(LAMMPS_NS::bigint step) const;
   void refuse_other_states() const;
+  void announce_approximate() const;
+  void cut_outputs();
 
   int sort_frequency_ = 0;
   bool begun_ = false;
+  LAMMPS_NS::bigint cut_step_ = -1;  // the outputs are cut behind this step before the next begins; -1: they are not
+  bool cut_exactly_ = false;
 };
 
 /// The newest whole state, as the first rank finds it; step -1: there is none, which no_state() tells. The grid of processors becomes that

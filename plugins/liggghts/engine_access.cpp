@@ -8,7 +8,20 @@ using namespace LIGGGHTS;
 namespace dembark_liggghts {
 namespace {
 
-enum Member { keyword_map, fix_map, command_map, pair_loop_map, wall_loop_map, partner_count, partner };
+enum Member {
+  keyword_map,
+  fix_map,
+  command_map,
+  pair_loop_map,
+  wall_loop_map,
+  partner_count,
+  partner,
+  mean_mode,
+  mean_file,
+  variable_count,
+  variable_names,
+  variable_texts
+};
 template <Member>
 struct Tag {};
 template <Member name, auto Pointer>
@@ -22,6 +35,11 @@ auto pointer(Tag<pair_loop_map>);
 auto pointer(Tag<wall_loop_map>);
 auto pointer(Tag<partner_count>);
 auto pointer(Tag<partner>);
+auto pointer(Tag<mean_mode>);
+auto pointer(Tag<mean_file>);
+auto pointer(Tag<variable_count>);
+auto pointer(Tag<variable_names>);
+auto pointer(Tag<variable_texts>);
 template struct Reach<keyword_map, &Settings::settings>;
 template struct Reach<fix_map, &Modify::fix_map>;
 template struct Reach<command_map, &Input::command_map>;
@@ -29,6 +47,11 @@ template struct Reach<pair_loop_map, &Utils::AbstractFactory<PairStyles::IGranul
 template struct Reach<wall_loop_map, &Utils::AbstractFactory<Walls::IGranularWall>::styleTable>;
 template struct Reach<partner_count, &FixContactHistory::npartner_>;
 template struct Reach<partner, &FixContactHistory::partner_>;
+template struct Reach<mean_mode, &FixAveTime::ave>;
+template struct Reach<mean_file, &FixAveTime::fp>;
+template struct Reach<variable_count, &Variable::nvar>;
+template struct Reach<variable_names, &Variable::names>;
+template struct Reach<variable_texts, &Variable::data>;
 
 template <Member name, class Type, class Owner>
 Type& reach(Owner& owner) {
@@ -50,5 +73,15 @@ GranularCreators<Walls::IGranularWall>& wall_loops() {
 }
 int* partner_counts(FixContactHistory& history) { return reach<partner_count, int*>(history); }
 int** partners(FixContactHistory& history) { return reach<partner, int**>(history); }
+bool is_of_one_interval(FixAveTime& mean) { return reach<mean_mode, int>(mean) == 0; }
+bool has_file(FixAveTime& mean) { return reach<mean_file, FILE*>(mean); }
+
+std::vector<std::pair<std::string, std::string>> formulas(Variable& variables) {
+  std::vector<std::pair<std::string, std::string>> all;
+  for (int k = 0; k < reach<variable_count, int>(variables); ++k)
+    if (variables.equalstyle(k) || variables.atomstyle(k))
+      all.emplace_back(reach<variable_names, char**>(variables)[k], reach<variable_texts, char***>(variables)[k][0]);
+  return all;
+}
 
 }  // namespace dembark_liggghts

@@ -8,13 +8,16 @@
 #include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "fix_ave_time.h"
 #include "fix_contact_history.h"
 #include "granular_pair_style.h"
 #include "granular_wall.h"
 #include "input.h"
 #include "modify.h"
 #include "settings.h"
+#include "variable.h"
 
 namespace dembark_liggghts {
 
@@ -37,6 +40,13 @@ GranularCreators<LIGGGHTS::Walls::IGranularWall>& wall_loops();
 /// Number of contacts of each atom and their partners: a state that is put back has to set them.
 int* partner_counts(LAMMPS_NS::FixContactHistory& history);
 int** partners(LAMMPS_NS::FixContactHistory& history);
+
+/// Whether a mean is over the steps of one interval, and whether it is written to a file: then a run that goes on writes the file anew.
+bool is_of_one_interval(LAMMPS_NS::FixAveTime& mean);
+bool has_file(LAMMPS_NS::FixAveTime& mean);
+
+/// Names and formulas of variables of styles equal and atom.
+std::vector<std::pair<std::string, std::string>> formulas(LAMMPS_NS::Variable& variables);
 
 }  // namespace dembark_liggghts
 

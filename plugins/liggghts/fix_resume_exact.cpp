@@ -1,6 +1,7 @@
 #include "fix_resume_exact.h"
 
 #include <algorithm>
+#include <cstring>
 #include <fstream>
 #include <numeric>
 
@@ -11,25 +12,39 @@
 #include "fix_contact_history.h"
 #include "fix_contact_history_mesh.h"
 #include "fix_property_atom.h"
+#include "fix_property_global.h"
 #include "force.h"
+#include "input.h"
 #include "modify.h"
 #include "neigh_list.h"
 #include "neighbor.h"
-#include "output.h"
 #include "pair_gran.h"
 #include "read_restart.h"
 #include "update.h"
+#include "variable.h"
 #include "write_restart.h"
 
 #include "engine_access.h"
+#include "exact_fixes.h"
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
 
 namespace {
 
-constexpr double format = 3.0;
-constexpr int header = 3;  // format, step, ranks; then how many numbers each rank has
+constexpr double format = 4.0;
+constexpr int header = 3;  // format, step, ranks; then how many numbers each rank has, their hashes, and the record of the run as text
+
+/// FNV-1a, 64 bits at a time.
+std::uint64_t hash_of(const std::vector<double> &numbers) {
+  std::uint64_t hash = 1469598103934665603u;
+  for (const double &number : numbers) {
+    std::uint64_t bits;
+    std::memcpy(&bits, &number, sizeof bits);
+    hash = (hash ^ bits) * 1099511628211u;
+  }
+  return hash;
+}
 
 PairGran *granular_pair(Force *force) { return static_cast<PairGran *>(force->pair_match("gran", 0)); }
 
@@ -120,7 +135,8 @@ void visit(Stream stream, Atom *atom, Force *force, Modify *modify) {
 
 }  // namespace
 
-FixResumeExact::FixResumeExact(LAMMPS *lmp, int narg, char **arg) : ResumeFix(lmp, narg, arg), lengths_(std::size_t(comm->nprocs)) {}
+FixResumeExact::FixResumeExact(LAMMPS *lmp, int narg, char **arg)
+    : ResumeFix(lmp, narg, arg), lengths_(std::size_t(comm->nprocs)), hashes_(std::size_t(comm->nprocs)) {}
 
 // The engine calls the set-up of a stage for the fixes of that stage only.
 int FixResumeExact::setmask() { return PRE_INITIAL_INTEGRATE | PRE_EXCHANGE | PRE_NEIGHBOR; }
@@ -139,10 +155,10 @@ void FixResumeExact::setup(int) {
     if (all) visit({part_, true, facts.size()}, atom, force, modify);
     else why = "the atoms or their candidates for contacts are others than in the state";
   }
-  skip_dumps();
-  if (comm->me == 0 && screen)
-    fprintf(screen, "dembark: resumed at step " BIGINT_FORMAT " %s%s\n", update->ntimestep,
-            why.empty() ? "exactly" : "approximately: ", why.c_str());
+  const std::string differences = why_approximate(record());
+  if (!differences.empty()) why += (why.empty() ? "" : "; ") + differences;
+  if (update->ntimestep == state_step_) resume_outputs(why.empty());
+  say("dembark: resumed at step " + std::to_string(update->ntimestep) + (why.empty() ? " exactly" : " approximately: ") + why + "\n");
   part_ = {};
   state_step_ = -1;
 }
@@ -150,14 +166,18 @@ void FixResumeExact::setup(int) {
 void FixResumeExact::write_state() {
   // The histories of pairs are in the list; what is written are those of the atoms.
   if (contact_list(force)) granular_pair(force)->get_fix_history()->pre_exchange();
+  record_ = record().text();
   part_ = structure(atom, force, modify);
   visit({part_, false}, atom, force, modify);
+  const std::uint64_t hash = hash_of(part_);
+  MPI_Gather(&hash, 1, MPI_UINT64_T, hashes_.data(), 1, MPI_UINT64_T, 0, world);
   const double mine = double(part_.size());
   MPI_Gather(&mine, 1, MPI_DOUBLE, lengths_.data(), 1, MPI_DOUBLE, 0, world);
   std::string path = part_path();
   WriteRestart(lmp).write(&path[0]);
   const bool whole = append_parts(path);
   lengths_.assign(lengths_.size(), 0.0);
+  record_.clear();
   if (comm->me != 0) return;
   if (!whole) fail_alone("file " + path + " could not be written whole. No space left on the disk?");
   keep_state();
@@ -210,24 +230,72 @@ std::string FixResumeExact::read_parts(const double *lengths) {
     MPI_Recv(part_.data(), int(part_.size()), MPI_DOUBLE, 0, 0, world, MPI_STATUS_IGNORE);
   }
   MPI_Bcast(&whole, 1, MPI_INT, 0, world);
-  return whole ? "" : "file " + path + " does not hold the forces and histories of its ranks";
+  int own = hash_of(part_) == hashes_[std::size_t(comm->me)], all = 0;
+  MPI_Allreduce(&own, &all, 1, MPI_INT, MPI_MIN, world);
+  return whole && all ? "" : "file " + path + " does not hold the forces and histories of its ranks";
 }
 
 /// How long the parts of all ranks are, which write_state() appends; a stock restart file has none.
 void FixResumeExact::write_restart(FILE *file) {
   if (comm->me != 0) return;
-  std::vector<double> numbers{format, double(update->ntimestep), double(comm->nprocs)};
-  numbers.insert(numbers.end(), lengths_.begin(), lengths_.end());
-  write_part(file, {{numbers.data(), numbers.size() * sizeof(double)}});
+  const double numbers[header] = {format, double(update->ntimestep), double(comm->nprocs)};
+  write_part(file, {{numbers, sizeof numbers},
+                    {lengths_.data(), lengths_.size() * sizeof lengths_[0]},
+                    {hashes_.data(), hashes_.size() * sizeof hashes_[0]},
+                    {record_.c_str(), record_.size() + 1}});
 }
 
 void FixResumeExact::restart(char *buffer) {
-  const double *const numbers = reinterpret_cast<const double *>(buffer);
+  double numbers[header];
+  std::memcpy(numbers, buffer, sizeof numbers);
   state_step_ = update->ntimestep;
   saved_ranks_ = static_cast<int>(numbers[2]);
-  if (numbers[0] != format) lacking_ = "the state was written by another version of dembark";
-  else if (static_cast<bigint>(numbers[1]) == update->ntimestep && saved_ranks_ == comm->nprocs) lacking_ = read_parts(numbers + header);
-  if (comm->me == 0) cut_outputs();
+  if (numbers[0] != format) {
+    lacking_ = "the state was written by another version of dembark";
+    return;
+  }
+  const std::size_t ranks = std::size_t(saved_ranks_);
+  std::vector<double> lengths(ranks);
+  std::vector<std::uint64_t> hashes(ranks);
+  buffer += sizeof numbers;
+  std::memcpy(lengths.data(), buffer, ranks * sizeof lengths[0]);
+  buffer += ranks * sizeof lengths[0];
+  std::memcpy(hashes.data(), buffer, ranks * sizeof hashes[0]);
+  saved_ = dembark::restart::RunRecord::read(buffer + ranks * sizeof hashes[0]);
+  if (comm->me == 0) keep_unappendable();
+  if (static_cast<bigint>(numbers[1]) != update->ntimestep || saved_ranks_ != comm->nprocs) return;
+  hashes_ = hashes;
+  lacking_ = read_parts(lengths.data());
+}
+
+std::string FixResumeExact::inexact_fix(Fix &fix, bigint step) const {
+  const auto known = std::find_if(std::begin(dembark_liggghts::exact_fixes), std::end(dembark_liggghts::exact_fixes),
+                                  [&](const auto &exact) { return is(fix, exact.style); });
+  if (known == std::end(dembark_liggghts::exact_fixes)) return "begins anew or differently";
+  auto *const mean = dynamic_cast<FixAveTime *>(&fix);
+  if (!mean) return "";
+  if (!dembark_liggghts::is_of_one_interval(*mean)) return "averages over more than one interval";
+  if (step % mean->global_freq != 0) return "is within an interval at step " + std::to_string(step);
+  return dembark_liggghts::has_file(*mean) ? "writes its file anew" : "";
+}
+
+std::vector<std::pair<std::string, std::string>> FixResumeExact::formulas() const { return dembark_liggghts::formulas(*input->variable); }
+
+/// Materials and contact models.
+void FixResumeExact::add_facts(dembark::restart::RunRecord &run) const {
+  if (PairGran *const pair = granular_pair(force))
+    run.facts.emplace_back("contact models",
+                           dembark::restart::hashed(std::to_string(pair->hashcode()) + " " + std::to_string(pair->dnum())));
+  for (FixPropertyGlobal *property : ::fixes<FixPropertyGlobal>(modify)) {
+    std::string values;
+    if (property->get_array())
+      for (int i = 0; i < property->size_array_rows; ++i)
+        for (int k = 0; k < property->size_array_cols; ++k) values += dembark::restart::digits(property->get_array()[i][k]) + " ";
+    else
+      for (int i = 0; i < std::max(property->vector_flag ? property->size_vector : 1, 1); ++i)
+        values += dembark::restart::digits(property->get_values()[i]) + " ";
+    run.facts.emplace_back(std::string("values of fix ") + property->id, dembark::restart::hashed(values));
+  }
 }
 
 double FixResumeExact::memory_usage() { return double(part_.size() * sizeof(double)); }

@@ -13,7 +13,9 @@ CommandStyle(resume_state,ResumeState)
 #ifndef LMP_FIX_RESUME_EXACT_H
 #define LMP_FIX_RESUME_EXACT_H
 
+#include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "per_instance.h"
@@ -35,12 +37,17 @@ class FixResumeExact : public dembark_family::ResumeFix {
  private:
   bool keeps_order() const { return !part_.empty(); }
   void write_state();
+  std::string inexact_fix(Fix &fix, bigint step) const;
+  std::vector<std::pair<std::string, std::string>> formulas() const;
+  void add_facts(dembark::restart::RunRecord &run) const;
   bool append_parts(const std::string &path);
   std::string read_parts(const double *lengths);
 
-  std::vector<double> part_;     // this rank's part of a state that is being written, or that waits to be put back
-  std::vector<double> lengths_;  // of the parts of all ranks, on the first
-  std::string lacking_;          // why there is no part to put back
+  std::vector<double> part_;           // this rank's part of a state that is being written, or that waits to be put back
+  std::vector<double> lengths_;        // of the parts of all ranks, on the first
+  std::vector<std::uint64_t> hashes_;  // of the same
+  std::string record_;                 // of the run that writes a state
+  std::string lacking_;                // why there is no part to put back
   int saved_ranks_ = 0;
 };
 

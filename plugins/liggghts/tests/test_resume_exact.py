@@ -8,6 +8,7 @@ from rig import liggghts_driver
 from rig.liggghts_driver import run_deck
 from rig.packing import CREATE, STATE, packing
 from rig.scenarios import SPRING, Material
+from rig.walls import stl
 
 BED = Material(static_friction=0.5, kinetic_friction=0.4, interface_shear_strength=1e5, bridge_volume=2e-10)
 STOCK = """\
@@ -152,3 +153,157 @@ def test_file_of_the_stock_command_says_that_it_has_no_parts(tmp_path):
     done = run_deck(tmp_path, deck)
     assert done.code == 0, done.error
     assert "at step 700 approximately: file bed.700.restart does not hold the forces and histories" in done.output
+
+
+# --- which fixes go on exactly --------------------------------------------------------------------------------------------
+
+# Fixes of the list in one bed: groups of grains that are pushed, held or moved, and a plate that shakes.
+GROUPS = """\
+group pushed id 1:8
+group held id 9:12
+group frozen id 13:14
+group moved id 15:16
+group free subtract all moved
+"""
+EXACT = """\
+variable push equal 1e-3*sin(300*step*dt)
+fix push pushed addforce v_push 0 0
+fix hold held setforce NULL NULL 0
+fix drag held drag 0.01 0.01 0 1e-6 0.002
+fix slow all viscous 1e-5
+fix plane held planeforce 1 0 0
+fix line held lineforce 0 1 0
+fix still frozen freeze
+fix rest all momentum 50 linear 1 1 0
+fix note all property/atom note vector yes no no 0 0 0
+fix check all check/timestep/gran 100 0.9 0.9
+fix plate all mesh/surface file plate.stl type 2
+fix shake all move/mesh mesh plate wiggle amplitude 0. 0. 0.0003 period 0.01
+fix wall all wall/gran {model} mesh n_meshes 1 meshes plate
+fix motion free nve/sphere
+fix still_more moved move wiggle 0.0005 0 0 0.01
+compute energy all ke
+fix mean all ave/time 1 20 20 c_energy
+variable mean equal f_mean
+fix means all print 100 "${{mean}}" {how} means.txt screen no title none
+"""
+PLATE = [((0.001, 0.001, 1e-4), (0.023, 0.001, 1e-4), (0.023, 0.023, 1e-4))]
+
+
+def with_fixes(folder, text, lines):
+    folder.mkdir(exist_ok=True)
+    (folder / "plate.stl").write_text(stl(PLATE))
+    assert "fix motion all nve/sphere\n" in text
+    return text.replace("fix motion all nve/sphere\n", lines)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_fixes_of_the_list_are_resumed_exactly(tmp_path, ranks):
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    model = liggghts_driver.models(BED)
+    states = STATES.format(every=200).replace("grains.dump", "grains.dump means.txt")
+    for folder, steps in ((whole, 900), (broken, 530)):
+        text = with_fixes(folder, bed(False, f"{states}run {steps}", ranks=ranks), GROUPS + EXACT.format(model=model, how="file"))
+        done = run_deck(folder, text, ranks=ranks)
+        assert done.code == 0, done.error or done.output[-1500:]
+        assert "approximately" not in done.output
+    text = with_fixes(broken, bed(False, f"{states}run 900 upto", ranks=ranks, resume=True), EXACT.format(model=model, how="append"))
+    done = run_deck(broken, text, ranks=ranks)
+    assert done.code == 0, done.error or done.output[-1500:]
+    assert "dembark: resumed at step 400 exactly" in done.output
+    for name in ("grains.dump", "means.txt"):
+        assert (whole / name).read_bytes() == (broken / name).read_bytes(), name
+    assert liggghts_driver.read_dump(broken / "grains.dump")[0].tolist() == [0, 500]
+
+
+INEXACT = {
+    "fix rain (insert/pack) begins anew": """\
+fix one all particletemplate/sphere 15485863 atom_type 1 density constant 2500 radius constant 0.002
+fix kinds all particledistribution/discrete 15485867 1 one 1.0
+region high block 0.002 0.022 0.002 0.022 0.03 0.05 units box
+fix rain all insert/pack seed 49979687 distributiontemplate kinds vel constant 0. 0. -0.5 insert_every 30 overlapcheck yes &
+    particles_in_region 20 region high""",
+    "fix mean (ave/time) averages over more than one interval": "fix mean all ave/time 1 20 20 c_thermo_temp ave running",
+    "fix late (ave/time) is within an interval at step 400": "fix late all ave/time 1 30 30 c_thermo_temp",
+    "fix file (ave/time) writes its file anew": "fix file all ave/time 1 20 20 c_thermo_temp file mean.txt",
+    "fix bins (ave/histo) begins anew": "fix bins all ave/histo 1 20 20 -1 1 5 vz mode vector",
+    "variable chance uses random": "variable chance equal 1e-6*random(0,1,4321)\nfix push all addforce v_chance 0 0",
+    "variable past uses ramp": "variable past equal ramp(0,1)",
+}
+
+
+def test_fixes_with_a_state_of_their_own_are_named(tmp_path):
+    """The engine begins them anew: what goes on is another run, and says so, beforehand and when it goes on."""
+    lines = "".join(f"{line}\n" for line in INEXACT.values()) + "fix motion all nve/sphere\n"
+    states = STATES.format(every=200)
+    done = run_deck(tmp_path, with_fixes(tmp_path, bed(False, f"{states}run 450", ranks=1), lines))
+    assert done.code == 0, done.error or done.output[-1500:]
+    warned = next(line for line in done.output.splitlines() if "goes on from these states approximately" in line)
+    done = run_deck(tmp_path, with_fixes(tmp_path, bed(False, f"{states}run 460 upto", ranks=1, resume=True), lines))
+    assert done.code == 0, done.error or done.output[-1500:]
+    reasons = next(line for line in done.output.splitlines() if "dembark: resumed at step 400 approximately: " in line)
+    for reason in INEXACT:
+        assert reason in reasons
+        assert reason.replace("400", "200") in warned
+
+
+def test_what_another_run_changed_is_named(tmp_path):
+    states = STATES.format(every=200)
+    assert run_deck(tmp_path, bed(False, f"{states}run 250", ranks=1)).code == 0
+    other = bed(False, f"{states}run 210 upto", ranks=1, resume=True)
+    for old, new in (("timestep 1e-5", "timestep 2e-5"), ("gravity 9.81", "gravity 9.8"), ("staticFriction peratomtypepair 2 0.5", "staticFriction peratomtypepair 2 0.45"),
+                     ("fix motion", "group some id 1:24\nfix extra some setforce NULL NULL NULL\nfix motion")):
+        assert old in other
+        other = other.replace(old, new)
+    done = run_deck(tmp_path, other)
+    assert done.code == 0, done.error or done.output[-1500:]
+    reasons = next(line for line in done.output.splitlines() if "dembark: resumed at step 200 approximately: " in line)
+    for reason in ("timestep was 1.0000000000000001e-05, and is 2.0000000000000002e-05", "acceleration of fix weight was 0 0 -9.81",
+                   "values of fix p_staticFriction changed", "fix extra (setforce) is not in the state",
+                   "number of atoms of group some (24) is not in the state"):
+        assert reason in reasons, reasons
+
+
+def test_state_of_another_run_under_the_same_name_is_not_taken(tmp_path):
+    """Forces and histories stand in the file BASE.<step>.restart: if that is of another run, they do not belong to these atoms."""
+    states = STATES.format(every=200)
+    for folder, material in (("one", BED), ("other", replace(BED, static_friction=0.1))):
+        assert run_deck(tmp_path / folder, bed(False, f"{states}run 250", ranks=1, material=material)).code == 0
+    text = bed(False, f"{states}run 260 upto", ranks=1, resume=True).replace("resume_state bed", "read_restart ../one/bed.200.restart")
+    done = run_deck(tmp_path / "other", text)
+    assert done.code == 0, done.error or done.output[-1500:]
+    assert "approximately: file bed.200.restart does not hold the forces and histories of its ranks" in done.output
+
+
+# --- what a resumed run appends to ------------------------------------------------------------------------------------------
+
+OUTPUT = """\
+variable energy equal ke
+fix words all print 50 "no step, but ${{energy}}" {how} words.txt screen no
+compute pairs all pair/gran/local id force
+dump touch all local 50 touch.dump c_pairs[1] c_pairs[2]
+dump_modify touch label contacts
+dump xyz all xyz 50 frames.xyz
+dump_modify xyz sort id
+dump binary all custom 50 frames.bin id x y z
+dump_modify binary sort id
+"""
+FILES = ("words.txt", "touch.dump", "frames.xyz", "frames.bin", "grains.dump")
+
+
+def test_every_output_goes_on_where_the_state_ends(tmp_path):
+    """No row or frame is lost and none is there twice, whatever the format."""
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    states = f"fix state all resume/exact 200 bed cut {' '.join(FILES)}\n"
+    for folder, steps in ((whole, 900), (broken, 530)):
+        done = run_deck(folder, bed(False, OUTPUT.format(how="file") + f"{states}run {steps}", ranks=1))
+        assert done.code == 0, done.error or done.output[-1500:]
+    lines = OUTPUT.format(how="append") + "".join(f"dump_modify {name} append yes\n" for name in ("touch", "xyz", "binary"))
+    done = run_deck(broken, bed(False, f"{lines}{states}run 900 upto", ranks=1, resume=True))
+    assert done.code == 0, done.error or done.output[-1500:]
+    assert "dembark: resumed at step 400 exactly" in done.output
+    assert "what was written up to step 400 is in frames.bin.until-400" in done.output
+    for name in FILES:
+        one, other = (folder / name for folder in (whole, broken))
+        before = (broken / "frames.bin.until-400").read_bytes() if name == "frames.bin" else b""
+        assert one.read_bytes() == before + other.read_bytes(), name

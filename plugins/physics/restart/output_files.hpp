@@ -79,11 +79,25 @@ inline bool is_compressed(const std::string& path) {
   return gzip || (first[0] == 0x28 && first[1] == 0xb5 && first[2] == 0x2f && first[3] == 0xfd);
 }
 
+/// Whether LIGGGHTS and LAMMPS append to a dump of this name, if they are asked to. Others they write anew.
+inline bool can_append(const std::string& path) {
+  const std::string end = fs::path(path).extension().string();
+  for (const char* const other : {".bin", ".gz", ".bz2", ".zst", ".xz", ".lzma", ".lz4"})
+    if (end == other) return false;
+  return true;
+}
+
+/// `name`, or the first of name.2, name.3, ... that is no file.
+inline std::string free_name(const std::string& name) {
+  std::string free = name;
+  for (int k = 2; fs::exists(free); ++k) free = name + "." + std::to_string(k);
+  return free;
+}
+
 /// Copy all behind `at` into a file of its own next to `path`; its name.
 inline std::string keep_behind(const std::string& path, std::int64_t at, long long step) {
   const std::string name = path + ".after-" + std::to_string(step), part = name + ".part";
-  std::string kept = name;
-  for (int k = 2; fs::exists(kept); ++k) kept = name + "." + std::to_string(k);
+  const std::string kept = free_name(name);
   std::ifstream from(path, std::ios::binary);
   std::ofstream to(part, std::ios::binary);
   from.seekg(at);
@@ -132,6 +146,17 @@ inline std::string cut_output(const OutputFile& file, long long step, bool keep)
   if (is_compressed(file.path)) return left(file.path, "it is compressed");
   if (hash_before(file.path, file.bytes) != file.hash) return left(file.path, "it is another one than at step " + std::to_string(step));
   return shorten(file.path, file.bytes, step, keep);
+}
+
+/// Give a file that cannot be appended to another name, cut to its length in the state if it is known and not packed. What there is to say,
+/// or nothing.
+inline std::string keep_unappendable(const std::string& path, const std::vector<OutputFile>& known, long long step) {
+  if (can_append(path) || !fs::is_regular_file(path) || fs::file_size(path) == 0) return "";
+  const std::string kept = free_name(path + ".until-" + std::to_string(step));
+  fs::rename(path, kept);
+  for (OutputFile file : known)
+    if (file.path == path && !is_compressed(kept) && hash_before(kept, file.bytes) == file.hash) shorten(kept, file.bytes, step, false);
+  return "nothing can be appended to file " + path + "; what was written up to step " + std::to_string(step) + " is in " + kept;
 }
 
 }  // namespace dembark::restart

@@ -174,3 +174,18 @@ TEST_CASE("a file is cut to its length in the state whatever it holds") {
   fs::remove(path);
   CHECK_THAT(cut_output(files[0], 400, false), Catch::Contains("is gone"));
 }
+
+TEST_CASE("a file that the engines write anew keeps what it has under another name") {
+  const Folder folder;
+  CHECK(keep_unappendable(folder.write("a.dump", "text"), {}, 400).empty());
+  const std::string path = folder.write("a.bin", "frames");
+  const std::vector<OutputFile> files = output_files({path});
+  folder.write("a.bin", "frames and more");
+  CHECK_THAT(keep_unappendable(path, files, 400), Catch::Contains("is in " + path + ".until-400"));
+  CHECK(folder.read("a.bin.until-400") == "frames");
+  CHECK(!fs::exists(path));
+  CHECK(keep_unappendable(path, files, 400).empty());
+  folder.write("a.bin", "others");
+  keep_unappendable(path, files, 400);
+  CHECK(folder.read("a.bin.until-400.2") == "others");
+}

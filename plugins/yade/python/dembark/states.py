@@ -2,7 +2,7 @@
 
 import glob
 import gzip
-import math
+import json
 import os
 import re
 import shutil
@@ -15,6 +15,7 @@ from yade.dembark.report import announce, fail, finish, monitor
 
 O = Omega()
 _KEPT_STATES = 2
+_SUMMED_BYTES = 1 << 16
 
 
 @cache
@@ -74,15 +75,16 @@ def _can_be_read(path):
 
 
 def _number(line):
-    """The integer that a line begins with; infinity when it begins with something else."""
-    found = re.match(rb"\d+", line)
-    return int(found.group()) if found else math.inf
+    """The integer >= 0 that is the first field of a line; None when that is something else."""
+    found = re.match(rb"\d+(?=[,\s])", line)
+    return int(found.group()) if found else None
 
 
 def _save(base, outputs):
     """Save the scene as `base`.<step>.yade.gz: whole or not at all, and marked with its check sum when it is; keep the last two."""
     path = f"{base}.{O.iter}.yade.gz"
     part = f"{base}.part.yade.gz"
+    O.tags["dembark_outputs"] = json.dumps([_known(name) for name in outputs if os.path.isfile(name)], separators=(",", ":"))
     # YADE would try for ever to write on a full disk. A packed body with its contacts takes about 150 bytes.
     if shutil.disk_usage(os.path.dirname(path) or ".").free < 1000 * len(O.bodies) + (1 << 20):
         fail(f"file {path} cannot be written: No space left on the disk")
@@ -109,26 +111,71 @@ def _forget(states):
                 os.unlink(name)
 
 
-def _cut(path, step):
-    """Cut a table or a dump before the first row or frame at or after `step`, or the first that is not whole."""
+def _known(path):
+    """A file by its name, its length and a check sum of its last bytes."""
+    size = os.path.getsize(path)
+    return [path, size, _sum_before(path, size)]
+
+
+def _sum_before(path, end):
+    with open(path, "rb") as file:
+        file.seek(max(0, end - _SUMMED_BYTES))
+        return zlib.crc32(file.read(min(end, _SUMMED_BYTES)))
+
+
+def _cut(path, step, known):
+    """Cut `path` to its length in the state, or else, if the state does not know it, before the first row or frame at or after `step`.
+
+    A file that cannot be cut so is left as it is, with one line that says why.
+    """
     if not os.path.isfile(path):
         return
-    end = 0
+    if known:
+        end = known[1] if os.path.getsize(path) >= known[1] and _sum_before(path, known[1]) == known[2] else None
+    else:
+        end = _end_before(path, step)
+    if end is None:
+        why = f"another one than at step {step}" if known else "not a dump, nor a table whose first column is the step"
+        print(f"dembark: file {path} is left as it is: it is {why}; look for what stands there twice", flush=True)
+    else:
+        os.truncate(path, end)
+
+
+def _end_before(path, step):
+    """Bytes of a dump or a table before the first row or frame at or after `step`, or the first that is not complete; None: unknown."""
+    end, last = 0, -1
     with open(path, "rb") as file:
         first = file.readline()
         if first == b"ITEM: TIMESTEP\n":
             line = first
-            while line == b"ITEM: TIMESTEP\n" and _number(file.readline()) < step:
+            while line == b"ITEM: TIMESTEP\n":
+                text = file.readline()
+                if not text.endswith(b"\n"):
+                    return end
+                now = _number(text)
+                if now is None or now < last:
+                    return None
+                last = now
                 file.readline()
-                rows = _number(file.readline()) + 5  # and the box, and the names of the columns
-                if rows == math.inf or sum(file.readline().endswith(b"\n") for _ in range(rows)) < rows:
-                    break
+                rows = _number(file.readline())
+                if now >= step or rows is None or sum(file.readline().endswith(b"\n") for _ in range(rows + 5)) < rows + 5:
+                    return end
                 end, line = file.tell(), file.readline()
-        elif first.endswith(b"\n"):
-            end = file.tell()
-            while (line := file.readline()).endswith(b"\n") and _number(line) < step:
-                end = file.tell()
-    os.truncate(path, end)
+            return end if b"ITEM: TIMESTEP\n".startswith(line) else None
+        if re.match(rb"[#\s\"]*step[\"\s,]", first, re.IGNORECASE) is None:
+            return None
+        end, cut = file.tell(), None
+        for line in file:
+            if not line.endswith(b"\n"):
+                break
+            now = _number(line)
+            if now is None or now <= last:
+                return None
+            last = now
+            if now >= step and cut is None:
+                cut = end
+            end += len(line)
+    return end if cut is None else cut
 
 
 def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.csv", "grains.dump", "contacts.dump"), base="state",
@@ -152,9 +199,11 @@ def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.c
         if not whole:
             fail(f"resume=yes: there is no whole state {base}.<step>.yade.gz in this folder; start with restart_every > 0 first")
         O.load(whole[0], quiet=True)
+        known = {one[0]: one for one in json.loads(O.tags["dembark_outputs"] if "dembark_outputs" in O.tags.keys() else "[]")}
         for path in outputs:
-            _cut(path, O.iter)
-        print(f"dembark: resumed at step {O.iter} exactly", flush=True)
+            _cut(path, O.iter, known.get(path))
+        exact = "exactly" if O.numThreads == 1 else f"approximately: sums of {O.numThreads} threads round differently each time"
+        print(f"dembark: resumed at step {O.iter} {exact}", flush=True)
         if loaded:
             loaded()
     elif restart_every:

@@ -1,0 +1,120 @@
+// What fix resume/exact compares between the run that wrote a state and the run that goes on, and which of its fixes go on exactly.
+#include <cctype>
+#include <cstdlib>
+#include <cstring>
+
+#include "group.h"
+#include "neighbor.h"
+
+#include "resume_fix.h"
+
+using namespace LAMMPS_NS;
+namespace states = dembark::restart;
+
+namespace dembark_family {
+namespace {
+
+/// Whether a pair style writes its settings into restart files, and nothing else. LAMMPS's granular also counts how often it was set.
+bool writes_settings(const std::string& pair_style) { return pair_style == "gran" || pair_style == "sph/coupled"; }
+
+std::string pair_settings(Pair* pair) {
+  char* text = nullptr;
+  std::size_t size = 0;
+  FILE* const file = open_memstream(&text, &size);
+  if (!file) return "";
+  pair->write_restart(file);
+  std::fclose(file);
+  const std::string settings(text, size);
+  std::free(text);
+  return settings;
+}
+
+/// Words of formulas whose value depends on what was drawn before, on where the run began, or on the machine.
+const char* const words_with_a_past[] = {"random",  "normal",   "ramp", "vdisplace", "swiggle", "cwiggle",
+                                         "elapsed", "elaplong", "cpu",  "tpcpu",     "spcpu",   "cpuremain"};
+
+std::string word_with_a_past(const std::string& formula) {
+  const auto in_word = [&](std::size_t k) {
+    return k < formula.size() && (std::isalnum(static_cast<unsigned char>(formula[k])) || formula[k] == '_');
+  };
+  for (const char* const word : words_with_a_past)
+    for (std::size_t at = formula.find(word); at != std::string::npos; at = formula.find(word, at + 1))
+      if (!(at > 0 && in_word(at - 1)) && !in_word(at + std::strlen(word))) return word;
+  return "";
+}
+
+}  // namespace
+
+/// Collective; complete on the first rank.
+states::RunRecord ResumeFix::record() const {
+  states::RunRecord run;
+  const auto add = [&run](const std::string& name, const std::string& value) {
+    run.facts.emplace_back(name, value.empty() ? "none" : value);
+  };
+  const auto word = [](const char* text) { return std::string(text ? text : ""); };
+  bigint atoms = 0;
+  const bigint own = atom->nlocal;
+  MPI_Allreduce(&own, &atoms, 1, MPI_LMP_BIGINT, MPI_SUM, world);
+  add("number of atoms", std::to_string(atoms));
+  for (int k = 1; k < group->ngroup; ++k)
+    if (group->names[k]) add("number of atoms of group " + word(group->names[k]), std::to_string(bigint(group->count(k))));
+  // A box that fits itself to the atoms is set anew by their positions.
+  for (int k = 0; k < 3; ++k)
+    if (domain->boundary[k][0] < 2 && domain->boundary[k][1] < 2)
+      add(std::string("box along ") + "xyz"[k], states::digits(domain->boxlo[k], domain->boxhi[k]));
+  if (domain->triclinic) add("tilt of the box", states::digits(domain->xy, domain->xz, domain->yz));
+  std::string boundary;
+  for (int k = 0; k < 6; ++k) boundary += "pfsm"[domain->boundary[k / 2][k % 2]];
+  add("boundary", boundary);
+  add("timestep", states::digits(update->dt));
+  add("units", word(update->unit_style));
+  add("atom_style", word(atom->atom_style));
+  add("newton", force->newton_pair ? "on" : "off");
+  add("neighbor", states::digits(neighbor->skin, neighbor->style));
+  add("neigh_modify every, delay, check", states::digits(neighbor->every, neighbor->delay, neighbor->dist_check));
+  add("processors", states::digits(comm->procgrid[0], comm->procgrid[1], comm->procgrid[2]));
+  add("atom_modify sort", states::digits(sort_frequency_));
+  add("pair_style", word(force->pair_style));
+  std::string acting;
+  for (Fix* const fix : fixes()) {
+    if (fix == this) continue;
+    add("fix " + word(fix->id), fix->style);
+    if (is(*fix, "gravity")) {
+      const dembark::Vec3<double> g = acceleration_of(fix)();
+      add("acceleration of fix " + word(fix->id), states::digits(g.x, g.y, g.z));
+    }
+  }
+  for (int k = 0; k < modify->nfix; ++k)
+    if (modify->fix[k] && modify->fmask[k] & acting_stages) acting += (acting.empty() ? "" : " ") + word(modify->fix[k]->id);
+  add("order of fixes", acting);
+  add_facts(run);
+  if (comm->me != 0) return run;
+  if (force->pair && writes_settings(word(force->pair_style)))
+    add("settings of the pair style", states::hashed(pair_settings(force->pair)));
+  run.files = states::output_files(outputs_);
+  return run;
+}
+
+/// Fixes and variables that do not go on from a state of `step`, each with its reason.
+std::vector<std::string> ResumeFix::inexact(bigint step) const {
+  std::vector<std::string> all;
+  for (Fix* const fix : fixes())
+    if (const std::string why = inexact_fix(*fix, step); !why.empty())
+      all.push_back(std::string("fix ") + fix->id + " (" + fix->style + ") " + why);
+  for (const auto& [name, formula] : formulas())
+    if (const std::string word = word_with_a_past(formula); !word.empty()) all.push_back("variable " + name + " uses " + word);
+  return all;
+}
+
+/// On the first rank.
+std::string ResumeFix::why_approximate(const states::RunRecord& run) const {
+  std::string why;
+  const auto add = [&why](const std::vector<std::string>& reasons) {
+    for (const std::string& reason : reasons) why += (why.empty() ? "" : "; ") + reason;
+  };
+  if (!saved_.facts.empty()) add(states::differences(saved_, run));
+  add(inexact(update->ntimestep));
+  return why;
+}
+
+}  // namespace dembark_family
