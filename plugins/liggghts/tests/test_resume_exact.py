@@ -251,7 +251,8 @@ def test_what_another_run_changed_is_named(tmp_path):
     states = STATES.format(every=200)
     assert run_deck(tmp_path, bed(False, f"{states}run 250", ranks=1)).code == 0
     other = bed(False, f"{states}run 210 upto", ranks=1, resume=True)
-    for old, new in (("timestep 1e-5", "timestep 2e-5"), ("gravity 9.81", "gravity 9.8"), ("staticFriction peratomtypepair 2 0.5", "staticFriction peratomtypepair 2 0.45"),
+    for old, new in (("timestep 1e-5", "timestep 2e-5"), ("gravity 9.81", "gravity 9.8"),
+                     ("staticFriction peratomtypepair 2 0.5", "staticFriction peratomtypepair 2 0.45"),
                      ("fix motion", "group some id 1:24\nfix extra some setforce NULL NULL NULL\nfix motion")):
         assert old in other
         other = other.replace(old, new)

@@ -143,38 +143,46 @@ def _cut(path, step, known):
 
 def _end_before(path, step):
     """Bytes of a dump or a table before the first row or frame at or after `step`, or the first that is not complete; None: unknown."""
-    end, last = 0, -1
     with open(path, "rb") as file:
         first = file.readline()
         if first == b"ITEM: TIMESTEP\n":
-            line = first
-            while line == b"ITEM: TIMESTEP\n":
-                text = file.readline()
-                if not text.endswith(b"\n"):
-                    return end
-                now = _number(text)
-                if now is None or now < last:
-                    return None
-                last = now
-                file.readline()
-                rows = _number(file.readline())
-                if now >= step or rows is None or sum(file.readline().endswith(b"\n") for _ in range(rows + 5)) < rows + 5:
-                    return end
-                end, line = file.tell(), file.readline()
-            return end if b"ITEM: TIMESTEP\n".startswith(line) else None
-        if re.match(rb"[#\s\"]*step[\"\s,]", first, re.IGNORECASE) is None:
+            return _end_of_frames(file, step)
+        if re.match(rb"[#\s\"]*step[\"\s,]", first, re.IGNORECASE):
+            return _end_of_rows(file, step)
+    return None
+
+
+def _end_of_frames(file, step):
+    end, last = 0, -1
+    while (text := file.readline()).endswith(b"\n"):
+        now = _number(text)
+        if now is None or now < last:
             return None
-        end, cut = file.tell(), None
-        for line in file:
-            if not line.endswith(b"\n"):
-                break
-            now = _number(line)
-            if now is None or now <= last:
-                return None
-            last = now
-            if now >= step and cut is None:
-                cut = end
-            end += len(line)
+        last = now
+        file.readline()
+        rows = _number(file.readline())
+        if now >= step or rows is None or sum(file.readline().endswith(b"\n") for _ in range(rows + 5)) < rows + 5:
+            break
+        end, line = file.tell(), file.readline()
+        if not line.endswith(b"\n"):
+            break
+        if line != b"ITEM: TIMESTEP\n":
+            return None
+    return end
+
+
+def _end_of_rows(file, step):
+    end, cut, last = file.tell(), None, -1
+    for line in file:
+        if not line.endswith(b"\n"):
+            break
+        now = _number(line)
+        if now is None or now <= last:
+            return None
+        last = now
+        if now >= step and cut is None:
+            cut = end
+        end += len(line)
     return end if cut is None else cut
 
 
@@ -199,7 +207,7 @@ def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.c
         if not whole:
             fail(f"resume=yes: there is no whole state {base}.<step>.yade.gz in this folder; start with restart_every > 0 first")
         O.load(whole[0], quiet=True)
-        known = {one[0]: one for one in json.loads(O.tags["dembark_outputs"] if "dembark_outputs" in O.tags.keys() else "[]")}
+        known = {one[0]: one for one in json.loads(O.tags["dembark_outputs"] if O.tags.has_key("dembark_outputs") else "[]")}
         for path in outputs:
             _cut(path, O.iter, known.get(path))
         exact = "exactly" if O.numThreads == 1 else f"approximately: sums of {O.numThreads} threads round differently each time"
