@@ -46,7 +46,10 @@ void FixResumeExact::setup_pre_exchange() {
 }
 
 FixResumeExact::Facts FixResumeExact::facts() const {
-  const dembark_family::OrderHash order(*atom, force->pair ? force->pair->list : nullptr);
+  // Under pair_style hybrid the lists are those of its parts.
+  Pair* const own = force->pair_match(dembark_lammps::ContactCoefficients::style_name, 1);
+  Pair* const pair = own ? own : force->pair;
+  const dembark_family::OrderHash order(*atom, pair ? pair->list : nullptr);
   return {double(atom->nlocal), double(atom->nghost), order.high(), order.low()};
 }
 

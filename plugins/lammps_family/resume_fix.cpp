@@ -80,6 +80,7 @@ void ResumeFix::setup_pre_exchange() {
 void ResumeFix::begin_step() {
   if (cut_step_ >= 0) cut_outputs();
   if (every_ == 0 || update->ntimestep != next_reneighbor + 1) return;
+  std::fflush(nullptr);  // what any rank holds back of its output
   --update->ntimestep;
   write_state();
   ++update->ntimestep;

@@ -101,7 +101,7 @@ def remember(work: Path, what: Attempts) -> None:
 
 
 def clear(run: Run, work: Path) -> None:
-    """Take away what only an unfinished run needs."""
-    for pattern in (f"{BASE}.*", *run.engine.facts.leftovers, _ATTEMPTS):
+    """Take away what only an unfinished run needs, and what was cut off from its files when it was resumed approximately."""
+    for pattern in (f"{BASE}.*", "*.after-*", *run.engine.facts.leftovers, _ATTEMPTS):
         for path in work.glob(pattern):
             path.unlink(missing_ok=True)

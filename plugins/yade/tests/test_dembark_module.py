@@ -140,6 +140,31 @@ def test_a_wrong_word_for_restarts_is_one_line_and_code_2(yade, word, parts):
     assert_one_line(done, parts)
 
 
+def test_output_files_are_cut_behind_the_state_or_left(yade):
+    """To their length in the state; by their format if the state does not know them; never when their rows do not begin with the step."""
+    frame = "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n1\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\nITEM: ATOMS id\n7\n"
+    files = {"grains.dump": "".join(frame.format(n) for n in (0, 50, 100)), "half.csv": "step,x\n0,1\n50,2\n10",
+             "known.txt": "no step\nat all\n", "means.txt": "# Means\n# TimeStep x\n50 1\n100 2\n", "other.txt": "no step\nat all\n",
+             "short.txt": "x", "table.csv": "step,x\n0,1\n50,2\n100,3\n150,4\n", "times.csv": "time,x\n0,1\n1,2\n"}
+    for name, text in files.items():
+        (yade.folder / name).write_text(text)
+    done = yade(script(yade, "cuts", f"""
+        from yade.dembark import states
+        same = states._sum_before("known.txt", 8)
+        known = {{"known.txt": ["", 8, same], "short.txt": ["", 8, same], "other.txt": ["", 8, 1]}}
+        for name in {list(files)}:
+            states._cut(name, 100, known.get(name))
+        print("done")
+        """))
+    assert "done" in done.stdout, done.stderr
+    found = {name: (yade.folder / name).read_text() for name in files}
+    cut = {"grains.dump": frame.format(0) + frame.format(50), "half.csv": "step,x\n0,1\n50,2\n", "known.txt": "no step\n",
+           "table.csv": "step,x\n0,1\n50,2\n"}
+    assert found == files | cut
+    left = [line.split()[2] for line in done.stdout.splitlines() if "is left as it is" in line]
+    assert left == [name for name in files if name not in cut]
+
+
 def test_a_deck_without_numbers_says_where_they_come_from(yade):
     assert_one_line(yade(script(yade, "bare", "p = dembark.parameters()\nprint('went on')\n")), ("dembark deck",))
 
