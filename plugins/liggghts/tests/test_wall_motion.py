@@ -302,4 +302,5 @@ def test_motions_that_are_given_late_begin_where_the_wall_stands(tmp_path):
         assert_begins_where_it_stands(tmp_path, words, times, mine[:, :3], mine[:, 3], mine[:, 4])
     again = run_deck(tmp_path, late_deck(f"run {late.PART}", create="read_restart half.state"), name="again.in")
     assert again.code == 0, again.error or again.output[-2000:]
-    np.testing.assert_array_equal(np.loadtxt(tmp_path / "again.txt"), table[late.PART // late.EVERY:])
+    # The engine's own time begins anew with a restart.
+    np.testing.assert_array_equal(np.loadtxt(tmp_path / "again.txt")[:, 1:], table[late.PART // late.EVERY:, 1:])
