@@ -43,6 +43,7 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
   int offset_;
   int model_ = 0;
   bool viscous_ = false, carried_ = false;
+  dembark_liggghts::StockSums sums_;
   int imbalance_ = -1;               // where a bridge of carried liquid keeps how it will be split
   LAMMPS_NS::PairGran* const pair_;  // nullptr: these are contacts with a wall
   LAMMPS_NS::FixWallGran* const wall_;
@@ -141,9 +142,11 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     dembark_liggghts::register_choice(settings, "capillary_model", model_, dembark::capillary::model_names());
     settings.registerOnOff("viscous_liquid", viscous_, false);
     settings.registerOnOff("carried_liquid", carried_, false);
+    sums_.register_in(settings, false);
   }
 
   inline void postSettings(IContactHistorySetup* host, ContactModelBase* models) {
+    sums_.refuse(error, viscous_ ? "cohesion capillary with viscous_liquid" : "cohesion capillary", viscous_);
     if (!carried_) return;
     imbalance_ = host->add_history_value("bridge_imbalance", "1");
     models->add_history_offset(imbalance_name, imbalance_);

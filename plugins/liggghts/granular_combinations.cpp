@@ -1,11 +1,15 @@
 #include "granular_combinations.h"
 
+#include <algorithm>
+#include <array>
 #include <cctype>
 #include <cstdint>
 #include <cstring>
+#include <initializer_list>
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 // The library's headers depend on this order.
 #include "fix_insert_stream.h"
@@ -56,6 +60,73 @@ std::string available() {
   return line;
 }
 
+/// Models of a combination in the order in which a user writes them, and in which their numbers stand in its hash.
+constexpr const char* kinds[] = {"model", "tangential", "cohesion", "rolling_friction", "surface"};
+typedef std::array<int, 5> Combination;
+
+/// The name of a model, as a user writes it.
+std::string name(int kind, int number) {
+  std::string found = "off";
+#define NORMAL_MODEL(id, text, constant) \
+  if (kind == 0 && number == constant) found = #text;
+#define TANGENTIAL_MODEL(id, text, constant) \
+  if (kind == 1 && number == constant) found = #text;
+#define COHESION_MODEL(id, text, constant) \
+  if (kind == 2 && number == constant) found = #text;
+#define ROLLING_MODEL(id, text, constant) \
+  if (kind == 3 && number == constant) found = #text;
+#define SURFACE_MODEL(id, text, constant) \
+  if (kind == 4 && number == constant) found = #text;
+#include "style_normal_model.h"
+#include "style_tangential_model.h"
+#include "style_cohesion_model.h"
+#include "style_rolling_model.h"
+#include "style_surface_model.h"
+#undef NORMAL_MODEL
+#undef TANGENTIAL_MODEL
+#undef COHESION_MODEL
+#undef ROLLING_MODEL
+#undef SURFACE_MODEL
+  return found;
+}
+
+std::vector<Combination> compiled_combinations() {
+  std::vector<Combination> all;
+#define MODELS(...) {__VA_ARGS__}
+#define GRAN_MODELS(normal, tangential, cohesion, rolling, surface) \
+  for (const int n : std::initializer_list<int> MODELS normal)      \
+    for (const int r : std::initializer_list<int> MODELS rolling) all.push_back({n, tangential, cohesion, r, surface});
+#include "granular_combinations_list.h"
+#undef GRAN_MODELS
+#undef MODELS
+  return all;
+}
+
+/// Which model of `asked` there is no combination with, and what could stand there: those of the combinations that differ least.
+std::string what_does_not_fit(const Combination& asked) {
+  const std::vector<Combination> all = compiled_combinations();
+  const auto others = [&](const Combination& c) {
+    int count = 0;
+    for (std::size_t k = 0; k < asked.size(); ++k) count += c[k] != asked[k];
+    return count;
+  };
+  int fewest = int(asked.size());
+  for (const Combination& c : all) fewest = std::min(fewest, others(c));
+  std::string line;
+  for (std::size_t k = 0; k < asked.size(); ++k) {
+    std::vector<std::string> choices;
+    for (const Combination& c : all) {
+      if (others(c) != fewest || c[k] == asked[k]) continue;
+      const std::string choice = name(int(k), c[k]);
+      if (std::find(choices.begin(), choices.end(), choice) == choices.end()) choices.push_back(choice);
+    }
+    if (choices.empty()) continue;
+    line += std::string(line.empty() ? "" : fewest > 1 ? ", and " : ", or ") + kinds[k] + " " + name(int(k), asked[k]) + " can be ";
+    for (std::size_t c = 0; c < choices.size(); ++c) line += (c ? ", " : "") + choices[c];
+  }
+  return line;
+}
+
 template <class Host>
 using Creator = typename GranularCreators<Host>::mapped_type;
 
@@ -67,7 +138,10 @@ bool ours(std::int64_t hash) { return ((hash >> 6) & 63) == TANGENTIAL_FINNIE_RA
 template <class Host>
 Host* fallback_or_refuse(LAMMPS* lammps, typename Host::ParentType* parent, std::int64_t hash) {
   if (ours(hash)) {
-    const std::string line = "this combination of contact models is not compiled; there is " + available();
+    Combination asked;
+    for (std::size_t k = 0; k < asked.size(); ++k) asked[k] = (hash >> (6 * k)) & 63;
+    const std::string line =
+        "this combination of contact models is not compiled: " + what_does_not_fit(asked) + "; there is, in this order, " + available();
     lammps->error->all(FLERR, line.c_str());
   }
   return stock_fallback<Host>(lammps, parent, hash);

@@ -3,6 +3,7 @@
 #ifndef DEMBARK_MODEL_PROPERTIES_H
 #define DEMBARK_MODEL_PROPERTIES_H
 
+#include <array>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -10,8 +11,10 @@
 #include "atom.h"
 #include "error.h"
 #include "fix_property_global.h"
+#include "force.h"
 #include "modify.h"
 #include "property_registry.h"
+#include "update.h"
 
 #include "dembark/contact.hpp"
 #include "dembark/pair_table.hpp"
@@ -45,6 +48,35 @@ inline void register_choice(Settings& settings, const std::string& name, int& ta
   setting->registerTarget(target);
   setting->setDefault(values[0]);
 }
+
+/// Sums of the engine's models, of energy and of heat: they would be incomplete with models that have no part in them.
+class StockSums {
+  struct Sum {
+    const char* name;
+    bool heat, on = false;
+  };
+  std::array<Sum, 6> sums_{{{"computeElasticPotential", false},
+                            {"computeDissipatedEnergy", false},
+                            {"heating_normal_hertz", true},
+                            {"heating_normal_hooke", true},
+                            {"heating_tangential_history", true},
+                            {"heating_tracking", true}}};
+
+ public:
+  /// `all`: also those that no model has registered, and that the engine would call unknown.
+  void register_in(Settings& settings, bool all) {
+    for (Sum& sum : sums_)
+      if (all || keywords(settings).count(sum.name)) settings.registerOnOff(sum.name, sum.on, false);
+  }
+  /// Refuses those that are on, of heat only where `with_heat`.
+  void refuse(LAMMPS_NS::Error* error, const std::string& model, bool with_heat) const {
+    for (const Sum& sum : sums_)
+      if (sum.on && (with_heat || !sum.heat))
+        error->all(FLERR, (model + " has no part in '" + sum.name + "', whose sums would be incomplete; leave it out, and take " +
+                           "fix energy/account for energies")
+                              .c_str());
+  }
+};
 
 using dembark::PairTable;
 
@@ -81,7 +113,11 @@ class PropertyReader {
 
  public:
   PropertyReader(PropertyRegistry& registry, LAMMPS_NS::Modify* modify, LAMMPS_NS::Error* error, const std::string& model)
-      : lmp_(registry.getLAMMPS()), modify_(modify), error_(error), types_(registry.max_type()), model_(model) {}
+      : lmp_(registry.getLAMMPS()), modify_(modify), error_(error), types_(registry.max_type()), model_(model) {
+    if (lmp_->force->nktv2p != 1.0)
+      fail(std::string("pressures of units ") + lmp_->update->unit_style +
+           " are not force over length squared; use si, cgs, micro, nano or lj");
+  }
 
   int types() const { return types_; }
 

@@ -12,9 +12,13 @@ TANGENTIAL_MODEL(TANGENTIAL_FINNIE_RABINOWICZ,finnie_rabinowicz,20)
 #ifndef TANGENTIAL_MODEL_FINNIE_RABINOWICZ_H_
 #define TANGENTIAL_MODEL_FINNIE_RABINOWICZ_H_
 
+#include <cstdio>
+#include <utility>
+
 #include "contact_models.h"
 #include "tangential_model_base.h"
 #include "atom.h"
+#include "comm.h"
 #include "fix_wall_gran.h"
 #include "global_properties.h"
 #include "neighbor.h"
@@ -36,12 +40,14 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
   int rings_ = -1;  // offset, with partial slip
   int angle_ = -1;  // the same of an elastic-plastic rolling spring
   int presliding_ = 0, rolling_model_ = 0;
+  dembark_liggghts::StockSums sums_;
   dembark_liggghts::PairTable<dembark::FinnieRabinowicz> laws_;
   dembark_liggghts::PairTable<dembark::RollingResistance> rolling_;
   LAMMPS_NS::PairGran* const pair_;  // nullptr: these are contacts with a wall
   LAMMPS_NS::FixWallGran* const wall_;
   dembark_liggghts::EnergyTally* tally_ = nullptr;
   double exponent_ = 1.0;  // of the normal spring
+  bool noted_ = false;
 
  public:
   static constexpr const char* history_name = "finnie_rabinowicz";
@@ -64,9 +70,11 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
   void registerSettings(Settings& settings) {
     dembark_liggghts::register_choice(settings, "presliding", presliding_, dembark::presliding_names());
     dembark_liggghts::register_choice(settings, "rolling_resistance", rolling_model_, dembark::rolling_names());
+    sums_.register_in(settings, true);
   }
 
   inline void postSettings(IContactHistorySetup* host, ContactModelBase* models) {
+    sums_.refuse(error, "tangential finnie_rabinowicz", true);
     if (static_cast<dembark::Presliding>(presliding_) == dembark::Presliding::partial_slip) {
       rings_ = dembark_liggghts::add_rings(*host);
       models->add_history_offset(rings_name, rings_);
@@ -86,6 +94,7 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
         read.fail("rolling_resistance and the model rolling_friction are both on; leave one of them out");
       rolling_ = dembark_liggghts::read_rolling(read, rolling_model());
     }
+    note_slow_rolling();
     tally_ = dembark_liggghts::find_energy_tally(modify);
     exponent_ = matches("normal", "hertz") ? 1.5 : 1.0;
     // The engine tells a model of the end of a contact only within this factor of the radii; without it a grain that bounces
@@ -149,6 +158,17 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
 
   bool matches(const char* kind, const char* model) const {
     return wall_ ? wall_->contact_match(kind, model) : pair_->contact_match(kind, model);
+  }
+
+  /// Says once that a pair style takes the engine's own loop, where it could have the faster one.
+  void note_slow_rolling() {
+    if (!pair_ || noted_ || comm->me != 0 || !matches("normal", "hertz")) return;
+    noted_ = true;
+    for (const auto [stock, ours] : {std::pair("cdt", "constant_torque"), std::pair("epsd2", "elastic_plastic")})
+      for (FILE* const out : {screen, logfile})
+        if (out && matches("rolling_friction", stock))
+          fprintf(out, "dembark: rolling_friction %s runs in the engine's pair loop; rolling_resistance %s runs in the fast one\n", stock,
+                  ours);
   }
 
   void store(double* history, const dembark::FrictionState<double>& state, const dembark::SlipRings& rings,
