@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "../surface/point_grid.hpp"
 #include "../surface/surface_contacts.hpp"
 #include "types.hpp"
 
@@ -236,24 +237,11 @@ class TriangleFinder {
  public:
   /// In the order of the bodies' ids. `mesh.id` must be wall_key(number); a contact's key is wall_key(number, feature of the triangle).
   void find(const std::vector<Body>& bodies, const Mesh& mesh, double reach, std::vector<Contact>& contacts) {
-    const SurfaceContacts& surface = mesh.surface;
-    double largest = 0.0;
-    for (const Body& b : bodies) largest = std::max(largest, b.radius);
-    const double range = largest + reach;
-    build_grid(bodies, 2.0 * range, grid_);
     hits_.clear();
-    const std::vector<Triangle>& triangles = surface.triangles();
-    for (int t = 0; t < int(triangles.size()); ++t) {
-      const Triangle& triangle = triangles[std::size_t(t)];
-      const Vec3<double> first = triangle.node[0], across = cross(triangle.node[1] - first, triangle.node[2] - first);
-      const double size = norm(across);
-      const auto [low, high] = box(triangle, range);
-      grid_.in_box(low, high, [&, t](int i) {
-        const Body& b = bodies[std::size_t(i)];
-        if (std::fabs(dot(across, b.position - first)) > 1.001 * size * (b.radius + reach)) return;  // most are far from its plane
-        const ClosestPoint here = closest_point(triangle, b.position);
-        if (here.distance - b.radius <= reach && surface.owner(t, here, b.position, b.radius) == t) hits_.push_back({i, t, here});
-      });
+    const std::vector<Triangle>& triangles = mesh.surface.triangles();
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      mesh.surface.contacts(bodies[i].position, bodies[i].radius, bodies[i].radius + reach, found_);
+      for (const SurfacePoint& f : found_) hits_.push_back({int(i), f.triangle, f.at});
     }
     // Faces before edges before corners.
     const auto order = [&](const Hit& h) {
@@ -282,7 +270,7 @@ class TriangleFinder {
     ClosestPoint closest;
   };
 
-  PointGrid grid_;
+  std::vector<SurfacePoint> found_;
   std::vector<Hit> hits_;
 };
 

@@ -1,159 +1,219 @@
-// Triangles as one surface: a sphere has a contact where its distance to the surface has a minimum.
+// Triangles as one surface: a sphere has a contact where its distance to the surface has a minimum, however the surface is cut into
+// triangles, and whatever lies on it twice.
 //
-// Each triangle that a sphere reaches has a point closest to the sphere. Two triangles compete when these points belong together: the point
-// of one lies on the other (a shared edge or corner, wherever the triangulation puts it), or, on a smooth surface, both triangles are
-// touched in the same direction. Of those that compete the nearest has the contact; equal distances are settled by the triangles' order.
-// As that order is the same for all, one always remains, so that no contact is lost and none counts twice: a flat patch is a plane, an
-// edge counts once, and a groove is touched on both sides unless it is smooth. Both sides of a triangle are solid.
+// Each triangle that a sphere reaches has a point closest to the sphere's centre. It gives way to a triangle that is nearer to the centre
+// if
+//   - both points are one, within the precision: one of them lies on the other triangle (an edge, a corner, a triangle given twice, patches
+//     that overlap);
+//   - the nearer one stands before the point: from the centre it is seen in the same direction, within the smooth angle, and no farther
+//     away (a slight groove, an open seam, sheets one above the other, a rib below a floor).
+// What remains are the contacts. Equal distances are settled by the triangles' order. As that order is the same for all, the nearest
+// triangle always remains, so that no contact is lost and none counts twice: a flat patch is a plane, an edge counts once, and a groove is
+// touched on both sides unless it is smooth. Both sides of a triangle are solid. A triangle without area has no contact.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <stdexcept>
-#include <string>
 #include <utility>
 #include <vector>
 
-#include "point_grid.hpp"
 #include "triangle.hpp"
+#include "triangle_cells.hpp"
 
 namespace dembark {
 
+/// A triangle, by its place in the surface, and its point closest to a sphere.
+struct SurfacePoint {
+  int triangle;
+  ClosestPoint at;
+};
+
 class SurfaceContacts {
  public:
-  SurfaceContacts() = default;
-  /// smooth_angle (rad, 0 ... pi/4): a groove of a smaller angle is touched on its nearer side only. Springs on both sides would be twice
-  /// as stiff; conditions on the gap (impacts) need none of it. weld: corners and edges nearer to each other than this part of the shortest
-  /// edge are joined.
-  SurfaceContacts(double smooth_angle, double weld) : smooth_angle_(smooth_angle), weld_(weld) {}
+  /// rad, of walls under forces: sides of a slighter groove are one contact. Springs on both would be twice as stiff.
+  static constexpr double usual_smooth_angle = 0.05;
+  /// m: points of the surface nearer to each other than this are one point.
+  static constexpr double usual_precision = 1e-8;
 
-  /// The triangles as they are now. Which of them stand beside each other is found anew only when they are others, have changed their
-  /// shape or have moved against each other. moved: whether any has since the last call.
+  SurfaceContacts() = default;
+  /// smooth_angle: rad, 0 ... pi/4; conditions on the gap (impacts) need none. precision: m.
+  SurfaceContacts(double smooth_angle, double precision)
+      : smooth_(smooth_angle > 0.0), cosine_(std::cos(smooth_angle + 1e-9)), precision_(precision) {}
+
+  /// The triangles as they are now. They are sorted anew only when they are others, have changed their shape or have moved against each
+  /// other. moved: whether any has since the last call.
   void update(std::vector<Triangle> triangles, bool moved = true) {
     const bool same = std::equal(triangles.begin(), triangles.end(), triangles_.begin(), triangles_.end(),
                                  [](const Triangle& a, const Triangle& b) { return a.id == b.id; });
+    if (same && moved && seen_.empty())
+      for (const Triangle& t : triangles_) seen_.insert(seen_.end(), t.node, t.node + 3);
     triangles_.swap(triangles);
-    if (!same || (moved && !moved_as_one())) join();
+    if (!same || (moved && !moved_as_one())) sort();
+  }
+  /// usual: m, of the distances that are asked for. It matters for the speed alone.
+  void expect(double usual) {
+    if (!(usual > usual_)) return;
+    usual_ = usual;
+    sort();
   }
 
   const std::vector<Triangle>& triangles() const { return triangles_; }
 
-  /// Triangle t, if it has a contact with a sphere there; otherwise one that competes with it and is nearer to the sphere.
+  /// Calls visit(t) for each triangle whose box is within `distance` (m) of the place, until one of the calls returns false.
+  template <class Visit>
+  void near(const Vec3<double>& place, double distance, Visit visit) const {
+    // Equal distances differ by round-off.
+    const double within = distance + 1e-9 * (distance + cells_.edge()), square = within * within;
+    cells_.near(turned_ ? as_sorted(place) : place, turned_ ? within + slack * cells_.edge() : within, [&](int t) {
+      const Vec3<double>* n = triangles_[std::size_t(t)].node;
+      const auto beyond = [](double p, double a, double b, double c) {
+        const double below = std::min(std::min(a, b), c) - p, above = p - std::max(std::max(a, b), c);
+        return std::max(std::max(below, above), 0.0);
+      };
+      const double x = beyond(place.x, n[0].x, n[1].x, n[2].x), y = beyond(place.y, n[0].y, n[1].y, n[2].y);
+      const double z = beyond(place.z, n[0].z, n[1].z, n[2].z);
+      return x * x + y * y + z * z > square || visit(t);
+    });
+  }
+
+  /// Contacts of a sphere with all of the surface within `distance` (m) of its centre, the nearest one first.
+  void contacts(const Vec3<double>& centre, double radius, double distance, std::vector<SurfacePoint>& found) const {
+    found.clear();
+    near(centre, distance, [&](int t) {
+      const ClosestPoint here = closest_point(triangles_[std::size_t(t)], centre);
+      if (here.distance <= distance) found.push_back({t, here});
+      return true;
+    });
+    if (found.size() < 2) return;
+    std::sort(found.begin(), found.end(), [](const SurfacePoint& a, const SurfacePoint& b) {
+      return a.at.distance != b.at.distance ? a.at.distance < b.at.distance : a.triangle < b.triangle;
+    });
+    const double touch = touch_of(radius);
+    thread_local std::vector<char> gives_way;
+    gives_way.assign(found.size(), 0);
+    for (std::size_t k = 1; k < found.size(); ++k) {
+      // Of many small triangles most give way to one that they touch.
+      if (found.size() > many) gives_way[k] = nearer_around(found[k].at.point, touch, found[k], centre, touch) != found[k].triangle;
+      for (std::size_t j = k; j-- > 0 && !gives_way[k];) gives_way[k] = yields(found[k], found[j], centre, touch);
+    }
+    std::size_t kept = 1;
+    for (std::size_t k = 1; k < found.size(); ++k)
+      if (!gives_way[k]) found[kept++] = found[k];
+    found.resize(kept);
+  }
+
+  /// Triangle t, if it has a contact with a sphere there; otherwise one to which it gives way; -1 if it has no area.
   /// here: of t, to the centre.
   int owner(int t, const ClosestPoint& here, const Vec3<double>& centre, double radius) const {
-    const double touch = std::max(1e-6 * radius, weld_ * shortest_), reach = touch + radius * std::tan(smooth_angle_);
-    const double* height = &height_[3 * std::size_t(t)];
-    if (here.weight[0] * height[0] > reach && here.weight[1] * height[1] > reach && here.weight[2] * height[2] > reach) return t;
-    const double parallel = std::cos(smooth_angle_ + 1e-9);
-    thread_local std::vector<int> around;
-    thread_local std::vector<std::uint64_t> seen;
-    thread_local std::uint64_t search = 0;
-    seen.resize(std::max(seen.size(), triangles_.size()), search++);
-    around.assign(1, t);
-    seen[std::size_t(t)] = search;
-    for (std::size_t next = 0; next < around.size(); ++next)
-      for (int k = first_[std::size_t(around[next])]; k < first_[std::size_t(around[next]) + 1]; ++k) {
-        const int other = beside_[std::size_t(k)];
-        if (seen[std::size_t(other)] == search) continue;
-        seen[std::size_t(other)] = search;
-        const double apart = distance_to(other, here.point);
-        if (apart > reach) continue;
-        around.push_back(other);
-        const ClosestPoint there = closest_point(triangles_[std::size_t(other)], centre);
-        if (there.distance > here.distance || (there.distance == here.distance && other > t)) continue;
-        if (apart <= touch || distance_to(t, there.point) <= touch ||
-            (smooth_angle_ > 0.0 && dot(here.arm, there.arm) >= parallel * here.distance * there.distance))
-          return other;
-      }
-    return t;
+    if (is_flat(triangles_[std::size_t(t)])) return -1;
+    const double touch = touch_of(radius);
+    const int beside = here.feature == 0 ? t : nearer_around(here.point, touch, {t, here}, centre, touch);
+    return beside != t ? beside : nearer_around(centre, here.distance, {t, here}, centre, touch);
   }
 
   /// The triangle that a sphere's contact with triangle t is on now.
   int follow(int t, const Vec3<double>& centre, double radius) const {
-    for (int next = t;; t = next) {
+    for (int next = t; t >= 0; t = next) {
       next = owner(t, closest_point(triangles_[std::size_t(t)], centre), centre, radius);
-      if (next == t) return t;
+      if (next == t) break;
     }
+    return t;
   }
 
  private:
-  double distance_to(int t, const Vec3<double>& p) const { return closest_point(triangles_[std::size_t(t)], p).distance; }
+  double touch_of(double radius) const { return std::max(1e-6 * radius, precision_); }
 
-  /// Calls visit(k, place) for each corner, with its place as seen from the first triangle, until one of the calls returns false.
-  template <class Visit>
-  bool seen_from_first(Visit visit) const {
-    const Vec3<double>* n = triangles_.front().node;
-    Vec3<double> x = n[1] - n[0], z = cross(x, n[2] - n[0]);
-    x *= 1.0 / norm(x), z *= 1.0 / norm(z);
-    const Vec3<double> y = cross(z, x);
-    for (std::size_t k = 0; k < 3 * triangles_.size(); ++k) {
-      const Vec3<double> p = triangles_[k / 3].node[k % 3] - n[0];
-      if (!visit(k, Vec3<double>{dot(p, x), dot(p, y), dot(p, z)})) return false;
+  /// Of the triangles within `distance` (m) of the place one to which `own` gives way, else its own.
+  int nearer_around(const Vec3<double>& place, double distance, const SurfacePoint& own, const Vec3<double>& centre, double touch) const {
+    int found = own.triangle;
+    near(place, distance, [&](int other) {
+      if (other == own.triangle) return true;
+      const ClosestPoint there = closest_point(triangles_[std::size_t(other)], centre);
+      if (there.distance > own.at.distance || (there.distance == own.at.distance && other > own.triangle)) return true;
+      if (!yields(own, {other, there}, centre, touch)) return true;
+      found = other;
+      return false;
+    });
+    return found;
+  }
+
+  /// Whether `far` gives way to `close`, which is nearer to the centre.
+  bool yields(const SurfacePoint& far, const SurfacePoint& close, const Vec3<double>& centre, double touch) const {
+    const double same = cosine_ * far.at.distance;
+    if (smooth_ && dot(far.at.arm, close.at.arm) >= same * close.at.distance) return true;
+    const Triangle &t = triangles_[std::size_t(far.triangle)], &other = triangles_[std::size_t(close.triangle)];
+    const ClosestPoint beside = closest_point(other, far.at.point);
+    if (beside.distance <= touch) return true;
+    const Vec3<double> to = centre - beside.point;
+    if (smooth_ && dot(far.at.arm, to) >= same * norm(to)) {
+      // From there to its closest point the other triangle comes nearer. Where that way leaves the smooth angle:
+      const Vec3<double> way = close.at.arm - to;
+      const double c2 = same * same, along = dot(far.at.arm, to), more = dot(far.at.arm, way);
+      const double a = more * more - c2 * dot(way, way), b = along * more - c2 * dot(to, way), c = along * along - c2 * dot(to, to);
+      const double root = std::sqrt(std::max(b * b - a * c, 0.0)), share = b < 0.0 ? c / (root - b) : a < 0.0 ? -(b + root) / a : 1.0;
+      const Vec3<double> nearest = to + std::clamp(share, 0.0, 1.0) * way;
+      if (dot(nearest, nearest) <= far.at.distance * far.at.distance) return true;
+    }
+    const Vec3<double> normal = cross(other.node[1] - other.node[0], other.node[2] - other.node[0]);
+    const double above = dot(normal, centre - other.node[0]), below = dot(normal, far.at.point - other.node[0]);
+    if (above * below < 0.0) {
+      const Vec3<double> through = centre + (above / (above - below)) * (far.at.point - centre);
+      if (closest_point(other, through).distance <= touch) return true;
+    }
+    return far.at.distance <= close.at.distance + touch && closest_point(t, close.at.point).distance <= touch;
+  }
+
+  /// Place and directions of the first triangle with an area, by which a motion of all is known.
+  struct Frame {
+    Vec3<double> at{}, x{1.0, 0.0, 0.0}, y{0.0, 1.0, 0.0}, z{0.0, 0.0, 1.0};
+  };
+  Frame frame() const {
+    Frame f;
+    for (const Triangle& t : triangles_) {
+      if (is_flat(t)) continue;
+      f.at = t.node[0];
+      f.x = t.node[1] - t.node[0], f.z = cross(f.x, t.node[2] - t.node[0]);
+      f.x *= 1.0 / norm(f.x), f.z *= 1.0 / norm(f.z);
+      f.y = cross(f.z, f.x);
+      break;
+    }
+    return f;
+  }
+  Vec3<double> as_sorted(const Vec3<double>& place) const {
+    const Vec3<double> p = place - now_.at;
+    return sorted_.at + dot(p, now_.x) * sorted_.x + dot(p, now_.y) * sorted_.y + dot(p, now_.z) * sorted_.z;
+  }
+
+  bool moved_as_one() {
+    now_ = frame();
+    turned_ = true;
+    const double limit = slack * cells_.edge();
+    for (std::size_t k = 0; k < seen_.size(); ++k) {
+      const Vec3<double> moved = as_sorted(triangles_[k / 3].node[k % 3]) - seen_[k];
+      if (!(dot(moved, moved) <= limit * limit)) return false;
     }
     return true;
   }
 
-  bool moved_as_one() const {
-    if (triangles_.empty()) return true;
-    // Two triangles may each have moved by this, and yet none is beside another that it was not beside before.
-    const double limit = 0.2 * slack * shortest_;
-    return seen_from_first([&](std::size_t k, const Vec3<double>& now) {
-      const Vec3<double> moved = now - seen_[k];
-      return dot(moved, moved) <= limit * limit;
-    });
+  void sort() {
+    cells_.build(triangles_, usual_);
+    now_ = sorted_ = frame();
+    turned_ = false;
+    seen_.clear();
   }
 
-  /// Finds which triangles stand beside each other: a corner of one is on the other.
-  void join() {
-    const std::size_t n = triangles_.size();
-    height_.resize(3 * n);
-    shortest_ = INFINITY;
-    double sum = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
-      const Vec3<double>* node = triangles_[i].node;
-      const double area = norm(cross(node[1] - node[0], node[2] - node[0]));
-      if (!(area > 0.0)) throw std::invalid_argument("triangle " + std::to_string(triangles_[i].id) + " has no area");
-      for (int k = 0; k < 3; ++k) {
-        const double opposite = norm(node[(k + 2) % 3] - node[(k + 1) % 3]);
-        height_[3 * i + std::size_t(k)] = area / opposite;
-        shortest_ = std::min(shortest_, opposite);
-        sum += opposite;
-      }
-    }
-    const auto corner = [this](std::size_t k) { return triangles_[k / 3].node[k % 3]; };
-    PointGrid corners;
-    corners.build(3 * n, corner, n > 0 ? sum / double(3 * n) : 0.0);
-    const double near = slack * shortest_;
-    std::vector<std::pair<int, int>> pairs;
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto [low, high] = box(triangles_[i], near);
-      corners.in_box(low, high, [&](int k) {
-        const int j = k / 3;
-        if (j == int(i) || distance_to(int(i), corner(std::size_t(k))) > near) return;
-        pairs.emplace_back(int(i), j);
-        pairs.emplace_back(j, int(i));
-      });
-    }
-    std::sort(pairs.begin(), pairs.end());
-    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-    first_.assign(n + 1, 0);
-    beside_.clear();
-    for (const auto& [i, j] : pairs) ++first_[std::size_t(i) + 1], beside_.push_back(j);
-    for (std::size_t i = 0; i < n; ++i) first_[i + 1] += first_[i];
-    seen_.resize(3 * n);
-    const auto keep = [this](std::size_t k, const Vec3<double>& now) { return seen_[k] = now, true; };
-    if (n > 0) seen_from_first(keep);
-  }
+  static constexpr std::size_t many = 16;  ///< triangles about one sphere
+  static constexpr double slack = 0.1;     ///< of the cells' edge, by which triangles may have moved against each other
 
-  static constexpr double slack = 0.01;  ///< of the shortest edge: triangles nearer than this may come to stand beside each other
-
-  double smooth_angle_ = 0.0, weld_ = 1e-6, shortest_ = 0.0;
+  bool smooth_ = false;
+  double cosine_ = 1.0, precision_ = usual_precision, usual_ = 0.0;
   std::vector<Triangle> triangles_;
-  std::vector<double> height_;       ///< m, of each triangle over its edges
-  std::vector<int> first_, beside_;  ///< of triangle i: beside_[first_[i]] ... beside_[first_[i + 1] - 1]
-  std::vector<Vec3<double>> seen_;   ///< corners when they were joined
+  TriangleCells cells_;             ///< of the triangles where they were when they were sorted
+  Frame sorted_, now_;              ///< then, and now
+  bool turned_ = false;             ///< they have moved since
+  std::vector<Vec3<double>> seen_;  ///< corners then; empty if they have not moved since
 };
 
 }  // namespace dembark

@@ -15,6 +15,13 @@ struct Triangle {
   std::int64_t id = 0;         ///< >= 0, below 2^29, stable
 };
 
+/// Whether it has no area: lower than this part of its longest edge, which round-off of corners in single precision leaves.
+inline bool is_flat(const Triangle& t) {
+  const Vec3<double> a = t.node[1] - t.node[0], b = t.node[2] - t.node[1], c = t.node[0] - t.node[2], n = cross(a, b);
+  const double longest = std::max({dot(a, a), dot(b, b), dot(c, c)});
+  return !(dot(n, n) > 1e-14 * longest * longest);
+}
+
 /// Corners of the box around a triangle, wider by `grow` (m) on all sides.
 inline std::pair<Vec3<double>, Vec3<double>> box(const Triangle& t, double grow) {
   const Vec3<double>* n = t.node;

@@ -7,6 +7,7 @@
 #include <vector>
 #include "catch.hpp"
 
+#include "dembark/surface/point_grid.hpp"
 #include "dembark/surface/surface_contacts.hpp"
 
 using namespace dembark;
@@ -243,13 +244,148 @@ TEST_CASE("triangles that move as one keep what stands beside them, those that m
   }
 }
 
-TEST_CASE("a triangle without area is refused by its number") {
+namespace {
+
+/// Two triangles of the rectangle x0 ... x1, y0 ... y1 at the height z.
+void add_patch(std::vector<Triangle>& to, double x0, double x1, double y0, double y1, double z = 0.0) {
+  add(to, {x0, y0, z}, {x1, y0, z}, {x1, y1, z});
+  add(to, {x0, y0, z}, {x1, y1, z}, {x0, y1, z});
+}
+
+struct Soup {
+  std::string name;
+  std::vector<Triangle> triangles;
+  double raised = 0.0;  ///< by how much parts of it stand above z = 0
+};
+
+/// One and the same floor z = 0, |x|, |y| <= 4, as CAD programs write it.
+std::vector<Soup> soups() {
+  std::vector<Soup> found;
+  const auto make = [&](const std::string& name, auto change) {
+    std::vector<Triangle> t;
+    add_patch(t, -4, 0, -4, 4), add_patch(t, 0, 4, -4, 4);
+    double raised = 0.0;
+    change(t, raised);
+    found.push_back({name, t, raised});
+  };
+  make("plain", [](auto&, double&) {});
+  make("given twice", [](auto& t, double&) {
+    for (int k = 0; k < 4; ++k) add(t, t[std::size_t(k)].node[0], t[std::size_t(k)].node[1], t[std::size_t(k)].node[2]);
+  });
+  make("given again in another order", [](auto& t, double&) {
+    for (std::size_t k = 0; k < 4; ++k) add(t, t[k].node[1], t[k].node[2], t[k].node[0]), add(t, t[k].node[0], t[k].node[2], t[k].node[1]);
+  });
+  make("again, cut the other way",
+       [](auto& t, double&) { add(t, {-4, -4, 0}, {4, -4, 0}, {-4, 4, 0}), add(t, {4, 4, 0}, {-4, 4, 0}, {4, -4, 0}); });
+  make("a finer patch on it", [](auto& t, double&) {
+    for (const Triangle& one : floor_of(7, 3, {-3.5, -3.5, 0})) add(t, one.node[0], one.node[1], one.node[2]);
+  });
+  make("patches that overlap", [](auto& t, double&) { add_patch(t, -0.7, 0.9, -4, 4), add_patch(t, -1.3, 0.4, -2, 3); });
+  make("crossing bars, no corner inside another",
+       [](auto& t, double&) { add_patch(t, -3.9, 3.9, -0.4, 0.3), add_patch(t, -0.3, 0.2, -3.9, 3.9); });
+  make("a fold", [](auto& t, double&) { add(t, {0, -4, 0}, {0, 4, 0}, {-0.5, 1, 0}), add(t, {0, 4, 0}, {-0.5, 1, 0}, {1.5, 0.5, 0}); });
+  make("slivers and needles", [](auto& t, double&) {
+    add(t, {0, -4, 0}, {0, 0, 0}, {0, 4, 0}), add(t, {1, 1, 0}, {1, 1, 0}, {1, 1, 0}), add(t, {-1, 1, 0}, {1, 1, 0}, {1, 1, 0});
+    add(t, {0, -4, 0}, {1e-9, 0, 0}, {0, 4, 0}), add(t, {0, -4, 0}, {1e-5, 0, 0}, {0, 4, 0}), add(t, {0, 0, 0}, {NAN, 0, 0}, {0, 1, 0});
+  });
+  for (const double gap : {1e-9, 1e-8, 3e-7, 1e-5, 1e-3})
+    make("a seam open by " + std::to_string(gap), [gap](auto& t, double&) {
+      t.clear();
+      add_patch(t, -4, -0.5 * gap, -4, 4), add_patch(t, 0.5 * gap, 4, -4, 4);
+    });
+  for (const double up : {1e-12, 1e-9, 1e-7, 1e-5, 1e-3}) {
+    make("a sheet above", [up](auto& t, double& raised) { add_patch(t, -3, 2, -1, 3, up), raised = up; });
+    make("a sheet below", [up](auto& t, double&) { add_patch(t, -3, 2, -1, 3, -up); });
+    make("a thin plate", [up](auto& t, double&) {
+      add_patch(t, -4, 4, -4, 4, -up);
+      for (const double x : {-4.0, 4.0}) add(t, {x, -4, 0}, {x, 4, 0}, {x, 4, -up}), add(t, {x, -4, 0}, {x, 4, -up}, {x, -4, -up});
+    });
+    make("ribs below", [up](auto& t, double&) {
+      for (const double x : {-0.3, 0.05, 0.4}) add(t, {x, -4, -up}, {x, 4, -up}, {x, 4, -2}), add(t, {x, -4, -up}, {x, 4, -2}, {x, -4, -2});
+    });
+    make("two halves, one higher", [up](auto& t, double& raised) {
+      t.clear();
+      add_patch(t, -4, 0, -4, 4), add_patch(t, 0, 4, -4, 4, up), raised = up;
+    });
+  }
+  return found;
+}
+
+}  // namespace
+
+TEST_CASE("any soup of triangles of one floor is touched once") {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  const double radius = 1.0, height = 0.99;
+  for (const Soup& soup : soups()) {
+    SurfaceContacts surface(SurfaceContacts::usual_smooth_angle, SurfaceContacts::usual_precision);
+    surface.update(soup.triangles);
+    std::vector<SurfacePoint> found;
+    const auto check = [&](double x, double y) {
+      const V centre{x, y, height};
+      INFO(soup.name << " at " << x << ", " << y);
+      const std::vector<Touch> touching = touches(surface, centre, radius);
+      REQUIRE(touching.size() == 1);
+      CHECK_THAT(touching[0].at.distance, WithinAbs(height, soup.raised + 5e-7));
+      CHECK(touching[0].at.arm.z > 0.999 * touching[0].at.distance);
+      surface.contacts(centre, radius, radius, found);
+      REQUIRE(found.size() == 1);
+      CHECK(found[0].triangle == touching[0].triangle);
+    };
+    for (int k = 0; k < 60; ++k) check(2.5 * unit(random), 2.5 * unit(random));
+    for (const double off : {0.0, 1e-16, 1e-12, 1e-9, 5e-9, 1e-8, 2e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.03, 0.06, 0.1})
+      for (const int side : {-1, 1})
+        check(side * off, 0.4 * unit(random)), check(0.4 * unit(random), side * off), check(side * off, side * off);
+  }
+}
+
+TEST_CASE("what lies on a surface twice does not change its edges, corners and grooves") {
+  const auto twice = [](std::vector<Triangle> t, const V& shift) {
+    for (std::size_t k = 0, n = t.size(); k < n; ++k) add(t, t[k].node[2] + shift, t[k].node[0] + shift, t[k].node[1] + shift);
+    return t;
+  };
+  for (const V& shift : {V{}, V{0, 0, -1e-9}, V{1e-9, 2e-9, -1e-9}, V{0, 0, -1e-5}}) {
+    const SurfaceContacts ridge = join(twice(bent(-0.6), shift), 0.05), groove = join(twice(bent(0.6), shift), 0.05);
+    for (double x = -0.25; x < 0.05; x += 0.0101) CHECK(touches(ridge, {x, 0.5, 0.48}, 0.5).size() == 1);
+    CHECK(touches(groove, {-0.45 * std::tan(0.3), 0.5, 0.45}, 0.5).size() == 2);
+    std::vector<Triangle> corner;
+    for (int k = 0; k < 3; ++k) {
+      const auto turn = [k](double a, double b) { return k == 0 ? V{a, b, 0} : k == 1 ? V{0, a, b} : V{b, 0, a}; };
+      add(corner, turn(0, 0), turn(1, 0), turn(1, 1)), add(corner, turn(0, 0), turn(1, 1), turn(0, 1));
+    }
+    CHECK(touches(join(twice(corner, V{-1e-9, -1e-9, shift.z}), 0.05), {0.09, 0.092, 0.094}, 0.1).size() == 3);
+    CHECK(touches(join(twice(corner, V{-1e-9, -1e-9, shift.z}), 0.05), {0.09, 0.092, 0.5}, 0.1).size() == 2);
+  }
+}
+
+TEST_CASE("precision joins what an exporter left apart, also without a smooth angle") {
+  std::vector<Triangle> t;
+  add_patch(t, -4, -1e-3, -4, 4), add_patch(t, 1e-3, 4, -4, 4);
+  for (const auto& [precision, expected] : {std::pair<double, std::size_t>{1e-8, 2}, {1e-2, 1}}) {
+    SurfaceContacts surface(0.0, precision);
+    surface.update(t);
+    CHECK(touches(surface, {0.0, 0.3, 0.9}, 1.0).size() == expected);
+  }
+}
+
+TEST_CASE("a triangle without area has no contact") {
   std::vector<Triangle> t = bent(0.1);
   t[2].node[1] = t[2].node[0];
   SurfaceContacts surface;
-  CHECK_THROWS_WITH(surface.update(t), "triangle 2 has no area");
+  surface.update(t);
+  const V centre{0.5, 0.25, 0.5};
+  CHECK(surface.owner(2, closest_point(t[2], centre), centre, 1.0) == -1);
+  CHECK(surface.follow(2, centre, 1.0) == -1);
+  std::vector<SurfacePoint> found;
+  surface.contacts(centre, 1.0, 1.0, found);
+  for (const SurfacePoint& f : found) CHECK(f.triangle != 2);
+  for (Triangle& each : t) each.node[1] = each.node[0];
+  surface.update(t);
+  surface.contacts(centre, 1.0, 1.0, found);
+  CHECK(found.empty());
   surface.update({});
-  CHECK(surface.triangles().empty());
+  surface.contacts(centre, 1.0, 1.0, found);
+  CHECK((surface.triangles().empty() && found.empty()));
 }
 
 TEST_CASE("points far away on either side add no work to the grid, and none is lost") {
