@@ -168,8 +168,14 @@ class CohesionModel<COHESION_CAPILLARY> : public CohesionModelBase {
     const auto volume = [this](const dembark::Liquid& liquid, double radius, double other) {
       return carried_ ? owner_->likely_bridge(radius, other) : liquid.bridge_volume;
     };
-    neighbor->register_contact_dist_factor(dembark_liggghts::bridge_distance_factor(
-        liquids_, dembark_liggghts::radius_ranges(*atom, *modify, world, read.types()), wall_, volume));
+    // The pair style comes first when a run begins, and how far copies of grains reach follows from what is registered by then: were it
+    // without the walls, the second run of a script would have more copies than the first.
+    std::vector<const LAMMPS_NS::FixWallGran*> bodies = {wall_};
+    for (int k = 0; pair_ && k < modify->nfix; ++k)
+      if (const auto* const wall = dynamic_cast<LAMMPS_NS::FixWallGran*>(modify->fix[k])) bodies.push_back(wall);
+    const std::vector<dembark_liggghts::RadiusRange> ranges = dembark_liggghts::radius_ranges(*atom, *modify, world, read.types());
+    for (const LAMMPS_NS::FixWallGran* const body : bodies)
+      neighbor->register_contact_dist_factor(dembark_liggghts::bridge_distance_factor(liquids_, ranges, body, volume));
   }
 
   inline void surfacesIntersect(SurfacesIntersectData& d, ForceData& i_forces, ForceData& j_forces) {

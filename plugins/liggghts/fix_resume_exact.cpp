@@ -33,7 +33,8 @@ using namespace FixConst;
 namespace {
 
 constexpr double format = 4.0;
-constexpr int header = 3;  // format, step, ranks; then how many numbers each rank has, their hashes, and the record of the run as text
+// Format, step, ranks, contact distance factor; then how many numbers each rank has, their hashes, and the record of the run as text.
+constexpr int header = 4;
 
 /// FNV-1a, 64 bits at a time.
 std::uint64_t hash_of(const std::vector<double> &numbers) {
@@ -238,7 +239,7 @@ std::string FixResumeExact::read_parts(const double *lengths) {
 /// How long the parts of all ranks are, which write_state() appends; a stock restart file has none.
 void FixResumeExact::write_restart(FILE *file) {
   if (comm->me != 0) return;
-  const double numbers[header] = {format, double(update->ntimestep), double(comm->nprocs)};
+  const double numbers[header] = {format, double(update->ntimestep), double(comm->nprocs), neighbor->contactDistanceFactor};
   write_part(file, {{numbers, sizeof numbers},
                     {lengths_.data(), lengths_.size() * sizeof lengths_[0]},
                     {hashes_.data(), hashes_.size() * sizeof hashes_[0]},
@@ -254,6 +255,8 @@ void FixResumeExact::restart(char *buffer) {
     lacking_ = "the state was written by another version of dembark";
     return;
   }
+  // Models register it when a run begins, by the liquid that there is then.
+  neighbor->register_contact_dist_factor(numbers[3]);
   const std::size_t ranks = std::size_t(saved_ranks_);
   std::vector<double> lengths(ranks);
   std::vector<std::uint64_t> hashes(ranks);
