@@ -29,7 +29,7 @@ struct StlSurface {
   std::vector<Triangle> triangles;  ///< with the ids 0, 1, ...; in the unit of the file
   std::vector<int> line;            ///< of each: of its `facet` in a text, its number from 1 on in a binary file
   std::vector<int> solid;           ///< of each: number of its solid
-  std::vector<std::string> names;   ///< of the solids; empty where there is none
+  std::vector<std::string> names;   ///< of the solids of a text; "" where there is none
   int flat = 0, again = 0;          ///< left out: without area, and given again
 
   /// What was left out, for the user, or nothing.
@@ -49,7 +49,6 @@ constexpr std::size_t head = 80, facet = 50;  ///< bytes, of the binary form
 }
 
 inline void read_binary(const std::string& content, std::uint32_t count, StlSurface& found) {
-  found.names.assign(1, "");
   found.triangles.resize(count);
   found.line.resize(count);
   found.solid.assign(count, 0);

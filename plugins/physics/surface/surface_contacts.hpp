@@ -40,7 +40,7 @@ class SurfaceContacts {
   SurfaceContacts() = default;
   /// smooth_angle: rad, 0 ... pi/4; conditions on the gap (impacts) need none. precision: m.
   SurfaceContacts(double smooth_angle, double precision)
-      : smooth_(smooth_angle > 0.0), cosine_(std::cos(smooth_angle + 1e-9)), precision_(precision) {}
+      : smooth_(smooth_angle > 0.0), cosine_(std::cos(smooth_angle + 1e-9)), tangent_(std::tan(smooth_angle)), precision_(precision) {}
 
   /// The triangles as they are now. They are sorted anew only when they are others, have changed their shape or have moved against each
   /// other. moved: whether any has since the last call.
@@ -107,8 +107,9 @@ class SurfaceContacts {
   /// Triangle t, if it has a contact with a sphere there; otherwise one to which it gives way; -1 if it has no area.
   /// here: of t, to the centre.
   int owner(int t, const ClosestPoint& here, const Vec3<double>& centre, double radius) const {
-    if (is_flat(triangles_[std::size_t(t)])) return -1;
     const double touch = touch_of(radius);
+    if (is_alone(t, here, radius, touch)) return t;
+    if (is_flat(triangles_[std::size_t(t)])) return -1;
     const int beside = here.feature == 0 ? t : nearer_around(here.point, touch, {t, here}, centre, touch);
     return beside != t ? beside : nearer_around(centre, here.distance, {t, here}, centre, touch);
   }
@@ -124,6 +125,54 @@ class SurfaceContacts {
 
  private:
   double touch_of(double radius) const { return std::max(1e-6 * radius, precision_); }
+
+  /// Whether no triangle can stand before this point of t: nothing lies over the triangle, and its edges are far enough.
+  bool is_alone(int t, const ClosestPoint& here, double radius, double touch) const {
+    if (here.feature != 0 || !clear_[std::size_t(t)] || radius + drift_ > usual_) return false;
+    const double reach = touch + radius * tangent_ + std::sqrt(2.0 * radius * touch) + drift_;
+    const Vec3<double>* n = triangles_[std::size_t(t)].node;
+    const Vec3<double> ab = n[1] - n[0], bc = n[2] - n[1], ca = n[0] - n[2], normal = cross(ab, bc);
+    const double area2 = dot(normal, normal), limit = reach * reach;
+    const auto far = [&](double weight, const Vec3<double>& opposite) { return weight * weight * area2 > limit * dot(opposite, opposite); };
+    return far(here.weight[0], bc) && far(here.weight[1], ca) && far(here.weight[2], ab);
+  }
+
+  /// Finds the triangles over which no other one lies, as far as `usual_` from them on either side.
+  void find_clear() {
+    clear_.assign(triangles_.size(), 0);
+    if (!(usual_ > 0.0)) return;
+    for (std::size_t t = 0; t < triangles_.size(); ++t) {
+      if (is_flat(triangles_[t])) continue;
+      const Vec3<double>* n = triangles_[t].node;
+      Vec3<double> normal = cross(n[1] - n[0], n[2] - n[0]);
+      normal *= 1.0 / norm(normal);
+      const Vec3<double> middle = (1.0 / 3.0) * (n[0] + n[1] + n[2]);
+      const double size = std::max({norm(n[0] - middle), norm(n[1] - middle), norm(n[2] - middle)});
+      const auto extent = [](const Vec3<double>* nodes, const Vec3<double>& axis) {
+        const double p = dot(nodes[0], axis), q = dot(nodes[1], axis), r = dot(nodes[2], axis);
+        return std::pair(std::min({p, q, r}), std::max({p, q, r}));
+      };
+      // Apart along an axis by no less than `by`, an edge that both share not counted.
+      const auto apart = [&](const Vec3<double>* other, const Vec3<double>& axis, double by) {
+        const double length = norm(axis), least = (by - 1e-9 * size) * length;
+        const auto own = extent(n, axis), its = extent(other, axis);
+        return length > 0.0 && (its.first - own.second >= least || own.first - its.second >= least);
+      };
+      std::size_t seen = 0;
+      bool clear = true;
+      near(middle, std::sqrt(size * size + usual_ * usual_), [&](int k) {
+        if (std::size_t(k) == t) return true;
+        const Vec3<double>* const other = triangles_[std::size_t(k)].node;
+        bool beside = apart(other, normal, usual_);
+        for (int e = 0; e < 3 && !beside; ++e)
+          beside =
+              apart(other, cross(n[(e + 1) % 3] - n[e], normal), 0.0) || apart(other, cross(other[(e + 1) % 3] - other[e], normal), 0.0);
+        // Among many small triangles it is not worth its time.
+        return clear = beside && ++seen < most_around;
+      });
+      clear_[t] = clear;
+    }
+  }
 
   /// Of the triangles within `distance` (m) of the place one to which `own` gives way, else its own.
   int nearer_around(const Vec3<double>& place, double distance, const SurfacePoint& own, const Vec3<double>& centre, double touch) const {
@@ -190,10 +239,13 @@ class SurfaceContacts {
     now_ = frame();
     turned_ = true;
     const double limit = slack * cells_.edge();
+    double most = 0.0;
     for (std::size_t k = 0; k < seen_.size(); ++k) {
       const Vec3<double> moved = as_sorted(triangles_[k / 3].node[k % 3]) - seen_[k];
       if (!(dot(moved, moved) <= limit * limit)) return false;
+      most = std::max(most, dot(moved, moved));
     }
+    drift_ = 2.0 * std::sqrt(most);
     return true;
   }
 
@@ -201,18 +253,23 @@ class SurfaceContacts {
     cells_.build(triangles_, usual_);
     now_ = sorted_ = frame();
     turned_ = false;
+    drift_ = 0.0;
     seen_.clear();
+    find_clear();
   }
 
-  static constexpr std::size_t many = 16;  ///< triangles about one sphere
-  static constexpr double slack = 0.1;     ///< of the cells' edge, by which triangles may have moved against each other
+  static constexpr std::size_t many = 16;         ///< triangles about one sphere
+  static constexpr std::size_t most_around = 64;  ///< of which it is asked whether they lie over another one
+  static constexpr double slack = 0.1;            ///< of the cells' edge, by which triangles may have moved against each other
 
   bool smooth_ = false;
-  double cosine_ = 1.0, precision_ = usual_precision, usual_ = 0.0;
+  double cosine_ = 1.0, tangent_ = 0.0, precision_ = usual_precision, usual_ = 0.0;
   std::vector<Triangle> triangles_;
   TriangleCells cells_;             ///< of the triangles where they were when they were sorted
   Frame sorted_, now_;              ///< then, and now
   bool turned_ = false;             ///< they have moved since
+  double drift_ = 0.0;              ///< m, at most, of two against each other since then
+  std::vector<char> clear_;         ///< of each triangle: nothing lay over it then
   std::vector<Vec3<double>> seen_;  ///< corners then; empty if they have not moved since
 };
 

@@ -38,6 +38,7 @@ class TriangleCells {
     const auto cells = [&](int k) { return std::floor(length[k] / edge_) + 1.0; };
     while (cells(0) * cells(1) * cells(2) > 4.0 * double(solid) + 64.0) edge_ *= 1.26;
     for (int k = 0; k < 3; ++k) count_[k] = int(cells(k));
+    inverse_ = 1.0 / edge_;
 
     // Counted first, then filled: two flat arrays, however many cells a triangle passes through.
     start_.assign(std::size_t(count_[0]) * count_[1] * count_[2] + 1, 0);
@@ -60,7 +61,7 @@ class TriangleCells {
     int from[3], to[3];
     const double place[3] = {p.x - low_.x, p.y - low_.y, p.z - low_.z};
     for (int k = 0; k < 3; ++k) {
-      const double first = (place[k] - distance) / edge_, last = (place[k] + distance) / edge_;
+      const double first = (place[k] - distance) * inverse_, last = (place[k] + distance) * inverse_;
       if (!(last >= 0.0 && first < count_[k])) return;
       from[k] = first > 0.0 ? int(first) : 0;
       to[k] = last < count_[k] ? int(last) : count_[k] - 1;
@@ -87,7 +88,7 @@ class TriangleCells {
 
  private:
   std::size_t index(int x, int y, int z) const { return (std::size_t(z) * count_[1] + y) * count_[0] + x; }
-  int at(double place, int axis) const { return std::clamp(int(place / edge_), 0, count_[axis] - 1); }
+  int at(double place, int axis) const { return std::clamp(int(place * inverse_), 0, count_[axis] - 1); }
 
   /// Calls visit(cell) for each cell that meets the triangle's box and its plane; none for a triangle without area.
   template <class Visit>
@@ -107,7 +108,7 @@ class TriangleCells {
   }
 
   Vec3<double> low_{};
-  double edge_ = 1.0;
+  double edge_ = 1.0, inverse_ = 1.0;
   int count_[3] = {0, 0, 0};
   std::vector<std::size_t> start_;
   std::vector<std::int32_t> member_;

@@ -320,6 +320,8 @@ TEST_CASE("any soup of triangles of one floor is touched once") {
   for (const Soup& soup : soups()) {
     SurfaceContacts surface(SurfaceContacts::usual_smooth_angle, SurfaceContacts::usual_precision);
     surface.update(soup.triangles);
+    SurfaceContacts expected = surface;
+    expected.expect(radius);
     std::vector<SurfacePoint> found;
     const auto check = [&](double x, double y) {
       const V centre{x, y, height};
@@ -331,6 +333,9 @@ TEST_CASE("any soup of triangles of one floor is touched once") {
       surface.contacts(centre, radius, radius, found);
       REQUIRE(found.size() == 1);
       CHECK(found[0].triangle == touching[0].triangle);
+      const std::vector<Touch> same = touches(expected, centre, radius);
+      REQUIRE(same.size() == 1);
+      CHECK(same[0].triangle == touching[0].triangle);
     };
     for (int k = 0; k < 60; ++k) check(2.5 * unit(random), 2.5 * unit(random));
     for (const double off : {0.0, 1e-16, 1e-12, 1e-9, 5e-9, 1e-8, 2e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.03, 0.06, 0.1})
@@ -366,6 +371,39 @@ TEST_CASE("precision joins what an exporter left apart, also without a smooth an
     surface.update(t);
     CHECK(touches(surface, {0.0, 0.3, 0.9}, 1.0).size() == expected);
   }
+}
+
+TEST_CASE("what is expected changes the speed alone, also of parts that move against each other") {
+  std::mt19937 random(8);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  const double radius = 0.4;
+  SurfaceContacts plain(SurfaceContacts::usual_smooth_angle, SurfaceContacts::usual_precision), expected = plain;
+  expected.expect(radius);
+  int both = 0;
+  for (int step = 0; step < 60; ++step) {
+    // A box without lid over a floor, which sinks into it and turns.
+    std::vector<Triangle> t = floor_of(4, 5, {-2, -2, 0});
+    const std::size_t fixed = t.size();
+    add_patch(t, -0.8, 0.8, -0.8, 0.8, 0.5 - 0.013 * step);
+    for (const double x : {-0.8, 0.8}) {
+      const double z = 0.5 - 0.013 * step;
+      add(t, {x, -0.8, z}, {x, 0.8, z}, {x, 0.8, z + 1}), add(t, {x, -0.8, z}, {x, 0.8, z + 1}, {x, -0.8, z + 1});
+    }
+    for (std::size_t k = fixed; k < t.size(); ++k)
+      for (V& p : t[k].node) p = turned(p, 0.02 * step);
+    plain.update(t);
+    expected.update(t);
+    for (int k = 0; k < 60; ++k) {
+      const V centre{1.5 * unit(random), 1.5 * unit(random), 0.6 + 0.5 * unit(random)};
+      for (const double size : {0.2 * radius, radius, 1.5 * radius}) {
+        const std::vector<Touch> one = touches(plain, centre, size), other = touches(expected, centre, size);
+        REQUIRE(one.size() == other.size());
+        for (std::size_t i = 0; i < one.size(); ++i) CHECK(one[i].triangle == other[i].triangle);
+        both += one.size() > 1;
+      }
+    }
+  }
+  CHECK(both > 20);
 }
 
 TEST_CASE("a triangle without area has no contact") {
