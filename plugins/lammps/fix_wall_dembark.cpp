@@ -36,16 +36,21 @@ constexpr int motion_numbers = 17;
 FixWallDembark::FixWallDembark(LAMMPS* lmp, int narg, char** arg) : RowsFix(lmp, narg, arg) {
   const auto word = [&](int k) { return k < narg ? std::string(arg[k]) : std::string(); };
   const std::string kind = word(3);
-  if (narg < 7 || (kind != "region" && kind != "stl") || word(5) != "type" || (narg > 7 && word(7) != "motion"))
-    fail("it is written 'wall/dembark region ID type T' or 'wall/dembark stl FILE type T', and 'motion TERM ...' behind them");
+  const bool precise = kind == "stl" && word(7) == "precision";
+  const int rest = precise ? 9 : 7;  // behind it is the motion
+  if (narg < rest || (kind != "region" && kind != "stl") || word(5) != "type" || (narg > rest && word(rest) != "motion"))
+    fail(
+        "it is written 'wall/dembark region ID type T' or 'wall/dembark stl FILE type T [precision P]', and 'motion TERM ...' behind them");
   wall_type_ = utils::is_integer(word(6)) ? utils::inumeric(FLERR, word(6), false, lmp) : 0;
   if (wall_type_ < 1 || wall_type_ > atom->ntypes) fail("there is no atom type " + word(6));
+  const double precision = precise ? utils::numeric(FLERR, word(8), false, lmp) : dembark::SurfaceContacts::usual_precision;
+  if (!(precision >= 0.0 && std::isfinite(precision))) fail("precision " + word(8) + " must be a length >= 0 (m)");
   find_pair();
   checked([&] {
     if (kind == "region") surface_ = std::make_unique<dembark_lammps::RegionSurface>(lmp, word(4));
-    else surface_ = std::make_unique<dembark_lammps::TriangleSurface>(lmp, word(4));
-    for (int k = 8; k < narg; ++k) words_ += (k > 8 ? " " : "") + std::string(arg[k]);
-    if (narg > 7) motion_ = std::make_unique<dembark::PrescribedMotion>(words_);
+    else surface_ = std::make_unique<dembark_lammps::TriangleSurface>(lmp, word(4), precision);
+    for (int k = rest + 1; k < narg; ++k) words_ += (k > rest + 1 ? " " : "") + std::string(arg[k]);
+    if (narg > rest) motion_ = std::make_unique<dembark::PrescribedMotion>(words_);
   });
   layout_ = pair_->coefficients().layout();
   restart_global = 1;

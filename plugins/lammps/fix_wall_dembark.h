@@ -2,7 +2,7 @@
 // the wall has. The wall is the surface of a region or the triangles of an STL file, and can move as
 // dembark/motion/prescribed_motion.hpp says.
 //
-//   fix ID group wall/dembark region REGION|stl FILE type T [motion TERM ...]
+//   fix ID group wall/dembark region REGION|stl FILE type T [precision P] [motion TERM ...]
 //
 // Forces of step n are computed from the grains' velocities v(n-1/2). A wall has its own of that time, [x(n) - x(n-1)] / dt.
 #ifndef DEMBARK_FIX_WALL_DEMBARK_H

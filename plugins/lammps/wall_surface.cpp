@@ -4,12 +4,14 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "comm.h"
 #include "domain.h"
 #include "region.h"
+#include "utils.h"
 
 #include "contact_call.h"
 #include "dembark/motion/words.hpp"
-#include "dembark/surface/stl.hpp"
+#include "shared_stl.h"
 
 using namespace LAMMPS_NS;
 using dembark::Triangle;
@@ -64,20 +66,34 @@ const std::vector<WallContact>& RegionSurface::contacts(const Vec3& centre, doub
   return found_;
 }
 
-TriangleSurface::TriangleSurface(LAMMPS* lmp, const std::string& file) : WallSurface(lmp), own_(dembark::read_stl(file)) {
-  // What is wrong with a triangle is told where the file is named.
-  surface_.update(own_);
+TriangleSurface::TriangleSurface(LAMMPS* lmp, const std::string& file, double precision)
+    : WallSurface(lmp), surface_(dembark::SurfaceContacts::usual_smooth_angle, precision) {
+  dembark::StlSurface read = dembark_family::read_shared_stl(file, precision, world);
+  if (const std::string line = read.left_out(file); comm->me == 0 && !line.empty()) utils::logmesg(lmp, line + "\n");
+  own_ = read.triangles.size();
+  surface_.update(std::move(read.triangles));
 }
 
 void TriangleSurface::prepare(double reach, const dembark::PrescribedMotion* motion) {
   if (domain->triclinic) throw std::invalid_argument("an STL surface needs a box with right angles");
-  std::vector<Triangle> all = own_;
   for (int k = 0; k < 3; ++k) {
     if (!domain->periodicity[k]) continue;
     const std::string direction = std::string("direction ") + "xyz"[k];
     if (motion && motion->turns_out_of(k)) throw std::invalid_argument("its motion turns the surface out of the periodic " + direction);
     if (domain->box_change_size || domain->box_change_shape)
       throw std::invalid_argument("the box changes its size, and its surface is periodic along " + direction);
+  }
+  copy_across_periods(reach);
+}
+
+/// Grains in the box are near these copies alone.
+void TriangleSurface::copy_across_periods(double reach) {
+  reach_ = reach;
+  surface_.expect(reach);
+  if (!domain->xperiodic && !domain->yperiodic && !domain->zperiodic) return;
+  std::vector<Triangle> all(surface_.triangles().begin(), surface_.triangles().begin() + std::ptrdiff_t(own_));
+  for (int k = 0; k < 3; ++k) {
+    if (!domain->periodicity[k]) continue;
     const std::size_t count = all.size();
     for (const int sign : {-1, 1})
       for (std::size_t i = 0; i < count; ++i) {
@@ -87,9 +103,9 @@ void TriangleSurface::prepare(double reach, const dembark::PrescribedMotion* mot
         if (to.*axes[k] > domain->boxlo[k] && from.*axes[k] < domain->boxhi[k]) all.push_back(copy);
       }
   }
-  copies_.assign(own_.size(), {});
-  for (std::size_t i = 0; i < all.size(); ++i) copies_[std::size_t(all[i].id)].push_back(int(i));
-  cells_.build(all, reach);
+  copies_.clear();
+  for (std::size_t i = own_; i < all.size(); ++i) copies_.emplace_back(int(all[i].id), int(i));
+  std::sort(copies_.begin(), copies_.end());
   surface_.update(std::move(all));
 }
 
@@ -102,27 +118,29 @@ Vec3 TriangleSurface::wrapped(Vec3 place) const {
 
 const std::vector<WallContact>& TriangleSurface::contacts(const Vec3& centre, double radius, double reach) {
   found_.clear();
-  const Vec3 place = wrapped(centre);
-  cells_.near(place, [&](int t) {
-    const Triangle& triangle = surface_.triangles()[std::size_t(t)];
-    const dembark::ClosestPoint here = closest_point(triangle, place);
-    if (here.distance < radius + reach && surface_.owner(t, here, place, radius) == t)
-      found_.push_back({int(triangle.id), here.arm, {}, t});
-  });
+  // Grains that enter or grow during a run may be larger than all before.
+  if (radius + reach > reach_ && (domain->xperiodic || domain->yperiodic || domain->zperiodic))
+    copy_across_periods(1.25 * (radius + reach));
+  surface_.contacts(wrapped(centre), radius, radius + reach, points_);
+  for (const dembark::SurfacePoint& point : points_)
+    found_.push_back({int(surface_.triangles()[std::size_t(point.triangle)].id), point.at.arm, {}, point.triangle});
   return found_;
 }
 
 bool TriangleSurface::goes_on(int before, const WallContact& now, const Vec3& centre, double radius) const {
   if (before == now.surface) return true;
   const Vec3 place = wrapped(centre);
-  for (const int t : copies_[std::size_t(before)])
-    if (surface_.follow(t, place, radius) == now.triangle) return true;
+  if (surface_.follow(before, place, radius) == now.triangle) return true;
+  for (auto copy = std::lower_bound(copies_.begin(), copies_.end(), std::pair(before, 0)); copy != copies_.end() && copy->first == before;
+       ++copy)
+    if (surface_.follow(copy->second, place, radius) == now.triangle) return true;
   return false;
 }
 
 std::string TriangleSurface::outside(const Vec3& back, const Vec3& forth) const {
   Vec3 low{1e300, 1e300, 1e300}, high = -1.0 * low;
-  for (const Triangle& triangle : own_) {
+  for (std::size_t i = 0; i < own_; ++i) {
+    const Triangle& triangle = surface_.triangles()[i];
     const Vec3 centre = (1.0 / 3.0) * (triangle.node[0] + triangle.node[1] + triangle.node[2]);
     for (double Vec3::* const axis : axes) {
       low.*axis = std::min(low.*axis, centre.*axis);

@@ -2,14 +2,15 @@
 #ifndef DEMBARK_WALL_SURFACE_H
 #define DEMBARK_WALL_SURFACE_H
 
+#include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pointers.h"
 
 #include "dembark/motion/prescribed_motion.hpp"
 #include "dembark/surface/surface_contacts.hpp"
-#include "dembark/surface/triangle_cells.hpp"
 #include "dembark/vec3.hpp"
 
 namespace LAMMPS_NS {
@@ -31,7 +32,8 @@ class WallSurface : protected LAMMPS_NS::Pointers {
  public:
   explicit WallSurface(LAMMPS_NS::LAMMPS* lmp) : Pointers(lmp) {}
 
-  /// Before a run; `reach`: m, from a sphere's centre to whatever can act on it; `motion`: of the whole surface, or nullptr.
+  /// Before a run; `reach`: m, from a sphere's centre to whatever can act on it, as it is now: it may grow during the run; `motion`: of the
+  /// complete surface, or nullptr.
   virtual void prepare(double reach, const dembark::PrescribedMotion* motion) = 0;
   virtual void begin_step() {}
   /// Of the centre of a sphere, in the surface's own frame, with all of the surface within `reach` (m). Until the next call.
@@ -72,19 +74,21 @@ class RegionSurface : public WallSurface {
 /// The triangles and, where the box is periodic, their copies.
 class TriangleSurface : public WallSurface {
  public:
-  TriangleSurface(LAMMPS_NS::LAMMPS* lmp, const std::string& file);
+  /// Collective: the first rank reads the file. precision: m.
+  TriangleSurface(LAMMPS_NS::LAMMPS* lmp, const std::string& file, double precision);
   void prepare(double reach, const dembark::PrescribedMotion* motion) override;
   const std::vector<WallContact>& contacts(const dembark::Vec3<double>& centre, double radius, double reach) override;
   bool goes_on(int before, const WallContact& now, const dembark::Vec3<double>& centre, double radius) const override;
   std::string outside(const dembark::Vec3<double>& back, const dembark::Vec3<double>& forth) const override;
 
  private:
-  const std::vector<dembark::Triangle> own_;
-  // Planes that form an angle of less than 0.05 rad are one smooth surface, as in LIGGGHTS.
-  dembark::SurfaceContacts surface_{0.05, 1e-6};
-  dembark::TriangleCells cells_;
-  std::vector<std::vector<int>> copies_;  // of each own triangle: its places in `surface_`
+  std::size_t own_ = 0;  // triangles of the file, which come first
+  dembark::SurfaceContacts surface_;
+  double reach_ = 0.0;  // m, for which there are copies
+  std::vector<dembark::SurfacePoint> points_;
+  std::vector<std::pair<int, int>> copies_;  // of own triangles: a copy's number in `surface_`; sorted
 
+  void copy_across_periods(double reach);
   dembark::Vec3<double> wrapped(dembark::Vec3<double> place) const;
 };
 
