@@ -18,6 +18,7 @@ enum Member {
   partner,
   mean_mode,
   mean_file,
+  mesh_precision,
   variable_count,
   variable_names,
   variable_texts
@@ -40,6 +41,7 @@ auto pointer(Tag<mean_file>);
 auto pointer(Tag<variable_count>);
 auto pointer(Tag<variable_names>);
 auto pointer(Tag<variable_texts>);
+auto pointer(Tag<mesh_precision>);
 template struct Reach<keyword_map, &Settings::settings>;
 template struct Reach<fix_map, &Modify::fix_map>;
 template struct Reach<command_map, &Input::command_map>;
@@ -52,6 +54,7 @@ template struct Reach<mean_file, &FixAveTime::fp>;
 template struct Reach<variable_count, &Variable::nvar>;
 template struct Reach<variable_names, &Variable::names>;
 template struct Reach<variable_texts, &Variable::data>;
+template struct Reach<mesh_precision, &MultiNodeMesh<3>::precision_>;
 
 template <Member name, class Type, class Owner>
 Type& reach(Owner& owner) {
@@ -83,5 +86,6 @@ std::vector<std::pair<std::string, std::string>> formulas(Variable& variables) {
       all.emplace_back(reach<variable_names, char**>(variables)[k], reach<variable_texts, char***>(variables)[k][0]);
   return all;
 }
+double precision(TriMesh& mesh) { return reach<mesh_precision, double>(static_cast<MultiNodeMesh<3>&>(mesh)); }
 
 }  // namespace dembark_liggghts

@@ -17,6 +17,7 @@
 #include "input.h"
 #include "modify.h"
 #include "settings.h"
+#include "tri_mesh.h"
 #include "variable.h"
 
 namespace dembark_liggghts {
@@ -47,6 +48,8 @@ bool has_file(LAMMPS_NS::FixAveTime& mean);
 
 /// Names and formulas of variables of styles equal and atom.
 std::vector<std::pair<std::string, std::string>> formulas(LAMMPS_NS::Variable& variables);
+/// m, of a mesh: its keyword `precision`, which only the mesh itself can read.
+double precision(LAMMPS_NS::TriMesh& mesh);
 
 }  // namespace dembark_liggghts
 

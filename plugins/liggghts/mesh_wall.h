@@ -9,11 +9,9 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <stdexcept>
 #include <vector>
 
 #include "atom.h"
-#include "error.h"
 #include "fix_contact_history_mesh.h"
 #include "fix_mesh_surface.h"
 #include "fix_wall_gran_base.h"
@@ -22,6 +20,7 @@
 
 #include "dembark/surface/surface_contacts.hpp"
 #include "contact_data.h"
+#include "engine_access.h"
 #include "fix_wall_motion.h"
 #include "mesh_triangles.h"
 
@@ -48,19 +47,17 @@ class MeshWall : public LIGGGHTS::Walls::Granular<Models> {
   /// As the mesh is now: the engine numbers it anew with the neighbour lists, and moves it in any step.
   const Surface& surface_of(LAMMPS_NS::TriMesh& mesh) {
     auto found = std::find_if(surfaces_.begin(), surfaces_.end(), [&mesh](const Surface& s) { return s.mesh == &mesh; });
-    // Planes that form an angle of less than 0.05 rad are one smooth surface.
-    if (found == surfaces_.end()) found = surfaces_.insert(found, {&mesh, -1, {}, dembark::SurfaceContacts(0.05, 1e-6), nullptr});
+    if (found == surfaces_.end())
+      found = surfaces_.insert(
+          found, {&mesh, -1, {}, dembark::SurfaceContacts(dembark::SurfaceContacts::usual_smooth_angle, precision(mesh)), nullptr});
     const bool moves = mesh.isMoving() || mesh.isDeforming();
     const LAMMPS_NS::bigint now = moves ? lmp_->update->ntimestep : lmp_->neighbor->lastcall;
     const std::size_t count = std::size_t(mesh.sizeLocal() + mesh.sizeGhost());
     if (found->when != now || found->triangles.size() != count) {
       found->triangles.resize(count);
       for (std::size_t i = 0; i < count; ++i) found->triangles[i] = triangle_of(mesh, int(i));
-      try {
-        found->contacts.update(found->triangles, moves);
-      } catch (const std::invalid_argument& e) {
-        lmp_->error->one(FLERR, (std::string("mesh ") + mesh.mesh_id() + ": " + e.what()).c_str());
-      }
+      found->contacts.expect(0.5 * lmp_->neighbor->cutneighmax);
+      found->contacts.update(found->triangles, moves);
       found->when = now;
       found->motion = moves ? find_wall_motion(lmp_->modify, &mesh) : nullptr;
     }
@@ -115,6 +112,7 @@ class MeshWall : public LIGGGHTS::Walls::Granular<Models> {
       const Surface& known = surface_of(*mesh);
       const dembark::SurfaceContacts& surface = known.contacts;
       const int owner = surface.follow(triangle, centre, contact.radi);
+      if (owner < 0) return;  // on a triangle without area
       Histories* const histories = fix->contactHistory();
       if (owner != triangle && computed(*mesh, histories, contact.i, x, triangle, owner)) return;
       if (histories && contact.contact_history)
