@@ -1,11 +1,13 @@
 #include "FacetSurface.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include <core/Scene.hpp>
 
 #include "ContactView.hpp"
+#include "dembark/surface/stl.hpp"
 #include "report.hpp"
 
 namespace yade {
@@ -20,9 +22,23 @@ namespace {
 
 }  // namespace
 
+boost::python::list FacetSurface::readStl(const std::string& path, Real precision) {
+	try {
+		boost::python::list found;
+		for (const ::dembark::Triangle& t : ::dembark::read_stl(path, precision).triangles) {
+			boost::python::list corners;
+			for (const auto& n : t.node) corners.append(Vector3r(n.x, n.y, n.z));
+			found.append(corners);
+		}
+		return found;
+	} catch (const std::exception& error) {
+		fail(error.what());
+	}
+}
+
 void FacetSurface::postLoad(FacetSurface&) {
 	if (!(smoothAngle >= 0.0 && smoothAngle <= 0.25 * M_PI)) fail("FacetSurface.smoothAngle must be an angle of 0 ... pi/4 rad");
-	if (!(weld >= 0.0 && weld <= 0.1)) fail("FacetSurface.weld must be a number of 0 ... 0.1");
+	if (!(precision >= 0.0 && std::isfinite(precision))) fail("FacetSurface.precision must be a length >= 0 [m]");
 	bodiesSeen = 0;
 	members.clear();
 }
@@ -44,7 +60,11 @@ void FacetSurface::refresh() {
 			members.push_back({body->getId(), body.get(), {}, {}});
 		}
 		triangles.resize(members.size());
-		surface = ::dembark::SurfaceContacts(smoothAngle, weld);
+		surface = ::dembark::SurfaceContacts(smoothAngle, precision);
+		Real largest = 0.0;
+		for (const auto& body : bodies)
+			if (const Sphere* sphere = body ? dynamic_cast<const Sphere*>(body->shape.get()) : nullptr) largest = std::max(largest, sphere->radius);
+		surface.expect(largest);
 	}
 	bool moved = changed;
 	for (std::size_t i = 0; i < members.size(); ++i) {
@@ -58,12 +78,7 @@ void FacetSurface::refresh() {
 		triangles[i].id    = m.id;
 		for (int k = 0; k < 3; ++k) triangles[i].node[k] = xyz(Vector3r(state.pos + state.ori * facet.vertices[k]));
 	}
-	if (!moved) return;
-	try {
-		surface.update(triangles);
-	} catch (const std::invalid_argument& error) {
-		fail(std::string("FacetSurface: ") + error.what() + "; the number is the body's");
-	}
+	if (moved) surface.update(triangles);
 }
 
 void FacetSurface::handOver(const shared_ptr<Interaction>& from, int facet) {
@@ -99,7 +114,7 @@ void FacetSurface::action() {
 		if (!sphere) continue;
 		const Vector3r centre = body->state->pos + dembark_yade::imageShift(*scene, each->cellDist);
 		const int      now    = surface.follow(facet, xyz(centre), sphere->radius);
-		if (now != facet) moved.push_back({each, now});
+		if (now != facet && now >= 0) moved.push_back({each, now});
 	}
 	for (const auto& [interaction, facet] : moved) handOver(interaction, facet);
 }

@@ -18,6 +18,8 @@ public:
 	virtual ~FacetSurface() = default;
 	void postLoad(FacetSurface&);
 	void action() override;
+	/// Triangles of an STL file, by the rule of all engines.
+	static boost::python::list readStl(const std::string& path, Real precision);
 
 	/// Number of a facet in this surface, -1 for a body that is none.
 	int                               index(Body::id_t id) const { return id < Body::id_t(indexOf.size()) ? indexOf[id] : -1; }
@@ -26,10 +28,14 @@ public:
 	bool upToDate(long iteration) const { return iteration == lastRun; }
 
 	// clang-format off
-	YADE_CLASS_BASE_DOC_ATTRS(FacetSurface,GlobalEngine,"Joins all :yref:`Facet` bodies that stand beside each other to one surface: of the facets that a sphere overlaps only those have a contact on which the distance to the surface has a minimum, so that a flat patch acts as one plane, and an edge counts once. When the minimum moves to a neighbour, the interaction's geometry and physics (friction, bridge) go with it. Stands before :yref:`InteractionLoop`, which has :yref:`Ig2_FacetSurface_Sphere_ScGeom` in place of :yref:`Ig2_Facet_Sphere_ScGeom`.",
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(FacetSurface,GlobalEngine,"Joins all :yref:`Facet` bodies to one surface: of the facets that a sphere overlaps only those have a contact on which the distance to the surface has a minimum, so that a flat patch acts as one plane, an edge counts once, and facets that lie on others do not count again. When the minimum moves to a neighbour, the interaction's geometry and physics (friction, bridge) go with it. Stands before :yref:`InteractionLoop`, which has :yref:`Ig2_FacetSurface_Sphere_ScGeom` in place of :yref:`Ig2_Facet_Sphere_ScGeom`.",
 		((Real,smoothAngle,0.05,Attr::triggerPostLoad,"Sides of a groove that form a smaller angle [rad] are one smooth surface: a sphere between them touches only the nearer one. 0 ... pi/4."))
-		((Real,weld,1e-6,Attr::triggerPostLoad,"Facets nearer to each other than this part of the shortest edge of all facets stand beside each other. 0 ... 0.1."))
+		((Real,precision,1e-8,Attr::triggerPostLoad,"Points of the facets nearer to each other than this [m] are one point. >= 0."))
 		((long,handedOver,0,Attr::readonly,"Number of contacts that have been handed to another facet so far"))
+		, /*ctor*/
+		, /*py*/
+		.def("readStl",&FacetSurface::readStl,(boost::python::arg("path"),boost::python::arg("precision")=1e-8),"Triangles of an STL file, text or binary, in the unit of the file: lists of three corners. Those without area, and those given again within the precision, are left out.")
+		.staticmethod("readStl")
 	);
 	// clang-format on
 

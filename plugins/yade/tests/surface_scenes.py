@@ -11,6 +11,7 @@ from yade import utils
 
 sys.path.insert(0, str(Path(sys.argv[0] if sys.argv[0].endswith(".py") else __file__).resolve().parents[2] / "tests"))
 
+from rig import floors
 from rig.meshes import bent, box_corner, patch
 
 RADIUS, DENSITY, STEP = 0.005, 2500.0, 1e-5
@@ -133,18 +134,97 @@ def changes():
     for step in range(3):
         grain.pos, grain.vel = Vector3(0.001, 0.0005, RADIUS - 2e-5), Vector3(0, 0, 0)
         if step == 1:
+            O.bodies.append(utils.facet([(0.00599, -0.02, -0.02), (0.00599, -0.02, 0.02), (0.00599, 0.05, 0)], material=0))
             O.bodies.append(utils.facet([(-0.02, -0.02, -5e-6), (0.02, -0.02, -5e-6), (0, 0.03, -5e-6)], material=0))
         if step == 2:
-            owner = next(i.id1 for i in O.interactions if i.isReal and i.id1 < len(O.bodies) - 1)
+            owner = next(i.id1 for i in O.interactions if i.isReal and i.id1 < len(O.bodies) - 2)
             O.bodies.erase(owner)
         O.step()
         found.append([O.forces.f(0)[2], sum(i.isReal for i in O.interactions)])
     return found
 
 
+def floor_forces(walls):
+    """Forces (step, grain, 3) on grains that are dragged over a floor."""
+    O.reset()
+    material = O.materials.append(FrictMat(young=5e6, poisson=0.3, density=2500, frictionAngle=0))
+    heavy = O.materials.append(FrictMat(young=5e6, poisson=0.3, density=1e12, frictionAngle=0))
+    walls(material)
+    grains = []
+    for start, velocity in floors.PATHS:
+        grain = utils.sphere((*start, floors.HEIGHT), floors.RADIUS, material=heavy)
+        grain.state.vel, grain.state.blockedDOFs = Vector3(*velocity, 0), "xyzXYZ"
+        grains.append(O.bodies.append(grain))
+    surface = FacetSurface()
+    rows = []
+    builtins.look = lambda: rows.append([list(O.forces.f(k)) for k in grains])
+    O.dt = floors.STEP
+    O.engines = [
+        ForceResetter(), InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb(), Bo1_Facet_Aabb()], verletDist=1e-3), surface,
+        InteractionLoop([Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom(), Ig2_FacetSurface_Sphere_ScGeom(surface=surface)],
+                        [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(restitution=1, staticFriction=0.5, kineticFriction=0.4,
+                                                                    criticalSlipDistance=1e-5)],
+                        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz()]),
+        PyRunner(iterPeriod=5, command="look()", initRun=True), NewtonIntegrator(damping=0)]
+    O.run(floors.STEPS, True)
+    return rows
+
+
+def files():
+    """Facets as a file has them, with what the reader leaves out, and as the reader gives them."""
+    from yade import dembark
+
+    found = {"plane": floor_forces(lambda material: O.bodies.append(utils.wall(0, 2, material=material)))}
+    plain = floors.quad(-floors.HALF, 0, -floors.HALF, floors.HALF) + floors.quad(0, floors.HALF, -floors.HALF, floors.HALF)
+    turned = plain + [(c, a, b) for a, b, c in plain] + [((0, -0.02, 0), (0, 0, 0), (0, 0.02, 0))]
+    found["facets given twice, and one without area"] = floor_forces(
+        lambda material: O.bodies.append([utils.facet(three, material=material) for three in turned]))
+    for name, content in floors.files().items():
+        Path("floor.stl").write_bytes(content)
+        found[name] = floor_forces(lambda material: dembark.mesh("floor.stl", material))
+    return found
+
+
+def refused():
+    from yade import dembark
+
+    found = {}
+    for line, content in floors.refused().items():
+        Path("floor.stl").write_bytes(content)
+        try:
+            dembark.mesh("floor.stl", 0)
+            found[line] = "accepted"
+        except RuntimeError as error:
+            found[line] = str(error)
+    return found
+
+
+def entering():
+    """A grain that is made when the surface knows of none, one that has grown, and where it should be."""
+    O.reset()
+    material = O.materials.append(FrictMat(young=5e6, poisson=0.3, density=2500, frictionAngle=0))
+    O.bodies.append([utils.facet(three, material=material) for three in floors.quad(-0.02, 0.02, -0.02, 0.02)])
+    surface = FacetSurface()
+    O.dt = 1e-7
+    O.engines = [
+        ForceResetter(), InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Facet_Aabb()], verletDist=1e-4), surface,
+        InteractionLoop([Ig2_Sphere_Sphere_ScGeom(), Ig2_FacetSurface_Sphere_ScGeom(surface=surface)],
+                        [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(restitution=1, staticFriction=0.5, kineticFriction=0.4,
+                                                                    criticalSlipDistance=1e-5)],
+                        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz()]), NewtonIntegrator(damping=0)]
+    O.step()
+    forces = []
+    for radius in (0.0025, 0.05):
+        grain = O.bodies.append(utils.sphere((0.001, 0.002, radius - 1e-5), radius, material=material))
+        O.step()
+        forces.append(O.forces.f(grain)[2] / radius**0.5)
+        O.bodies.erase(grain)
+    return forces
+
+
 def messages():
     said = []
-    for wrong in (lambda: FacetSurface(smoothAngle=3), lambda: FacetSurface(weld=-1), lambda: FacetSurface(smoothAngle=math.nan)):
+    for wrong in (lambda: FacetSurface(smoothAngle=3), lambda: FacetSurface(precision=-1), lambda: FacetSurface(smoothAngle=math.nan)):
         try:
             wrong()
             said.append("accepted")

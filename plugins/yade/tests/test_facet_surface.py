@@ -13,7 +13,8 @@ FORCE, SLIP, VOLUME, LOST, REAL, TOUCH = slice(0, 3), 6, 7, 8, 9, 10
 @pytest.fixture(scope="module")
 def found(yade):
     out = yade.folder / "surface.json"
-    done = yade(HERE / "surface_scenes.py", str(out), "flat", "bends", "corner", "moving", "periodic", "changes", "messages")
+    done = yade(HERE / "surface_scenes.py", str(out), "flat", "bends", "corner", "moving", "periodic", "changes", "messages", "files", "refused",
+                "entering")
     assert "scenes: finished" in done.stdout, (done.stdout + done.stderr)[-3000:]
     return json.loads(out.read_text())
 
@@ -76,11 +77,31 @@ def test_moving_facets_and_periodic_images(found):
 
 
 def test_facets_may_come_and_go(found):
-    """A deeper facet beside the patch is a contact of its own; where the owner was erased, the edges of the hole carry."""
+    """A facet across the patch is a contact of its own, one that lies below it is none; where the owner was erased, what is below carries."""
     (alone, one), (both, two), (after, _) = found["changes"]
-    assert one == 1 and two == 2 and both > alone and after > 0.0
+    assert one == 1 and two == 2 and both == pytest.approx(alone, rel=1e-9) and after > 0.0
 
 
 def test_wrong_numbers_are_told(found):
-    for message, name in zip(found["messages"], ("smoothAngle", "weld", "smoothAngle"), strict=True):
+    for message, name in zip(found["messages"], ("smoothAngle", "precision", "smoothAngle"), strict=True):
         assert message.startswith("dembark: FacetSurface.") and name in message
+
+
+def test_every_file_of_a_floor_is_the_floor(found):
+    forces = {name: np.array(rows) for name, rows in found["files"].items()}
+    plane = forces["plane"]
+    assert plane[2:, :, 2] == pytest.approx(5.7917e-3, rel=1e-4)
+    for name, force in forces.items():
+        assert np.abs(force - plane).max() < 2e-3 * plane.max(), name
+        if "um" not in name:
+            assert np.abs(force - plane).max() < 3e-5 * plane.max(), name
+
+
+def test_other_files_are_refused_in_one_line(found):
+    for line, said in found["refused"].items():
+        assert said.startswith("dembark: file 'floor.stl'") and line in said and "\n" not in said
+
+
+def test_grains_that_enter_feel_the_facets(found):
+    small, large = found["entering"]
+    assert small > 0.0 and large == pytest.approx(small, rel=1e-9)

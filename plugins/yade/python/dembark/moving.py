@@ -1,8 +1,6 @@
 """Walls that move as prescribed, in decks: facets of a mesh file, the engines that move them, and what those tell for time.csv."""
 
-import re
-
-from yade import Omega, WallMotion, utils
+from yade import FacetSurface, Omega, WallMotion, utils
 from yade.dembark.report import fail
 
 O = Omega()
@@ -13,15 +11,11 @@ _LABEL = "motion_of_"
 
 
 def mesh(path, material, mask=1):
-    """Ids of held facets with the triangles of an STL file in ASCII (m), of one `material` (id) and `mask`."""
-    try:
-        with open(path, encoding="ascii") as file:
-            corners = [tuple(map(float, found)) for found in re.findall(r"vertex\s+(\S+)\s+(\S+)\s+(\S+)", file.read())]
-    except (OSError, ValueError) as error:
-        fail(f"mesh {path}: {error}; it must be an STL file in ASCII")
-    if not corners or len(corners) % 3:
-        fail(f"mesh {path}: it has {len(corners)} corners; it must be an STL file in ASCII")
-    triangles = [corners[k:k + 3] for k in range(0, len(corners), 3)]
+    """Ids of held facets with the triangles of an STL file (m), text or binary, of one `material` (id) and `mask`.
+
+    Triangles without area and triangles given again are left out, as by the other engines.
+    """
+    triangles = FacetSurface.readStl(str(path))
     return O.bodies.append([utils.facet(three, fixed=True, material=material, mask=mask) for three in triangles])
 
 
