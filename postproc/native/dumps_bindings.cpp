@@ -1,12 +1,16 @@
-// dembark._dumps: lines of text dumps as arrays. Private; dembark.postproc.dumps adds files, frames and messages.
+// dembark._dumps: lines of text dumps, and STL files, as arrays. Private; dembark.postproc adds files, frames and messages.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <stdexcept>
+#include <string>
 #include <thread>
 
+#include "dembark/surface/stl.hpp"
 #include "dumps_lines.hpp"
 
 namespace nb = nanobind;
@@ -53,12 +57,31 @@ nb::tuple parse(const Text& text, std::size_t begin, std::size_t end, const std:
   return tuple_of(read, start);
 }
 
+nb::tuple read_stl(const std::string& path, double precision) {
+  dembark::StlSurface found;
+  {
+    nb::gil_scoped_release release;
+    found = dembark::read_stl(path, precision);
+  }
+  const std::size_t count = found.triangles.size();
+  auto* const corners = new double[9 * count];
+  const nb::capsule owner(corners, [](void* p) noexcept { delete[] static_cast<double*>(p); });
+  for (std::size_t k = 0; k < 3 * count; ++k) {
+    const dembark::Vec3<double>& n = found.triangles[k / 3].node[k % 3];
+    corners[3 * k] = n.x, corners[3 * k + 1] = n.y, corners[3 * k + 2] = n.z;
+  }
+  return nb::make_tuple(nb::ndarray<nb::numpy, double, nb::ndim<3>>(corners, {count, 3, 3}, owner), found.solid, found.names, found.flat,
+                        found.again);
+}
+
 }  // namespace
 
 NB_MODULE(_dumps, module) {
-  module.doc() = "Lines of text dumps as arrays.";
+  module.doc() = "Lines of text dumps, and STL files, as arrays.";
   module.def("skip", &skip, "text"_a, "begin"_a, "end"_a, "lines"_a,
              "Pass over whole lines; (position, lines, fault, column).");
   module.def("parse", &parse, "text"_a, "begin"_a, "end"_a, "place"_a, "values"_a, "row"_a, "threads"_a = 0,
              "Fill rows of `values` from `row` on; (position, rows, fault, column) with the fault of the row after them, or 0.");
+  module.def("read_stl", &read_stl, "path"_a, "precision"_a,
+             "Triangles of an STL file: (corners, solid of each, names, left out without area, left out as given again).");
 }

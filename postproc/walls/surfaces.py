@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
-from dembark.postproc.walls.mesh import TriangleTree, read_stl
+from dembark.postproc.walls.mesh import PRECISION, TriangleTree, read_stl
 
 Array = NDArray[np.float64]
 Vector = Sequence[float] | Array
@@ -195,7 +195,7 @@ class MeshWall:
     @classmethod
     def from_stl(cls, name: str, path: str | Path, *, scale: float = 1.0, motion: Motion = _REST) -> MeshWall:
         """Mesh of an STL file, text or binary, whose unit is `scale` (m): 1e-3 for a file in mm; its solids are the groups."""
-        surface = read_stl(path)
+        surface = read_stl(path, PRECISION / scale)
         return cls(name, surface.triangles * scale, surface.solids, surface.names, motion)
 
     @cached_property
