@@ -154,7 +154,7 @@ class FieldJob:
         recorders = recorders_of(self.walls, self.source, self.numbers, _PATCH * self.diameter)
         stream = checked_frames(self.walls, self.source, self.numbers)
         with ExitStack() as stack:
-            netcdf = stack.enter_context(FieldsNetcdf(self.words.out, attributes)) if self.words.out else None
+            netcdf = stack.enter_context(FieldsNetcdf(self.words.out, attributes, timed=self.source.timed)) if self.words.out else None
             vtkhdf = stack.enter_context(FieldsVtkhdf(self.words.vtkhdf, attributes)) if self.words.vtkhdf else None
             points = stack.enter_context(GrainsVtkhdf(self.words.grains, attributes)) if self.words.grains else None
 

@@ -54,29 +54,34 @@ def write_netcdf(path: str | Path, fields: Labelled | Iterable[tuple[float, Labe
     return Path(path)
 
 
-def write_wall_netcdf(path: str | Path, walls: Iterable[WallStress], attributes: Attributes | None = None) -> Path:
+def write_wall_netcdf(
+    path: str | Path, walls: Iterable[WallStress], attributes: Attributes | None = None, *, timed: bool = True
+) -> Path:
     """Write wall loads, a group for each wall by its name: `xarray.open_dataset(path, group="side")`; returns the path."""
-    with FieldsNetcdf(path, attributes, without_fields=True) as file:
+    with FieldsNetcdf(path, attributes, without_fields=True, timed=timed) as file:
         file.add_walls(walls)
     return Path(path)
 
 
-def _write_walls(file: Any, walls: Iterable[WallStress]) -> None:
+def _write_walls(file: Any, walls: Iterable[WallStress], timed: bool) -> None:
     """Add a group for each wall; `wall_<name>` for one that is called like a field."""
     taken = {*file.variables, *file.dimensions}
     for stress in walls:
         name = stress.wall.name
         group = file.create_group(f"wall_{name}" if name in taken else name)
-        wall_dataset(stress).dump_to_store(xarray.backends.H5NetCDFStore(group))
+        wall_dataset(stress, timed=timed).dump_to_store(xarray.backends.H5NetCDFStore(group))
 
 
 class FieldsNetcdf:
     """A NetCDF file that grows by one time with each `add`; leaving the `with` block makes it whole, an error removes it.
 
-    `without_fields`: it may hold walls alone.
+    `without_fields`: it may hold walls alone. Not `timed`: what is given as times are numbers of steps, and the file says so.
     """
 
-    def __init__(self, path: str | Path, attributes: Attributes | None = None, without_fields: bool = False) -> None:
+    def __init__(
+        self, path: str | Path, attributes: Attributes | None = None, without_fields: bool = False, *, timed: bool = True
+    ) -> None:
+        self._timed = timed
         self._whole = WholeFile(path)
         try:
             self._part = SteadyFile(self._whole.part)
@@ -128,7 +133,7 @@ class FieldsNetcdf:
             else:
                 variable = file.create_variable(name, dimensions, values.dtype, data=values)
             variable.attrs.update(attributes)
-        file.create_variable("time", ("time",), "f8").attrs.update(_TIME)
+        file.create_variable("time", ("time",), "f8").attrs.update(_TIME if self._timed else {**_STEPS, "bounds": "time_bounds"})
         file.create_variable("time_bounds", ("time", "bounds"), "f8")
         for name, values in arrays.items():
             dimensions = _DIMENSIONS[: values.ndim + 1]
@@ -147,7 +152,7 @@ class FieldsNetcdf:
         try:
             if self._count == 0 and not self._may_be_empty:
                 raise DembarkError(f"nothing to write to {self._whole.path}", "there is no field of any time")
-            _write_walls(self._file, self._walls)
+            _write_walls(self._file, self._walls, self._timed)
         finally:
             self._close()
         self._part.check()
@@ -155,6 +160,7 @@ class FieldsNetcdf:
 
 _TIME = {"units": "s", "long_name": "simulated time, middle of the averaged span", "axis": "T", "standard_name": "time",
          "bounds": "time_bounds"}
+_STEPS = {"units": "1", "long_name": "number of the time step, for the time is not known", "axis": "T"}
 
 
 def _coordinates(grid: Grid) -> dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]:
@@ -173,7 +179,7 @@ def _attributes(fields: Labelled, name: str) -> dict[str, str]:
     return {"units": fields.units[name], "long_name": fields.long_names[name], "cell_methods": "time: mean"}
 
 
-def wall_dataset(stress: WallStress) -> xarray.Dataset:
+def wall_dataset(stress: WallStress, *, timed: bool = True) -> xarray.Dataset:
     """Load of a wall as a labelled xarray Dataset: its patches, time series, peaks and histograms.
 
     Patches lie along the wall's coordinates (u, v; angle, height; angle, polar_angle) or along `patch` on a mesh.
@@ -183,7 +189,7 @@ def wall_dataset(stress: WallStress) -> xarray.Dataset:
     coordinates: dict[str, Any] = {
         "component": ("component", list(COMPONENTS), {"long_name": "normal (compression positive) and shear stress"}),
         "axis": ("axis", list(_AXES)),
-        "time": ("time", stress.times, {"units": "s", "long_name": "simulated time"}),
+        "time": ("time", stress.times, {"units": "s", "long_name": "simulated time"} if timed else _STEPS),
     }
     for axis, name in enumerate(patches.names):
         coordinates[name] = (name, patches.middles(axis), {"units": patches.units[axis], "long_name": f"{name} of the patches' middles"})
@@ -213,7 +219,7 @@ def wall_dataset(stress: WallStress) -> xarray.Dataset:
         shape = (len(stress.times), *patches.shape, len(COMPONENTS))
         put("stress_series", ("time", *names, "component"), stress.series.reshape(shape), "Pa", "stress of each frame")
     put("peak_force", ("peak",), stress.peak_forces, "N", "local maxima in time of the wall's normal force")
-    put("peak_time", ("peak",), stress.peak_times, "s", "their times")
+    put("peak_time", ("peak",), stress.peak_times, "s" if timed else "1", "their times")
     for name, histogram, units, text in (("patch_peak", stress.peak_stress, "Pa", "local maxima in time of the patches' normal stress"),
                                          ("contact_force", stress.contact_force, "N", "normal force of a contact")):
         _put_histogram(variables, coordinates, name, histogram, units, text)

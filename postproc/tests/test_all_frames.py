@@ -149,6 +149,22 @@ def test_times_are_those_of_the_dump(here, capsys):
     assert "the frame has no ITEM: TIME, but others have" in capsys.readouterr().err
 
 
+def test_steps_are_not_called_times_where_those_are_not_known(here, capsys):
+    assert fields([frame(step, walls={"base": np.ones((4, 3))}) for step in (10, 20)], "--wall", "base:plane") == 0
+    moving = ["--wall", "base:plane:velocity=0,0,-1mm/s"]
+    for options, unit, time in (([], "1", 15.0), (["--time-step", "0.1"], "s", 1.5)):
+        assert main(["fields", "g.dump", "--grid", "9", "--width", "1d", "--out", "f.nc", *options]) == 0
+        assert main(["walls", "g.dump", "--out", "w.nc", *options, *(moving if options else ["--wall", "base:plane"])]) == 0
+        raw = {"decode_times": False}
+        with xarray.open_dataset("f.nc", **raw) as found, xarray.open_dataset("w.nc", group="base", **raw) as wall:
+            assert found.time.values == pytest.approx([time])
+            assert found.time.attrs["units"] == wall.time.attrs["units"] == wall.peak_time.attrs["units"] == unit
+    capsys.readouterr()
+    for command in ("walls", "fields"):
+        assert main([command, "g.dump", "--out", "w.nc", *moving]) == 2
+        assert "the wall moves, but the times of the frames are not known, for --wall base, give --time-step" in capsys.readouterr().err
+
+
 def test_a_mean_diameter_that_changes_is_told(here, capsys):
     for later, said in ((RADII, False), (2.0 * RADII, True)):
         assert fields([frame(0), frame(1, radii=later, walls={"base": np.ones((4, 3))})]) == 0

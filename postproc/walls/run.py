@@ -74,7 +74,7 @@ class WallJob:
             advance()
         self.results = [recorder.result() for recorder in recorders]
         if self.out:
-            self.written.append(write_wall_netcdf(self.out, self.results, provenance))
+            self.written.append(write_wall_netcdf(self.out, self.results, provenance, timed=self.source.timed))
         if self.vtkhdf:
             self.written += write_wall_files(self.vtkhdf, self.results, provenance)
         if self.plot:
@@ -117,6 +117,8 @@ def choose_walls(texts: Sequence[str], source: Source, frame: GrainFrame, diamet
             raise DembarkError(f"wall {name} is given twice", "in --wall", "give each a name of its own")
         if isinstance(word.wall, Inclusion):
             word.wall.members(frame)
+        elif any(word.wall.motion.velocity) and not source.timed:
+            raise DembarkError("the wall moves, but the times of the frames are not known", f"for --wall {name}", "give --time-step")
         elif name not in frame.wall_forces:
             known = ", ".join(frame.wall_forces) or "none"
             raise DembarkError(f"the dump has no columns f_force_{name}[1..3]", f"for --wall {name}", f"walls in it: {known}")
