@@ -46,10 +46,10 @@ class Yade(Engine):
         return result | {"YADE_PREFIX": str(self.prefix), "PATH": "/usr/bin:" + result.get("PATH", "")}
 
     def own_files(self) -> Iterable[Path]:
-        """The program and dembark's part of the overlay."""
+        """The program, YADE's libraries and dembark's part of the overlay."""
         # The overlay consists of links to YADE's own files; what is no link, or carries our name, is dembark's.
         return [self.executable, *(path for suffix in ("*.so", "*.py") for path in (self.prefix / "lib").rglob(suffix)
-                                   if path.is_file() and (not path.is_symlink() or "dembark" in path.name))]
+                                   if path.is_file() and (not path.is_symlink() or "dembark" in path.name or path.match("lib*.so")))]
 
     def lacking(self) -> Iterable[str]:
         """See Engine; its start script names the features."""

@@ -241,8 +241,8 @@ store = sqlite3.connect(sys.argv[1], isolation_level=None)
 store.execute("PRAGMA synchronous = FULL")
 store.execute("PRAGMA cache_size = 1")
 store.execute("BEGIN IMMEDIATE")
-store.execute("UPDATE steps SET inputs = 'half'")
-store.executemany("INSERT INTO steps (campaign, name, kind, state, inputs) VALUES ('c', ?, 'k', 'running', ?)",
+store.execute("UPDATE steps SET message = 'half'")
+store.executemany("INSERT INTO steps (campaign, name, kind, state, message) VALUES ('c', ?, 'k', 'running', ?)",
                   [(f"more{k}", "x" * 4000) for k in range(200)])
 os.kill(os.getpid(), 9)
 """
@@ -252,9 +252,9 @@ def test_what_a_killed_writer_had_begun_is_taken_back_by_who_reads(tmp_path: Pat
     """Its journal is on the disk, and pages of its transaction are in the file."""
     path = tmp_path / schema.FILE
     with schema.writing(path) as store:
-        schema.put(store, "steps", [{"campaign": "c", "name": "one", "kind": "k", "state": "waiting", "inputs": "whole"}])
+        schema.put(store, "steps", [{"campaign": "c", "name": "one", "kind": "k", "state": "waiting", "message": "whole"}])
     subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False, timeout=60)
     assert path.with_name(f"{schema.FILE}-journal").is_file()
-    assert schema.rows(path, "SELECT name, inputs FROM steps") == [{"name": "one", "inputs": "whole"}]
+    assert schema.rows(path, "SELECT name, message FROM steps") == [{"name": "one", "message": "whole"}]
     with pytest.raises(DembarkError, match="readonly database"):
         schema.rows(path, "DELETE FROM steps")

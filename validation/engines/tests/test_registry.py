@@ -118,16 +118,21 @@ def test_a_registered_engine_fulfils_the_protocol(engine: type[Engine], tmp_path
 
 
 def test_the_engine_itself_counts_and_not_its_launcher_alone(tmp_path: Path) -> None:
-    """A script that starts a program, as that of LAMMPS, and a program with the engine in a library, as that of LIGGGHTS."""
+    """A script that starts a program, as that of LAMMPS, a program with the engine in a library, as that of LIGGGHTS, and links to YADE's
+    libraries."""
     program, launcher = tmp_path / "lmp", tmp_path / "bin" / "lammps-dembark"
     launcher.parent.mkdir()
     launcher.write_text(f'#!/bin/sh\nexec "{program}" "$@"\n')
-    kinds = {"lammps": launcher, "liggghts": tmp_path / "liggghts-dembark"}
+    kinds = {"lammps": launcher, "liggghts": tmp_path / "liggghts-dembark", "yade": tmp_path / "overlay/bin/yade"}
+    (tmp_path / "overlay/bin").mkdir(parents=True)
+    (tmp_path / "overlay/lib").mkdir()
+    kinds["yade"].touch()
+    (tmp_path / "overlay/lib/libyade.so").symlink_to(tmp_path / "libyade.so")
     (tmp_path / "library.c").write_text("int answer(void) { return ANSWER; }\n")
     (tmp_path / "main.c").write_text("int answer(void);\nint main(void) { return answer(); }\n")
 
     def build(answer: int) -> dict[str, str]:
-        for name, linked in (("lammps", program), ("liggghts", kinds["liggghts"])):
+        for name, linked in (("lammps", program), ("liggghts", kinds["liggghts"]), ("yade", kinds["yade"])):
             library = tmp_path / f"lib{name}.so"
             subprocess.run(["gcc", "-shared", "-fPIC", f"-DANSWER={answer}", "-o", library, tmp_path / "library.c"], check=True)
             if not linked.exists():
@@ -135,7 +140,7 @@ def test_the_engine_itself_counts_and_not_its_launcher_alone(tmp_path: Path) -> 
         return {name: digest(registered(name)(path, "1", "").own_files()) for name, path in kinds.items()}
 
     before, after = build(1), build(2)
-    assert before["lammps"] != after["lammps"] and before["liggghts"] != after["liggghts"]
+    assert all(before[name] != after[name] for name in kinds)
     assert build(1) == before
 
 
