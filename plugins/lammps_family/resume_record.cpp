@@ -72,7 +72,6 @@ states::RunRecord ResumeFix::record() const {
   add("newton", force->newton_pair ? "on" : "off");
   add("neighbor", states::digits(neighbor->skin, neighbor->style));
   add("neigh_modify every, delay, check", states::digits(neighbor->every, neighbor->delay, neighbor->dist_check));
-  add("processors", states::digits(comm->procgrid[0], comm->procgrid[1], comm->procgrid[2]));
   add("atom_modify sort", states::digits(sort_frequency_));
   add("pair_style", word(force->pair_style));
   std::string acting;
