@@ -14,6 +14,7 @@ enum Member {
   command_map,
   pair_loop_map,
   wall_loop_map,
+  restarted_styles,
   partner_count,
   partner,
   mean_mode,
@@ -34,6 +35,7 @@ auto pointer(Tag<fix_map>);
 auto pointer(Tag<command_map>);
 auto pointer(Tag<pair_loop_map>);
 auto pointer(Tag<wall_loop_map>);
+auto pointer(Tag<restarted_styles>);
 auto pointer(Tag<partner_count>);
 auto pointer(Tag<partner>);
 auto pointer(Tag<mean_mode>);
@@ -47,6 +49,7 @@ template struct Reach<fix_map, &Modify::fix_map>;
 template struct Reach<command_map, &Input::command_map>;
 template struct Reach<pair_loop_map, &Utils::AbstractFactory<PairStyles::IGranularPairStyle>::styleTable>;
 template struct Reach<wall_loop_map, &Utils::AbstractFactory<Walls::IGranularWall>::styleTable>;
+template struct Reach<restarted_styles, &Modify::style_restart_peratom>;
 template struct Reach<partner_count, &FixContactHistory::npartner_>;
 template struct Reach<partner, &FixContactHistory::partner_>;
 template struct Reach<mean_mode, &FixAveTime::ave>;
@@ -73,6 +76,10 @@ GranularCreators<PairStyles::IGranularPairStyle>& pair_loops() {
 }
 GranularCreators<Walls::IGranularWall>& wall_loops() {
   return reach<wall_loop_map, GranularCreators<Walls::IGranularWall>>(Walls::Factory::instance());
+}
+std::vector<std::string> restarted_fixes(Modify& modify) {
+  char** const styles = reach<restarted_styles, char**>(modify);
+  return {styles, styles + (styles ? modify.nfix_restart_peratom : 0)};
 }
 int* partner_counts(FixContactHistory& history) { return reach<partner_count, int*>(history); }
 int** partners(FixContactHistory& history) { return reach<partner, int**>(history); }

@@ -38,6 +38,9 @@ using GranularCreators = std::map<std::pair<std::string, int>, Host* (*)(LAMMPS_
 GranularCreators<LIGGGHTS::PairStyles::IGranularPairStyle>& pair_loops();
 GranularCreators<LIGGGHTS::Walls::IGranularWall>& wall_loops();
 
+/// Styles of the fixes whose values for atoms a restart file had, as long as no run has begun: whether there are contact histories.
+std::vector<std::string> restarted_fixes(LAMMPS_NS::Modify& modify);
+
 /// Number of contacts of each atom and their partners: a state that is put back has to set them.
 int* partner_counts(LAMMPS_NS::FixContactHistory& history);
 int** partners(LAMMPS_NS::FixContactHistory& history);

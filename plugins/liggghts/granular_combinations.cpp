@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <initializer_list>
+#include <map>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -133,18 +134,49 @@ using Creator = typename GranularCreators<Host>::mapped_type;
 template <class Host>
 Creator<Host> stock_fallback = nullptr;
 
-bool ours(std::int64_t hash) { return ((hash >> 6) & 63) == TANGENTIAL_FINNIE_RABINOWICZ || ((hash >> 12) & 63) == COHESION_CAPILLARY; }
+Combination combination(std::int64_t hash) {
+  Combination models;
+  for (std::size_t k = 0; k < models.size(); ++k) models[k] = (hash >> (6 * k)) & 63;
+  return models;
+}
+bool is_ours(const Combination& models) { return models[1] == TANGENTIAL_FINNIE_RABINOWICZ || models[2] == COHESION_CAPILLARY; }
 
 template <class Host>
 Host* fallback_or_refuse(LAMMPS* lammps, typename Host::ParentType* parent, std::int64_t hash) {
-  if (ours(hash)) {
-    Combination asked;
-    for (std::size_t k = 0; k < asked.size(); ++k) asked[k] = (hash >> (6 * k)) & 63;
+  const Combination asked = combination(hash);
+  if (is_ours(asked)) {
     const std::string line =
         "this combination of contact models is not compiled: " + what_does_not_fit(asked) + "; there is, in this order, " + available();
     lammps->error->all(FLERR, line.c_str());
   }
   return stock_fallback<Host>(lammps, parent, hash);
+}
+
+typedef PairStyles::IGranularPairStyle PairHost;
+std::map<int, Creator<PairHost>> pair_makers;
+std::map<const LAMMPS*, std::int64_t> pair_hashes;  // of what was made last
+
+/// The engine compares the histories of a restart file with those of the pair style by their length alone: those of other models with as
+/// many numbers would be read as displacements or volumes.
+void check_restarted_histories(LAMMPS* lammps, std::int64_t hash) {
+  const auto before = pair_hashes.find(lammps);
+  if (before == pair_hashes.end() || before->second == hash) return;
+  const Combination then = combination(before->second), now = combination(hash);
+  const std::vector<std::string> styles = restarted_fixes(*lammps->modify);
+  if (!(is_ours(then) || is_ours(now)) || std::find(styles.begin(), styles.end(), "contacthistory") == styles.end()) return;
+  std::string line = "pair_style gran: the restart file has contact histories of";
+  for (std::size_t k = 0; k < then.size(); ++k)
+    if (then[k] != now[k]) line += std::string(" ") + kinds[k] + " " + name(int(k), then[k]) + ",";
+  line += " which other models cannot read; give the models of the file, or start from positions and velocities";
+  lammps->error->all(FLERR, line.c_str());
+}
+
+/// Makes the loop of any combination, ours or not; read_restart makes that of its file, and pair_style the one to go on with.
+PairHost* make_pair_loop(LAMMPS* lammps, LAMMPS_NS::PairGran* parent, std::int64_t hash) {
+  check_restarted_histories(lammps, hash);
+  pair_hashes[lammps] = hash;
+  const auto maker = pair_makers.find(int(hash));
+  return (maker == pair_makers.end() ? &fallback_or_refuse<PairHost> : maker->second)(lammps, parent, hash);
 }
 
 template <class Host, class Type>
@@ -193,8 +225,7 @@ struct PairLoop<GranStyle<HERTZ, TANGENTIAL_FINNIE_RABINOWICZ, Cohesion, Rolling
 template <int Normal, int Tangential, int Cohesion, int Rolling, int Surface>
 void add_combination() {
   typedef GranStyle<Normal, Tangential, Cohesion, Rolling, Surface> Style;
-  PairStyles::Factory::instance().addStyle("gran", Style::HASHCODE,
-                                           &create<PairStyles::IGranularPairStyle, typename PairLoop<Style>::type>);
+  PairStyles::Factory::instance().addStyle("gran", Style::HASHCODE, &create<PairHost, typename PairLoop<Style>::type>);
   Walls::Factory::instance().addStyle("gran", Style::HASHCODE, &create<Walls::IGranularWall, MeshWall<ContactModel<Style>>>);
 }
 
@@ -215,20 +246,7 @@ void guard_fallback(GranularCreators<Host>& creators) {
   creator = &fallback_or_refuse<Host>;
 }
 
-}  // namespace
-
-bool has_our_models(LAMMPS_NS::Force& force) {
-  LAMMPS_NS::PairGran* const pair = dynamic_cast<LAMMPS_NS::PairGran*>(force.pair_match("gran", 0));
-  return pair && ours(pair->hashcode());
-}
-
-void register_contact_models() {
-  guard_fallback(pair_loops());
-  guard_fallback(wall_loops());
-  // The tables outlive the command clear.
-  static bool known = false;
-  if (known) return;
-  known = true;
+void enter_combinations() {
   ContactModels::Factory& models = ContactModels::Factory::instance();
   models.addTangentialModel("finnie_rabinowicz", TANGENTIAL_FINNIE_RABINOWICZ);
   models.addCohesionModel("capillary", COHESION_CAPILLARY);
@@ -239,6 +257,26 @@ void register_contact_models() {
 #include "granular_combinations_list.h"
 #undef GRAN_MODELS
 #undef MODELS
+}
+
+}  // namespace
+
+bool has_our_models(LAMMPS_NS::Force& force) {
+  LAMMPS_NS::PairGran* const pair = dynamic_cast<LAMMPS_NS::PairGran*>(force.pair_match("gran", 0));
+  return pair && is_ours(combination(pair->hashcode()));
+}
+
+void register_contact_models() {
+  guard_fallback(wall_loops());
+  // The tables outlive the command clear, but the engine enters its own combinations anew.
+  static bool known = false;
+  if (!std::exchange(known, true)) enter_combinations();
+  for (auto& [key, creator] : pair_loops()) {
+    if (creator == &make_pair_loop) continue;
+    const bool fallback = key.second == int(GranStyle<>::HASHCODE);
+    (fallback ? stock_fallback<PairHost> : pair_makers[key.second]) = creator;
+    creator = &make_pair_loop;
+  }
 }
 
 }  // namespace dembark_liggghts

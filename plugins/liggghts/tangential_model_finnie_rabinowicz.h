@@ -12,13 +12,9 @@ TANGENTIAL_MODEL(TANGENTIAL_FINNIE_RABINOWICZ,finnie_rabinowicz,20)
 #ifndef TANGENTIAL_MODEL_FINNIE_RABINOWICZ_H_
 #define TANGENTIAL_MODEL_FINNIE_RABINOWICZ_H_
 
-#include <cstdio>
-#include <utility>
-
 #include "contact_models.h"
 #include "tangential_model_base.h"
 #include "atom.h"
-#include "comm.h"
 #include "fix_wall_gran.h"
 #include "global_properties.h"
 #include "neighbor.h"
@@ -47,7 +43,6 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
   LAMMPS_NS::FixWallGran* const wall_;
   dembark_liggghts::EnergyTally* tally_ = nullptr;
   double exponent_ = 1.0;  // of the normal spring
-  bool noted_ = false;
 
  public:
   static constexpr const char* history_name = "finnie_rabinowicz";
@@ -94,7 +89,6 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
         read.fail("rolling_resistance and the model rolling_friction are both on; leave one of them out");
       rolling_ = dembark_liggghts::read_rolling(read, rolling_model());
     }
-    note_slow_rolling();
     tally_ = dembark_liggghts::find_energy_tally(modify);
     exponent_ = matches("normal", "hertz") ? 1.5 : 1.0;
     // The engine tells a model of the end of a contact only within this factor of the radii; without it a grain that bounces
@@ -158,17 +152,6 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
 
   bool matches(const char* kind, const char* model) const {
     return wall_ ? wall_->contact_match(kind, model) : pair_->contact_match(kind, model);
-  }
-
-  /// Says once that a pair style takes the engine's own loop, where it could have the faster one.
-  void note_slow_rolling() {
-    if (!pair_ || noted_ || comm->me != 0 || !matches("normal", "hertz")) return;
-    noted_ = true;
-    for (const auto [stock, ours] : {std::pair("cdt", "constant_torque"), std::pair("epsd2", "elastic_plastic")})
-      for (FILE* const out : {screen, logfile})
-        if (out && matches("rolling_friction", stock))
-          fprintf(out, "dembark: rolling_friction %s runs in the engine's pair loop; rolling_resistance %s runs in the fast one\n", stock,
-                  ours);
   }
 
   void store(double* history, const dembark::FrictionState<double>& state, const dembark::SlipRings& rings,

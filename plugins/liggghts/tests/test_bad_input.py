@@ -148,16 +148,3 @@ def test_units_that_do_not_fit_together(tmp_path):
     """The engine refuses `real` and `metal`, but not these."""
     done = run(tmp_path, lambda deck: deck.replace("units si", "units electron"))
     assert_one_line(done, "units electron", "si, cgs, micro, nano or lj")
-
-
-@pytest.mark.parametrize(("rolling", "instead"), [("cdt", "rolling_resistance constant_torque"),
-                                                  ("epsd2", "rolling_resistance elastic_plastic")])
-def test_stock_rolling_friction_is_said_to_be_slow(tmp_path, rolling, instead):
-    def change(deck):
-        lines = "fix p_roll all property/global coefficientRollingFriction peratomtypepair 2 0 0 0 0\npair_style"
-        return deck.replace("pair_style", lines).replace("cohesion capillary", f"cohesion capillary rolling_friction {rolling}")
-
-    done = run(tmp_path, change)
-    assert done.code == 0, done.error
-    (line,) = [line for line in done.output.splitlines() if f"rolling_friction {rolling}" in line]
-    assert instead in line

@@ -63,3 +63,37 @@ def test_others_are_refused_with_exactly_this_list(tmp_path, other):
     assert len(errors) == 1 and "not compiled" in errors[0]
     told = re.findall(r"model (\S+) tangential (\S+) cohesion (\S+) surface (\S+) rolling_friction ([\w|]+)", errors[0])
     assert {(n, t, c, r, s) for ns, t, c, s, rs in told for n in ns.split("|") for r in rs.split("|")} == COMBINATIONS
+
+
+HISTORY, FRICTION = ("hertz", "history"), ("hertz", "finnie_rabinowicz")
+
+
+@pytest.mark.parametrize(("written", "settings", "read", "then", "words"), [
+    # As many numbers: 5, 5, 8, and of another kind.
+    ((*HISTORY, "capillary", "off"), "", (*FRICTION, "off", "off"), "", ("tangential history, cohesion capillary, which",)),
+    ((*FRICTION, "off", "off"), "", (*HISTORY, "capillary", "off"), "", ("tangential finnie_rabinowicz, cohesion off, which",)),
+    ((*FRICTION, "off", "epsd2"), "", (*FRICTION, "off", "off"), " rolling_resistance elastic_plastic", ("rolling_friction epsd2, which",)),
+    ((*HISTORY, "off", "off"), "", (*FRICTION, "off", "off"), "", ("tangential history, which",)),
+    # The same models, and a law of the engine that keeps nothing.
+    ((*FRICTION, "capillary", "epsd2"), "", (*FRICTION, "capillary", "epsd2"), "", ()),
+    (("hertz", "no_history", "off", "off"), "", (*FRICTION, "off", "off"), "", ()),
+    ((*HISTORY, "off", "off"), "", (*HISTORY, "off", "off"), "", ()),
+])
+def test_histories_of_a_restart_file_are_read_by_its_models_alone(tmp_path, written, settings, read, then, words):
+    """The engine compares their lengths: bridge volumes were read as displacements, and displacements as volumes."""
+    first = deck((*written, "default"), settings).replace(" presliding exponential", "")
+    again = deck((*read, "default"), then).replace(" presliding exponential", "")
+    again = re.sub(r"^region domain.*\ncreate_box.*$", "read_restart state", again, flags=re.MULTILINE)
+    again = re.sub(r"^(create_atoms|group|set|dump\S*) .*\n", "", again, flags=re.MULTILINE)
+    done = liggghts_driver.run_deck(tmp_path, f"{first}\nwrite_restart state\n")
+    assert done.code == 0, done.error
+    # A wall of the same models keeps its own.
+    wall = re.search(r"^fix floor.*$", first, re.MULTILINE)
+    again = re.sub(r"^fix floor.*$", lambda _: wall[0], again, flags=re.MULTILINE)
+    done = liggghts_driver.run_deck(tmp_path, again, name="again.in")
+    if not words:
+        assert done.code == 0, done.error
+        return
+    assert done.code != 0 and "the restart file has contact histories of" in done.error
+    for word in words:
+        assert word in done.error
