@@ -201,6 +201,8 @@ def grain_frame(raw: RawFrame, where: str, density: float | None = None, say: Sa
     raw, kept = in_si(raw, where)
     if kept:
         say(KEPT_UNITS.format(", ".join(kept), units))
+    if twice := sorted({name for name in raw.columns if raw.columns.count(name) > 1}):
+        say(f"columns {', '.join(twice)} are there more than once; the first of each counts")
     if any(name.startswith(_SHAPE) for name in raw.columns):
         say("grains are taken as spheres of their radius, though the dump has columns of a shape")
     if not raw.columns and not len(raw.values):

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _CHUNK = 4_000_000  # shares that numpy holds at once
+_MOST_THREADS = 64
 _LINES = 1 << 18  # lines whose columns numpy holds at once
 
 
@@ -50,8 +51,9 @@ class Spreader:
 
     @property
     def workers(self) -> int:
-        """The number of threads."""
-        return self.threads or len(os.sched_getaffinity(0))
+        """The number of threads; more than a few for each core would only wait, and very many cannot be started."""
+        cores = len(os.sched_getaffinity(0))
+        return min(self.threads or cores, max(_MOST_THREADS, cores))
 
     def grains(self, grains: Grains, out: Array) -> None:
         """Add to `out` (nx, ny, nz, 32), made by `zeros`, what the grains carry times the kernel's shares about them."""

@@ -250,6 +250,7 @@ GRAINS = grain_frame(PLACES, radii=0.01, high=(1.0,) * 3)
 PERIODIC = grain_frame(PLACES, radii=0.01, high=(1.0,) * 3, periodic=(True,) * 3)
 CALLS = {
     "grid": lambda: coarse_grain(GRAINS, None, Grid((0, 0, 0), (1, 1, 1), (10000, 10000, 1)), width=0.01),
+    "grid beyond 2^64": lambda: coarse_grain(GRAINS, None, Grid((0, 0, 0), (1, 1, 1), (2**32, 2**32, 2)), width=0.01),
     "kernel": lambda: coarse_grain(PERIODIC, None, Grid((0, 0, 0), (1, 1, 1), (9, 9, 9), (True,) * 3), width=30.0),
     "images": lambda: coarse_grain(PERIODIC, None, Grid((0, 0, 0), (1, 1, 1), (9, 9, 9), (True,) * 3), width=300.0, kernel="lucy"),
     "cells": lambda: cell_totals(GRAINS, None, Grid((0, 0, 0), (1, 1, 1), (10000, 10000, 1))),
@@ -267,6 +268,11 @@ def test_functions_refuse_what_does_not_fit(small, name):
     with pytest.raises(DembarkError, match=r"of memory|larger ones|margin|more than") as caught:
         CALLS[name]()
     assert "\n" not in str(caught.value)
+
+
+def test_more_threads_than_can_be_started_do_no_harm(here):
+    for threads in ("100000", "99999999999999"):
+        assert fields([frame(0)], "--threads", threads) == 0
 
 
 def test_free_memory_is_that_of_the_machine():

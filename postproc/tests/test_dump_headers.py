@@ -281,6 +281,7 @@ def test_numbers_that_make_no_sense_are_refused(tmp_path, columns, rows, message
     ("id x y z radius mass", "1 0 0 0 1 5", 2.0, 5.0, "the given density is not used, for the dump has a column mass"),
     ("id x y z radius density", "1 0 0 0 1 5", 2.0, 20.943951, "the given density is not used, for the dump has a column density"),
     ("id type x y z radius", "1 1 0 0 0 1\n2 2 0 0 0 1", 2.0, 8.3775804, "all grains have the given density, though there are 2 types"),
+    ("id x y z radius mass mass", "1 0 0 0 1 5 7", None, 5.0, "columns mass are there more than once; the first of each counts"),
     ("id x y z radius mass shapex shapey shapez", "1 0 0 0 1 5 1 1 2", None, 5.0, "grains are taken as spheres"),
 ])
 def test_masses_are_those_of_the_dump_or_one_line_says_what_they_are(tmp_path, columns, row, density, mass, message):
