@@ -91,11 +91,20 @@ def open_source(path: Path, contacts: Path | None = None, reading: Reading | Non
     if contacts is None and folder and (folder / "contacts.dump").is_file():
         contacts = folder / "contacts.dump"
     time_step = how.time_step if how.time_step is not None else float(record.get("time_step", math.nan))
-    grains = GrainsDump(file, skip_truncated=True, columns=how.columns, density=how.density, units=how.units)
+
+    def grains_in(units: str) -> GrainsDump:
+        return GrainsDump(file, skip_truncated=True, columns=how.columns, density=how.density, units=units)
+
+    grains = grains_in(how.units)
     if not len(grains):
         raise DumpError(f"{file} has no whole frame")
-    beside = ContactsDump(contacts, skip_truncated=True, columns=how.contact_columns, units=how.units) if contacts else None
-    return Source(path, grains, beside, time_step, record)
+    if contacts is None:
+        return Source(path, grains, None, time_step, record)
+    # Both are of one run: where only one of them names the units, they hold for the other.
+    touching = ContactsDump(contacts, skip_truncated=True, columns=how.contact_columns, units=how.units or grains.units)
+    if touching.units and not grains.units:
+        grains = grains_in(touching.units)
+    return Source(path, grains, touching, time_step, record)
 
 
 def _run_folder(path: Path) -> Path | None:

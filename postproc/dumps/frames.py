@@ -121,7 +121,7 @@ class Dump(ABC):
         """Make the index unless `stream`."""
         self.path = path
         self.skip_truncated = skip_truncated
-        self._given = self._units = units
+        self._given = self._units = units.strip().lower()
         self.truncated = ""
         self.remarks: tuple[str, ...] = ()
         self._index: list[Entry] | None = None
@@ -154,7 +154,9 @@ class Dump(ABC):
     def _agreed_units(self, found: Sequence[Entry]) -> str:
         """The units of all frames; DumpError when two of them name different ones, or others than were given."""
         named = [entry for entry in found if entry.units]
-        units, source = (self._given, "the option units") if self._given or not named else (named[0].units, self._where(named[0]))
+        units, source = self._given, "the option units, or another dump of the run,"
+        if named and not units:
+            units, source = named[0].units, self._where(named[0])
         for entry in named:
             if entry.units != units:
                 raise DumpError(f"{self._where(entry)}: its units are {entry.units}, but {source} says {units}; all frames have the same")

@@ -46,9 +46,14 @@ class TypedDump(ABC, Generic[Frame]):
             warnings.warn(self._said[line], DumpWarning, stacklevel=4)
 
     @property
+    def units(self) -> str:
+        """The unit style of the file, "" when it names none and none was given; the frames are in SI."""
+        return self._dump.units
+
+    @property
     def times(self) -> Array:
         """The time of every frame in s, NaN where the file does not say it."""
-        return self._dump.times * unit_style(self._dump.units, str(self.path)).time
+        return self._dump.times * unit_style(self.units, str(self.path)).time
 
     @property
     def steps(self) -> NDArray[np.int64]:

@@ -186,9 +186,24 @@ def test_units_of_dumps_that_name_none_are_given(here, capsys):
     assert fields([frame(0), frame(1)], "--units", "cgs") == 0
     assert "mean diameter d = 0.2 mm" in capsys.readouterr().out
     assert fields(["ITEM: UNITS\nsi\n" + frame(0)], "--units", "cgs") == 2
-    assert "its units are si, but the option units says cgs" in capsys.readouterr().err
+    assert "its units are si, but the option units, or another dump of the run, says cgs" in capsys.readouterr().err
     assert fields([frame(0)], "--units", "lj") == 2
     assert "its units are lj, which have no size in SI" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("of_grains", "of_contacts"), [("cgs", ""), ("", "cgs"), ("cgs", "cgs"), ("cgs", "si")])
+def test_grains_and_contacts_of_a_run_have_the_same_units(here, capsys, of_grains, of_contacts):
+    head = "ITEM: UNITS\n{}\n"
+    code = fields([head.format(of_grains) * bool(of_grains) + frame(0)], contacts=[head.format(of_contacts) * bool(of_contacts) + pairs(0)])
+    said = capsys.readouterr()
+    if of_contacts == "si":
+        assert code == 2 and "its units are si, but the option units, or another dump of the run, says cgs" in said.err
+        return
+    assert code == 0 and "d = 0.2 mm" in said.out
+    with xarray.open_dataset("f.nc") as found:
+        volume = math.prod(float(np.diff(found[f"{axis}_bounds"].values[0])[0]) for axis in "xyz")
+        # -f l of the one contact: 1 dyn over 0.02 cm.
+        assert float(found.contact_stress[0].sel(i="x", j="x").sum()) * volume == pytest.approx(2e-9, rel=1e-9)
 
 
 @pytest.mark.parametrize("flags", ["ff ff ff", "pp ff ff"])
