@@ -24,7 +24,7 @@ def dembark(tmp_path: Path, environment: dict[str, str]) -> Dembark:
     """The command in a process of its own, in the test's folder."""
     def call(*words: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run([sys.executable, "-m", "dembark.validation.cli", *words], cwd=tmp_path, env=environment,
-                              capture_output=True, text=True, timeout=60, check=False)
+                              capture_output=True, text=True, timeout=300, check=False)
     return call
 
 
