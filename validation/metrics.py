@@ -66,8 +66,8 @@ def measure(folder: Path, wanted: int | None = None, early: Early | None = None)
     if not runs:
         raise RunError(f"nothing to measure in {folder}", "it has no finished replica-*/run.json")
     first, case = runs[0].record, find(runs[0].record["case"])
-    made_of = inputs.of_measurement(case, [one.folder / "run.json" for one in runs])
-    kept = measured.read(folder, made_of) or _measure(folder, case, runs, early, made_of)
+    inputs_hash = inputs.of_measurement(case, [one.folder / "run.json" for one in runs])
+    kept = measured.read(folder, inputs_hash) or _measure(folder, case, runs, early, inputs_hash)
     parameters = {key: value for key, value in first["parameters"].items() if key != "seed"}
     if wanted is not None and "replicas" in parameters:
         # Those of an earlier request for fewer or more are kept, and know its number.
@@ -81,7 +81,7 @@ def measure(folder: Path, wanted: int | None = None, early: Early | None = None)
         replicas_missing=tuple(number for number in range(1, (wanted or 0) + 1) if number not in numbers))
 
 
-def _measure(folder: Path, case: Case, runs: Sequence[Replica], early: Early, made_of: str) -> measured.Measured:
+def _measure(folder: Path, case: Case, runs: Sequence[Replica], early: Early, inputs_hash: str) -> measured.Measured:
     (folder / measured.FILE).unlink(missing_ok=True)
     fields = ""
     with analysis.warnings_kept() as warnings:
@@ -93,7 +93,7 @@ def _measure(folder: Path, case: Case, runs: Sequence[Replica], early: Early, ma
             fields = figures.FILE
             labelled.write(folder / fields, found.fields)
     noted = replace(found, remarks=[*found.remarks, *dict.fromkeys([*early.warnings, *warnings])], fields=None)
-    return measured.write(folder, measured.Measured(made_of, noted, provenance.measured(), fields))
+    return measured.write(folder, measured.Measured(inputs_hash, noted, provenance.measured(), fields))
 
 
 def picture(folder: Path) -> Mapping[str, Any] | None:

@@ -83,7 +83,7 @@ def dependencies(*roots: Path) -> Dependencies:
             elif place := module_file(module):
                 waiting.append((_label(place), place))
         waiting += [(f"{name.rpartition('/')[0]}/{word}".lstrip("/"), path.parent / word) for word in found.words
-                    if _is_beside(path.parent, word)]
+                    if _is_file_of(path.parent, word)]
     return Dependencies(files, frozenset(libraries - sys.stdlib_module_names))
 
 
@@ -164,7 +164,7 @@ def _label(path: Path) -> str:
     return path.name
 
 
-def _is_beside(folder: Path, word: str) -> bool:
+def _is_file_of(folder: Path, word: str) -> bool:
     return 0 < len(word) < 100 and "." in word and "/" not in word and "\0" not in word and (folder / word).is_file()
 
 

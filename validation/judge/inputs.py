@@ -1,7 +1,7 @@
-"""What results are made of, each as one hash: it stands in the result's own file, and the result is up to date while it is the same.
+"""The inputs of results, as one hash each: it stands in the result's own file, and the result is up to date while it is the same.
 
-A measurement is made of the finished runs, what the case is compared with, and measure.py with the modules that it imports. Verdicts are
-made of the measurement and of what case.toml declares: tolerances, reasons, labels, kinds of evidence, controls.
+Inputs of a measurement are the finished runs, the references of the case, and measure.py with the modules that it imports. Inputs of
+verdicts are the measurement and the declarations of case.toml: tolerances, reasons, labels, kinds of evidence, controls.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from dembark.validation.case import deck, imports
 from dembark.validation.case.model import Case
 
 _HERE = Path(__file__).parent
-KEY = "made_of"
+KEY = "inputs_hash"
 # Of what `measured` keeps: another number measures everything anew.
 _FORMAT = 1
 
@@ -83,6 +83,6 @@ def stored(path: Path) -> str:
     return last.partition(f"<!-- {KEY} ")[2].partition(" ")[0]
 
 
-def stamp(text: str, made_of: str) -> str:
+def stamp(text: str, inputs_hash: str) -> str:
     """The report `text` with its hash, see `stored`."""
-    return f"{text.rstrip()}\n<!-- {KEY} {made_of} -->\n"
+    return f"{text.rstrip()}\n<!-- {KEY} {inputs_hash} -->\n"

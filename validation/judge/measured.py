@@ -19,10 +19,10 @@ _ESTIMATES = ("estimate", "reference")
 
 @dataclass(frozen=True)
 class Measured:
-    """A measurement without its fields, which are in the file `fields` if there are any; `made_of`: see `inputs`; `facts`: when it was
+    """A measurement without its fields, which are in the file `fields` if there are any; `inputs_hash`: see `inputs`; `facts`: when it was
     measured, and by which commit."""
 
-    made_of: str
+    inputs_hash: str
     found: Measurement
     facts: Mapping[str, Any]
     fields: str = ""
@@ -31,18 +31,18 @@ class Measured:
 def write(folder: Path, one: Measured) -> Measured:
     """Write it into the `folder` of the series; returns what `read` gives."""
     values = {name: _value_as_json(value) for name, value in one.found.values.items()}
-    write_json(folder / FILE, {KEY: one.made_of, "measured": dict(one.facts), "values": values, "profiles": list(one.found.profiles),
+    write_json(folder / FILE, {KEY: one.inputs_hash, "measured": dict(one.facts), "values": values, "profiles": list(one.found.profiles),
                                "remarks": list(one.found.remarks), "fields": one.fields})
-    return read(folder, one.made_of) or one
+    return read(folder, one.inputs_hash) or one
 
 
-def read(folder: Path, made_of: str) -> Measured | None:
-    """The measurement in `folder`; None when there is none that is made of `made_of`, or its fields are gone."""
+def read(folder: Path, inputs_hash: str) -> Measured | None:
+    """The measurement in `folder`; None when there is none of the inputs `inputs_hash`, or its fields are gone."""
     content = read_json(folder / FILE)
-    if content is None or content.get(KEY) != made_of or not (folder / content["fields"]).exists():
+    if content is None or content.get(KEY) != inputs_hash or not (folder / content["fields"]).exists():
         return None
     values = {name: _value(entry) for name, entry in content["values"].items()}
-    return Measured(made_of, Measurement(values, content["profiles"], content["remarks"]), content["measured"], content["fields"])
+    return Measured(inputs_hash, Measurement(values, content["profiles"], content["remarks"]), content["measured"], content["fields"])
 
 
 def _value_as_json(value: Value) -> dict[str, Any]:

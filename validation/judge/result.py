@@ -98,7 +98,7 @@ class Result:
 
     `profiles`: curves as `postproc.resampling.profile` makes them; `picture`: how to show the packing; `references`: cited works;
     `measured`: when and by which commit; `inputs`: hash of each replica's inputs; `replicas_missing`: numbers of those that did not finish;
-    `made_of`: hash of all that it is made of, see `inputs`.
+    `inputs_hash`: that of all its inputs, see `judge.inputs`.
     """
 
     case: str
@@ -117,7 +117,7 @@ class Result:
     measured: Mapping[str, Any] = field(default_factory=dict)
     inputs: tuple[str, ...] = ()
     replicas_missing: tuple[int, ...] = ()
-    made_of: str = ""
+    inputs_hash: str = ""
 
     def find(self, name: str) -> QuantityRecord | None:
         """The quantity of that name; None when there is none."""
@@ -136,7 +136,7 @@ class Comparison:
     cap: float = 0.10
     measured: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
-    made_of: str = ""
+    inputs_hash: str = ""
 
 
 def as_json(value: QuantityRecord | Result | Comparison) -> dict[str, Any]:

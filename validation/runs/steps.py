@@ -33,7 +33,7 @@ _REPORTING = ("validation/report", "validation/campaigns/report", "validation/ve
 class Step:
     """`call(*arguments)` makes `target`, after all runs and steps called `needs` have ended; `place` is its folder.
 
-    `inputs` gives the hash of what the target is to be made of; the target holds that of which it was made.
+    `inputs` gives the hash of the present inputs; the target holds that of the inputs that it was made from.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Step:
     arguments: tuple[Any, ...]
 
     def up_to_date(self) -> bool:
-        """Whether the target is there and made of what is there now."""
+        """Whether the target is there and was made from the present inputs."""
         return self.target.is_file() and inputs.stored(self.target) == self.inputs()
 
 
@@ -73,7 +73,7 @@ def steps(plan: Plan, results: Path) -> list[Step]:
 
 
 def of_series(folder: Path, runs: Iterable[Run]) -> str:
-    """What the results of a series are made of: measurement, verdicts and pictures of the finished ones of `runs`."""
+    """Hash of the inputs of a series' results: measurement, verdicts and pictures of the finished ones of `runs`."""
     runs = list(runs)
     case = runs[0].case
     records = [path for run in runs if finished((path := folder / run.folder_name / "run.json").parent, run)]
@@ -82,19 +82,19 @@ def of_series(folder: Path, runs: Iterable[Run]) -> str:
 
 
 def of_study(results: Path, planned: PlannedStudy) -> str:
-    """What a study is made of."""
+    """Hash of the inputs of a study."""
     case = planned.series[0].runs[0].case
     return inputs.digest(asdict(planned.study) | {"formal_order": planned.study.formal_order.text},
                          inputs.of_study(case, [results / one.place / METRICS for one in planned.series]))
 
 
 def of_comparison(metrics: Iterable[Path]) -> str:
-    """What a comparison of engines is made of."""
+    """Hash of the inputs of a comparison of engines."""
     return inputs.digest(inputs.of_code("validation/judge/compare.py"), [inputs.content(path) for path in metrics])
 
 
 def of_report(results: Path) -> str:
-    """What a report is made of: results, what was to be run, what the cases say of themselves, and the code that lays it out."""
+    """Hash of the inputs of a report: results, the list of runs, the files of the cases, and the code that lays it out."""
     read = (results / "runs.json", results / CAMPAIGN_FILE, *result_files(results))
     kept = {str(path.relative_to(results)): inputs.content(path) for path in read}
     cases = {path.parent.name: inputs.content(path) for path in files() if path.parent.name in {name.split("/")[0] for name in kept}}
@@ -140,7 +140,7 @@ def measure_series(folder: Path, runs: Iterable[Run], drawn: Future[list[str]] |
     if not done:
         retire(target)
         raise RunError(f"nothing to measure in {folder}", "none of its runs is finished")
-    made_of = of_series(folder, wanted.values())
+    inputs_hash = of_series(folder, wanted.values())
     target.unlink(missing_ok=True)
     with _told(f"{folder} could not be measured", lambda error: analysis.reasons(folder, error, done[0].case)):
         from dembark.validation.metrics import measure
@@ -149,38 +149,38 @@ def measure_series(folder: Path, runs: Iterable[Run], drawn: Future[list[str]] |
         with ThreadPoolExecutor(1) as beside:
             drawing = beside.submit(_drawn, folder, done, drawn)
             found = measure(folder, len(wanted), early)
-        return write(target, replace(found, remarks=(*found.remarks, *drawing.result()), made_of=made_of))
+        return write(target, replace(found, remarks=(*found.remarks, *drawing.result()), inputs_hash=inputs_hash))
 
 
 def _drawn(folder: Path, runs: Sequence[Run], drawn: Future[list[str]] | None) -> list[str]:
     """Remarks on the pictures of `runs`, which are drawn unless those in `folder` are of the same inputs."""
     record = folder / _DRAWN
-    made_of = inputs.of_pictures(runs[0].case, [folder / run.folder_name / "run.json" for run in runs])
+    inputs_hash = inputs.of_pictures(runs[0].case, [folder / run.folder_name / "run.json" for run in runs])
     kept = read_json(record) or {}
-    if drawn is None and kept.get(inputs.KEY) == made_of and all((folder / name).is_file() for name in kept["files"]):
+    if drawn is None and kept.get(inputs.KEY) == inputs_hash and all((folder / name).is_file() for name in kept["files"]):
         return list(kept["remarks"])
     record.unlink(missing_ok=True)
     remarks = drawn.result() if drawn else draw(folder)
     there = [name for name in (pictures.PICTURE, pictures.ANIMATION) if (folder / name).is_file()]
-    write_json(record, {inputs.KEY: made_of, "files": there, "remarks": remarks})
+    write_json(record, {inputs.KEY: inputs_hash, "files": there, "remarks": remarks})
     return remarks
 
 
 def measure_study(results: Path, planned: PlannedStudy) -> None:
     """Write `metrics.json` of a study from those of its variants; RunError when one of them is missing or the study fails."""
-    target, made_of = results / planned.place / METRICS, of_study(results, planned)
+    target, inputs_hash = results / planned.place / METRICS, of_study(results, planned)
     target.parent.mkdir(parents=True, exist_ok=True)
     target.unlink(missing_ok=True)
     with _told(f"{results / planned.place} could not be measured"):
         from dembark.validation.metrics import study
 
-        write(target, replace(study(planned.study, [results / one.place for one in planned.series]), made_of=made_of))
+        write(target, replace(study(planned.study, [results / one.place for one in planned.series]), inputs_hash=inputs_hash))
 
 
 def compare_engines(folder: Path, metrics: Sequence[Path]) -> None:
     """Write `folder/comparison.json` (folder = results/<profile>/<case>/<variant>) when two of `metrics` or more are there; an old one goes
     aside otherwise. RunError when the comparison fails."""
-    target, made_of = folder / COMPARISON, of_comparison(metrics)
+    target, inputs_hash = folder / COMPARISON, of_comparison(metrics)
     if sum(path.is_file() for path in metrics) < 2:
         retire(target)
         return
@@ -188,13 +188,13 @@ def compare_engines(folder: Path, metrics: Sequence[Path]) -> None:
     with _told(f"{folder} could not be compared"):
         from dembark.validation.judge.compare import compare
 
-        write(target, replace(compare(folder), measured=provenance.measured(), made_of=made_of))
+        write(target, replace(compare(folder), measured=provenance.measured(), inputs_hash=inputs_hash))
 
 
 def build_report(results: Path) -> None:
     """Write report.html and report.pdf into `results` (results/<profile> or a campaign's folder); RunError when that fails."""
     build: Callable[[Path], Path]
-    made_of = of_report(results)
+    inputs_hash = of_report(results)
     if (results / CAMPAIGN_FILE).is_file():
         from dembark.validation.campaigns.report.build import build
     else:
@@ -208,4 +208,4 @@ def build_report(results: Path) -> None:
     report.unlink(missing_ok=True)
     with _told(f"the report of {results} could not be built"):
         build(results)
-        write_whole(report, inputs.stamp(report.read_text(encoding="utf-8"), made_of).encode())
+        write_whole(report, inputs.stamp(report.read_text(encoding="utf-8"), inputs_hash).encode())

@@ -10,7 +10,7 @@ from dembark.validation.case import imports
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder of modules beside those of the package: a chain of two, a package of modules, one that nothing imports."""
+    """Further modules of the package: a chain of two, a package of modules, one that nothing imports."""
     root = tmp_path / "package"
     (root / "tools").mkdir(parents=True)
     for name, text in {"one.py": "from dembark.two import x\n", "two.py": "import numpy\nx = 1\n", "other.py": "",

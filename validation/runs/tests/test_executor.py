@@ -125,13 +125,13 @@ def test_steps_are_made_again_when_what_they_read_has_changed(tmp_path: Path) ->
     assert made() == {"b"}
     source.write_text("2")
     assert made() == {"a", "b"}
-    (tmp_path / schema.FILE).unlink()  # the files say what they were made of, not the store
+    (tmp_path / schema.FILE).unlink()  # the files hold the hashes of their inputs, not the store
     assert made() == set()
     (tmp_path / "a.json").write_text(json.dumps({KEY: "other"}))
     assert made() == {"a"}  # which was made as before, so that nothing follows from it
 
 
-def test_a_step_that_fails_stops_only_what_is_made_of_it(tmp_path: Path) -> None:
+def test_a_step_that_fails_stops_only_what_is_inputs_hash_it(tmp_path: Path) -> None:
     once = tmp_path / "once"
     steps = [step("bad", tmp_path, [], fail, "no number"), step("killed", tmp_path, ["bad"], die, once), step("good", tmp_path, ["killed"])]
     made, table = executor(tmp_path, Scripted(), [], steps)

@@ -81,7 +81,7 @@ def test_a_line_of_runs_may_give_an_engine_its_own_number_of_replicas(decks: Pat
     assert {one.runs[0].engine.name: len(one.runs) for one in of_profile("standard")} == {"liggghts": 3, "yade": 1}
 
 
-def test_a_study_is_made_of_its_variants_and_again_when_one_of_them_changes(tmp_path: Path, environment: dict[str, str],
+def test_a_study_is_inputs_hash_its_variants_and_again_when_one_of_them_changes(tmp_path: Path, environment: dict[str, str],
                                                                             decks: Path) -> None:
     path = decks / "box" / "case.toml"
     path.write_text(path.read_text().replace("[runs]\n", STUDY).replace(

@@ -1,4 +1,4 @@
-"""Each result says of what it was made: what changes is made anew, with all that follows from it, and nothing else is."""
+"""Each result holds the hash of its inputs: when they change it is made anew, with all that follows from it, and nothing else is."""
 
 from __future__ import annotations
 
@@ -173,7 +173,7 @@ MADE = [
 ]
 
 
-def test_what_a_run_is_made_of_runs_anew(chain: Chain, box: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_run_is_inputs_hash_runs_anew(chain: Chain, box: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for file, before, after in MADE:
         (box / file).touch()
         edit(box / file, before, after)
@@ -195,11 +195,11 @@ def test_a_reference_that_the_set_up_reads_is_an_input_of_the_run(box: Path, tmp
 
 def test_a_result_that_is_lost_or_damaged_is_made_anew_when_it_is_needed(chain: Chain, box: Path) -> None:
     (path,) = chain.results.glob("box/dry/*/metrics.json")
-    for damage in (path.unlink, lambda: path.write_text("{"), lambda: edit(path, '"made_of"', '"made"')):
+    for damage in (path.unlink, lambda: path.write_text("{"), lambda: edit(path, '"inputs_hash"', '"made"')):
         damage()
         assert chain() == (0, 0, True)
     kept = path.with_name("measurement.json")
-    damages = (kept.unlink, lambda: kept.write_text('{"made_of"'), lambda: kept.write_text('{"made_of": 1}'))
+    damages = (kept.unlink, lambda: kept.write_text('{"inputs_hash"'), lambda: kept.write_text('{"inputs_hash": 1}'))
     for number, damage in enumerate(damages, start=1):
         damage()
         assert chain() == (0, 0, False)
@@ -241,4 +241,4 @@ def test_a_report_is_built_anew_when_a_verdict_changes_and_kept_otherwise(
     times = [one[0] for one in facts]
     assert times[0] == times[1] < times[2] == times[3]
     assert [one[1:] for one in facts] == [(False, 1, "x"), (False, 0, "x"), (True, 0, "x"), (True, 0, "x")]
-    assert read_json(tmp_path / "results/quick/box/dry/liggghts/metrics.json")["made_of"]
+    assert read_json(tmp_path / "results/quick/box/dry/liggghts/metrics.json")["inputs_hash"]
