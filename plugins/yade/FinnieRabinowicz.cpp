@@ -159,8 +159,7 @@ void Ip2::check(const FrictMat& material) {
 	const std::string name = "material " + std::to_string(material.id) + (material.label.empty() ? "" : " '" + material.label + "'");
 	if (typeid(material) != typeid(FrictMat))
 		fail(name + " is a " + material.getClassName() +
-		     ", of which this law knows no more than young and poisson; give the body a FrictMat, and " + ip2 +
-		     "... what the pair has");
+		     ", of which this law knows no more than young and poisson; use a FrictMat, and the attributes of the Ip2 functor");
 	if (material.id < 0) return;  // of a single body: nothing says which one it was before
 	const std::lock_guard<std::mutex> lock(guard);
 	if (frictionAngles.size() <= std::size_t(material.id)) frictionAngles.resize(material.id + 1, NaN);
@@ -227,7 +226,7 @@ void Ip2::go(const shared_ptr<Material>& material1, const shared_ptr<Material>& 
 }
 
 void Law2::postLoad(Law2&) {
-	static std::atomic<long> revisions{0};
+	static std::atomic<long> revisions{1};  // that of a law without a word is 1
 
 	std::vector<std::string> models = ::dembark::capillary::model_names();
 	models.insert(models.begin(), "none");

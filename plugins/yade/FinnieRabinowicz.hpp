@@ -205,7 +205,7 @@ private:
 	bool                        wet     = false;
 	::dembark::capillary::Model model   = ::dembark::capillary::Model::exact;
 	bool                        damped = true, limited = false;
-	std::atomic<double>         revision{0};
+	std::atomic<double>         revision{-1.0};
 	std::atomic<bool>           warned{false};
 	std::atomic<long>           checked{-1};  // last step of checkScene()
 	dembark_yade::LawKinds      kinds;        // of this revision

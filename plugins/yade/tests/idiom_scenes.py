@@ -76,9 +76,7 @@ def friction_changed():
         O.bodies.append(utils.sphere((1.9 * R, 0, 0), R, material=O.materials[0]))
 
     def triaxial():
-        engine = ThreeDTriaxialEngine()
-        O.engines = [*O.engines[:3], engine, O.engines[3]]
-        engine.setContactProperties(20.0)
+        ThreeDTriaxialEngine().setContactProperties(20.0)
 
     found = {}
     for loop in LOOPS:
@@ -98,9 +96,8 @@ def _pulled(static, change=None, loop="stock"):
     """Shear over normal force of a sphere that is drawn along far enough to slip."""
     pressed(loop, pair=dict(staticFriction=static, kineticFriction=static))
     O.bodies[1].state.blockedDOFs = "xyzXYZ"
-    O.bodies[0].state.blockedDOFs = "yzXYZ"
+    O.bodies[0].state.blockedDOFs = "xyzYZ"  # two bodies that are held exert no force
     O.bodies[1].state.vel = Vector3(0.5, 0, 0)
-    O.bodies[0].state.mass = 1e3
     advance(20)
     if change:
         change()
@@ -185,8 +182,7 @@ def time_step():
 
 def grown_later():
     """A column in which bodies come and grow while it runs, larger than all before, on both loops, dry and with bridges: the largest
-    overlap over the radius that any pair of spheres or a sphere and the floor has in the end, and whether every pair that overlaps has a
-    contact."""
+    overlap over the radius, and how many pairs that overlap have no contact."""
     found = {}
     for loop in LOOPS:
         for wet in (False, True):
@@ -203,56 +199,60 @@ def grown_later():
                     factory = BoxFactory(maxParticles=3, extents=(6 * R, 6 * R, R), center=(0, 0, 25 * R), rMin=3 * R, rMax=4 * R, vMin=1,
                                          vMax=1, vAngle=0, normal=(0, 0, -1), massFlowRate=10, materialId=0, stopIfFailed=False)
                     O.engines = [*O.engines[:-1], factory, O.engines[-1]]
-                elif how == "grow one":
-                    for _ in range(30):
-                        utils.growParticle(1, 1.05)
-                        O.run(20, True)
-                elif how == "grow all":
-                    for _ in range(30):
-                        utils.growParticles(1.05)
-                        O.run(20, True)
-                else:
-                    O.bodies[2].shape.radius *= 3
-                    O.bodies[2].state.mass *= 27
-                    O.bodies[2].state.inertia *= 243
-                O.run(3000, True)
-                found[f"{loop} {'wet' if wet else 'dry'} {how}"] = _overlaps()
+                worst = {"deepest": 0.0, "missing": 0, "touching": 0}
+                for _ in range(60):
+                    if how == "grow one":
+                        utils.growParticle(1, 1.01)
+                    elif how == "grow all":
+                        utils.growParticles(1.01)
+                    elif how == "radius":
+                        O.bodies[2].shape.radius *= 1.01
+                        O.bodies[2].state.mass *= 1.01**3
+                        O.bodies[2].state.inertia *= 1.01**5
+                    O.run(50, True)
+                    worst = {name: max(worst[name], value) for name, value in _overlaps().items()}
+                found[f"{loop} {'wet' if wet else 'dry'} {how}"] = worst | {"count": len(O.bodies) - 1}
+    return found
+
+
+def grown_on_facets():
+    """The same on a floor of facets, by the functor of YADE and by FacetSurface."""
+    found = {}
+    corners = [(-1, -1, 0), (1, -1, 0), (0, 1, 0)]
+    for floor in ("facet", "surface"):
+        pressed("short", [utils.facet(corners), *(utils.sphere((0.1 * R * (k % 2), 0, (1 + 2.1 * k) * R), R) for k in range(3))],
+                gravity=(0, 0, -9.81))
+        O.dt = 1e-5
+        surface = FacetSurface()
+        below = Ig2_FacetSurface_Sphere_ScGeom(surface=surface) if floor == "surface" else Ig2_Facet_Sphere_ScGeom()
+        reset, collider, loop, newton = O.engines
+        collider.boundDispatcher.functors = [Bo1_Sphere_Aabb(), Bo1_Facet_Aabb()]
+        loop.geomDispatcher.functors = [Ig2_Sphere_Sphere_ScGeom(), below]
+        O.engines = [reset, collider, *([surface] if floor == "surface" else []), loop, newton]
+        worst = {"deepest": 0.0, "missing": 0, "touching": 0}
+        for n in range(60):
+            if n == 5:
+                O.bodies.append(utils.sphere((12 * R, 0, 10.1 * R), 10 * R))
+            utils.growParticle(1, 1.01)
+            O.run(50, True)
+            worst = {name: max(worst[name], value) for name, value in _overlaps().items()}
+        found[floor] = worst | {"count": len(O.bodies) - 1}
     return found
 
 
 def _overlaps():
     balls = [body for body in O.bodies if isinstance(body.shape, Sphere)]
-    deepest, missing = 0.0, 0
+    deepest, missing, touching = 0.0, 0, 0
     for k, one in enumerate(balls):
         gaps = [(0, one.shape.radius - one.state.pos[2], one.shape.radius)]
         gaps += [(two.id, one.shape.radius + two.shape.radius - (one.state.pos - two.state.pos).norm(),
                   min(one.shape.radius, two.shape.radius)) for two in balls[k + 1:]]
         for other, depth, radius in gaps:
             deepest = max(deepest, depth / radius)
-            # The step in which a contact begins is the one after that in which bodies meet.
-            missing += depth > 1e-3 * radius and not (O.interactions.has(other, one.id, True))
-    return {"deepest": deepest, "missing": missing, "count": len(balls)}
-
-
-def cohesion_of_a_grown_grain():
-    """A bridge between two spheres of which one grows: force over that of a bridge between spheres of the new size, at the same gap."""
-    forces = []
-    for grown in (True, False):
-        wet = dict(bridgeVolume=2e-11, surfaceTension=0.072, contactAngle=0.35)
-        radius = R if grown else 1.5 * R
-        pressed(bodies=[utils.sphere((0, 0, 0), radius, fixed=True), utils.sphere((0, 0, 1.999 * radius), radius)], pair=wet,
-                law=dict(capillaryModel="exact"))
-        O.bodies[1].state.blockedDOFs = "xyzXYZ"
-        O.bodies[0].state.blockedDOFs = ""
-        O.bodies[0].state.mass = 1e6
-        advance(2)
-        for body in O.bodies:
-            body.shape.radius = 1.5 * R
-        O.bodies[1].state.pos = Vector3(0, 0, 3.01 * R)
-        advance(2)
-        contact = O.interactions[0, 1].phys
-        forces.append([contact.capillaryForce, contact.ruptureDistance])
-    return forces
+            touching += depth > 0.0
+            # A contact begins in the step after the one in which bodies meet.
+            missing += depth > 1e-2 * radius and not O.interactions.has(other, one.id, True)
+    return {"deepest": deepest, "missing": missing, "touching": touching}
 
 
 def released():

@@ -40,7 +40,7 @@ def _changed(known, pair, value):
     """A MatchMaker with `value` for `pair`, or for all."""
     if pair is None:
         return MatchMaker(algo="val", val=value)
-    others = [each for each in (known.matches if known else ()) if tuple(sorted(map(int, each[:2]))) != pair]
+    others = [tuple(each) for each in (known.matches if known else ()) if tuple(sorted((int(each[0]), int(each[1])))) != pair]
     if known is None:
         return MatchMaker(matches=[(*pair, value)])
     return MatchMaker(matches=[*others, (*pair, value)], algo=known.algo, val=known.val)
