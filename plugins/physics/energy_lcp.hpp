@@ -234,7 +234,7 @@ class LcpSolver {
   LcpResult result_;
   lcp::Islands islands_;
   std::vector<int> order_;  ///< the unknowns, island after island; so do the next three go
-  Eigen::ArrayXd q_, z_;     ///< over 2^exponent_
+  Eigen::ArrayXd q_, z_;    ///< over 2^exponent_
   int exponent_ = 0;
   std::vector<char> active_;
   lcp::Unknowns unknowns_;  ///< of one island

@@ -1,4 +1,4 @@
-// Contacts in packs beside contact_step, on random pairs and on degenerate ones.
+// Contacts in packs compared with contact_step, on random pairs and on degenerate ones.
 #include <cmath>
 #include <random>
 #include <vector>
@@ -137,10 +137,6 @@ struct Scene : ScalarLaws, ScalarMemory {
     PairBlock block;
     loops.lists(s, block);
   }
-};
-
-struct Sizes {
-  double force = 0.0, torque = 0.0;
 };
 
 /// Compares packs with contact_step over some steps of grains that drift; returns how many pairs acted.
