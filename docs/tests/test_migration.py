@@ -43,3 +43,61 @@ def test_the_capillary_force_of_viscelcapmat_ends_where_the_spheres_overlap(tmp_
     before, apart, after = map(float, found.groups())
     assert before == after == pytest.approx(-5e-7, rel=1e-3), "the spring alone"
     assert 0.5 < apart / (2.0 * math.pi * 0.0025 * 0.072) < 1.0
+
+
+BOUNCE = """
+units si
+atom_style sphere
+atom_modify map array
+boundary f f f
+comm_modify vel yes
+region domain block -1 3 -1 1 -1 1 units box
+create_box 1 domain
+create_atoms 1 single 0 0 0 units box
+create_atoms 1 single 0.7501 0 0 units box
+group second id 2
+set group all diameter 0.75 density 1
+velocity second set -2 0 0 units box
+neighbor 0.1 bin
+{style}
+fix move all nve/sphere
+timestep 1e-5
+run {steps}
+variable apart equal vx[2]-vx[1]
+variable e equal v_apart/2
+print "returned $(v_e:%.6f)"
+"""
+MATERIAL = "pair_style granular\npair_coeff * * hertz/material 1e5 {} 0.3 tangential linear_nohistory 0 0 damping {}"
+OURS = ("pair_style dembark/granular {}\npair_coeff * * youngs_modulus {} poissons_ratio 0.3 restitution {} static_friction 0 "
+        "kinetic_friction 0 critical_slip_distance 0")
+
+
+def test_restitution_of_the_models_of_lammps(tmp_path: Path) -> None:
+    """What the page gives for `tsuji`, `coeff_restitution`, `gran/hertz` and `gran/hooke` is what their grains do, and ours with it."""
+    try:
+        lammps = engines.find("lammps")
+    except DembarkError as error:
+        pytest.skip(str(error))
+    page = (Path(__file__).parents[1] / "migration.md").read_text(encoding="utf-8")
+    heads = ("| `hertz/material E e ν … damping", "| `restitution` |")
+    tsuji = dict(zip(*(re.findall(r"0\.\d+", line) for line in page.splitlines() if line.startswith(heads)), strict=True))
+    (block,) = re.findall(r"```python\n(import numpy as np\nfrom scipy.*?)```", page, re.DOTALL)
+    functions: dict[str, object] = {}
+    exec(block, functions)
+    mass, stiffness = math.pi / 6 * 0.75**3, 4000
+    hertz = functions["restitution_hertz"](stiffness, 100, 0.1875, mass / 2, 2)
+    hooke = functions["restitution_hooke"](2000, 50, mass / 2)
+    youngs = functions["youngs_modulus_hooke"](2000, 0.1875, mass / 2, 1)
+    pairs = [(MATERIAL.format(e, "tsuji"), OURS.format("", 1e5, found), float(found)) for e, found in tsuji.items()]
+    pairs += [(MATERIAL.format(e, "coeff_restitution"), OURS.format("", 1e5, e), e) for e in (0.1, 0.5, 0.9)]
+    stock = "pair_style gran/{}/history {} NULL {} NULL 0 0\npair_coeff * *"
+    pairs += [(stock.format("hertz", stiffness, 100), OURS.format("", 1.5 * 0.91 * stiffness, hertz), hertz),
+              (stock.format("hooke", 2000, 50), OURS.format("normal hooke 1", youngs, hooke), hooke)]
+    script = tmp_path / "script.in"
+    script.write_text("clear\n".join(BOUNCE.format(style=style, steps=12000 if "granular\npair_coeff * * hertz" in pair[0] else 40000)
+                                     for pair in pairs for style in pair[:2]))
+    done = engines.call(lammps.command(script, {}), tmp_path, lammps.environment())
+    found = [float(number) for number in re.findall(r"^returned (\S+)$", done.stdout, re.MULTILINE)]
+    assert len(found) == 2 * len(pairs), done.stdout[-2000:]
+    for k, (stock, _, expected) in enumerate(pairs):
+        assert found[2 * k : 2 * k + 2] == [pytest.approx(expected, rel=0.01)] * 2, stock
