@@ -108,7 +108,7 @@ group grains type 1 2
 region floor"""
 
 
-def test_hybrid_asks_for_the_coefficients_of_its_own_pairs_only(tmp_path):
+def test_hybrid_needs_the_coefficients_of_its_own_pairs_only(tmp_path):
     """Type 3 belongs to another style; the wall, of type 1, takes the grains."""
     text = hybrid(bed(f"run {STEPS}"), "hybrid {} lj/cut 0.004").replace("region floor", FOREIGN, 1)
     for pair in ("* *", "1 2"):
@@ -117,6 +117,12 @@ def test_hybrid_asks_for_the_coefficients_of_its_own_pairs_only(tmp_path):
     assert (run(tmp_path, served)[-1][:, 18] != 0.0).any()
     for change, types in ((text, "types 1 and 3"), (served.replace("fix floor grains", "fix floor all"), "types 3 and 1")):
         assert_one_line(run_deck(tmp_path / types, change), "fix floor wall/dembark", types, "no dembark/granular")
+
+
+@pytest.mark.parametrize("words", ["energy/account", "integration/monitor speed 1 action report"])
+def test_what_knows_this_style_alone_refuses_hybrid_styles(tmp_path, words):
+    text = hybrid(bed("run 1"), "hybrid {}").replace("fix motion", f"fix more all {words}\nfix motion")
+    assert_one_line(run_deck(tmp_path, text), f"fix more {words.partition(' ')[0]}", "pair_style dembark/granular only")
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [
