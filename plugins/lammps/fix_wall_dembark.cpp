@@ -81,7 +81,6 @@ void FixWallDembark::init() {
   check_types();
   if (!motion_) return;
   if (const std::string wrong = motion_->step_error(update->dt); !wrong.empty()) fail(wrong);
-  if (update->whichflag == 2) fail("a wall with a motion is for 'run', not for 'minimize', whose steps take no time");
   // Displacements are from where the surface stands when the motion is run first; a restart file has the time of that.
   clock_.begin(update->atime, long(update->atimestep), long(update->ntimestep), update->dt);
   checked([&] { motion_->begin(clock_.begun); });
