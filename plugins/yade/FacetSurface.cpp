@@ -60,10 +60,11 @@ void FacetSurface::refresh() {
 			members.push_back({body->getId(), body.get(), {}, {}});
 		}
 		triangles.resize(members.size());
-		surface = ::dembark::SurfaceContacts(smoothAngle, precision);
+		surface      = ::dembark::SurfaceContacts(smoothAngle, precision);
 		Real largest = 0.0;
 		for (const auto& body : bodies)
-			if (const Sphere* sphere = body ? dynamic_cast<const Sphere*>(body->shape.get()) : nullptr) largest = std::max(largest, sphere->radius);
+			if (const Sphere* sphere = body ? dynamic_cast<const Sphere*>(body->shape.get()) : nullptr)
+				largest = std::max(largest, sphere->radius);
 		surface.expect(largest);
 	}
 	bool moved = changed;

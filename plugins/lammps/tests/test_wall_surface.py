@@ -40,7 +40,8 @@ def test_every_file_of_a_floor_is_the_floor(tmp_path):
     for number, (name, content) in enumerate(files.items()):
         (tmp_path / f"{number}.stl").write_bytes(content)
         wall = f"stl {number}.stl" if name != "plane" else "region floor"
-        decks.append(deck("region floor plane 0 0 0 0 0 1 units box\n" * (name == "plane") + f"fix wall all wall/dembark {wall} type 2", number))
+        region = "region floor plane 0 0 0 0 0 1 units box\n" * (name == "plane")
+        decks.append(deck(region + f"fix wall all wall/dembark {wall} type 2", number))
     done = run_deck(tmp_path, "clear\n".join(decks))
     assert done.code == 0, done.error or done.output[-2000:]
     forces = {name: np.array(read_dump(tmp_path / f"{number}.dump")[1])[..., 1:] for number, name in enumerate(files)}

@@ -1,4 +1,4 @@
-"""One and the same floor z = 0, |x|, |y| <= 20 mm, as STL files of CAD programs have it; files that are none. Plain Python, for YADE too."""
+"""One floor z = 0, |x|, |y| <= 20 mm, as STL files of CAD programs have it; files that are none. Plain Python, for YADE too."""
 
 import math
 import struct
@@ -18,7 +18,8 @@ def quad(x0, x1, y0, y1, z=0.0):
 def text(triangles, normal="0 0 1", form="%.9g"):
     lines = ["solid floor"]
     for triangle in triangles:
-        lines += [f"facet normal {normal}", "outer loop", *("vertex " + " ".join(form % c for c in p) for p in triangle), "endloop", "endfacet"]
+        corners = ["vertex " + " ".join(form % c for c in p) for p in triangle]
+        lines += [f"facet normal {normal}", "outer loop", *corners, "endloop", "endfacet"]
     return ("\n".join([*lines, "endsolid floor"]) + "\n").encode()
 
 
@@ -39,11 +40,11 @@ def files():
         "upside down": [plain[0], plain[1][::-1], plain[2][::-1], plain[3]],
         "given twice": plain + plain[:2],
         "given again in other orders": plain + turned,
-        "given again, 5 nm off": plain + [tuple((x + 5e-9, y, z - 5e-9) for x, y, z in t) for t in plain],
+        "given again, 5 nm off": [*plain, *(tuple((x + 5e-9, y, z - 5e-9) for x, y, z in t) for t in plain)],
         "a sheet 0.3 um below": plain + quad(-h, h, -h, h, -3e-7),
         "overlap": quad(-h, 1e-3, -h, h) + quad(-1e-3, h, -h, h),
-        "crossing bars": plain + quad(-h, h, -1e-3, 2e-3) + quad(-1e-3, 1e-3, -h, h),
-        "cut another way": plain + [((-h, -h, 0), (h, -h, 0), (-h, h, 0)), ((h, h, 0), (-h, h, 0), (h, -h, 0))],
+        "crossing bars": [*plain, *quad(-h, h, -1e-3, 2e-3), *quad(-1e-3, 1e-3, -h, h)],
+        "cut another way": [*plain, ((-h, -h, 0), (h, -h, 0), (-h, h, 0)), ((h, h, 0), (-h, h, 0), (h, -h, 0))],
         "without area": [*plain, ((0, -h, 0), (0, 0, 0), (0, h, 0)), ((0, 0, 0), (0, 0, 0), (h, h, 0))],
         "open by 20 nm": quad(-h, -1e-8, -h, h) + quad(1e-8, h, -h, h),
         "open by 2 um": quad(-h, -1e-6, -h, h) + quad(1e-6, h, -h, h),
@@ -56,7 +57,8 @@ def files():
         "binary": binary(plain), "binary, headed solid": binary(plain, b"solid of a CAD program", (math.nan,) * 3, 0xFFFF),
         "upper case": ascii_.upper(), "mixed case": ascii_.replace(b"facet", b"Facet").replace(b"vertex", b"VERTEX"),
         "CR LF": ascii_.replace(b"\n", b"\r\n"), "CR": ascii_.replace(b"\n", b"\r"), "tabs": ascii_.replace(b" ", b"\t"),
-        "end loop": ascii_.replace(b"endloop", b"end loop"), "normals of zero": text(plain, "0 0 0"), "normals nan": text(plain, "nan nan nan"),
+        "end loop": ascii_.replace(b"endloop", b"end loop"), "normals of zero": text(plain, "0 0 0"),
+        "normals nan": text(plain, "nan nan nan"),
         "odd name": ascii_.replace(b"solid floor", "solid K\u00f6rper (mm), facet normal".encode()),
         "no name": ascii_.replace(b" floor", b""), "digits": text(plain, form="%.9E"),
         "two solids": text(plain[:2]) + text(plain[2:]).replace(b"floor", b"other")}

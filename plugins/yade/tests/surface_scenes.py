@@ -153,11 +153,11 @@ def floor_forces(walls):
     grains = []
     for start, velocity in floors.PATHS:
         grain = utils.sphere((*start, floors.HEIGHT), floors.RADIUS, material=heavy)
-        grain.state.vel, grain.state.blockedDOFs = Vector3(*velocity, 0), "xyzXYZ"
+        grain.state.vel, grain.state.blockedDOFs = Vector3(*velocity, 0), "zXYZ"
         grains.append(O.bodies.append(grain))
     surface = FacetSurface()
     rows = []
-    builtins.look = lambda: rows.append([list(O.forces.f(k)) for k in grains])
+    builtins.look = lambda: rows.append([list(O.forces.f(k, sync=True)) for k in grains])
     O.dt = floors.STEP
     O.engines = [
         ForceResetter(), InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb(), Bo1_Facet_Aabb()], verletDist=1e-3), surface,
@@ -166,7 +166,8 @@ def floor_forces(walls):
                                                                     criticalSlipDistance=1e-5)],
                         [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz()]),
         PyRunner(iterPeriod=5, command="look()", initRun=True), NewtonIntegrator(damping=0)]
-    O.run(floors.STEPS, True)
+    for _ in range(floors.STEPS + 1):
+        O.step()
     return rows
 
 

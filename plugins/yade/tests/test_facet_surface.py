@@ -13,8 +13,8 @@ FORCE, SLIP, VOLUME, LOST, REAL, TOUCH = slice(0, 3), 6, 7, 8, 9, 10
 @pytest.fixture(scope="module")
 def found(yade):
     out = yade.folder / "surface.json"
-    done = yade(HERE / "surface_scenes.py", str(out), "flat", "bends", "corner", "moving", "periodic", "changes", "messages", "files", "refused",
-                "entering")
+    done = yade(HERE / "surface_scenes.py", str(out), "flat", "bends", "corner", "moving", "periodic", "changes", "messages",
+                "files", "refused", "entering")
     assert "scenes: finished" in done.stdout, (done.stdout + done.stderr)[-3000:]
     return json.loads(out.read_text())
 
@@ -77,7 +77,7 @@ def test_moving_facets_and_periodic_images(found):
 
 
 def test_facets_may_come_and_go(found):
-    """A facet across the patch is a contact of its own, one that lies below it is none; where the owner was erased, what is below carries."""
+    """A facet across the patch is a contact of its own, one below it is none; where the owner was erased, what is below carries."""
     (alone, one), (both, two), (after, _) = found["changes"]
     assert one == 1 and two == 2 and both == pytest.approx(alone, rel=1e-9) and after > 0.0
 
