@@ -112,6 +112,17 @@ def test_solids_of_a_text_file_are_groups(tmp_path):
 
 
 @pytest.mark.parametrize("binary", [False, True])
+def test_triangles_given_again_do_not_count_again(tmp_path, binary):
+    """In any order of their corners, and off by less than the precision of the engines: areas and stresses are those of the mesh."""
+    mesh = sphere_mesh(rings=4)
+    again = np.concatenate([mesh, np.roll(mesh, 1, axis=1), mesh[:, ::-1], mesh[:3] + 3e-7])
+    write_stl(tmp_path / "part.stl", again, binary)
+    write_stl(tmp_path / "plain.stl", mesh, binary)
+    plain = MeshWall.from_stl("side", tmp_path / "plain.stl", scale=1e-3)
+    np.testing.assert_array_equal(MeshWall.from_stl("side", tmp_path / "part.stl", scale=1e-3).triangles, plain.triangles)
+
+
+@pytest.mark.parametrize("binary", [False, True])
 @pytest.mark.parametrize("cut", [1, 20, 500])
 def test_cut_off_stl_is_refused_in_one_line(tmp_path, binary, cut):
     path = tmp_path / "part.stl"
