@@ -220,6 +220,25 @@ def test_contacts_across_a_border_that_their_dump_does_not_know_are_refused(here
     coarse_grain(chain, pair, Grid.around(chain, 0.01), width=0.01)
 
 
+STL = "solid base\n" + "".join(
+    "facet normal 0 0 1\nouter loop\n" + "".join(f"vertex {x} {y} 0\n" for x, y in corners) + "endloop\nendfacet\n"
+    for corners in (((0, 0), (1, 0), (1, 1)), ((0, 0), (1, 1), (0, 1)))) + "endsolid base\n"
+
+
+@pytest.mark.parametrize("wall", ["base:plane", "base:cylinder:radius=1", "base:mesh:file=base.stl"])
+@pytest.mark.parametrize("command", ["walls", "fields"])
+def test_frames_without_grains_are_frames(here, command, wall):
+    """The load of a wall is zero in them, and the mean of the fields counts them."""
+    (here / "base.stl").write_text(STL)
+    low = PLACES * [1, 1, 0] + [0, 0, 0.01]
+    frames = [frame(step, low[:count], RADII[:count], walls={"base": np.ones((count, 3))}) for step, count in enumerate((0, 4, 0, 4))]
+    (here / "g.dump").write_text("".join(frames))
+    more = {"walls": ["--patch", "0.5", "--out", "w.nc"], "fields": ["--grid", "9", "--width", "1d", "--out", "w.nc", "--grains", "g.vtkhdf"]}
+    assert main([command, "g.dump", "--wall", wall, *more[command]]) == 0
+    with xarray.open_dataset("w.nc", group="base") as found:
+        np.testing.assert_allclose(found.force.values, np.array([0, 4, 0, 4])[:, None] * np.ones(3))
+
+
 # --- what would not fit ---------------------------------------------------------------------------------------------------
 
 @pytest.fixture

@@ -137,6 +137,8 @@ def check_meshes(words: Iterable[WallWord], source: Source, frame: GrainFrame) -
 
     Returns the meshes that no grain feels yet, of which only the size was looked at.
     """
+    if not len(frame.radii):
+        return list(words)
     time, unfelt = source.time(frame), []
     for word in words:
         if not isinstance(word.wall, MeshWall):
