@@ -110,8 +110,8 @@ class SurfaceContacts {
     const double touch = touch_of(radius);
     if (is_alone(t, here, radius, touch)) return t;
     if (is_flat(triangles_[std::size_t(t)])) return -1;
-    const int beside = here.feature == 0 ? t : nearer_around(here.point, touch, {t, here}, centre, touch);
-    return beside != t ? beside : nearer_around(centre, here.distance, {t, here}, centre, touch);
+    const int next = here.feature == 0 ? t : nearer_around(here.point, touch, {t, here}, centre, touch);
+    return next != t ? next : nearer_around(centre, here.distance, {t, here}, centre, touch);
   }
 
   /// The triangle that a sphere's contact with triangle t is on now.
@@ -163,12 +163,12 @@ class SurfaceContacts {
       near(middle, std::sqrt(size * size + usual_ * usual_), [&](int k) {
         if (std::size_t(k) == t) return true;
         const Vec3<double>* const other = triangles_[std::size_t(k)].node;
-        bool beside = apart(other, normal, usual_);
-        for (int e = 0; e < 3 && !beside; ++e)
-          beside =
+        bool separate = apart(other, normal, usual_);
+        for (int e = 0; e < 3 && !separate; ++e)
+          separate =
               apart(other, cross(n[(e + 1) % 3] - n[e], normal), 0.0) || apart(other, cross(other[(e + 1) % 3] - other[e], normal), 0.0);
         // Among many small triangles it is not worth its time.
-        return clear = beside && ++seen < most_around;
+        return clear = separate && ++seen < most_around;
       });
       clear_[t] = clear;
     }
@@ -193,9 +193,9 @@ class SurfaceContacts {
     const double same = cosine_ * far.at.distance;
     if (smooth_ && dot(far.at.arm, close.at.arm) >= same * close.at.distance) return true;
     const Triangle &t = triangles_[std::size_t(far.triangle)], &other = triangles_[std::size_t(close.triangle)];
-    const ClosestPoint beside = closest_point(other, far.at.point);
-    if (beside.distance <= touch) return true;
-    const Vec3<double> to = centre - beside.point;
+    const ClosestPoint there = closest_point(other, far.at.point);
+    if (there.distance <= touch) return true;
+    const Vec3<double> to = centre - there.point;
     if (smooth_ && dot(far.at.arm, to) >= same * norm(to)) {
       // From there to its closest point the other triangle comes nearer. Where that way leaves the smooth angle:
       const Vec3<double> way = close.at.arm - to;

@@ -90,7 +90,7 @@ class TriangleCells {
   std::size_t index(int x, int y, int z) const { return (std::size_t(z) * count_[1] + y) * count_[0] + x; }
   int at(double place, int axis) const { return std::clamp(int(place * inverse_), 0, count_[axis] - 1); }
 
-  /// Calls visit(cell) for each cell that meets the triangle's box and its plane; none for a triangle without area.
+  /// Calls visit(cell) for each cell in the triangle's box through which its plane passes; none for a triangle without area.
   template <class Visit>
   void each_cell(const Triangle& t, Visit visit) const {
     if (is_flat(t)) return;
