@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rig.cloud import DECK, cloud, deviation
-from rig.liggghts_driver import deck, motion, read_dump, run_deck
-from rig.scenarios import DRY, SPRING, Grain, Scenario
+from rig.liggghts_driver import deck, head, motion, properties, read_dump, run_deck
+from rig.scenarios import DRY, SPRING, Grain, Material, Scenario
 from rig.walls import FLOOR, on_mesh
 
 G, FRICTION = 9.81, 0.05
@@ -113,3 +113,28 @@ def test_both_kinds_at_once_are_refused(tmp_path):
     case = Scenario(name="both", material=replace(DRY, **SPRING), grains=(Grain(),), wall=True, steps=10)
     done = run_deck(tmp_path, deck(case).replace("tangential finnie_rabinowicz", "tangential finnie_rabinowicz rolling_friction cdt"))
     assert done.code != 0 and "rolling_resistance and the model rolling_friction are both on" in done.error
+
+
+@pytest.mark.parametrize(("word", "faster"), [("cdt", "constant_torque"), ("epsd2", "elastic_plastic"), ("off", "")])
+def test_a_stock_model_that_leaves_the_packed_loop_says_so_once(tmp_path, word, faster):
+    done = run_deck(tmp_path, f"""\
+{head()}
+region domain block -0.03 0.03 -0.03 0.03 -0.03 0.03 units box
+create_box 2 domain
+create_atoms 1 single 0 0 0 units box
+set group all diameter 0.008 density 2500
+neighbor 0.0005 bin
+timestep 5e-6
+{properties(Material())}
+fix r1 all property/global coefficientRollingFriction peratomtypepair 2 0.1 0.1 0.1 0.1
+fix r2 all property/global coefficientRollingViscousDamping peratomtypepair 2 0.1 0.1 0.1 0.1
+pair_style gran model hertz tangential finnie_rabinowicz rolling_friction {word}
+pair_coeff * *
+fix motion all nve/sphere
+run 1
+run 1
+""")
+    assert done.code == 0, done.error or done.output[-1000:]
+    warnings = [line for line in done.output.splitlines() if "WARNING" in line and "rolling_friction" in line]
+    assert len(warnings) == (1 if faster else 0)
+    assert all(f"rolling_friction {word}" in line and f"'rolling_resistance {faster}'" in line for line in warnings)
