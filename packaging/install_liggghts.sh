@@ -47,7 +47,7 @@ for file in "$here"/plugins/liggghts/*_model_*.h "$here"/plugins/liggghts/{bridg
 done
 # What LIGGGHTS and LAMMPS both have.
 family=$here/plugins/lammps_family
-for file in "$here/plugins/liggghts/engine_fix.h" "$family"/{shared,liquid,energy_account,resume}_fix.{h,cpp}; do
+for file in "$here/plugins/liggghts/engine_fix.h" "$family"/{shared,liquid,energy_account,resume}_fix.{h,cpp} "$family"/{resume_record.cpp,shared_stl.h}; do
   copy "$file" "$src/$(basename "$file")"
 done
 # Liquid that grains and walls own.
@@ -63,7 +63,7 @@ for file in "$here"/plugins/liggghts/{pair_sph_coupled,pair_sph_options,fix_nve_
   copy "$file" "$src/$(basename "$file")"
 done
 # States to resume from.
-for file in "$here"/plugins/liggghts/{fix_resume_exact*,per_instance.h}; do
+for file in "$here"/plugins/liggghts/{fix_resume_exact*,exact_fixes.h,per_instance.h}; do
   copy "$file" "$src/$(basename "$file")"
 done
 # The fix for impacts of logs solves its equations with Eigen, a library of headers; without it LIGGGHTS would not compile any more.

@@ -24,8 +24,8 @@ comm_modify     vel yes
 region          domain block -0.01 0.02 -0.01 0.01 -0.0025 0.01 units box
 create_box      2 domain
 neighbor        0.001 bin
-create_atoms    1 single 0 0 0 units box
-create_atoms    1 single 0.004998 0 0 units box
+create_atoms    1 single 0 0 0.0025 units box
+create_atoms    1 single 0.004998 0 0.0025 units box
 set             group all density 2500 diameter 0.005
 group           wetted id 1
 """

@@ -156,6 +156,7 @@ void FixWallDembark::act_on(int i, bool advance) {
     reach = std::max(reach, slots[k + 1 + std::size_t(layout_.bridge_at()) + 1]);
   const Vec3 x = vector(atom->x[i]), centre = frame_.inside(x);
   const std::vector<dembark_lammps::WallContact>& contacts = surface_->contacts(centre, atom->radius[i], reach);
+  if (contacts.empty() && slots.empty()) return;
   before_ = slots;
   if (advance) slots.clear();
   // Until the end of the step the liquid holds on to where bridges stand.

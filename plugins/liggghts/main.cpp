@@ -81,7 +81,8 @@ void enter_styles(LAMMPS_NS::LAMMPS& host) {
   (*host.force->pair_map)["sph/coupled"] = [](LAMMPS_NS::LAMMPS* owner) -> LAMMPS_NS::Pair* {
     return new LAMMPS_NS::PairSphCoupled(owner);
   };
-  auto& run = dembark_liggghts::commands(*host.input)["run"];
+  auto& commands = dembark_liggghts::commands(*host.input);
+  auto& run = commands["run"];
   if (run != &run_and_keep_histories) stock_run = std::exchange(run, &run_and_keep_histories);
   dembark_liggghts::commands(*host.input)["resume_state"] = [](LAMMPS_NS::LAMMPS* owner, int narg, char** arg) {
     LAMMPS_NS::ResumeState(owner).command(narg, arg);

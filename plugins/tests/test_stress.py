@@ -67,7 +67,9 @@ def assert_goes_on(driver: ModuleType, deck: Any, folder: Path, scene: Scene, fo
     elif "exactly" in done.output:
         assert (again / "grains.dump").read_bytes() == (found.run.folder / "grains.dump").read_bytes(), scene
     else:
-        assert "approximately" in done.output and scene.entering in INSERTED, f"{scene}: {done.output[-2000:]}"
+        # How far LIGGGHTS looks for bridges follows from the liquid that grains have when a run begins.
+        liquid_moves = scene.carried and driver is liggghts_driver
+        assert "approximately" in done.output and (scene.entering in INSERTED or liquid_moves), f"{scene}: {done.output[-2000:]}"
 
 
 def assert_same_on_two_ranks(one: Found, two: Found, scene: Scene) -> None:

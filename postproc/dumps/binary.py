@@ -17,8 +17,8 @@ from dembark.postproc.dumps.source import Handle, Source
 _START, _TILT, _END = struct.Struct("=qqi6i6d"), struct.Struct("=3d"), struct.Struct("=2i")
 _BLOCK = struct.Struct("=i")
 _FACES = range(4)
-# Newer versions of LAMMPS begin with a name and its length, negative.
-_OF_LAMMPS = (b"DUMPCUSTOM", b"DUMPATOM")
+# Another format begins with a name and its length, negative.
+_FOREIGN = (b"DUMPCUSTOM", b"DUMPATOM")
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class BinaryDump(Dump):
     ) -> None:
         """Open; DumpError for a missing, foreign or truncated file, or when the columns are not as many as are in it."""
         self._source = Source(Path(path))
-        if any(self._source.begins_with(struct.pack("=q", -len(name)) + name) for name in _OF_LAMMPS):
-            raise DumpError(f"{path} is a binary dump of LAMMPS, of which only text dumps are read")
+        if any(self._source.begins_with(struct.pack("=q", -len(name)) + name) for name in _FOREIGN):
+            raise DumpError(f"{path} is a binary dump of a format that is not read; write a text dump")
         try:
             with self._source.at(0) as handle:
                 head = self._header(handle)

@@ -129,7 +129,7 @@ class FieldJob:
 
     @classmethod
     def plan(cls, words: Words, show: Show | None = None) -> FieldJob:
-        """Check everything the user wrote; DembarkError or DumpError before any work is done. `show` tells how far the reading is."""
+        """Check everything the user wrote; DembarkError or DumpError before any work is done. `show` reports how far the reading is."""
         files = (words.out, words.vtkhdf, words.grains)
         if not any((*files, words.plot)):
             raise DembarkError("there is nothing to write", "", "name a file with --out or --vtkhdf, or a folder with --plot")

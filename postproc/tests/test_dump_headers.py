@@ -247,7 +247,7 @@ TURNED = "ITEM: BOX BOUNDS abc origin pp pp pp\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n"
     (text(0).replace("pp pp pp", "pp pp"), "frame 1: header cannot be read"),
     (b"(\xb5/\xfd" + b"x" * 40, "is compressed by zstd; unpack it first"),
     (b"BZh9" + b"x" * 40, "is compressed by bzip2; unpack it first"),
-    (struct.pack("=q", -10) + b"DUMPCUSTOM" + b"x" * 99, "is a binary dump of LAMMPS, of which only text dumps are read"),
+    (struct.pack("=q", -10) + b"DUMPCUSTOM" + b"x" * 99, "is a binary dump of a format that is not read; write a text dump"),
     (text(0).replace("\n2 ", "\n\n2 "), "more than its 3 lines"),
 ])
 def test_a_header_that_cannot_be_served_gets_one_line(tmp_path, data, message):

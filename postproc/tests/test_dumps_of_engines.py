@@ -133,7 +133,7 @@ def test_whatever_lammps_dumps_the_places_are_the_same(cgs, pattern):
 
 
 def test_a_binary_dump_of_lammps_is_refused_by_name(cgs):
-    with pytest.raises(DumpError, match="is a binary dump of LAMMPS, of which only text dumps are read"):
+    with pytest.raises(DumpError, match="is a binary dump of a format that is not read; write a text dump"):
         GrainsDump(cgs / "binary.bin")
 
 

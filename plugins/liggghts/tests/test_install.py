@@ -91,7 +91,8 @@ def test_wrong_folders(tmp_path):
 
 def test_lines_that_are_no_cpp17_are_mended_once(tmp_path):
     source = stand_in(tmp_path / "src")
-    (source / "utils.h").write_text("  // numbers\n  return static_cast< std::ostringstream & >(( std::ostringstream() << std::dec << a ) ).str();\n")
+    (source / "utils.h").write_text(
+        "  // numbers\n  return static_cast< std::ostringstream & >(( std::ostringstream() << std::dec << a ) ).str();\n")
     (source / "finish.cpp").write_text("  if (neighbor->lists[m]->numneigh > 0) {\n  if (neighbor->lists[m]->inum > 0)\n")
     done = install(source)
     assert done.returncode == 0 and done.stdout.count("mended") == 2, done.stderr

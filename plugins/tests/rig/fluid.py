@@ -177,7 +177,7 @@ def deck(scene: Scene, steps: int, *, ranks: int = 1, style: str = "hybrid granu
 def resumed(text: str, types: int) -> str:
     """The deck `text` from the newest state on, with groups of `types` types."""
     groups = "".join(f"group g{number} type {number}\n" for number in range(1, types + 1))
-    return (text[:text.index("region domain")] + "resume_state state\nneighbor 0.0052 bin\nneigh_modify delay 0 check yes\n" + groups
+    return (text[:text.index("region domain")] + "resume_state state\n" + text[text.index("neighbor "):text.index("create_atoms")] + groups
             + text[text.index("pair_style"):])
 
 

@@ -107,7 +107,8 @@ def _deck(scene: Scene, resumed: bool, *, head: str, styles: str, walls: str, la
         f"run {FIRST}", _create(second(scene), len(first(scene)) + 1),
         *(f"set atom {n} diameter {2.0 * GROWTH * grain.radius!r}\nset atom {n} density {DENSITY}"
           for n, grain in enumerate(first(scene), start=1) if scene.entering == "grown"), late])
-    append = "dump_modify grains append yes\n" if resumed else ""
+    dump = f"dump grains all custom {EVERY} grains.dump {columns}\ndump_modify grains sort id format {digits}\n"
+    before, after = ("", f"{dump}dump_modify grains append yes\n") if resumed else (dump, "")
     state = f"fix state all resume/exact {STATES} state cut grains.dump books.txt\n" if scene.resumed else ""
     books = liquid.replace("file books.txt", "append books.txt" if resumed else "file books.txt")
     return f"""\
@@ -122,10 +123,8 @@ timestep {STEP}
 fix weight all gravity {GRAVITY} vector 0 0 -1
 fix motion all nve/sphere
 {FIX}
-dump grains all custom {EVERY} grains.dump {columns}
-dump_modify grains sort id format {digits}
-{append}{THERMO}thermo {EVERY}
+{before}{THERMO}thermo {EVERY}
 {between}
-{enters}
+{after}{enters}
 {state}run {LAST} upto
 """
