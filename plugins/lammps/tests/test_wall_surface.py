@@ -80,7 +80,8 @@ ENTER = {
     "grown between runs": "create_atoms 1 single 0.001 0.002 0.0024 units box\nset group all diameter 0.002 density 2500\nrun 0\n"
                           "set group all diameter 0.005\n",
     "grown during a run": "create_atoms 1 single 0.001 0.002 0.0024 units box\nset group all diameter 0.001 density 2500\n"
-                          "pair_coeff 1 1 largest_radius 0.0026\nvariable d equal 0.001+0.0004*step\nfix grow all adapt 1 atom diameter v_d\nrun 10\nunfix grow\n",
+                          "pair_coeff 1 1 largest_radius 0.0026\n"
+                          "variable d equal 0.001+0.0004*step\nfix grow all adapt 1 atom diameter v_d\nrun 10\nunfix grow\n",
 }
 
 

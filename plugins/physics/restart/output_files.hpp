@@ -154,7 +154,7 @@ inline std::string keep_unappendable(const std::string& path, const std::vector<
   if (can_append(path) || !fs::is_regular_file(path) || fs::file_size(path) == 0) return "";
   const std::string kept = free_name(path + ".until-" + std::to_string(step));
   fs::rename(path, kept);
-  for (OutputFile file : known)
+  for (const OutputFile& file : known)
     if (file.path == path && !is_compressed(kept) && hash_before(kept, file.bytes) == file.hash) shorten(kept, file.bytes, step, false);
   return "nothing can be appended to file " + path + "; what was written up to step " + std::to_string(step) + " is in " + kept;
 }

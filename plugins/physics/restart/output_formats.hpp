@@ -196,9 +196,9 @@ inline End table_yaml(Lines file, long long step) {
     const std::vector<std::string> all = fields(line);
     if (rows && starts(line, "  - [")) {
       if (all.size() < 2 || !frames.add(integer(all[1].substr(1)), file.begin)) return {};
-    } else if (!rows && starts(line, "  ") && all.size() == 1 && all[0].back() == ':') {
-      if (!frames.add(integer(all[0].substr(0, all[0].size() - 1)), file.begin)) return {};
-    }
+    } else if (!rows && starts(line, "  ") && all.size() == 1 && all[0].back() == ':' &&
+               !frames.add(integer(all[0].substr(0, all[0].size() - 1)), file.begin))
+      return {};
   }
   return frames.any() ? End(frames.end(file.end, true)) : End();
 }
@@ -275,7 +275,7 @@ inline End table(Lines file, long long step) {
       continue;
     }
     const auto now = integer(row[0]);
-    if ((columns != 0 && row.size() != columns) || !frames.add(now, file.begin)) return {};
+    if (!now || (columns != 0 && row.size() != columns) || !frames.add(now, file.begin)) return {};
     columns = row.size();
     if (last >= 0 && distance == 0) distance = *now - last;
     if (last >= 0) regular = regular && *now - last == distance && *now % distance == 0;
@@ -292,7 +292,8 @@ inline FileEnd end_of_kept(const std::string& path, long long step) {
   using namespace formats;
   FileEnd end;
   Lines first(path);
-  if ((end.unread = first.failed())) return end;
+  end.unread = first.failed();
+  if (end.unread) return end;
   std::vector<End (*)(Lines, long long)> readers{table, blocks, long_correlation};
   while (first.next()) {
     const std::string line = first.line;

@@ -3,8 +3,10 @@
 
 #include <cinttypes>
 #include <cstdio>
+#include <initializer_list>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -62,13 +64,18 @@ struct RunRecord {
 /// Why a run is another one than that of the state, one reason an entry.
 inline std::vector<std::string> differences(const RunRecord& state, const RunRecord& run) {
   std::vector<std::string> all;
+  const auto add = [&all](std::initializer_list<std::string_view> words) {
+    std::string& reason = all.emplace_back();
+    for (const std::string_view word : words) reason += word;
+  };
   for (const auto& [name, value] : run.facts) {
     const std::string* const before = state.find(name);
-    if (!before) all.push_back(name + " (" + value + ") is not in the state");
-    else if (*before != value) all.push_back(value[0] == '#' ? name + " changed" : name + " was " + *before + ", and is " + value);
+    if (!before) add({name, " (", value, ") is not in the state"});
+    else if (*before != value && value[0] == '#') add({name, " changed"});
+    else if (*before != value) add({name, " was ", *before, ", and is ", value});
   }
   for (const auto& [name, value] : state.facts)
-    if (!run.find(name)) all.push_back(name + " (" + value + ") of the state is missing");
+    if (!run.find(name)) add({name, " (", value, ") of the state is missing"});
   return all;
 }
 
