@@ -149,7 +149,7 @@ def foreign_engines():
 
 
 def warned():
-    """Numerical damping and O.trackEnergy beside the law; what they say stands on stderr."""
+    """Numerical damping and O.trackEnergy with the law; the warnings are on stderr."""
     for damping, track in ((0.2, False), (0.0, True), (0.3, True)):
         pressed(damping=damping)
         O.trackEnergy = track

@@ -1,6 +1,5 @@
 """Runs inside YADE: `yade -n -x surface_scenes.py out.json`. Spheres on prescribed paths over walls made of facets."""
 
-import builtins
 import json
 import math
 import os
@@ -38,7 +37,7 @@ def scene(walls, joined=True, cell=0.0, **surface):
         ForceResetter(), InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb(), Bo1_Facet_Aabb()], verletDist=0), surface,
         InteractionLoop([Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom(), facets],
                         [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**PAIR)], [law]),
-        PyRunner(iterPeriod=1, command="look()", initRun=True), NewtonIntegrator(damping=0)]
+        NewtonIntegrator(damping=0)]
     return law, surface
 
 
@@ -48,16 +47,8 @@ def sum_of(contacts, name):
 
 def drag(walls, path, steps, joined=True, half=0, **surface):
     """Rows of one sphere on a path (place and velocity as functions of time); saved and loaded after `half` steps."""
-    _, joint = scene(walls, joined, **surface)
+    scene(walls, joined, **surface)
     rows = []
-
-    def look():
-        real = [i for i in O.interactions if i.isReal]
-        touch = [i for i in real if i.geom.penetrationDepth > 0]
-        rows.append([*O.forces.f(0), *O.forces.t(0), sum_of(real, "slip"), sum_of(real, "bridgeVolume"), sum_of(real, "dissipatedEnergy"),
-                     len(real), len(touch), *sum((i.phys.elasticDisplacement for i in real), Vector3(0, 0, 0))])
-
-    builtins.look = look
     for k in range(steps):
         place, velocity = path(k * STEP)
         if half and k == half:
@@ -67,8 +58,12 @@ def drag(walls, path, steps, joined=True, half=0, **surface):
         grain = O.bodies[0].state
         grain.pos, grain.vel, grain.angVel = Vector3(*place), Vector3(*velocity), Vector3(1, 2, 3)
         O.step()
+        real = [i for i in O.interactions if i.isReal]
+        touch = [i for i in real if i.geom.penetrationDepth > 0]
+        rows.append([*O.forces.f(0), *O.forces.t(0), sum_of(real, "slip"), sum_of(real, "bridgeVolume"), sum_of(real, "dissipatedEnergy"),
+                     len(real), len(touch), *sum((i.phys.elasticDisplacement for i in real), Vector3(0, 0, 0))])
     joint = O.engines[2]
-    return {"rows": rows[:steps], "handed": joint.handedOver, "lost": O.engines[3].lawDispatcher.functors[0].dissipatedEnergy()}
+    return {"rows": rows, "handed": joint.handedOver, "lost": O.engines[3].lawDispatcher.functors[0].dissipatedEnergy()}
 
 
 def facets(triangles, **options):
@@ -128,7 +123,6 @@ def periodic():
 def changes():
     """Facets that come and go during a run."""
     scene(facets(patch()))
-    builtins.look = lambda: None
     found = []
     grain = O.bodies[0].state
     for step in range(3):
@@ -156,8 +150,6 @@ def floor_forces(walls):
         grain.state.vel, grain.state.blockedDOFs = Vector3(*velocity, 0), "zXYZ"
         grains.append(O.bodies.append(grain))
     surface = FacetSurface()
-    rows = []
-    builtins.look = lambda: rows.append([list(O.forces.f(k, sync=True)) for k in grains])
     O.dt = floors.STEP
     O.engines = [
         ForceResetter(), InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb(), Bo1_Facet_Aabb()], verletDist=1e-3), surface,
@@ -165,9 +157,12 @@ def floor_forces(walls):
                         [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(restitution=1, staticFriction=0.5, kineticFriction=0.4,
                                                                     criticalSlipDistance=1e-5)],
                         [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz()]),
-        PyRunner(iterPeriod=5, command="look()", initRun=True), NewtonIntegrator(damping=0)]
-    for _ in range(floors.STEPS + 1):
+        NewtonIntegrator(damping=0)]
+    rows = []
+    for step in range(floors.STEPS + 1):
         O.step()
+        if step % 5 == 0:
+            rows.append([list(O.forces.f(k)) for k in grains])
     return rows
 
 
