@@ -19,6 +19,7 @@
 #include "signal_handling.h"
 
 #include "engine_access.h"
+#include "fix_adapt_at_once.h"
 #include "fix_capillary_liquid.h"
 #include "fix_energy_account.h"
 #include "fix_integration_monitor.h"
@@ -69,6 +70,8 @@ void enter_styles(LAMMPS_NS::LAMMPS& host) {
   LAMMPS_NS::ResumeState::file.forget(&host);
   dembark_liggghts::register_contact_models();
   auto& fixes = dembark_liggghts::fix_styles(*host.modify);
+  // In place of the stock style, of the same name.
+  fixes.at("adapt") = &create_fix<LAMMPS_NS::FixAdaptAtOnce>;
   fixes["capillary/liquid"] = &create_fix<LAMMPS_NS::FixCapillaryLiquid>;
   fixes["energy/account"] = &create_fix<LAMMPS_NS::FixEnergyAccount>;
   fixes["integration/monitor"] = &create_fix<LAMMPS_NS::FixIntegrationMonitor>;

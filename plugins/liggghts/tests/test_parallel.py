@@ -123,6 +123,16 @@ def test_grains_created_between_runs_leave_the_others_as_they_are(tmp_path, rank
     assert_same_contacts(contacts(tmp_path / "without"), contacts(tmp_path / "with"), 1e-12)
 
 
+@pytest.mark.parametrize("every", [1, 10])
+def test_grains_that_grow_are_as_large_across_a_border(tmp_path, every):
+    """Copies have the new radius in the same step, so that ranks and periods do not matter."""
+    grow = f"variable width equal 0.0045+5e-7*step\nfix grow all adapt {every} atom diameter v_width\n"
+    for ranks in (1, 2):
+        run(tmp_path / str(ranks), bed(f"{grow}run 1500", ranks=ranks), ranks)
+    assert_same_grains(last(tmp_path / "1"), last(tmp_path / "2"), 1e-9)
+    assert_same_contacts(contacts(tmp_path / "1"), contacts(tmp_path / "2"), 1e-8)
+
+
 @pytest.mark.parametrize("ranks", [(1, 1), (2, 2), (1, 2), (2, 1)])
 def test_restart_keeps_every_value(tmp_path, ranks):
     """read_restart, also on another number of ranks: what the pairs held at the last build of the lists comes back to the bit."""
