@@ -68,7 +68,6 @@ EXAMPLES = {
                                  swapped(LINEAR, 1, _WALLED.format("tan(radians(compFricDegree))"))),
     "triax-basic": Example("examples/test/triax-basic.py", 1000, swapped(LINEAR, 1, _WALLED.format("tan(radians(30))"))),
     "periodic-triax": Example("examples/PeriodicBoundaries/periodic-triax.py", 3000, swapped(LINEAR, 1, "tan(0.5)")),
-    "periodicSandPile": Example("examples/PeriodicBoundaries/periodicSandPile.py", 1500, swapped(LINEAR, 1, "tan(radians(30))")),
     "timeStepperUsage": Example("examples/timeStepperUsage.py", 1000, swapped(LINEAR, 1, "tan(0.5)")),
     "addToClump": Example("examples/clumps/addToClump-example.py", 20000, swapped(LINEAR, 1, "tan(1)")),
     "spheresFactory": Example("examples/spheresFactory.py", 4000, (
