@@ -65,8 +65,7 @@ def lammps(scene: Scene, *, ranks: int = 1, resumed: bool = False) -> str:
 processors {ranks} 1 1""", styles=f"""\
 pair_style dembark/granular {law}
 pair_coeff * * {coefficients}
-region floor plane 0 0 0 0 0 1 units box
-thermo_modify lost error""", walls=moved if not scene.late else "" if resumed else wall,
+region floor plane 0 0 0 0 0 1 units box""", walls=moved if not scene.late else "" if resumed else wall,
                  late=(moved if resumed else f"unfix floor\n{moved}") if scene.late else "",
                  liquid=liquid, columns=COLUMNS + " f_floor[1] f_floor[2] f_floor[3]", digits="float %.17g")
 
