@@ -74,9 +74,9 @@ def measure(folder: Path, wanted: int | None = None, early: Early | None = None)
         parameters["replicas"] = wanted
     numbers = {int(one.record["replica"]) for one in runs}
     return Result(
-        case.name, first["variant"], first["engine"], measuring.quantities(case, kept.found), first["profile"], parameters=parameters,
-        profiles=tuple(kept.found.profiles), remarks=_remarks(case, kept.found), picture=measuring.picture(case, first),
-        references=measuring.references(case), provenance=_provenance(runs), measured=kept.facts,
+        case.name, first["variant"], first["engine"], measuring.quantities(case, kept.found, first["variant"]), first["profile"],
+        parameters=parameters, profiles=tuple(kept.found.profiles), remarks=_remarks(case, kept.found),
+        picture=measuring.picture(case, first), references=measuring.references(case), provenance=_provenance(runs), measured=kept.facts,
         inputs=tuple(one.record["inputs"] for one in runs if "inputs" in one.record),
         replicas_missing=tuple(number for number in range(1, (wanted or 0) + 1) if number not in numbers))
 
@@ -118,9 +118,9 @@ def study(planned: Study, folders: Sequence[Path]) -> Result:
     first, case = points[0], find(points[0].case)
     found = measuring.study(case, planned, [as_json(point) for point in points])
     return Result(
-        case.name, planned.folder_name, first.engine, measuring.quantities(case, found), first.profile, planned.title, planned.description,
-        profiles=tuple(found.profiles), remarks=_remarks(case, found), references=measuring.references(case),
-        provenance={"variants": list(planned.variants)}, measured=provenance.measured())
+        case.name, planned.folder_name, first.engine, measuring.quantities(case, found, planned.folder_name), first.profile,
+        planned.title, planned.description, profiles=tuple(found.profiles), remarks=_remarks(case, found),
+        references=measuring.references(case), provenance={"variants": list(planned.variants)}, measured=provenance.measured())
 
 
 def worst(found: Sequence[Mapping[str, float]]) -> dict[str, float]:

@@ -124,11 +124,12 @@ def quantity_table(result: Result, width: int = 200) -> Table:
 
 
 def open_lines(result: Result) -> list[str]:
-    """Why quantities are open, failed without a number, or have little meaning: a line for each reason."""
+    """Why quantities are open, failed, or have little meaning, and what would decide them: a line for each reason."""
     reasons: dict[tuple[str, str], list[str]] = {}
     for one in result.quantities:
-        if one.verdict != "pass" and one.reason:
-            reasons.setdefault((one.standing, one.reason), []).append(one.title)
+        decided = f"decided by {one.decides}" if one.decides else ""
+        if one.verdict != "pass" and (reason := "; ".join(filter(None, (one.reason, one.cause, decided)))):
+            reasons.setdefault((one.standing, reason), []).append(one.title)
     return [f"{standing}: {', '.join(names)}: {reason}" for (standing, reason), names in reasons.items()]
 
 

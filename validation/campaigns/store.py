@@ -146,7 +146,7 @@ def tally(path: Path | str, **where: Any) -> Tally:
     last = {(row["case_name"], row["variant"], row["engine"], row.get("reference_engine"), row["name"]): row
             for table in ("quantities", "comparisons") for row in _by_date(read(path, table, **where))}
     return count(QuantityRecord(row["name"], row["value"], row["verdict"], tolerance=row["tolerance"], evidence=row["evidence"] or "",
-                                control=row.get("control") or "") for row in last.values())
+                                control=row.get("control") or "", family=row.get("family") or "") for row in last.values())
 
 
 def curve(path: Path | str, case_name: str, engine: str, name: str, axis: str, **fixed: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -132,6 +132,7 @@ class Declared:
     compared : whether engines are compared in it
     control : wrong physics that fails it, as tests prove; a check without any is not counted
     independent : whether the reference is something else than other measured numbers of the same run
+    family : name of the fact that it measures; all quantities, variants and engines of the case with that name count as one check
     """
 
     name: str
@@ -147,6 +148,16 @@ class Declared:
     compared: bool = True
     control: str = ""
     independent: bool = True
+    family: str = ""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Why checks fail: the `cause` of the failures of `quantities` in `variants`, all of them when none is named."""
+
+    quantities: tuple[str, ...]
+    cause: str
+    variants: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -155,7 +166,7 @@ class Case:
 
     `derived`: numbers that follow from the parameters, by expressions; a setup.py beside the case file may add others, and the packing.
     `controls`: wrong physics, in words, with the declared quantities whose checks it fails. `needs`: capabilities that an engine has to
-    have where a condition between the parameters holds.
+    have where a condition between the parameters holds. `findings`: known causes of failures.
     """
 
     name: str
@@ -178,6 +189,7 @@ class Case:
     references: tuple[str, ...] = ()
     picture: Mapping[str, Value] = field(default_factory=dict)
     needs: Mapping[str, Expression] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
 
     def lacks(self, engine: str, values: Mapping[str, Value]) -> list[str]:
         """What `engine` has not of what a run with the parameters `values` needs, in words."""
@@ -187,6 +199,21 @@ class Case:
     def deck(self, engine: str) -> Path:
         """Deck of `engine` in this folder."""
         return self.folder / engines.facts(engine).deck
+
+    def declared(self, name: str) -> tuple[Declared, str] | None:
+        """The declaration of the measured quantity `name`, and the part that stands for its `*`; None when there is none."""
+        if name in self.quantities:
+            return self.quantities[name], ""
+        for pattern, one in self.quantities.items():
+            before, star, after = pattern.partition("*")
+            if star and name.startswith(before) and name.endswith(after) and len(name) > len(before) + len(after):
+                return one, name[len(before) : len(name) - len(after)]
+        return None
+
+    def cause(self, name: str, declared: str, variant: str) -> str:
+        """The known cause of a failure of the quantity `name`, declared under `declared`, in `variant`; "" when none is known."""
+        return next((one.cause for one in self.findings
+                     if {name, declared} & set(one.quantities) and variant in (one.variants or (variant,))), "")
 
     def formal_order(self, along: str) -> Expression:
         """Formal order of the scheme in the parameter `along`, as the first study along it says; 1 where there is none."""

@@ -23,6 +23,7 @@ from dembark.validation.case.model import (
     Case,
     Constraint,
     Declared,
+    Finding,
     Parameter,
     PlannedRun,
     Study,
@@ -64,7 +65,7 @@ class CaseReader(TableReader):
     def case(self, data: Mapping[str, Any]) -> Case:
         """The whole case; `data` is the content of the file."""
         tables = {"case": dict, "parameters": dict, "profiles": dict, "variants": dict, "runs": dict, "constraints": dict, "studies": dict,
-                  "derived": dict, "quantities": dict, "controls": dict, "picture": dict, "needs": dict}
+                  "derived": dict, "quantities": dict, "controls": dict, "picture": dict, "needs": dict, "findings": list}
         self.table(data, "top level", tables, ("case",))
         head = data["case"]
         keys = {"name": str, "title": str, "description": str, "source": list, "engines": list, "outputs": list, "particles": str,
@@ -112,7 +113,28 @@ class CaseReader(TableReader):
                         for name, entry in quantities.items()},
             controls=controls,
             references=tuple(head.get("references", ())), picture=self.picture(data.get("picture", {})), needs=needs)
-        return replace(one, runs=self.runs(data.get("runs", {}), one))
+        self.families(one.quantities)
+        return replace(one, runs=self.runs(data.get("runs", {}), one),
+                       findings=tuple(self.finding(entry, one) for entry in data.get("findings", ())))
+
+    def families(self, quantities: Mapping[str, Declared]) -> None:
+        """A family is one fact, so that its quantities have one kind of evidence."""
+        kinds: dict[str, Declared] = {}
+        for one in quantities.values():
+            first = kinds.setdefault(one.family, one)
+            if one.family and one.evidence != first.evidence:
+                raise self.fail(f"quantities.{one.name}", f"evidence = {one.evidence!r} in the family {one.family!r}",
+                                f"{first.name} of the same family has {first.evidence!r}")
+
+    def finding(self, entry: Any, case: Case) -> Finding:
+        """An entry of [[findings]]: the cause of failures of `quantities`, in `variants` where not in all."""
+        self.table(entry, "findings", {"quantities": list, "variants": list, "cause": str}, ("quantities", "cause"))
+        for name in entry["quantities"]:
+            if not case.declared(str(name)):
+                self.pick(str(name), case.quantities, "quantity", "findings")
+        known = [*case.variants, *(study.folder_name for study in case.studies.values())]
+        return Finding(tuple(entry["quantities"]), entry["cause"],
+                       tuple(self.pick(str(name), known, "variant or study", "findings") for name in entry.get("variants", ())))
 
     def picture(self, data: Mapping[str, Any]) -> dict[str, Any]:
         """[picture]: how a run is drawn, see `postproc.pictures`; numbers may be expressions, also in what a setup.py derives."""
@@ -162,7 +184,7 @@ class CaseReader(TableReader):
         table = f"quantities.{name}"
         keys: dict[str, Types] = {
             "label": str, "unit": str, "evidence": str, "tolerance": (int, float, str), "why": str, "absolute": bool, "source": str,
-            "detail": str, "agreement": (int, float), "compared": bool, "independent": bool}
+            "detail": str, "agreement": (int, float), "compared": bool, "independent": bool, "family": str}
         self.table(entry, table, keys, ("label",))
         if "evidence" in entry:
             self.pick(entry["evidence"], EVIDENCE, "kind of evidence", table)

@@ -5,25 +5,26 @@ Two one-sided tests (TOST, D. J. Schuirmann, J. Pharmacokinet. Biopharm. 15 (198
 -10 % and below +10 %, which is so when its 95 % interval is within them. That engines do not differ significantly shows nothing: runs that
 are noisy enough never do.
 
-Packings differ by more than what varies within one, so a comparison of random runs is decided only by intervals over three packings or
-more in each engine. Engines that solve the same equations are due to differ by chance alone: a difference beyond chance fails, though it
-may be within 10 %. A page compares many quantities, of which one in twenty lies beyond its 95 % interval although nothing is wrong, so
-what counts as beyond chance is what is outside of the interval that holds all differences of the page together with 99 %.
+Packings differ by more than what varies within one, so random runs are compared only by intervals over three packings or more in each
+engine; with fewer the difference is shown, and nothing is due to be checked. Engines that solve the same equations are due to differ by
+chance alone: a difference beyond chance fails, though it may be within 10 %. A page compares many quantities, of which one in twenty lies
+beyond its 95 % interval although nothing is wrong, so what counts as beyond chance is what is outside of the interval that holds all
+differences of the page together with 99 %.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
 from dembark.common.errors import RunError
 from dembark.postproc.statistics import joint_half, joint_limit
 from dembark.validation.judge import result
-from dembark.validation.judge.measuring import packings
+from dembark.validation.judge.deciding import PACKINGS, decides, packings
 from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result
 
 CAP = 0.10
-PACKINGS = 3
 # Of all comparisons of a page together.
 CONFIDENCE = 0.99
 
@@ -39,7 +40,8 @@ def compare(folder: Path) -> Comparison:
                        f"there is a measurement of {measured[0].engine if measured else 'no engine'} only")
     first = measured[0]
     both = [(one, other, *two) for one, other in combinations(measured, 2) for two in _shared(one, other)]
-    pairs = [pair(reference, value, one.engine, other.engine, len(both)) for one, other, reference, value in both]
+    pairs = [replace(pair(reference, value, one.engine, other.engine, len(both)),
+                     family=f"{first.case}, {first.variant}: {value.name} in the engines") for one, other, reference, value in both]
     return Comparison(first.case, first.variant, tuple(one.engine for one in measured), tuple(pairs), first.profile, CAP)
 
 
@@ -53,14 +55,15 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
     """One quantity of two engines with its verdict; `comparisons`: how many are made on its page, of all pairs of engines.
 
     pass: the joint 95 % interval of the difference is within 10 %. fail: the difference is beyond what chance does to one of all
-    `comparisons`. info: the joint interval reaches beyond 10 %, is unknown, or comes from fewer than three packings in either engine, which
-    cannot hold what varies from one packing to the next.
+    `comparisons`. info: the joint interval reaches beyond 10 %; or, without a tolerance, it is unknown or comes from fewer than three
+    packings in either engine, which cannot hold what varies from one packing to the next.
 
     A quantity of a deterministic run has an `agreement` instead, in its own unit: pass within it, fail beyond it.
     """
     both = (value, reference)
     deviation: float | None = None
-    kind, tolerance, half, chance = "relative", CAP, None, None
+    kind, half, chance, decided = "relative", None, None, ""
+    tolerance: float | None = CAP
     bounds = [one.agreement for one in both if one.agreement is not None]
     if value.value is None or reference.value is None or not (bounds or reference.value):
         verdict, reason = "fail", "no value to compare"
@@ -70,29 +73,27 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
         verdict, reason = ("pass", "") if same else ("fail", "the values must agree")
     else:
         deviation = (value.value - reference.value) / abs(reference.value)
-        unknown = next((one for one in both if one.half is None), None)
-        if unknown is not None:
-            verdict, reason = "info", f"an interval is unknown: {unknown.basis or 'the run is too short'}"
+        half = None if value.half is None or reference.half is None else joint_half(value.half, reference.half)
+        counts, scale = (packings(value.basis), packings(reference.basis)), abs(reference.value)
+        if half is None or min(counts) < PACKINGS:
+            tolerance, verdict, reason = None, "info", f"{PACKINGS} packings in each engine are needed to compare them"
         else:
-            halves, scale = (value.half or 0.0, reference.half or 0.0), abs(reference.value)
-            half = joint_half(*halves)
-            verdict, reason = _judged(abs(deviation), (halves[0] / scale, halves[1] / scale),
-                                      (packings(value.basis), packings(reference.basis)), comparisons)
+            halves = ((value.half or 0.0) / scale, (reference.half or 0.0) / scale)
+            verdict, reason = _judged(abs(deviation), halves, counts, comparisons)
             chance = (1.0 - CONFIDENCE) / comparisons if verdict != "info" else 0.0
+            if verdict == "info":
+                fewest = min((value.basis, reference.basis), key=packings)
+                decided = decides(deviation, half / scale, 0.0, CAP, fewest, "packings in each engine")
     return ComparedRecord(
         name=value.name, label=value.label, unit=value.unit, value=value.value, interval=value.interval, reference=reference.value,
         reference_interval=reference.interval, deviation=deviation, deviation_kind=kind, tolerance=tolerance, verdict=verdict,
-        reason=reason, chance=chance, detail="agreement of the engines", source=reference_engine, engine=engine,
+        reason=reason, decides=decided, chance=chance, detail="agreement of the engines", source=reference_engine, engine=engine,
         reference_engine=reference_engine, joint_half_width=half)
 
 
 def _judged(difference: float, halves: tuple[float, float], counts: tuple[float, float], comparisons: int) -> tuple[str, str]:
     """Verdict and reason from |difference| and half-widths over the reference, and the numbers `counts` of packings."""
     half = joint_half(*halves)
-    few = min(counts)
-    if few < PACKINGS:
-        return "info", (f"the joint interval (±{half:.1%}) comes from within {few:g} packing{'s' * (few > 1)}; "
-                        f"{PACKINGS} in each engine are needed for a verdict")
     limit = max(half, joint_limit(*halves, *counts, 1.0 - (1.0 - CONFIDENCE) / comparisons))
     if difference > limit:
         within = ", although within 10 %" if difference <= CAP else ""

@@ -1,7 +1,8 @@
 """The inputs of results, as one hash each: it stands in the result's own file, and the result is up to date while it is the same.
 
 Inputs of a measurement are the finished runs, the references of the case, and measure.py with the modules that it imports. Inputs of
-verdicts are the measurement and the declarations of case.toml: tolerances, reasons, labels, kinds of evidence, controls.
+verdicts are the measurement and the declarations of case.toml: tolerances, reasons, labels, kinds of evidence, families, controls,
+findings.
 """
 
 from __future__ import annotations
@@ -64,7 +65,8 @@ def of_pictures(case: Case, records: Iterable[Path]) -> str:
 def of_verdicts(case: Case) -> str:
     """That of the judgement of measured quantities, apart from what was measured."""
     judging = imports.dependencies(_HERE / "measuring.py", _HERE.parent / "metrics.py").digest()
-    return digest(judging, [asdict(one) for one in case.quantities.values()], case.references)
+    return digest(judging, [asdict(one) for one in case.quantities.values()], [asdict(one) for one in case.findings],
+                  case.references)
 
 
 def of_study(case: Case, points: Iterable[Path]) -> str:

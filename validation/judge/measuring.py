@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -19,6 +19,7 @@ from dembark.validation.case import deck
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.model import Case, Declared, Study
 from dembark.validation.case.read import citations
+from dembark.validation.judge.deciding import decides, packings
 from dembark.validation.judge.result import QuantityRecord
 
 if TYPE_CHECKING:
@@ -84,34 +85,43 @@ def _call(case: Case, name: str, call: Callable[[Callable[..., Any]], Any]) -> M
     return found
 
 
-def quantities(case: Case, found: Measurement) -> tuple[QuantityRecord, ...]:
-    """The measured quantities as declared, with verdicts, in the order of the declaration; DembarkError for one that is not declared."""
+def quantities(case: Case, found: Measurement, variant: str = "") -> tuple[QuantityRecord, ...]:
+    """The measured quantities of `variant` as declared, with verdicts, families and known causes of failures, in the order of the
+    declaration; DembarkError for one that is not declared."""
     order = list(case.quantities)
     matched = [(*declared(case, name), name, value) for name, value in found.values.items()]
-    return tuple(judged(one, value, name, part)
-                 for one, part, name, value in sorted(matched, key=lambda entry: order.index(entry[0].name)))
+    records = []
+    for one, part, name, value in sorted(matched, key=lambda entry: order.index(entry[0].name)):
+        record = judged(one, value, name, part)
+        cause = case.cause(name, one.name, variant) if record.verdict == "fail" else ""
+        records.append(replace(record, family=_family(case, one, name, variant), cause=cause))
+    return tuple(records)
+
+
+def _family(case: Case, one: Declared, name: str, variant: str) -> str:
+    """The fact that the quantity `name` measures. Engines solve the same equations and are compared with each other: compared with what
+    lies outside of them, they measure one fact."""
+    if one.family:
+        return f"{case.name}: {one.family}"
+    return f"{case.name}, {variant}: {name}" if one.evidence in ("experiment", "code") else ""
 
 
 def declared(case: Case, name: str) -> tuple[Declared, str]:
-    """The declaration of the quantity `name`, and what stands in the place of its `*`; DembarkError when there is none."""
-    if name in case.quantities:
-        return case.quantities[name], ""
-    for pattern, one in case.quantities.items():
-        before, star, after = pattern.partition("*")
-        if star and name.startswith(before) and name.endswith(after) and len(name) > len(before) + len(after):
-            return one, name[len(before) : len(name) - len(after)]
+    """The declaration of the quantity `name`, and the part that stands for its `*`; DembarkError when there is none."""
+    if found := case.declared(name):
+        return found
     raise DembarkError(f"quantity {name} is measured but not declared", f"{case.folder / 'case.toml'}", f"add a table [quantities.{name}]")
 
 
 def judged(one: Declared, value: Value, name: str = "", part: str = "") -> QuantityRecord:
     """A quantity with its verdict, as results hold it (see QuantityRecord); numbers that are not finite become None.
 
-    `name` is that of the measured quantity where the declared one has a `*`, in the place of which `part` stands. DembarkError when the
+    `name` is that of the measured quantity where the declared one has a `*`, for which `part` stands. DembarkError when the
     value has a bound that the declaration does not ask for, or none where it does, or where the quantity has an interval.
     """
     name = name or one.name
     tolerance, deviation, half = _tolerance(one, value, name), None, value.estimate.half
-    verdict, reason, reference = value.verdict, value.reason, value.reference
+    verdict, reason, reference, decided = value.verdict, value.reason, value.reference, ""
     if reference is not None:
         scale = 1.0 if one.absolute else reference.value
         deviation = (value.estimate.value - reference.value) / scale if scale else math.nan
@@ -120,6 +130,8 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
         verdict = "info"
         if not reason and tolerance is not None and deviation is not None:
             verdict, reason = judge(deviation, half if value.half is None else value.half, tolerance)
+            if verdict == "info":
+                decided = decides(deviation, *_halves(value, one.absolute), tolerance, value.estimate.basis)
     return QuantityRecord(
         name=name, label=one.label.replace("*", part), value=_finite(value.estimate.value), unit=one.unit,
         interval=_interval(value.estimate), basis=value.estimate.basis,
@@ -127,9 +139,17 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
         deviation=_finite(deviation),
         deviation_kind="absolute" if one.absolute else "relative", tolerance=_finite(tolerance), verdict=verdict, reason=reason,
         detail=value.detail or one.detail or one.why, source=one.source, evidence=one.evidence, compared=one.compared and value.compared,
-        control=one.control, deviation_half_width=_finite(value.half), independent=one.independent and value.half is None,
+        control=one.control, decides=decided, deviation_half_width=_finite(value.half), independent=one.independent and value.half is None,
         chance=chance(half if value.half is None else value.half, tolerance, packings(value.estimate.basis)),
         agreement=None if one.agreement is None else one.agreement * value.scale)
+
+
+def _halves(value: Value, absolute: bool) -> tuple[float, float]:
+    """Half-widths of the deviation that come from the value and from its reference."""
+    if value.half is not None or value.reference is None:
+        return value.estimate.half if value.half is None else value.half, 0.0
+    scale = 1.0 if absolute else abs(value.reference.value)
+    return value.estimate.half / scale, value.reference.half / scale
 
 
 def _tolerance(one: Declared, value: Value, name: str) -> float | None:
@@ -181,12 +201,6 @@ def judge(deviation: float, half: float, tolerance: float) -> tuple[str, str]:
     if abs(deviation) > tolerance:
         return "fail", ""
     return ("pass", "") if abs(deviation) + half <= tolerance else ("info", f"its interval (±{half:.2g}) extends beyond the tolerance")
-
-
-def packings(basis: str) -> float:
-    """Over how many packings an interval was taken; 1 or 2 when it comes from within them, infinite when it rests on no packing."""
-    told = re.match(r"(?:within )?(\d+) replica", basis)
-    return int(told.group(1)) if told else math.inf
 
 
 def chance(half: float, tolerance: float | None, count: float) -> float | None:

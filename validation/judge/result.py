@@ -27,7 +27,9 @@ class QuantityRecord:
     minus reference, over the reference when `deviation_kind` is "relative". `evidence`: what the reference is, one of EVIDENCE; "" is not
     stated. `compared`: the engines are to agree in it, within `agreement` (in `unit`) where nothing is random. `control`: wrong physics
     that fails the check; a pass of a check that nothing is known to fail is not counted. `independent`: the reference is not made of other
-    numbers of the same run. `chance`: probability that the check fails by chance alone, None where there is no chance.
+    numbers of the same run. `chance`: probability that the check fails by chance alone, None where there is no chance. `family`: the fact
+    that is measured; checks of one family count as one, "" is a check by itself. `cause`: why it fails, where that is known. `decides`:
+    what would decide an open check.
     """
 
     name: str
@@ -52,6 +54,9 @@ class QuantityRecord:
     control: str = ""
     independent: bool = True
     chance: float | None = None
+    family: str = ""
+    cause: str = ""
+    decides: str = ""
 
     def __post_init__(self) -> None:
         """RunError for a verdict or a kind of evidence that does not exist."""
@@ -153,7 +158,7 @@ def as_json(value: QuantityRecord | Result | Comparison) -> dict[str, Any]:
     return content
 
 
-_OPTIONAL = ("deviation_half_width", "agreement", "independent", "chance", "title", "description")
+_OPTIONAL = ("deviation_half_width", "agreement", "independent", "chance", "family", "cause", "decides", "title", "description")
 
 
 def _default(one: dataclasses.Field[Any]) -> Any:

@@ -1,4 +1,8 @@
-"""How many checks passed, failed and stayed open, by kind of evidence: what every place says that speaks of verdicts."""
+"""How many checks passed, failed and stayed open, by kind of evidence: what every place says that speaks of verdicts.
+
+One fact is one check: quantities of a family, such as a measured angle in three engines, count once. The family fails when one of them
+fails, and is open when one of them is open.
+"""
 
 from __future__ import annotations
 
@@ -47,8 +51,9 @@ class Counts:
 class Tally(Counts):
     """Counts of all quantities, and `by_evidence` of each kind that occurs among the checks, in the order of EVIDENCE; `unread`: a line
     for each result that could not be read and is not counted. `random`: checks that rest on intervals, of which `by_chance` are expected
-    to fail if every model held exactly."""
+    to fail if every model held exactly. `members`: judged quantities that the checks unite."""
 
+    members: int = 0
     by_evidence: Mapping[str, Counts] = field(default_factory=dict)
     random: int = 0
     by_chance: float = 0.0
@@ -58,26 +63,43 @@ class Tally(Counts):
     def sentences(self) -> list[str]:
         """A line for each kind of evidence, `theory (laws and exact solutions): 3 of 4 checks passed, 1 FAILED`, and each unread result."""
         lines = [f"{kind or 'evidence'} ({MEANING[kind]}): {counts.sentence}" for kind, counts in self.by_evidence.items()]
-        return [*lines, *([self.multiplicity] if self.random else []), *(f"not counted: {line}" for line in self.unread)]
+        united = f"families: the {self.checks} checks unite {self.members} judged values, those of one fact as one"
+        return [*lines, *([united] if self.members > self.checks else []), *([self.multiplicity] if self.random else []),
+                *(f"not counted: {line}" for line in self.unread)]
 
     @property
     def multiplicity(self) -> str:
         """How many checks rest on intervals, and how many of these would fail by chance."""
         return (f"chance: {self.random} of the checks rest{'s' if self.random == 1 else ''} on intervals; if every model held exactly, "
-                f"{self.by_chance:.1g} of them would fail")
+                f"at most {self.by_chance:.1g} of them would fail")
+
+
+# How a family stands: as the first of these does that occurs among its members.
+_ORDER = ("failed", "open", "passed", "uncontrolled", "information")
+
+
+def families(quantities: Iterable[QuantityRecord]) -> list[list[QuantityRecord]]:
+    """`quantities` by families, in the order of their first members; one without a family stands by itself."""
+    found: dict[tuple[str, str], list[QuantityRecord]] = {}
+    for number, one in enumerate(quantities):
+        found.setdefault((one.evidence, one.family or str(number)), []).append(one)
+    return list(found.values())
 
 
 def tally(quantities: Iterable[QuantityRecord]) -> Tally:
-    """Count `quantities` by how they stand, and by kind of evidence."""
+    """Count the families of `quantities` by how they stand, and by kind of evidence."""
     kinds: dict[str, Counter[str]] = {kind: Counter() for kind in (*EVIDENCE, "")}
-    chances: list[float] = []
-    for one in quantities:
-        kinds[one.evidence][one.standing] += 1
-        if one.chance is not None and one.standing != "information":
-            chances.append(one.chance)
+    members, chances = 0, []
+    for family in families(quantities):
+        checks = [one for one in family if one.standing != "information"]
+        kinds[family[0].evidence][min((one.standing for one in family), key=_ORDER.index)] += 1
+        members += sum(one.standing != "uncontrolled" for one in checks)
+        # Members are correlated: their sum is an upper limit of the probability that one of them fails.
+        if known := [one.chance for one in checks if one.chance is not None]:
+            chances.append(min(1.0, sum(known)))
     total = sum(kinds.values(), Counter())
     by_evidence = {kind: Counts(*_numbers(counts)) for kind, counts in kinds.items() if counts.keys() - {"information"}}
-    return Tally(*_numbers(total), by_evidence=by_evidence, random=len(chances), by_chance=sum(chances))
+    return Tally(*_numbers(total), members=members, by_evidence=by_evidence, random=len(chances), by_chance=sum(chances))
 
 
 def _numbers(counts: Counter[str]) -> tuple[int, int, int, int, int]:

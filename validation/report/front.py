@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from typing import Any
 
 from dembark.validation.case.model import EVIDENCE
 from dembark.validation.judge.result import QuantityRecord
-from dembark.validation.judge.tally import MEANING, Counts, Tally, tally
+from dembark.validation.judge.tally import MEANING, Counts, Tally, families, tally
 from dembark.validation.report import figures, scatter
 from dembark.validation.report.gather import Row
 
@@ -21,30 +22,48 @@ MOST = {"failed": 8, "open": 18, "missing": 6}
 # The kinds of evidence in order of importance of a failure.
 _WEIGHT = ("experiment", "theory", "identity", "", "code")
 
+_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
 # Of a quantity in all tables, see `cells`.
 COLUMNS = ("quantity", "label", "unit", "value", "low", "high", "reference", "reference_low", "reference_high", "deviation",
-           "deviation_kind", "tolerance", "verdict", "evidence", "reason", "detail", "source", "control")
+           "deviation_kind", "tolerance", "verdict", "evidence", "reason", "decides", "cause", "family", "detail",
+           "source", "control")
 
 
 @dataclass(frozen=True)
 class OpenLine:
-    """Checks of a case that stayed open for one reason: how many, and which."""
+    """Checks of a case that stayed open for one reason: how many, which, and what would decide them."""
 
     case: str
     anchor: str
     reason: str
     count: int
     names: str
+    decides: str
 
 
 def open_lines(rows: Iterable[Row]) -> list[OpenLine]:
-    """One line for each case and reason; numbers in brackets, which differ from quantity to quantity, are left out of the reason."""
+    """One line for each case and reason; numbers in brackets, which differ from quantity to quantity, are left out of the reason. A
+    family counts once."""
     found: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         if row.record.standing == "open":
             reason = re.sub(r" \([^()]*\d[^()]*\)", "", row.record.reason) or "there is no value to judge"
             found.setdefault((row.case, reason), []).append(row)
-    return [OpenLine(case, group[0].anchor, reason, len(group), _names(group)) for (case, reason), group in found.items()]
+    return [OpenLine(case, group[0].anchor, reason, len(families(row.record for row in group)), _names(group),
+                     _range(row.record.decides for row in group)) for (case, reason), group in found.items()]
+
+
+def _range(texts: Iterable[str]) -> str:
+    """What decides several checks: where texts differ in one number only, its smallest and largest value; else the most frequent first."""
+    found: dict[str, list[float]] = {}
+    for text in filter(None, texts):
+        found.setdefault(_NUMBER.sub("#", text, count=1), []).append(float(match[0]) if (match := _NUMBER.search(text)) else math.nan)
+    lines = []
+    for text, numbers in sorted(found.items(), key=lambda item: -len(item[1])):
+        low, high = min(numbers), max(numbers)
+        lines.append(text.replace("#", f"{low:g}" if low == high else f"{low:g} to {high:g}"))
+    return "; ".join(lines[:2])
 
 
 def _names(group: Sequence[Row]) -> str:
@@ -73,8 +92,9 @@ def context(rows: Sequence[Row], missing: Sequence[str]) -> Mapping[str, Any]:
     """What the template shows on the first pages."""
     counted = tally(row.record for row in rows)
     found = scatter.points(rows)
-    failed = sorted((row for row in rows if row.record.standing == "failed"), key=lambda row: _WEIGHT.index(row.record.evidence))
-    alike = (list(group) for _, group in groupby(failed, lambda row: (row.record.evidence, row.case)))
+    failed = sorted((row for row in rows if row.record.standing == "failed"),
+                    key=lambda row: (_WEIGHT.index(row.record.evidence), row.case, row.record.cause))
+    alike = (list(group) for _, group in groupby(failed, lambda row: (row.record.evidence, row.case, row.record.cause)))
     groups = [(sorted(group, key=badness, reverse=True), _names(group)) for group in alike]
     return {"tally": counted, "evidence": evidence(counted), "failed": failed, "failed_groups": groups,
             "open": open_lines(rows), "missing": missing, "points": found, "kinds": scatter.kinds(found),
@@ -85,7 +105,7 @@ def cells(one: QuantityRecord) -> list[Any]:
     """A quantity as part of the row of a table, see COLUMNS."""
     return [one.name, one.label, one.unit, one.value, *(one.interval or (None, None)), one.reference,
             *(one.reference_interval or (None, None)), one.deviation, one.deviation_kind, one.tolerance, one.verdict, one.evidence,
-            one.reason, one.detail, one.source, one.control]
+            one.reason, one.decides, one.cause, one.family, one.detail, one.source, one.control]
 
 
 def write_tables(folder: Path, rows: Sequence[Row], found: Sequence[scatter.Point]) -> None:

@@ -14,7 +14,7 @@ from dembark.common.files import disk_error
 
 FILE = "store.sqlite"
 # A change of the tables below is a new version.
-VERSION = 5
+VERSION = 6
 PATIENCE = 60.0
 
 _PLACE = {"campaign": "TEXT NOT NULL", "case_name": "TEXT NOT NULL", "variant": "TEXT NOT NULL"}
@@ -22,7 +22,7 @@ _MEASURED = {"commit_hash": "TEXT NOT NULL", "dirty": "INTEGER", "measured_at": 
 _VALUE = {"name": "TEXT NOT NULL", "label": "TEXT", "unit": "TEXT", "value": "REAL", "low": "REAL", "high": "REAL",
           "reference": "REAL", "reference_low": "REAL", "reference_high": "REAL", "deviation": "REAL", "deviation_kind": "TEXT",
           "tolerance": "REAL", "verdict": "TEXT", "evidence": "TEXT", "reason": "TEXT", "detail": "TEXT", "source": "TEXT",
-          "control": "TEXT"}
+          "control": "TEXT", "family": "TEXT", "cause": "TEXT", "decides": "TEXT"}
 # What the table of runs knows of each run and step; see `table.State`.
 _STATE = {"state": "TEXT NOT NULL", "message": "TEXT", "attempts": "INTEGER", "began": "REAL", "ended": "REAL", "host": "TEXT",
           "job": "TEXT"}

@@ -12,10 +12,13 @@ from hypothesis import strategies as st
 
 from dembark.common.errors import DembarkError
 from dembark.common.units import to_si
+from dembark.postproc.measurement import Measurement, Value
+from dembark.postproc.statistics import exact
 from dembark.validation.case import folders
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.folders import discover, find, load
 from dembark.validation.case.resolve import for_replica, portable, resolve, settings
+from dembark.validation.judge.measuring import quantities
 
 
 def edited(decks: Path, old: str, new: str) -> Path:
@@ -44,6 +47,25 @@ def test_what_the_folder_says_need_not_be_written(decks: Path) -> None:
     folders.load.cache_clear()
     with pytest.raises(DembarkError, match=r"there is no deck, \[case\] of .*, one of liggghts.in, yade.py, lammps.in"):
         load(path)
+
+
+def test_a_failure_has_the_cause_that_is_known_of_its_quantity_and_variant(decks: Path) -> None:
+    case = load(edited(decks, "[runs]", """
+[quantities]
+angle = { label = "a", evidence = "experiment", tolerance = 0.1, why = "w" }
+"part_*" = { label = "part *", evidence = "theory", tolerance = 0.1, why = "w", family = "parts" }
+[[findings]]
+quantities = ["angle", "part_1"]
+variants = ["wet"]
+cause = "The plate is too small."
+[runs]"""))
+    wrong = Value(exact(2.0), exact(1.0))
+    found = Measurement({"angle": wrong, "part_1": wrong, "part_2": wrong})
+    causes = {variant: [one.cause for one in quantities(case, found, variant)] for variant in ("wet", "dry")}
+    assert causes == {"wet": ["The plate is too small.", "The plate is too small.", ""], "dry": ["", "", ""]}
+    assert [one.family for one in quantities(case, found, "wet")] == ["box, wet: angle", "box: parts", "box: parts"]
+    # A cause is shown with failures alone.
+    assert not any(one.cause for one in quantities(case, Measurement({"angle": Value(exact(1.0), exact(1.0))}), "wet"))
 
 
 def test_runs_are_named_or_tables(decks: Path) -> None:
@@ -178,6 +200,12 @@ variants = ["dry", "wet", "large"]
     ("[runs]", STUDY.replace(', "wet"', "") + "[runs]", ["studies.size", "at least three variants"]),
     ("[runs]", '[controls]\n"gravity doubled" = ["weight"]\n[runs]', ["weight", "quantity", "[controls]"]),
     ("[runs]", '[controls]\n"gravity doubled" = "weight"\n[runs]', ["gravity doubled", "a list of the quantities", "[controls]"]),
+    ("[runs]", '[[findings]]\nquantities = ["weight"]\ncause = "c"\n[runs]', ["weight", "quantity", "[findings]"]),
+    ("[runs]", '[quantities.k]\nlabel = "K"\n[[findings]]\nquantities = ["k"]\nvariants = ["wett"]\ncause = "c"\n[runs]',
+     ["did you mean wet"]),
+    ("[runs]", '[quantities.k]\nlabel = "K"\n[[findings]]\nquantities = ["k"]\n[runs]', ["cause is missing", "[findings]"]),
+    ("[runs]", '[quantities]\na = { label = "A", family = "f" }\nb = { label = "B", family = "f", evidence = "code" }\n[runs]',
+     ["quantities.b", "family 'f'", "a of the same family"]),
     ("[runs]", STUDY.replace("along", "alone") + "[runs]", ["studies.size", "alone"]),
     ("[runs]", '[quantities.k]\nlabel = "K"\nevidence = "theory"\ntolerance = 0.1\n[runs]', ["quantities.k", "a tolerance without why"]),
     ("[derived]\n", '[derived]\nrows = "cel(grain_count / 2)"\n', ["cel()", "did you mean ceil?"]),

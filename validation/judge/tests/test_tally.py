@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,22 @@ def test_each_quantity_is_counted_once() -> None:
     assert tally(()).sentence == "no checks"
 
 
+def test_a_family_counts_once_and_stands_as_its_worst_member() -> None:
+    one = QuantityRecord("angle", 1.0, "pass", tolerance=0.1, evidence="experiment", control="friction off", family="heap: angle",
+                         chance=0.03)
+    failed, undecided = replace(one, verdict="fail"), replace(one, verdict="info")
+    other = replace(one, family="heap: height", chance=None)
+    assert tally((one, one, one)).sentence == "1 of 1 check passed, none failed"
+    assert tally((one, undecided, one, other)).sentence == "1 of 2 checks passed, none failed, 1 open"
+    found = tally((one, undecided, failed, other))
+    assert (found.passed, found.failed, found.open, found.members, found.random) == (1, 1, 0, 4, 1)
+    assert found.by_chance == pytest.approx(0.09) and found.sentences[1] == ("families: the 2 checks unite 4 judged values, "
+                                                                             "those of one fact as one")
+    # Neither a shown value nor a pass that nothing is known to fail makes a family pass or fail.
+    assert tally((replace(one, verdict="info", tolerance=None), one)).passed == 1
+    assert tally((replace(one, control=""), failed)).failed == 1
+
+
 def test_a_pass_without_a_negative_control_is_not_counted() -> None:
     without = QuantityRecord("f", 1.0, "pass", tolerance=0.1, evidence="identity")
     found = tally((*QUANTITIES, without))
@@ -52,7 +69,8 @@ def test_checks_that_rest_on_intervals_are_counted_with_what_chance_does_to_them
     assert [one.chance for one in found] == [None, pytest.approx(0.05), pytest.approx(0.00516, rel=0.01), pytest.approx(0.0208, rel=0.01)]
     counted = tally([*found, QuantityRecord("d", 1.0, "info", chance=0.5)])
     assert counted.random == 3 and counted.by_chance == pytest.approx(0.0759, rel=0.01)
-    assert counted.sentences[-1] == "chance: 3 of the checks rest on intervals; if every model held exactly, 0.08 of them would fail"
+    assert counted.sentences[-1] == ("chance: 3 of the checks rest on intervals; "
+                                     "if every model held exactly, at most 0.08 of them would fail")
     assert not any("chance" in line for line in tally(QUANTITIES).sentences)
 
 

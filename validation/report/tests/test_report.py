@@ -41,7 +41,7 @@ def results(tmp_path_factory):
     full_size.change(folder / "silo/variant_0/yade/metrics.json", "quantity_0", verdict="fail", value=0.3, deviation=0.3, tolerance=0.1,
                      label="lost momentum")
     full_size.change(folder / "silo/variant_0/liggghts/metrics.json", "quantity_0", verdict="fail", value=0.2, deviation=0.2, tolerance=0.1,
-                     label="lost energy")
+                     label="lost energy", cause="the floor does not carry what it should")
     full_size.change(folder / "log_pile/variant_1/liggghts/metrics.json", "quantity_6", verdict="fail", tolerance=None,
                      label="too few contacts")
     runs = json.loads((folder / "runs.json").read_text())
@@ -74,10 +74,9 @@ def test_no_trajectory_is_opened_and_no_result_is_written(results):
 def test_the_first_page_says_what_failed_and_what_is_missing(results):
     first = pdf.pages(results[1])[0]
     assert "3 FAILED" in first and "lost momentum" in first and "too few contacts" in first
-    # Of a case and a kind of evidence the worst stands for all.
-    assert "worst of 2 (" in first and "and 1 more); silo, variant 0; identity" in first
-    assert "lost energy" not in first.replace("lost energy and 1 more", "")
-    assert first.index("lost momentum") < first.index("too few contacts")
+    # What has the same cause stands together, under its cause.
+    assert first.index("silo: The cause is not known.") < first.index("lost momentum") < first.index("too few contacts")
+    assert first.index("silo: the floor does not carry what it should") < first.index("lost energy")
     assert "the engine was killed by SIGKILL <at> step 7" in first
     assert re.search(r"silo/variant_1/yade/metrics.json has no .*variant", first.replace(" ", " "))
     assert re.search(r"identity conservation laws, the scheme against itself \d+ 2 \d+", first)
@@ -147,12 +146,14 @@ def test_symbols_have_subscripts_and_no_number_is_parted_from_its_per_cent():
 
 
 def test_open_checks_are_one_line_for_each_case_and_reason():
-    rows = [row(8, reason="its interval (±0.4) is wider than the tolerance"),
-            row(17, reason="its interval (±0.5) is wider than the tolerance"),
+    rows = [row(8, reason="its interval (±0.4) is wider than the tolerance", decides="about 7 packings", family="silo: a"),
+            row(8, reason="its interval (±0.4) is wider than the tolerance", decides="about 12 packings", family="silo: a"),
+            row(17, reason="its interval (±0.5) is wider than the tolerance", decides="3 packings or more"),
             row(26, reason="the run is too short")]
     first, second = front.open_lines(rows)
     assert (first.count, first.reason) == (2, "its interval is wider than the tolerance") and "1 more" in first.names
-    assert (second.count, second.reason) == (1, "the run is too short")
+    assert first.decides == "about 7 to 12 packings; 3 packings or more"
+    assert (second.count, second.reason, second.decides) == (1, "the run is too short", "")
 
 
 def test_of_many_variants_the_worst_is_shown_and_every_failure_counts():

@@ -1,0 +1,49 @@
+"""What would decide a check that is open: how many packings, how long a run, or a better reference."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from dembark.postproc.statistics import student
+
+PACKINGS = 3
+_MOST = 100_000
+
+
+def decides(deviation: float, own: float, reference: float, tolerance: float, basis: str, unit: str = "packings") -> str:
+    """What decides a check whose deviation has the half-widths `own` of the value, with this `basis`, and `reference`.
+
+    All in the unit of the tolerance. A deviation that stays as it is passes when all of its interval is within the tolerance, and fails
+    when all of it is beyond or it is as narrow as the tolerance.
+    """
+    if not (math.isfinite(deviation) and math.isfinite(reference)):
+        return "a reference with an interval" if math.isfinite(deviation) else ""
+    count, excess = packings(basis), abs(deviation) - tolerance
+    target = -excess if excess < 0.0 else max(tolerance, excess)
+    if reference >= target:
+        return f"a reference known to ±{target:.2g}, now ±{reference:.2g}"
+    wanted = math.sqrt(target**2 - reference**2)
+    enough, longer = f"{PACKINGS} {unit} or more", f"runs about {(own / wanted) ** 2:.0f} times as long"
+    if count < PACKINGS or not math.isfinite(own):
+        return enough if count == 1.0 or not math.isfinite(own) else f"{enough}, or {longer}"
+    if math.isfinite(count):
+        return f"about {_packings(own, wanted, round(count))} {unit}"
+    return longer if "block" in basis else f"inputs known so well that they change the value by ±{wanted:.2g}, now ±{own:.2g}"
+
+
+def packings(basis: str) -> float:
+    """Over how many packings an interval with this `basis` was taken; 1 or 2 when it comes from within them, infinite when it rests on no
+    packing."""
+    found = re.match(r"(?:within )?(\d+) replica", basis)
+    return int(found.group(1)) if found else math.inf
+
+
+def _packings(own: float, wanted: float, count: int) -> int:
+    """How many packings of the same scatter have a mean with the half-width `wanted`, when `count` have `own`."""
+    spread = own * math.sqrt(count) / student(count - 1)
+    low, high = count, _MOST
+    while low < high:
+        middle = (low + high) // 2
+        low, high = (low, middle) if spread * student(middle - 1) / math.sqrt(middle) <= wanted else (middle + 1, high)
+    return low
