@@ -11,37 +11,68 @@ from pathlib import Path
 import numpy as np
 
 from dembark.postproc.instruments.growth import ordered
-from dembark.postproc.instruments.tumbler import Tumbler, estimates, layer_slope, read
+from dembark.postproc.instruments.tumbler import Tumbler, estimates, layer_flux, read
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, pooled, profile
+from dembark.postproc.statistics import jackknife
 from dembark.postproc.studies import compared, measured
 
 HERE = Path(__file__).with_name("reference")
-FLOW = ("surface_speed", "layer_depth", "layer_shear", "zero_crossing")
-METHODS = {"surface_speed": "surface_speed", "zero_crossing": "turn", "layer_depth": "layer_depth", "layer_shear": "shear",
+FLOW = ("surface_speed", "layer_depth", "layer_shape", "zero_crossing")
+METHODS = {"surface_speed": "surface_speed", "zero_crossing": "turn", "layer_depth": "layer_depth", "layer_shape": "layer_shape",
            "surface_angle": "surface_angle", "flux_balance": "flux_balance", "solid_body": "solid_body"}
 # 95 % limits of a point of the tracked profile: reading of the figure, and scatter about a smooth curve.
 SPEED_READ, PLACE_READ = 0.01, 0.0005
+# The angle depends on it by more than its limits.
+UNKNOWN = "the length of the other code's drum is not known"
 # What makes a run one of the tracked drum.
 ALIZADEH = {"drum_radius": 0.12, "drum_speed": 1.2147, "solid_filling": 0.1962, "grain_diameter": 0.003}
 
 
 def tracked() -> tuple[Array, Array]:
-    """n (m) and speed (m/s) of the tracked points, from the surface downwards; without one that is out of line by 0.05 m/s."""
+    """n (m), ascending, and speed (m/s) of the tracked points, without one that is out of line by 0.05 m/s."""
     with (HERE / "alizadeh_2013.csv").open(encoding="utf-8") as file:
-        rows = np.array([(float(row["y"]), float(row["u"])) for row in csv.DictReader(file) if row["used"] == "1"])
+        rows = np.array(sorted((float(row["y"]), float(row["u"])) for row in csv.DictReader(file) if row["used"] == "1"))
     return rows[:, 0], rows[:, 1]
 
 
-def data() -> dict[str, Estimate]:
-    """What the tracked points say of the quantities, by the same definitions."""
+def change_of_sign(n: Array, u: Array) -> float:
+    """n (m) below the layer of the tracked points at which their speed is 0."""
+    first = int(np.nonzero(u < 0.0)[0][0])
+    return float(n[first] - (n[first] - n[first - 1]) * u[first] / (u[first] - u[first - 1]))
+
+
+def fluxes() -> tuple[float, float]:
+    """m2/s: what the tracked layer returns, and what a bed that turns with the drum carries up below it. Equal if the profile is right."""
     n, u = tracked()
-    top, last = float(n.max()), int(np.nonzero(u < 0.0)[0][-1])
-    turn = float(n[last] + (n[last + 1] - n[last]) * u[last] / (u[last] - u[last + 1]))
-    skin = u[n > top - 0.0045]
-    return {"surface_speed": Estimate(-float(skin.mean()), SPEED_READ, "reading of the figure"),
-            "zero_crossing": Estimate(turn, PLACE_READ, "reading of the figure"),
-            "layer_depth": Estimate(top - turn, math.sqrt(2.0) * PLACE_READ, "reading of the figure"),
-            "layer_shear": layer_slope(n, -u, turn, top)}
+    turn = change_of_sign(n, u)
+    return (layer_flux(n, -u, turn, float(n[-1]))[0], 0.5 * ALIZADEH["drum_speed"] * (ALIZADEH["drum_radius"] ** 2 - turn**2))
+
+
+def data() -> dict[str, Estimate]:
+    """What the tracked points say of the quantities, by the same definitions.
+
+    U_D has what closes the balance of mass if the quantity alone is wrong: a faster layer, a deeper one, or less of the bed below it. The
+    shape of the profile does not depend on an error of scale in speed or place, nor on one of the origin of places.
+    """
+    n, u = tracked()
+    turn, top = change_of_sign(n, u), float(n[-1])
+    returned, carried = fluxes()
+    missing = carried / returned - 1.0
+    closed = -math.sqrt(ALIZADEH["drum_radius"] ** 2 - 2.0 * returned / ALIZADEH["drum_speed"])
+
+    speed, basis = -float(u[n > top - 1.5 * ALIZADEH["grain_diameter"]].mean()), "reading of the figure, and balance of mass"
+    shape = jackknife(lambda keep: layer_flux(n[keep], -u[keep], turn, top)[1], np.arange(len(n)), name="points")
+    return {"surface_speed": Estimate(speed, math.hypot(SPEED_READ, missing * speed), basis),
+            "zero_crossing": Estimate(turn, math.hypot(PLACE_READ, turn - closed), basis),
+            "layer_depth": Estimate(top - turn, math.hypot(math.sqrt(2.0) * PLACE_READ, missing * (top - turn)), basis),
+            "layer_shape": shape}
+
+
+def unbalanced() -> str:
+    """Why the flow has no verdict."""
+    returned, carried = fluxes()
+    return (f"the tracked profile does not conserve mass: the layer returns {1e3 * returned:.2f}e-3 m²/s, a bed that turns with the drum "
+            f"carries up {1e3 * carried:.2f}e-3")
 
 
 def other_code() -> dict[str, dict[str, float]]:
@@ -64,13 +95,14 @@ def measure(replicas: Replicas) -> Measurement:
     values["froude"] = Value(exact(given["drum_speed"] ** 2 * given["drum_radius"] / given["gravity"]))
     if tracked_drum:
         for name, datum in data().items():
-            values[name] = Value(over[name], datum, detail=compared(over[name].value, datum, sim=over[name].half).text)
+            values[name] = Value(over[name], datum, reason="" if name == "layer_shape" else unbalanced(),
+                                 detail=compared(over[name].value, datum, sim=over[name].half).text)
     if row := other_code().get(variant):
         values["centrifuging"] = Value(over["overhead"], exact(row["centrifuging"]))
         if flows:
             depth, angle, d = over["layer_depth"], over["surface_angle"], given["grain_diameter"]
             datum = Estimate(row["angle"], row["angle_limit"], "scatter in the other code")
-            values["repose_angle"] = Value(angle, datum, detail=compared(angle.value, datum, sim=angle.half).text)
+            values["repose_angle"] = Value(angle, datum, reason=UNKNOWN, detail=compared(angle.value, datum, sim=angle.half).text)
             values["layer_over_diameter"] = Value(Estimate(depth.value / d, depth.half / d, depth.basis), exact(row["layer"])
                                                   if math.isfinite(row["layer"]) else None)
     return Measurement(values, [speeds(drums, tracked_drum), densities(drums)])
@@ -85,7 +117,7 @@ def speeds(drums: list[Tumbler], beside: bool) -> Curve:
     title, along, across = "Speed along the free surface", "distance from the axis along the normal (m)", "u (m/s), positive with the drum"
     if not beside:
         return profile("velocity", title, along, across, place, values)
-    n, u = (part[::-1] for part in tracked())
+    n, u = tracked()
     inside = (n > place[0]) & (n < place[-1])
     return profile("velocity", title, along, across, n[inside], [np.interp(n[inside], place, one) for one in values], reference=u[inside],
                    reference_half=np.full(inside.sum(), SPEED_READ), reference_label="Alizadeh et al. (2013)")
@@ -112,7 +144,8 @@ def study(name: str, points: Points, along: str) -> Measurement:
         one = measured(middle, quantity)
         varied = {"input": half, "num": 0.0} if name == "friction" else {"input": 0.0, "num": half}
         values[quantity] = Value(Estimate(one.value, math.hypot(one.half, half), "scatter in time and effect of the varied parameter"),
-                                 datum[quantity], detail=compared(one.value, datum[quantity], sim=one.half, **varied).text)
+                                 datum[quantity], reason="" if quantity == "layer_shape" else unbalanced(),
+                                 detail=compared(one.value, datum[quantity], sim=one.half, **varied).text)
     curves = [profile(quantity, quantity.replace("_", " "), along, quantity, places,
                       [np.array([measured(point, quantity).value for point in points])]) for quantity in FLOW]
     return Measurement(values, curves)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Parameters, Setup, contacts, time_step, window
+from dembark.input_decks.common.setup import Parameters, Setup, contacts, rectangle, time_step, window
 
 
 def setup(p: Parameters) -> Setup:
@@ -15,31 +15,42 @@ def setup(p: Parameters) -> Setup:
     d_max, lined = packing.largest(p), p.wall_lining == "grains"
     shell = p.drum_radius + 1.5 * p.grain_diameter * lined
     half = shell + d_max
-    box = [(-half, half), (-half, half), (0.0, p.drum_depth)]
-    inside = p.drum_radius - 0.65 * d_max
-    bodies = packing.grains(p, close_packed(inside, p.drum_depth, 1.15 * d_max), box)
+    closed, inside = p.ends == "walls", p.drum_radius - 0.65 * d_max
+    # Grains at the end walls have room for their shift, too.
+    room, margin = (0.6 * d_max, d_max) if closed else (0.0, 0.0)
+    box = [(-half, half), (-half, half), (-margin, p.drum_depth + margin)]
+    sites = close_packed(inside, p.drum_depth, 1.15 * d_max, room)
+    bodies = packing.grains(p, sites, box)
     if lined:
         bodies = bodies.joined(lining(p), p.grain_diameter, p.grain_density, 2)
-    return Setup(steps["steps"], step, bodies, {**steps, **contacts(p), "shell_radius": shell})
+    meshes = {"ends": np.vstack([rectangle((-shell, -shell, z), (2.0 * shell, 0.0, 0.0), (0.0, 2.0 * shell, 0.0))
+                                 for z in (0.0, p.drum_depth)])} if closed else {}
+    return Setup(steps["steps"], step, bodies, {**steps, **contacts(p), "shell_radius": shell}, meshes)
 
 
-def close_packed(radius: float, depth: float, spacing: float) -> packing.Array:
-    """Points (n, 3) in m within `radius` (m) of the z axis, which are at least `spacing` (m) apart, with the period `depth` (m) along z.
+def close_packed(radius: float, depth: float, spacing: float, room: float = 0.0) -> packing.Array:
+    """Points (n, 3) in m within `radius` (m) of the z axis, which are at least `spacing` (m) apart, with the period `depth` (m) along z;
+    or, with `room` (m), that far or farther from the ends z = 0 and z = `depth`.
 
-    Layers of a face-centred lattice: stretched along z to fit the period, or compressed along z and stretched across, whichever holds more.
+    Layers of a face-centred lattice: stretched along z to fit, or compressed along z and stretched across, whichever holds more.
     """
-    fewest = 2 * int(depth / (math.sqrt(2.0) * spacing))
-    return max((_layers(count, radius, depth, spacing) for count in (fewest, fewest + 2) if 2.0 * depth >= count * spacing), key=len)
+    span = depth - 2.0 * room
+    fewest = int(math.sqrt(2.0) * span / spacing)
+    if room > 0.0:
+        fitting = [(gaps + 1, span / gaps, room) for gaps in (fewest, fewest + 1)]
+    else:
+        # Every other layer is the same, so a period has an even number of them.
+        fitting = [(count, span / count, 0.5 * span / count) for count in (fewest - fewest % 2, fewest - fewest % 2 + 2)]
+    return max((_layers(count, height, first, radius, spacing) for count, height, first in fitting if 2.0 * height >= spacing), key=len)
 
 
-def _layers(count: int, radius: float, depth: float, spacing: float) -> packing.Array:
-    height = depth / count
+def _layers(count: int, height: float, first: float, radius: float, spacing: float) -> packing.Array:
     side = math.sqrt(max(0.5 * spacing**2, spacing**2 - height**2))
     reach = math.ceil(radius / side)
     plane = np.arange(-reach, reach + 1)
     k, j, i = (axis.ravel() for axis in np.meshgrid(np.arange(count), plane, plane, indexing="ij"))
     kept = ((i + j + k) % 2 == 0) & (side * np.hypot(i, j) <= radius)
-    return np.column_stack((side * i, side * j, height * (k + 0.5)))[kept]
+    return np.column_stack((side * i, side * j, first + height * k))[kept]
 
 
 def lining(p: Parameters) -> packing.Array:

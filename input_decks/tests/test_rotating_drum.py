@@ -18,13 +18,14 @@ from dembark.validation.case.resolve import resolve
 
 CASE = find("rotating_drum")
 drum = module("rotating_drum")
-JUDGED = {"surface_speed", "zero_crossing", "layer_depth"}
+FLOW = {"surface_speed", "zero_crossing", "layer_depth"}
 
 
 def flow(angle: float = 27.0, surface: float = -0.03, turn: float = -0.066, speed: float = 0.345, carried: float = 1.0,
-         variant: str = "alizadeh", ring: bool = False) -> Any:
+         power: float = 1.0, variant: str = "alizadeh", ring: bool = False) -> Any:
     """A run whose grains fill a segment, on a lattice that is shifted from frame to frame: they turn with the drum (times `carried`) below
-    `turn`, and above it their speed falls linearly to -`speed` at the `surface`. `ring`: all turn with the drum, at the wall."""
+    `turn`, and above it their speed falls to -`speed` at the `surface`, linearly or as a `power` of the height. `ring`: all turn with the
+    drum, at the wall."""
     given = defaults("rotating_drum", frames=12) | ({} if variant == "alizadeh" else {"solid_filling": 0.2})
     random, radius, omega = np.random.default_rng(3), given["drum_radius"], given["drum_speed"]
     t = np.radians(angle)
@@ -36,7 +37,7 @@ def flow(angle: float = 27.0, surface: float = -0.03, turn: float = -0.066, spee
         n = place @ normal
         place = place[(np.hypot(*place.T) < radius - 0.0015) & (np.hypot(*place.T) > 0.09 if ring else n < surface)]
         n, s = place @ normal, place @ along
-        back = np.clip((n - turn) / (surface - turn), 0.0, 1.0)
+        back = np.clip((n - turn) / (surface - turn), 0.0, 1.0) ** power
         turning = ring | (n < turn)
         velocity = np.where(turning, -carried * omega * n, -omega * turn * (1.0 - back) - speed * back)[:, None] * along
         velocity += np.where(turning, carried * omega * s, 0.0)[:, None] * normal
@@ -59,7 +60,19 @@ def test_the_tracked_profile_says_what_it_is_quoted_for() -> None:
     assert found["surface_speed"].value == pytest.approx(0.33, abs=0.01)
     assert found["zero_crossing"].value == pytest.approx(-0.0595, abs=0.0005)
     assert found["layer_depth"].value == pytest.approx(0.030, abs=0.001)
-    assert found["layer_shear"].value == pytest.approx(13.0, rel=0.1)
+    # Of a layer whose speed falls linearly, 2/3.
+    assert found["layer_shape"].value == pytest.approx(0.65, abs=0.005) and found["layer_shape"].half < 0.02
+
+
+def test_the_tracked_layer_does_not_return_what_the_drum_carries_up() -> None:
+    """The error of closure is in the uncertainty of the data: any of them changed by it alone would close the balance."""
+    returned, carried = drum.fluxes()
+    assert returned == pytest.approx(5.53e-3, rel=0.01) and carried == pytest.approx(6.60e-3, rel=0.01)
+    found = drum.data()
+    for name in ("surface_speed", "layer_depth"):
+        assert found[name].half >= (carried / returned - 1.0) * found[name].value
+    edge = found["zero_crossing"].value - found["zero_crossing"].half
+    assert 0.5 * 1.2147 * (0.12**2 - edge**2) <= returned
 
 
 def test_a_known_flow_is_measured_as_it_is() -> None:
@@ -67,21 +80,27 @@ def test_a_known_flow_is_measured_as_it_is() -> None:
     assert found["surface_angle"]["value"] == pytest.approx(27.0, abs=0.3)
     up = 1.2147 * 0.066
     assert found["zero_crossing"]["value"] == pytest.approx(-0.066 + 0.036 * up / (up + 0.345), abs=6e-4)
-    assert found["layer_shear"]["value"] == pytest.approx((up + 0.345) / 0.036, rel=0.02)
+    assert found["layer_shape"]["value"] == pytest.approx(2.0 / 3.0, abs=0.01)
     assert found["solid_body"]["value"] == pytest.approx(1.0, abs=0.01)
-    assert JUDGED | {"solid_body"} <= names(found, "pass")
+    assert {"layer_shape", "solid_body"} <= names(found, "pass")
+    # What the data cannot decide is shown with its reason.
+    assert all(found[name]["verdict"] == "info" and "conserve mass" in found[name]["reason"] for name in FLOW)
 
 
 @pytest.mark.parametrize(("changes", "seen"), [
-    ({"speed": 0.45}, {"surface_speed"}), ({"speed": 0.25}, {"surface_speed"}), ({"turn": -0.08}, {"zero_crossing", "layer_depth"}),
-    ({"surface": -0.04, "turn": -0.08}, {"zero_crossing"}), ({"carried": 0.85}, {"solid_body"}),
-], ids=["faster", "slower", "deep", "less filled", "a wall that slips"])
+    ({"power": 0.2}, {"layer_shape"}), ({"power": 3.0}, {"layer_shape"}), ({"carried": 0.85}, {"solid_body"}),
+], ids=["a plug", "a thin layer on a creeping bed", "a wall that slips"])
 def test_wrong_flows_fail(changes: dict[str, float], seen: set[str]) -> None:
     assert seen <= names(verdicts(**changes), "fail")
 
 
 def test_of_other_drums_no_flow_is_judged() -> None:
-    assert not JUDGED & (names(verdicts(variant="other"), "pass") | names(verdicts(variant="other"), "fail"))
+    assert "layer_shape" not in names(verdicts(variant="other"), "pass") | names(verdicts(variant="other"), "fail")
+
+
+def test_no_angle_is_judged_while_the_length_of_the_drum_is_unknown() -> None:
+    found = verdicts(angle=26.1, variant="sunday_smooth")["repose_angle"]
+    assert found["reference"] == 26.1 and found["verdict"] == "info" and "length" in found["reason"]
 
 
 def study(name: str, along: str, values: list[float], speeds: list[float]) -> dict[str, Any]:
@@ -95,7 +114,6 @@ def test_the_study_adds_what_friction_makes_of_it() -> None:
     found = study("friction", "grain_friction", [0.27, 0.3, 0.33], [0.36, 0.345, 0.33])
     assert 0.005 < 0.5 * np.diff(found["surface_speed"]["interval"])[0] < 0.03
     assert "U_input = 0.01" in found["surface_speed"]["detail"] and "U_num = 0" in found["surface_speed"]["detail"]
-    assert "surface_speed" not in names(study("stiffness", "youngs_modulus", [5e6, 1e7, 2e7], [0.345, 0.32, 0.28]), "pass")
 
 
 SMALL = {"drum_radius": 0.03, "drum_speed": 4.0, "solid_filling": 0.15, "run_in": 0.25, "measure_time": 0.05, "frames": 10}
@@ -125,19 +143,42 @@ def test_a_smooth_wall_holds_the_grains_and_drags_them_the_same_way(engine: str,
     assert low.sum() > 20 and last.velocities[low, 0].mean() > 0.01
 
 
-@pytest.mark.parametrize("variant", [SMALL | {"wall_lining": "grains"}, "alizadeh", "smooth", "sunday_smooth", "sunday_15"], ids=str)
+@pytest.mark.parametrize("engine", find("rotating_drum").engines)
+def test_end_walls_hold_the_grains_and_drag_them_with_the_drum(engine: str, decks: Any, tmp_path: Path) -> None:
+    one = decks("rotating_drum", engine, tmp_path, SMALL | {"ends": "walls"})
+    one.run()
+    aligned = []
+    for frame in one.replica().grains():
+        grains = frame.select(frame.types == 1)
+        z, radii, force = grains.positions[:, 2], grains.radii, grains.wall_forces["ends"]
+        assert (z - radii).min() > -1e-4 and (z + radii).max() < 0.012 + 1e-4
+        touching = np.abs(force[:, 2]) > 0.0
+        np.testing.assert_allclose(touching, np.minimum(z, 0.012 - z) < radii, atol=1e-9)
+        # The velocity of the wall at the contact less that of the grain.
+        arm = np.column_stack([np.zeros((len(z), 2)), np.where(z < 0.006, -radii, radii)])
+        slip = np.cross([0.0, 0.0, 4.0], grains.positions) - grains.velocities - np.cross(grains.omegas, arm)
+        slides = touching & (np.hypot(*slip[:, :2].T) > 0.01)
+        pull = (force[:, :2] * slip[:, :2]).sum(axis=1) / np.hypot(*force[:, :2].T).clip(1e-300) / np.hypot(*slip[:, :2].T).clip(1e-300)
+        aligned += list(pull[slides])
+    assert len(aligned) > 20 and np.median(aligned) > 0.95
+
+
+@pytest.mark.parametrize("variant", [SMALL | {"wall_lining": "grains"}, SMALL | {"ends": "walls"}, "alizadeh", "smooth", "sunday_smooth",
+                                     "sunday_005_slice", "sunday_005_long", "sunday_15"], ids=str)
 def test_all_grains_have_room_and_no_two_touch(variant: str | dict[str, Any]) -> None:
     """Nor one of them and the lining."""
     values = resolve(CASE, "standard", variant, {}) if isinstance(variant, str) else resolve(CASE, None, None, variant)
     packed = deck.prepare(CASE, values).packing
     assert packed is not None
     moving = packed.types == 1
-    period = packed.box[2, 1]
+    period, ended = values["drum_depth"], values["ends"] == "walls"
     drum_volume = np.pi * values["drum_radius"] ** 2 * period
     assert np.pi / 6.0 * (packed.diameters[moving] ** 3).sum() == pytest.approx(values["solid_filling"] * drum_volume, rel=0.01)
-    images = np.vstack([packed.positions + shift for shift in ((0.0, 0.0, 0.0), (0.0, 0.0, period), (0.0, 0.0, -period))])
+    images = np.vstack([packed.positions + np.array([0.0, 0.0, shift]) for shift in ([0.0] if ended else [0.0, period, -period])])
     far = cKDTree(images).query(packed.positions, 2)[0][:, 1]
     largest = values["grain_diameter"] * (1.0 + values["grain_diameter_spread"])
     assert far[moving].min() >= 1.005 * largest and far.min() >= values["grain_diameter"]
     shell = values["drum_radius"] - 0.5 * packed.diameters - np.hypot(*packed.positions[:, :2].T)
     assert shell[moving].min() > 0.0
+    ends = np.minimum(packed.positions[:, 2], period - packed.positions[:, 2]) - 0.5 * packed.diameters
+    assert not ended or ends[moving].min() > 0.0

@@ -18,20 +18,18 @@ from dembark.postproc.measurement import Estimate
 from dembark.postproc.replica import Array, Replica, once
 from dembark.postproc.resampling import resampled
 from dembark.postproc.spheres import slice_volumes, volume
-from dembark.postproc.statistics import block_mean, student, time_blocks
+from dembark.postproc.statistics import block_mean, time_blocks
 
 Mask = NDArray[np.bool_]
 # Half-width along s of what counts as the middle of the chord, and depth of what counts as the surface, in diameters.
 HALF_WINDOW, SKIN = 2.0, 1.5
-# Part of the flowing layer's depth that a line is fitted to, from the change of sign to the surface.
-INNER = (0.15, 0.85)
 
 
 @dataclass(frozen=True)
 class Tumbler:
     """One replica: `solid` (m3) and `flow` = sum V u (m4/s), (frames, cells along n); `edges` (cells + 1,) in m; `plane` (frames, x, y):
     m3 of grains whose centre is in each square cell of the cross-section, `cell` (m) wide; `angle` (rad) of the mean surface; `overhead`
-    (frames,): see the case; `radius` and `diameter` in m, `depth`: period (m), `speed`: rad/s."""
+    (frames,): see the case; `radius` and `diameter` in m, `depth`: length along the axis (m), `speed`: rad/s."""
 
     edges: Array
     solid: Array
@@ -85,9 +83,9 @@ class Tumbler:
         """m, from the surface to the change of sign."""
         return self.surface(frames) - self.turn(frames)
 
-    def shear(self, frames: Mask) -> float:
-        """Shear rate (1/s) in the flowing layer."""
-        return layer_slope(self.middle, -self.velocity(frames), self.turn(frames), self.surface(frames)).value
+    def layer_shape(self, frames: Mask) -> float:
+        """Mean height of the layer's flux over the depth of the layer."""
+        return layer_flux(self.middle, -self.velocity(frames), self.turn(frames), self.surface(frames))[1]
 
     def flux_balance(self, frames: Mask) -> float:
         """Net flux through the normal over that of the grains that are carried up."""
@@ -115,15 +113,16 @@ def _fall(place: Array, fraction: Array) -> float:
     return float(place[k] + (place[k + 1] - place[k]) * (fraction[k] - half) / (fraction[k] - fraction[k + 1]))
 
 
-def layer_slope(place: Array, speed: Array, turn: float, surface: float) -> Estimate:
-    """Slope of the line that fits `speed` (down the surface) best over `place` in the INNER part of the layer, with Student's interval
-    from what is left; NaN for fewer than four places."""
-    low, high = (turn + part * (surface - turn) for part in INNER)
-    inside = (place > low) & (place < high) & np.isfinite(speed)
-    if inside.sum() < 4:
-        return Estimate(float("nan"), float("inf"), "fewer than four places in the layer")
-    (slope, _), covariance = np.polyfit(place[inside], speed[inside], 1, cov=True)
-    return Estimate(float(slope), student(float(inside.sum()) - 2.0) * float(np.sqrt(covariance[0, 0])), "scatter about a line")
+def layer_flux(place: Array, speed: Array, turn: float, surface: float) -> tuple[float, float]:
+    """Flux (m2/s) of the `speed` (down the surface) over `place` (ascending) from `turn`, where it is 0, to `surface`; and the mean height
+    of that flux above `turn` over the depth of the layer: 1/2 of a plug, 2/3 of a linear profile. NaN without a place in between."""
+    inside = (place > turn) & (place <= surface) & np.isfinite(speed)
+    if not inside.any():
+        return float("nan"), float("nan")
+    part = np.linspace(0.0, 1.0, 2001)
+    fine = np.interp(turn + part * (surface - turn), [turn, *place[inside]], [0.0, *speed[inside]])
+    mean = float(np.trapezoid(fine, part))
+    return mean * (surface - turn), float(np.trapezoid(fine * part, part)) / mean
 
 
 def surface_line(plane: Array, cell: float, radius: float, diameter: float) -> float:
