@@ -57,6 +57,8 @@ def measure(replicas: Replicas) -> Measurement:
         "aspect_ratio": Value(aspect),
         "run_out": beside(lambda one: one.front() / one.width - 1.0, run_out_law(aspect.value)),
         "final_height": beside(lambda one: one.height_at_wall() / one.width, height_law(aspect.value)),
+        "mean_run_out": Value(over(lambda one: 2.0 * one.centre()[0] / one.width - 1.0)),
+        "mean_height": Value(over(lambda one: 2.0 * one.centre()[2] / one.width)),
     }
     fallen, turned = 1e3 * np.mean([(one.fallen, one.rows["scale"][-1]) for one in runs], axis=0)
     remarks = [f"The collapse loses {fallen:.4g} mJ of potential energy; the total work of the run, with the rain, is {turned:.4g} mJ."]

@@ -80,6 +80,8 @@ def test_right_energies_pass(tmp_path: Path) -> None:
     assert measured["aspect_ratio"]["value"] == pytest.approx(2.0)
     assert measured["run_out"]["value"] == pytest.approx(31.5 / 8 - 1.0) and measured["run_out"]["reference"] is None
     assert measured["final_height"]["value"] == pytest.approx(0.5)
+    # A block of 32 x 4 grains.
+    assert measured["mean_run_out"]["value"] == pytest.approx(3.0) and measured["mean_height"]["value"] == pytest.approx(0.5)
 
 
 def spoiled(**changes: Callable[[np.ndarray], np.ndarray]) -> Callable[[Rows], None]:

@@ -79,6 +79,10 @@ class Collapse:
         behind = np.cumsum(self.last.masses[order]) / self.last.masses.sum()
         return float(self.last.positions[order[np.searchsorted(behind, FRONT)], 0])
 
+    def centre(self) -> Array:
+        """Centre of mass (3,) of the deposit in m."""
+        return np.average(self.last.positions, axis=0, weights=self.last.masses)
+
     def height_at_wall(self) -> float:
         """m, of the deposit: the highest grain within 2 d of the back wall."""
         return float(surface(self.last, np.array([0.0, 2.0 * self.diameter]))[0])
