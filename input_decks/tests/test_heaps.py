@@ -62,9 +62,10 @@ def heap(folder: Path, angle: float, count: int = 3, **changes: Any) -> Verdicts
         own = folder / str(k)
         own.mkdir(parents=True)
         slope = np.tan(np.radians(angle + 0.3 * (k - 1)))
-        x = (np.arange(30) + 0.5) * d
-        where = np.column_stack([x, np.zeros(30), slope * (0.5 * width - np.abs(x - 0.5 * width)) + 0.5 * d])
-        (own / "grains.dump").write_text(grains_text(0, where, np.full(30, 0.5 * d)) + grains_text(1, where, np.full(30, 0.5 * d)))
+        cells = round(width / d)
+        x = (np.arange(cells) + 0.5) * d
+        where = np.column_stack([x, np.zeros(cells), slope * (0.5 * width - np.abs(x - 0.5 * width)) + 0.5 * d])
+        (own / "grains.dump").write_text("".join(grains_text(step, where, np.full(cells, 0.5 * d)) for step in (0, 1)))
         runs.append(Replica(own, {"parameters": p, "time_step": 1e-5, "engine": "liggghts"}))
     return judged("angle_of_repose", repose.measure(runs))
 
@@ -180,6 +181,13 @@ def test_a_heap_like_the_measured_one_passes(tmp_path: Path) -> None:
 ])
 def test_other_heaps_fail(angle: float, changes: dict[str, Any], tmp_path: Path) -> None:
     assert set(verdicts(heap(tmp_path, angle, **changes)).values()) == {"fail"}
+
+
+def test_a_heap_on_a_narrower_plate_has_no_verdict(tmp_path: Path) -> None:
+    """Neither a right angle nor a wrong one: the measured heaps were on a plate of 30 d."""
+    for name, angle in (("right", 28.5), ("wrong", 20.0)):
+        found = heap(tmp_path / name, angle, plate_width=0.18)
+        assert verdicts(found) == {"angle": "info", "angle_of_code": "info"} and "18 d wide" in found["angle"]["reason"]
 
 
 def test_heaps_of_other_beads_stand_beside_the_other_code_alone(tmp_path: Path) -> None:
