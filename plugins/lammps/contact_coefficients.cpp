@@ -68,6 +68,7 @@ void ContactCoefficients::settings(int narg, char** arg) {
         if (!(settings_.characteristic_velocity > 0.0)) fail("normal hooke needs a characteristic velocity > 0 m/s");
       }
     } else if (keyword == "presliding") choose(keyword, word(), dembark::presliding_names(), settings_.presliding);
+    else if (keyword == "friction_limit") choose(keyword, word(), dembark::friction_limit_names(), settings_.friction_limit);
     else if (keyword == "rolling_resistance") choose(keyword, word(), dembark::rolling_names(), settings_.rolling_model);
     else if (keyword == "capillary_model") {
       choose(keyword, word(), dembark::capillary::model_names(), settings_.capillary_model);
@@ -83,9 +84,8 @@ void ContactCoefficients::settings(int narg, char** arg) {
     else if (keyword == "limit_force") choose(keyword, word(), off_on, settings_.limit_force);
     else
       fail("'" + keyword +
-           "' is unknown; it can be normal, presliding, rolling_resistance, capillary_model, surface_tension, viscous_liquid, "
-           "carried_liquid, healing_time, "
-           "tangential_damping or limit_force");
+           "' is unknown; it can be normal, presliding, friction_limit, rolling_resistance, capillary_model, surface_tension, "
+           "viscous_liquid, carried_liquid, healing_time, tangential_damping or limit_force");
   }
   if (settings_.wet && !(settings_.surface_tension >= 0.0 && settings_.surface_tension < INFINITY))
     fail("capillary_model needs surface_tension S with S (N/m) >= 0 and finite");
@@ -149,6 +149,7 @@ ContactParameters ContactCoefficients::common() const {
   p.limit_force = settings_.limit_force;
   p.friction.healing_time = settings_.healing_time;
   p.friction.presliding = settings_.presliding;
+  p.friction.friction_limit = settings_.friction_limit;
   p.rolling.model = settings_.rolling_model;
   p.liquid.surface_tension = settings_.surface_tension;
   p.liquid.viscous = settings_.viscous;
@@ -185,7 +186,8 @@ void ContactCoefficients::complete(int i, int j) {
                 needed(i, j, &Given::critical_slip_distance),
                 given.interface_shear_strength,
                 settings_.healing_time,
-                settings_.presliding};
+                settings_.presliding,
+                settings_.friction_limit};
   if (const char* wrong = p.friction.error()) fail(wrong + pair);
   if (settings_.rolling_model != dembark::RollingModel::off)
     p.rolling = {settings_.rolling_model, needed(i, j, &Given::rolling_friction), given.rolling_damping_ratio};

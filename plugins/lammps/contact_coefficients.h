@@ -35,6 +35,7 @@ class ContactCoefficients : protected LAMMPS_NS::Pointers {
     dembark::NormalLaw normal_law = dembark::NormalLaw::hertz;
     double characteristic_velocity = NAN, healing_time = 0.0, surface_tension = NAN;
     dembark::Presliding presliding = dembark::Presliding::linear;
+    dembark::FrictionLimit friction_limit = dembark::FrictionLimit::total;
     dembark::RollingModel rolling_model = dembark::RollingModel::off;
     bool wet = false, carried = false, tangential_damping = true, limit_force = false;
     dembark::capillary::Model capillary_model = dembark::capillary::Model::exact;

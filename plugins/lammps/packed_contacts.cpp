@@ -69,6 +69,7 @@ void PackedContacts::step(const LAMMPS_NS::NeighList& list, const NeighborHistor
   step.wet = layout_.bridge;
   step.limit_force = any.limit_force;
   step.tangential_damping = any.tangential_damping;
+  step.elastic_limit = any.friction.friction_limit == dembark::FrictionLimit::elastic;
   // The scalar law knows that curve, and steps of zero length.
   step.pack_friction = any.friction.presliding != dembark::Presliding::exponential && update->dt > 0.0;
   step.rolls = any.rolling.model != dembark::RollingModel::off;

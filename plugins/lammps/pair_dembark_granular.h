@@ -1,7 +1,8 @@
 // LAMMPS adapter of whole contacts between grains: fetches the pairs, calls dembark/contact.hpp, adds the forces.
 //
 //   pair_style dembark/granular [normal hertz|hooke V] [presliding linear|exponential|partial_slip]
-//              [rolling_resistance off|constant_torque|elastic_plastic] [capillary_model M surface_tension S] ...
+//              [friction_limit total|elastic] [rolling_resistance off|constant_torque|elastic_plastic]
+//              [capillary_model M surface_tension S] ...
 //   pair_coeff I J keyword value ...
 #ifndef DEMBARK_PAIR_DEMBARK_GRANULAR_H
 #define DEMBARK_PAIR_DEMBARK_GRANULAR_H

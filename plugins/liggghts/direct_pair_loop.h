@@ -59,6 +59,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
   LAMMPS_NS::FixCapillaryLiquid* liquid_ = nullptr;  // of carried liquid
   bool plain_settings_ = true, carried_ = false, limit_force_ = false, tangential_damping_ = true;
   dembark::Presliding presliding_ = dembark::Presliding::linear;
+  dembark::FrictionLimit friction_limit_ = dembark::FrictionLimit::total;
   dembark::RollingModel rolling_model_ = dembark::RollingModel::off;
   dembark::capillary::Model model_ = dembark::capillary::Model::exact;
   const bool in_packs_ = dembark::PairLoops::asked_lanes() != 1;
@@ -219,6 +220,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
       if (word == "limitForce") limit_force_ = value == "on";
       else if (word == "tangential_damping") tangential_damping_ = value == "on";
       else if (word == "presliding") dembark::option_from_name(dembark::presliding_names(), value, presliding_);
+      else if (word == "friction_limit") dembark::option_from_name(dembark::friction_limit_names(), value, friction_limit_);
       else if (word == "rolling_resistance") dembark::option_from_name(dembark::rolling_names(), value, rolling_model_);
       else if (word == "carried_liquid") carried_ = value == "on";
       else if (word == "capillary_model") dembark::capillary::model_from_name(words[k + 1], model_);
@@ -234,7 +236,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     registry.connect("Geff", shear_modulus_, "model hertz");
     registry.connect("betaeff", damping_factor_, "model hertz");
     const PropertyReader read(registry, lmp_->modify, lmp_->error, "pair_style gran");
-    friction_ = read_friction(read, presliding_);
+    friction_ = read_friction(read, presliding_, friction_limit_);
     typedef models::TangentialModel<models::TANGENTIAL_FINNIE_RABINOWICZ> Friction;
     friction_offset_ = Stock::get_history_offset(Friction::history_name);
     if (presliding_ == dembark::Presliding::partial_slip) rings_offset_ = Stock::get_history_offset(Friction::rings_name);
@@ -308,6 +310,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     step.wet = wet;
     step.limit_force = limit_force_;
     step.tangential_damping = tangential_damping_;
+    step.elastic_limit = friction_limit_ == dembark::FrictionLimit::elastic;
     step.pack_friction = pack_friction;
     step.rolls = rolling_model_ != dembark::RollingModel::off;
     step.frozen = pair->freeze_group_bit();

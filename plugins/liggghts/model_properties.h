@@ -152,7 +152,8 @@ auto for_all_pairs(const PropertyReader& read, Law law) {
   return laws;
 }
 
-inline PairTable<dembark::FinnieRabinowicz> read_friction(const PropertyReader& read, dembark::Presliding presliding) {
+inline PairTable<dembark::FinnieRabinowicz> read_friction(const PropertyReader& read, dembark::Presliding presliding,
+                                                          dembark::FrictionLimit friction_limit) {
   return for_all_pairs(read, [&](int i, int j, const std::string& pair) {
     dembark::FinnieRabinowicz law;
     law.static_friction = read.per_pair("staticFriction", i, j);
@@ -161,6 +162,7 @@ inline PairTable<dembark::FinnieRabinowicz> read_friction(const PropertyReader& 
     law.interface_shear_strength = read.per_pair("interfaceShearStrength", i, j, dembark::unlimited_strength);
     law.healing_time = read.scalar("healingTime", 0.0);
     law.presliding = presliding;
+    law.friction_limit = friction_limit;
     if (law.error()) read.fail(std::string(law.error()) + " (types " + pair + ")");
     return law;
   });

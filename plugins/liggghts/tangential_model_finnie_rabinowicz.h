@@ -2,7 +2,7 @@
 // the force.
 //
 //   pair_style gran model hertz tangential finnie_rabinowicz [presliding linear|exponential|partial_slip]
-//              [rolling_resistance off|constant_torque|elastic_plastic]
+//              [friction_limit total|elastic] [rolling_resistance off|constant_torque|elastic_plastic]
 //
 // Works compiled out of tree into liggghts-dembark and, unchanged, copied into a LIGGGHTS src/ folder.
 #ifdef TANGENTIAL_MODEL
@@ -35,7 +35,7 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
   int offset_;
   int rings_ = -1;  // offset, with partial slip
   int angle_ = -1;  // the same of an elastic-plastic rolling spring
-  int presliding_ = 0, rolling_model_ = 0;
+  int presliding_ = 0, friction_limit_ = 0, rolling_model_ = 0;
   dembark_liggghts::StockSums sums_;
   dembark_liggghts::PairTable<dembark::FinnieRabinowicz> laws_;
   dembark_liggghts::PairTable<dembark::RollingResistance> rolling_;
@@ -64,6 +64,7 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
 
   void registerSettings(Settings& settings) {
     dembark_liggghts::register_choice(settings, "presliding", presliding_, dembark::presliding_names());
+    dembark_liggghts::register_choice(settings, "friction_limit", friction_limit_, dembark::friction_limit_names());
     dembark_liggghts::register_choice(settings, "rolling_resistance", rolling_model_, dembark::rolling_names());
     sums_.register_in(settings, true);
   }
@@ -83,7 +84,8 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
 
   void connectToProperties(PropertyRegistry& registry) {
     const dembark_liggghts::PropertyReader read(registry, modify, error, "tangential finnie_rabinowicz");
-    laws_ = dembark_liggghts::read_friction(read, static_cast<dembark::Presliding>(presliding_));
+    laws_ = dembark_liggghts::read_friction(read, static_cast<dembark::Presliding>(presliding_),
+                                            static_cast<dembark::FrictionLimit>(friction_limit_));
     if (rolling_model() != dembark::RollingModel::off) {
       if (!matches("rolling_friction", "off"))
         read.fail("rolling_resistance and the model rolling_friction are both on; leave one of them out");
@@ -102,7 +104,7 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     if (d.contact_flags) *d.contact_flags |= CONTACT_TANGENTIAL_MODEL;
     const bool update_history = d.computeflag && d.shearupdate;
     const double dt = update_history ? update->dt : 0.0, radius = d.is_wall ? d.radi : d.radi * d.radj / d.radsum;
-    const dembark::NormalResponse<double> response{d.Fn, d.kt, d.gammat, dembark::pi * radius * d.deltan, d.kn};
+    const dembark::NormalResponse<double> response{d.Fn, d.kt, d.gammat, dembark::pi * radius * d.deltan, d.kn, d.kn * d.deltan};
     double* const history = d.contact_history + offset_;
     dembark::FrictionState<double> state = dembark_liggghts::load_friction(history);
     dembark::SlipRings rings;

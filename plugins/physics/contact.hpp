@@ -122,11 +122,12 @@ inline RelativeMotion relative_motion(const ContactBodies& b, const Vec3<double>
 inline Vec3<double> contact_friction(const FinnieRabinowicz& law, const Vec3<double>& normal, double twist,
                                      const NormalResponse<double>& response, const Vec3<double>& velocity, double dt,
                                      FrictionState<double>& state, SlipRings* rings) {
+  const double limiting = response.limiting_force(law.friction_limit == FrictionLimit::elastic);
   if (law.presliding == Presliding::partial_slip)
-    return partial_slip_step(law, normal, twist, response.force, response.tangential_stiffness, response.tangential_damping,
+    return partial_slip_step(law, normal, twist, limiting, response.tangential_stiffness, response.tangential_damping,
                              response.contact_area, velocity, dt, state, *rings);
   state.displacement = rotate_to_plane(state.displacement, normal, twist);
-  return friction_step(law, response.force, response.tangential_stiffness, response.tangential_damping, response.contact_area, velocity, dt,
+  return friction_step(law, limiting, response.tangential_stiffness, response.tangential_damping, response.contact_area, velocity, dt,
                        state);
 }
 

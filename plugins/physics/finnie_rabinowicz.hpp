@@ -22,7 +22,8 @@
 // Ingredients switch off: mu_k = mu_s gives Coulomb friction, tau_s >= unlimited_strength no saturation, and both together with
 // `linear` the law of LIGGGHTS's `tangential history`.
 //
-// Units SI. N is the repulsive force of the normal law (>= 0): adhesion acts through the larger overlap that it causes.
+// Units SI. N is the repulsive force of the normal law (>= 0), with its dash-pot or, with `friction_limit elastic`, of its spring alone.
+// With both, adhesion acts through the larger overlap that it causes.
 #pragma once
 
 #include <algorithm>
@@ -42,6 +43,11 @@ enum class Presliding { linear, exponential, partial_slip };
 /// Their names, in their order.
 inline std::vector<std::string> presliding_names() { return {"linear", "exponential", "partial_slip"}; }
 
+/// What N is: the normal force with its dash-pot, or that of the spring alone.
+enum class FrictionLimit { total, elastic };
+/// Their names, in their order.
+inline std::vector<std::string> friction_limit_names() { return {"total", "elastic"}; }
+
 struct FinnieRabinowicz {
   double static_friction = 0.5;                          ///< mu_s, >= mu_k
   double kinetic_friction = 0.5;                         ///< mu_k, >= 0
@@ -49,6 +55,7 @@ struct FinnieRabinowicz {
   double interface_shear_strength = unlimited_strength;  ///< tau_s, Pa, > 0
   double healing_time = 0.0;                             ///< s, >= 0; time constant of s -> 0 while the contact sticks; 0 = at once
   Presliding presliding = Presliding::linear;
+  FrictionLimit friction_limit = FrictionLimit::total;
 
   /// The one clear line about what is wrong with these parameters, or nullptr.
   const char* error() const {

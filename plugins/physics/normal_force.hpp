@@ -56,6 +56,10 @@ struct NormalResponse {
   Real tangential_damping;    ///< gamma_t, N s/m
   Real contact_area;          ///< pi R* delta, m^2: the apparent area of the Hertz contact
   Real normal_stiffness;      ///< S_n or k_n, N/m: what the spring's force grows with the overlap
+  Real elastic_force;         ///< N, of the spring alone, > 0
+
+  /// N of the friction law: with damping, or of the spring alone.
+  DEMBARK_HOT Real limiting_force(bool elastic) const { return elastic ? elastic_force : force; }
 };
 
 /// beta = ln e / sqrt(ln^2 e + pi^2), in (-1, 0].
@@ -85,8 +89,13 @@ DEMBARK_HOT NormalResponse<Real> hertz(const Parameters& p, Real effective_radiu
   const Real stiffness = 2.0 * p.effective_youngs_modulus * root;
   const Real k_t = 8.0 * p.effective_shear_modulus * root;
   const auto damping = -2.0 * sqrt_five_sixths * p.damping;
-  return {4.0 / 3.0 * p.effective_youngs_modulus * root * overlap - damping * sqrt(stiffness * effective_mass) * normal_velocity, k_t,
-          damping * sqrt(k_t * effective_mass), pi * effective_radius * overlap, stiffness};
+  const Real elastic = 4.0 / 3.0 * p.effective_youngs_modulus * root * overlap;
+  return {elastic - damping * sqrt(stiffness * effective_mass) * normal_velocity,
+          k_t,
+          damping * sqrt(k_t * effective_mass),
+          pi * effective_radius * overlap,
+          stiffness,
+          elastic};
 }
 
 /// `characteristic_velocity` v_c, m/s, > 0: impact speed at which the overlap equals that of Hertz.
@@ -99,7 +108,8 @@ inline NormalResponse<Real> hooke(const HertzParameters& p, double characteristi
   const Real k_n = 16.0 / 15.0 * rigidity *
                    pow(15.0 * effective_mass * characteristic_velocity * characteristic_velocity / (16.0 * rigidity), Real(0.2));
   const Real damping = -2.0 * p.damping * sqrt(effective_mass * k_n);
-  return {k_n * overlap - damping * normal_velocity, k_n, damping, pi * effective_radius * overlap, k_n};
+  const Real elastic = k_n * overlap;
+  return {elastic - damping * normal_velocity, k_n, damping, pi * effective_radius * overlap, k_n, elastic};
 }
 
 /// A response without what the user switched off: attraction by damping, or tangential damping.

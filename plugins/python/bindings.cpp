@@ -115,10 +115,14 @@ NB_MODULE(_physics, m) {
   nb::class_<FinnieRabinowicz>(m, "FinnieRabinowicz")
       .def("__init__",
            [](FinnieRabinowicz* self, double static_friction, double kinetic_friction, double critical_slip_distance,
-              double interface_shear_strength, double healing_time, const std::string& presliding) {
-             const FinnieRabinowicz law{static_friction,        kinetic_friction,
-                                        critical_slip_distance, interface_shear_strength,
-                                        healing_time,           option_of<Presliding>("presliding", presliding_names(), presliding)};
+              double interface_shear_strength, double healing_time, const std::string& presliding, const std::string& friction_limit) {
+             const FinnieRabinowicz law{static_friction,
+                                        kinetic_friction,
+                                        critical_slip_distance,
+                                        interface_shear_strength,
+                                        healing_time,
+                                        option_of<Presliding>("presliding", presliding_names(), presliding),
+                                        option_of<FrictionLimit>("friction_limit", friction_limit_names(), friction_limit)};
              if (law.error()) throw std::invalid_argument(law.error());
              new (self) FinnieRabinowicz(law);
            })
@@ -139,7 +143,7 @@ NB_MODULE(_physics, m) {
         for (std::size_t i = 0; i < n; ++i) {
           const Vec3<double> here{path(i, 0), path(i, 1), path(i, 2)};
           const double dt = time_step(i);
-          const NormalResponse<double> response{normal_force(i), stiffness(i), 0.0, area(i), 0.0};
+          const NormalResponse<double> response{normal_force(i), stiffness(i), 0.0, area(i), 0.0, normal_force(i)};
           const Vec3<double> t = contact_friction(law, normal, 0.0, response, (here - last) * (1.0 / dt), dt, state, &rings);
           last = here;
           force[3 * i] = -t.x;

@@ -22,6 +22,7 @@ CASES = {
     "approach": _shorter("approach, bridge, wall", 1200),
     "cycles": _shorter("cycles, wall", 2200),
     "exponential": replace(_shorter("cycles, wall", 1500), material=replace(ALL_OF_IT, presliding="exponential")),
+    "elastic limit": replace(_shorter("cycles, wall", 1500), material=replace(ALL_OF_IT, friction_limit="elastic", restitution=0.4)),
     "rolling spring": replace(_shorter("cycles, wall", 1500), material=replace(ALL_OF_IT, **SPRING)),
     "constant torque": replace(_shorter("cycles, wall", 1500), material=replace(ALL_OF_IT, **CONSTANT)),
     "sliding": _shorter("sliding, slow weakening", 1000),

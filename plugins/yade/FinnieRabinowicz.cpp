@@ -233,6 +233,7 @@ void Law2::postLoad(Law2&) {
 	int chosen = 0;
 	choose("normalLaw", normalLaw, ::dembark::normal_law_names(), normal);
 	choose("presliding", presliding, ::dembark::presliding_names(), path);
+	choose("frictionLimit", frictionLimit, ::dembark::friction_limit_names(), load);
 	choose("rollingResistance", rollingResistance, ::dembark::rolling_names(), rolling);
 	choose("capillaryModel", capillaryModel, models, chosen);
 	wet     = chosen > 0;
@@ -248,6 +249,7 @@ std::vector<::dembark::PairLaw<double>> Law2::forPacks(::dembark::PairStep& step
 	step.wet                = wet;
 	step.limit_force        = limited;
 	step.tangential_damping = damped;
+	step.elastic_limit      = load == ::dembark::FrictionLimit::elastic;
 	return kinds.laws(step.dt);
 }
 
@@ -301,8 +303,13 @@ void Law2::prepare(Phys& phys, const Body& body1, const Body& body2) {
 	p.characteristic_velocity = characteristicVelocity;
 	p.tangential_damping      = damped;
 	p.limit_force             = limited;
-	p.friction                = {phys.staticFriction,         phys.kineticFriction, phys.criticalSlipDistance,
-	                             phys.interfaceShearStrength, phys.healingTime,     path};
+	p.friction                = {phys.staticFriction,
+	                             phys.kineticFriction,
+	                             phys.criticalSlipDistance,
+	                             phys.interfaceShearStrength,
+	                             phys.healingTime,
+	                             path,
+	                             load};
 	if (rolling != ::dembark::RollingModel::off && !phys.rolls)
 		fail(law2 + "rollingResistance='" + rollingResistance + "' needs " + ip2 +
 		     "rollingFriction; give it a number or a MatchMaker");

@@ -175,6 +175,7 @@ public:
 		((string,normalLaw,"hertz",Attr::triggerPostLoad,"'hertz' or 'hooke'"))
 		((Real,characteristicVelocity,NaN,Attr::triggerPostLoad,"Impact speed [m/s] at which the overlap of 'hooke' equals that of 'hertz'. Required for 'hooke'."))
 		((string,presliding,"linear",Attr::triggerPostLoad,"Tangential force before gross slip: 'linear', 'exponential' or 'partial_slip'"))
+		((string,frictionLimit,"total",Attr::triggerPostLoad,"Normal force that limits friction: 'total', with its damping, or 'elastic', of its spring alone"))
 		((string,rollingResistance,"off",Attr::triggerPostLoad,"Couple against rolling: 'off', 'constant_torque' or 'elastic_plastic'"))
 		((string,capillaryModel,"none",Attr::triggerPostLoad,"'none', or the force law of a bridge: 'exact', 'willett', 'willett_full', 'rabinovich', 'bagheri', 'constant'"))
 		((bool,carriedLiquid,false,Attr::triggerPostLoad,"Bridges take their liquid from the bodies and give it back; needs the engine :yref:`CapillaryLiquid` after the :yref:`InteractionLoop`"))
@@ -201,6 +202,7 @@ private:
 
 	::dembark::NormalLaw        normal  = ::dembark::NormalLaw::hertz;
 	::dembark::Presliding       path    = ::dembark::Presliding::linear;
+	::dembark::FrictionLimit    load    = ::dembark::FrictionLimit::total;
 	::dembark::RollingModel     rolling = ::dembark::RollingModel::off;
 	bool                        wet     = false;
 	::dembark::capillary::Model model   = ::dembark::capillary::Model::exact;
@@ -215,3 +217,4 @@ REGISTER_SERIALIZABLE(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz);
 }  // namespace yade
 
 DEMBARK_SAVED_FORMAT(FinnieRabinowiczPhys, 1)
+DEMBARK_SAVED_FORMAT(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz, 1)

@@ -35,8 +35,9 @@ def test_the_deck_runs_as_it_is(tmp_path, deck):
 @pytest.mark.parametrize(("old", "new", "words"), [
     ("normal hertz", "normal linear", ("pair_style dembark/granular", "normal 'linear'", "hertz or hooke")),
     ("normal hertz", "normal hooke -1", ("characteristic velocity > 0",)),
-    ("normal hertz", "normals hertz", ("'normals' is unknown", "presliding, rolling_resistance, capillary_model")),
+    ("normal hertz", "normals hertz", ("'normals' is unknown", "presliding, friction_limit, rolling_resistance, capillary_model")),
     ("presliding linear", "presliding bent", ("presliding 'bent'", "linear, exponential or partial_slip")),
+    ("presliding linear", "friction_limit viscous", ("friction_limit 'viscous'", "total or elastic")),
     ("healing_time 0.0", "healing_time soon", ("healing_time needs a number, not 'soon'",)),
     ("surface_tension 0.072", "surface_tension -1", ("surface_tension", ">= 0 and finite")),
     ("surface_tension 0.072", "", ("capillary_model needs surface_tension",)),

@@ -18,7 +18,8 @@ def frames(folder, ranks=1, deck=DECK, **words) -> np.ndarray:
     return np.stack(tables)
 
 
-@pytest.mark.parametrize("settings", ["", "limitForce on", "tangential_damping off", "presliding exponential", "presliding partial_slip"])
+@pytest.mark.parametrize("settings", ["", "limitForce on", "tangential_damping off", "presliding exponential", "presliding partial_slip",
+                                      "friction_limit elastic", "friction_limit elastic presliding partial_slip"])
 @pytest.mark.parametrize("cohesion", ["", "cohesion capillary"])
 def test_same_motion_as_in_the_engines_loop(tmp_path, cohesion, settings):
     ours = frames(tmp_path / "ours", cohesion=cohesion, rolling="", settings=settings)

@@ -225,6 +225,7 @@ inline std::string settings_error(const Settings& s) {
     const std::string which = "materials " + std::to_string(k / n) + " and " + std::to_string(k % n) + ": ";
     if (p.friction.error()) return which + p.friction.error();
     if (p.friction.presliding == Presliding::partial_slip) return which + "partial slip is that of spheres, logs have none";
+    if (p.friction.friction_limit != FrictionLimit::total) return which + "friction of logs is limited by the total normal force";
     must(ratio > 0.0 && std::isfinite(ratio), which + "tangential stiffness ratio must be > 0", ratio);
     must(p.contact_damping >= 0.0 && std::isfinite(p.contact_damping), which + "contact damping must be >= 0 N s/m and finite",
          p.contact_damping);

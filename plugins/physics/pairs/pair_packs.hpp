@@ -105,10 +105,10 @@ __attribute__((noinline)) void scalar_friction(const PairStep& s, const PairBloc
   for (int k = 0; k < P::size; ++k) {
     if (!(rest >> k & 1)) continue;
     const auto lane = [k](const PackVec<P>& v) { return Vec3<double>{v.x[k], v.y[k], v.z[k]}; };
-    const Vec3<double> force = s.scalar.friction(
-        b, first + k, lane(normal), twist[k],
-        {response.force[k], response.tangential_stiffness[k], response.tangential_damping[k], response.contact_area[k], 0.0},
-        lane(velocity));
+    const Vec3<double> force = s.scalar.friction(b, first + k, lane(normal), twist[k],
+                                                 {response.force[k], response.tangential_stiffness[k], response.tangential_damping[k],
+                                                  response.contact_area[k], 0.0, response.elastic_force[k]},
+                                                 lane(velocity));
     tangential.x.lanes[k] = force.x;
     tangential.y.lanes[k] = force.y;
     tangential.z.lanes[k] = force.z;
@@ -143,13 +143,13 @@ struct Slip {
   FrictionState<P> moved{};
 };
 template <class P>
-__attribute__((noinline)) Slip<P> slip_of(const PairLaw<P>& law, const NormalResponse<P>& response, const PackVec<P>& increment,
+__attribute__((noinline)) Slip<P> slip_of(const PairLaw<P>& law, const P& limiting_force, const P& stiffness, const PackVec<P>& increment,
                                           const LaneMask<P>& unsure, const FrictionState<P>& state) {
   // Bounded, which what is no number is not.
   const auto plain = unsure & !(law.interface_shear_strength < unlimited_strength) &
-                     (response.tangential_stiffness * dot(state.displacement, state.displacement) < P(INFINITY));
+                     (stiffness * dot(state.displacement, state.displacement) < P(INFINITY));
   Slip<P> found;
-  found.slips = coulomb_slip(law, response.force, response.tangential_stiffness, increment, plain, state, found.moved);
+  found.slips = coulomb_slip(law, limiting_force, stiffness, increment, plain, state, found.moved);
   found.sticks = bits(plain & !found.slips);
   return found;
 }
@@ -164,8 +164,8 @@ DEMBARK_HOT void replace(const LaneMask<P>& which, PackVec<P>& old, const PackVe
 /// has changed.
 template <class P>
 DEMBARK_HOT unsigned partial_slip(const PairStep& s, const PairBlock& b, int first, unsigned there, const PairLaw<P>& law,
-                                  const PackVec<P>& normal, const P& twist, const PackVec<P>& velocity, NormalResponse<P>& response,
-                                  FrictionState<P>& state, P& kept_slip) {
+                                  const PackVec<P>& normal, const P& twist, const PackVec<P>& velocity, const P& limiting_force,
+                                  NormalResponse<P>& response, FrictionState<P>& state, P& kept_slip) {
   constexpr int N = P::size;
   typedef SlipRings Rings;
   constexpr int axis = offsetof(Rings, axis) / 8, radius = offsetof(Rings, radius) / 8;
@@ -180,14 +180,14 @@ DEMBARK_HOT unsigned partial_slip(const PairStep& s, const PairBlock& b, int fir
   // Lane by lane from here on: a lane's rings are a pack of their own.
   alignas(64) double motion[sizeof step.motion / sizeof(P)][N], limit[N], slip[N], slides[N] = {}, sums[3][N] = {}, frame[N][4], reach[N];
   __builtin_memcpy(motion, &step.motion, sizeof motion);
-  first_limit(law, response.force).store(limit);
+  first_limit(law, limiting_force).store(limit);
   state.slip.store(slip);
   step.radius.store(reach);
   store_rows(Quad<P>{step.axis.x, step.axis.y, step.axis.z, old.w}, [&frame](int k) { return frame[k]; });
   const auto other_limit = (state.slip > 0.0) | (law.interface_shear_strength < unlimited_strength);
   for (unsigned rest = bits(other_limit) & served; rest != 0; rest &= rest - 1) {
     const int k = __builtin_ctz(rest);
-    limit[k] = s.memory->limit(b, first + k, response.force[k], response.contact_area[k], slip[k]);
+    limit[k] = s.memory->limit(b, first + k, limiting_force[k], response.contact_area[k], slip[k]);
   }
   for (int k = 0; k < N; ++k) {
     if (!(served >> k & 1)) continue;
@@ -196,7 +196,7 @@ DEMBARK_HOT unsigned partial_slip(const PairStep& s, const PairBlock& b, int fir
     RingSums found;
     while (move_rings<P>(lane, limit[k], slides[k] > 0.0, rings, rings + Rings::count, found)) {
       slides[k] = 1.0;
-      limit[k] = s.memory->sliding_limit(b, first + k, lane, rings, response.force[k], response.contact_area[k], slip[k]);
+      limit[k] = s.memory->sliding_limit(b, first + k, lane, rings, limiting_force[k], response.contact_area[k], slip[k]);
     }
     sums[0][k] = found.along, sums[1][k] = found.across, sums[2][k] = found.lost;
     __builtin_memcpy(rings + axis, frame[k], sizeof frame[k]);
@@ -269,6 +269,7 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
     NormalResponse<P> response =
         adjusted(hertz<PairLaw<P>, P>(law, radius_i * radius_j / radius_sum, reduced_mass, overlap, motion.normal_velocity), s.limit_force,
                  s.tangential_damping);
+    const P limiting_force = response.limiting_force(s.elastic_limit);
 
     const auto history = [=, &b, &s](int k) { return b.history[first + k] + s.offset; };
     const P dt = s.dt, twist = contact_twist<P>(normal, omega_i, omega_j, dt);
@@ -281,15 +282,16 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
       const PackVec<P> increment = motion.tangential_velocity * dt;
       state.displacement = rotate_to_plane<P>(state.displacement, normal, twist);
       state.displacement += increment;
-      const auto sticks = plainly_sticks(law, response.force, response.tangential_stiffness, response.contact_area, state);
+      const auto sticks = plainly_sticks(law, limiting_force, response.tangential_stiffness, response.contact_area, state);
       served = bits(sticks);
       if (s.pack_friction && there & ~served & ~apart) {
-        slip = slip_of<P>(law, response, increment, touching & !sticks, state);
+        slip = slip_of<P>(law, limiting_force, response.tangential_stiffness, increment, touching & !sticks, state);
         slipping = bits(slip.slips);
         served |= slip.sticks | slipping;
       }
     } else if (s.pack_friction) {
-      served = partial_slip<P>(s, b, first, there & ~apart, law, normal, twist, motion.tangential_velocity, response, state, kept_slip);
+      served = partial_slip<P>(s, b, first, there & ~apart, law, normal, twist, motion.tangential_velocity, limiting_force, response, state,
+                               kept_slip);
     }
     PackVec<P> tangential =
         sticking_force<P>(response.tangential_stiffness, response.tangential_damping, motion.tangential_velocity, dt, kept_slip, state);

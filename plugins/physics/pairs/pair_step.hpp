@@ -92,7 +92,8 @@ struct PairStep {
   int more = -1, more_numbers = 0;        ///< of partial slip and of a rolling spring together; -1: there is neither
   double dt = 0.0;
   bool wet = false, limit_force = false, tangential_damping = true;
-  bool pack_friction = true;  ///< false leaves all friction to the scalar law
+  bool elastic_limit = false;  ///< FrictionLimit::elastic, of all laws
+  bool pack_friction = true;   ///< false leaves all friction to the scalar law
   bool rolls = false;
 
   const double *x = nullptr, *v = nullptr, *omega = nullptr, *radius = nullptr, *mass = nullptr;

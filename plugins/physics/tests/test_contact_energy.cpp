@@ -110,6 +110,7 @@ TEST_CASE("works of all parts of a contact balance the kinetic energy to round-o
               ContactParameters p = parameters(restitution, friction, viscosity >= 0.0, viscosity);
               p.normal_law = law;
               p.friction.presliding = path;
+              p.friction.friction_limit = law == NormalLaw::hertz ? FrictionLimit::elastic : FrictionLimit::total;
               const Account a = impact(p, dt);
               CHECK(std::abs(a.total) > 1e-9 * a.scale);
               CHECK(a.worst < 1e-12 * a.scale);

@@ -122,6 +122,7 @@ struct Scene : ScalarLaws, ScalarMemory {
     s.wet = layout.bridge;
     s.limit_force = law.limit_force;
     s.tangential_damping = law.tangential_damping;
+    s.elastic_limit = law.friction.friction_limit == FrictionLimit::elastic;
     s.pack_friction = law.friction.presliding != Presliding::exponential;
     s.rolls = law.rolling.on();
     s.x = x.data(), s.v = v.data(), s.omega = omega.data(), s.radius = radius.data(), s.mass = mass.data();
@@ -213,6 +214,7 @@ Scene random_scene(std::mt19937& random, int count) {
   s.law.friction.healing_time = random() % 2 ? 0.0 : 1e-4;
   if (random() % 4 == 0) s.law.friction.interface_shear_strength = 1e3;
   s.law.friction.presliding = Presliding(random() % 3);
+  s.law.friction.friction_limit = FrictionLimit(random() % 2);
   s.law.limit_force = random() % 2;
   s.law.tangential_damping = random() % 2;
   if (random() % 2) s.law.rolling = {random() % 2 ? RollingModel::constant_torque : RollingModel::elastic_plastic, 0.1, 0.3};

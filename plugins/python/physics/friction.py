@@ -36,6 +36,8 @@ class FinnieRabinowicz:
     interface_shear_strength : tau_s, Pa, > 0; inf = unlimited (Coulomb)
     presliding : 'linear' (T = k_t u up to the limit), 'exponential' (T = T_max (1 - exp(-k_t u / T_max)), Dahl) or 'partial_slip' (a
         Hertzian contact whose rim slips first; Mindlin and Deresiewicz, with the loading history)
+    friction_limit : what limits friction in a contact, N above: 'total', the normal force with its dashpot, or 'elastic', that of its
+        spring alone; `drive` and `follow` are given N
     healing_time : s, time constant with which a contact that sticks forgets its slip; 0 = at once
 
     >>> law = FinnieRabinowicz(static_friction=0.5, kinetic_friction=0.4, critical_slip_distance=1e-5, interface_shear_strength=np.inf)
@@ -49,6 +51,7 @@ class FinnieRabinowicz:
     interface_shear_strength: float = np.inf
     presliding: str = "linear"
     healing_time: float = 0.0
+    friction_limit: str = "total"
     _law: _physics.FinnieRabinowicz = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -56,7 +59,8 @@ class FinnieRabinowicz:
             numbers(name, getattr(self, name), "", infinite=name == "interface_shear_strength")
         object.__setattr__(self, "_law", _physics.FinnieRabinowicz(
             float(self.static_friction), float(self.kinetic_friction), float(self.critical_slip_distance),
-            float(self.interface_shear_strength), float(self.healing_time), self.presliding))
+            float(self.interface_shear_strength), float(self.healing_time), self.presliding,
+            self.friction_limit))
 
     def friction_coefficient(self, slip: ArrayLike) -> NDArray[np.float64] | float:
         """mu(s) for the slip s (m, >= 0)."""

@@ -143,6 +143,8 @@ def _law(friction: Friction) -> FinnieRabinowicz:
     if isinstance(friction, FinnieRabinowicz):
         if friction.presliding == "partial_slip":
             raise ValueError("presliding of logs must be 'linear' or 'exponential': partial slip is that of spheres")
+        if friction.friction_limit != "total":
+            raise ValueError("friction_limit of logs must be 'total'")
         return friction
     mu = float(numbers("friction", 0.0 if friction is None else friction, "", low=0.0))
     return FinnieRabinowicz(static_friction=mu, kinetic_friction=mu, critical_slip_distance=0.0)

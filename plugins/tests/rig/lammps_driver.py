@@ -37,6 +37,7 @@ def run_deck(folder: Path, deck: str, *, ranks: int = 1, name: str = "case.in") 
 def settings(m: Material) -> str:
     """The words of `pair_style`."""
     words = ["normal", m.normal_law, *([repr(m.characteristic_velocity)] if m.normal_law == "hooke" else []), "presliding", m.presliding,
+             "friction_limit", m.friction_limit,
              "rolling_resistance", m.rolling_resistance, "healing_time", repr(m.healing_time)]
     if m.bridge_volume > 0.0:
         words += ["capillary_model", m.capillary_model, "surface_tension", repr(m.surface_tension)]

@@ -28,7 +28,8 @@ def contact(m: Material) -> Contact:
         rolling=RollingResistance(model=m.rolling_resistance, friction=m.rolling_friction, damping_ratio=m.rolling_damping_ratio),
         friction=FinnieRabinowicz(
             static_friction=m.static_friction, kinetic_friction=m.kinetic_friction, critical_slip_distance=m.critical_slip_distance,
-            interface_shear_strength=m.interface_shear_strength, presliding=m.presliding, healing_time=m.healing_time))
+            interface_shear_strength=m.interface_shear_strength, presliding=m.presliding, friction_limit=m.friction_limit,
+            healing_time=m.healing_time))
 
 
 def prescribed(case: Scenario) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

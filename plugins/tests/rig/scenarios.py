@@ -29,6 +29,7 @@ class Material:
     interface_shear_strength: float = inf
     healing_time: float = 0.0
     presliding: str = "linear"
+    friction_limit: str = "total"
     rolling_resistance: str = "off"
     rolling_friction: float = 0.0
     rolling_damping_ratio: float = 0.0
@@ -247,6 +248,7 @@ def _all() -> dict[str, Scenario]:
     undamped = replace(DRY, restitution=1.0)
     strong = replace(DRY, interface_shear_strength=2e4)
     partial = replace(DRY, presliding="partial_slip")
+    elastic = replace(DRY, friction_limit="elastic", restitution=0.4)
     rolling, constant = replace(DRY, **SPRING), replace(DRY, **CONSTANT)
     rolling_cycles = _cycles("cycles, rolling spring", rolling)
     linear = _cycles("cycles, linear, limited strength", strong)
@@ -297,6 +299,11 @@ def _all() -> dict[str, Scenario]:
         _collision("collision, unequal", strong, 0.6),
         _collision("collision, exponential", replace(strong, presliding="exponential"), 0.6),
         _collision("collision, partial slip", replace(strong, presliding="partial_slip"), 0.6),
+        *(_collision(f"collision, elastic limit{more}", replace(elastic, **change), 0.6) for more, change in (
+            ("", {}), (", exponential", {"presliding": "exponential"}), (", partial slip", {"presliding": "partial_slip"}),
+            (", hooke", {"normal_law": "hooke", "characteristic_velocity": 0.5}))),
+        _collision("collision, elastic limit, wet", replace(ALL_OF_IT, friction_limit="elastic"), 0.6),
+        _drop("drop, elastic limit", replace(elastic, interface_shear_strength=2e4)),
         _collision("collision, partial slip, viscous", replace(ALL_OF_IT, viscosity=0.05, presliding="partial_slip"), 0.6),
         loaded(partial).spinning((1.0, 2.0, 2.0), 200.0, "loaded, partial slip, rigidly rotating"),
         _collision("collision, rolling spring", replace(strong, **SPRING), 0.6),

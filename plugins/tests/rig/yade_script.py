@@ -105,7 +105,8 @@ def run(case, arrays):
             [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**laws)],
             [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(
                 normalLaw=m["normal_law"], characteristicVelocity=m["characteristic_velocity"], presliding=m["presliding"],
-                rollingResistance=m["rolling_resistance"], capillaryModel=m["capillary_model"] if wet else "none")]),
+                frictionLimit=m["friction_limit"], rollingResistance=m["rolling_resistance"],
+                capillaryModel=m["capillary_model"] if wet else "none")]),
         NewtonIntegrator(damping=0, gravity=gravity),
     ]
     O.dt = case["time_step"]

@@ -86,6 +86,11 @@ def partial_slip(kind):
 
 
 @both
+def elastic_limit(kind):
+    return left(*settled(kind, {}, {"frictionLimit": "elastic"}))
+
+
+@both
 def carried(kind):
     """With liquid that is exchanged."""
     return left(*settled(kind, {"surfaceTension": 0.072, "contactAngle": 0.35}, {"capillaryModel": "willett", "carriedLiquid": True},

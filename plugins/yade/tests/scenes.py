@@ -259,6 +259,7 @@ def messages():
     return [refusal(wrong) for wrong in (
         lambda: Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(normalLaw="herz"),
         lambda: Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding="bent"),
+        lambda: Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(frictionLimit="viscous"),
         lambda: Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(capillaryModel="wet"),
         lambda: CylinderWall(radius=-1.0), lambda: CylinderWall(radius=1, axis=(0, 0, 0)))]
 

@@ -160,6 +160,7 @@ def test_wrong_words_name_attribute_and_choices(found):
     said = found["messages"]
     for message, parts in zip(said, (("normalLaw", "'herz'", "hertz or hooke"),
                                      ("presliding", "'bent'", "linear, exponential, partial_slip"),
+                                     ("frictionLimit", "'viscous'", "total or elastic"),
                                      ("capillaryModel", "'wet'", "none, exact"), ("CylinderWall.radius", "> 0 m"),
                                      ("CylinderWall.axis", "not zero")), strict=True):
         assert message.startswith("dembark: ") and "\n" not in message

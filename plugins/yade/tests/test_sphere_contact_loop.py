@@ -2,7 +2,7 @@
 
 import pytest
 
-SCENES = ("dry", "wet", "partial_slip", "carried", "periodic", "odd_bodies", "changed_on_the_way", "many_laws",
+SCENES = ("dry", "wet", "partial_slip", "elastic_limit", "carried", "periodic", "odd_bodies", "changed_on_the_way", "many_laws",
           "saved")
 
 

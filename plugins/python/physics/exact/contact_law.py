@@ -1,8 +1,9 @@
 """The contact law in single impacts, written down again without the project's headers: solved by an integration that resolves touch and
 release, and in the engines' scheme at their step.
 
-The law: F = 4/3 E* sqrt(R* d) d - gamma_n v_n, T = -k_t xi - gamma_t v_t while it sticks and |T| = mu max(F, 0) once k_t |xi| reaches
-that, k_t = 8 G* sqrt(R* d), gamma = -2 sqrt(5/6) beta sqrt(S m*) with S = 2 E* sqrt(R* d) or k_t, lever arms r - d/2.
+The law: F = 4/3 E* sqrt(R* d) d - gamma_n v_n, T = -k_t xi - gamma_t v_t while it sticks and |T| = mu max(N, 0) once k_t |xi| reaches
+that, k_t = 8 G* sqrt(R* d), gamma = -2 sqrt(5/6) beta sqrt(S m*) with S = 2 E* sqrt(R* d) or k_t, lever arms r - d/2. N is F or, where
+the elastic force limits friction, F without its damping.
 """
 
 from __future__ import annotations
@@ -47,8 +48,10 @@ class _Law:
         arm = np.where(self.arm > 0.0, self.arm - 0.5 * overlap, 0.0)
         vn, vt = vy * ny + vz * nz, vy * nz - vz * ny + (arm * state[8:10]).sum(axis=0)
         stiffness, k_t = 2.0 * one.e_star * root, 8.0 * one.g_star * root
-        force = 4.0 / 3.0 * one.e_star * root * inside - self.damping * np.sqrt(stiffness) * vn
-        limit, trial = one.friction * np.maximum(force, 0.0), state[10] + vt * step
+        spring = 4.0 / 3.0 * one.e_star * root * inside
+        force = spring - self.damping * np.sqrt(stiffness) * vn
+        load = spring if one.friction_limit == "elastic" else np.maximum(force, 0.0)
+        limit, trial = one.friction * load, state[10] + vt * step
         # Without a pressing force there is no friction, and no damping either.
         slips = (k_t * np.abs(trial) > limit * (1.0 - 1e-12)) | (limit <= 0.0)
         friction = np.where(slips, -np.copysign(limit, trial), -k_t * trial - self.damping * np.sqrt(k_t) * vt)

@@ -22,7 +22,8 @@ HERTZ_TIME = 4.0 * math.sqrt(math.pi) * gamma(0.4) / (5.0 * gamma(0.9))
 @dataclass(frozen=True)
 class Impacts:
     """n impacts, in SI units. (n,): material constants `e_star`, `g_star`, `restitution`, `friction`. (2, n), of the sphere and of its
-    partner: `radius` and `mass`, inf for a plane; before the impact the velocities along y and z (`slide`, `normal`) and `spin`."""
+    partner: `radius` and `mass`, inf for a plane; before the impact the velocities along y and z (`slide`, `normal`) and `spin`.
+    `friction_limit`: "total" or "elastic", see FinnieRabinowicz."""
 
     e_star: Array
     g_star: Array
@@ -33,6 +34,7 @@ class Impacts:
     slide: Array
     normal: Array
     spin: Array
+    friction_limit: str = "total"
 
     def __len__(self) -> int:
         return len(self.e_star)

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from dembark.physics import (
     Body,
@@ -15,6 +17,7 @@ from dembark.physics import (
     effective_youngs_modulus,
     rupture_distance,
 )
+from dembark.physics.contact import ContactForce
 
 ELASTIC = (1e7, 0.3, 1e7, 0.3)
 ROUGH = FinnieRabinowicz(static_friction=0.5, kinetic_friction=0.5, critical_slip_distance=1e-5)
@@ -148,3 +151,25 @@ def test_bad_bodies(change, words):
 def test_bad_settings(settings, words):
     with pytest.raises(ValueError, match=words):
         drop(CONTACT, ONE, **{"time_step": 1e-6, "steps": 5} | settings)
+
+
+@settings(max_examples=20, deadline=None)
+@given(restitution=st.floats(0.1, 1.0), speed=st.floats(0.05, 2.0), normal_law=st.sampled_from(["hertz", "hooke"]),
+       presliding=st.sampled_from(["linear", "partial_slip"]), volume=st.sampled_from([0.0, 1e-10]))
+def test_friction_limit_is_that_of_the_chosen_normal_force(restitution, speed, normal_law, presliding, volume):
+    """A grain with a fast tangential motion slides from touch to release: T = mu N at each step, with N of the spring alone or of spring
+    and dashpot; a bridge is in neither."""
+    for limit in ("elastic", "total"):
+        contact = replace(CONTACT, restitution=restitution, normal_law=normal_law, bridge_volume=volume, surface_tension=0.072,
+                          friction=replace(ROUGH, friction_limit=limit, presliding=presliding))
+        spring = replace(contact, restitution=1.0)
+        body = Body(radius=RADIUS, mass=MASS, position=(0.0, 0.0, RADIUS + 1e-9), velocity=(50.0, 0.0, -speed))
+        motion = drop(contact, body, time_step=2e-6, steps=120, gravity=(0.0, 0.0, 0.0))
+        touching = [k for k, step in enumerate(motion.contacts) if step.overlap > 0.0]
+        assert len(touching) > 40
+        for k in touching[2::20]:
+            step = motion.contacts[k]
+            at_rest = spring.begin().step((0.0, 0.0, RADIUS - step.overlap), *[(0.0, 0.0, 0.0)] * 4, RADIUS, np.inf, MASS, np.inf, 2e-6,
+                                          True)
+            load = ContactForce(*at_rest).normal_force if limit == "elastic" else max(step.normal_force, 0.0)
+            assert step.tangential[0] == pytest.approx(-0.5 * load, rel=1e-9, abs=1e-12)

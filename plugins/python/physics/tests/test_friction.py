@@ -218,6 +218,7 @@ def test_a_long_path_needs_memory_for_its_points_alone():
     ({"healing_time": -1.0}, "healing time"),
     ({"healing_time": np.nan}, "healing_time"),
     ({"static_friction": np.inf}, "static_friction"),
+    ({"friction_limit": "viscous"}, "'total' or 'elastic'"),
     ({"presliding": "curved"}, "'linear' or 'exponential' or 'partial_slip'"),
 ])
 def test_bad_parameters(change, words):

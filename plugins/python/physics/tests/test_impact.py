@@ -190,6 +190,8 @@ def test_in_space():
     (lambda: ImpactSystem(1.0, 0.1, [[0.0, 1.0]], friction=-1.0), "friction"),
     (lambda: ImpactSystem(1.0, 0.1, [[0.0, 1.0]], friction=FinnieRabinowicz(
         static_friction=0.5, kinetic_friction=0.5, critical_slip_distance=0.0, presliding="partial_slip")), "presliding of logs"),
+    (lambda: ImpactSystem(1.0, 0.1, [[0.0, 1.0]], friction=FinnieRabinowicz(
+        static_friction=0.5, kinetic_friction=0.5, critical_slip_distance=0.0, friction_limit="elastic")), "friction_limit of logs"),
     (lambda: ImpactSystem(1.0, 0.1, [[0.0, 1.0]], walls=[Plane(point=(0, 0), normal=(0, 0))]), "normal must not be zero"),
     (lambda: ImpactSystem(1.0, 0.1, [[0.0, 1.0]]).run(1.0, 0.0), "dt must be > 0 s"),
 ])
