@@ -1,19 +1,22 @@
-"""Prints the table of docs/single_impacts.md, which has the commands: Kharaz et al. (2001) beside this project and other codes."""
+"""Prints the two tables of docs/single_impacts.md, which has the commands: Kharaz et al. (2001), this project and other codes."""
 
 from __future__ import annotations
 
 import csv
 import math
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
-from dembark.validation.judge.result import METRICS, ComparedRecord, read
+from dembark.validation.judge.result import METRICS, ComparedRecord, Result, read
 
 REFERENCE = Path(__file__).resolve().parents[1] / "input_decks/oblique_impact/reference"
+LAWS = ("partial_slip", "linear")
 QUANTITIES = {"tangential_restitution": ("e_t", "{:.3f}"), "spin": ("spin (rad/s)", "{:.0f}"),
               "centre_angle": ("rebound angle, centre (°)", "{:.1f}"), "contact_angle": ("rebound angle, point of contact (°)", "{:.1f}")}
+VERDICTS = {"pass": "pass", "fail": "**fails**", "info": "open"}
 
 
 def others(quantity: str, angle: float) -> dict[str, float]:
@@ -29,33 +32,40 @@ def others(quantity: str, angle: float) -> dict[str, float]:
 
 
 def main(results: Path) -> None:
-    """The table of the results in `results`, the folder of a profile."""
-    of_engine, linear = ([read(path) for path in sorted((results / "oblique_impact" / f"study-{study}").glob(f"*/{METRICS}"))]
-                         for study in ("partial_slip", "linear"))
-    head = ("quantity", "at", "experiment", "LIGGGHTS", "YADE", "E ± U_val", "E ± U_val, `linear`", "allowed", "nearest other code")
-    print(f"| {' | '.join(head)} |", "|" + len(head) * "---|", sep="\n")
+    """The tables of the results in `results`, the folder of a profile."""
+    studies = {law: read(results / "oblique_impact" / f"study-{law}" / "liggghts" / METRICS) for law in LAWS}
+    checks = [one for one in studies[LAWS[0]].quantities if one.tolerance is not None]
+    table(("judged", "allowed", *(f"`{law}`" for law in LAWS)), (_judged(one, studies) for one in checks))
     with (REFERENCE / "kharaz_2001.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
+    table(("quantity", "at", "experiment", *(f"`{law}`" for law in LAWS), "nearest other code"),
+          (_point(row["quantity"], float(row["angle"]), studies) for row in rows))
+
+
+def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
+    """In Markdown."""
+    cells = tuple(head)
+    print(f"\n| {' | '.join(cells)} |", "|" + len(cells) * "---|", sep="\n")
     for row in rows:
-        quantity, angle = row["quantity"], float(row["angle"])
-        label, digits = QUANTITIES[quantity]
-        known = [one for each in of_engine if (one := each.find(f"{quantity}_{angle:.0f}"))]
-        due = float(row["value"])
-        near = min(others(quantity, angle).items(), key=lambda entry: abs(entry[1] - due), default=None)
-        one, datum_half = known[0], _half(known[0].reference_interval)
-        allowed = None if one.tolerance is None else one.tolerance * (due if one.deviation_kind == "relative" else 1.0)
-        cells = [label, f"{angle:.1f}°", f"{digits.format(due)} ± {digits.format(datum_half)}",
-                 *(f"{digits.format(each.value)} ± {digits.format(each.half)}" for each in known),
-                 *(_error(each, due, datum_half, digits) for each in (one, linear[0].find(one.name)) if each),
-                 "–" if allowed is None else digits.format(allowed),
-                 "–" if near is None else f"{digits.format(near[1])}, {near[0]}"]
-        print(f"| {' | '.join(cells)} |".replace("| -", "| −").replace("**-", "**−"))
+        print(f"| {' | '.join(row)} |".replace("| -", "| −"))
 
 
-def _error(one: ComparedRecord, due: float, datum_half: float, digits: str) -> str:
-    """E ± U_val, bold where the check fails."""
-    shown = f"{digits.format((one.value or 0.0) - due)} ± {digits.format(math.hypot(one.half or 0.0, datum_half))}"
-    return f"**{shown}**" if one.verdict == "fail" else shown
+def _judged(one: ComparedRecord, studies: dict[str, Result]) -> list[str]:
+    digits = next((QUANTITIES[name][1] for name in ("centre_angle", "contact_angle") if one.name.startswith(name)), "{:.3f}")
+    found = [same for law in LAWS if (same := studies[law].find(one.name))]
+    return [one.label, digits.format(one.tolerance), *(
+        f"{digits.format(each.value)} ± {digits.format(math.hypot(each.half or 0.0, _half(each.reference_interval)))}, "
+        f"{VERDICTS[each.verdict]}" for each in found)]
+
+
+def _point(quantity: str, angle: float, studies: dict[str, Result]) -> list[str]:
+    label, digits = QUANTITIES[quantity]
+    known = [one for law in LAWS if (one := studies[law].find(f"{quantity}_{angle:.0f}"))]
+    due, half = known[0].reference or 0.0, _half(known[0].reference_interval)
+    near = min(others(quantity, angle).items(), key=lambda entry: abs(entry[1] - due), default=None)
+    return [label, f"{angle:.1f}°", f"{digits.format(due)} ± {digits.format(half)}",
+            *(f"{digits.format(one.value)} ± {digits.format(one.half)}" for one in known),
+            "–" if near is None else f"{digits.format(near[1])}, {near[0]}"]
 
 
 def _half(interval: tuple[float, float] | None) -> float:

@@ -4,13 +4,14 @@ beside a datum."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dembark.postproc.convergence import SAFETY_UNSEEN_ORDER, convergence
 from dembark.postproc.statistics import Estimate, combined
 
 Array = NDArray[np.float64]
@@ -56,6 +57,13 @@ def compared(value: float, datum: Estimate, **parts: float) -> Comparison:
     joint = math.hypot(*every.values())
     listed = ", ".join(f"U_{name} = {part:.2g}" for name, part in every.items())
     return Comparison(error, joint, f"E = {error:.3g} {'exceeds' if abs(error) > joint else 'is within'} U_val = {joint:.2g}; {listed}")
+
+
+def numerical(sizes: Sequence[float], values: Sequence[float]) -> float:
+    """U_num of the value at the finest of the refinements `sizes`; where no order shows, three times the range of `values` (L. Eça,
+    M. Hoekstra, J. Comput. Phys. 262 (2014) 104)."""
+    found = convergence(sizes, values).uncertainty
+    return SAFETY_UNSEEN_ORDER * float(np.ptp(values)) if found is None else found
 
 
 def fitted_exponent(x: Array, y: Array) -> float:

@@ -12,16 +12,15 @@ import pytest
 
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.physics.exact.contact_law import stepped
-from dembark.physics.exact.impacts import Impacts, partial_slip
+from dembark.physics.exact.impacts import Impacts, Rebounds, partial_slip
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
 
 CASE = find("oblique_impact")
 oblique = module("oblique_impact")
 ENGINES = CASE.engines
-# What the law cannot, for it has no partial slip; the first three by far.
-LACKING = {"tangential_restitution_2", "tangential_restitution_4", "spin_6", "tangential_restitution_10"}
-FAR_OFF = LACKING - {"tangential_restitution_10"}
+# What nearly all that is judged passes, whatever the law.
+SURE = {"tangential_restitution_sliding", "centre_angle_mixed", "centre_angle_sliding", "contact_angle_mixed", "contact_angle_sliding"}
 
 
 def impacts(p: dict[str, Any]) -> Impacts:
@@ -41,7 +40,11 @@ def impacts(p: dict[str, Any]) -> Impacts:
 
 def flown(p: dict[str, Any], one: Impacts) -> Any:
     """A run by the scheme that was written down again."""
-    after = stepped(one, p["time_step"], p["lead_steps"] % 1.0, p["duration"])
+    return seen(p, one, stepped(one, p["time_step"], p["lead_steps"] % 1.0, p["duration"]))
+
+
+def seen(p: dict[str, Any], one: Impacts, after: Rebounds) -> Any:
+    """A run with these rebounds."""
     ids, zero = np.arange(1, len(one) + 1), np.zeros(len(one))
     frames = [SimpleNamespace(ids=ids, velocities=np.column_stack([zero, slide, normal]), omegas=np.column_stack([spin, zero, zero]))
               for slide, normal, spin in ((one.slide[0], one.normal[0], zero), (after.slide[0], after.normal[0], after.spin[0]))]
@@ -78,9 +81,11 @@ def test_every_sphere_does_what_the_law_demands_in_this_scheme(engine: str, fini
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_study_says_what_agrees_and_what_does_not(engine: str, finished: Any) -> None:
     found = studied([finished(variant, engine) for variant in CASE.studies["linear"].variants])
-    assert len(found) == 40 and FAR_OFF <= names(found, "fail") <= LACKING, found
-    assert {"tangential_restitution_30", "tangential_restitution_50", "spin_50", "contact_angle_39"} <= names(found, "pass")
-    assert found["tangential_restitution_2"]["value"] > 0.95 and found["tangential_restitution_2"]["reference"] < 0.8
+    judged_ones = {name for name, one in found.items() if one["tolerance"] is not None}
+    assert len(found) == 49 and len(judged_ones) == 9
+    # What the law cannot, for it has no partial slip, is one fact.
+    assert names(found, "fail") == {"sticking"} and names(found, "pass") >= SURE, found
+    assert found["sticking"]["value"] == pytest.approx(0.209, abs=2e-3) and found["tangential_restitution_2"]["value"] > 0.95
     for one in found.values():
         # The joint interval is U_val, with all three parts.
         assert one["interval"][1] > one["value"] and one["reference_interval"][1] > one["reference"]
@@ -91,33 +96,74 @@ def test_the_study_says_what_agrees_and_what_does_not(engine: str, finished: Any
 def test_a_run_without_friction_fails_where_it_matters(engine: str, finished: Any) -> None:
     run = finished("coarse", engine, friction=0.0, friction_uncertainty=0.0)
     finer = SimpleNamespace(parameters=run.parameters | {"time_step": 1e-8}, grains=run.grains)
-    failed = names(studied([run, finer]), "fail")
-    assert {f"tangential_restitution_{angle}" for angle in (20, 30, 39, 50, 60)} <= failed
-    assert {"spin_6", "spin_84", "contact_angle_20", "contact_angle_30"} <= failed
+    assert names(studied([run, finer]), "fail") == {name for name, one in CASE.quantities.items() if one.tolerance is not None}
 
 
 @pytest.mark.parametrize(("wrong", "seen"), [
-    (lambda one: replace(one, restitution=0.9 * one.restitution), {"centre_angle_40", "centre_angle_50", "centre_angle_60"}),
-    (lambda one: replace(one, g_star=0.5 * one.g_star), {"tangential_restitution_20", "spin_11"}),
-    (lambda one: replace(one, friction=1.25 * one.friction), {"tangential_restitution_39", "spin_50", "spin_70"}),
-    (lambda one: replace(one, slide=0.9 * one.slide), {"centre_angle_40", "centre_angle_50", "centre_angle_60"}),
+    (lambda one: replace(one, restitution=0.9 * one.restitution), {"centre_angle_sliding"}),
+    (lambda one: replace(one, g_star=0.5 * one.g_star), {"tangential_restitution_mixed", "spin_mixed"}),
+    (lambda one: replace(one, friction=1.25 * one.friction), {"tangential_restitution_sliding", "spin_sliding"}),
+    (lambda one: replace(one, slide=0.9 * one.slide), {"centre_angle_sliding"}),
 ], ids=["restitution", "half the shear stiffness", "friction", "tangential velocity"])
 def test_wrong_physics_is_seen(wrong: Any, seen: set[str]) -> None:
-    right = by_scheme()
-    assert FAR_OFF <= names(right, "fail") <= LACKING
-    assert seen <= names(by_scheme(wrong), "fail") - names(right, "fail")
+    assert names(by_scheme(), "fail") == {"sticking"}
+    assert seen <= names(by_scheme(wrong), "fail")
+
+
+def test_measured_spin_and_restitution_contradict_each_other_by_a_velocity() -> None:
+    """The figures of reference/README.md."""
+    every = {one.name: one for one in oblique.measured()}
+    assert every["spin_6"].as_restitution(every["spin_6"].value) == pytest.approx(0.668, abs=1e-3)
+    assert [every["spin_84"].common, every["spin_84"].half] == pytest.approx([13.4, 31.5], abs=0.1)
+    assert [every[name].half for name in ("tangential_restitution_2", "tangential_restitution_10", "tangential_restitution_85")] \
+        == pytest.approx([0.226, 0.048, 0.0082], abs=1e-3)
+    # The one velocity is that of the rebound angles, whose uncertainty comes from elsewhere.
+    assert np.degrees(every["spin_84"].half * 0.4 * oblique.RADIUS / oblique.SPEED) == pytest.approx(0.5, abs=0.05)
+
+
+def test_data_that_satisfy_the_balance_of_angular_momentum_have_no_misclosure() -> None:
+    angles = np.linspace(2.0, 85.0, 200)
+    kept = 1.0 - 0.2 * np.sin(np.radians(angles))
+
+    def rows(off: float) -> list[dict[str, Any]]:
+        spins = oblique.SPEED * np.sin(np.radians(angles)) * (1.0 - kept) / (0.4 * oblique.RADIUS) + off
+        return [{"quantity": name, "angle": angle, "value": value} for name, values in (("tangential_restitution", kept), ("spin", spins))
+                for angle, value in zip(angles, values, strict=True)]
+
+    assert np.abs(oblique.misclosure(rows(0.0))).max() < 1e-6
+    np.testing.assert_allclose(oblique.misclosure(rows(20.0)), 0.4 * oblique.RADIUS * 20.0, atol=1e-6)
+
+
+def test_regimes_are_those_of_the_inputs() -> None:
+    one = impacts(defaults("oblique_impact"))
+    sticks = one.friction[0] * one.e_star[0] / (4.0 * one.g_star[0])
+    slides = 3.5 * one.friction[0] * (1.0 + one.restitution[0])
+    assert np.degrees(np.arctan([sticks, slides])) == pytest.approx([oblique.STICKS_BELOW, oblique.SLIDES_BEYOND], abs=0.01)
+
+
+def test_deviations_of_both_signs_do_not_cancel_and_scatter_of_the_data_does_not_count() -> None:
+    def together(*off: float, common: float = 0.0) -> Any:
+        points = [oblique.Point(oblique.Datum("spin", 10.0, 500.0, 10.0, common), 500.0 + one, 0.0, 0.0) for one in off]
+        return oblique._together(points)
+
+    assert together(100.0, -100.0).estimate.value == pytest.approx(np.sqrt(2.0) * 100.0, rel=0.01)
+    assert together(3.0, -3.0).estimate.value == 0.0
+    assert together(30.0, 30.0).estimate.value == pytest.approx(30.0)
+    # Scatter averages out, what is common to all points does not.
+    assert together(*[0.0] * 4).reference.half == pytest.approx(5.0)
+    assert together(*[0.0] * 4, common=12.0).reference.half == pytest.approx(13.0)
 
 
 def test_partial_slip_accounts_for_what_the_law_lacks_below_5_degrees() -> None:
     """The table of docs/single_impacts.md."""
-    rows, every = oblique.measured(), impacts(defaults("oblique_impact"))
-    one = Impacts(*(getattr(every, field.name)[..., : len(rows)] for field in fields(Impacts)))
+    data, every = oblique.measured(), impacts(defaults("oblique_impact"))
+    one = Impacts(*(getattr(every, field.name)[..., : len(data)] for field in fields(Impacts)))
     found = partial_slip(one, 200, 1500)
-    kept = {row["name"]: (found.slide[0] / one.slide[0])[k] for k, row in enumerate(rows)}
+    kept = {datum.name: (found.slide[0] / one.slide[0])[k] for k, datum in enumerate(data)}
     due = {"tangential_restitution_2": 0.771, "tangential_restitution_4": 0.748, "tangential_restitution_10": 0.639,
            "tangential_restitution_20": 0.591}
     assert {name: kept[name] for name in due} == pytest.approx(due, abs=2e-3)
-    measured = {row["name"]: row["value"] for row in rows}
+    measured = {datum.name: datum.value for datum in data}
     assert all(abs(kept[name] - measured[name]) < 0.025 for name in ("tangential_restitution_2", "tangential_restitution_4"))
 
 
@@ -127,8 +173,8 @@ def test_runs_of_other_measured_angles_are_done_again() -> None:
 
 def test_an_input_that_is_not_known_leaves_checks_open() -> None:
     found = by_scheme(friction_uncertainty=0.03)
-    assert {"tangential_restitution_30", "spin_50"} <= names(found, "info")
-    assert "wider" in found["tangential_restitution_30"]["reason"]
+    assert {"tangential_restitution_sliding", "spin_mixed"} <= names(found, "info")
+    assert "wider" in found["spin_mixed"]["reason"]
 
 
 def test_uncertainties_of_inputs_add_up_in_squares() -> None:
@@ -137,9 +183,9 @@ def test_uncertainties_of_inputs_add_up_in_squares() -> None:
     only = {name: 0.0 for name in p if name.endswith("_uncertainty")} | {"friction_uncertainty": 1e-3, "restitution_uncertainty": 1e-2}
     run = flown(p | only, impacts(p | only))
     found = judged("oblique_impact", oblique.measure([run]))
-    row = next(row for row in oblique.measured() if row["name"] == "tangential_restitution_60")
-    slope = 1.0 / np.tan(np.radians(row["angle"]))
-    of_angle = 0.092 * 1.98 * np.radians(row["angle_digitised"]) / np.sin(np.radians(row["angle"])) ** 2
+    angle = next(np.radians(datum.angle) for datum in oblique.measured() if datum.name == "tangential_restitution_60")
+    slope = 1.0 / np.tan(angle)
+    of_angle = 0.092 * 1.98 * np.radians(0.0892) / np.sin(angle) ** 2
     due = np.sqrt((1.98 * 1e-3 * slope) ** 2 + (0.092 * 1e-2 * slope) ** 2 + of_angle**2)
     half = 0.5 * np.diff(found["tangential_restitution_60"]["interval"])[0]
     assert half == pytest.approx(due, rel=0.05)
