@@ -1,21 +1,27 @@
-"""The front of the column beside two experiments."""
+"""The front of the column beside two experiments, the zero of whose times is not known."""
+
+from __future__ import annotations
 
 import csv
 import math
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import linregress
 
 from dembark.postproc.history import reached
 from dembark.postproc.instruments.growth import Growth, ordered
 from dembark.postproc.instruments.water import common_values
-from dembark.postproc.measurement import Array, Measurement, Points, Replica, Replicas, Value, exact, profile
+from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Numbers, Points, Replica, Replicas, Value, exact, profile
 from dembark.postproc.replica import once
-from dembark.postproc.studies import measured
+from dembark.postproc.statistics import student
+from dembark.postproc.studies import compared, measured, numerical
 
 MEASURED = Path(__file__).with_name("reference") / "fronts.csv"
-# Where the time of the front's way begins and ends, over the width of the column.
-WAY = (1.44, 4.11)
+NAMES = {"martin_moyce": "Martin & Moyce (1952)", "koshizuka_oka": "Koshizuka & Oka (1996)"}
+# T from which points count, and the fewest with which a line is fitted.
+FREE, FEWEST = 1.0, 4
+NOWHERE = Estimate(math.nan, math.inf, "the front did not get there")
 
 
 def published(source: str) -> tuple[Array, Array]:
@@ -37,38 +43,76 @@ def front(run: Replica) -> tuple[Array, Array]:
     return times, places
 
 
-def beside(run: Replica, source: str) -> float:
-    """Mean of the front over that measured, T ≥ 1."""
+def pace(own: tuple[Array, Array], source: str) -> tuple[Estimate, Estimate]:
+    """Speed of the front `own` over that measured, and the delay of the measured times T, each with the 95 % interval that the scatter of
+    the points leaves.
+
+    When the water was free is not known, so that a time alone says nothing. Times T of the experiment are a straight line over those of the
+    simulation at the same places: its slope is the speed, and the mean difference is the delay. Points count from T = 1 on.
+    """
     times, fronts = published(source)
-    own = front(run)
-    judged = (times >= 1.0) & (times <= own[0][-1])
-    return float(np.mean(np.interp(times[judged], *own) / fronts[judged]))
+    counted = (times >= FREE) & (fronts <= own[1].max())
+    if counted.sum() < FEWEST:
+        return NOWHERE, NOWHERE
+    there, ours = times[counted], np.array([reached(*own, place) for place in fronts[counted]])
+    reach, line, late = student(len(ours) - 2), linregress(ours, there), there - ours
+    return (Estimate(float(line.slope), reach * float(line.stderr), f"scatter of {len(ours)} points"),
+            Estimate(float(late.mean()), reach * float(late.std(ddof=1)) / math.sqrt(len(ours)), f"scatter of {len(ours)} points"))
+
+
+def due(source: str, found: tuple[Estimate, Estimate]) -> tuple[Estimate, Estimate]:
+    """References of speed and delay, whose U_D is the scatter of the points.
+
+    The delay is between zero and the first entry of the table, when water had moved by a tenth of a. The later experiment contradicts the
+    earlier one, of a column of the same shape, which was done with columns of two sizes that agree: this is in its U_D of the speed.
+    """
+    speed, delay = found
+    contradiction = 0.0 if source == "martin_moyce" else abs(pace(published("martin_moyce"), source)[0].value - 1.0)
+    return (Estimate(1.0, math.hypot(speed.half, contradiction), speed.basis),
+            Estimate(0.5 * float(published(source)[0][0]), delay.half, delay.basis))
 
 
 def measure(replicas: Replicas) -> Measurement:
-    """Of the one run: nothing is random."""
+    """Of the one run: nothing is random. What has no spacings to be studied with is judged by itself."""
     run = replicas[0]
-    times, places = front(run)
-    start, end = (reached(times, places, place) for place in WAY)
-    table_times, table = published("table")
-    due = float(np.interp(WAY[1], table, table_times) - np.interp(WAY[0], table, table_times))
-    p = run.parameters
+    own, p = front(run), run.parameters
     energy = p["fluid_density"] * p["gravity"] * 2.0 * p["column_width"] ** 3
-    values = {"front": Value(exact(beside(run, "table")), exact(1.0)),
-              "front_koshizuka": Value(exact(beside(run, "koshizuka")), exact(1.0)),
-              "passage": Value(exact(end - start), exact(due), reason="" if end > start else "the front did not get there"),
-              "front_at_3": Value(exact(float(np.interp(3.0, times, places)))), **common_values(run, energy)}
-    place = table_times[table_times <= times[-1]]
-    curves = [profile(name, title, "T = t √(2g/a)", "front over a", published(source)[0],
-                      [np.interp(published(source)[0], times, places)], reference=published(source)[1], reference_label=label)
-              for name, source, title, label in (("front", "table", "Front", "Martin & Moyce (1952)"),
-                                                 ("front_koshizuka", "koshizuka", "Front, another experiment", "Koshizuka & Oka (1996)"))]
-    return Measurement(values, curves if len(place) else [])
+    values = {"front_at_3": Value(exact(float(np.interp(3.0, *own)))), **common_values(run, energy)}
+    for source in NAMES:
+        found = pace(own, source)
+        references = due(source, found) if p["no_slip"] == "yes" else (None, None)
+        values |= {f"{what}_{source}": Value(one if reference is None else exact(one.value), reference)
+                   for what, one, reference in zip(("speed", "delay"), found, references, strict=True)}
+    return Measurement(values, [_curve(own, source, f"front_{source}", label) for source, label in NAMES.items()])
 
 
 def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001 (there is one study)
-    """How far the two finest spacings are apart."""
+    """The front with the finest particles beside the experiments, and how far the two finest are apart."""
     points, place = ordered(points, along)
     fronts = np.array([measured(point, "front_at_3").value for point in points])
-    return Measurement({"front_converged": Value(exact(fronts[-1] - fronts[-2]), exact(0.0))},
-                       [Growth(place, fronts, 0.0 * fronts).curve("front", "Front at T = 3", "particles across the column", "over a")])
+    values = {"front_converged": Value(exact(fronts[-1] - fronts[-2]), exact(0.0))}
+    for source in NAMES:
+        every = [[_known(point, f"{what}_{source}") for point in points] for what in ("speed", "delay")]
+        references = due(source, (every[0][-1], every[1][-1]))
+        for what, found, reference in zip(("speed", "delay"), every, references, strict=True):
+            of_spacing = numerical(1.0 / place, [one.value for one in found])
+            value = found[-1].value
+            values[f"{what}_{source}"] = Value(Estimate(value, of_spacing, "spacing"), reference,
+                                               detail=compared(value, reference, num=of_spacing).text)
+    curve = Growth(place, fronts, 0.0 * fronts).curve("front", "Front at T = 3", "particles across the column", "over a")
+    return Measurement(values, [curve])
+
+
+def _known(point: Numbers, name: str) -> Estimate:
+    """The quantity of a run; no number where its front did not get there."""
+    one = next(quantity for quantity in point["quantities"] if quantity["name"] == name)
+    return NOWHERE if one["value"] is None else measured(point, name)
+
+
+def _curve(own: tuple[Array, Array], source: str, name: str, label: str) -> Curve:
+    """The front beside that of an experiment whose times are shifted by the delay."""
+    times, fronts = published(source)
+    delay = pace(own, source)[1].value
+    shifted = times - (delay if math.isfinite(delay) else 0.0)
+    return profile(name, f"Front, {label}", "T = t √(2g/a), measured times less the delay", "front over a", shifted,
+                   [np.interp(shifted, *own)], reference=fronts, reference_label=label)

@@ -11,20 +11,21 @@ import pytest
 
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.postproc.tests.scenes import frame_of
+from dembark.validation.case.folders import find
 
 dam = module("dam_break")
 A, G, DT, STRIDE, SPACING = 0.05715, 9.81, 5e-5, 50, 0.05715 / 20
 
 
-def run(faster: float = 1.0, leaked: int = 0, made: float = 0.0) -> Any:
-    """A front that is that of the table, `faster` by a factor from T = 1.19 on; `leaked` particles below the floor; the part `made` of the
-    energy comes from nowhere."""
-    times, fronts = dam.published("table")
+def run(faster: float = 1.0, late: float = 0.0, leaked: int = 0, made: float = 0.0, source: str = "martin_moyce") -> Any:
+    """A front that is that of an experiment, whose water is free at T = 0.2 + `late`, `faster` by a factor; `leaked` particles below the
+    floor; the part `made` of the energy comes from nowhere."""
+    times, fronts = dam.published(source)
     unit = math.sqrt(A / (2.0 * G))
 
     def frame(k: int) -> Any:
-        now = k * STRIDE * DT / unit
-        place = np.interp(1.19 + (now - 1.19) * faster if now > 1.19 else now, [0.0, *times], [1.0, *fronts])
+        now = 0.2 + late + k * STRIDE * DT / unit * faster
+        place = np.interp(now, [0.0, *times, times[-1] + 1.0], [1.0, *fronts, fronts[-1] + 1.5])
         places = np.zeros((800, 3))
         places[:, :2] = 0.5 * SPACING
         places[0, 0] = place * A - 0.5 * SPACING
@@ -43,24 +44,68 @@ def verdicts(**changes: Any) -> dict[str, dict[str, Any]]:
     return judged("dam_break", dam.measure([run(**changes)]))
 
 
-def study(apart: float) -> dict[str, dict[str, Any]]:
-    """Fronts at three spacings, the two finest `apart`."""
-    points = [{"parameters": {"resolution": number}, "quantities": [{"name": "front_at_3", "value": value, "interval": [value, value]}]}
-              for number, value in ((10, 3.9), (20, 4.0), (40, 4.0 + apart))]
+def study(apart: float = 0.0, **changes: Any) -> dict[str, dict[str, Any]]:
+    """The study of a front that has no error of spacing but that at T = 3 the two finest are `apart`."""
+    found = verdicts(**changes)
+    points = [{"parameters": {"resolution": number}, "quantities": [
+        *(one for name, one in found.items() if name != "front_at_3"), {"name": "front_at_3", "value": value, "interval": [value, value]}]}
+        for number, value in ((10, 3.9), (20, 4.0), (40, 4.0 + apart))]
     return judged("dam_break", dam.study("spacing", points, "resolution"))
 
 
-def test_the_front_of_the_experiment_passes() -> None:
-    found = verdicts()
-    assert {"front", "passage", "energy_growth", "leaked"} <= names(found, "pass"), found
-    assert found["front"]["value"] == pytest.approx(1.0, abs=2e-3) and found["passage"]["value"] == pytest.approx(2.14, abs=0.01)
+def test_the_front_of_the_experiment_passes_wherever_its_zero_is() -> None:
+    for late in (-0.1, 0.0, 0.1):
+        found = study(late=late)
+        assert {"speed_martin_moyce", "delay_martin_moyce", "front_converged"} <= names(found, "pass"), found
+        assert found["speed_martin_moyce"]["value"] == pytest.approx(1.0, abs=5e-3)
+        assert found["delay_martin_moyce"]["value"] == pytest.approx(0.2 + late, abs=5e-3)
+
+
+@pytest.mark.parametrize("changes", [{"faster": 8.0 / 7.0}, {"faster": 7.0 / 8.0}], ids=["faster", "slower"])
+def test_no_delay_hides_a_wrong_speed(changes: dict[str, float]) -> None:
+    found = study(**changes)
+    assert "speed_martin_moyce" in names(found, "fail")
+    assert found["speed_martin_moyce"]["value"] == pytest.approx(changes["faster"], abs=0.01)
+
+
+def test_a_delay_is_no_longer_than_water_stands_still() -> None:
+    assert "delay_martin_moyce" in names(study(late=0.4), "fail")
+    assert "delay_martin_moyce" in names(study(late=-0.4), "fail")
+    for name, one in find("dam_break").quantities.items():
+        if name.startswith("delay"):
+            assert one.tolerance == pytest.approx(0.5 * dam.published(name.removeprefix("delay_"))[0][0], abs=1e-3)
+
+
+def test_the_two_experiments_contradict_each_other_and_the_two_sizes_of_the_first_do_not() -> None:
+    """The figures of reference/README.md."""
+    own = dam.published("martin_moyce")
+    speed, delay = dam.pace(own, "martin_moyce_half")
+    assert abs(speed.value - 1.0) < speed.half < 0.1 and abs(delay.value) < delay.half
+    other = dam.pace(own, "koshizuka_oka")[0]
+    assert other.value == pytest.approx(1.195, abs=2e-3) and other.value - other.half > 1.05
+    # So the later one cannot decide 5 %.
+    found = study()
+    assert found["speed_koshizuka_oka"]["verdict"] == "info" and "wider" in found["speed_koshizuka_oka"]["reason"]
+
+
+def test_a_front_that_does_not_get_there_fails() -> None:
+    assert {"speed_martin_moyce", "delay_martin_moyce"} <= names(study(faster=0.3), "fail")
+
+
+def test_a_run_without_spacings_to_study_is_judged_by_itself() -> None:
+    alone = run(faster=8.0 / 7.0)
+    alone.parameters["no_slip"] = "yes"
+    assert "speed_martin_moyce" in names(judged("dam_break", dam.measure([alone])), "fail")
+    assert "speed_martin_moyce" in names(verdicts(faster=8.0 / 7.0), "info")
 
 
 @pytest.mark.parametrize("engine", ["liggghts", "yade"])
 def test_the_column_breaks_in_an_engine(engine: str, simulate: Any) -> None:
     one = simulate("dam_break", engine, {"resolution": 10, "frames": 38})
     found = judged("dam_break", dam.measure([one]))
-    assert {"passage", "energy_growth", "leaked"} <= names(found, "pass"), found
+    assert {"energy_growth", "leaked"} <= names(found, "pass"), found
+    assert found["speed_martin_moyce"]["value"] == pytest.approx(1.0, abs=0.05)
+    assert found["delay_martin_moyce"]["value"] == pytest.approx(0.17, abs=0.05)
     assert 3.7 < found["front_at_3"]["value"] < 4.3
     rows = one.times()
     # Water leaves the place where it was, and the tank carries it.
