@@ -24,11 +24,15 @@ _WINDOW = 2.5  # correlation times, which count both sides here: five of Sokal's
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value with the half-width of its interval (inf when the data allow none) and the `basis` of that interval in words."""
+    """A value with the half-width of its interval (inf when the data allow none) and the `basis` of that interval in words.
+
+    samples : the values of the replicas, in their order, where it is their mean
+    """
 
     value: float
     half: float
     basis: str = ""
+    samples: tuple[float, ...] = ()
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -168,7 +172,7 @@ def replica_mean(values: Sequence[float], confidence: float = CONFIDENCE) -> Est
     if len(data) < 2:
         return Estimate(float(data.mean()), math.inf, "1 replica")
     half = student(len(data) - 1, confidence) * float(data.std(ddof=1)) / math.sqrt(len(data))
-    return Estimate(float(data.mean()), half, f"{len(data)} replicas")
+    return Estimate(float(data.mean()), half, f"{len(data)} replicas", tuple(map(float, data)))
 
 
 def jackknife(
@@ -210,6 +214,12 @@ def over_replicas(estimates: Sequence[Estimate]) -> Estimate:
 def joint_half(one: float, other: float) -> float:
     """Half-width of the interval of a difference of two independent values with half-widths `one` and `other`."""
     return combined([one, other])
+
+
+def paired_half(differences: Sequence[float], confidence: float = CONFIDENCE) -> float:
+    """Half-width of Student's interval of the mean of `differences`, each between two values of one and the same packing."""
+    data = np.asarray(differences, float)
+    return student(len(data) - 1, confidence) * float(data.std(ddof=1)) / math.sqrt(len(data))
 
 
 def joint_limit(one: float, other: float, count_one: float, count_other: float, confidence: float) -> float:

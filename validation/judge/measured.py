@@ -49,13 +49,14 @@ def _value_as_json(value: Value) -> dict[str, Any]:
     entry = {one.name: getattr(value, one.name) for one in fields(value)}
     for name in _ESTIMATES:
         if entry[name] is not None:
-            entry[name] = [_number(entry[name].value), _number(entry[name].half), entry[name].basis]
+            one = entry[name]
+            entry[name] = [_number(one.value), _number(one.half), one.basis, [_number(sample) for sample in one.samples]]
     return entry | {name: _number(entry[name]) for name in ("half", "bound", "scale")}
 
 
 def _value(entry: Mapping[str, Any]) -> Value:
     def estimate(given: Sequence[Any] | None) -> Estimate | None:
-        return None if given is None else Estimate(float(given[0]), float(given[1]), given[2])
+        return None if given is None else Estimate(float(given[0]), float(given[1]), given[2], tuple(map(float, given[3])))
 
     numbers = {name: None if entry[name] is None else float(entry[name]) for name in ("half", "bound", "scale")}
     return Value(**{**entry, **numbers, **{name: estimate(entry[name]) for name in _ESTIMATES}})

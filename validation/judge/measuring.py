@@ -139,7 +139,8 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
         deviation=_finite(deviation),
         deviation_kind="absolute" if one.absolute else "relative", tolerance=_finite(tolerance), verdict=verdict, reason=reason,
         detail=value.detail or one.detail or one.why, source=one.source, evidence=one.evidence, compared=one.compared and value.compared,
-        control=one.control, decides=decided, deviation_half_width=_finite(value.half), independent=one.independent and value.half is None,
+        control=one.control, decides=decided, samples=value.estimate.samples,
+        deviation_half_width=_finite(value.half), independent=one.independent and value.half is None,
         chance=chance(half if value.half is None else value.half, tolerance, packings(value.estimate.basis)),
         agreement=None if one.agreement is None else one.agreement * value.scale)
 

@@ -29,7 +29,7 @@ class QuantityRecord:
     that fails the check; a pass of a check that nothing is known to fail is not counted. `independent`: the reference is not made of other
     numbers of the same run. `chance`: probability that the check fails by chance alone, None where there is no chance. `family`: the fact
     that is measured; checks of one family count as one, "" is a check by itself. `cause`: why it fails, where that is known. `decides`:
-    what would decide an open check.
+    what would decide an open check. `samples`: the values of the replicas, in their order, where `value` is their mean.
     """
 
     name: str
@@ -57,6 +57,7 @@ class QuantityRecord:
     family: str = ""
     cause: str = ""
     decides: str = ""
+    samples: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """RunError for a verdict or a kind of evidence that does not exist."""
@@ -158,7 +159,7 @@ def as_json(value: QuantityRecord | Result | Comparison) -> dict[str, Any]:
     return content
 
 
-_OPTIONAL = ("deviation_half_width", "agreement", "independent", "chance", "family", "cause", "decides", "title", "description")
+_OPTIONAL = ("deviation_half_width", "agreement", "independent", "chance", "family", "cause", "decides", "samples", "title", "description")
 
 
 def _default(one: dataclasses.Field[Any]) -> Any:

@@ -119,3 +119,35 @@ def test_a_bound_that_is_not_finite_is_none_in_the_file() -> None:
 def test_no_replica_is_told(tmp_path):
     with pytest.raises(RunError, match="nothing to measure"):
         measure(tmp_path)
+
+
+def packed(shared: float, own: float, difference: float, random: np.random.Generator, packings: int = 5):
+    """The verdict on two engines that start from the same packings, which scatter by `shared`; each engine adds `own` and one of them the
+    `difference`, all relative."""
+    packing = 1.0 + shared * random.standard_normal(packings)
+    both = [packing + own * random.standard_normal(packings) + more for more in (0.0, difference)]
+    return pair(*(QuantityRecord("q", one.value, "info", interval=one.interval, basis=one.basis, samples=one.samples)
+                  for one in (over_replicas([Estimate(value, 0.0) for value in values]) for values in both)), "liggghts", "yade", 20)
+
+
+def test_what_a_packing_does_to_all_engines_is_no_part_of_their_difference():
+    random = np.random.default_rng(9)
+    found = [packed(0.3, 0.003, 0.0, random) for _ in range(200)]
+    assert {one.verdict for one in found} == {"pass"} and max(one.joint_half_width for one in found) < 0.02
+    assert {packed(0.3, 0.003, 0.05, random).verdict for _ in range(50)} == {"fail"}
+    # Without the values of each packing the same engines cannot be compared.
+    assert pair(entry(1.0, 0.3), entry(1.05, 0.3), "liggghts", "yade").verdict == "info"
+
+
+def test_differences_of_the_schemes_below_one_per_cent_do_not_fail_because_packings_are_paired():
+    random = np.random.default_rng(10)
+    assert {packed(0.1, 1e-5, 0.007, random).verdict for _ in range(50)} == {"pass"}
+    assert {packed(0.1, 1e-5, 0.014, random).verdict for _ in range(50)} == {"fail"}
+    # They fail where independent packings would show them.
+    assert {packed(1e-4, 1e-4, 0.009, random).verdict for _ in range(50)} == {"fail"}
+
+
+def test_pairs_fail_by_chance_as_seldom_as_independent_packings():
+    random = np.random.default_rng(11)
+    pages = [{packed(0.1, 0.02, 0.0, random).verdict for _ in range(20)} for _ in range(300)]
+    assert sum("fail" in page for page in pages) <= 8
