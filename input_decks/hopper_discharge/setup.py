@@ -21,6 +21,9 @@ def setup(p: Parameters) -> Setup:
     bottom = np.vstack([strip((low, 0.0, 0.0), (left, 0.0, 0.0), p.bin_depth) for low in (0.0, right)])
     drop_steps = math.ceil((p.fall - 2.0 * d_max) / (p.gate_speed * step))
     numbers = {"settle_steps": settle_steps, "drop_steps": drop_steps, "outlet_left": left, "outlet_right": right}
+    if p.rolling_length is not None:
+        # The coefficients refer to the effective radius: d/4 of two equal grains, d/2 of a grain and a wall.
+        numbers |= {"grain_rolling": 4.0 * p.rolling_length / p.grain_diameter, "wall_rolling": 2.0 * p.rolling_length / p.grain_diameter}
     # Beads that fall are fast: a wide skin keeps the neighbour lists longer.
     return Setup(steps["steps"], step, packing.grains(p, sites, box), {**steps, **contacts(p, skin=0.4), **numbers},
                  {"bottom": bottom, "lid": strip((left, 0.0, 0.0), (right - left, 0.0, 0.0), p.bin_depth)})

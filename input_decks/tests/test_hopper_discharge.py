@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.validation.case.deck import prepare
 from dembark.validation.case.folders import find
+from dembark.validation.case.resolve import resolve
 
 hopper = module("hopper_discharge")
 
@@ -95,6 +97,17 @@ def test_the_study_adds_what_friction_makes_of_it() -> None:
 
 SMALL = {"grain_count": 150, "bin_width": 0.03, "outlet_width": 0.0134, "settle_time": 0.12, "discharge_time": 0.2, "frames": 21,
          "fall": 0.1}
+
+
+def test_one_length_against_rolling_gives_the_coefficients_of_grains_and_walls() -> None:
+    """Coefficients refer to the effective radius, which at a wall is twice that between grains."""
+    case = find("hopper_discharge")
+    values = resolve(case, None, "rolling")
+    numbers = prepare(case, values).numbers
+    assert numbers["grain_rolling"] * 0.25 * values["grain_diameter"] == pytest.approx(1e-4)
+    assert numbers["wall_rolling"] * 0.5 * values["grain_diameter"] == pytest.approx(1e-4)
+    given = prepare(case, resolve(case, None, "rolling", {"rolling_length": 2e-4})).numbers
+    assert given["grain_rolling"] == pytest.approx(2.0 * numbers["grain_rolling"])
 
 
 @pytest.mark.parametrize("engine", find("hopper_discharge").engines)
