@@ -3,19 +3,11 @@
 from yade import dembark
 
 p = dembark.parameters()
-O.dt = p.time_step
 weight = Vector3(0, 0, -p.gravity)
 grain = O.materials.append(FrictMat(young=p.youngs_modulus, poisson=p.poisson_ratio, density=p.grain_density))
 steel = O.materials.append(FrictMat(young=p.steel_youngs_modulus, poisson=p.steel_poisson_ratio, density=p.steel_density))
-for kind, diameter, _, place, velocity, _ in dembark.packing():
-    sphere = utils.sphere(place, 0.5 * diameter, material=O.materials[(grain, steel)[kind - 1]])
-    # Velocities are half a step behind positions.
-    sphere.state.vel = Vector3(*velocity) - 0.5 * O.dt * weight
-    O.bodies.append(sphere)
-ball = len(O.bodies) - 1
-for axis, place, sense in ((0, -0.5 * p.box_length, 1), (0, 0.5 * p.box_length, -1), (1, -0.5 * p.box_width, 1), (1, 0.5 * p.box_width, -1),
-                           (2, p.floor, 1)):
-    O.bodies.append(utils.wall(place, axis=axis, sense=sense, material=O.materials[steel]))
+grains = [O.bodies.append(utils.sphere(place, 0.5 * diameter, material=O.materials[grain]))
+          for _, diameter, _, place, *_ in dembark.packing()]
 
 
 def of_pairs(*values):
@@ -24,8 +16,29 @@ def of_pairs(*values):
     return MatchMaker(matches=[(*pair, value) for pair, value in zip(pairs, values, strict=True)])
 
 
-friction = of_pairs(p.friction, p.grain_steel_friction, p.steel_friction)
-writer = dembark.FrameWriter(columns=["ball_height", "ball_velocity"], gravity=weight)
+def loop(*recorders):
+    """All engines; recorders come between forces and motion, where positions and forces belong to the same time."""
+    friction = of_pairs(p.friction, p.grain_steel_friction, p.steel_friction)
+    return [
+        ForceResetter(),
+        InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()], verletDist=0.1 * p.grain_diameter),
+        SphereContactLoop(
+            [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
+            [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(restitution=of_pairs(p.restitution, p.grain_steel_restitution, p.steel_restitution),
+                                                        staticFriction=friction, kineticFriction=friction, criticalSlipDistance=0)],
+            [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding=p.presliding)],
+        ),
+        *recorders,
+        NewtonIntegrator(damping=0, gravity=weight),
+    ]
+
+
+def settle(modulus, time_step, steps):
+    """Let the grains fall or relax; with the contacts go their springs."""
+    O.materials[grain].young, O.dt, O.engines = modulus, time_step, loop()
+    O.run(steps, True)
+    O.interactions.clear()
+    O.resetTime()
 
 
 def record():
@@ -37,18 +50,19 @@ def record():
         writer.frame()
 
 
-O.engines = [
-    ForceResetter(),
-    InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()], verletDist=0.1 * p.grain_diameter),
-    SphereContactLoop(
-        [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
-        [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(restitution=of_pairs(p.restitution, p.grain_steel_restitution, p.steel_restitution),
-                                                    staticFriction=friction, kineticFriction=friction, criticalSlipDistance=0)],
-        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding=p.presliding)],
-    ),
-    # Between forces and motion, where positions and forces belong to the same time.
-    PyRunner(command="record()", iterPeriod=p.every, initRun=True),
-    NewtonIntegrator(damping=0, gravity=weight),
-]
-
+# The frames number bodies in this order: the ball follows the grains, then come the walls.
+ball = O.bodies.append(utils.sphere((0, 0, p.ball_height), 0.5 * p.ball_diameter, material=O.materials[steel], fixed=True))
+for axis, place, sense in ((0, -0.5 * p.box_length, 1), (0, 0.5 * p.box_length, -1), (1, -0.5 * p.box_width, 1), (1, 0.5 * p.box_width, -1),
+                           (2, p.floor, 1)):
+    O.bodies.append(utils.wall(place, axis=axis, sense=sense, material=O.materials[steel]))
+if p.bed == "settled" and not dembark.options()[1]:
+    settle(p.soft_modulus, p.soft_step, p.fall_steps)
+    settle(p.youngs_modulus, p.time_step, p.relax_steps)
+O.dt = p.time_step
+for body in [*grains, ball]:
+    O.bodies[body].dynamic = True
+    # Velocities are half a step behind positions.
+    O.bodies[body].state.vel = -0.5 * O.dt * weight - Vector3(0, 0, p.ball_speed if body == ball else 0)
+writer = dembark.FrameWriter(columns=["ball_height", "ball_velocity"], gravity=weight)
+O.engines = loop(PyRunner(command="record()", iterPeriod=p.every, initRun=True))
 dembark.run(p.steps)
