@@ -1,11 +1,15 @@
-"""Discharge of a bin: grains settle in a rectangular bin (periodic along the slot in its bottom), the gate below the slot drops."""
+"""Discharge of a bin: grains settle in a rectangular bin, the gate below the slot in its bottom drops."""
 
 from yade import dembark
 
 p = dembark.parameters()
 weight = (0, 0, -p.gravity)
-materials, _ = dembark.begin(p, weight, along=[1])
+ended = p.ends == "walls"
+dembark.periodic([] if ended else [1], room=8 * p.grain_diameter)
+materials, _ = dembark.begin(p, weight)
 walls = dembark.planes(p, materials, left=(0, 0.0, 1), right=(0, p.bin_width, -1), floor=(2, -p.fall, 1))
+if ended:
+    walls |= dembark.planes(p, materials, front=(1, 0.0, 1), rear=(1, p.bin_depth, -1))
 
 
 def panel(low, high):
@@ -18,7 +22,7 @@ def panel(low, high):
 # A plate that ends at a wall reaches into it; boxes that are fixed do not touch each other.
 gate = panel(p.outlet_left, p.outlet_right)
 walls["base"] = [panel(-p.grain_diameter, p.outlet_left), panel(p.outlet_right, p.bin_width + p.grain_diameter), gate]
-record = dembark.Recorder(p, walls, boundary="ff pp ff", gravity=weight, report=p.stride)
+record = dembark.Recorder(p, walls, boundary="ff ff ff" if ended else "ff pp ff", gravity=weight, report=p.stride)
 
 
 def step():
