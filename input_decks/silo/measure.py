@@ -26,6 +26,6 @@ def measure(replicas: Replicas) -> Measurement:
                    fields=fields.fields)
 
 
-def study(_name: str, points: Points, _along: str) -> Measurement:
-    """The apparent masses of all `points` but `dry`, which they are predicted from."""
-    return silo.predicted(points)
+def study(name: str, points: Points, _along: str) -> Measurement:
+    """How much friction the walls mobilise, or the apparent masses of all `points` but `dry`, which they are predicted from."""
+    return silo.mobilised(points) if name == "mobilisation" else silo.predicted(points)

@@ -20,5 +20,5 @@ def controls(folder: Path) -> Iterator[Control]:
     yield Control("gravity doubled", right, measured(told(plane_silo(folder / "gravity", noise=0.01), gravity=2.0 * 9.81)))
     # A column deep enough to feel K.
     deep = measured(plane_silo(folder / "deep", noise=0.01, friction=0.5))
-    for name, inner in (("K of the contacts 15 % too high", 1.15), ("K of the contacts 15 % too low", 0.85)):
+    for name, inner in (("K of the contacts 20 % too high", 1.2), ("K of the contacts 20 % too low", 0.8)):
         yield Control(name, deep, measured(plane_silo(folder / name, noise=0.01, friction=0.5, inner=inner)))

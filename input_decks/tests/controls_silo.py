@@ -13,7 +13,7 @@ from dembark.input_decks.tests.test_silo_measures import study
 def controls(folder: Path) -> Iterator[Control]:
     right = measured(silo(folder / "right", noise=0.01))
     for name, change in {"an almost liquid: hardly any friction of the wall": {"friction": 0.005, "stated": 0.25},
-                         "K of the contacts 15 % too high": {"inner": 1.15}, "K of the contacts 15 % too low": {"inner": 0.85},
+                         "K of the contacts 20 % too high": {"inner": 1.2}, "K of the contacts 20 % too low": {"inner": 0.8},
                          "a wall ten times as smooth in its lower half": {"smooth": 0.1},
                          "a lost contact in each layer": {"lost_contacts": 1},
                          "a fiftieth of the wall's force lost": {"lost_wall_force": 0.02}}.items():

@@ -12,7 +12,7 @@ from dembark.physics import capillary_force
 from dembark.postproc.instruments.momentum import PARTS
 from dembark.postproc.tests.dumps import BOX, contacts_text, grains_text, write_times
 
-GRAVITY, DIAMETER, DENSITY = 9.81, 0.005, 2500.0
+GRAVITY, DIAMETER, DENSITY, WALL_SPEED = 9.81, 0.005, 2500.0, 0.01
 # Of a bed at rest and of a flow, which needs more for its means.
 FRAMES, FLOW_FRAMES = 20, 40
 # From a grain to its neighbour across the channel.
@@ -72,14 +72,14 @@ def told(folder: Path, **changes: float) -> Path:
 
 def silo(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: str = "dry", k: float = 0.8, friction: float = 0.25,
          noise: float = 0.0, seed: int = 0, lost_wall_force: float = 0.0, bridge_volume: float = 0.0, smooth: float = 1.0,
-         lost_contacts: int = 0, stated: float | None = None, inner: float = 1.0, heavier: float = 1.0) -> Path:
+         lost_contacts: int = 0, stated: float | None = None, inner: float = 1.0, heavier: float = 1.0, sticking: float = 0.0) -> Path:
     """Write a replica whose wall and base forces follow Janssen's law; returns the engine's folder.
 
     `noise`: relative scatter of the wall forces among grains and frames; `lost_wall_force`: share that is missing in time.csv;
     `bridge_volume` (m3): every grain hangs on the wall by a liquid bridge too, whose pull is rubbed like the rest of the pressure;
     `smooth`: friction of the wall's lower half over that of its upper one; `lost_contacts`: how many of the 24 between two layers are
-    missing. Wrong physics: `stated` is the wall's friction that the run says it had, `inner` the stress across inside over that at the
-    wall, `heavier` the gravity that acts over the one it says.
+    missing; `sticking`: share of the grains at the wall that move with it. Wrong physics: `stated` is the wall's friction that the run says
+    it had, `inner` the stress across inside over that at the wall, `heavier` the gravity that acts over the one it says.
     """
     random = np.random.default_rng(seed)
     radius, levels, ring = 0.025, 30, 24
@@ -113,13 +113,15 @@ def silo(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: 
         held = first % ring >= lost_contacts
         run.frame(step, place, np.full(len(place), 0.5 * DIAMETER),
                   (place[first][held], place[second][held], (first[held], second[held]), forces[held]), masses=mass,
+                  velocities=WALL_SPEED * np.outer(np.arange(len(place)) % ring < sticking * ring, [0.0, 0.0, 1.0]),
                   walls={"side": side, "base": base})
         lift.append((side[:, 2].sum(), base[:, 2].sum()))
     side_fz, base_fz = np.array(lift).T
     return run.finish(
         {"step": steps, "time": steps * 1e-5, "kinetic_energy": 0 * side_fz, "side_fz": (1.0 - lost_wall_force) * side_fz,
          "base_fz": base_fz},
-        {"cylinder_radius": radius, "wall_friction": friction if stated is None else stated, "grain_count": len(place), **liquid})
+        {"cylinder_radius": radius, "wall_friction": friction if stated is None else stated, "grain_count": len(place),
+         "wall_speed": WALL_SPEED, **liquid})
 
 
 def plug_flow(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: str = "smooth", slip: float = 0.4,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.input_decks.tests.synthetic import BESIDE, DENSITY, DIAMETER, FLOW_FRAMES, FRAMES, GRAVITY, Written
+from dembark.input_decks.tests.synthetic import BESIDE, DENSITY, DIAMETER, FLOW_FRAMES, FRAMES, GRAVITY, WALL_SPEED, Written
 
 STEP = 1e-5
 
@@ -57,7 +57,8 @@ def plane_silo(results: Path, *, replica: int = 1, k: float = 0.7, friction: flo
     table = dict(zip(("left_fz", "right_fz", "base_fz"), np.array(lift).T, strict=True))
     table["left_fz"] = (1.0 - lost_wall_force) * table["left_fz"]
     return run.finish({"step": steps, "time": steps * STEP, "kinetic_energy": 0.0 * steps, **table},
-                      {"silo_width": width, "slab_depth": depth, "wall_friction": friction if stated is None else stated})
+                      {"silo_width": width, "slab_depth": depth, "wall_speed": WALL_SPEED,
+                       "wall_friction": friction if stated is None else stated})
 
 
 def gravity_channel(results: Path, *, cells: int = 20, variant: str = "w20", replica: int = 1, greatest: float = 3.0, slip: float = 2.0,

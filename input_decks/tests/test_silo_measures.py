@@ -35,7 +35,7 @@ def test_silo_that_follows_janssen_passes(tmp_path):
             "janssen_profile_deviation",
             "janssen_length_predicted",
             "apparent_mass_ratio",
-            "wall_mobilisation",
+            "sliding_friction",
             "force_balance_error",
             "field_balance_deviation",
         )
@@ -104,9 +104,9 @@ def test_height_of_one_packing_has_no_interval_and_decides_nothing(tmp_path):
 
 
 @pytest.mark.parametrize(("wrong", "failed"), [
-    ({"friction": 0.005, "stated": 0.25}, {"apparent_mass_ratio", "wall_mobilisation"}),
-    ({"inner": 1.15}, {"apparent_mass_ratio"}),
-    ({"inner": 0.85}, {"apparent_mass_ratio"}),
+    ({"friction": 0.005, "stated": 0.25}, {"sliding_friction"}),
+    ({"inner": 1.2}, {"apparent_mass_ratio"}),
+    ({"inner": 0.8}, {"apparent_mass_ratio"}),
     ({"heavier": 2.0}, {"apparent_mass_ratio", "force_balance_error"}),
 ], ids=["almost_liquid", "k_high", "k_low", "doubled_gravity"])
 def test_silo_with_wrong_physics_fails_what_is_predicted(tmp_path, wrong, failed):
@@ -119,12 +119,21 @@ def test_silo_with_wrong_physics_fails_what_is_predicted(tmp_path, wrong, failed
         assert "fail" not in {one["verdict"] for one in calibrated}
 
 
-def test_wall_as_rough_as_the_grains_has_no_reference(tmp_path):
-    """Spheres roll along it, and the kinetic friction is not mobilised."""
-    found = by_name(measure(silo(tmp_path, noise=0.02, stated=1.0)))
-    for name in ("apparent_mass_ratio", "wall_mobilisation"):
-        assert found[name]["verdict"] == "info" and found[name]["reference"] is None
-        assert "as rough as the grains" in found[name]["detail"]
+@pytest.mark.parametrize(("stated", "judged"), [(0.26, True), (0.27, False)], ids=["mobilised", "not mobilised"])
+def test_janssen_with_the_kinetic_friction_is_a_reference_where_it_is_mobilised(tmp_path, stated, judged):
+    """A wall of 0.25 has 96 and 93 % of these."""
+    content = measure(silo(tmp_path, noise=0.02, stated=stated))
+    share, remarks = by_name(content)["apparent_mass_ratio"], " ".join(content["remarks"])
+    assert (share["reference"] is not None) is judged and ("mobilises less than 95%" in share["detail"]) is not judged
+    assert ("is no reference here" in remarks) is not judged
+
+
+def test_only_contacts_that_slide_have_kinetic_friction(tmp_path):
+    half = by_name(measure(silo(tmp_path / "half", sticking=0.5)))
+    assert half["sliding_load"]["value"] == pytest.approx(0.5) and half["sliding_friction"]["verdict"] == "pass"
+    none = by_name(measure(silo(tmp_path / "none", sticking=1.0, stated=1.0)))
+    assert none["sliding_load"]["value"] == 0.0 and "sliding_friction" not in none
+    assert none["apparent_mass_ratio"]["reference"] is None
 
 
 def points(k_mu=0.235, others=None, heavier=1.0, hydrostatic=0.0, half=0.002, silos=(("quarter", 1.3, 0.025), ("half", 2.6, 0.025),
@@ -173,6 +182,18 @@ def test_a_hydrostatic_zone_is_found():
     shallow = tuple((f"filled_{height}", height, 0.025) for height in (0.5, 1.0, 2.0, 3.0))
     quantity, _ = study(k_mu=1.0 / 3.0, hydrostatic=1.0, silos=(*shallow, ("dry", 5.0, 0.025)))
     assert quantity["filling_two_parameter_gain"]["value"] > 0.95
+
+
+def test_mobilisation_over_the_friction_of_the_wall():
+    def wall(friction, share):
+        found = {"wall_mobilisation": 0.8 * friction * share, "sliding_load": share}
+        return {"parameters": {"wall_friction": friction, "kinetic_friction_ratio": 0.8},
+                "quantities": [{"name": name, "value": value, "interval": [value - 0.01, value + 0.01]} for name, value in found.items()]}
+
+    walls = [wall(0.5, 0.57), wall(0.2, 1.0), wall(0.3, 0.93)]
+    mobilised, sliding = SILO.study("mobilisation", walls, "wall_friction").profiles
+    assert mobilised["place"] == sliding["place"] == [0.2, 0.3, 0.5]
+    assert mobilised["value"] == pytest.approx([1.0, 0.93, 0.57]) and sliding["value"] == [1.0, 0.93, 0.57]
 
 
 def test_compare_needs_two_engines(tmp_path):

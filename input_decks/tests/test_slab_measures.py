@@ -22,7 +22,7 @@ def test_plane_silo_that_follows_janssen_passes(tmp_path):
     assert found["janssen_length_measured"]["value"] == pytest.approx(1.0 / (2 * 0.7 * 0.2), rel=0.03)
     assert found["stress_ratio_k_contacts"]["value"] == pytest.approx(0.7, rel=0.02)
     assert found["solid_fraction"]["value"] == pytest.approx(np.pi / 6.0, rel=2e-3)
-    for name in ("janssen_profile_deviation", "janssen_length_predicted", "apparent_mass_ratio", "wall_mobilisation"):
+    for name in ("janssen_profile_deviation", "janssen_length_predicted", "apparent_mass_ratio", "sliding_friction"):
         assert found[name]["verdict"] == "pass", name
     assert {found[name]["verdict"] for name in ("force_balance_error", "field_balance_deviation")} == {"pass"}
     assert abs(found["field_balance_deviation"]["value"]) < 1e-9
@@ -30,9 +30,9 @@ def test_plane_silo_that_follows_janssen_passes(tmp_path):
     assert "sigma_xx" in {one["name"] for one in content["profiles"]}
 
 
-@pytest.mark.parametrize(("wrong", "failed"), [({"friction": 0.004, "stated": 0.2}, {"apparent_mass_ratio", "wall_mobilisation"}),
-                                               ({"friction": 0.5, "inner": 1.15}, {"apparent_mass_ratio"}),
-                                               ({"friction": 0.5, "inner": 0.85}, {"apparent_mass_ratio"})],
+@pytest.mark.parametrize(("wrong", "failed"), [({"friction": 0.004, "stated": 0.2}, {"sliding_friction"}),
+                                               ({"friction": 0.5, "inner": 1.2}, {"apparent_mass_ratio"}),
+                                               ({"friction": 0.5, "inner": 0.8}, {"apparent_mass_ratio"})],
                          ids=["almost_liquid", "k_high", "k_low"])
 def test_plane_silo_with_wrong_physics_fails(tmp_path, wrong, failed):
     assert failed <= names(by_name(measure(plane_silo(tmp_path, noise=0.02, **wrong))), "fail")

@@ -2,10 +2,11 @@
 
 Everything is defined at the wall: the cross-section and the solid fraction count the volume up to it, although the grains' centres keep
 half a diameter off. K is the wall's normal stress over the mean sigma_zz of the cross-section, mu_mob the wall's shear over its normal
-stress, both measured in the lower half, without the lowest diameter, where the base orders the packing. Both together are the walls' shear
+stress, both measured in the bulk, without the lowest diameter, where the base orders the packing, and the uppermost, where hardly anything
+presses: lower half and upper half have the same K, but twice as many grains scatter less. Both together are the walls' shear
 over sigma_zz, which the balance of forces makes of the same shear: Janssen's law with them holds in a column whenever its shear is
 proportional to sigma_zz, in an almost frictionless one too. What can be predicted instead is the law with `contact_ratio`, K of the forces
-between grains, and the kinetic friction that the wall was given, or with the numbers of another column.
+between grains, and the kinetic friction that the wall was given, where the wall mobilises that; or with the numbers of another column.
 
 Wet grains are also pulled to the wall by their liquid bridges, with a stress a that adds to the pressure in the contacts but not to the
 wall's net normal stress. Janssen's balance d sigma / dh = rho_b g - 2 tau / R with tau = mu_mob (K sigma + a) then gives the same law with
@@ -14,6 +15,7 @@ the specific weight rho_b g - 2 mu_mob a / R, and mu_mob = tau / (sigma_rr + a).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -32,6 +34,10 @@ from dembark.postproc.spheres import slice_volumes
 Mask = NDArray[np.bool_]
 Bridges = Callable[[Array], Array]
 
+# A contact slides when its surfaces pass each other with more than this share of the wall's speed. Between 0.05 and 0.2 the load that
+# slides changes by a thirtieth, its friction by a thousandth.
+SLIDES = 0.1
+
 
 @dataclass(frozen=True)
 class Column:
@@ -43,7 +49,8 @@ class Column:
     the wall (N); solid `volume` (m3). (frames, bands): the walls' `lift` and the grains' weight `weight_above`, and the upward force
     `net_above` that accelerates the grains above (N); vertical contact stress `field` (Pa), and the one towards the walls `pressing` by
     sectors (Pa), which sum up to it. (frames, levels, ...): `level_lift`, by sectors too, and
-    `level_weight`. (frames,): force `base` on the base (N).
+    `level_weight`. (frames,): force `base` on the base (N). (frames, 3) in N: `rubbing`, the normal force of all contacts with the wall in
+    the bulk, and normal force and friction of those that slide.
     """
 
     edges: Array
@@ -63,6 +70,7 @@ class Column:
     net_above: Array
     field: Array
     pressing: Array
+    rubbing: Array
     volume: Array
     base: Array
     force_error: Estimate
@@ -83,9 +91,14 @@ class Column:
         return self.mass * self.gravity / (self.vessel.area * self.height)
 
     @property
+    def bulk(self) -> Mask:
+        """Bands without one diameter above the base, which orders the packing, and one below the surface."""
+        return (self.middle > self.diameter) & (self.middle < self.height - self.diameter)
+
+    @property
     def lower(self) -> Mask:
-        """Bands of the lower half, without the lowest diameter."""
-        return (self.middle > self.diameter) & (self.middle < 0.5 * self.height)
+        """Bands of the lower half of them, where the stress is high enough for relative deviations."""
+        return self.bulk & (self.middle < 0.5 * self.height)
 
     @property
     def everything(self) -> tuple[Mask, Mask]:
@@ -109,19 +122,29 @@ class Column:
 
     def stress_ratio(self, frames: Mask, sectors: Mask) -> float:
         """K. The balance stress is that of the whole column: it is known, and no sector has one of its own."""
-        return float(self.wall(self.normal, frames, sectors)[self.lower].sum() / self.balance(frames)[self.lower].sum())
+        return float(self.wall(self.normal, frames, sectors)[self.bulk].sum() / self.balance(frames)[self.bulk].sum())
 
     def contact_ratio(self, frames: Mask, sectors: Mask) -> float:
         """K of the contact stress alone, mean over the section: no force that a wall's shear has a part in."""
-        return float(self._whole(self.pressing, frames, sectors)[self.lower].sum() / self.field[frames].mean(axis=0)[self.lower].sum())
+        return float(self._whole(self.pressing, frames, sectors)[self.bulk].sum() / self.field[frames].mean(axis=0)[self.bulk].sum())
 
     def adhesive_stress(self, frames: Mask, sectors: Mask) -> float:
         """a: pull of the liquid bridges over the wall's area (Pa); 0 when dry."""
-        return float(self.wall(self.adhesion, frames, sectors)[self.lower].mean())
+        return float(self.wall(self.adhesion, frames, sectors)[self.bulk].mean())
 
     def mobilisation(self, frames: Mask, sectors: Mask) -> float:
         """mu_mob."""
-        return float(self.wall(self.shear, frames, sectors)[self.lower].sum() / self.pressure(frames, sectors)[self.lower].sum())
+        return float(self.wall(self.shear, frames, sectors)[self.bulk].sum() / self.pressure(frames, sectors)[self.bulk].sum())
+
+    def sliding_load(self, frames: Mask, _: Mask | None = None) -> float:
+        """Share of the walls' normal force in contacts that slide."""
+        every, sliding, _friction = self.rubbing[frames].sum(axis=0)
+        return float(sliding / every)
+
+    def sliding_friction(self, frames: Mask, _: Mask | None = None) -> float:
+        """Friction over normal force of the contacts that slide; NaN when none does."""
+        _every, sliding, friction = self.rubbing[frames].sum(axis=0)
+        return float(friction / sliding) if sliding > 0.0 else math.nan
 
     def hanging_weight(self, frames: Mask, sectors: Mask) -> float:
         """rho_b g - 2 mu_mob a / size (N/m3): the specific weight less what adhesion alone hangs on the wall."""
@@ -163,10 +186,10 @@ class Column:
         """Force on the base over the weight."""
         return float(self.base[frames].mean()) / (self.mass * self.gravity)
 
-    def coulomb_base_share(self, frames: Mask, sectors: Mask) -> float:
-        """The same by Janssen's law with K of the contact stress and the kinetic friction of the walls, which slide."""
-        k_mu = self.contact_ratio(frames, sectors) * self.friction
-        hanging = 1.0 - 2.0 * self.friction * self.adhesive_stress(frames, sectors) / (self.vessel.size * self.weight)
+    def janssen_base_share(self, friction: float, frames: Mask, sectors: Mask) -> float:
+        """The same by Janssen's law with K of the contact stress and the `friction` of the walls."""
+        k_mu = self.contact_ratio(frames, sectors) * friction
+        hanging = 1.0 - 2.0 * friction * self.adhesive_stress(frames, sectors) / (self.vessel.size * self.weight)
         return hanging * float(janssen.base_share(2.0 * k_mu * self.height / self.vessel.size))
 
     def fractions(self, frames: Mask, sectors: Mask) -> Array:
@@ -174,9 +197,8 @@ class Column:
         return self._whole(self.volume, frames, sectors) / (self.vessel.area * np.diff(self.edges))
 
     def solid_fraction(self, frames: Mask, sectors: Mask) -> float:
-        """Between one diameter above the base and one below the surface."""
-        inside = (self.middle > self.diameter) & (self.middle < self.height - self.diameter)
-        return float(self.fractions(frames, sectors)[inside].mean())
+        """Of the bulk."""
+        return float(self.fractions(frames, sectors)[self.bulk].mean())
 
     def field_errors(self) -> Array:
         """Relative deviation (frames,) of the contact-stress field from the balance, over the bands below the uppermost two diameters.
@@ -200,7 +222,8 @@ def read(replica: Replica) -> Column:
     sectors, bridges = silo.sectors(diameter), wall_bridges(values)
 
     def of_frame(grains: GrainFrame, contacts: ContactFrame) -> dict[str, Any]:
-        return _frame_rows(grains, contacts, silo, gravity, edges, sectors, bridges)
+        return {**_frame_rows(grains, contacts, silo, gravity, edges, sectors, bridges),
+                "rubbing": rubbing(grains, silo, float(values["wall_speed"]), (diameter, height - diameter), bridges)}
 
     rows = [row for _, row in replica.mapped(of_frame)]
     times = replica.times()
@@ -238,6 +261,21 @@ def wall_pull(grains: GrainFrame, side: Array, silo: Vessel, bridges: Bridges | 
     pull = np.where(touching, 0.0, -np.einsum("na,na->n", side, silo.inward(grains.positions)))
     pull[touching] = bridges(grains.radii[touching])
     return pull
+
+
+def rubbing(grains: GrainFrame, silo: Vessel, wall_speed: float, between: tuple[float, float], bridges: Bridges | None) -> Array:
+    """(3,) in N of the contacts with a wall that rises with `wall_speed` (m/s), at heights `between` (m): the normal force of all, and
+    normal force and friction of those that slide, by the velocities of both surfaces and no force."""
+    side, place = np.sum([grains.wall_forces[name] for name in silo.names], axis=0), grains.positions
+    inward, arm = silo.inward(place), silo.distance(place)
+    touching = (arm <= grains.radii) & (place[:, 2] > between[0]) & (place[:, 2] < between[1])
+    across = np.einsum("na,na->n", side, inward)
+    normal, friction = across + wall_pull(grains, side, silo, bridges), np.linalg.norm(side - across[:, None] * inward, axis=1)
+    slip = grains.velocities - np.cross(grains.omegas, inward * arm[:, None]) - [0.0, 0.0, wall_speed]
+    slip -= np.einsum("na,na->n", slip, inward)[:, None] * inward
+    # Along a wall at rest nothing slides for long.
+    slides = touching & (np.linalg.norm(slip, axis=1) > (SLIDES * wall_speed if wall_speed > 0.0 else np.inf))
+    return np.array([normal[touching].sum(), normal[slides].sum(), friction[slides].sum()])
 
 
 def _frame_rows(grains: GrainFrame, contacts: ContactFrame, silo: Vessel, gravity: float, edges: Array, sectors: int,

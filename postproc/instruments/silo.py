@@ -10,7 +10,7 @@ import numpy as np
 
 from dembark.postproc.instruments import janssen
 from dembark.postproc.instruments.column import Column, Mask
-from dembark.postproc.instruments.growth import Growth
+from dembark.postproc.instruments.growth import Growth, ordered
 from dembark.postproc.instruments.vessel import overlap
 from dembark.postproc.measurement import Array, Measurement, Value
 from dembark.postproc.replica import once
@@ -21,6 +21,9 @@ from dembark.postproc.studies import propagated
 
 Fit = Callable[[Mask, Mask], Any]
 ZERO = Estimate(0.0, 0.0)
+# Share of its kinetic friction that a wall must mobilise for Janssen's law with that friction to be a reference: the force on the base
+# changes relatively by no more than the friction does, which so takes at most half of the tolerance of 10 %.
+MOBILISED = 0.95
 
 
 def _kept(fit: Fit) -> Fit:
@@ -41,13 +44,21 @@ def scalars(one: Column) -> dict[str, Estimate]:
     """Quantities of one replica by name, lengths over the vessel's size; names with _ are what references and intervals are made of."""
     frames, (_, whole), size = time_blocks(one.shear.sum(axis=(1, 2))), one.everything, one.vessel.size
     sectors, fitted, pair = np.arange(len(whole)), _kept(one.fitted_length), _kept(one.fitted_pair)
+
+    def coulomb(f: Mask, s: Mask) -> float:
+        return one.janssen_base_share(one.friction, f, s)
+
+    def mobilised(f: Mask, s: Mask) -> float:
+        return one.janssen_base_share(one.mobilisation(f, s), f, s)
+
     measures = {
         "janssen_profile_deviation": one.worst_deviation,
         "janssen_length_predicted": lambda f, s: one.predicted_length(f, s) / size,
         "janssen_length_measured": lambda f, s: fitted(f, s) / size,
         "_length_error": lambda f, s: one.predicted_length(f, s) / fitted(f, whole) - 1.0,
-        "_base_predicted": one.coulomb_base_share,
-        "_base_error": lambda f, s: one.base_share(f) / one.coulomb_base_share(f, s) - 1.0,
+        "_base_predicted": coulomb,
+        "_base_mobilised": mobilised,
+        "_base_error": lambda f, s: one.base_share(f) / coulomb(f, s) - 1.0,
         "stress_ratio_k": one.stress_ratio,
         "stress_ratio_k_contacts": one.contact_ratio,
         "k_mu_contacts": lambda f, s: one.contact_ratio(f, s) * one.mobilisation(f, s),
@@ -63,6 +74,8 @@ def scalars(one: Column) -> dict[str, Estimate]:
     return {
         **{name: resampled(measure, frames, sectors, overlap(len(sectors))) for name, measure in measures.items()},
         "apparent_mass_ratio": resampled(one.base_share, frames),
+        "sliding_load": resampled(one.sliding_load, frames),
+        "sliding_friction": resampled(one.sliding_friction, frames),
         "field_balance_deviation": block_mean(one.field_errors()),
         "force_balance_error": one.force_error,
         "filled_mass": Estimate(one.mass, math.inf, unknown),
@@ -113,49 +126,70 @@ def predicted(points: Sequence[Mapping[str, Any]]) -> Measurement:
     return Measurement(values, [curve], [remark])
 
 
+def mobilised(points: Sequence[Mapping[str, Any]]) -> Measurement:
+    """How much of its kinetic friction the wall mobilises, over the static friction of the wall, which the results `points` differ in."""
+    points, place = ordered(points, "wall_friction")
+    kinetic = place * np.array([point["parameters"]["kinetic_friction_ratio"] for point in points], float)
+    share = Growth.of(points, "wall_mobilisation", place, 1.0 / kinetic)
+    sliding = Growth.of(points, "sliding_load", place)
+    along = "static friction of the wall"
+    return Measurement({}, [
+        profile("mobilisation", "Mobilised friction", along, "μ_mob / kinetic friction", place, [share.values], half=share.halves,
+                reference=np.full_like(place, MOBILISED), reference_label="above, Janssen's law with it is a reference"),
+        sliding.curve("sliding_load", "Normal force in contacts that slide", along, "share of the wall's normal force")])
+
+
 def measured(columns: Sequence[Column], size: str, across: str, friction: Mapping[str, float]) -> Measurement:
     """Values, profiles and remarks of all columns of a series.
 
     `size`: symbol of the length in Janssen's law; `across`: letter of the direction to the wall; `friction`: the coefficients
-    `wall_static`, `wall_kinetic` and `grain_kinetic`.
+    `wall_static` and `wall_kinetic`.
     """
     found, wet = [scalars(column) for column in columns], bool(columns[0].adhesion.any())
     over = {name: pooled(found, name) for name in found[0]}
-    # Coulomb's law gives the shear of a wall that slides; along one as rough as the grains spheres roll.
-    slides = 0.0 < friction["wall_kinetic"] < friction["grain_kinetic"]
+    kinetic = friction["wall_kinetic"]
+    predicts, slides = over["wall_mobilisation"].value >= MOBILISED * kinetic > 0.0, math.isfinite(over["sliding_friction"].value)
     references: dict[str, tuple[Estimate, float | None]] = {
         "janssen_profile_deviation": (ZERO, None),
         "janssen_length_predicted": (over["janssen_length_measured"], over["_length_error"].half),
-        **({"apparent_mass_ratio": (over["_base_predicted"], over["_base_error"].half),
-            "wall_mobilisation": (exact(friction["wall_kinetic"]), None)} if slides else {}),
+        **({"apparent_mass_ratio": (over["_base_predicted"], over["_base_error"].half)} if predicts else {}),
+        **({"sliding_friction": (exact(kinetic), None)} if slides and kinetic > 0.0 else {}),
         "force_balance_error": (ZERO, None),
         "field_balance_deviation": (ZERO, None),
     }
-    rolls = "" if slides else "; no reference: the wall is as rough as the grains or has no friction"
-    details = {"wall_mobilisation": f"lower half; the wall's static friction is {friction['wall_static']:g}{rolls}",
-               "apparent_mass_ratio": f"reference: Janssen with K of the contact stress and the wall's kinetic friction{rolls}",
+    none = "" if predicts else f"; no reference: the wall mobilises less than {MOBILISED:.0%} of that friction"
+    details = {"wall_mobilisation": f"the wall's static friction is {friction['wall_static']:g}, its kinetic one {kinetic:g}",
+               "apparent_mass_ratio": f"Janssen with K of the contact stress and the wall's kinetic friction{none}",
+               "sliding_friction": "" if slides else "no contact with the wall slides",
                "two_parameter_gain": f"with it λ is {over['_pair_length'].value:.2f} {size}"}
     values = {name: Value(one, reference, half, detail=details.get(name, ""))
               for name, one in over.items() for reference, half in [references.get(name, (None, None))]
-              if not name.startswith("_") and (wet or name != "wall_adhesion")}
+              if not name.startswith("_") and (wet or name != "wall_adhesion") and (slides or name != "sliding_friction")}
     return Measurement(values, _profiles(columns, over, across, friction["wall_static"]), _remarks(columns, over, wet, friction))
 
 
 def _remarks(columns: Sequence[Column], over: Mapping[str, Estimate], wet: bool, friction: Mapping[str, float]) -> list[str]:
     static, kinetic, mobilised = friction["wall_static"], friction["wall_kinetic"], over["wall_mobilisation"].value
-    limits = f"{mobilised / static:.0%} of its static and {mobilised / kinetic:.0%} of its kinetic" if static > 0 and kinetic > 0 else "no"
-    # Spheres that slide reach the kinetic limit; a clear shortfall means that they roll.
-    manner = ("The grains at the wall slide, close to the kinetic limit." if mobilised > 0.85 * kinetic
-              else "Spheres roll along a smooth wall instead of sliding, which keeps the shear below Coulomb's limit.")
+    measured, predicted, own = (over[name].value for name in ("apparent_mass_ratio", "_base_predicted", "_base_mobilised"))
+    share = f"{mobilised / kinetic:.0%} of its kinetic" if kinetic > 0.0 else "no"
+    judged = ("Janssen's law with the kinetic friction is a reference for the force on the base." if mobilised >= MOBILISED * kinetic > 0.0
+              else "Janssen's law with the kinetic friction is no reference here; along a wall with less friction, or where they resist "
+                   "rolling, all grains slide.")
+    remarks = [
+        (f"The wall mobilises {share} friction (μ_mob = {mobilised:.3f}; static {static:g}, kinetic {kinetic:g}): "
+         f"{over['sliding_load'].value:.0%} of its normal force is in contacts that slide; at others spheres stick and roll, and their "
+         f"friction is smaller or not vertical. {judged}"),
+        (f"The base carries {measured:.3f} of the weight, by Janssen's law {predicted:.3f} with the kinetic friction and {own:.3f} with "
+         f"μ_mob: friction that is not mobilised explains {own / predicted - 1.0:+.1%} of {measured / predicted - 1.0:+.1%}. The rest is "
+         "what the law with one K leaves out, above all the lowest diameter: the base orders its grains, and less of the load presses on "
+         "the wall."),
+        ("Calibrated in the same column, and therefore counted as identities: λ = size / (2 K μ_mob), where K μ_mob is the wall "
+         "shear over σ_zz, and Janssen's profile with it. They hold for any shear that is proportional to σ_zz and do not test its "
+         "magnitude, which the friction of the sliding contacts does.")]
     if wet:
-        share = 1.0 - over["_hanging_weight"].value / float(np.mean([column.weight for column in columns]))
-        manner += (f" Liquid bridges pull the grains to the wall with {over['wall_adhesion'].value:.3g} Pa; the friction due to this pull "
-                   f"alone carries {share:.0%} of the weight, and Janssen's law is applied to the remaining weight.")
-    remarks = [(f"The wall carries {limits} friction (μ_mob = {mobilised:.3f}; static {static:g}, kinetic {kinetic:g}). {manner} With the "
-               "static coefficient in its place λ would be shorter by the first of these fractions."),
-               ("Calibrated in the same column, and therefore counted as identities: λ = size / (2 K μ_mob), where K μ_mob is the wall "
-                "shear over σ_zz, and Janssen's profile with it. They hold for any shear that is proportional to σ_zz and do not test its "
-                "magnitude. Predicted: the force on the base, from K of the contact stress and the given kinetic friction of the wall.")]
+        hanging = 1.0 - over["_hanging_weight"].value / float(np.mean([column.weight for column in columns]))
+        remarks.append(f"Liquid bridges pull the grains to the wall with {over['wall_adhesion'].value:.3g} Pa; the friction due to this "
+                       f"pull alone carries {hanging:.0%} of the weight, and Janssen's law is applied to the remaining weight.")
     if len(columns) < 3:
         remarks.append("With fewer than three packings the intervals come from time blocks and from sectors of the walls within the "
                        "packing; they do not include variations from packing to packing.")

@@ -17,13 +17,13 @@ import numpy as np
 from dembark.postproc import ContactFrame, GrainFrame
 from dembark.postproc.fields.rings import Fields, Rings, Zones, coarse_grain
 from dembark.postproc.instruments import column, janssen
+from dembark.postproc.instruments.column import Column, Mask
 from dembark.postproc.instruments.vessel import Cylinder, overlap
 from dembark.postproc.labelled import labelled, variable, with_interval
 from dembark.postproc.measurement import Array, Measurement, Replica, Value
 from dembark.postproc.replica import once
 from dembark.postproc.resampling import resampled
-from dembark.postproc.statistics import Estimate, TimeBlocks, block_mean, combined, over_replicas, time_blocks
-from dembark.postproc.studies import propagated
+from dembark.postproc.statistics import Estimate, TimeBlocks, block_mean, over_replicas, time_blocks
 from dembark.postproc.walls import CylinderWall, PlaneWall, wall_contacts
 from dembark.postproc.walls.patches import cylinder_patches
 from dembark.postproc.walls.stress import WallRecorder
@@ -37,7 +37,7 @@ _STRESSES = {"zz": "vertical stress", "rr": "radial stress", "tt": "hoop stress"
 
 @dataclass(frozen=True)
 class Silo:
-    """One replica. `zones` (frames, 1 + bands, sectors, rings, 2): stress times volume zz and rr, first of the lower half of the column;
+    """One replica. `zones` (frames, 1 + bands, sectors, rings, 2): stress times volume zz and rr, first of the bulk of the column;
     `column` (frames, layers): zz of all rings together; `wall` (layers, 2): normal and upward shear stress of the wall in Pa;
     `wall_error`: force of the wall on the grains less that of time.csv, over the `weight` (N)."""
 
@@ -86,7 +86,7 @@ def read(replica: Replica) -> Silo:
     cells = Rings.around(radius, math.ceil(2.0 * height / diameter) * 0.5 * diameter, diameter, 0.5 * diameter)
     vessel, side, base = Cylinder(radius), CylinderWall("side", radius), PlaneWall("base")
     sectors = min(_MOST_SECTORS, vessel.sectors(diameter))
-    zones = [(diameter, 0.5 * height), *((low * height, high * height) for low, high in BANDS)]
+    zones = [(diameter, height - diameter), *((low * height, high * height) for low, high in BANDS)]
     low, high = cells.vertical[:-1, None], cells.vertical[1:, None]
     # Part of each layer that lies in each zone.
     layers = np.clip(np.minimum(high, [top for _, top in zones]) - np.maximum(low, [foot for foot, _ in zones]), 0.0, None) / (high - low)
@@ -126,32 +126,35 @@ def _all(replicas: Sequence[Replica]) -> list[Silo]:
 
 
 class _Janssen:
-    """Janssen's law from the measured quantities of a case, and how far it moves within their intervals."""
+    """Janssen's law from the measured quantities of a case."""
 
     def __init__(self, known: Mapping[str, Value], radius: float, height: float, specific: float) -> None:
         """`specific`: weight (N/m3) of the column per volume."""
         found = [known[name].estimate for name in ("stress_ratio_k", "wall_mobilisation", "wall_adhesion") if name in known]
-        self.values, self.halves = (np.array([getattr(one, part) for one in found]) for part in ("value", "half"))
+        self._values = [one.value for one in found]
         self._radius, self.height, self._specific = radius, height, specific
 
-    def __call__(self, heights: Array, values: Array | None = None) -> Array:
-        """sigma_zz (Pa) at `heights` (m), with other `values` of K, mu_mob and a."""
-        k, friction, *adhesion = self.values if values is None else values
+    def __call__(self, heights: Array) -> Array:
+        """sigma_zz (Pa) at `heights` (m)."""
+        k, friction, *adhesion = self._values
         weight = self._specific - 2.0 * friction * sum(adhesion) / self._radius
         return janssen.stress(np.maximum(self.height - heights, 0.0), self._radius / (2.0 * k * friction), weight)
 
-    def deviation(self, silos: Sequence[Silo], diameter: float) -> Value:
-        """Largest |law / field - 1| of the lower half."""
-        heights = silos[0].rings.heights
-        chosen = np.nonzero((heights > diameter) & (heights < 0.5 * self.height))[0]
-        mean = np.mean([one.section.mean(axis=0) for one in silos], axis=0)
-        worst = int(chosen[np.argmax(np.abs(self(heights) / mean - 1.0)[chosen])])
-        measured = over_replicas([block_mean(one.section[:, worst]) for one in silos])
-        known = propagated(lambda values: float(self(heights, values)[worst]) / measured.value - 1.0, self.values, self.halves)
-        half = combined([known.half, (1.0 + known.value) * measured.half / measured.value])
-        found = Estimate(abs(known.value), half, f"propagated from K, μ_mob and σ_zz; {measured.basis}")
-        return Value(found, Estimate(0.0, 0.0), detail="mean over the cross-section, at the worst height "
-                     f"(z = {heights[worst] / diameter:.1f} d); law with K, μ_mob, ρ_b of the same column")
+
+def _deviation(silos: Sequence[Silo], columns: Sequence[Column]) -> Value:
+    """Largest |law / field - 1| of the lower half, each packing with its own K and friction, which its stress is correlated with."""
+    found = []
+    for one, known in zip(silos, columns, strict=True):
+        heights = one.rings.heights
+        chosen = (heights > known.diameter) & (heights < 0.5 * known.height)
+
+        def worst(frames: Mask, sectors: Mask, section: Array = one.section[:, chosen], known: Column = known,
+                  depth: Array = known.height - heights[chosen]) -> float:
+            return float(np.abs(known.predicted_stress(depth, frames, sectors) / section[frames].mean(axis=0) - 1.0).max())
+
+        sectors = known.shear.shape[2]
+        found.append(resampled(worst, one.blocks, np.arange(sectors), overlap(sectors)))
+    return Value(over_replicas(found), Estimate(0.0, 0.0), detail="mean over the cross-section; law with K, μ_mob, ρ_b of the same column")
 
 
 def measured(replicas: Sequence[Replica], known: Mapping[str, Value]) -> Measurement:
@@ -171,7 +174,7 @@ def measured(replicas: Sequence[Replica], known: Mapping[str, Value]) -> Measure
         return Estimate(float(np.abs(rest).max()) / specific, 0.0, "every ring of the mean over all frames")
 
     values = {
-        "field_janssen_deviation": law.deviation(silos, diameter),
+        "field_janssen_deviation": _deviation(silos, [column.read(one) for one in replicas]),
         "field_momentum_residual": Value(over_replicas([worst(one, True) for one in silos]), zero),
         "field_static_residual": Value(over_replicas([worst(one, False) for one in silos])),
         "wall_force_deviation": Value(over_replicas([one.wall_error for one in silos]), zero),
