@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dembark.postproc.statistics import Estimate
-from dembark.postproc.studies import compared, fitted_exponent, measured, propagated
+from dembark.postproc.studies import compared, fitted_exponent, measured, numerical, propagated
 
 
 def point(value, interval):
@@ -36,3 +36,9 @@ def test_compared_tells_error_and_every_part():
     assert error.text == "E = 2 exceeds U_val = 1.3; U_num = 0.4, U_input = 1.2, U_D = 0.3"
     near = compared(0.0, Estimate(1.0, 1.0), sim=math.inf)
     assert not near.seen and near.text.startswith("E = -1 is within U_val = inf")
+
+
+def test_a_numerical_uncertainty_is_known_with_and_without_an_order() -> None:
+    # 1 + h, whose order is the formal one, and values that run away from each other.
+    assert numerical([0.1, 0.2, 0.4], [1.1, 1.2, 1.4]) == pytest.approx(1.25 * 0.1)
+    assert numerical([0.1, 0.2, 0.4], [1.0, 2.0, 2.5]) == pytest.approx(3.0 * 1.5)
