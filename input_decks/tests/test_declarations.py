@@ -17,7 +17,7 @@ from dembark.validation.case.model import Case
 from dembark.validation.case.resolve import resolve
 
 HERE = Path(__file__).parent
-FIELDS = ("unit", "evidence", "tolerance", "absolute", "agreement", "compared", "why", "source")
+FIELDS = ("unit", "evidence", "tolerance", "absolute", "agreement", "compared", "family", "why", "source")
 
 
 def _cases() -> list[Case]:
