@@ -29,9 +29,9 @@ def measure(replicas: Replicas) -> Measurement:
 def measured(p: Numbers, flight: Flight) -> Measurement:
     """The same from a run with parameters `p` that was read."""
     one = impacts(p)
-    known, after = Solutions(one, p["time_step"], p["lead_steps"]), flight.after.numbers(one)
+    known, after = Solutions(one, p["time_step"], p["lead_steps"], p["presliding"] == "partial_slip"), flight.after.numbers(one)
     apart = [np.abs(after[name] - known.scheme[0][name]).max() / max(1.0, np.abs(known.scheme[0][name]).max())
-             for name in ("restitution", "slide", "spin")]
+             for name in (("restitution",) if known.in_parts else ("restitution", "slide", "spin"))]
     values = {"scheme_deviation": number(max(apart), 0.0)}
     if flight.momentum_error is not None:
         values["momentum_error"] = number(flight.momentum_error, 0.0)

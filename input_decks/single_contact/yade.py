@@ -28,7 +28,7 @@ O.engines = [
         [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
         [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
             restitution=MatchMaker(matches=rebound), staticFriction=p.friction, kineticFriction=p.friction, criticalSlipDistance=0)],
-        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz()],
+        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding=p.presliding, frictionLimit=p.friction_limit)],
     ),
     # Between forces and motion, where positions and forces belong to the same time.
     PyRunner(command="writer.write()", iterPeriod=p.stride, initRun=True),

@@ -25,6 +25,7 @@ RESUMED = ("liggghts", "yade", "lammps")
 SCENES: dict[str, dict[str, Any]] = {
     "test_3": {"time_step": 1e-7, "duration": 4e-5},
     "test_4": {"points": 2, "sweep_from": 20.0, "sweep_to": 60.0, "time_step": 1e-7},
+    "test_6": {"points": 3, "time_step": 1e-5},
     "test_7": {"points": 2, "time_step": 1e-5},
     "test_8_b": {"points": 3, "time_step": 1e-5},
 }

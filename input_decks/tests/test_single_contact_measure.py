@@ -7,6 +7,7 @@ import pytest
 
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.physics.exact.contact_law import stepped
+from dembark.physics.exact.impacts import partial_slip
 from dembark.postproc.instruments.impacts import Flight
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
@@ -22,6 +23,9 @@ def flown(p, one=None):
     """A run by the scheme that was written down again, through the impacts `one`: those of `p` when left out."""
     one = one or single_contact.impacts(p)
     after = replace(stepped(one, p["time_step"], p["lead_steps"] % 1.0, p["duration"]), overlap=one.peak_overlap, force=one.peak_force)
+    if p["presliding"] == "partial_slip":
+        # Of which the scheme knows the motion along the normal.
+        after = replace(after, slide=(known := partial_slip(one, 100, 1000)).slide, spin=known.spin)
     times = np.linspace(-0.1, 1.1, 401) * one.duration.max()
     # After Hertz, and free before and after.
     apart = one.closing * np.minimum(times[:, None], one.duration - times[:, None])
@@ -33,7 +37,7 @@ def verdicts(p, flight):
     return judged("single_contact", single_contact.measured(p, flight))
 
 
-@pytest.mark.parametrize("variant", ["test_1", "test_3", "test_4", "test_7", "test_8_b"])
+@pytest.mark.parametrize("variant", ["test_1", "test_3", "test_4", "test_5_partial_slip", "test_7", "test_8_b"])
 def test_what_the_scheme_does_passes_and_what_is_wrong_is_seen(variant):
     p = parameters(variant)
     p |= {"points": min(p["points"], 5), "time_step": 8.0 * p["time_step"]}

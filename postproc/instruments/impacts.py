@@ -52,7 +52,7 @@ def impacts(p: Numbers) -> Impacts:
     return Impacts(1.0 / ((1.0 - poisson**2) * softness), 1.0 / (2.0 * (2.0 - poisson) * (1.0 + poisson) * softness),
                    value if kind == "restitution" else p["restitution"] * full, p["friction"] * full,
                    np.array([p["radius"] * full, larger * p["radius"] * full]), np.array([mass, larger**3 * denser * mass]),
-                   moving * slide, moving * normal, moving * spin)
+                   moving * slide, moving * normal, moving * spin, p["friction_limit"])
 
 
 def read(replica: Replica, one: Impacts, touch: float) -> Flight:
@@ -87,17 +87,25 @@ def _top(values: Array) -> Array:
 
 class Solutions:
     """What impacts are held against: the `scheme` (numbers) at the run's phase and three others; where friction acts the contact law
-    solved exactly and in half the parts, `law`, and, for elastic impacts on a plane, where it is known, partial `slip`."""
+    solved exactly and in half the parts, `law`, and, for elastic impacts on a plane, where it is known, partial `slip`.
 
-    def __init__(self, one: Impacts, time_step: float, phase: float) -> None:
+    `in_parts`: the contacts of the run slip in parts. Then that is the law, and the scheme knows the motion along the normal only."""
+
+    def __init__(self, one: Impacts, time_step: float, phase: float, in_parts: bool = False) -> None:
         length = float((1.4 * one.duration * (1.0 - np.log(one.restitution) / 4.0)).max())
         self.scheme = [stepped(one, time_step, (phase + more) % 1.0, length).numbers(one) for more in _PHASES]
         self.law: tuple[Rebounds, ...] = (solved(one), solved(one, 500)) if one.slides else ()
         known = one.slides and not one.arm[1].any() and (one.restitution > 0.95).all()
         self.slip = partial_slip(one) if known else None
+        self.in_parts, self._sliding = in_parts and self.slip is not None, one.friction * (1.0 + one.restitution)
+        if self.in_parts and self.slip:
+            self.law = (self.slip, partial_slip(one, 200, 1000))
 
     def bound(self, name: str, due: Array) -> Array:
-        """What is allowed beside `due` (n,): twice what the scheme loses at this step, the worst of four phases of the touch within it."""
+        """What is allowed beside `due` (n,): twice what the scheme loses at this step, the worst of four phases of the touch within it. Of
+        contacts that slip in parts: a hundredth of the sliding friction throughout, within which their eight rings lie."""
+        if self.in_parts and name in ("slide", "spin"):
+            return 0.01 * {"slide": 1.0, "spin": 2.5}[name] * self._sliding
         return np.asarray(2.0 * np.max([np.abs(each[name] - due) for each in self.scheme], axis=0), np.float64)
 
 
