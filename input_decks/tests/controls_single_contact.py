@@ -49,7 +49,7 @@ def published(variant: str, method: str) -> Verdicts:
 
 
 def linear(variant: str) -> Verdicts:
-    """What a run is worth whose contacts do not slip in parts."""
+    """What a run with linear springs is worth."""
     p = parameters(variant) | {"points": 17}
     return beside(variant, single_contact.measured(p, flown(p | {"presliding": "linear"})))
 
@@ -62,7 +62,7 @@ def controls(_folder: Path) -> Iterator[Control]:
     yield Control("an external push", head_on, of("test_1", spoil=lambda one: replace(one, momentum_error=1e-9)))
     for variant in ("test_1", "test_3", "test_4", "test_7"):
         yield Control("restitution a tenth too low", of(variant), of(variant, scaled(restitution=0.9)))
-    yield Control("contacts that slip as a whole", of("test_5_partial_slip"), linear("test_5_partial_slip"))
+    yield Control("no slip before all slides", of("test_5_partial_slip"), linear("test_5_partial_slip"))
     for variant in ("test_6", "test_8_a", "test_8_b"):
         wrong = of(variant, lambda one: replace(one, friction_limit="total"))
         yield Control("friction limited with the dashpot", published(variant, "published"), wrong)
@@ -72,6 +72,6 @@ def controls(_folder: Path) -> Iterator[Control]:
         lacking, right = of(variant, scaled(friction=0.0)), of(variant)
         yield Control("friction off", right, lacking)
         if variant != "test_5":
-            # Beside points that the law does not follow, what passes is the publication itself.
+            # Where the law does not follow all points, what passes is the publication itself.
             method = "finite_elements" if variant == "test_5_partial_slip" else "published"
             yield Control("friction off", published(variant, method), lacking)

@@ -107,7 +107,7 @@ __attribute__((noinline)) void scalar_friction(const PairStep& s, const PairBloc
     const auto lane = [k](const PackVec<P>& v) { return Vec3<double>{v.x[k], v.y[k], v.z[k]}; };
     const Vec3<double> force = s.scalar.friction(b, first + k, lane(normal), twist[k],
                                                  {response.force[k], response.tangential_stiffness[k], response.tangential_damping[k],
-                                                  response.contact_area[k], 0.0, response.elastic_force[k]},
+                                                  response.contact_area[k], 0.0, response.force[k]},
                                                  lane(velocity));
     tangential.x.lanes[k] = force.x;
     tangential.y.lanes[k] = force.y;
@@ -143,13 +143,13 @@ struct Slip {
   FrictionState<P> moved{};
 };
 template <class P>
-__attribute__((noinline)) Slip<P> slip_of(const PairLaw<P>& law, const P& limiting_force, const P& stiffness, const PackVec<P>& increment,
+__attribute__((noinline)) Slip<P> slip_of(const PairLaw<P>& law, const NormalResponse<P>& response, const PackVec<P>& increment,
                                           const LaneMask<P>& unsure, const FrictionState<P>& state) {
   // Bounded, which what is no number is not.
   const auto plain = unsure & !(law.interface_shear_strength < unlimited_strength) &
-                     (stiffness * dot(state.displacement, state.displacement) < P(INFINITY));
+                     (response.tangential_stiffness * dot(state.displacement, state.displacement) < P(INFINITY));
   Slip<P> found;
-  found.slips = coulomb_slip(law, limiting_force, stiffness, increment, plain, state, found.moved);
+  found.slips = coulomb_slip(law, response.force, response.tangential_stiffness, increment, plain, state, found.moved);
   found.sticks = bits(plain & !found.slips);
   return found;
 }
@@ -164,8 +164,8 @@ DEMBARK_HOT void replace(const LaneMask<P>& which, PackVec<P>& old, const PackVe
 /// has changed.
 template <class P>
 DEMBARK_HOT unsigned partial_slip(const PairStep& s, const PairBlock& b, int first, unsigned there, const PairLaw<P>& law,
-                                  const PackVec<P>& normal, const P& twist, const PackVec<P>& velocity, const P& limiting_force,
-                                  NormalResponse<P>& response, FrictionState<P>& state, P& kept_slip) {
+                                  const PackVec<P>& normal, const P& twist, const PackVec<P>& velocity, NormalResponse<P>& response,
+                                  FrictionState<P>& state, P& kept_slip) {
   constexpr int N = P::size;
   typedef SlipRings Rings;
   constexpr int axis = offsetof(Rings, axis) / 8, radius = offsetof(Rings, radius) / 8;
@@ -180,14 +180,14 @@ DEMBARK_HOT unsigned partial_slip(const PairStep& s, const PairBlock& b, int fir
   // Lane by lane from here on: a lane's rings are a pack of their own.
   alignas(64) double motion[sizeof step.motion / sizeof(P)][N], limit[N], slip[N], slides[N] = {}, sums[3][N] = {}, frame[N][4], reach[N];
   __builtin_memcpy(motion, &step.motion, sizeof motion);
-  first_limit(law, limiting_force).store(limit);
+  first_limit(law, response.force).store(limit);
   state.slip.store(slip);
   step.radius.store(reach);
   store_rows(Quad<P>{step.axis.x, step.axis.y, step.axis.z, old.w}, [&frame](int k) { return frame[k]; });
   const auto other_limit = (state.slip > 0.0) | (law.interface_shear_strength < unlimited_strength);
   for (unsigned rest = bits(other_limit) & served; rest != 0; rest &= rest - 1) {
     const int k = __builtin_ctz(rest);
-    limit[k] = s.memory->limit(b, first + k, limiting_force[k], response.contact_area[k], slip[k]);
+    limit[k] = s.memory->limit(b, first + k, response.force[k], response.contact_area[k], slip[k]);
   }
   for (int k = 0; k < N; ++k) {
     if (!(served >> k & 1)) continue;
@@ -196,7 +196,7 @@ DEMBARK_HOT unsigned partial_slip(const PairStep& s, const PairBlock& b, int fir
     RingSums found;
     while (move_rings<P>(lane, limit[k], slides[k] > 0.0, rings, rings + Rings::count, found)) {
       slides[k] = 1.0;
-      limit[k] = s.memory->sliding_limit(b, first + k, lane, rings, limiting_force[k], response.contact_area[k], slip[k]);
+      limit[k] = s.memory->sliding_limit(b, first + k, lane, rings, response.force[k], response.contact_area[k], slip[k]);
     }
     sums[0][k] = found.along, sums[1][k] = found.across, sums[2][k] = found.lost;
     __builtin_memcpy(rings + axis, frame[k], sizeof frame[k]);
@@ -236,8 +236,8 @@ DEMBARK_HOT void scatter(const PairStep& s, const int* grain, const int* partner
   }
 }
 
-/// Forces of the picked pairs, by the stages of dembark/contact.hpp.
-template <class P>
+/// Forces of the picked pairs, by the stages of dembark/contact.hpp. `Elastic`: friction is limited by the force of the spring alone.
+template <class P, bool Elastic>
 inline void compute(const PairStep& s, PairBlock& b, int found) {
   constexpr int N = P::size;
   repeat_last<P>(b, found);
@@ -269,7 +269,12 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
     NormalResponse<P> response =
         adjusted(hertz<PairLaw<P>, P>(law, radius_i * radius_j / radius_sum, reduced_mass, overlap, motion.normal_velocity), s.limit_force,
                  s.tangential_damping);
-    const P limiting_force = response.limiting_force(s.elastic_limit);
+    // Until friction is known, the force that limits it is the normal one here.
+    [[maybe_unused]] P with_damping;
+    if constexpr (Elastic) {
+      with_damping = response.force;
+      response.force = response.elastic_force;
+    }
 
     const auto history = [=, &b, &s](int k) { return b.history[first + k] + s.offset; };
     const P dt = s.dt, twist = contact_twist<P>(normal, omega_i, omega_j, dt);
@@ -282,16 +287,15 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
       const PackVec<P> increment = motion.tangential_velocity * dt;
       state.displacement = rotate_to_plane<P>(state.displacement, normal, twist);
       state.displacement += increment;
-      const auto sticks = plainly_sticks(law, limiting_force, response.tangential_stiffness, response.contact_area, state);
+      const auto sticks = plainly_sticks(law, response.force, response.tangential_stiffness, response.contact_area, state);
       served = bits(sticks);
       if (s.pack_friction && there & ~served & ~apart) {
-        slip = slip_of<P>(law, limiting_force, response.tangential_stiffness, increment, touching & !sticks, state);
+        slip = slip_of<P>(law, response, increment, touching & !sticks, state);
         slipping = bits(slip.slips);
         served |= slip.sticks | slipping;
       }
     } else if (s.pack_friction) {
-      served = partial_slip<P>(s, b, first, there & ~apart, law, normal, twist, motion.tangential_velocity, limiting_force, response, state,
-                               kept_slip);
+      served = partial_slip<P>(s, b, first, there & ~apart, law, normal, twist, motion.tangential_velocity, response, state, kept_slip);
     }
     PackVec<P> tangential =
         sticking_force<P>(response.tangential_stiffness, response.tangential_damping, motion.tangential_velocity, dt, kept_slip, state);
@@ -331,6 +335,7 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
       scalar_friction<P>(s, b, first, there & ~packed, normal, twist, motion.tangential_velocity, response, tangential);
     }
 
+    if constexpr (Elastic) response.force = select(touching, with_damping, P(0.0));
     if (s.rolls) scalar_rolling<P>(s, b, first, there & ~apart, normal, twist, omega_i - omega_j, response);
     if (s.wet) {
       alignas(64) double gap[N], pull[N];
@@ -354,6 +359,11 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
 }
 
 template <class P>
+void compute_found(const PairStep& step, PairBlock& block, int found) {
+  (step.elastic_limit ? compute<P, true> : compute<P, false>)(step, block, found);
+}
+
+template <class P>
 void pair_packs(const PairStep& step, PairBlock& block) {
   typedef Part < P, P::size<4 ? P::size : 4> Picks;  // grains have few neighbours
   constexpr int ahead = 6;                           // grains for which the lists, strewn over the memory, are fetched early
@@ -361,7 +371,7 @@ void pair_packs(const PairStep& step, PairBlock& block) {
   const auto finish = [&] {
     if (found == 0) return;
     gather<P>(step, block, found);
-    compute<P>(step, block, found);
+    compute_found<P>(step, block, found);
     found = 0;
   };
   for (int n = 0; n < step.count; ++n) {
@@ -378,7 +388,7 @@ void pair_packs(const PairStep& step, PairBlock& block) {
 
 template <class P>
 void picked_packs(const PairStep& step, PairBlock& block, int found) {
-  if (found > 0) compute<P>(step, block, found);
+  if (found > 0) compute_found<P>(step, block, found);
 }
 
 }  // namespace dembark

@@ -91,7 +91,8 @@ def properties(m: Material, **overrides: str) -> str:
 def models(m: Material, tangential: str = "finnie_rabinowicz", wall: str = "") -> str:
     """The words of `pair_style gran` or `fix wall/gran` that choose the models; `wall` stands between models and settings."""
     wet = m.bridge_volume > 0.0
-    settings = f" presliding {m.presliding} friction_limit {m.friction_limit}" if tangential == "finnie_rabinowicz" else ""
+    settings = f" presliding {m.presliding}" if tangential == "finnie_rabinowicz" else ""
+    settings += f" friction_limit {m.friction_limit}" if m.friction_limit != "total" else ""
     settings += f" rolling_resistance {m.rolling_resistance}" if m.rolling_resistance != "off" else ""
     settings += f" capillary_model {m.capillary_model}" if wet else ""
     settings += " viscous_liquid on" if wet and m.viscosity > 0.0 else ""
