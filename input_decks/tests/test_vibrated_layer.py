@@ -18,12 +18,15 @@ from dembark.postproc.instruments.phases import PHASES
 
 layer = module("vibrated_layer")
 D, STRIDE, STILL = 0.005, 10, 4
+# A frequency (Hz) at which the plate reaches 3 sqrt(g d) at 2.5 g.
+FAST = 5.0
 
 
 def shaken(height: Callable[[float], float] = lambda _: 0.5, *, part: float = 0.5, waves: int = 4, noise: float = 0.05, lost: float = 0.0,
-           **changes: Any) -> Any:
+           lasting: Callable[[float], bool] = lambda _: True, **changes: Any) -> Any:
     """A run with a standing wave of the amplitude `height(gamma)` (d), `waves` on the length, at `part` of the frequency of the drive; two
-    layers of grains are enough for its surface. `lost`: share of all works that no force explains."""
+    layers of grains are enough for its surface. `lost`: share of all works that no force explains; `lasting(gamma)`: whether waves stay, or
+    come anew, elsewhere, in each window of eight periods."""
     given = defaults("vibrated_layer", **{"periods": 16, "level_ramp": 2, "run_in": 0, "motion_ramp": 2} | changes)
     random, length = np.random.default_rng(7), given["layer_length"]
     place = np.array([((i + 0.5) * D, (j + 0.5) * D) for i in range(round(length / D)) for j in range(round(given["layer_depth"] / D))])
@@ -33,7 +36,8 @@ def shaken(height: Callable[[float], float] = lambda _: 0.5, *, part: float = 0.
     def frame(number: int) -> Any:
         past = number / PHASES - STILL
         gamma = next((one.gamma for one in reversed(planned) if past >= one.start), planned[0].gamma)
-        wave = np.cos(2.0 * np.pi * waves * place[:, 0] / length) * math.cos(2.0 * np.pi * part * past)
+        shift = 0.0 if lasting(gamma) else 2.4 * math.floor((number - STILL * PHASES) / (8 * PHASES))
+        wave = np.cos(2.0 * np.pi * waves * place[:, 0] / length + shift) * math.cos(2.0 * np.pi * part * past)
         cell = np.floor(place[:, 0] / (2.0 * D)).astype(int)
         top = D * (4.0 + height(gamma) * wave + noise * random.standard_normal(cell.max() + 1)[cell])
         positions = np.column_stack([np.tile(place, (2, 1)), np.concatenate([top, top - D])])
@@ -52,12 +56,24 @@ def verdicts(*args: Any, **changes: Any) -> dict[str, Any]:
 
 
 def test_waves_are_measured_as_they_are() -> None:
-    found = verdicts(noise=0.0)
+    found = verdicts(noise=0.0, motion_frequency=FAST)
     assert {"strongest_frequency", "energy_balance"} == names(found, "pass") and not names(found, "fail")
     assert found["wave_amplitude"]["value"] == pytest.approx(0.5, rel=0.05)
     assert found["wavelength"]["value"] == pytest.approx(12.5) and found["wavelength_over_height"]["value"] == pytest.approx(2.5)
+    assert found["coherence"]["value"] == pytest.approx(1.0)
     assert found["wavelength_over_height"]["verdict"] == "info"
     assert "flat_peak" not in found
+
+
+def panel(waves: int, part: float) -> dict[str, Any]:
+    """Panel b of Bizon et al. (1998), five stripes on 100 d that repeat after two periods."""
+    return verdicts(waves=waves, part=part, layer_height=5.42, layer_length=100.0 * D, motion_frequency=0.44 / math.sqrt(5.42 * D / 9.81))
+
+
+def test_waves_of_a_published_layer_are_compared_with_its_own() -> None:
+    assert {"published_period", "published_waves"} <= names(panel(5, 0.5), "pass")
+    assert {"published_period", "published_waves"} <= names(panel(2, 0.25), "fail")
+    assert "published_period" not in verdicts()
 
 
 def test_a_flat_layer_has_noise_alone() -> None:
@@ -71,24 +87,40 @@ def test_a_flat_layer_has_noise_alone() -> None:
     ({"lost": 1e-9}, "energy_balance"),
 ], ids=["waves below the onset", "at f", "at f/4", "lost energy"])
 def test_wrong_layers_fail(changes: dict[str, Any], name: str) -> None:
-    assert name in names(verdicts(lambda _: 0.3, **changes), "fail")
+    assert name in names(verdicts(lambda _: 0.3, **{"motion_frequency": FAST} | changes), "fail")
 
 
 def sweep(critical: float, **changes: Any) -> dict[str, Any]:
     """Levels of the acceleration beyond `critical` g with waves whose square grows with what is beyond."""
-    return verdicts(lambda gamma: 0.6 * math.sqrt(max(gamma - critical, 0.0)),
-                    **{"motion_gamma": 1.8, "last_gamma": 3.2, "levels": 8, "noise": 0.05} | changes)
+    given = {"motion_gamma": 1.8, "last_gamma": 3.2, "levels": 8, "noise": 0.05, "motion_frequency": FAST, "periods": 24}
+    return verdicts(lambda gamma: 0.6 * math.sqrt(max(gamma - critical, 0.0)), **given | changes)
 
 
 def test_the_onset_is_where_the_power_comes_from_zero() -> None:
     found = sweep(2.5)
-    assert found["onset"]["value"] == pytest.approx(2.5, abs=0.05) and found["onset"]["reference"] == 2.5
+    assert found["onset"]["value"] == pytest.approx(2.5, abs=0.05) and found["onset"]["reference"] is None
     assert "onset_back" not in found and "wavelength" not in found
+
+
+def test_the_onset_of_order_is_between_waves_that_come_and_go_and_waves_that_stay() -> None:
+    """Disordered waves begin at 2 g, and stay from 2.5 g on: the one is judged, the other not."""
+    found = sweep(2.0, lasting=lambda gamma: gamma > 2.5)
+    assert found["onset"]["value"] == pytest.approx(2.0, abs=0.1)
+    assert found["order_onset"]["value"] == pytest.approx(2.5) and found["order_onset"]["verdict"] == "pass"
+    assert found["order_onset"]["interval"] == pytest.approx([2.4, 2.6])
+
+
+def test_waves_of_a_slow_plate_have_no_verdict() -> None:
+    """At 14 Hz the plate reaches 1.3 sqrt(g d) at 2.5 g."""
+    order, strongest = sweep(2.5, motion_frequency=14.0)["order_onset"], verdicts()["strongest_frequency"]
+    assert order["verdict"] == strongest["verdict"] == "info"
+    assert "1.3 √(g d)" in order["reason"] and "1.5 √(g d)" in strongest["reason"]
 
 
 def test_a_sweep_without_waves_is_open() -> None:
     found = sweep(5.0, periods=8)
     assert found["onset"]["verdict"] == "info" and "too few" in found["onset"]["reason"]
+    assert found["order_onset"]["verdict"] == "info" and "not ordered at the highest" in found["order_onset"]["reason"]
 
 
 @pytest.mark.parametrize("ends", [(1.8, 3.2), (3.2, 1.8)])
@@ -99,8 +131,7 @@ def test_both_ways_have_onsets_of_their_own(ends: tuple[float, float]) -> None:
 
 @pytest.mark.parametrize("change", [{"spins": "blocked"}, {"floor": "strips"}, {"bridge_volume": 8e-11}, {"grain_friction": 0.0}])
 def test_of_changed_layers_the_onset_is_not_judged(change: dict[str, Any]) -> None:
-    found = sweep(2.5, periods=8, **change)
-    assert found["onset"]["reference"] is None
+    assert sweep(2.5, **change)["order_onset"]["reference"] is None
 
 
 def study(name: str, along: str, **found: tuple[float, dict[str, Any]]) -> dict[str, Any]:
@@ -114,7 +145,7 @@ def study(name: str, along: str, **found: tuple[float, dict[str, Any]]) -> dict[
 
 
 def dispersion(*found: float) -> dict[str, Any]:
-    return study("frequency", "motion_frequency", **{f"f{k}": (one, {"motion_frequency": 9.0 + 3.0 * k}) for k, one in enumerate(found)})
+    return study("frequency", "motion_frequency", **{f"f{k}": (one, {"motion_frequency": 4.0 + 0.75 * k}) for k, one in enumerate(found)})
 
 
 def test_wavelengths_fall_with_the_frequency() -> None:

@@ -16,6 +16,9 @@ from dembark.postproc.studies import measured
 # Accelerations (g) up to which a layer is flat, and those at which it has waves at f/2 and no others; not at the onset.
 FLAT, WAVY = 2.0, (2.75, 4.0)
 ONSET = 2.5
+# Highest speed of the plate over sqrt(g d) that ordered waves need: grains of a slower one do not move along the layer
+# (P. B. Umbanhowar, H. L. Swinney, Physica A 288 (2000) 344, quoted from memory: about 3).
+LEAST_SPEED = 3.0
 # The variant that the others of the study `changes` are compared with, and what these change.
 PLAIN = "sweep"
 CHANGES = {"sweep_blocked": "spins_blocked", "sweep_smooth": "no_friction", "sweep_wet": "wet", "sweep_strips": "floor_of_strips",
@@ -25,6 +28,27 @@ CHANGES = {"sweep_blocked": "spins_blocked", "sweep_smooth": "no_friction", "swe
 def quoted_length(number: float) -> float:
     """Length of the waves over H by the law that is quoted from memory, for f sqrt(H/g) = `number`."""
     return 1.0 + 1.1 * number**-1.32
+
+
+# Simulated patterns of C. Bizon, M. D. Shattuck, J. B. Swift, W. D. McCormick, H. L. Swinney, Phys. Rev. Lett. 80 (1998) 57, as the first
+# author's repository (github.com/cbizon/granular_benchmark) has them: by acceleration (g) and f sqrt(H/g) the periods of the drive until
+# they repeat, and the strongest shell of the Fourier transform of a box 100 d wide.
+PUBLISHED = {(3.0, 0.27): (2, 3), (3.0, 0.44): (2, 5), (4.0, 0.38): (2, 4), (5.79, 0.47): (4, 3), (6.0, 0.84): (4, 5), (7.0, 0.75): (4, 4)}
+PUBLISHED_HEIGHT, PUBLISHED_WIDTH = 5.42, 100.0
+
+
+def published(p: Numbers, gamma: float) -> tuple[int, int] | None:
+    """What was published for a layer with the parameters `p` at the acceleration `gamma` (g), within their rounding."""
+    number = p["motion_frequency"] * math.sqrt(p["layer_height"] * p["grain_diameter"] / p["gravity"])
+    fits = plain(p) and abs(p["layer_height"] - PUBLISHED_HEIGHT) < 0.01
+    return next((row for (one, other), row in PUBLISHED.items() if fits and abs(gamma - one) < 0.01 and abs(number - other) < 0.005), None)
+
+
+def slow(p: Numbers, gamma: float) -> str:
+    """Why waves at the acceleration `gamma` (g) cannot be judged; "" where the plate is fast enough."""
+    speed = gamma * p["gravity"] / (2.0 * math.pi * p["motion_frequency"]) / math.sqrt(p["gravity"] * p["grain_diameter"])
+    return "" if speed >= LEAST_SPEED else (f"the plate's highest speed at {gamma:g} g is {speed:.1f} √(g d); ordered waves are known "
+                                            f"from about {LEAST_SPEED:g} √(g d) on")
 
 
 def plain(p: Numbers) -> bool:
@@ -40,6 +64,8 @@ def measure(replicas: Replicas) -> Measurement:
     values = {"energy_balance": Value(exact(max(unexplained(one.rows) for one in runs)), exact(0.0)),
               "acceleration": Value(exact(max(gammas))),
               "plate_speed": Value(exact(replicas[0].derived["plate_speed"] / math.sqrt(p["gravity"] * p["grain_diameter"])))}
+    coherent = [Estimate(max(waves.coherence() for waves in one.waves), math.inf, "a level has no interval") for one in runs]
+    values["coherence"] = Value(over_replicas(coherent))
     values |= of_level(runs, gammas[0], p) if len(gammas) == 1 else of_sweep(runs, p)
     curves = [*spectra(runs), *crests(runs[0])] if len(gammas) == 1 else [powers(runs)]
     return Measurement(values, curves, fields=diagram(runs[0]))
@@ -68,19 +94,23 @@ def of_level(runs: list[Layer], gamma: float, p: Numbers) -> dict[str, Value]:
     values |= {"wavelength": Value(Estimate(lengths.value / d, lengths.half / d, lengths.basis)),
                "mean_wavelength": Value(over(lambda waves: waves.mean_wavelength() / d)),
                "wavelength_over_height": Value(Estimate(lengths.value / height, math.inf, lengths.basis), exact(law))}
+    if known := published(p, gamma):
+        values["published_period"] = Value(exact(mean(lambda waves: 1.0 / waves.strongest())), exact(known[0]))
+        values["published_waves"] = Value(exact(PUBLISHED_WIDTH * d / lengths.value), exact(known[1]))
     if WAVY[0] <= gamma <= WAVY[1]:
         # The run that is farthest off counts.
         found = max((one.waves[0].strongest() for one in runs), key=lambda value: abs(value - 0.5))
-        values["strongest_frequency"] = Value(exact(found), exact(0.5))
+        values["strongest_frequency"] = Value(exact(found), exact(0.5), reason=slow(p, gamma))
     return values
 
 
 def of_sweep(runs: list[Layer], p: Numbers) -> dict[str, Value]:
     """From where on there are waves, and on the way back when there is one."""
-    begin = over_replicas([one.onset() for one in runs])
+    begin, order = (over_replicas([find(one) for one in runs]) for find in (Layer.onset, Layer.order_onset))
     # A sweep that shows no onset decides nothing.
-    unknown = "" if math.isfinite(begin.value) else begin.basis
-    values = {"onset": Value(begin, exact(ONSET) if plain(p) else None, reason=unknown)}
+    values = {"onset": Value(begin, reason="" if math.isfinite(begin.value) else begin.basis),
+              "order_onset": Value(order, exact(ONSET) if plain(p) else None,
+                                   reason=slow(p, ONSET) or ("" if math.isfinite(order.value) else order.basis))}
     if p["back"] == "yes":
         values["onset_back"] = Value(over_replicas([one.onset(back=True) for one in runs]))
     return values
@@ -143,7 +173,8 @@ def study(name: str, points: Points, along: str) -> Measurement:
            * one["layer_height"] for one in p]
     means = np.array([measured(one, "mean_wavelength").value for one in points])
     return Measurement(
-        {"wavelength_trend": Value(exact(rank_correlation(place, lengths)), exact(-1.0))},
+        {"wavelength_trend": Value(exact(rank_correlation(place, lengths)), exact(-1.0),
+                                   reason=next((why for one in p for why in [slow(one, one["motion_gamma"])] if why), ""))},
         [profile("wavelength", "Length of the waves", "frequency (Hz)", "λ / d", place, [lengths], reference=np.array(law),
                  reference_label="law quoted from memory"),
          profile("mean_wavelength", "Length of the waves by their mean wave number", "frequency (Hz)", "λ / d", place, [means])])

@@ -11,7 +11,7 @@ import numpy as np
 from dembark.postproc import DumpError
 from dembark.postproc.instruments.levels import Level, levels
 from dembark.postproc.instruments.phases import PHASES, read_phases
-from dembark.postproc.instruments.standing_waves import Waves, amplitude, onset, surface_levels
+from dembark.postproc.instruments.standing_waves import Waves, amplitude, onset, order_onset, surface_levels
 from dembark.postproc.measurement import Array, Estimate, Replica, block_mean
 from dembark.postproc.replica import once
 
@@ -44,6 +44,11 @@ class Layer:
         power = [mean_power(one) for one in self.waves[chosen]]
         seen = [one.value > (SEEN - 1.0) * float(waves.noise().sum()) for one, waves in zip(power, self.waves[chosen], strict=True)]
         return onset(drive, np.array([one.value for one in power]), np.array([one.half for one in power]), np.array(seen))
+
+    def order_onset(self) -> Estimate:
+        """Acceleration (g) from which on the waves of the levels from the first to the last are ordered."""
+        chosen = slice(0, self.outward)
+        return order_onset(np.array([one.gamma for one in self.levels[chosen]]), np.array([one.ordered() for one in self.waves[chosen]]))
 
 
 def mean_power(waves: Waves) -> Estimate:

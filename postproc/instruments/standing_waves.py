@@ -67,14 +67,19 @@ class Waves:
             raise ValueError(f"{len(self.heights)} frames of the surface: a spectrum needs {WINDOW} periods of {PHASES} frames")
 
     @cached_property
+    def _windows(self) -> Array:
+        """Heights (windows, frames, cells) in diameters, empty cells filled with the mean of their frame."""
+        count = len(self.heights) // (WINDOW * PHASES)
+        filled = np.where(np.isnan(self.heights), np.nanmean(self.heights, axis=1, keepdims=True), self.heights) / self.diameter
+        return filled[-count * WINDOW * PHASES :].reshape(count, WINDOW * PHASES, -1)
+
+    @cached_property
     def power(self) -> Array:
         """(windows, modes, lines): power of the mode n, whose waves are length/n long, from n = 0 on, in the line l, the frequency
         l f / WINDOW. All together are the mean square of the height: half the square of the amplitude of a wave that travels, a quarter
         of that of one that stands."""
-        count, cells = len(self.heights) // (WINDOW * PHASES), self.heights.shape[1]
-        filled = np.where(np.isnan(self.heights), np.nanmean(self.heights, axis=1, keepdims=True), self.heights) / self.diameter
-        windows = filled[-count * WINDOW * PHASES :].reshape(count, WINDOW * PHASES, cells)
-        both = np.abs(np.fft.fft2(windows) / (WINDOW * PHASES * cells)) ** 2
+        cells = self.heights.shape[1]
+        both = np.abs(np.fft.fft2(self._windows) / (WINDOW * PHASES * cells)) ** 2
         modes, lines = cells // 2 + 1, WINDOW * PHASES // 2 + 1
         # What is real has each wave twice, at (k, w) and (-k, -w): the lines w >= 0 hold those that travel to either side.
         ahead, back = both[:, :lines, :modes], both[:, :lines, -np.arange(modes)]
@@ -104,6 +109,18 @@ class Waves:
     def peak(self, keep: Mask | slice = slice(None)) -> float:
         """Power at f/2 of all modes from 1 on, over that of noise: 1 where there is nothing but noise."""
         return float(self.line(0.5, keep).sum() / self.noise(keep).sum())
+
+    def coherence(self) -> float:
+        """Part of the power at f/2 of all modes from 1 on that is in the mean amplitude over windows: 1 for waves that stay where they are,
+        1 / windows on average for waves that come and go."""
+        amplitudes = np.fft.fft2(self._windows)[:, WINDOW // 2, 1:]
+        return float((np.abs(amplitudes.mean(axis=0)) ** 2).sum() / (np.abs(amplitudes) ** 2).mean(axis=0).sum())
+
+    def ordered(self) -> bool:
+        """Whether at least half of the power at f/2 is coherent, and more than one mode of noise has by chance in one of a hundred cases:
+        for n windows its coherence has the distribution 1 - (1 - c)^(n - 1)."""
+        count = len(self._windows)
+        return count > 1 and self.coherence() >= max(0.5, 1.0 - 0.01 ** (1.0 / (count - 1)))
 
     def harmonic(self, keep: Mask | slice = slice(None)) -> float:
         """Power at f of all modes from 1 on."""
@@ -164,6 +181,18 @@ def onset(drive: Array, power: Array, halves: Array, seen: Mask) -> Estimate:
     known = float(np.sqrt(((weights * half) ** 2).sum())) / slope if np.isfinite(half).all() else 0.0
     basis = f"scatter of {count} points about a line" if about >= known else f"propagated from {count} points"
     return Estimate(float(value), max(about, known), basis)
+
+
+def order_onset(drive: Array, ordered: Mask) -> Estimate:
+    """Between the highest of `drive` (n,) at which waves are not `ordered` (n,) and the next one, from which on all are; or NaN."""
+    order = np.argsort(drive)
+    x, without = np.asarray(drive, float)[order], np.flatnonzero(~np.asarray(ordered, bool)[order])
+    if not len(without):
+        return Estimate(math.nan, math.inf, "waves are ordered at all levels")
+    if without[-1] == len(x) - 1:
+        return Estimate(math.nan, math.inf, "waves are not ordered at the highest level")
+    low, high = x[without[-1]], x[without[-1] + 1]
+    return Estimate(float(0.5 * (low + high)), float(0.5 * (high - low)), "two neighbouring levels")
 
 
 def rank_correlation(x: Sequence[float] | Array, y: Sequence[float] | Array) -> float:
