@@ -33,15 +33,15 @@ def table(name: str) -> Array:
 
 
 def bed(replica: Replica) -> dict[str, float]:
-    """Height of the bed, twice that of its centre of mass, and its solid fraction over the whole section of the box, from three diameters
+    """Height of the bed, twice that of its centre of mass, and its solid fraction over the full section of the box, from three diameters
     above the floor to eight tenths of that height; in the first frame, just before the ball touches."""
     p, frame = replica.parameters, replica.grains()[0]
     grains = frame.ids <= p["grain_count"]
     height, radii = frame.positions[grains, 2] - p["floor"], frame.radii[grains]
-    whole = 2.0 * float(height.mean())
-    edges = np.array([3.0 * p["grain_diameter"], 0.8 * whole])
+    total = 2.0 * float(height.mean())
+    edges = np.array([3.0 * p["grain_diameter"], 0.8 * total])
     volume = float(slice_volumes(height, radii, edges).sum())
-    return {"solid_fraction": volume / (p["box_length"] * p["box_width"] * float(np.diff(edges)[0])), "bed_height": whole}
+    return {"solid_fraction": volume / (p["box_length"] * p["box_width"] * float(np.diff(edges)[0])), "bed_height": total}
 
 
 def free_flight(replica: Replica) -> float:
