@@ -38,6 +38,7 @@ class Value:
     bound : the tolerance where case.toml says "bound": what theory allows for the parameters of the run
     scale : what the declared agreement of engines is multiplied with, in the unit of the value
     reason : why the quantity cannot be decided
+    inapplicable : why the reference does not hold for this set-up: the deviation is shown, and nothing is checked
     verdict : pass or fail by another rule than the tolerance, told in `detail`
     compared : False where engines are not compared in it for what was measured
     """
@@ -48,6 +49,7 @@ class Value:
     bound: float | None = None
     scale: float = 1.0
     reason: str = ""
+    inapplicable: str = ""
     verdict: str = ""
     detail: str = ""
     compared: bool = True

@@ -211,11 +211,6 @@ def over_replicas(estimates: Sequence[Estimate]) -> Estimate:
     return Estimate(mean, half, f"within {len(estimates)} replica{plural}: {estimates[0].basis}")
 
 
-def joint_half(one: float, other: float) -> float:
-    """Half-width of the interval of a difference of two independent values with half-widths `one` and `other`."""
-    return combined([one, other])
-
-
 def paired_half(differences: Sequence[float], confidence: float = CONFIDENCE) -> float:
     """Half-width of Student's interval of the mean of `differences`, each between two values of one and the same packing."""
     data = np.asarray(differences, float)

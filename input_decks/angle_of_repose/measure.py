@@ -61,19 +61,19 @@ def measure(replicas: Replicas) -> Measurement:
                                for left, right, _ in found])
     of_input = simulated.value * p["input_uncertainty"] * math.hypot(*EXPONENTS)
     plate = p["plate_width"] / p["grain_diameter"]
-    reason = (f"the plate is {plate:.3g} d wide, that of the experiment and of the other code {PLATE:g} d" if plate < 0.99 * PLATE else
-              "" if all(rests for *_, rests in found) else "the heap is still moving")
+    narrow = f"the plate is {plate:.3g} d wide, that of the experiment and of the other code {PLATE:g} d" if plate < 0.99 * PLATE else ""
+    moving = "" if all(rests for *_, rests in found) else "the heap is still moving"
     values = {"flank_difference": Value(exact(max(abs(left - right) for left, right, _ in found)))}
     if p["beads"] == "glass":
         datum = Estimate(law(p["grain_diameter"], p["confinement"]), MEASURED, "error of the measured angles")
         error = compared(simulated.value, datum, sim=simulated.half, num=p["numerical_uncertainty"], input=of_input)
-        values["angle"] = Value(simulated, datum, half=error.uncertainty, reason=reason, detail=error.text)
+        values["angle"] = Value(simulated, datum, half=error.uncertainty, reason=moving, inapplicable=narrow, detail=error.text)
     else:
         values["angle"] = Value(simulated)
     other = [angle for walls, rolling, angle in code(p["confinement"]) if math.isclose(rolling, p["rolling_friction"])]
     if other and p["rolling_resistance"] == "elastic_plastic":
         half = math.hypot(simulated.half, p["numerical_uncertainty"])
-        values["angle_of_code"] = Value(simulated, exact(other[0]), half=half, reason=reason)
+        values["angle_of_code"] = Value(simulated, exact(other[0]), half=half, reason=moving, inapplicable=narrow)
     return Measurement(values, [_surface(replicas)])
 
 

@@ -100,7 +100,7 @@ def of_level(runs: list[Layer], gamma: float, p: Numbers) -> dict[str, Value]:
     if WAVY[0] <= gamma <= WAVY[1]:
         # The run that is farthest off counts.
         found = max((one.waves[0].strongest() for one in runs), key=lambda value: abs(value - 0.5))
-        values["strongest_frequency"] = Value(exact(found), exact(0.5), reason=slow(p, gamma))
+        values["strongest_frequency"] = Value(exact(found), exact(0.5), inapplicable=slow(p, gamma))
     return values
 
 
@@ -110,7 +110,7 @@ def of_sweep(runs: list[Layer], p: Numbers) -> dict[str, Value]:
     # A sweep that shows no onset decides nothing.
     values = {"onset": Value(begin, reason="" if math.isfinite(begin.value) else begin.basis),
               "order_onset": Value(order, exact(ONSET) if plain(p) else None,
-                                   reason=slow(p, ONSET) or ("" if math.isfinite(order.value) else order.basis))}
+                                   reason="" if math.isfinite(order.value) else order.basis, inapplicable=slow(p, ONSET))}
     if p["back"] == "yes":
         values["onset_back"] = Value(over_replicas([one.onset(back=True) for one in runs]))
     return values
@@ -174,7 +174,7 @@ def study(name: str, points: Points, along: str) -> Measurement:
     means = np.array([measured(one, "mean_wavelength").value for one in points])
     return Measurement(
         {"wavelength_trend": Value(exact(rank_correlation(place, lengths)), exact(-1.0),
-                                   reason=next((why for one in p for why in [slow(one, one["motion_gamma"])] if why), ""))},
+                                   inapplicable=next((why for one in p for why in [slow(one, one["motion_gamma"])] if why), ""))},
         [profile("wavelength", "Length of the waves", "frequency (Hz)", "λ / d", place, [lengths], reference=np.array(law),
                  reference_label="law quoted from memory"),
          profile("mean_wavelength", "Length of the waves by their mean wave number", "frequency (Hz)", "λ / d", place, [means])])

@@ -14,7 +14,6 @@ from dembark.postproc.statistics import (
     block_mean,
     correlation_time,
     jackknife,
-    joint_half,
     joint_limit,
     over_replicas,
     replica_mean,
@@ -101,7 +100,7 @@ def test_pooling_below_three_replicas_keeps_their_own_intervals():
 
 
 def test_joint_interval_adds_in_quadrature():
-    assert joint_half(3.0, 4.0) == 5.0
+    assert joint_limit(3.0, 4.0, math.inf, math.inf, 0.95) == pytest.approx(5.0)
 
 
 @pytest.mark.parametrize("counts", [(3, 3), (3, 10), (5, 5)])

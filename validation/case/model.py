@@ -166,7 +166,8 @@ class Case:
 
     `derived`: numbers that follow from the parameters, by expressions; a setup.py beside the case file may add others, and the packing.
     `controls`: wrong physics, in words, with the declared quantities whose checks it fails. `needs`: capabilities that an engine has to
-    have where a condition between the parameters holds. `findings`: known causes of failures.
+    have where a condition between the parameters holds. `findings`: known causes of failures. `paired`: the initial packing decides what
+    comes out, so that engines are compared packing by packing.
     """
 
     name: str
@@ -190,6 +191,7 @@ class Case:
     picture: Mapping[str, Value] = field(default_factory=dict)
     needs: Mapping[str, Expression] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+    paired: bool = False
 
     def lacks(self, engine: str, values: Mapping[str, Value]) -> list[str]:
         """What `engine` has not of what a run with the parameters `values` needs, in words."""

@@ -69,7 +69,7 @@ class CaseReader(TableReader):
         self.table(data, "top level", tables, ("case",))
         head = data["case"]
         keys = {"name": str, "title": str, "description": str, "source": list, "engines": list, "outputs": list, "particles": str,
-                "groups": list, "references": list}
+                "groups": list, "references": list, "paired": bool}
         self.table(head, "case", keys, ("title",))
         for key in (key for key, kind in keys.items() if kind is list):
             if any(not isinstance(one, str) for one in head.get(key, ())):
@@ -112,7 +112,8 @@ class CaseReader(TableReader):
             quantities={name: self.quantity(name, entry, [wrong for wrong, seen in controls.items() if name in seen])
                         for name, entry in quantities.items()},
             controls=controls,
-            references=tuple(head.get("references", ())), picture=self.picture(data.get("picture", {})), needs=needs)
+            references=tuple(head.get("references", ())), paired=head.get("paired", False),
+            picture=self.picture(data.get("picture", {})), needs=needs)
         self.families(one.quantities)
         return replace(one, runs=self.runs(data.get("runs", {}), one),
                        findings=tuple(self.finding(entry, one) for entry in data.get("findings", ())))

@@ -11,8 +11,9 @@ chance alone: a difference beyond chance fails, though it may be within 10 %. A 
 beyond its 95 % interval although nothing is wrong, so what counts as beyond chance is what is outside of the interval that holds all
 differences of the page together with 99 %.
 
-All engines start from the same packings. Where a quantity has a value of each packing, the difference is the mean of the differences in
-each packing, with their own interval: what a packing does to all engines alike is no part of it.
+All engines start from the same packings. In a case whose packing decides what comes out (`paired`), the difference is the mean of the
+differences in each packing, with their own interval: what a packing does to all engines alike is no part of it. Where motion is chaotic,
+engines differ as much as packings do, and pairs would only cost degrees of freedom.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from itertools import combinations
 from pathlib import Path
 
 from dembark.common.errors import RunError
-from dembark.postproc.statistics import joint_half, joint_limit, paired_half
+from dembark.postproc.statistics import CONFIDENCE as INTERVAL
+from dembark.postproc.statistics import joint_limit, paired_half
 from dembark.validation.judge import result
 from dembark.validation.judge.deciding import PACKINGS, decides, packings
 from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result
@@ -102,7 +104,7 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
 def _chance(value: QuantityRecord, reference: QuantityRecord, confidence: float) -> tuple[float, float, float]:
     """Half-width of the 95 % interval of the difference, that with `confidence`, and the size from which a difference beyond that fails."""
     halves, counts = (value.half or 0.0, reference.half or 0.0), (packings(value.basis), packings(reference.basis))
-    half, limit = joint_half(*halves), joint_limit(*halves, *counts, confidence)
+    half, limit = (joint_limit(*halves, *counts, level) for level in (INTERVAL, confidence))
     if not value.samples or len(value.samples) != len(reference.samples):
         return half, limit, 0.0
     differences = [one - other for one, other in zip(value.samples, reference.samples, strict=True)]

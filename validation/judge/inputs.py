@@ -66,7 +66,7 @@ def of_verdicts(case: Case) -> str:
     """That of the judgement of measured quantities, apart from what was measured."""
     judging = imports.dependencies(_HERE / "measuring.py", _HERE.parent / "metrics.py").digest()
     return digest(judging, [asdict(one) for one in case.quantities.values()], [asdict(one) for one in case.findings],
-                  case.references)
+                  case.references, case.paired)
 
 
 def of_study(case: Case, points: Iterable[Path]) -> str:

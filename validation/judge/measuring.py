@@ -94,7 +94,8 @@ def quantities(case: Case, found: Measurement, variant: str = "") -> tuple[Quant
     for one, part, name, value in sorted(matched, key=lambda entry: order.index(entry[0].name)):
         record = judged(one, value, name, part)
         cause = case.cause(name, one.name, variant) if record.verdict == "fail" else ""
-        records.append(replace(record, family=_family(case, one, name, variant), cause=cause))
+        samples = record.samples if case.paired else ()
+        records.append(replace(record, family=_family(case, one, name, variant), cause=cause, samples=samples))
     return tuple(records)
 
 
@@ -121,7 +122,7 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
     """
     name = name or one.name
     tolerance, deviation, half = _tolerance(one, value, name), None, value.estimate.half
-    verdict, reason, reference, decided = value.verdict, value.reason, value.reference, ""
+    verdict, reason, reference, decided = value.verdict, value.inapplicable or value.reason, value.reference, ""
     if reference is not None:
         scale = 1.0 if one.absolute else reference.value
         deviation = (value.estimate.value - reference.value) / scale if scale else math.nan
@@ -157,14 +158,14 @@ def _tolerance(one: Declared, value: Value, name: str) -> float | None:
     if one.tolerance != "bound":
         if value.bound is not None:
             raise DembarkError(f"quantity {name} has a bound", 'its tolerance is not the word "bound"', "remove the bound or declare it")
-        return None if one.tolerance is None or value.reference is None else float(one.tolerance)
+        return None if one.tolerance is None or value.reference is None or value.inapplicable else float(one.tolerance)
     if value.bound is None and value.reference is not None and not value.reason:
         raise DembarkError(f"quantity {name} is declared with tolerance = \"bound\"", "", "give bound=... in its Value")
     if value.bound is not None and value.estimate.half != 0.0:
         # The noise of a run must not decide what it is allowed.
         raise DembarkError(f"quantity {name} has a bound and an interval", "a bound is for runs in which nothing is random",
                            "declare its tolerance as a number, with the reason")
-    return None if value.reference is None else value.bound
+    return None if value.reference is None or value.inapplicable else value.bound
 
 
 def picture(case: Case, record: Mapping[str, Any]) -> dict[str, Any] | None:

@@ -29,7 +29,8 @@ class QuantityRecord:
     that fails the check; a pass of a check that nothing is known to fail is not counted. `independent`: the reference is not made of other
     numbers of the same run. `chance`: probability that the check fails by chance alone, None where there is no chance. `family`: the fact
     that is measured; checks of one family count as one, "" is a check by itself. `cause`: why it fails, where that is known. `decides`:
-    what would decide an open check. `samples`: the values of the replicas, in their order, where `value` is their mean.
+    what would decide an open check. `samples`: the values of the replicas, in their order, where
+    engines are compared packing by packing.
     """
 
     name: str
