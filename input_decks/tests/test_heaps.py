@@ -187,7 +187,7 @@ def test_a_heap_on_a_narrower_plate_has_no_verdict(tmp_path: Path) -> None:
     """Neither a right angle nor a wrong one: the measured heaps were on a plate of 30 d."""
     for name, angle in (("right", 28.5), ("wrong", 20.0)):
         found = heap(tmp_path / name, angle, plate_width=0.18)
-        assert verdicts(found) == {"angle": "info", "angle_of_code": "info"} and "18 d wide" in found["angle"]["reason"]
+        assert not verdicts(found) and "18 d wide" in found["angle"]["reason"]
 
 
 def test_heaps_of_other_beads_stand_beside_the_other_code_alone(tmp_path: Path) -> None:
