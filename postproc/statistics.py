@@ -211,12 +211,6 @@ def over_replicas(estimates: Sequence[Estimate]) -> Estimate:
     return Estimate(mean, half, f"within {len(estimates)} replica{plural}: {estimates[0].basis}")
 
 
-def paired_half(differences: Sequence[float], confidence: float = CONFIDENCE) -> float:
-    """Half-width of Student's interval of the mean of `differences`, each between two values of one and the same packing."""
-    data = np.asarray(differences, float)
-    return student(len(data) - 1, confidence) * float(data.std(ddof=1)) / math.sqrt(len(data))
-
-
 def joint_limit(one: float, other: float, count_one: float, count_other: float, confidence: float) -> float:
     """Half-width of the interval of the same difference for another `confidence`, when `one` and `other` are Student's 95 % half-widths
     over `count_one` and `count_other` values (two or more; inf: known exactly how they scatter).

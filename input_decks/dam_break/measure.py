@@ -1,4 +1,4 @@
-"""The front of the column beside two experiments, the zero of whose times is not known."""
+"""The front of the column compared with two experiments, the zero of whose times is not known."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def measure(replicas: Replicas) -> Measurement:
 
 
 def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001 (there is one study)
-    """The front with the finest particles beside the experiments, and how far the two finest are apart."""
+    """The front with the finest particles compared with the experiments, and how far the two finest are apart."""
     points, place = ordered(points, along)
     fronts = np.array([measured(point, "front_at_3").value for point in points])
     values = {"front_converged": Value(exact(fronts[-1] - fronts[-2]), exact(0.0))}

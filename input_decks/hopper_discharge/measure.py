@@ -36,7 +36,8 @@ LOW, HIGH, K = 0.1, 0.7, 1.4
 READ = 0.0035
 TITLES = ("Discharged mass", "time since 10 % discharged (s)", "fraction of the mass of all grains")
 # What makes a run one of the published bin.
-ANAND = {"grain_count": 6790, "grain_diameter": 0.00224, "bin_width": 0.12544, "bin_depth": 0.0056, "outlet_width": 0.025088}
+ANAND = {"grain_count": 6790, "grain_diameter": 0.00224, "bin_width": 0.12544, "bin_depth": 0.0056, "outlet_width": 0.025088,
+         "ends": "periodic"}
 
 
 @dataclass(frozen=True)

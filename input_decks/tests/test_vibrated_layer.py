@@ -149,9 +149,9 @@ def dispersion(*found: float) -> dict[str, Any]:
 
 
 def test_wavelengths_fall_with_the_frequency() -> None:
-    assert names(dispersion(20.0, 16.7, 14.3, 11.1, 11.1), "pass") == {"wavelength_trend"}
-    assert names(dispersion(16.7, 20.0, 14.3, 11.1, 10.0), "pass") == {"wavelength_trend"}
-    assert names(dispersion(14.3, 16.7, 14.3, 16.7, 14.3), "fail") == {"wavelength_trend"}
+    assert dispersion(20.0, 16.7, 14.3, 11.1, 10.0)["wavelength_trend"]["value"] == pytest.approx(-1.0)
+    assert dispersion(16.7, 20.0, 14.3, 11.1, 10.0)["wavelength_trend"]["value"] == pytest.approx(-0.9)
+    assert dispersion(10.0, 11.1, 14.3, 16.7, 20.0)["wavelength_trend"]["value"] == pytest.approx(1.0)
 
 
 def lengths(*found: float) -> dict[str, Any]:

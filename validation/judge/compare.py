@@ -18,15 +18,19 @@ engines differ as much as packings do, and pairs would only cost degrees of free
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
+import numpy as np
+
 from dembark.common.errors import RunError
 from dembark.postproc.statistics import CONFIDENCE as INTERVAL
-from dembark.postproc.statistics import joint_limit, paired_half
+from dembark.postproc.statistics import joint_limit, student
 from dembark.validation.judge import result
-from dembark.validation.judge.deciding import PACKINGS, decides, packings
+from dembark.validation.judge.deciding import PACKINGS, packings, smallest
 from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result
 
 CAP = 0.10
@@ -48,9 +52,14 @@ def compare(folder: Path) -> Comparison:
                        f"there is a measurement of {measured[0].engine if measured else 'no engine'} only")
     first = measured[0]
     both = [(one, other, *two) for one, other in combinations(measured, 2) for two in _shared(one, other)]
-    pairs = [replace(pair(reference, value, one.engine, other.engine, len(both)),
+    pairs = [replace(pair(reference, value, one.engine, other.engine, len(both), min(_planned(one), _planned(other))),
                      family=f"{first.case}, {first.variant}: {value.name} in the engines") for one, other, reference, value in both]
     return Comparison(first.case, first.variant, tuple(one.engine for one in measured), tuple(pairs), first.profile, CAP)
+
+
+def _planned(one: Result) -> int:
+    """How many packings the run was to have."""
+    return int(one.parameters.get("replicas", 1))
 
 
 def _shared(first: Result, second: Result) -> list[tuple[QuantityRecord, QuantityRecord]]:
@@ -62,12 +71,14 @@ def _shared(first: Result, second: Result) -> list[tuple[QuantityRecord, Quantit
     return [(replace(one, samples=()), replace(other, samples=())) for one, other in pairs]
 
 
-def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str, engine: str, comparisons: int = 1) -> ComparedRecord:
-    """One quantity of two engines with its verdict; `comparisons`: how many are made on its page, of all pairs of engines.
+def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str, engine: str, comparisons: int = 1,
+         planned: int = PACKINGS) -> ComparedRecord:
+    """One quantity of two engines with its verdict; `comparisons`: how many are made on its page, of all pairs of engines; `planned`: how
+    many packings the engine with fewer was to run.
 
     pass: the joint 95 % interval of the difference is within 10 %. fail: the difference is beyond what chance does to one of all
-    `comparisons`. info: the joint interval reaches beyond 10 %; or, without a tolerance, it is unknown or comes from fewer than three
-    packings in either engine, which cannot hold what varies from one packing to the next.
+    `comparisons`. info: the joint interval reaches beyond 10 %, is unknown, or comes from fewer than three packings in either engine, which
+    cannot hold what varies from one packing to the next. Where fewer than three were planned, nothing is due to be checked.
 
     A quantity of a deterministic run has an `agreement` instead, in its own unit: pass within it, fail beyond it.
     """
@@ -84,16 +95,21 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
         verdict, reason = ("pass", "") if same else ("fail", "the values must agree")
     else:
         deviation = (value.value - reference.value) / abs(reference.value)
-        if value.half is None or reference.half is None or min(packings(value.basis), packings(reference.basis)) < PACKINGS:
+        few, unknown = min(packings(value.basis), packings(reference.basis)), next((one for one in both if one.half is None), None)
+        if planned < PACKINGS and (unknown is not None or few < PACKINGS):
             tolerance, verdict, reason = None, "info", f"{PACKINGS} packings in each engine are needed to compare them"
+        elif unknown is not None or few < PACKINGS:
+            verdict, decided = "info", f"{PACKINGS} packings in each engine or more"
+            reason = "an interval comes from within fewer packings than were planned" if unknown is None else (
+                f"an interval is unknown: {unknown.basis or 'the run is too short'}")
         else:
-            half, limit, seen = _chance(value, reference, 1.0 - (1.0 - CONFIDENCE) / comparisons)
-            scale = abs(reference.value)
-            verdict, reason = _judged(abs(deviation), half / scale, limit / scale, seen / scale)
+            chance_of = _chance(value, reference, 1.0 - (1.0 - CONFIDENCE) / comparisons)
+            half = abs(reference.value) * chance_of(0)[0]
+            verdict, reason = _judged(abs(deviation), *chance_of(0))
             chance = (1.0 - CONFIDENCE) / comparisons if verdict != "info" else 0.0
-            if verdict == "info":
-                fewest = min((value.basis, reference.basis), key=packings)
-                decided = decides(deviation, half / scale, 0.0, CAP, fewest, "packings in each engine")
+            if verdict == "info" and math.isfinite(few):
+                needed = smallest(lambda count: _judged(abs(deviation), *chance_of(count))[0] != "info", int(few))
+                decided = f"about {needed} packings in each engine"
     return ComparedRecord(
         name=value.name, label=value.label, unit=value.unit, value=value.value, interval=value.interval, reference=reference.value,
         reference_interval=reference.interval, deviation=deviation, deviation_kind=kind, tolerance=tolerance, verdict=verdict,
@@ -101,15 +117,28 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
         reference_engine=reference_engine, joint_half_width=half)
 
 
-def _chance(value: QuantityRecord, reference: QuantityRecord, confidence: float) -> tuple[float, float, float]:
-    """Half-width of the 95 % interval of the difference, that with `confidence`, and the size from which a difference beyond that fails."""
-    halves, counts = (value.half or 0.0, reference.half or 0.0), (packings(value.basis), packings(reference.basis))
-    half, limit = (joint_limit(*halves, *counts, level) for level in (INTERVAL, confidence))
-    if not value.samples or len(value.samples) != len(reference.samples):
-        return half, limit, 0.0
-    differences = [one - other for one, other in zip(value.samples, reference.samples, strict=True)]
-    # Values without an interval in common show a difference as they did before.
-    return paired_half(differences), paired_half(differences, confidence), min(limit, _SEEN * abs(reference.value or 0.0))
+def _chance(value: QuantityRecord, reference: QuantityRecord, confidence: float) -> Callable[[int], tuple[float, float, float]]:
+    """For any number of packings in each engine, all over the reference: the half-width of the 95 % interval of the difference, that with
+    `confidence`, and the size from which a difference beyond that fails. 0: the packings that there are; others of the same scatter."""
+    scale = abs(reference.value or 0.0)
+    counts = [packings(one.basis) for one in (value, reference)]
+    # Standard deviations of the packings; none of values that rest on no packing.
+    scatter = [(one.half or 0.0) / student(count - 1.0) * (math.sqrt(count) if math.isfinite(count) else 1.0)
+               for one, count in zip((value, reference), counts, strict=True)]
+    differences = np.subtract(value.samples, reference.samples) if len(value.samples) == len(reference.samples) else np.zeros(0)
+
+    def found(count: int) -> tuple[float, float, float]:
+        sizes = [one if not count or math.isinf(one) else float(count) for one in counts]
+        halves = [spread * student(size - 1.0) / (math.sqrt(size) if math.isfinite(size) else 1.0)
+                  for spread, size in zip(scatter, sizes, strict=True)]
+        half, limit = (joint_limit(halves[0], halves[1], sizes[0], sizes[1], level) / scale for level in (INTERVAL, confidence))
+        if len(differences) < PACKINGS:
+            return half, limit, 0.0
+        pairs, spread = count or len(differences), float(differences.std(ddof=1)) / scale
+        paired, widest = (student(pairs - 1.0, level) * spread / math.sqrt(pairs) for level in (INTERVAL, confidence))
+        return paired, widest, min(limit, _SEEN)
+
+    return found
 
 
 def _judged(difference: float, half: float, limit: float, seen: float) -> tuple[str, str]:

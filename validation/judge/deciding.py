@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 
 from dembark.postproc.statistics import student
 
@@ -11,7 +12,7 @@ PACKINGS = 3
 _MOST = 100_000
 
 
-def decides(deviation: float, own: float, reference: float, tolerance: float, basis: str, unit: str = "packings") -> str:
+def decides(deviation: float, own: float, reference: float, tolerance: float, basis: str) -> str:
     """What decides a check whose deviation has the half-widths `own` of the value, with this `basis`, and `reference`.
 
     All in the unit of the tolerance. A deviation that stays as it is passes when all of its interval is within the tolerance, and fails
@@ -24,11 +25,11 @@ def decides(deviation: float, own: float, reference: float, tolerance: float, ba
     if reference >= target:
         return f"a reference known to ±{target:.2g}, now ±{reference:.2g}"
     wanted = math.sqrt(target**2 - reference**2)
-    enough, longer = f"{PACKINGS} {unit} or more", f"runs about {(own / wanted) ** 2:.0f} times as long"
+    enough, longer = f"{PACKINGS} packings or more", f"runs about {(own / wanted) ** 2:.0f} times as long"
     if count < PACKINGS or not math.isfinite(own):
         return enough if count == 1.0 or not math.isfinite(own) else f"{enough}, or {longer}"
     if math.isfinite(count):
-        return f"about {_packings(own, wanted, round(count))} {unit}"
+        return f"about {_packings(own, wanted, round(count))} packings"
     return longer if "block" in basis else f"inputs known so well that they change the value by ±{wanted:.2g}, now ±{own:.2g}"
 
 
@@ -42,8 +43,13 @@ def packings(basis: str) -> float:
 def _packings(own: float, wanted: float, count: int) -> int:
     """How many packings of the same scatter have a mean with the half-width `wanted`, when `count` have `own`."""
     spread = own * math.sqrt(count) / student(count - 1)
-    low, high = count, _MOST
+    return smallest(lambda number: spread * student(number - 1) / math.sqrt(number) <= wanted, count)
+
+
+def smallest(enough: Callable[[int], bool], least: int) -> int:
+    """The smallest number from `least` on that is `enough`, as all larger ones are."""
+    low, high = least, _MOST
     while low < high:
         middle = (low + high) // 2
-        low, high = (low, middle) if spread * student(middle - 1) / math.sqrt(middle) <= wanted else (middle + 1, high)
+        low, high = (low, middle) if enough(middle) else (middle + 1, high)
     return low

@@ -2,13 +2,14 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
 
 from dembark.common.errors import RunError
 from dembark.postproc.measurement import Value
-from dembark.postproc.statistics import Estimate, over_replicas
+from dembark.postproc.statistics import Estimate, over_replicas, student
 from dembark.validation.case.model import Declared
 from dembark.validation.judge.compare import pair
 from dembark.validation.judge.measuring import judge, judged
@@ -24,7 +25,7 @@ def entry(value, half, basis="5 replicas"):
     ("one", "other", "verdict"),
     [
         ((1.0, 0.04), (1.04, 0.04), "pass"),
-        ((1.0, 0.04), (1.05, 0.04), "info"),
+        ((1.0, 0.04), (1.06, 0.04), "info"),
         ((1.0, 0.01), (1.05, 0.01), "fail"),
         ((1.0, 0.2), (1.15, 0.2), "info"),
         ((1.0, 0.05), (1.3, 0.05), "fail"),
@@ -40,9 +41,29 @@ def test_verdict_of_a_pair(one, other, verdict):
 @pytest.mark.parametrize("packings", ["1 replica", "2 replicas"])
 def test_engines_with_fewer_than_three_packings_are_not_compared(other, packings):
     single = f"within {packings}: jackknife over 8 sectors or bands"
-    found = pair(entry(1.0, 0.01, single), entry(other, 0.01), "liggghts", "yade")
+    found = pair(entry(1.0, 0.01, single), entry(other, 0.01), "liggghts", "yade", planned=int(packings[0]))
     assert found.standing == "information" and found.deviation == pytest.approx(other - 1.0)
     assert "3 packings in each engine" in found.reason
+    # What was planned with more, and did not finish or has no interval, is open.
+    assert pair(entry(1.0, 0.01, single), entry(other, 0.01), "liggghts", "yade", planned=5).standing == "open"
+    assert pair(entry(1.0, None), entry(other, 0.01), "liggghts", "yade", planned=5).standing == "open"
+
+
+@pytest.mark.parametrize(("deviation", "half", "samples"), [(0.3, 0.3, False), (0.02, 0.2, False), (0.3, 0.3, True), (0.02, 0.2, True)])
+def test_as_many_packings_as_stated_decide_a_comparison(deviation, half, samples):
+    def entries(count):
+        """Two engines whose packings scatter as in five with the half-width `half`."""
+        places = np.arange(count) - 0.5 * (count - 1)
+        spread = half * math.sqrt(5) / student(4) * places / places.std(ddof=1)
+        both = (over_replicas([Estimate(one, 0.0) for one in mean + sign * spread]) for mean, sign in ((1.0, 1.0), (1.0 + deviation, -1.0)))
+        return [QuantityRecord("q", one.value, "info", interval=one.interval, basis=one.basis, samples=one.samples if samples else ())
+                for one in both]
+
+    open_one = pair(*entries(5), "liggghts", "yade", 60)
+    needed = int(re.search(r"\d+", open_one.decides)[0])
+    assert open_one.standing == "open" and needed > 5
+    assert pair(*entries(needed), "liggghts", "yade", 60).verdict == ("fail" if deviation > 0.1 else "pass")
+    assert pair(*entries(needed - 1), "liggghts", "yade", 60).verdict == "info"
 
 
 def test_one_of_many_comparisons_may_lie_beyond_its_interval():
