@@ -152,19 +152,20 @@ def measured(columns: Sequence[Column], size: str, across: str, friction: Mappin
     references: dict[str, tuple[Estimate, float | None]] = {
         "janssen_profile_deviation": (ZERO, None),
         "janssen_length_predicted": (over["janssen_length_measured"], over["_length_error"].half),
-        **({"apparent_mass_ratio": (over["_base_predicted"], over["_base_error"].half)} if predicts else {}),
-        **({"sliding_friction": (exact(kinetic), None)} if slides and kinetic > 0.0 else {}),
+        "apparent_mass_ratio": (over["_base_predicted"], over["_base_error"].half),
+        **({"sliding_friction": (exact(kinetic), None)} if kinetic > 0.0 else {}),
         "force_balance_error": (ZERO, None),
         "field_balance_deviation": (ZERO, None),
     }
-    none = "" if predicts else f"; no reference: the wall mobilises less than {MOBILISED:.0%} of that friction"
+    undue = {} if predicts else {"apparent_mass_ratio": f"the wall mobilises less than {MOBILISED:.0%} of its kinetic friction"}
+    unknown = {} if slides else {"sliding_friction": "no contact with the wall slides"}
     details = {"wall_mobilisation": f"the wall's static friction is {friction['wall_static']:g}, its kinetic one {kinetic:g}",
-               "apparent_mass_ratio": f"Janssen with K of the contact stress and the wall's kinetic friction{none}",
-               "sliding_friction": "" if slides else "no contact with the wall slides",
+               "apparent_mass_ratio": "Janssen with K of the contact stress and the wall's kinetic friction",
                "two_parameter_gain": f"with it λ is {over['_pair_length'].value:.2f} {size}"}
-    values = {name: Value(one, reference, half, detail=details.get(name, ""))
+    values = {name: Value(one, reference, half, detail=details.get(name, ""), reason=unknown.get(name, ""),
+                          inapplicable=undue.get(name, ""))
               for name, one in over.items() for reference, half in [references.get(name, (None, None))]
-              if not name.startswith("_") and (wet or name != "wall_adhesion") and (slides or name != "sliding_friction")}
+              if not name.startswith("_") and (wet or name != "wall_adhesion")}
     return Measurement(values, _profiles(columns, over, across, friction["wall_static"]), _remarks(columns, over, wet, friction))
 
 
