@@ -30,8 +30,8 @@ TITLES = {"tangential_restitution": ("Tangential restitution", "e_t"), "spin": (
           "centre_angle": ("Rebound angle of the centre", "angle after (°)"),
           "contact_angle": ("Rebound angle of the point of contact", "angle after (°)")}
 # Angles of incidence (°), for the nominal inputs, below which the contact sticks when it is touched first, tan α = μ E* / (4 G*), and
-# beyond which it slides to the end, tan α = 7/2 μ (1 + e): R. D. Mindlin, J. Appl. Mech. 16 (1949) 259; N. Maw, J. R. Barber, J. N. Fawcett, Wear
-# 38 (1976) 101.
+# beyond which it slides to the end, tan α = 7/2 μ (1 + e): R. D. Mindlin, J. Appl. Mech. 16 (1949) 259; N. Maw, J. R. Barber,
+# J. N. Fawcett, Wear 38 (1976) 101.
 STICKS_BELOW, SLIDES_BEYOND = 6.11, 32.52
 
 
