@@ -88,9 +88,9 @@ def _measure(folder: Path, case: Case, runs: Sequence[Replica], early: Early, in
         found = measuring.measure(case, runs)
         if found.fields is not None:
             # Labelled arrays take a second to import, which commands that measure nothing need not wait for.
-            from dembark.postproc import figures, labelled
+            from dembark.postproc import field_figures, labelled
 
-            fields = figures.FILE
+            fields = field_figures.FILE
             labelled.write(folder / fields, found.fields)
     noted = replace(found, remarks=[*found.remarks, *dict.fromkeys([*early.warnings, *warnings])], fields=None)
     return measured.write(folder, measured.Measured(inputs_hash, noted, provenance.measured(), fields))

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dembark.input_decks.avalanche.slope_flow import Slope, front_law, layers, mean_power
+from dembark.input_decks.common.growth import Growth, ordered
+from dembark.input_decks.common.heaps import at_rest
+from dembark.input_decks.common.momentum import imbalance, impulses, left_to, walls_of
 from dembark.postproc import GrainFrame
 from dembark.postproc.history import reached
-from dembark.postproc.instruments.avalanche import Slope, front_law, layers, mean_power
-from dembark.postproc.instruments.growth import Growth, ordered
-from dembark.postproc.instruments.heaps import at_rest
-from dembark.postproc.instruments.momentum import imbalance, impulses, left_to, walls_of
 from dembark.postproc.measurement import (
     Array,
     Curve,

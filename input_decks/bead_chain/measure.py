@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dembark.postproc.instruments.growth import Growth, ordered
+from dembark.input_decks.common.growth import Growth, ordered
 from dembark.postproc.measurement import Array, Measurement, Points, Replica, Replicas, Value, exact, profile
 from dembark.postproc.studies import fitted_exponent, measured
 

@@ -5,6 +5,7 @@ from itertools import pairwise
 from types import SimpleNamespace as Parameters
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dembark.input_decks.common import packing
 from dembark.input_decks.common.setup import Array, rectangle
@@ -52,7 +53,7 @@ def sites_within(p: Parameters, lines: Array, clear: tuple[float, float, float])
     share = np.einsum("nka,ka->nk", places[:, None] - start, along) / np.maximum((along**2).sum(axis=1), 1e-300)
     gap = np.linalg.norm(places[:, None] - start - np.clip(share, 0.0, 1.0)[..., None] * along, axis=2).min(axis=1)
 
-    def met(axis: int, sign: int) -> Array:
+    def met(axis: int, sign: int) -> NDArray[np.bool_]:
         """Whether a ray from each place along an axis meets a line; `sign`: which way."""
         other = 1 - axis
         crossed = (lines[:, 0, other] > places[:, None, other]) != (lines[:, 1, other] > places[:, None, other])

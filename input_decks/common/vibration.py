@@ -6,7 +6,7 @@ from dembark.common.errors import DembarkError
 from dembark.input_decks.common.motion import amplitude
 from dembark.input_decks.common.setup import Number, Parameters, time_step
 
-# Frames a period, as `dembark.postproc.instruments.phases` has them.
+# Frames a period.
 PHASES = 8
 # How far grains may give way in an impact at the highest speed of the wall, over d; steps that such an impact has to last.
 DEEPEST, SHORTEST = 0.02, 25

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import linregress
 
+from dembark.input_decks.common.growth import Growth, ordered
+from dembark.input_decks.dam_break.water import common_values
 from dembark.postproc.history import reached
-from dembark.postproc.instruments.growth import Growth, ordered
-from dembark.postproc.instruments.water import common_values
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Numbers, Points, Replica, Replicas, Value, exact, profile
 from dembark.postproc.replica import once
 from dembark.postproc.statistics import student
@@ -95,7 +95,7 @@ def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001
         every = [[_known(point, f"{what}_{source}") for point in points] for what in ("speed", "delay")]
         references = due(source, (every[0][-1], every[1][-1]))
         for what, found, reference in zip(("speed", "delay"), every, references, strict=True):
-            of_spacing = numerical(1.0 / place, [one.value for one in found])
+            of_spacing = numerical(list(1.0 / place), [one.value for one in found])
             value = found[-1].value
             values[f"{what}_{source}"] = Value(Estimate(value, of_spacing, "spacing"), reference,
                                                detail=compared(value, reference, num=of_spacing).text)

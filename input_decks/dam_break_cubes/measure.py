@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from dembark.input_decks.common.growth import Growth, ordered
 from dembark.postproc.convergence import convergence
 from dembark.postproc.history import reached
-from dembark.postproc.instruments.growth import Growth, ordered
 from dembark.postproc.measurement import Array, Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas, profile
 from dembark.postproc.replica import once
 from dembark.postproc.statistics import replica_mean
@@ -90,7 +90,8 @@ def water(run: Replica) -> dict[str, float]:
         if np.isnan(found["floor_wetted"]) and now >= 1.5 - 0.5 * run.derived["stride"] * run.time_step:
             found["floor_wetted"] = wetted(places, p["flume_width"], dx)
     # Between frames; nan if it does not come.
-    found["arrival"] = reached(*np.array(fronts).T, p["distance"])
+    when, where = np.array(fronts).T
+    found["arrival"] = reached(when, where, p["distance"])
     return found
 
 

@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from dembark.postproc.instruments.drum import estimates, fields, profiles, read
-from dembark.postproc.instruments.growth import Growth, ordered
+from dembark.input_decks.common.growth import Growth, ordered
+from dembark.input_decks.debarking_drum.drum_impacts import estimates, fields, profiles, read
 from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas, Value, pooled
 
 CURVES = {"impacts_per_log": ("Impacts per log and revolution", "1"), "peak_force_mean": ("Mean peak force", "kN"),

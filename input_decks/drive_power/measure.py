@@ -5,10 +5,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dembark.postproc.instruments.drive import PARTS, Drive, phases, read, sticking_block, transients
-from dembark.postproc.instruments.growth import Growth, ordered
-from dembark.postproc.instruments.levels import acceleration
-from dembark.postproc.instruments.momentum import imbalance
+from dembark.input_decks.common.drive_levels import acceleration
+from dembark.input_decks.common.growth import Growth, ordered
+from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
+from dembark.input_decks.drive_power.drive import Drive, phases, read, sticking_block, transients
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, over_replicas, profile
 from dembark.postproc.studies import measured
 
@@ -42,7 +42,7 @@ def measure(replicas: Replicas) -> Measurement:
         return Value(exact(number(runs[0])) if len(runs) == 1 else once(number).estimate, exact(0.0))
 
     values = {
-        "energy_balance": worst(lambda one: imbalance(one.rows, PARTS)),
+        "energy_balance": worst(lambda one: imbalance(one.rows, CONTACT_PARTS)),
         "power_gap": worst(Drive.power_gap),
         **({"dissipation_gap": mean(Drive.dissipation_gap)} if steady else {}),
         "power": Value(over(Drive.power), exact(block.power) if block else None),

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from dembark.postproc.instruments.growth import Growth, ordered
-from dembark.postproc.instruments.heaps import at_rest, column_height, front, height, power_law, surface
+from dembark.input_decks.common.growth import Growth, ordered
+from dembark.input_decks.common.heaps import at_rest, column_height, front, height, power_law, surface
 from dembark.postproc.measurement import Array, Estimate, Measurement, Points, Replica, Replicas, Value, over_replicas, profile
 from dembark.postproc.studies import compared, measured, propagated
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from dembark.input_decks.common.growth import ordered
 from dembark.postproc.history import reached
-from dembark.postproc.instruments.growth import ordered
 from dembark.postproc.measurement import (
     Array,
     Curve,

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
+from dembark.input_decks.common.log_run import read, solver_values
+from dembark.input_decks.log_pair.exact_motion import row_curves
 from dembark.physics.exact.chains import Chain
-from dembark.postproc.instruments.log_exact import row_curves
-from dembark.postproc.instruments.logs import read, solver_values
 from dembark.postproc.measurement import Measurement, Numbers, Replicas, number
 
 

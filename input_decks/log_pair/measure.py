@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from dembark.input_decks.common.growth import Growth, ordered
+from dembark.input_decks.common.log_run import read, solver_values
+from dembark.input_decks.log_pair.exact_motion import error, pair_curves, restitution, velocities
 from dembark.physics.exact.pairs import Pair
-from dembark.postproc.instruments.growth import Growth, ordered
-from dembark.postproc.instruments.log_exact import error, pair_curves, restitution, velocities
-from dembark.postproc.instruments.logs import read, solver_values
 from dembark.postproc.measurement import Measurement, Numbers, Points, Replicas, number
 
 

@@ -6,20 +6,20 @@ R's place, lambda = W / (2 K mu_mob). K is the mean normal stress of both walls 
 
 from dataclasses import replace
 
-from dembark.postproc.instruments import silo
-from dembark.postproc.instruments.column import read
+from dembark.input_decks.silo import quantities
+from dembark.input_decks.silo.column import read
 from dembark.postproc.measurement import Measurement, Replica, Replicas
 
 
 def prepare(replica: Replica) -> None:
     """What needs no other replica: done while they still run."""
-    silo.scalars(read(replica))
+    quantities.scalars(read(replica))
 
 
 def measure(replicas: Replicas) -> Measurement:
     """Values, profiles and remarks of all replicas of a series."""
     given = replicas[0].parameters
-    found = silo.measured([read(replica) for replica in replicas], "W", "x", replicas[0].derived)
+    found = quantities.measured([read(replica) for replica in replicas], "W", "x", replicas[0].derived)
     remark = (f"The period of the slab is {given['slab_depth'] / given['grain_diameter']:.1f} d, so that grains pack in three dimensions; "
               "a layer one grain deep would need front and rear walls, which carry weight too, or grains constrained to a plane.")
     return replace(found, remarks=[*found.remarks, remark])

@@ -3,10 +3,16 @@
 Only the steady part is used; it is detected in the wall friction (MSER-5 and a drift test).
 """
 
+from __future__ import annotations
 
-from dembark.postproc.instruments import channel, channel_fields, channel_plug
-from dembark.postproc.instruments.liquid import liquid_values
-from dembark.postproc.measurement import Estimate, Measurement, Replicas, Value, pooled
+from collections.abc import Sequence
+
+import numpy as np
+
+from dembark.input_decks.common.liquid import liquid_values
+from dembark.input_decks.plug_flow import channel, fields
+from dembark.input_decks.plug_flow.channel import Channel
+from dembark.postproc.measurement import CONFIDENCE, Curve, Estimate, Measurement, Replicas, Value, block_mean, pooled
 
 # A wall zone whose velocity deficit is below this cannot be told from the core's own scatter.
 LEAST_DEFICIT = 0.02
@@ -19,10 +25,41 @@ REMARKS = (
 )
 
 
+def estimates(one: Channel) -> dict[str, Estimate]:
+    """All that is measured of one run, velocities over that of the plate."""
+    errors = one.flux_errors()
+    # With as many heights as bands, each gets the interval with which all together hold 95 % (Bonferroni).
+    each = [block_mean(column, 1.0 - (1.0 - CONFIDENCE) / errors.shape[1]) for column in errors.T]
+    return {
+        **channel.estimates(one, one.shear.sum(axis=(1, 2)), {
+            "core_velocity": lambda f, b: one.core_velocity(f, b) / one.speed,
+            "wall_slip": one.wall_velocity,
+            "shear_zone_width": one.decay_length,
+            "shear_zone_width_90": one.ninety_width,
+        }),
+        "flux_error": max(each, key=lambda found: abs(found.value) - (found.half if np.isfinite(found.half) else 0.0)),
+        "core_velocity_lagrangian": block_mean(one.core_motion / one.speed),
+        "wall_shear_stress": block_mean(one.shear.mean(axis=(1, 2))),
+    }
+
+
+def profiles(channels: Sequence[Channel]) -> list[Curve]:
+    """Across the channel: velocities, fluctuation and solid fraction; up the walls: their stresses."""
+    plate = {"reference": np.ones(len(channels[0].middle)), "reference_label": "the plate, v₀"}
+    return [
+        channel.across(channels, "velocity", "Velocity, Eulerian", "v / v₀", lambda c: c.velocity(c.frames) / c.speed, **plate),
+        channel.across(channels, "velocity_lagrangian", "Velocity, Lagrangian", "v / v₀", lambda c: c.lagrangian() / c.speed, **plate),
+        channel.across(channels, "fluctuation", "Velocity fluctuation", "standard deviation of v / v₀", lambda c: c.fluctuation(c.frames)),
+        channel.across(channels, "solid_fraction", "Solid fraction", "φ", lambda c: c.fraction(c.frames)),
+        channel.upward(channels, "wall_normal", "Wall normal stress", "σ_xx (Pa)", lambda c: c.normal),
+        channel.upward(channels, "wall_shear", "Wall shear stress", "τ (Pa)", lambda c: c.shear),
+    ]
+
+
 def measure(replicas: Replicas) -> Measurement:
     """Values, profiles, remarks and fields of all replicas of a series."""
     channels = [channel.read(replica) for replica in replicas]
-    found = [channel_plug.estimates(one) for one in channels]
+    found = [estimates(one) for one in channels]
     over = {name: pooled(found, name) for name in found[0]}
     first, unsteady, slip = channels[0], next((one.remark for one in channels if one.remark), ""), 1.0 - over["wall_slip"].value
     faint = f"the layer at the walls lags by only {slip:.1%}: no shear zone to measure" if slip < LEAST_DEFICIT else ""
@@ -31,10 +68,10 @@ def measure(replicas: Replicas) -> Measurement:
     values |= {name: Value(over[name], reason=faint, compared=not faint) for name in ("shear_zone_width", "shear_zone_width_90")}
     told = f"the wall's static friction is {replicas[0].derived['wall_static']:g}"
     values["wall_mobilisation"] = Value(over["wall_mobilisation"], detail=told)
-    fields = channel_fields.measured(replicas, unsteady)
+    maps = fields.measured(replicas, unsteady)
     steady = f"The steady part holds {first.steady_share:.0%} of the measuring window (MSER-5 and a drift test on the wall friction)."
     d, window = first.diameter, first.levels[-1] - first.levels[0]
     size = (f"The channel is {first.width / d:.0f} d wide and filled {first.height / d:.0f} d high; the cells, which are at rest in the "
             f"laboratory frame, cover {window / d:.0f} d of it.")
     remarks = [unsteady + "." if unsteady else steady, size, *REMARKS]
-    return Measurement({**values, **liquid_values(replicas), **fields.values}, channel_plug.profiles(channels), remarks, fields.fields)
+    return Measurement({**values, **liquid_values(replicas), **maps.values}, profiles(channels), remarks, maps.fields)

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.postproc.instruments.growth import ordered
-from dembark.postproc.instruments.tumbler import Tumbler, estimates, layer_flux, read
+from dembark.input_decks.common.growth import ordered
+from dembark.input_decks.rotating_drum.drum_flow import DrumFlow, estimates, layer_flux, read
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, pooled, profile
 from dembark.postproc.statistics import jackknife
 from dembark.postproc.studies import compared, measured
@@ -108,7 +108,7 @@ def measure(replicas: Replicas) -> Measurement:
     return Measurement(values, [speeds(drums, tracked_drum), densities(drums)])
 
 
-def speeds(drums: list[Tumbler], beside: bool) -> Curve:
+def speeds(drums: list[DrumFlow], beside: bool) -> Curve:
     """The speed along the surface over n, with the tracked points."""
     every = np.ones(len(drums[0].solid), bool)
     known = ~np.isnan([drum.velocity(every) for drum in drums]).any(axis=0)
@@ -123,7 +123,7 @@ def speeds(drums: list[Tumbler], beside: bool) -> Curve:
                    reference_half=np.full(inside.sum(), SPEED_READ), reference_label="Alizadeh et al. (2013)")
 
 
-def densities(drums: list[Tumbler]) -> Curve:
+def densities(drums: list[DrumFlow]) -> Curve:
     """The solid fraction over n."""
     every = np.ones(len(drums[0].solid), bool)
     return profile("solid_fraction", "Solid fraction on the normal", "distance from the axis along the normal (m)", "φ", drums[0].middle,

@@ -6,26 +6,26 @@ with K of the contact stress and the friction that the wall was given; in the st
 
 from dataclasses import replace
 
-from dembark.postproc.instruments import silo, silo_fields
-from dembark.postproc.instruments.column import read
-from dembark.postproc.instruments.liquid import liquid_values
+from dembark.input_decks.common.liquid import liquid_values
+from dembark.input_decks.silo import fields, quantities
+from dembark.input_decks.silo.column import read
 from dembark.postproc.measurement import Measurement, Points, Replica, Replicas
 
 
 def prepare(replica: Replica) -> None:
     """What needs no other replica: done while they still run."""
-    silo.scalars(read(replica))
-    silo_fields.read(replica)
+    quantities.scalars(read(replica))
+    fields.read(replica)
 
 
 def measure(replicas: Replicas) -> Measurement:
     """Values, profiles, remarks and fields of all replicas of a series."""
-    found = silo.measured([read(replica) for replica in replicas], "R", "r", replicas[0].derived)
-    fields = silo_fields.measured(replicas, found.values)
-    return replace(found, values={**found.values, **liquid_values(replicas), **fields.values}, remarks=[*found.remarks, *fields.remarks],
-                   fields=fields.fields)
+    found = quantities.measured([read(replica) for replica in replicas], "R", "r", replicas[0].derived)
+    maps = fields.measured(replicas, found.values)
+    return replace(found, values={**found.values, **liquid_values(replicas), **maps.values}, remarks=[*found.remarks, *maps.remarks],
+                   fields=maps.fields)
 
 
 def study(name: str, points: Points, _along: str) -> Measurement:
     """How much friction the walls mobilise, or the apparent masses of all `points` but `dry`, which they are predicted from."""
-    return silo.mobilised(points) if name == "mobilisation" else silo.predicted(points)
+    return quantities.mobilised(points) if name == "mobilisation" else quantities.predicted(points)

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.postproc.instruments.impact_tests import head_on, mirrored, oblique, restitutions
-from dembark.postproc.instruments.impacts import Flight, Solutions, impacts, read, sweep
-from dembark.postproc.instruments.published_curves import beside_published
+from dembark.input_decks.single_contact.impact_tests import head_on, mirrored, oblique, restitutions
+from dembark.input_decks.single_contact.impacts import Flight, Solutions, impacts, read, sweep
+from dembark.input_decks.single_contact.published_curves import beside_published
 from dembark.postproc.measurement import Measurement, Numbers, Replicas, number
 
 PUBLISHED = Path(__file__).with_name("reference") / "chung_ooi_2011.csv"

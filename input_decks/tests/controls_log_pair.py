@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from dembark.input_decks.common.log_run import LogRun
 from dembark.input_decks.tests.measuring import Control, judged
 from dembark.input_decks.tests.test_log_measures import log_pair, of_pair, pair_run, unsolved
-from dembark.postproc.instruments.logs import LogRun
 
 
 def off_centre() -> LogRun:

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from dembark.input_decks.common.log_run import LogRun
 from dembark.input_decks.tests.measuring import Control
 from dembark.input_decks.tests.test_log_measures import of_pile, stack, unsolved
-from dembark.postproc.instruments.logs import LogRun
 
 
 def controls(_folder: Path) -> Iterator[Control]:

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from dembark.input_decks.single_contact.impacts import Flight
+from dembark.input_decks.single_contact.published_curves import beside_published
 from dembark.input_decks.tests.measuring import Control, Verdicts, judged
 from dembark.input_decks.tests.test_single_contact_measure import flown, parameters, single_contact
 from dembark.physics.exact.impacts import Impacts
-from dembark.postproc.instruments.impacts import Flight
-from dembark.postproc.instruments.published_curves import beside_published
 from dembark.postproc.measurement import Measurement
 from dembark.postproc.resampling import profile
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from dembark.input_decks.tests.measuring import Control
+from dembark.input_decks.tests.synthetic_bed import trough
 from dembark.input_decks.tests.test_vibro_finishing import GRAIN, measured, sense_study, step_study
-from dembark.postproc.instruments.tests.test_machines import trough
 
 
 def controls(folder: Path) -> Iterator[Control]:

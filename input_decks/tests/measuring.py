@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dembark.postproc.instruments.liquid import liquid_values
-from dembark.postproc.instruments.logs import LogRun, read
+from dembark.input_decks.common.liquid import liquid_values
+from dembark.input_decks.common.log_run import LogRun, read
 from dembark.postproc.measurement import Measurement
 from dembark.postproc.replica import Replica
 from dembark.validation import metrics

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from dembark.input_decks.common.momentum import PARTS
 from dembark.physics import capillary_force
-from dembark.postproc.instruments.momentum import PARTS
 from dembark.postproc.tests.dumps import BOX, contacts_text, grains_text, write_times
 
 GRAVITY, DIAMETER, DENSITY, WALL_SPEED = 9.81, 0.005, 2500.0, 0.01

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from dembark.common.errors import DembarkError
+from dembark.input_decks.avalanche.slope_flow import Slope, front_law, mean_power, profile_power
+from dembark.input_decks.common.momentum import imbalance
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.input_decks.tests.synthetic import account
-from dembark.postproc.instruments.avalanche import Slope, front_law, mean_power, profile_power
-from dembark.postproc.instruments.momentum import imbalance
 from dembark.postproc.measurement import Measurement
 from dembark.postproc.tests.scenes import frame_of
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dembark.input_decks.column_collapse.measure import PARTS
 from dembark.input_decks.tests.measuring import defaults, judged, module
 from dembark.postproc import DumpError
-from dembark.postproc.instruments.collapse import PARTS
 from dembark.postproc.replica import Replica
 from dembark.postproc.tests.dumps import grains_text, write_times
 

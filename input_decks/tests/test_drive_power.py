@@ -13,9 +13,9 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import brentq
 
 from dembark.common.errors import DembarkError
+from dembark.input_decks.drive_power.drive import LONGEST, sticking_block
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.postproc import DumpError
-from dembark.postproc.instruments.drive import LONGEST, sticking_block
 from dembark.validation.case.deck import prepare
 from dembark.validation.case.folders import find
 from dembark.validation.case.resolve import resolve

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dembark.input_decks.debarking_drum.drum_impacts import Drum, _along_shell, estimates, read
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.postproc import DumpError
-from dembark.postproc.instruments.drum import Drum, _along_shell, estimates, read
 from dembark.postproc.replica import Replica
 from dembark.postproc.resampling import Array
 from dembark.postproc.tests.dumps import write_times

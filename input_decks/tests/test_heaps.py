@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dembark.input_decks.common.heaps import EDGE, at_rest, flank, front, power_law
 from dembark.input_decks.common.packing import lattice
 from dembark.input_decks.tests.measuring import defaults, judged, module
 from dembark.postproc import GrainsDump
-from dembark.postproc.instruments.heaps import EDGE, at_rest, flank, front, power_law
 from dembark.postproc.measurement import Measurement
 from dembark.postproc.replica import Replica
 from dembark.postproc.tests.dumps import grains_text

@@ -12,7 +12,7 @@ import pytest
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import check_impacts, check_times, count_frames
-from dembark.postproc.instruments.logs import LogRun, read
+from dembark.input_decks.common.log_run import LogRun, read
 from dembark.validation.case.folders import find
 
 CASES = ("log_pair", "log_cradle", "log_pile")

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dembark.input_decks.common.log_run import LogRun, TouchFrame
+from dembark.input_decks.log_pile.measure import beginning, impact_values, loads, together
 from dembark.input_decks.tests.measuring import defaults, judged, logs, module, names
-from dembark.postproc.instruments.log_stack import beginning, impact_values, loads, together
-from dembark.postproc.instruments.logs import LogRun, TouchFrame
 from dembark.postproc.measurement import Estimate, Value, number
 
 log_pair, log_cradle = (module(name) for name in ("log_pair", "log_cradle"))

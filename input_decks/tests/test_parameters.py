@@ -90,7 +90,7 @@ def test_every_text_that_a_deck_includes_is_an_input(name):
         assert len(read) > 1
 
 
-@pytest.mark.parametrize(("name", "module"), [("vibrated_layer", "postproc/instruments/levels.py"),
+@pytest.mark.parametrize(("name", "module"), [("vibrated_layer", "input_decks/common/drive_levels.py"),
                                               ("vibro_finishing", "postproc/walls/mesh.py")])
 def test_what_a_setup_shares_with_the_measurement_is_an_input(name, module):
     content = (package_root().parent / module).read_bytes()

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dembark.input_decks.single_contact.published_curves import beside_published
 from dembark.input_decks.tests.measuring import judged, module, names
-from dembark.postproc.instruments.published_curves import beside_published
 from dembark.postproc.measurement import Measurement
 from dembark.postproc.resampling import profile
 from dembark.validation.case.folders import find

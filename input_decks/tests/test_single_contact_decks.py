@@ -11,10 +11,10 @@ import pytest
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import check_times, count_frames
+from dembark.input_decks.single_contact.impacts import Flight, read
 from dembark.input_decks.tests.measuring import module
 from dembark.physics.exact.contact_law import stepped
 from dembark.postproc import GrainsDump
-from dembark.postproc.instruments.impacts import Flight, read
 from dembark.validation.case.folders import find
 from dembark.validation.case.resolve import resolve
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dembark.input_decks.single_contact.impacts import Flight
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.physics.exact.contact_law import stepped
 from dembark.physics.exact.impacts import partial_slip
-from dembark.postproc.instruments.impacts import Flight
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
 

@@ -11,7 +11,7 @@ import pytest
 
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.input_decks.tests.synthetic import account
-from dembark.postproc.instruments.container import ring_period, slid, tops
+from dembark.input_decks.transport_container.measure import ring_period, slid, tops
 from dembark.postproc.tests.scenes import frame_of
 from dembark.validation.case.folders import find
 

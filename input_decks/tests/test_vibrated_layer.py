@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dembark.input_decks.common.drive_levels import levels
+from dembark.input_decks.common.momentum import unexplained
+from dembark.input_decks.common.vibration import PHASES
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
-from dembark.postproc.instruments.layer import read, unexplained
-from dembark.postproc.instruments.levels import levels
-from dembark.postproc.instruments.phases import PHASES
+from dembark.input_decks.vibrated_layer.layer import read
 
 layer = module("vibrated_layer")
 D, STRIDE, STILL = 0.005, 10, 4

@@ -13,12 +13,12 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from dembark.common.errors import DembarkError
+from dembark.input_decks.common.momentum import CONTACT_PARTS
 from dembark.input_decks.common.trough import sites_within
 from dembark.input_decks.common.trough import trough as trough_mesh
+from dembark.input_decks.common.vibrated_bed import Trough, read
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
-from dembark.postproc.instruments.drive import PARTS
-from dembark.postproc.instruments.machines import Trough, read
-from dembark.postproc.instruments.tests.test_machines import trough
+from dembark.input_decks.tests.synthetic_bed import trough
 from dembark.postproc.replica import Replica
 from dembark.postproc.walls.mesh import cut, read_stl
 from dembark.validation.case.deck import prepare, stl
@@ -32,7 +32,7 @@ GRAIN = {"part_diameter": 0.005, "part_density": 2500.0}
 def account(rows: dict[str, Any], booked: float = 1.0) -> dict[str, Any]:
     """Energies whose works balance, but for the part of the damping that is not `booked`."""
     time = rows["time"]
-    table = dict.fromkeys(("first_kinetic", "gravity", *PARTS, "balance"), 0.0 * time)
+    table = dict.fromkeys(("first_kinetic", "gravity", *CONTACT_PARTS, "balance"), 0.0 * time)
     table |= {"walls": 2.0 * time, "normal_viscous": -1.5 * booked * time, "kinetic_energy": 0.5 * time, "scale": 4.0 * time + 1.0}
     return rows | table
 

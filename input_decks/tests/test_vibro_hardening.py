@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dembark.input_decks.common import vibrated_bed
 from dembark.input_decks.common.trough import polygon
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.synthetic_bed import PERIOD, PERIODS, trough
 from dembark.input_decks.tests.test_vibro_finishing import account
-from dembark.postproc.instruments import machines
-from dembark.postproc.instruments.tests.test_machines import PERIOD, PERIODS, trough
-from dembark.postproc.instruments.touches import Touches, nearest, read_touches
+from dembark.input_decks.vibro_hardening.contact_record import ContactRecord, nearest, read_record
 from dembark.postproc.replica import Replica
 from dembark.postproc.tests.dumps import grains_text
 
@@ -33,7 +33,7 @@ def moving() -> Any:
                            velocity=lambda t: np.ones((len(t), 1)) * [0.0, 0.0, 0.1])
 
 
-def record(folder: Path, count: int = 60, lost: int = 0) -> Touches:
+def record(folder: Path, count: int = 60, lost: int = 0) -> ContactRecord:
     """`count` impacts on the upper side of a square part, one after the other, each of a half sine of force; grains alternate. Of `lost`
     impacts nothing was recorded."""
     top, text = CORNERS[:, 1].max(), []
@@ -49,7 +49,7 @@ def record(folder: Path, count: int = 60, lost: int = 0) -> Touches:
     folder.mkdir(exist_ok=True)
     path = folder / "touches.dump"
     path.write_text("".join(text))
-    return read_touches(path, moving(), CORNERS, stride=STRIDE, time_step=STEP, first=0, periods=PERIODS, period=PERIOD, depth=0.005)
+    return read_record(path, moving(), CORNERS, stride=STRIDE, time_step=STEP, first=0, periods=PERIODS, period=PERIOD, depth=0.005)
 
 
 def measured(folder: Path, booked: float = 1.0, lost: int = 0) -> dict[str, Any]:
@@ -62,7 +62,7 @@ def measured(folder: Path, booked: float = 1.0, lost: int = 0) -> dict[str, Any]
     # As heavy as the impacts on the part are strong.
     light = replace(run, rows=rows, weight=whole / (PERIODS * PERIOD))
     replica = Replica(Path(), {"parameters": defaults("vibro_hardening")})
-    replica.__dict__["_read"] = {machines.read.__wrapped__: light, hardening.touches.__wrapped__: hits}
+    replica.__dict__["_read"] = {vibrated_bed.read.__wrapped__: light, hardening.touches.__wrapped__: hits}
     return judged("vibro_hardening", hardening.measure([replica]))
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dembark.input_decks.common.momentum import unexplained
+from dembark.input_decks.common.vibration import PHASES
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
-from dembark.postproc.instruments.layer import unexplained
-from dembark.postproc.instruments.phases import PHASES
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
 from dembark.validation.case.resolve import resolve

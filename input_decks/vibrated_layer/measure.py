@@ -6,10 +6,11 @@ from collections.abc import Callable
 import numpy as np
 import xarray as xr
 
-from dembark.postproc.instruments.growth import ordered
-from dembark.postproc.instruments.layer import Layer, mean_power, read, unexplained, wave_amplitude
-from dembark.postproc.instruments.phases import PHASES
-from dembark.postproc.instruments.standing_waves import Waves, amplitude, rank_correlation
+from dembark.input_decks.common.growth import ordered
+from dembark.input_decks.common.momentum import unexplained
+from dembark.input_decks.common.vibration import PHASES
+from dembark.input_decks.vibrated_layer.layer import Layer, mean_power, read, wave_amplitude
+from dembark.input_decks.vibrated_layer.standing_waves import Waves, amplitude, rank_correlation
 from dembark.postproc.measurement import Curve, Estimate, Measurement, Numbers, Points, Replicas, Value, exact, over_replicas, profile
 from dembark.postproc.studies import measured
 

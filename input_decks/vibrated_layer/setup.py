@@ -6,10 +6,10 @@ from itertools import pairwise
 import numpy as np
 
 from dembark.input_decks.common import packing
+from dembark.input_decks.common.drive_levels import levels
 from dembark.input_decks.common.motion import amplitude, motion
 from dembark.input_decks.common.setup import Parameters, Setup, contacts, rectangle
 from dembark.input_decks.common.vibration import fixed_phases, suitable_step
-from dembark.postproc.instruments.levels import levels
 
 
 def setup(p: Parameters) -> Setup:

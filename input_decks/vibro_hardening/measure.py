@@ -6,13 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from dembark.input_decks.common import vibrated_bed
+from dembark.input_decks.common.growth import Growth, ordered
+from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
 from dembark.input_decks.common.motion import motion
 from dembark.input_decks.common.trough import polygon
-from dembark.postproc.instruments import machines
-from dembark.postproc.instruments.drive import PARTS
-from dembark.postproc.instruments.growth import Growth, ordered
-from dembark.postproc.instruments.momentum import imbalance
-from dembark.postproc.instruments.touches import Touches, histogram, read_touches
+from dembark.input_decks.vibro_hardening.contact_record import ContactRecord, histogram, read_record
 from dembark.postproc.measurement import Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas
 from dembark.postproc.replica import once
 from dembark.postproc.statistics import combined
@@ -25,19 +24,19 @@ STEADY = ("circulation", "impact_energy")
 
 
 @once
-def touches(replica: Replica) -> Touches:
+def touches(replica: Replica) -> ContactRecord:
     """The record of the grains on the part."""
     p, derived = replica.parameters, replica.derived
     period = int(derived["period_steps"])
     moving = motion(SimpleNamespace(**p), start=int(derived["begin"]) * replica.time_step)
     corners = polygon(p["part_diameter"], p["part_corners"], (0.0, -0.2 * p["trough_width"]))
-    return read_touches(replica.folder / "touches.dump", moving, corners, stride=int(derived["sample"]), time_step=replica.time_step,
+    return read_record(replica.folder / "touches.dump", moving, corners, stride=int(derived["sample"]), time_step=replica.time_step,
                         first=int(derived["first"]), periods=p["periods"], period=period * replica.time_step, depth=p["grain_diameter"])
 
 
 def measure(replicas: Replicas) -> Measurement:
     """Values and curves of all replicas of a series."""
-    runs, records, p = [machines.read(one) for one in replicas], [touches(one) for one in replicas], replicas[0].parameters
+    runs, records, p = [vibrated_bed.read(one) for one in replicas], [touches(one) for one in replicas], replicas[0].parameters
     drive = 2.0 * math.pi * p["motion_frequency"]
     mass = p["grain_density"] * math.pi / 6.0 * p["grain_diameter"] ** 3
     unit = 0.5 * mass * runs[0].speed**2
@@ -46,21 +45,21 @@ def measure(replicas: Replicas) -> Measurement:
         one = over_replicas(found)
         return Value(Estimate(one.value / scale, one.half / scale, one.basis))
 
-    def of_run(number: Callable[[machines.Trough], float]) -> Value:
+    def of_run(number: Callable[[vibrated_bed.Trough], float]) -> Value:
         return over([Estimate(number(one), math.inf, ONE) for one in runs])
 
     values = {
-        "energy_balance": Value(exact(np.max([imbalance(one.rows, PARTS) for one in runs])), exact(0.0)),
+        "energy_balance": Value(exact(np.max([imbalance(one.rows, CONTACT_PARTS) for one in runs])), exact(0.0)),
         "touch_balance": Value(exact(max(missed(*pair) for pair in zip(runs, records, strict=True))), exact(0.0)),
         "impact_rate": over([one.rate() for one in records]), "impact_energy": over([one.energy() for one in records], unit),
         "friction_power": over([one.friction() for one in records]), "circulation": over([one.turning() for one in runs], drive),
         "power": over([one.power(*WALLS) for one in runs]), "noise": of_run(lambda one: one.noise("trough")),
         "stirring": over([one.stirring() for one in runs]), "agitation": over([one.agitation() for one in runs]),
     }
-    return Measurement(values, [machines.drifts(runs), machines.spectra(runs, "trough"), histogram(records, unit)])
+    return Measurement(values, [vibrated_bed.drifts(runs), vibrated_bed.spectra(runs, "trough"), histogram(records, unit)])
 
 
-def missed(run: machines.Trough, record: Touches) -> float:
+def missed(run: vibrated_bed.Trough, record: ContactRecord) -> float:
     """Size of the difference between the impulse of the record and that of the force on the part, over the weight times the window."""
     whole = np.array([run.rows[f"part_j{axis}"][-1] - run.rows[f"part_j{axis}"][0] for axis in "xyz"])
     return float(np.linalg.norm(record.impulse() - whole) / (run.weight * run.periods * run.run.period))
@@ -77,5 +76,5 @@ def study(name: str, points: Points, along: str) -> Measurement:
         curve = Growth.of(points, "stirring", place).curve("stirring", "Fluctuation over mean speed", "amplitude (m)", "")
         told = "passes when the whole interval is above 1"
         return Measurement({"stirring_gain": Value(gain, exact(1.0), verdict=verdict, detail=told)}, [curve])
-    return Measurement({f"{quantity}_change": Value(machines.spread([measured(point, quantity) for point in points]), exact(0.0))
+    return Measurement({f"{quantity}_change": Value(vibrated_bed.spread([measured(point, quantity) for point in points]), exact(0.0))
                         for quantity in STEADY})

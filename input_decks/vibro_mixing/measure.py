@@ -6,9 +6,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.instruments.layer import unexplained
-from dembark.postproc.instruments.levels import acceleration
-from dembark.postproc.instruments.mixing import (
+from dembark.input_decks.common.drive_levels import acceleration
+from dembark.input_decks.common.momentum import unexplained
+from dembark.input_decks.common.phases import Phases, read_phases
+from dembark.input_decks.vibro_mixing.mixing import (
     Kinds,
     cells,
     lacey_index,
@@ -19,7 +20,6 @@ from dembark.postproc.instruments.mixing import (
     segregation,
     wall_drift,
 )
-from dembark.postproc.instruments.phases import Phases, read_phases
 from dembark.postproc.measurement import (
     Array,
     Curve,

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from dembark.input_decks.common.growth import Growth, ordered
+from dembark.input_decks.dam_break.water import common_values, pressure
 from dembark.postproc.history import reached
-from dembark.postproc.instruments.growth import Growth, ordered
-from dembark.postproc.instruments.water import common_values, pressure
 from dembark.postproc.measurement import Array, Curve, Measurement, Points, Replica, Replicas, Value, exact, profile
 from dembark.postproc.studies import measured
 

@@ -17,5 +17,5 @@ print(*sys.modules)
 
 def test_the_engine_does_not_wait_for_what_is_needed_later() -> None:
     loaded = subprocess.run([sys.executable, "-c", CODE], check=True, capture_output=True, text=True).stdout.split()
-    assert "dembark.postproc.instruments.silo_fields" in loaded
+    assert "dembark.input_decks.silo.fields" in loaded
     assert not SLOW & set(loaded)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import re
 import shutil
 import sys
 import traceback
@@ -30,12 +31,17 @@ PACKING = "packing.data"
 
 
 def load_module(path: Path, name: str) -> ModuleType:
-    """The Python file `path` of a case folder; DembarkError with file and line when it cannot be loaded."""
-    spec = importlib.util.spec_from_file_location(name, path)
+    """The Python file `path` of a case folder, as a module of the package `name`, which holds the other modules of that folder: these are
+    imported by `from . import ...`, anew each time. DembarkError with file and line when it cannot be loaded."""
+    spec = importlib.util.spec_from_file_location(f"{name}.{path.stem}", path)
     if spec is None or spec.loader is None:
         raise DembarkError(f"{path} cannot be loaded")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
+    for known in [one for one in sys.modules if one.startswith(f"{name}.")]:
+        del sys.modules[known]
+    importlib.invalidate_caches()
+    package, module = ModuleType(name), importlib.util.module_from_spec(spec)
+    package.__path__ = [str(path.parent)]
+    sys.modules |= {name: package, module.__name__: module}
     try:
         spec.loader.exec_module(module)
     except Exception as error:  # noqa: BLE001 - the file may be the user's: whatever is wrong in it is told in one line
@@ -146,20 +152,30 @@ def reference_files(case: Case) -> dict[str, Path]:
 
 
 def _companions(case: Case) -> dict[str, Path]:
-    """Other files of the case folder that decks may read, by their names in it: meshes, tables, what they include."""
-    known = {"case.toml", "setup.py", "measure.py", *(engines.facts(name).deck for name in engines.names())}
+    """Other files of the case folder that decks may read, by their names in it: meshes, tables, what they include; of Python modules, which
+    measure.py and setup.py import, only those that a deck imports, too, or names."""
+    decks = {engines.facts(name).deck for name in engines.names()}
+    known = {"case.toml", "setup.py", "measure.py", "figures.py", *decks}
+    texts = [path.read_text(encoding="utf-8", errors="replace") for name in sorted(decks) if (path := case.folder / name).is_file()]
     relative = {path.relative_to(case.folder): path for path in case.folder.rglob("*") if path.is_file()}
     return {str(name): path for name, path in sorted(relative.items())
             if str(name) not in known and name.suffix not in (".md", ".pyc") and name.parts[0] not in ("tests", "campaigns", "reference")
-            and not any(part.startswith(".") for part in name.parts)}
+            and not any(part.startswith(".") for part in name.parts)
+            and (name.suffix != ".py" or any(_names_module(text, name) for text in texts))}
+
+
+def _names_module(text: str, module: Path) -> bool:
+    return module.name in text or re.search(rf"^\s*(?:import|from) \.?{module.stem}\b", text, re.MULTILINE) is not None
 
 
 def archive(case: Case, folder: Path) -> None:
     """Copy the files that a run was made and is measured by into `folder`/case, as they are."""
-    for name in ("case.toml", "setup.py", "measure.py"):
-        if (case.folder / name).is_file():
+    code = [path for name in ("setup.py", "measure.py") if (path := case.folder / name).is_file()]
+    own = {path.resolve() for path in imports.dependencies(*code).files.values()}
+    for path in (case.folder / "case.toml", *case.folder.glob("*.py")):
+        if path.name == "case.toml" or path.resolve() in own:
             (folder / "case").mkdir(exist_ok=True)
-            shutil.copyfile(case.folder / name, folder / "case" / name)
+            shutil.copyfile(path, folder / "case" / path.name)
 
 
 def _files(case: Case, engine: str, values: Mapping[str, Value], setup: Setup) -> dict[str, bytes]:

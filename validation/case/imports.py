@@ -23,7 +23,7 @@ _COMPILED = (".so", ".pyd")
 
 @dataclass(frozen=True)
 class _Names:
-    """What the source of a module names: `modules` (`a.b.c`) that it may import, and other `words` of its text constants."""
+    """What the source of a module names: `modules`, `a.b.c` or relative `.b.c`, that it may import, other `words` of its text constants."""
 
     modules: frozenset[str]
     words: frozenset[str]
@@ -78,9 +78,14 @@ def dependencies(*roots: Path) -> Dependencies:
             continue
         found = _named(path)
         for module in found.modules:
-            if module.split(".")[0] != _PACKAGE:
+            if module.startswith("."):
+                place = _neighbour(path, module)
+            elif module.split(".")[0] == _PACKAGE:
+                place = module_file(module)
+            else:
                 libraries.add(module.split(".")[0])
-            elif place := module_file(module):
+                continue
+            if place:
                 waiting.append((_label(place), place))
         waiting += [(f"{name.rpartition('/')[0]}/{word}".lstrip("/"), path.parent / word) for word in found.words
                     if _is_file_of(path.parent, word)]
@@ -110,7 +115,7 @@ def _read(path: Path, *_state: int) -> _Names:
             case ast.ImportFrom(module=module, names=found, level=0) if module:
                 modules |= {f"{module}.{one.name}" for one in found}
             case ast.ImportFrom(module=module, names=found, level=level):
-                modules |= {f"{_own_package(path, level)}.{module + '.' if module else ''}{one.name}" for one in found}
+                modules |= {f"{'.' * level}{module + '.' if module else ''}{one.name}" for one in found}
             case ast.Constant(value=str(word)) if word.startswith(f"{_PACKAGE}.") and word.replace(".", "").isidentifier():
                 modules.add(word)  # for import_module
             case ast.Constant(value=str(word)):
@@ -128,22 +133,25 @@ def _nodes(tree: ast.AST) -> Iterator[ast.AST]:
         yield from _nodes(node)
 
 
-def _own_package(path: Path, level: int) -> str:
-    folder = path.parents[level - 1]
-    parts: list[str] = []
-    while (folder / "__init__.py").is_file():
-        parts.insert(0, folder.name)
-        folder = folder.parent
-    return ".".join([_PACKAGE, *parts])
+def _neighbour(path: Path, name: str) -> Path | None:
+    """File of the module that the file `path` calls `name`, with points in front; the folder of a case needs no __init__.py for it."""
+    parts = name.lstrip(".").split(".")
+    folder = path.parents[len(name) - len(name.lstrip(".")) - 1]
+    package = folder / "__init__.py"
+    return _module_in([folder], parts) or (package if package.is_file() else None)
 
 
 @cache
 def module_file(name: str) -> Path | None:
     """File of the module `name` of this package, or of the one that defines the name after its last point; None when there is none."""
     _, *parts = name.split(".")
+    return _module_in(dembark.__path__, parts)
+
+
+def _module_in(roots: Iterable[str | Path], parts: list[str]) -> Path | None:
     for count in range(len(parts), 0, -1):
-        for root in map(Path, dembark.__path__):
-            place = root.joinpath(*parts[:count])
+        for root in roots:
+            place = Path(root).joinpath(*parts[:count])
             for path in (place.with_name(f"{place.name}.py"), place / "__init__.py", *_compiled(place)):
                 if path.is_file():
                     return path

@@ -52,8 +52,8 @@ def check(case: Case) -> ModuleType:
     """The measure.py of the case, loaded; DembarkError, with file and line, when it is missing or cannot be loaded."""
     deck.require_measure(case)
     path = case.folder / "measure.py"
-    stat = path.stat()
-    module = _loaded(path, case.name, (stat.st_mtime_ns, stat.st_size))
+    facts = ((one.name, one.stat()) for one in sorted(path.parent.glob("*.py")))
+    module = _loaded(path, case.name, tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in facts))
     for name in ("measure", *(["study"] if case.studies else [])):
         if not callable(getattr(module, name, None)):
             raise DembarkError(f"{path} has no function {name}", "",
@@ -62,8 +62,8 @@ def check(case: Case) -> ModuleType:
 
 
 @cache
-def _loaded(path: Path, name: str, _changed: tuple[int, int]) -> ModuleType:
-    """The module of a measure.py, loaded once until it changes, so that what `prepare` has read is found by `measure`."""
+def _loaded(path: Path, name: str, _changed: tuple[tuple[str, int, int], ...]) -> ModuleType:
+    """The module of a measure.py, loaded once until it or a module next to it changes: `measure` finds what `prepare` has read."""
     return deck.load_module(path, f"dembark_measure_{name}")
 
 

@@ -138,7 +138,7 @@ def gather(folder: Path) -> Gathered:
     def order(one: Page) -> tuple[Any, ...]:
         """Variants as the case lists them, for the first ones are shown with all their figures; then those of campaigns by name."""
         names = list(cases[one.case].variants) if one.case in cases else []
-        return one.case != "silo", one.case, one.is_study, names.index(one.variant) if one.variant in names else len(names), one.variant
+        return one.case, one.is_study, names.index(one.variant) if one.variant in names else len(names), one.variant
 
     ordered = sorted(pages.values(), key=order)
     return Gathered(folder, ordered, verification.read(folder), cases, unread, summary)

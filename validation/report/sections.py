@@ -14,9 +14,9 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from dembark.common.parallel import mapped
-from dembark.postproc import figures as field_figures
-from dembark.postproc import pictures
-from dembark.postproc.figures.panels import Look
+from dembark.postproc import field_figures, pictures
+from dembark.validation.case import deck
+from dembark.validation.case.folders import find
 from dembark.validation.judge.result import ComparedRecord
 from dembark.validation.judge.tally import Counts, tally
 from dembark.validation.report import figures, front
@@ -222,17 +222,22 @@ def _curves(page: Page) -> figures.Curves:
     return {engine: one.profiles for engine, one in sorted(page.results.items()) if one.profiles}
 
 
-def _look(engine: str) -> Look:
+def _look(engine: str) -> field_figures.Look:
     facts = figures.look(engine)
-    return Look(facts.title, facts.colour, facts.marker)
+    return field_figures.Look(facts.title, facts.colour, facts.marker)
 
 
 def _fields(page: Page, folder: Path) -> tuple[list[Shown], list[str]]:
-    """The page's figures of fields; their data are written beside the report, and why there are none is told."""
+    """The page's figures of fields, as figures.py of the case draws them; their data are written next to the report, and why there are none
+    is reported."""
     try:
         shown = sorted(page.results)
-        drawn = field_figures.draw(field_figures.read(page.folder, shown), {engine: _look(engine) for engine in shown})
-    except (OSError, ValueError, KeyError, AttributeError) as error:
+        datasets = field_figures.read(page.folder, shown)
+        path = find(page.case).folder / "figures.py" if datasets else None
+        if path is None or not path.is_file():
+            return [], []
+        drawn = deck.load_module(path, f"dembark_figures_{page.case}").draw(datasets, {engine: _look(engine) for engine in shown})
+    except Exception as error:  # noqa: BLE001 - figures.py may be the user's: whatever is wrong in it is reported in one line
         return [], [f"fields.nc cannot be drawn: {error}"]
     found = []
     for one in drawn:

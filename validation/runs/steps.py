@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 CAMPAIGN_FILE = "campaign.toml"
 _DRAWN = "pictures.json"
 # What draws and lays out reports, and the code that verifies the instruments for them.
-_REPORTING = ("validation/report", "validation/campaigns/report", "validation/verification", "postproc/figures")
+_REPORTING = ("validation/report", "validation/campaigns/report", "validation/verification", "postproc/field_figures.py")
 
 
 @dataclass(frozen=True)
@@ -97,8 +97,9 @@ def of_report(results: Path) -> str:
     """Hash of the inputs of a report: results, the list of runs, the files of the cases, and the code that lays it out."""
     read = (results / "runs.json", results / CAMPAIGN_FILE, *result_files(results))
     kept = {str(path.relative_to(results)): inputs.content(path) for path in read}
-    cases = {path.parent.name: inputs.content(path) for path in files() if path.parent.name in {name.split("/")[0] for name in kept}}
-    return inputs.digest(kept, cases, inputs.of_code(*_REPORTING))
+    cases = [path for path in files() if path.parent.name in {name.split("/")[0] for name in kept}]
+    drawing = [str(path) for case in cases if (path := case.with_name("figures.py")).is_file()]
+    return inputs.digest(kept, {path.parent.name: inputs.content(path) for path in cases}, inputs.of_code(*_REPORTING, *drawing))
 
 
 def name(kind: str, place: Path) -> str:

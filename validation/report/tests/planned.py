@@ -13,7 +13,7 @@ import xarray
 from matplotlib.figure import Figure
 
 from dembark.postproc import pictures
-from dembark.postproc.figures import FILE
+from dembark.postproc.field_figures import FILE
 from dembark.postproc.measurement import Value
 from dembark.postproc.pictures import saved
 from dembark.postproc.statistics import Estimate
@@ -25,8 +25,8 @@ from dembark.validation.judge.compare import compare
 from dembark.validation.judge.result import QuantityRecord, Result
 from dembark.validation.verification.item import Item
 
-# Cases whose measurement leaves fields, and of which kind.
-FIELDS = {"silo": "silo", "plug_flow": "channel", "gravity_channel": "channel", "debarking_drum": "drum"}
+# Cases whose measurement leaves fields.
+FIELDS = ("silo", "plug_flow", "debarking_drum")
 # What a measurement may put in the place of the `*` of a quantity's name.
 PARTS = ("1", "2", "3", "4", "5")
 
@@ -48,26 +48,26 @@ def _record(name: str, label: str, one: Declared, random: np.random.Generator) -
     return measuring.judged(given, Value(estimate, Estimate(due, 0.0) if one.evidence else None), name)
 
 
-def fields(kind: str) -> xarray.Dataset:
-    """Fields of a kind as a measurement leaves them, of the same number everywhere."""
+def fields(case: str) -> xarray.Dataset:
+    """Fields of a case as its measurement leaves them, of the same number everywhere."""
     across, up = np.linspace(0.05, 0.95, 8), np.linspace(0.1, 3.9, 20)
     places = {"radius": across, "height": up, "x": across, "z": up, "angle": np.arange(-175.0, 180.0, 10.0), "force": np.logspace(1, 6, 25),
               "log": np.zeros(3), "band": np.zeros(3), "side": np.zeros(2)}
-    of_channel = ("velocity", "shear_rate", "temperature", "solid_fraction")
+    flow = ("velocity", "shear_rate", "temperature", "solid_fraction")
     names = {
         "silo": {("radius", "height"): ["coverage", "stress_zz", "stress_rr", "stress_zr", "solid_fraction"],
                  ("height",): ["stress_zz_section", "stress_zz_section_half", "janssen", "wall_normal", "wall_shear"],
                  ("band", "radius"): ["k_profile", "k_profile_half"], ("band", "side"): ["band_bounds"]},
-        "channel": {("x", "z"): [*of_channel],
-                    ("x",): ["velocity_lagrangian", *(f"{name}_profile{end}" for name in of_channel for end in ("", "_half"))]},
-        "drum": {("x", "z"): ["impact_power"], ("angle",): ["shell_power", "shell_power_half"], ("angle", "force"): ["shell_peaks"],
-                 ("log",): ["log_x", "log_z", "log_radius"]}}[kind]
+        "plug_flow": {("x", "z"): [*flow],
+                      ("x",): ["velocity_lagrangian", *(f"{name}_profile{end}" for name in flow for end in ("", "_half"))]},
+        "debarking_drum": {("x", "z"): ["impact_power"], ("angle",): ["shell_power", "shell_power_half"],
+                           ("angle", "force"): ["shell_peaks"], ("log",): ["log_x", "log_z", "log_radius"]}}[case]
     variables = {name: (axes, np.full([len(places[axis]) for axis in axes], 0.5)) for axes, of_axes in names.items() for name in of_axes}
-    if kind == "silo":
+    if case == "silo":
         variables["band_bounds"] = (("band", "side"), np.array([[0.5, 1.0], [1.5, 2.0], [2.5, 3.0]]))
     used = {axis for axes in names for axis in axes} - {"log", "band", "side"}
     return xarray.Dataset(variables, {axis: places[axis] for axis in used}, {
-        "kind": kind, "filling_height": 4.0, "vessel_radius": 1.0, "grain_diameter": 0.1, "channel_width": 1.0, "width": 0.1, "frames": 10,
+        "filling_height": 4.0, "vessel_radius": 1.0, "grain_diameter": 0.1, "channel_width": 1.0, "width": 0.1, "frames": 10,
         "replicas": 5, "drum_radius": 1.0, "impact_speed": 0.1, "revolutions": 3, "impacts": 2, "log_length": 1.0})
 
 
@@ -82,7 +82,7 @@ def write(folder: Path) -> Path:
     figure = Figure(figsize=(4.4, 3.3))
     figure.subplots().plot([0.0, 1.0])
     picture, random, runs = saved(figure), np.random.default_rng(3), []
-    drawn = {kind: fields(kind) for kind in FIELDS.values()}
+    drawn = {case: fields(case) for case in FIELDS}
     for case in discover().values():
         planned = case.runs.get(folder.name, ())
         engines = {run.variant: run.engines for run in planned}
@@ -100,7 +100,7 @@ def write(folder: Path) -> Path:
                 if case.picture and not of_study:
                     (place / pictures.PICTURE).write_bytes(picture)
                 if case.name in FIELDS and not of_study:
-                    drawn[FIELDS[case.name]].to_netcdf(place / FILE, engine="h5netcdf")
+                    drawn[case.name].to_netcdf(place / FILE, engine="h5netcdf")
                 if not of_study:
                     runs.append({"case": case.name, "variant": variant, "engine": engine, "replica": 1, "state": "finished", "message": ""})
             if len(names) > 1:

@@ -8,8 +8,8 @@ import xarray
 from measuring import measure
 from synthetic import plug_flow, silo
 
-from dembark.postproc.figures import draw
-from dembark.postproc.figures.panels import Look
+from dembark.input_decks.debarking_drum.figures import draw
+from dembark.postproc.field_figures import Look
 from dembark.validation import report
 from dembark.validation.report import figures, sections
 from dembark.validation.report.gather import gather
@@ -50,7 +50,7 @@ def test_drum_is_drawn_without_a_single_impact_on_the_shell():
     variables = {"impact_power": (("x", "z"), np.array([[0.0, 1.0], [2.0, 0.0]])), "shell_power": (("angle",), none[:, 0]),
                  "shell_power_half": (("angle",), none[:, 0]), "shell_peaks": (("angle", "force"), none),
                  **{name: (("log",), np.array([0.1])) for name in ("log_x", "log_z", "log_radius")}}
-    attributes = {"kind": "drum", "drum_radius": 1.0, "impact_speed": 0.1, "revolutions": 3, "replicas": 1, "impacts": 2, "log_length": 1.0}
+    attributes = {"drum_radius": 1.0, "impact_speed": 0.1, "revolutions": 3, "replicas": 1, "impacts": 2, "log_length": 1.0}
     one = xarray.Dataset(variables, {"x": place, "z": place, "angle": angle, "force": force}, attributes)
     found, unrolled = draw({"yade": one}, {"yade": Look("YADE", "#0072B2", "o")})
     assert len(found.tables["power"][1]) == 4 and len(unrolled.tables["shell_power"][1]) == len(angle)

@@ -1,1 +1,0 @@
-"""Instruments: numbers with intervals from the files of a run, without judgement."""
