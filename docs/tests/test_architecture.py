@@ -57,6 +57,22 @@ def test_packages_import_only_what_the_table_says() -> None:
     assert not unused, "imports that the table allows and nobody has"
 
 
+def test_general_code_names_no_case() -> None:
+    """Prose, names and constants of modules and templates. Tables do: measured speeds of the engines, and statements of publications."""
+    cases = {path.parent.name for path in ROOT.glob("input_decks/*/case.toml")}
+    words = ["git", "ls-files", "common", "postproc", "validation"]
+    files = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+    code = [name for name in files if name.endswith((".py", ".j2", ".cpp", ".hpp")) and "/tests/" not in name and (ROOT / name).is_file()]
+    assert len(cases) > 20 and len(code) > 100
+    found = {name: sorted(named_cases((ROOT / name).read_text(encoding="utf-8"), cases)) for name in code}
+    assert {name: cases for name, cases in found.items() if cases} == {}
+
+
+def named_cases(text: str, cases: set[str]) -> set[str]:
+    """Cases that a source names as a word, in any case of letters."""
+    return cases & set(re.findall(r"\w+", text.lower()))
+
+
 def test_the_picture_names_folders_that_exist() -> None:
     page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
     picture = page.split("```picture")[1].split("```")[0]
@@ -69,3 +85,4 @@ def test_the_picture_names_folders_that_exist() -> None:
 def test_a_wrong_import_is_seen() -> None:
     assert imported("from dembark.validation import engines\nimport dembark.postproc.walls\n") == {"validation.engines", "postproc"}
     assert package("validation.cli") == "validation" and package("validation.runs.plan") == "validation.runs"
+    assert named_cases("# as in the Silo\nsilos = log_pile", {"silo", "log_pile", "plug_flow"}) == {"silo", "log_pile"}

@@ -28,7 +28,7 @@ def scene(folder: Path, colour_by: str, scale: float, cut: bool = False, radius:
 
     `colour_by` is "velocity" (downward, over `scale` in m/s), "force" (sum of the normal contact forces on a grain over the mean
     weight of a grain, `scale` being gravity in m/s2) or "stress" (pressure in a grain by its contacts with others, and with wall
-    and base of a silo of `radius` (m), over `scale` in Pa); `cut` leaves out the half that is nearer to the eye.
+    and base of a cylinder of `radius` (m), over `scale` in Pa); `cut` leaves out the half that is nearer to the eye.
     """
     grains = GrainsDump(folder / "grains.dump")
     frame = grains[len(grains) - 1]

@@ -141,7 +141,7 @@ class _Reader(TableReader):
             None if measure is None else self.changed(f"resources.{MEASURE}", Resources(), measure))
 
     def named(self, name: str) -> dict[str, str]:
-        """Case and profile that the name of a campaign such as silo-standard gives to all sweeps that name none."""
+        """Case and profile that the name of a campaign, CASE-PROFILE, gives to all sweeps that name none."""
         case, _, profile = name.rpartition("-")
         if case not in {path.parent.name for path in files()}:
             return {}

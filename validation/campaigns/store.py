@@ -125,7 +125,7 @@ def read_runs(path: Path | str, **where: Any) -> list[dict[str, Any]]:
 
 
 def read_quantities(path: Path | str, **where: Any) -> list[dict[str, Any]]:
-    """The table `quantities`, see `read`: `read_quantities("results/quick", case_name="silo", name="stress_ratio_k")`."""
+    """The table `quantities`, see `read`: `read_quantities("results/quick", case_name="my_case", name="rebound")`."""
     return read(path, "quantities", **where)
 
 

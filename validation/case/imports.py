@@ -86,7 +86,7 @@ def dependencies(*roots: Path) -> Dependencies:
                 libraries.add(module.split(".")[0])
                 continue
             if place:
-                waiting.append((_label(place), place))
+                waiting.append((_label(place, path.parent, name.rpartition("/")[0]), place))
         waiting += [(f"{name.rpartition('/')[0]}/{word}".lstrip("/"), path.parent / word) for word in found.words
                     if _is_file_of(path.parent, word)]
     return Dependencies(files, frozenset(libraries - sys.stdlib_module_names))
@@ -162,14 +162,14 @@ def _compiled(place: Path) -> Iterable[Path]:
     return (path for path in place.parent.glob(f"{place.name}.*") if path.suffix in _COMPILED) if place.parent.is_dir() else ()
 
 
-def _label(path: Path) -> str:
-    """The place within the package, the same in every installation; the name of a file of another place."""
+def _label(path: Path, folder: Path | None = None, label: str = "") -> str:
+    """The place within the package, the same in every installation; of other files that in `folder`, which has the `label`, or their names."""
     for root in map(Path, dembark.__path__):
         if path.is_relative_to(root):
             place = path.relative_to(root)
             # The ending of a compiled module says for which Python it is.
             return str(place.with_name(place.name.split(".")[0]) if path.suffix in _COMPILED else place)
-    return path.name
+    return str(Path(label, path.relative_to(folder))) if folder and path.is_relative_to(folder) else path.name
 
 
 def _is_file_of(folder: Path, word: str) -> bool:

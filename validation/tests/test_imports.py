@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 import dembark
-from dembark.validation.case import imports
+from dembark.validation.case import deck, folders, imports
+from dembark.validation.judge import measuring
 
 
 @pytest.fixture
@@ -39,10 +40,18 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ("import dembark.loop", {"loop.py"}),
     ("import dembark.no_such_module, no_such_library", set()),
     ("def f(:", set()),
+    ("from . import helper", {"helper.py", "two.py", "deeper/file.py"}),
+    ("from .helper import f", {"helper.py", "two.py", "deeper/file.py"}),
+    ("from .deeper import file", {"deeper/file.py"}),
+    ("from . import no_such_module", set()),
+    ("import helper", set()),
 ])
 def test_dependencies(package: Path, text: str, files: set[str]) -> None:
     measure = package.parent / "measure.py"
     measure.write_text(text)
+    (package.parent / "helper.py").write_text("from dembark.two import x\nfrom .deeper.file import f\n")
+    (package.parent / "deeper").mkdir()
+    (package.parent / "deeper" / "file.py").touch()
     found = imports.dependencies(measure)
     assert set(found.files) == files | {"measure.py"} and ("numpy" in found.libraries) == ("two.py" in files)
     assert len(found.digest()) == 64
@@ -56,3 +65,39 @@ def test_a_process_keeps_the_modules_that_it_imported_and_sees_changes_of_other_
     assert imports.dependencies(measure).digest() == before
     measure.write_text("from dembark.one import x  # it\n")
     assert imports.dependencies(measure).digest() != before
+
+
+@pytest.mark.parametrize(("case", "module"), [("silo", "silo/column.py"), ("plane_silo", "silo/column.py"),
+                                               ("plane_silo", "common/growth.py")])
+def test_the_modules_of_a_case_are_inputs_of_its_measurement(case: str, module: str) -> None:
+    measure = folders.find(case).folder / "measure.py"
+    assert f"input_decks/{module}" in imports.dependencies(measure).files
+
+
+def test_a_module_next_to_an_own_measure_is_imported_hashed_kept_and_no_part_of_the_deck(decks: Path, tmp_path: Path) -> None:
+    box = decks / "box"
+    (box / "helper.py").write_text("NUMBER = 1.0\n")
+    (box / "measure.py").write_text("from dembark.postproc.measurement import Measurement, Value, exact\nfrom . import helper\n\n"
+                                    "def measure(replicas):\n    return Measurement({'x': Value(exact(helper.NUMBER))})\n")
+    case, before = folders.find("box"), deck.sources(folders.find("box"), "liggghts")
+    digests = []
+    for text in ("NUMBER = 1.0\n", "NUMBER = 22.0\n"):
+        (box / "helper.py").write_text(text)
+        assert measuring.measure(case, []).values["x"].estimate.value == float(text.split()[-1])
+        digests.append(imports.dependencies(box / "measure.py").digest())
+    assert digests[0] != digests[1]
+    assert "helper.py" not in before and deck.sources(case, "liggghts") == before
+    deck.archive(case, tmp_path)
+    assert {path.name for path in (tmp_path / "case").iterdir()} == {"case.toml", "measure.py", "helper.py"}
+    # A deck that imports the module runs with it.
+    (box / "yade.py").write_text("import helper\np = dembark.parameters()\ndembark.run(p.steps)\n")
+    assert "helper.py" in deck.sources(case, "yade")
+
+
+def test_cases_may_have_modules_of_one_name(tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "helper.py").write_text(f"NAME = {name!r}\n")
+        (tmp_path / name / "measure.py").write_text("from .helper import NAME\n")
+    found = [deck.load_module(tmp_path / name / "measure.py", f"dembark_measure_{name}") for name in ("first", "second")]
+    assert [one.NAME for one in found] == ["first", "second"]
