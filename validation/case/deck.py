@@ -155,7 +155,7 @@ def _companions(case: Case) -> dict[str, Path]:
     """Other files of the case folder that decks may read, by their names in it: meshes, tables, what they include; of Python modules, which
     measure.py and setup.py import, only those that a deck imports, too, or names."""
     decks = {engines.facts(name).deck for name in engines.names()}
-    known = {"case.toml", "setup.py", "measure.py", "figures.py", *decks}
+    known = {"case.toml", "setup.py", "measure.py", *decks}
     texts = [path.read_text(encoding="utf-8", errors="replace") for name in sorted(decks) if (path := case.folder / name).is_file()]
     relative = {path.relative_to(case.folder): path for path in case.folder.rglob("*") if path.is_file()}
     return {str(name): path for name, path in sorted(relative.items())

@@ -163,7 +163,7 @@ def _compiled(place: Path) -> Iterable[Path]:
 
 
 def _label(path: Path, folder: Path | None = None, label: str = "") -> str:
-    """The place within the package, the same in every installation; of other files that in `folder`, which has the `label`, or their names."""
+    """The place within the package, the same in every installation; of other files that in `folder`, of the `label`, or their names."""
     for root in map(Path, dembark.__path__):
         if path.is_relative_to(root):
             place = path.relative_to(root)
