@@ -175,5 +175,5 @@ def plan(profile: str | None = None, file: Path | None = None, cases: Sequence[s
     if profile is None or file is not None:
         raise DembarkError("neither a profile nor a campaign is given, or both", "", "give --profile or --campaign")
     runs, gone = tuple(of_profile(profile, cases, engines)), left_out(profile, cases, engines)
-    return Plan(profile, runs, {"profile": profile} | ({"left_out": gone} if gone else {}),
+    return Plan(profile, runs, {"profile": profile, **({"cases": list(cases)} if cases else {}), **({"left_out": gone} if gone else {})},
                 ("--profile", profile), whole=not (cases or engines or gone))

@@ -42,7 +42,7 @@ def of_code(*places: str) -> str:
 
 
 def _files(place: Path) -> Iterable[Path]:
-    return [place] if place.is_file() else (path for path in sorted(place.rglob("*.*")) if path.suffix in (".py", ".j2", ".css")
+    return [place] if place.is_file() else (path for path in sorted(place.rglob("*.*")) if path.suffix in (".py", ".j2", ".css", ".js")
                                             and "tests" not in path.parts)
 
 

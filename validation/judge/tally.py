@@ -75,7 +75,7 @@ class Tally(Counts):
 
 
 # How a family stands: as the first of these does that occurs among its members.
-_ORDER = ("failed", "open", "passed", "uncontrolled", "information")
+ORDER = ("failed", "open", "passed", "uncontrolled", "information")
 
 
 def families(quantities: Iterable[QuantityRecord]) -> list[list[QuantityRecord]]:
@@ -92,7 +92,7 @@ def tally(quantities: Iterable[QuantityRecord]) -> Tally:
     members, chances = 0, []
     for family in families(quantities):
         checks = [one for one in family if one.standing != "information"]
-        kinds[family[0].evidence][min((one.standing for one in family), key=_ORDER.index)] += 1
+        kinds[family[0].evidence][min((one.standing for one in family), key=ORDER.index)] += 1
         members += sum(one.standing != "uncontrolled" for one in checks)
         # Members are correlated: their sum is an upper limit of the probability that one of them fails.
         if known := [one.chance for one in checks if one.chance is not None]:

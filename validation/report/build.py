@@ -15,7 +15,7 @@ from dembark.common.errors import RunError
 from dembark.common.files import disk_error, write_whole
 from dembark.common.units import duration
 from dembark.validation.judge.result import Result
-from dembark.validation.report import front, numbers, scatter, sections
+from dembark.validation.report import facts, front, numbers, scatter, sections
 from dembark.validation.report.figures import colour, engine_name, subscripts
 from dembark.validation.report.gather import Gathered, gather
 
@@ -47,35 +47,36 @@ def write(gathered: Gathered, chapters: Any) -> Path:
         for old in drawn.iterdir():
             old.unlink()
         own = chapters(drawn)
-        rows = gathered.rows
-        first = front.context(rows, gathered.missing)
-        front.write_tables(drawn, rows, first["points"])
+        first = front.context(gathered)
+        front.write_tables(drawn, gathered.rows, first["points"])
         figure = scatter.figure(first["points"])
         ratio = figure and sections.embed(figure, drawn, "scatter", "", ["scatter.csv"])
         measured = [one for page in gathered.pages if not page.is_study for _, one in sorted(page.results.items())]
         cited = {one["short"]: one for page in gathered.pages for found in page.results.values() for one in found.references}
-        context = {**_EMPTY, **own, **first, "style": Markup((_HERE / "style.css").read_text(encoding="utf-8")),
-                   "scatter": ratio, "measured": measured, "references": list(cited.values()),
+        own_files = {name: Markup((_HERE / file).read_text(encoding="utf-8")) for name, file in _FILES.items()}
+        context = {**_EMPTY, **own, **first, **own_files, "scatter": ratio, "measured": measured, "references": list(cited.values()),
                    "machine": machine(measured), "left_out_engines": gathered.left_out,
                    "description": gathered.summary.get("description", "")}
-        template = _environment().get_template("report.html.j2")
+        template = _environment(gathered).get_template("report.html.j2")
         write_pdf(template.render(context, full=False), folder / "report.pdf")
         return write_whole(folder / "report.html", template.render(context, full=True).encode())
     except OSError as error:
         raise disk_error(error, folder) from None
 
 
+# Within the document, which needs nothing from elsewhere but its figures.
+_FILES: Mapping[str, str] = {"style": "style.css", "script": "report.js"}
 # Chapters that only some reports have.
 _EMPTY: Mapping[str, Any] = {"sections": (), "sweeps": (), "errors": (), "verification": ()}
 
 
-def _environment() -> Environment:
+def _environment(gathered: Gathered) -> Environment:
     found = Environment(loader=FileSystemLoader(_HERE), autoescape=select_autoescape(["html", "j2"]), undefined=StrictUndefined,
                         trim_blocks=True, lstrip_blocks=True)
     found.filters |= {"plain": numbers.plain, "compact": numbers.compact, "subscripts": subscripts,
-                      "duration": duration, "engine": engine_name}
+                      "duration": duration, "engine": engine_name, "case": gathered.title}
     found.globals |= {"signs": _SIGNS, "estimate": numbers.with_interval, "unit": numbers.with_unit, "deviation": numbers.deviation,
-                      "allowed": numbers.allowed, "colour": colour}
+                      "allowed": numbers.allowed, "colour": colour, "engines_of": facts.engines}
     return found
 
 

@@ -1,26 +1,29 @@
-"""The first pages: verdicts by kind of evidence, failed checks, missing results, and open checks with their reasons."""
+"""The first pages: verdicts case by case, failed checks with their causes, missing results, and open checks with what decides them."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 from dembark.validation.case.model import EVIDENCE
 from dembark.validation.judge.result import QuantityRecord
-from dembark.validation.judge.tally import MEANING, Counts, Tally, families, tally
+from dembark.validation.judge.tally import MEANING, Tally, families, tally
 from dembark.validation.report import figures, scatter
-from dembark.validation.report.gather import Row
+from dembark.validation.report.facts import Fact, facts
+from dembark.validation.report.gather import Gathered, Row
 
 # Lines of each list that the first pages of the PDF hold; what is left out is counted, and in the HTML.
 MOST = {"failed": 8, "open": 18, "missing": 6}
 
 # The kinds of evidence in order of importance of a failure.
 _WEIGHT = ("experiment", "theory", "identity", "", "code")
+
+UNKNOWN = "The cause is not known."
 
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
@@ -32,14 +35,14 @@ COLUMNS = ("quantity", "label", "unit", "value", "low", "high", "reference", "re
 
 @dataclass(frozen=True)
 class OpenLine:
-    """Checks of a case that stayed open for one reason: how many, which, and what would decide them."""
+    """Checks of a case that stayed open for one reason: how many, which, of which evidence, and what would decide them."""
 
     case: str
-    anchor: str
     reason: str
     count: int
     names: str
     decides: str
+    evidence: list[str]
 
 
 def open_lines(rows: Iterable[Row]) -> list[OpenLine]:
@@ -50,8 +53,8 @@ def open_lines(rows: Iterable[Row]) -> list[OpenLine]:
         if row.record.standing == "open":
             reason = re.sub(r" \([^()]*\d[^()]*\)", "", row.record.reason) or "there is no value to judge"
             found.setdefault((row.case, reason), []).append(row)
-    return [OpenLine(case, group[0].anchor, reason, len(families(row.record for row in group)), _names(group),
-                     _range(row.record.decides for row in group)) for (case, reason), group in found.items()]
+    return [OpenLine(case, reason, len(families(row.record for row in group)), _names(group),
+                     _range(row.record.decides for row in group), sorted({row.record.evidence or "none" for row in group})) for (case, reason), group in found.items()]
 
 
 def _range(texts: Iterable[str]) -> str:
@@ -73,32 +76,66 @@ def _names(group: Sequence[Row]) -> str:
     return first + (f" and {len(names) - 1} more" if len(names) > 1 else "")
 
 
-def badness(row: Row) -> float:
-    """Deviation over tolerance; what failed counts as worse than everything else."""
-    one = row.record
-    size = abs(one.deviation) / one.tolerance if one.deviation is not None and one.tolerance else abs(one.deviation or 0.0)
-    return size + (1e9 if one.standing == "failed" else 0.0)
+@dataclass(frozen=True)
+class CaseLine:
+    """A case on the first page: `counts` by kind of evidence, and one sentence on what failed or is open."""
+
+    case: str
+    counts: Tally
+    remark: str
+
+    @property
+    def standings(self) -> list[str]:
+        """Those that occur among its checks."""
+        return [standing for standing in ("failed", "open", "passed") if getattr(self.counts, standing)]
 
 
-def evidence(counted: Tally) -> list[dict[str, Any]]:
-    """Rows of the table of verdicts: each kind of evidence with its counts, and all together."""
-    # A row also shows that nothing is compared with experiments.
-    kinds = {kind: Counts() for kind in EVIDENCE} | dict(counted.by_evidence)
-    return [*({"kind": kind or "not stated", "meaning": MEANING[kind] if kind else "not stated by the case", "counts": counts}
-              for kind, counts in kinds.items()), {"kind": "all", "meaning": "", "counts": counted}]
+def case_lines(rows: Sequence[Row], missing: Mapping[str, int]) -> list[CaseLine]:
+    """One line for each case that has checks, or of which results are `missing`."""
+    of_case: dict[str, list[Row]] = {case: [] for case in missing}
+    for row in rows:
+        of_case.setdefault(row.case, []).append(row)
+    return [CaseLine(case, tally(row.record for row in group), _remark(group, missing.get(case, 0))) for case, group in of_case.items()]
 
 
-def context(rows: Sequence[Row], missing: Sequence[str]) -> Mapping[str, Any]:
+def _remark(rows: Sequence[Row], missing: int) -> str:
+    """The causes of what failed; else why most of the open checks are open."""
+    lacking = [f"{missing} result{'s are' if missing > 1 else ' is'} missing."] if missing else []
+    failed, undecided = [row for row in rows if row.record.standing == "failed"], open_lines(rows)
+    causes = list(dict.fromkeys(row.record.cause for row in failed))
+    known = next(filter(None, causes), "")
+    if failed:
+        lacking += [known or f"{UNKNOWN} {_names(failed)}."]
+        lacking += [f"{len(causes) - 1} more cause{'s' * (len(causes) > 2)}, see below."] if len(causes) > 1 else []
+    elif undecided:
+        most = max(undecided, key=lambda one: one.count)
+        lacking += [f"Open: {most.reason}{f'; decided by {most.decides}' if most.decides else ''}."]
+    return " ".join(lacking)
+
+
+def cause(fact: Fact) -> str:
+    """Why a failed fact fails; "" where that is not known."""
+    return next((row.record.cause for row in fact.rows if row.record.standing == "failed" and row.record.cause), "")
+
+
+def failed_groups(found: Iterable[Fact]) -> list[tuple[str, list[Fact]]]:
+    """The failed facts of the same case and cause together, with the cause, those of the most important evidence first."""
+    groups: dict[tuple[str, str], list[Fact]] = {}
+    for one in sorted((one for one in found if one.standing == "failed"), key=lambda one: _WEIGHT.index(one.worst.record.evidence)):
+        groups.setdefault((one.worst.case, cause(one)), []).append(one)
+    return [(why or UNKNOWN, group) for (_, why), group in groups.items()]
+
+
+def context(gathered: Gathered) -> Mapping[str, Any]:
     """What the template shows on the first pages."""
-    counted = tally(row.record for row in rows)
-    found = scatter.points(rows)
-    failed = sorted((row for row in rows if row.record.standing == "failed"),
-                    key=lambda row: (_WEIGHT.index(row.record.evidence), row.case, row.record.cause))
-    alike = (list(group) for _, group in groupby(failed, lambda row: (row.record.evidence, row.case, row.record.cause)))
-    groups = [(sorted(group, key=badness, reverse=True), _names(group)) for group in alike]
-    return {"tally": counted, "evidence": evidence(counted), "failed": failed, "failed_groups": groups,
-            "open": open_lines(rows), "missing": missing, "points": found, "kinds": scatter.kinds(found),
-            "left_out": scatter.left_out(rows), "scatter_lines": len(scatter.lines(found)), "most": MOST}
+    rows = gathered.rows
+    found, counted = scatter.points(rows), tally(row.record for row in rows)
+    judged = facts(rows)
+    lacking = Counter(page.case for page in gathered.pages for _ in page.missing)
+    return {"tally": counted, "kinds": [kind for kind in (*EVIDENCE, "") if kind or "" in counted.by_evidence], "meaning": MEANING,
+            "cases": case_lines(rows, lacking), "failed": failed_groups(judged), "facts": judged, "open": open_lines(rows),
+            "missing": gathered.missing, "points": found, "points_by_kind": scatter.kinds(found), "left_out": scatter.left_out(rows),
+            "scatter_lines": len(scatter.lines(found)), "most": MOST}
 
 
 def cells(one: QuantityRecord) -> list[Any]:

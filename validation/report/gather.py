@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,18 +12,21 @@ from dembark.common.files import read_json
 from dembark.validation import verification
 from dembark.validation.case.folders import files, load
 from dembark.validation.case.model import STUDY_PREFIX, Case
-from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result, results
+from dembark.validation.judge.result import RUNS, ComparedRecord, Comparison, QuantityRecord, Result, results
 from dembark.validation.report.figures import engine_name
 from dembark.validation.verification.item import Item
 
 _SINGLE = "Single runs: what else a profile would run is not listed here."
+# What stands for the case of quantities of the instruments.
+VERIFIED = "verification"
 # What comparisons of variants leave out: they are due to differ, or say how long and often a run is repeated.
 _REPEATS = ("seed", "replicas", "frames", "grain_count", "settle_time", "measure_time")
 
 
 @dataclass(frozen=True)
 class Row:
-    """A judged quantity and where it was measured: `place` for people, `anchor` of its section, `engine` "" when no engine measured it."""
+    """A judged quantity and where it was measured: `place` is the variant for people, `anchor` that of its section, `engine` "" when no
+    engine measured it."""
 
     case: str
     place: str
@@ -75,9 +78,9 @@ class Page:
     def rows(self) -> Iterator[Row]:
         """All that was judged, engine by engine, then the comparison of the engines."""
         for engine, one in sorted(self.results.items()):
-            yield from (Row(self.case, self.name, self.anchor, engine, record) for record in one.quantities)
+            yield from (Row(self.case, self.words, self.anchor, engine, record) for record in one.quantities)
         for record in self.comparison.quantities if self.comparison else ():
-            yield Row(self.case, self.name, self.anchor, record.engine, record)
+            yield Row(self.case, self.words, self.anchor, record.engine, record)
 
 
 @dataclass(frozen=True)
@@ -95,8 +98,14 @@ class Gathered:
     @property
     def rows(self) -> list[Row]:
         """Everything judged."""
-        verified = [Row("verification", "verification", "verification", "", record) for item in self.items for record in item.quantities]
+        verified = [Row(VERIFIED, item.title, VERIFIED, "", record) for item in self.items for record in item.quantities]
         return [*(row for page in self.pages for row in page.rows()), *verified]
+
+    def title(self, case: str) -> str:
+        """The case in few words, for tables."""
+        if case == VERIFIED:
+            return "Verification"
+        return self.cases[case].title.partition(":")[0] if case in self.cases else case.replace("_", " ")
 
     @property
     def left_out(self) -> str:
@@ -112,13 +121,13 @@ class Gathered:
 
 def gather(folder: Path) -> Gathered:
     """Everything that `runs.json` expects in a results folder, and everything that is there; without it, nothing is known to be missing."""
-    cases, unread = _cases()
+    summary = read_json(folder / RUNS) or {"description": _SINGLE}
+    cases, unread = _cases(summary.get("cases", ()))
     pages: dict[tuple[str, str], Page] = {}
 
     def page(case: str, variant: str) -> Page:
         return pages.setdefault((case, variant), Page(case, variant, folder / case / variant))
 
-    summary = read_json(folder / "runs.json") or {"description": _SINGLE}
     expected = list(_expected(folder, summary))
     for case, variant, _, line in expected:
         page(case, variant).missing += [line] if line else []
@@ -144,11 +153,14 @@ def gather(folder: Path) -> Gathered:
     return Gathered(folder, ordered, verification.read(folder), cases, unread, summary)
 
 
-def _cases() -> tuple[dict[str, Case], list[str]]:
-    """The cases by name, and a line for each that cannot be read: a report of old results must not fail because a case is being edited."""
+def _cases(only: Collection[str]) -> tuple[dict[str, Case], list[str]]:
+    """The cases by name, all or `only` these, and a line for each that cannot be read: a report of old results must not fail because a case
+    is being edited."""
     found: dict[str, Case] = {}
     unread: list[str] = []
     for path in files():
+        if only and path.parent.name not in only:
+            continue
         try:
             found[path.parent.name] = load(path)
         except DembarkError as error:

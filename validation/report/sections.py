@@ -1,4 +1,4 @@
-"""The section of a case: what was decided by evidence in one table, the main figures; and for the HTML everything else."""
+"""The section of a case: its checks in one table, the main figures; and for the HTML everything else."""
 
 from __future__ import annotations
 
@@ -17,63 +17,53 @@ from dembark.common.parallel import mapped
 from dembark.postproc import field_figures, pictures
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
-from dembark.validation.judge.result import ComparedRecord
-from dembark.validation.judge.tally import Counts, tally
+from dembark.validation.judge.tally import Tally, tally
 from dembark.validation.report import figures, front
+from dembark.validation.report.facts import Fact, facts, quantities
 from dembark.validation.report.figures import engine_name
-from dembark.validation.report.gather import Gathered, Page, Row, beside
+from dembark.validation.report.gather import Gathered, Page, beside
 
-# Of a case in the PDF: variants with figures, panels of a figure, and rows of one quantity before only the worst is shown. Of the first
-# variant all main figures are printed, of others none, and of each study PANELS panels.
-VARIANTS, PANELS, ROWS = 1, 2, 4
+# Of a case in the PDF: variants with figures, and panels of a figure. Of the first variant all main figures are printed, of others none,
+# and of each study PANELS panels.
+VARIANTS, PANELS = 1, 2
 _PANELS_OF_STUDIES = 6  # at most in one figure
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A figure: its image in the HTML, its caption, the files with its data, its image in the PDF, '' when that leaves it out, and whether
-    the HTML shows it at once."""
+    """A figure: its file for the HTML, its caption, the files with its data, its image in the PDF, "" when that leaves it out, and whether
+    the HTML shows it at once. Files are relative to the report."""
 
-    image: Markup
+    file: str
     caption: str
-    files: Sequence[str] = ()
+    data: Sequence[str] = ()
     printed: Markup | str = ""
     main: bool = False
 
 
-@dataclass(frozen=True)
-class Decided:
-    """Rows of a quantity that are shown, and of how many the first of them is the worst (0: all are shown)."""
-
-    rows: Sequence[Row]
-    worst_of: int
-    counts: Counts
-
-
 @dataclass
 class Part:
-    """A variant within a case's section, for the HTML."""
+    """A variant within a case's section, for the HTML: figures, and values that nothing was due of."""
 
     page: Page
-    table: list[list[Row]]
+    values: list[Fact]
     figures: list[Shown]
     beside: list[Any]
     remarks: list[str]
-    bases: list[str]
 
 
 @dataclass
 class Section:
-    """A case: `decided` quantities by evidence, one line each for identities and for the comparison of the engines, figures, and
-    `parts`."""
+    """A case: its `checks`, those that the PDF shows as `printed`, `counts` of all, figures, and `parts`."""
 
     case: str
     title: str
     description: str
     source: Sequence[str]
     missing: list[str]
-    decided: list[Decided]
-    lines: list[str]
+    checks: list[Fact]
+    printed: list[Fact]
+    counts: Tally
     open: list[front.OpenLine]
     pictures: list[Shown]
     figures: list[Shown]
@@ -82,50 +72,20 @@ class Section:
 
 def embed(figure: Figure, folder: Path, name: str, caption: str, files: Sequence[str] = (), main: bool = True,
           printed: bool = True) -> Shown:
-    """The figure inside the document, in the PDF if `main` and `printed`, and as a file `name`.svg beside its data."""
-    data = figures.svg(figure)
-    (folder / f"{name}.svg").write_bytes(data)
-    return Shown(_image(data, "svg+xml", name), caption[:1].upper() + caption[1:], [f"figures/{file}" for file in files],
-                 _image(figures.png(figure), "png", name) if main and printed else "", main)
+    """The figure as a file `name`.svg next to its data, and inside the PDF if `main` and `printed`."""
+    (folder / f"{name}.svg").write_bytes(figures.svg(figure))
+    return Shown(f"figures/{name}.svg", caption[:1].upper() + caption[1:], [f"figures/{file}" for file in files],
+                 _image(figures.png(figure)) if main and printed else "", main)
 
 
-def _image(data: bytes, kind: str, alt: str) -> Markup:
-    return Markup('<img alt="{}" src="data:image/{};base64,{}">').format(alt, kind, base64.b64encode(data).decode())
+def _image(data: bytes) -> Markup:
+    return Markup('<img alt="" src="data:image/png;base64,{}">').format(base64.b64encode(data).decode())
 
 
-def decided(rows: Iterable[Row]) -> list[Decided]:
-    """Checks against experiment and theory, and those that do not state their evidence, by quantity; of many only what failed and the
-    worst."""
-    by_name: dict[str, list[Row]] = {}
-    for row in rows:
-        if row.record.standing != "information" and row.record.evidence not in ("identity", "code"):
-            by_name.setdefault(row.record.name, []).append(row)
-    found = []
-    for group in by_name.values():
-        few = len(group) <= ROWS
-        shown = group if few else sorted(group, key=front.badness, reverse=True)
-        failed = sum(row.record.standing == "failed" for row in group)
-        found.append(Decided(shown if few else shown[: min(ROWS, max(1, failed))], 0 if few else len(group),
-                             tally(row.record for row in group)))
-    return found
-
-
-def line(rows: Sequence[Row], what: str) -> str:
-    """The result of all checks of one kind, and which is closest to its limit, or what failed."""
-    checks = [row for row in rows if row.record.standing != "information"]
-    if not checks:
-        return ""
-    counts = tally(row.record for row in checks)
-    closed = [row for row in checks if row.record.standing != "open"]
-    text = f"{what}: {counts.passed} of {counts.checks} within tolerance" + (f", {counts.open} open" if counts.open else "")
-    if counts.failed:
-        bad = [f"{row.record.title} ({row.place}, {row.who})" for row in closed if row.record.standing == "failed"]
-        return f"{text}, {counts.failed} FAILED: {'; '.join(bad[:3])}" + (f" and {len(bad) - 3} more" if len(bad) > 3 else "") + "."
-    if not closed:
-        return f"{text}."
-    worst = max(closed, key=front.badness)
-    return (f"{text}; closest to its limit: {worst.record.title} ({worst.place}, {worst.who}), "
-            f"at {100.0 * front.badness(worst):.2g} % of the tolerance.")
+def printed(checks: Iterable[Fact]) -> list[Fact]:
+    """What the PDF shows of the checks: those that failed, and those against experiment and theory or of unstated evidence; of many
+    variants the worst."""
+    return quantities(one for one in checks if one.standing == "failed" or one.worst.record.evidence not in ("identity", "code"))
 
 
 def sections(gathered: Gathered, folder: Path) -> list[Section]:
@@ -143,17 +103,16 @@ def _section(gathered: Gathered, name: str, of_page: list[tuple[Page, list[Shown
     pages = [page for page, _ in of_page]
     rows = [row for page in pages for row in page.rows()]
     known = gathered.cases.get(name)
-    parts = [_part(page, pages, shown) for page, shown in of_page]
+    judged = facts(rows)
+    checks = [one for one in judged if one.is_check]
+    parts = [_part(page, pages, shown, [one for one in judged if not one.is_check and one.worst.anchor == page.anchor])
+             for page, shown in of_page]
     variants = [part for part in parts if not part.page.is_study]
     main = [*(one for part in variants[:VARIANTS] for one in part.figures if one.main), *studies]
-    engines, others = ([row for row in rows if isinstance(row.record, ComparedRecord) is compared] for compared in (True, False))
-    kinds = {kind: [row for row in others if row.record.evidence == kind] for kind in ("identity", "code")}
-    lines = [line(kinds["identity"], "Identities"), line(engines, "Comparison of the engines"), line(kinds["code"], "Other codes")]
     drawn = next((shown for part in variants if (shown := _pictures(part.page))), [])
     return Section(name, known.title if known else name.replace("_", " "), known.description if known else "",
-                   known.source if known else (),
-                   [f"{page.words}: {text}" for page in pages for text in page.missing], decided(rows), [one for one in lines if one],
-                   front.open_lines(rows), drawn, main, parts)
+                   known.source if known else (), [f"{page.words}: {text}" for page in pages for text in page.missing], checks,
+                   printed(checks), tally(row.record for row in rows), front.open_lines(rows), drawn, main, parts)
 
 
 def _pictures(page: Page) -> list[Shown]:
@@ -163,21 +122,16 @@ def _pictures(page: Page) -> list[Shown]:
         if path.is_file():
             moving = path.with_name(pictures.ANIMATION)
             files = [f"{page.case}/{page.variant}/{engine}/{moving.name}"] if moving.is_file() else []
-            image = _image(path.read_bytes(), "png", f"{page.name}, {engine}")
-            found.append(Shown(image, f"{engine_name(engine)}, {page.words}: last frame of the first replica.", files, image))
+            found.append(Shown(str(path.relative_to(page.folder.parents[1])),
+                               f"{engine_name(engine)}, {page.words}: last frame of the first replica.", files, _image(path.read_bytes())))
     return found
 
 
-def _part(page: Page, pages: list[Page], shown: list[Shown]) -> Part:
-    rows = list(page.rows())
-    names = list(dict.fromkeys(row.record.name for row in rows))
+def _part(page: Page, pages: list[Page], shown: list[Shown], values: list[Fact]) -> Part:
     shared = [text for one in page.results.values() for text in one.remarks]
     remarks = [f"{engine_name(engine)}: {text}" if shared.count(text) < len(page.results) else text
                for engine, one in sorted(page.results.items()) for text in one.remarks]
-    bases = [f"{engine_name(engine)}: {', '.join(dict.fromkeys(filter(None, (record.basis for record in one.quantities))))}"
-             for engine, one in sorted(page.results.items())]
-    return Part(page, [[row for row in rows if row.record.name == name] for name in names], shown, beside(page, pages),
-                list(dict.fromkeys(remarks)), bases)
+    return Part(page, values, shown, beside(page, pages), list(dict.fromkeys(remarks)))
 
 
 def _figures(page: Page, folder: Path) -> tuple[list[Shown], list[str]]:
@@ -187,7 +141,7 @@ def _figures(page: Page, folder: Path) -> tuple[list[Shown], list[str]]:
 
 
 def _profiles(page: Page, folder: Path) -> list[Shown]:
-    """The profiles of a page as figures of PANELS panels; the first is a main one. Their data are written beside the report."""
+    """The profiles of a page as figures of PANELS panels; the first is a main one. Their data are written next to the report."""
     curves = _curves(page)
     names = figures.profile_names(curves)
     for name in names:
@@ -213,8 +167,8 @@ def _studies(pages: Sequence[Page]) -> list[Shown]:
         return []
     # As many in each figure, and no panel alone in its row but the last.
     count = 2 * math.ceil(len(panels) / (2 * math.ceil(len(panels) / _PANELS_OF_STUDIES)))
-    return [Shown(Markup(""), f"{pages[0].case.replace('_', ' ').capitalize()}, studies; bands: 95 % intervals over replicas, where there "
-                  "are several.", printed=_image(figures.png(figures.panels_figure(panels[start : start + count])), "png", "studies"))
+    return [Shown("", f"{pages[0].case.replace('_', ' ').capitalize()}, studies; bands: 95 % intervals over replicas, where there "
+                  "are several.", printed=_image(figures.png(figures.panels_figure(panels[start : start + count]))))
             for start in range(0, len(panels), count)]
 
 

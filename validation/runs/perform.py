@@ -16,7 +16,7 @@ from dembark.common.errors import DembarkError
 from dembark.common.files import read_json, write_json
 from dembark.common.lock import lock
 from dembark.validation.campaigns import expand, store
-from dembark.validation.judge.result import METRICS, Result
+from dembark.validation.judge.result import METRICS, RUNS, Result
 from dembark.validation.judge.tally import Tally, of_folder
 from dembark.validation.runs.executor import Backend, Executor, Local, Task
 from dembark.validation.runs.plan import Plan, Resources, Series, studies
@@ -76,7 +76,7 @@ def perform(plan: Plan, results: Path, place: Place, cancel: threading.Event, co
             table.note(task.name, estimate=estimates.get(task.out.relative_to(results)))
 
     def write_summary() -> None:
-        write_json(results / "runs.json", {**plan.facts, "runs": summary(table.states(), folders)})
+        write_json(results / RUNS, {**plan.facts, "runs": summary(table.states(), folders)})
 
     def collect(places: Sequence[Path], whole: bool = False) -> None:
         try:

@@ -16,7 +16,7 @@ from dembark.postproc import pictures
 from dembark.validation import analysis, provenance
 from dembark.validation.case.folders import files
 from dembark.validation.judge import inputs
-from dembark.validation.judge.result import COMPARISON, METRICS, Result, result_files, write
+from dembark.validation.judge.result import COMPARISON, METRICS, RUNS, Result, result_files, write
 from dembark.validation.runs.plan import Plan, PlannedStudy, Run, finished, studies, variants
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def of_comparison(metrics: Iterable[Path]) -> str:
 
 def of_report(results: Path) -> str:
     """Hash of the inputs of a report: results, the list of runs, the files of the cases, and the code that lays it out."""
-    read = (results / "runs.json", results / CAMPAIGN_FILE, *result_files(results))
+    read = (results / RUNS, results / CAMPAIGN_FILE, *result_files(results))
     kept = {str(path.relative_to(results)): inputs.content(path) for path in read}
     cases = [path for path in files() if path.parent.name in {name.split("/")[0] for name in kept}]
     drawing = [str(path) for case in cases if (path := case.with_name("figures.py")).is_file()]
@@ -202,8 +202,11 @@ def build_report(results: Path) -> None:
         from dembark.validation import verification
         from dembark.validation.report import build
 
-        # The report of a profile includes the verification of the instruments.
-        verification.write(results)
+        # The report of a profile includes the verification of the instruments, that of some cases does not.
+        if (read_json(results / RUNS) or {}).get("cases"):
+            (results / verification.FILE).unlink(missing_ok=True)
+        else:
+            verification.write(results)
     # Better none than one of other results.
     report = results / "report.html"
     report.unlink(missing_ok=True)
