@@ -134,7 +134,7 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
             if verdict == "info":
                 decided = decides(deviation, *_halves(value, one.absolute), tolerance, value.estimate.basis)
     return QuantityRecord(
-        name=name, label=one.label.replace("*", part), value=_finite(value.estimate.value), unit=one.unit,
+        name=name, label=one.label.replace("*", part.replace("_", " ")), value=_finite(value.estimate.value), unit=one.unit,
         interval=_interval(value.estimate), basis=value.estimate.basis,
         reference=_finite(reference.value if reference else None), reference_interval=_interval(reference) if reference else None,
         deviation=_finite(deviation),

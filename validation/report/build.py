@@ -74,7 +74,9 @@ def _environment(gathered: Gathered) -> Environment:
     found = Environment(loader=FileSystemLoader(_HERE), autoescape=select_autoescape(["html", "j2"]), undefined=StrictUndefined,
                         trim_blocks=True, lstrip_blocks=True)
     found.filters |= {"plain": numbers.plain, "compact": numbers.compact, "subscripts": subscripts,
-                      "duration": duration, "engine": engine_name, "case": gathered.title}
+                      "duration": duration, "engine": engine_name, "case": gathered.title,
+                      # A line may end in front of the half-width, not within it.
+                      "unbroken": lambda text: text.replace("± ", "±\N{NO-BREAK SPACE}")}
     found.globals |= {"signs": _SIGNS, "estimate": numbers.with_interval, "unit": numbers.with_unit, "deviation": numbers.deviation,
                       "allowed": numbers.allowed, "colour": colour, "engines_of": facts.engines}
     return found

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -53,8 +52,8 @@ def open_lines(rows: Iterable[Row]) -> list[OpenLine]:
         if row.record.standing == "open":
             reason = re.sub(r" \([^()]*\d[^()]*\)", "", row.record.reason) or "there is no value to judge"
             found.setdefault((row.case, reason), []).append(row)
-    return [OpenLine(case, reason, len(families(row.record for row in group)), _names(group),
-                     _range(row.record.decides for row in group), sorted({row.record.evidence or "none" for row in group})) for (case, reason), group in found.items()]
+    return [OpenLine(case, reason, len(families(row.record for row in group)), _names(group), _range(row.record.decides for row in group),
+                     sorted({row.record.evidence or "none" for row in group})) for (case, reason), group in found.items()]
 
 
 def _range(texts: Iterable[str]) -> str:
@@ -84,14 +83,9 @@ class CaseLine:
     counts: Tally
     remark: str
 
-    @property
-    def standings(self) -> list[str]:
-        """Those that occur among its checks."""
-        return [standing for standing in ("failed", "open", "passed") if getattr(self.counts, standing)]
-
 
 def case_lines(rows: Sequence[Row], missing: Mapping[str, int]) -> list[CaseLine]:
-    """One line for each case that has checks, or of which results are `missing`."""
+    """One line for each case; `missing`: how many of its results there are not."""
     of_case: dict[str, list[Row]] = {case: [] for case in missing}
     for row in rows:
         of_case.setdefault(row.case, []).append(row)
@@ -105,7 +99,7 @@ def _remark(rows: Sequence[Row], missing: int) -> str:
     causes = list(dict.fromkeys(row.record.cause for row in failed))
     known = next(filter(None, causes), "")
     if failed:
-        lacking += [known or f"{UNKNOWN} {_names(failed)}."]
+        lacking += [known or f"{UNKNOWN[:-1]} ({_names(failed)})."]
         lacking += [f"{len(causes) - 1} more cause{'s' * (len(causes) > 2)}, see below."] if len(causes) > 1 else []
     elif undecided:
         most = max(undecided, key=lambda one: one.count)
@@ -131,7 +125,9 @@ def context(gathered: Gathered) -> Mapping[str, Any]:
     rows = gathered.rows
     found, counted = scatter.points(rows), tally(row.record for row in rows)
     judged = facts(rows)
-    lacking = Counter(page.case for page in gathered.pages for _ in page.missing)
+    lacking = {page.case: 0 for page in gathered.pages}
+    for page in gathered.pages:
+        lacking[page.case] += len(page.missing)
     return {"tally": counted, "kinds": [kind for kind in (*EVIDENCE, "") if kind or "" in counted.by_evidence], "meaning": MEANING,
             "cases": case_lines(rows, lacking), "failed": failed_groups(judged), "facts": judged, "open": open_lines(rows),
             "missing": gathered.missing, "points": found, "points_by_kind": scatter.kinds(found), "left_out": scatter.left_out(rows),

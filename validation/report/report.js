@@ -6,7 +6,7 @@
   form.addEventListener("change", () => {
     const leftOut = one => keys.some(key => form[key].value && key in one.dataset && !one.dataset[key].split(" ").includes(form[key].value));
     for (const one of document.querySelectorAll("[data-case]")) one.hidden = leftOut(one);
-    for (const table of document.querySelectorAll("table.facts")) table.hidden = !table.querySelector("tbody.fact:not([hidden])");
+    for (const table of document.querySelectorAll("table:has([data-case])")) table.hidden = !table.querySelector("[data-case]:not([hidden])");
   });
   form.reset();
 

@@ -104,7 +104,7 @@ def _section(gathered: Gathered, name: str, of_page: list[tuple[Page, list[Shown
     rows = [row for page in pages for row in page.rows()]
     known = gathered.cases.get(name)
     judged = facts(rows)
-    checks = [one for one in judged if one.is_check]
+    checks = sorted((one for one in judged if one.is_check), key=lambda one: one.order)
     parts = [_part(page, pages, shown, [one for one in judged if not one.is_check and one.worst.anchor == page.anchor])
              for page, shown in of_page]
     variants = [part for part in parts if not part.page.is_study]

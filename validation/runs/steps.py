@@ -17,6 +17,7 @@ from dembark.validation import analysis, provenance
 from dembark.validation.case.folders import files
 from dembark.validation.judge import inputs
 from dembark.validation.judge.result import COMPARISON, METRICS, RUNS, Result, result_files, write
+from dembark.validation.judge.tally import VERIFICATION
 from dembark.validation.runs.plan import Plan, PlannedStudy, Run, finished, studies, variants
 
 if TYPE_CHECKING:
@@ -204,7 +205,7 @@ def build_report(results: Path) -> None:
 
         # The report of a profile includes the verification of the instruments, that of some cases does not.
         if (read_json(results / RUNS) or {}).get("cases"):
-            (results / verification.FILE).unlink(missing_ok=True)
+            (results / VERIFICATION).unlink(missing_ok=True)
         else:
             verification.write(results)
     # Better none than one of other results.

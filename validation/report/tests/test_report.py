@@ -4,6 +4,8 @@ import csv
 import json
 import re
 import sys
+from dataclasses import replace
+from html.parser import HTMLParser
 from pathlib import Path
 
 import full_size
@@ -14,8 +16,10 @@ import pytest
 from dembark.common.errors import RunError
 from dembark.validation import report
 from dembark.validation.judge import result
+from dembark.validation.judge.compare import pair
+from dembark.validation.judge.tally import of_folder as tally_of
 from dembark.validation.judge.tally import tally
-from dembark.validation.report import figures, front, numbers, scatter, sections
+from dembark.validation.report import facts, figures, front, numbers, scatter, sections
 from dembark.validation.report.build import write_pdf
 from dembark.validation.report.gather import Row, gather
 
@@ -40,7 +44,7 @@ def results(tmp_path_factory):
     folder = full_size.write(tmp_path_factory.mktemp("results") / "quick", ("silo", "log_pile"), variants=2)
     full_size.change(folder / "silo/variant_0/yade/metrics.json", "quantity_0", verdict="fail", value=0.3, deviation=0.3, tolerance=0.1,
                      label="lost momentum")
-    full_size.change(folder / "silo/variant_0/liggghts/metrics.json", "quantity_0", verdict="fail", value=0.2, deviation=0.2, tolerance=0.1,
+    full_size.change(folder / "silo/variant_0/liggghts/metrics.json", "quantity_1", verdict="fail", value=0.2, deviation=0.2, tolerance=0.1,
                      label="lost energy", cause="the floor does not carry what it should")
     full_size.change(folder / "log_pile/variant_1/liggghts/metrics.json", "quantity_6", verdict="fail", tolerance=None,
                      label="too few contacts")
@@ -72,34 +76,106 @@ def test_no_trajectory_is_opened_and_no_result_is_written(results):
 
 
 def test_the_first_page_says_what_failed_and_what_is_missing(results):
-    first = pdf.pages(results[1])[0]
-    assert "3 FAILED" in first and "lost momentum" in first and "too few contacts" in first
+    first, second, *_ = pdf.pages(results[1])
+    assert "3 FAILED" in first and "lost momentum" in first + second and "too few contacts" in first + second
     # What has the same cause stands together, under its cause.
-    assert first.index("silo: The cause is not known.") < first.index("lost momentum") < first.index("too few contacts")
-    assert first.index("silo: the floor does not carry what it should") < first.index("lost energy")
+    failed = results[1].partition('<section id="failed">')[2].partition("</section>")[0]
+    known = failed.index("the floor does not carry what it should")
+    assert "lost energy" in failed[known:] and failed.count('class="cause"') == 3
     assert "the engine was killed by SIGKILL <at> step 7" in first
-    assert re.search(r"silo/variant_1/yade/metrics.json has no .*variant", first.replace(" ", " "))
-    assert re.search(r"identity conservation laws, the scheme against itself \d+ 2 \d+", first)
+    assert re.search(r"silo/variant_1/yade/metrics.json has no .*variant", first.replace("\N{NO-BREAK SPACE}", " "))
+
+
+def test_the_first_page_has_a_row_for_each_case(results):
+    rows = re.findall(r'<tr data-case="(\w+)" data-evidence="([^"]*)" data-verdict="([^"]*)"', results[1])[:4]
+    assert [case for case, _, _ in rows] == ["silo", "log_pile", "plug_flow", "verification"]
+    assert rows[0][1].split() == ["experiment", "theory", "code", "identity", "none"]
+    assert rows[0][2].split() == rows[1][2].split() == ["failed", "open", "passed"] and rows[3][2].split() == ["passed"]
+    # Of the case that was not measured, nothing is known.
+    assert rows[2][1:] == ("", "")
 
 
 def test_a_case_names_its_failed_identity_and_the_page_of_a_missing_case(results):
-    text = " ".join(pdf.pages(results[1]))
-    assert re.search(r"Identities: \d+ of \d+ within tolerance, \d+ open, 2 FAILED: .*lost momentum \(silo, variant 0, YADE\)", text)
-    assert "smooth: YADE, replica 1: the engine was killed" in text
+    text = results[1].partition('id="silo"')[2].partition('class="chapter"')[0]
+    assert "lost momentum" in text and "2 FAILED" in text and "smooth: YADE, replica 1: the engine was killed" in results[1]
 
 
-def test_html_has_contents_and_everything_and_stands_alone(results):
+def test_html_has_contents_and_everything_and_needs_nothing_from_elsewhere(results):
     folder = results[0]
     html = (folder / "report.html").read_text()
-    assert '<nav id="contents">' in html and html.count("<details>") > 6 and 'href="#silo-variant_0"' in html
-    links = re.findall(r'href="([^"#][^"]*)"', html)
-    assert links and all((folder / link).is_file() for link in links)
-    assert not re.search(r'src="(?!data:)', html) and "url(" not in html
+    assert '<nav id="contents">' in html and html.count("<details>") > 6 and 'id="silo-variant_0"' in html
+    links = re.findall(r'(?:href|src)="([^"#][^"]*)"', html)
+    assert links and all((folder / link).is_file() for link in links) and "url(" not in html
+    assert set(re.findall(r'href="#([^"]*)"', html)) <= set(re.findall(r'id="([^"]*)"', html))
     assert "quantity σ<sub>zz</sub> number 11" in html
     # What fails a check stands with it.
-    assert "fails with: friction off" in html and "fails with: a lost grain" in html and "not counted</th>" not in html
+    assert "fails with: friction off" in html and "fails with: a lost grain" in html
     for text in (html, results[1]):
         assert not re.search(r"\b(None|nan|inf)\b", pdf.text(text))
+
+
+class Rows(HTMLParser):
+    """The facts in the chapters of an HTML report: attributes, and the texts of the cells of their rows."""
+
+    def __init__(self, html):
+        super().__init__()
+        self.facts, self.fact, self.chapter, self.cell = [], {"rows": []}, False, None
+        self.feed(html)
+
+    def handle_starttag(self, tag, attrs):
+        attributes = dict(attrs)
+        self.chapter |= attributes.get("class") == "chapter"
+        if tag in ("thead", "tbody"):
+            self.fact = attributes | {"rows": []}
+            if self.chapter and attributes.get("class") == "fact":
+                self.facts.append(self.fact)
+        elif tag == "tr":
+            self.fact["rows"].append([])
+        elif tag == "td":
+            self.fact["rows"][-1].append((attributes.get("data-label"), ""))
+            self.cell = self.fact["rows"][-1]
+
+    def handle_data(self, data):
+        if self.cell:
+            label, text = self.cell[-1]
+            self.cell[-1] = label, text + data
+
+
+def test_a_fact_is_one_row_with_a_column_for_each_engine(results):
+    folder = results[0]
+    found = Rows((folder / "report.html").read_text()).facts
+    checks = [one for one in found if one["data-case"] == "log_pile" and one["data-verdict"] != "information"]
+    # 18 quantities of two variants in two engines, and 9 compared.
+    assert len(checks) == 2 * (18 + 9) and all(len(one["rows"]) == 1 for one in checks)
+    assert all([label for label, _ in one["rows"][0]][2:4] == ["LIGGGHTS", "YADE"] for one in checks)
+    assert {one["data-evidence"] for one in checks} == {"experiment", "theory", "code", "identity", "none"}
+    assert {one["data-verdict"] for one in found} == {"failed", "open", "passed"}
+    assert sum(one["data-verdict"] == "failed" for one in found) == 3
+    # Failed facts are first, and a value has its own verdict.
+    lost = next(one for one in found if one["data-case"] == "silo")["rows"][0]
+    assert ["✗" in text for _, text in lost[2:4]] == [False, True]
+
+
+def test_the_members_of_a_family_follow_it():
+    rows = [row(3, family="silo: k", deviation=0.01), row(3, family="silo: k", deviation=0.5, verdict="fail", cause="a wall"),
+            row(4, family="silo: k", deviation=0.02), row(3, deviation=0.3)]
+    rows[1] = replace(rows[1], engine="liggghts")
+    family, alone = facts.facts(rows)
+    assert family.standing == "failed" and family.worst == rows[1] and family.title == "k" and front.cause(family) == "a wall"
+    assert {engine: cell.standing for engine, cell in family.cells.items()} == {"yade": "passed", "liggghts": "failed"}
+    assert [len(one.rows) for one in family.members] == [2, 1] and alone.members == []
+    assert facts.engines([family, alone]) == ["liggghts", "yade"]
+    assert [why for why, _ in front.failed_groups([family, alone])] == ["a wall"]
+
+
+def test_engines_that_are_compared_are_one_row():
+    values = [replace(full_size.quantity(3, seed), samples=()) for seed in range(3)]
+    pairs = [replace(pair(values[one], values[two], names[0], names[1]), family="silo, dry: k in the engines")
+             for one, two, names in ((0, 1, ("lammps", "liggghts")), (0, 2, ("lammps", "yade")), (1, 2, ("liggghts", "yade")))]
+    (found,) = facts.facts(Row("silo", "dry", "silo-dry", one.engine, one) for one in pairs)
+    assert {engine: cell.value for engine, cell in found.cells.items()} == {
+        "lammps": values[0].value, "liggghts": values[1].value, "yade": values[2].value}
+    assert [found.label(one) for one in found.members] == ["LIGGGHTS / LAMMPS", "YADE / LAMMPS", "YADE / LIGGGHTS"]
 
 
 def test_csv_holds_every_quantity_and_profile(results):
@@ -121,7 +197,7 @@ def test_nothing_to_report_is_an_error(tmp_path, monkeypatch):
 
 def row(number, **changes):
     record = full_size.quantity(number, 0)
-    return Row("silo", "silo, dry", "silo-dry", "yade", type(record)(**{**record.__dict__, **changes}))
+    return Row("silo", "dry", "silo-dry", "yade", type(record)(**{**record.__dict__, **changes}))
 
 
 def test_scatter_is_of_checks_against_experiment_and_theory_only():
@@ -132,12 +208,6 @@ def test_scatter_is_of_checks_against_experiment_and_theory_only():
     drawn = scatter.figure(found)
     assert len(drawn.axes[1].get_yticklabels()) == len({one.line for one in found}) == 2
     assert scatter.figure([]) is None and scatter.statistics(found) is None
-
-
-def test_each_kind_of_evidence_has_a_row_even_without_a_check():
-    rows = front.evidence(tally([row(3).record, row(6).record]))
-    assert [(one["kind"], one["counts"].checks) for one in rows] == [
-        ("experiment", 0), ("theory", 1), ("code", 0), ("identity", 0), ("not stated", 1), ("all", 2)]
 
 
 def test_symbols_have_subscripts_and_no_number_is_parted_from_its_per_cent():
@@ -156,13 +226,23 @@ def test_open_checks_are_one_line_for_each_case_and_reason():
     assert (second.count, second.reason, second.decides) == (1, "the run is too short", "")
 
 
-def test_of_many_variants_the_worst_is_shown_and_every_failure_counts():
-    rows = [row(3, deviation=0.01 * number) for number in range(8)]
-    (found,) = sections.decided(rows)
-    assert len(found.rows) == 1 and found.worst_of == 8 and found.rows[0].record.deviation == 0.07
-    (found,) = sections.decided([*rows, row(3, deviation=0.5, verdict="fail"), row(3, deviation=0.2, verdict="fail")])
-    assert [one.record.deviation for one in found.rows] == [0.5, 0.2] and found.counts.failed == 2
-    assert sections.decided([row(0), row(3, tolerance=None, verdict="info")]) == []
+def test_of_many_variants_the_pdf_shows_the_worst():
+    rows = [replace(row(3, deviation=0.01 * number), place=str(number), anchor=f"silo-{number}") for number in range(8)]
+    (found,) = sections.printed(facts.facts(rows))
+    assert len(found.rows) == 8 and found.worst.record.deviation == 0.07
+    failed = [replace(row(3, deviation=0.5, verdict="fail"), anchor="silo-9"), row(0, verdict="fail"), row(0, name="other")]
+    shown = sections.printed(facts.facts([*rows, *failed]))
+    assert [(one.standing, one.worst.record.evidence) for one in shown] == [("failed", "theory"), ("failed", "identity")]
+
+
+def test_a_report_of_some_cases_shows_these_alone(tmp_path):
+    folder = full_size.write(tmp_path / "quick", ("silo", "log_pile"), variants=1, quantities=2, profiles=0)
+    assert {row.case for row in gather(folder).rows} == {"silo", "log_pile", "verification"}
+    (folder / "runs.json").write_text(json.dumps({"runs": [], "cases": ["silo"]}))
+    (folder / "verification.json").unlink()
+    found = gather(folder)
+    assert {row.case for row in found.rows} == set(found.cases) == {"silo"}
+    assert tally_of(folder).checks == tally(row.record for row in found.rows).checks
 
 
 def test_without_a_list_of_runs_nothing_of_other_cases_is_missing(tmp_path):
