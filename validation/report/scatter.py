@@ -20,7 +20,7 @@ from dembark.validation.report.figures import INK, WIDE, look, shortened, symbol
 from dembark.validation.report.gather import Row
 
 KINDS = ("experiment", "theory")
-# Lines that fit on the first pages; the others are in the table beside the report.
+# Lines that fit on the first pages; the others are in the table next to the report.
 LINES = 24
 _LETTERS = 5.8  # points, of the lines' names
 
@@ -116,7 +116,7 @@ def figure(found: Sequence[Point], tolerance: float = 0.10) -> Figure | None:
                     statistics([one for one in found if one.engine == engine]))
         spread = max(1.3 * tolerance, 1.15 * max(abs(one.ratio - 1.0) + one.half for one in drawn))
         right.set(xlim=(max(0.0, 1.0 - spread), 1.0 + spread), ylim=(len(shown) + 0.6, 0.4), xlabel="measured / reference", title="Ratio")
-        # Between the panels, beside the last number of the left one's axis.
+        # Between the panels, next to the last number of the left one's axis.
         room = (right.get_position().x0 - left.get_position().x1) * WIDE - 0.2
         right.set_yticks(range(1, len(shown) + 1), [_label(number[line], line, room) for line in shown], fontsize=_LETTERS)
         right.tick_params(axis="y", length=0)

@@ -203,7 +203,7 @@ def _fields(page: Page, folder: Path) -> tuple[list[Shown], list[str]]:
 
 
 def verification(gathered: Gathered, folder: Path) -> list[dict[str, Any]]:
-    """The items of the verification for the template; the data of their figures are written beside the report."""
+    """The items of the verification for the template; the data of their figures are written next to the report."""
     found = []
     for item in gathered.items:
         figure, stem = figures.verification_figure(item), f"verification-{item.name}"
