@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from dembark.input_decks.tests.measuring import Control
-from dembark.input_decks.tests.test_vibrated_layer import FAST, dispersion, lengths, panel, shifts, sweep, verdicts
+from dembark.input_decks.tests.test_vibrated_layer import FAST, lengths, panel, shifts, sweep, verdicts
 
 
 def controls(_folder: Path) -> Iterator[Control]:
@@ -17,7 +17,5 @@ def controls(_folder: Path) -> Iterator[Control]:
     yield Control("a surface that answers each stroke alike", waves, verdicts(part=1.0, motion_frequency=FAST))
     yield Control("ordered waves that begin at the acceleration of free fall and a half", sweep(2.5), sweep(2.0))
     yield Control("waves twice as long, at another part of the frequency, than published", panel(5, 0.5), panel(2, 0.25))
-    falling = (20.0, 16.7, 14.3, 12.5, 11.1)
-    yield Control("waves that get longer with the frequency", dispersion(*falling), dispersion(*falling[::-1]))
     yield Control("one wave on any length", lengths(12.5, 12.5, 14.3), lengths(12.5, 18.75, 25.0))
     yield Control("changes that change nothing", shifts(sweep_smooth=-0.2), shifts())

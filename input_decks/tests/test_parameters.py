@@ -20,7 +20,7 @@ SCENE = Path(__file__).resolve().parents[2] / "plugins/yade/python/dembark/scene
 # What parameters need to do anything.
 LIQUID = {"bridge_volume": 8e-11, "liquid_viscosity": 0.01}
 BASES: dict[str, dict[str, Any]] = {
-    "silo": {"grain_count": 40, "bridge_volume": 8e-11},
+    "silo": {"grain_count": 40, "bridge_volume": 8e-11, "rolling_resistance": "elastic_plastic"},
     "plane_silo": {"grain_count": 40, "bridge_volume": 8e-11},
     "plug_flow": {"grain_count": 40, "bridge_volume": 8e-11},
     "gravity_channel": {"channel_width": 0.04, "channel_depth": 0.021, "channel_length": 0.02, "bridge_volume": 8e-11},

@@ -157,7 +157,7 @@ def test_bad_settings(settings, words):
 @given(restitution=st.floats(0.1, 1.0), speed=st.floats(0.05, 2.0), normal_law=st.sampled_from(["hertz", "hooke"]),
        presliding=st.sampled_from(["linear", "partial_slip"]), volume=st.sampled_from([0.0, 1e-10]))
 def test_friction_limit_is_that_of_the_chosen_normal_force(restitution, speed, normal_law, presliding, volume):
-    """A grain with a fast tangential motion slides from touch to release: T = mu N at each step, with N of the spring alone or of spring
+    """A grain with a fast tangential motion slides soon after touch: T = mu N at each step, with N of the spring alone or of spring
     and dashpot; a bridge is in neither."""
     for limit in ("elastic", "total"):
         contact = replace(CONTACT, restitution=restitution, normal_law=normal_law, bridge_volume=volume, surface_tension=0.072,
@@ -167,7 +167,8 @@ def test_friction_limit_is_that_of_the_chosen_normal_force(restitution, speed, n
         motion = drop(contact, body, time_step=2e-6, steps=120, gravity=(0.0, 0.0, 0.0))
         touching = [k for k, step in enumerate(motion.contacts) if step.overlap > 0.0]
         assert len(touching) > 40
-        for k in touching[2::20]:
+        # In the first steps the spring has not reached the limit, and a contact that sticks has its dashpot in addition.
+        for k in touching[22::20]:
             step = motion.contacts[k]
             at_rest = spring.begin().step((0.0, 0.0, RADIUS - step.overlap), *[(0.0, 0.0, 0.0)] * 4, RADIUS, np.inf, MASS, np.inf, 2e-6,
                                           True)
