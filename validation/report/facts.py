@@ -101,9 +101,10 @@ class Fact:
         """What is to be known of it: why it stands so, the reference, the intervals, and what fails it; each once."""
         worst, records = self.worst.record, [row.record for row in self.rows]
         told = [worst.reason, worst.decides and f"decided by {worst.decides}", worst.cause if self.standing == "failed" else ""]
-        told += [text for one in records for text in (one.detail, one.source if not isinstance(one, ComparedRecord) else "",
-                                                      one.control and f"fails with: {one.control}",
-                                                      one.basis and f"95 % intervals: {one.basis}")]
+        for one in records:
+            # Of engines that are compared, these say nothing that the row does not.
+            told += [] if self.is_pair else [one.detail, one.source]
+            told += [one.control and f"fails with: {one.control}", one.basis and f"95 % intervals: {one.basis}"]
         return list(dict.fromkeys(filter(None, told)))
 
 
