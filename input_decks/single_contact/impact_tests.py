@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dembark.input_decks.single_contact.impacts import Flight, Solutions, materials
+from dembark.input_decks.single_contact.impacts import Flight, Solutions, materials, worst
 from dembark.physics.exact.impacts import Impacts, Rebounds, sliding_throughout
 from dembark.postproc.measurement import Array, Value, number, profile
 
@@ -55,11 +55,11 @@ def restitutions(one: Impacts, flight: Flight, known: Solutions) -> Found:
 def mirrored(one: Impacts, flight: Flight, known: Solutions) -> Found:
     """The points of contact of mirror images do not slide on each other: nothing turns."""
     after, before, asked = flight.after.numbers(one), one.radius[0] * one.spin[0] / one.closing, one.restitution
-    worst, spin = int(np.abs(after["restitution"] - asked).argmax()), one.spin[0]
+    k, spin = worst(np.abs(after["restitution"] - asked)), one.spin[0]
     values = {
         "spin_change": number(np.abs(after["spin"] - before).max() / np.abs(before).max(), 0.0),
         "tangential_velocity": number(np.abs(after["slide"]).max(), 0.0),
-        "restitution": number(after["restitution"][worst], asked[worst], bound=known.bound("restitution", asked).max()),
+        "restitution": number(after["restitution"][k], asked[k], bound=known.bound("restitution", asked).max()),
     }
     return values, _curves([
         ("spin", "Spin after", "ω (rad/s)", "ω after (rad/s)", spin, flight.after.spin[0], spin, "symmetry"),
@@ -77,10 +77,10 @@ def oblique(one: Impacts, flight: Flight, known: Solutions, sweep: str, swept: A
         for name in ("restitution", "slide", "spin"):
             allowed = (known.bound(name, law[name]) + np.abs(coarse[name] - law[name]))[which]
             found, due = after[name][which], law[name][which]
-            worst = int(np.abs(found - due).argmax())
+            k = worst(np.abs(found - due))
             values[f"{name}_{key}"] = number(
-                found[worst], due[worst], bound=allowed.max(), scale=max(1.0, np.abs(due).max()),
-                detail=f"at {swept[which][worst]:.3g}°, the worst angle; the tolerance there is {allowed[worst]:.2g}")
+                found[k], due[k], bound=allowed.max(), scale=max(1.0, np.abs(due).max()),
+                detail=f"at {swept[which][k]:.3g}°, the worst angle; the tolerance there is {allowed[k]:.2g}")
         if gross[which].any():
             values[f"rigid_sliding_difference_{key}"] = number(np.abs(after["patch"] - rigid["patch"])[which][gross[which]].max())
         if known.slip:

@@ -29,6 +29,13 @@ class Flight:
     momentum_error: float | None
 
 
+def worst(deviations: Array) -> int:
+    """Index of the largest of `deviations` (n,): the first of those that differ from it by round-off alone. Impacts that slide to the end
+    miss the law by the same, and engines that choose different ones of them cannot be compared."""
+    largest = deviations.max()
+    return int((deviations >= largest - 1e-6 * abs(largest) - 1e-10).argmax())
+
+
 def sweep(p: Numbers) -> Array:
     """What is swept, for the spheres of material A, then for those of B."""
     return np.tile(p["sweep_from"] + (p["sweep_to"] - p["sweep_from"]) * np.arange(p["points"]) / max(p["points"] - 1, 1), 2)

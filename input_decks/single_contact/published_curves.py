@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from dembark.input_decks.single_contact.impacts import worst
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.resampling import profile
 from dembark.postproc.statistics import Estimate
@@ -39,7 +40,7 @@ def beside_published(found: Measurement, path: Path, variant: str, labels: Mappi
         simulated, read_half = smooth(x), np.hypot(y_half, smooth(x, 1) * x_half)
         half = np.abs(simulated - np.interp(x, place, smooth(place)))
         beyond = np.where(judged, np.abs(simulated - y) - np.hypot(half, read_half), -np.inf)
-        k = int(beyond.argmax())
+        k = worst(beyond)
         if beyond[k] > excess.get(name, -np.inf):
             excess[name] = beyond[k]
             values[name] = Value(Estimate(simulated[k], half[k], "interpolation"), Estimate(y[k], read_half[k], "reading of the figure"),
