@@ -211,6 +211,15 @@ def over_replicas(estimates: Sequence[Estimate]) -> Estimate:
     return Estimate(mean, half, f"within {len(estimates)} replica{plural}: {estimates[0].basis}")
 
 
+def rescaled(half: float, count: float, other: float, confidence: float = CONFIDENCE) -> float:
+    """Half-width of the interval of the mean of `other` values that scatter as `count` with Student's half-width `half` do; infinite
+    `count`: known exactly how they scatter, which no number of values changes."""
+    if not math.isfinite(count):
+        return half
+    now, then = (student(number - 1.0, confidence) / math.sqrt(number) for number in (count, other))
+    return half * then / now
+
+
 def joint_limit(one: float, other: float, count_one: float, count_other: float, confidence: float) -> float:
     """Half-width of the interval of the same difference for another `confidence`, when `one` and `other` are Student's 95 % half-widths
     over `count_one` and `count_other` values (two or more; inf: known exactly how they scatter).

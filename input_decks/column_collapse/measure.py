@@ -115,7 +115,7 @@ def shares(runs: Sequence[Collapse], ways: Mapping[str, str]) -> list[dict[str, 
 
 
 def deposits(runs: Sequence[Collapse]) -> dict[str, Any]:
-    """Curve of the deposit's surface beside that of the column."""
+    """Curve of the deposit's surface, with that of the column as its reference."""
     width, edges = runs[0].width, np.arange(0.0, 5.0 * runs[0].width, runs[0].diameter)
     before = np.mean([surface(one.first, edges) for one in runs], axis=0) / width
     return profile("deposit", "Deposit", "x / W", "height / W", 0.5 * (edges[1:] + edges[:-1]) / width,

@@ -110,7 +110,7 @@ def _known(point: Numbers, name: str) -> Estimate:
 
 
 def _curve(own: tuple[Array, Array], source: str, name: str, label: str) -> Curve:
-    """The front beside that of an experiment whose times are shifted by the delay."""
+    """The front, with that of an experiment whose times are shifted by the delay as its reference."""
     times, fronts = published(source)
     delay = pace(own, source)[1].value
     shifted = times - (delay if math.isfinite(delay) else 0.0)

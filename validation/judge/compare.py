@@ -28,7 +28,7 @@ import numpy as np
 
 from dembark.common.errors import RunError
 from dembark.postproc.statistics import CONFIDENCE as INTERVAL
-from dembark.postproc.statistics import joint_limit, student
+from dembark.postproc.statistics import joint_limit, replica_mean, rescaled
 from dembark.validation.judge import result
 from dembark.validation.judge.deciding import PACKINGS, packings, smallest
 from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result
@@ -120,22 +120,19 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
 def _chance(value: QuantityRecord, reference: QuantityRecord, confidence: float) -> Callable[[int], tuple[float, float, float]]:
     """For any number of packings in each engine, all over the reference: the half-width of the 95 % interval of the difference, that with
     `confidence`, and the size from which a difference beyond that fails. 0: the packings that there are; others of the same scatter."""
-    scale = abs(reference.value or 0.0)
-    counts = [packings(one.basis) for one in (value, reference)]
-    # Standard deviations of the packings; none of values that rest on no packing.
-    scatter = [(one.half or 0.0) / student(count - 1.0) * (math.sqrt(count) if math.isfinite(count) else 1.0)
-               for one, count in zip((value, reference), counts, strict=True)]
+    scale, both = abs(reference.value or 0.0), (value, reference)
     differences = np.subtract(value.samples, reference.samples) if len(value.samples) == len(reference.samples) else np.zeros(0)
 
     def found(count: int) -> tuple[float, float, float]:
-        sizes = [one if not count or math.isinf(one) else float(count) for one in counts]
-        halves = [spread * student(size - 1.0) / (math.sqrt(size) if math.isfinite(size) else 1.0)
-                  for spread, size in zip(scatter, sizes, strict=True)]
+        counts = [packings(one.basis) for one in both]
+        sizes = [one if math.isinf(one) else count or one for one in counts]
+        halves = [rescaled(one.half or 0.0, now, then) for one, now, then in zip(both, counts, sizes, strict=True)]
         half, limit = (joint_limit(halves[0], halves[1], sizes[0], sizes[1], level) / scale for level in (INTERVAL, confidence))
-        if len(differences) < PACKINGS:
+        pairs = len(differences)
+        if pairs < PACKINGS:
             return half, limit, 0.0
-        pairs, spread = count or len(differences), float(differences.std(ddof=1)) / scale
-        paired, widest = (student(pairs - 1.0, level) * spread / math.sqrt(pairs) for level in (INTERVAL, confidence))
+        paired, widest = (rescaled(replica_mean(list(differences), level).half, pairs, count or pairs, level) / scale
+                          for level in (INTERVAL, confidence))
         return paired, widest, min(limit, _SEEN)
 
     return found

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable
 
-from dembark.postproc.statistics import student
+from dembark.postproc.statistics import rescaled
 
 PACKINGS = 3
 _MOST = 100_000
@@ -29,7 +29,7 @@ def decides(deviation: float, own: float, reference: float, tolerance: float, ba
     if count < PACKINGS or not math.isfinite(own):
         return enough if count == 1.0 or not math.isfinite(own) else f"{enough}, or {longer}"
     if math.isfinite(count):
-        return f"about {_packings(own, wanted, round(count))} packings"
+        return f"about {smallest(lambda number: rescaled(own, count, number) <= wanted, round(count))} packings"
     return longer if "block" in basis else f"inputs known so well that they change the value by ±{wanted:.2g}, now ±{own:.2g}"
 
 
@@ -38,12 +38,6 @@ def packings(basis: str) -> float:
     packing."""
     found = re.match(r"(?:within )?(\d+) replica", basis)
     return int(found.group(1)) if found else math.inf
-
-
-def _packings(own: float, wanted: float, count: int) -> int:
-    """How many packings of the same scatter have a mean with the half-width `wanted`, when `count` have `own`."""
-    spread = own * math.sqrt(count) / student(count - 1)
-    return smallest(lambda number: spread * student(number - 1) / math.sqrt(number) <= wanted, count)
 
 
 def smallest(enough: Callable[[int], bool], least: int) -> int:

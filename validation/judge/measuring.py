@@ -121,18 +121,18 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
     value has a bound that the declaration does not ask for, or none where it does, or where the quantity has an interval.
     """
     name = name or one.name
-    tolerance, deviation, half = _tolerance(one, value, name), None, value.estimate.half
+    tolerance, deviation, (own, of_reference) = _tolerance(one, value, name), None, _halves(value, one.absolute)
+    half = math.hypot(own, of_reference)
     verdict, reason, reference, decided = value.verdict, value.inapplicable or value.reason, value.reference, ""
     if reference is not None:
         scale = 1.0 if one.absolute else reference.value
         deviation = (value.estimate.value - reference.value) / scale if scale else math.nan
-        half = math.hypot(half, reference.half) / abs(scale) if scale else math.nan
     if not verdict:
         verdict = "info"
         if not reason and tolerance is not None and deviation is not None:
-            verdict, reason = judge(deviation, half if value.half is None else value.half, tolerance)
+            verdict, reason = judge(deviation, half, tolerance)
             if verdict == "info":
-                decided = decides(deviation, *_halves(value, one.absolute), tolerance, value.estimate.basis)
+                decided = decides(deviation, own, of_reference, tolerance, value.estimate.basis)
     return QuantityRecord(
         name=name, label=one.label.replace("*", part.replace("_", " ")), value=_finite(value.estimate.value), unit=one.unit,
         interval=_interval(value.estimate), basis=value.estimate.basis,
@@ -142,15 +142,15 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
         detail=value.detail or one.detail or one.why, source=one.source, evidence=one.evidence, compared=one.compared and value.compared,
         control=one.control, decides=decided, samples=value.estimate.samples,
         deviation_half_width=_finite(value.half), independent=one.independent and value.half is None,
-        chance=chance(half if value.half is None else value.half, tolerance, packings(value.estimate.basis)),
+        chance=chance(half, tolerance, packings(value.estimate.basis)),
         agreement=None if one.agreement is None else one.agreement * value.scale)
 
 
 def _halves(value: Value, absolute: bool) -> tuple[float, float]:
-    """Half-widths of the deviation that come from the value and from its reference."""
+    """Half-widths of the deviation that come from the value and from its reference; NaN where there is no relative deviation."""
     if value.half is not None or value.reference is None:
         return value.estimate.half if value.half is None else value.half, 0.0
-    scale = 1.0 if absolute else abs(value.reference.value)
+    scale = 1.0 if absolute else abs(value.reference.value) or math.nan
     return value.estimate.half / scale, value.reference.half / scale
 
 

@@ -7,13 +7,16 @@ fails, and is open when one of them is open.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeVar
 
 from dembark.common.files import read_json
 from dembark.validation.case.model import EVIDENCE
 from dembark.validation.judge.result import QuantityRecord, from_json, results
+
+Item = TypeVar("Item")
 
 VERIFICATION = "verification.json"
 # What each kind of evidence means, for people; "" is that of cases that do not say.
@@ -78,21 +81,23 @@ class Tally(Counts):
 ORDER = ("failed", "open", "passed", "uncontrolled", "information")
 
 
-def families(quantities: Iterable[QuantityRecord]) -> list[list[QuantityRecord]]:
-    """`quantities` by families, in the order of their first members; one without a family stands by itself."""
-    found: dict[tuple[str, str], list[QuantityRecord]] = {}
-    for number, one in enumerate(quantities):
-        found.setdefault((one.evidence, one.family or str(number)), []).append(one)
-    return list(found.values())
+def families(items: Iterable[Item], record: Callable[[Item], QuantityRecord]) -> list[tuple[str, list[Item]]]:
+    """`items`, each with the quantity `record`, by families, in the order of their first members, with how each family stands; an item
+    without a family stands by itself."""
+    found: dict[tuple[str, str], list[Item]] = {}
+    for number, item in enumerate(items):
+        one = record(item)
+        found.setdefault((one.evidence, one.family or str(number)), []).append(item)
+    return [(min((record(item).standing for item in family), key=ORDER.index), family) for family in found.values()]
 
 
 def tally(quantities: Iterable[QuantityRecord]) -> Tally:
     """Count the families of `quantities` by how they stand, and by kind of evidence."""
     kinds: dict[str, Counter[str]] = {kind: Counter() for kind in (*EVIDENCE, "")}
     members, chances = 0, []
-    for family in families(quantities):
+    for standing, family in families(quantities, lambda one: one):
         checks = [one for one in family if one.standing != "information"]
-        kinds[family[0].evidence][min((one.standing for one in family), key=ORDER.index)] += 1
+        kinds[family[0].evidence][standing] += 1
         members += sum(one.standing != "uncontrolled" for one in checks)
         # Members are correlated: their sum is an upper limit of the probability that one of them fails.
         if known := [one.chance for one in checks if one.chance is not None]:

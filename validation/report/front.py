@@ -45,15 +45,17 @@ class OpenLine:
 
 
 def open_lines(rows: Iterable[Row]) -> list[OpenLine]:
-    """One line for each case and reason; numbers in brackets, which differ from quantity to quantity, are left out of the reason. A
-    family counts once."""
-    found: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
-        if row.record.standing == "open":
-            reason = re.sub(r" \([^()]*\d[^()]*\)", "", row.record.reason) or "there is no value to judge"
-            found.setdefault((row.case, reason), []).append(row)
-    return [OpenLine(case, reason, len(families(row.record for row in group)), _names(group), _range(row.record.decides for row in group),
-                     sorted({row.record.evidence or "none" for row in group})) for (case, reason), group in found.items()]
+    """One line for each case and reason; numbers in brackets, which differ from quantity to quantity, are left out of the reason. As in the
+    tally a family counts once, with the reason of its first open member, and not where it failed."""
+    found: dict[tuple[str, str], list[list[Row]]] = {}
+    for standing, family in families(rows, lambda row: row.record):
+        if standing == "open":
+            members = [row for row in family if row.record.standing == "open"]
+            reason = re.sub(r" \([^()]*\d[^()]*\)", "", members[0].record.reason) or "there is no value to judge"
+            found.setdefault((members[0].case, reason), []).append(members)
+    return [OpenLine(case, reason, len(groups), _names(every), _range(row.record.decides for row in every),
+                     sorted({row.record.evidence or "none" for row in every}))
+            for (case, reason), groups in found.items() for every in [[row for group in groups for row in group]]]
 
 
 def _range(texts: Iterable[str]) -> str:

@@ -220,9 +220,14 @@ def test_open_checks_are_one_line_for_each_case_and_reason():
     rows = [row(8, reason="its interval (±0.4) is wider than the tolerance", decides="about 7 packings", family="silo: a"),
             row(8, reason="its interval (±0.4) is wider than the tolerance", decides="about 12 packings", family="silo: a"),
             row(17, reason="its interval (±0.5) is wider than the tolerance", decides="3 packings or more"),
-            row(26, reason="the run is too short")]
+            row(26, reason="the run is too short"),
+            # In a family with two reasons, and in one that failed.
+            row(8, reason="its interval (±0.4) is wider than the tolerance", decides="about 9 packings", family="silo: b"),
+            row(8, reason="it still moves", family="silo: b"),
+            row(8, reason="it still moves", family="silo: c"), row(8, verdict="fail", family="silo: c")]
     first, second = front.open_lines(rows)
-    assert (first.count, first.reason) == (2, "its interval is wider than the tolerance") and "1 more" in first.names
+    assert sum(one.count for one in (first, second)) == tally(row.record for row in rows).open
+    assert (first.count, first.reason) == (3, "its interval is wider than the tolerance") and "1 more" in first.names
     assert first.decides == "about 7 to 12 packings; 3 packings or more"
     assert (second.count, second.reason, second.decides) == (1, "the run is too short", "")
 
