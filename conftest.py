@@ -1,4 +1,4 @@
-"""`--slow`: tests that build whole engines run only when asked for; what all tests share."""
+"""Options that select long tests, and what all tests share."""
 
 # Before pytest takes the folder packaging/ for this library.
 import packaging.version  # noqa: F401
@@ -6,6 +6,7 @@ import pytest
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--full", action="store_true", help="also run the tests marked full")
     parser.addoption("--slow", action="store_true", help="also run the tests marked slow")
 
 
@@ -16,9 +17,9 @@ def _width_is_our_own(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    if config.getoption("--slow"):
-        return
-    skip = pytest.mark.skip(reason="slow; run with --slow")
-    for item in items:
-        if "slow" in item.keywords:
-            item.add_marker(skip)
+    for marker in ("full", "slow"):
+        if not config.getoption(f"--{marker}"):
+            skip = pytest.mark.skip(reason=f"{marker}; run with --{marker}")
+            for item in items:
+                if marker in item.keywords:
+                    item.add_marker(skip)
