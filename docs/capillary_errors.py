@@ -69,7 +69,7 @@ def summary(columns: dict[str, Array]) -> list[list[str]]:
 
 
 def markdown(rows: list[list[str]]) -> str:
-    """The table of the page docs/liggghts_cohesion_capillary.md."""
+    """The table of the page docs/reference/liggghts_cohesion_capillary.md."""
     lines = ["| model | 0° | 30° | 60° | whole, 0° | 30° | 60° | rupture |", "|---|---|---|---|---|---|---|---|"]
     return "\n".join([*lines, *(f"| `{row[0]}` | " + " | ".join(row[1:]) + " |" for row in rows)])
 

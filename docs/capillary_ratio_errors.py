@@ -75,7 +75,7 @@ def _name(ratio: float) -> str:
 
 def table() -> str:
     """Effective radius: largest and median deviation in per cent over all angles and volumes, for the page
-    docs/liggghts_cohesion_capillary.md."""
+    docs/reference/liggghts_cohesion_capillary.md."""
     lines = ["| radii | touching | median | gap to 0.6 of rupture | median | gap to 0.9 | median | rupture | median |", "|" + "---|" * 9]
     for ratio in RATIOS:
         forces, ends = (np.array(part) for part in zip(*(effective_radius_errors(ratio, angle) for angle in ANGLES), strict=True))

@@ -1,4 +1,4 @@
-"""Prints the two tables of docs/single_impacts.md, which has the commands: Kharaz et al. (2001), this project and other codes."""
+"""Prints the two tables of docs/theory/single_impacts.md, which has the commands: Kharaz et al. (2001), this project and other codes."""
 
 from __future__ import annotations
 

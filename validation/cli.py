@@ -109,7 +109,7 @@ def run(
     planned = series(one, chosen, profile, found.result(), changes)
     if restart_interval is not None and not restarts.supported(planned.runs[0]):
         raise DembarkError(f"--restart-interval {restart_interval}", f"{one.deck(engine)} writes no states to go on from",
-                           "leave it out; see docs/restarts.md for what a deck needs")
+                           "leave it out; see docs/how-to/restarts.md for what a deck needs")
     folder = (out or Path("results") / profile / planned.place).resolve()
     used = Resources(ranks, threads, restart_interval=interval)
     result = perform_series(planned, folder, cancelled_by_signal(), used, jobs, force)

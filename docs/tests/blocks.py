@@ -1,4 +1,4 @@
-"""The blocks of README.md and docs/*.md: where they stand, what they are, and what is run in their place.
+"""The blocks of README.md and docs/**/*.md: where they stand, what they are, and what is run in their place.
 
 A block is fenced, or indented by four spaces. Fenced ones say what they are; of indented ones the first word tells.
 """
@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
 
 SHELL = {"dembark", "make", "liggghts-dembark", "yade", "python", ".venv/bin/python", "mkdir", "cd", "cp", "export", "module"}
 LIGGGHTS = {"pair_style", "fix", "compute", "dump", "thermo_style", "wall", "resume_state", "if", "region", "run"}
@@ -44,7 +44,7 @@ def blocks(*kinds: str) -> list[Block]:
 def _of_engine(block: Block) -> Block:
     """LAMMPS and LIGGGHTS have one language; the styles tell which of them is meant."""
     kinds = {"deck": "LAMMPS deck", "syntax": "LAMMPS syntax", "LIGGGHTS fragment": "LAMMPS fragment"}
-    lammps = block.page.startswith("docs/lammps_") or re.search("dembark/granular|wall/dembark", block.text)
+    lammps = block.page.startswith("docs/reference/lammps_") or re.search("dembark/granular|wall/dembark", block.text)
     return replace(block, kind=kinds.get(block.kind, block.kind)) if lammps else block
 
 

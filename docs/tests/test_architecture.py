@@ -47,7 +47,7 @@ def actual() -> dict[str, set[str]]:
 
 
 def test_packages_import_only_what_the_table_says() -> None:
-    page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/development/architecture.md").read_text(encoding="utf-8")
     table = {name: set(re.findall(r"`([a-z._]+)`", row)) for name, row in re.findall(r"^\| `([a-z._]+)` \|(.*)\|$", page, re.MULTILINE)}
     found = actual()
     assert len(table) == 11 and set(found) - {"validation"} == set(table)
@@ -74,7 +74,7 @@ def named_cases(text: str, cases: set[str]) -> set[str]:
 
 
 def test_the_picture_names_folders_that_exist() -> None:
-    page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/development/architecture.md").read_text(encoding="utf-8")
     picture = page.split("```picture")[1].split("```")[0]
     names = re.findall(r"\b(?:input_decks|validation|postproc|plugins)[/\w<>]*", picture)
     named = {name.replace("/<case>", "").rstrip("/") for name in names}

@@ -1,4 +1,4 @@
-"""Every block of README.md and docs/*.md is run, or stands in the table of those that are not, with the reason."""
+"""Every block of README.md and docs/**/*.md is run, or stands in the table of those that are not, with the reason."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ def test_complete_deck(block: Block, tmp_path: Path) -> None:
 
 
 def test_decks_show_what_their_pages_say(tmp_path: Path) -> None:
-    drag, pull = (next(block.text for block in blocks("deck") if block.page == f"docs/{page}.md")
+    drag, pull = (next(block.text for block in blocks("deck") if block.page == f"docs/reference/{page}.md")
                   for page in ("liggghts_tangential_finnie_rabinowicz", "liggghts_cohesion_capillary"))
     ratios = [row[3] for row in run_lammps(drag, tmp_path)][1:]
     assert 0.5 < ratios[0] < 0.6 and ratios == sorted(ratios, reverse=True)
@@ -109,13 +109,13 @@ def load_errors(name: str = "capillary_errors") -> object:
 
 def test_table_of_capillary_errors_is_that_of_the_data() -> None:
     errors = load_errors()
-    page = (ROOT / "docs/liggghts_cohesion_capillary.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/reference/liggghts_cohesion_capillary.md").read_text(encoding="utf-8")
     assert page.split("<!-- capillary_errors.py -->\n")[1].split("\n<!-- end -->")[0] == errors.markdown(errors.summary(errors.read()))
 
 
 def test_tables_of_unequal_spheres_are_those_of_the_data() -> None:
     errors = load_errors("capillary_ratio_errors")
-    page = (ROOT / "docs/liggghts_cohesion_capillary.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/reference/liggghts_cohesion_capillary.md").read_text(encoding="utf-8")
     for name, table in (("table", errors.table()), ("law", errors.law_table())):
         assert page.split(f"<!-- capillary_ratio_errors.py: {name} -->\n")[1].split("\n<!-- end -->")[0] == table
 

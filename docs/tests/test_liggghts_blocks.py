@@ -139,7 +139,7 @@ def test_syntax_is_that_of_lines_that_run(block: Block) -> None:
 
 
 def test_resumed_run_says_what_its_page_says(liggghts: engines.Engine, tmp_path: Path) -> None:
-    page = "docs/liggghts_fix_resume_exact.md"
+    page = "docs/reference/liggghts_fix_resume_exact.md"
     (text,) = (block.text for block in blocks("deck") if block.page == page)
     (said,) = (block.text for block in blocks("output") if block.page == page)
     exactly, approximately = said.splitlines()
@@ -164,7 +164,7 @@ def test_binary_dump(liggghts: engines.Engine, tmp_path: Path, monkeypatch: pyte
 
 
 def test_compute_after_the_first_run_is_refused(liggghts: engines.Engine, tmp_path: Path) -> None:
-    page = (ROOT / "docs/trajectories.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/how-to/trajectories.md").read_text(encoding="utf-8")
     told = re.search(r"Otherwise the engine stops: `([^`]*)`", page).group(1)
     compute = next(line for line in shown() if "pair/gran/local" in line)
     (tmp_path / "deck.in").write_text(deck(["run 1", compute, "run 1"]))

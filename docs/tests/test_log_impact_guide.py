@@ -21,12 +21,12 @@ def found() -> dict[str, Any]:
 
 
 def test_table_is_that_of_the_data(found: dict[str, Any]) -> None:
-    page = (ROOT / "docs/log_impact_guide.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/how-to/log_impact_guide.md").read_text(encoding="utf-8")
     assert page.split("<!-- drum_penalty.py -->\n")[1].split("\n<!-- end -->")[0] == drum_penalty.markdown(found)
 
 
 def test_table_of_many_logs_is_that_of_the_data_and_so_are_the_largest_steps(found: dict[str, Any]) -> None:
-    page = (ROOT / "docs/log_impact_guide.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/how-to/log_impact_guide.md").read_text(encoding="utf-8")
     assert page.split("<!-- drum_penalty.py, many -->\n")[1].split("\n<!-- end -->")[0] == drum_penalty.markdown_many(found)
     found = dict(found)
     drum_penalty.conclude(found)

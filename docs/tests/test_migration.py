@@ -1,4 +1,4 @@
-"""The statements of docs/migration.md about models of YADE, tried with them."""
+"""The statements of docs/how-to/migration.md about models of YADE, tried with them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names in README.md and docs/*.md are those of the code: modules, commands, options, styles, keywords, classes, variables, files."""
+"""Names in README.md and docs/**/*.md are those of the code: modules, commands, options, styles, keywords, classes, variables, files."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def exists(name: str) -> bool:
 
 
 def test_table_of_modules_for_fields() -> None:
-    table = re.findall(r"^\| ((?:`[\w.]+`(?:, )?)+) \| (.*) \|$", TEXTS["docs/fields.md"].split("| module | what |")[1].split("\n\n")[0],
+    table = re.findall(r"^\| ((?:`[\w.]+`(?:, )?)+) \| (.*) \|$", TEXTS["docs/how-to/fields.md"].split("| module | what |")[1].split("\n\n")[0],
                        re.MULTILINE)
     assert len(table) > 5
     for modules, what in table:
@@ -110,7 +110,7 @@ def test_commands_and_options_exist() -> None:
 
 
 def test_table_of_options() -> None:
-    named = {option for cell in rows(TEXTS["docs/fields.md"], "option") for option in re.findall(r"`(--[a-z-]+)`", cell)}
+    named = {option for cell in rows(TEXTS["docs/how-to/fields.md"], "option") for option in re.findall(r"`(--[a-z-]+)`", cell)}
     assert named <= subcommands()["fields"] | subcommands()["walls"]
     assert {option for option in subcommands()["fields"] if option.startswith("--")} - named == {"--help"}
 
@@ -171,7 +171,7 @@ def test_readme_and_pages_name_every_class_of_yade() -> None:
 def test_keywords_of_liggghts_exist() -> None:
     source = code("plugins/liggghts", "plugins/physics")
     for page, text in TEXTS.items():
-        if page.startswith("docs/liggghts_"):
+        if page.startswith("docs/reference/liggghts_"):
             cells = rows(text, "keyword", "property", "name")
             names = [name for cell in cells for name in re.findall(r"`(\w+)`", cell) if not name.startswith("_")]
             assert [name for name in names if f'"{name}"' not in source] == [], page

@@ -1,4 +1,4 @@
-"""The statements of docs/stock_defects.md about LIGGGHTS 3.8.0, tried with the stock program.
+"""The statements of docs/how-to/stock_defects.md about LIGGGHTS 3.8.0, tried with the stock program.
 
 A test that fails means that the installed LIGGGHTS no longer has the defect: the page is then to be changed.
 """

@@ -70,8 +70,8 @@ SAID = {"LcpImpact": "impacts: ", "CapillaryLiquid": "all liquid: 1e-09", "Energ
         "Ig2_Wall_Sphere_ScGeom": "stopped after 0.0071",
         "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz": "bridges: 1"}
 # Headings of the pages of YADE below which a table of attributes or methods stands, and pages about one class.
-CLASSES = {"docs/yade_lcp_impact.md": "LcpImpact", "docs/yade_energy_account.md": "EnergyAccount",
-           "docs/yade_sph_fluid.md": "SphFluid"}
+CLASSES = {"docs/reference/yade_lcp_impact.md": "LcpImpact", "docs/reference/yade_energy_account.md": "EnergyAccount",
+           "docs/reference/yade_sph_fluid.md": "SphFluid"}
 # Words in the first column of other tables: of the dict for friction, and of a body's blocked degrees of freedom.
 NO_ATTRIBUTES = {"static", "kinetic", "slip", "strength", "area", "healing", "xyzXYZ", "XYZ", "zXY", "zXYZ"}
 

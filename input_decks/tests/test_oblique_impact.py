@@ -155,7 +155,7 @@ def test_deviations_of_both_signs_do_not_cancel_and_scatter_of_the_data_does_not
 
 
 def test_partial_slip_accounts_for_what_the_law_lacks_below_5_degrees() -> None:
-    """The table of docs/single_impacts.md."""
+    """The table of docs/theory/single_impacts.md."""
     data, every = oblique.measured(), impacts(defaults("oblique_impact"))
     one = replace(every, **{field.name: value[..., : len(data)] for field in fields(Impacts)
                             if isinstance(value := getattr(every, field.name), np.ndarray)})

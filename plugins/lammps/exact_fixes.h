@@ -1,4 +1,4 @@
-// Fixes of LAMMPS that go on exactly from a state of fix resume/exact. docs/restarts.md has the same list, which a test compares.
+// Fixes of LAMMPS that go on exactly from a state of fix resume/exact. docs/how-to/restarts.md has the same list, which a test compares.
 #ifndef DEMBARK_EXACT_FIXES_H
 #define DEMBARK_EXACT_FIXES_H
 

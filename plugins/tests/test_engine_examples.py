@@ -9,7 +9,7 @@ from rig.engine_examples import PACKAGES, ROOT, Example, bulk, outputs, programs
 from conftest import skip_without
 
 EXAMPLES = table()
-PAGE = (ROOT / "docs/engine_examples.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs/how-to/engine_examples.md").read_text(encoding="utf-8")
 # Beyond what contacts that turn, or end, change in a run of some hundred grains; rows of the table with another number say why.
 WITHIN = {"centre": 0.03, "height": 0.03, "kinetic": 0.1, "walls": 0.15, "grains": 0.0}
 

@@ -1,4 +1,4 @@
-"""Fields on a grid from grains and contacts by coarse graining; definitions and sources: docs/fields_theory.md."""
+"""Fields on a grid from grains and contacts by coarse graining; definitions and sources: docs/theory/fields_theory.md."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class Fields:
     """Coarse-grained fields, averages over each cell of `grid` and over `frames`; SI units, compression positive.
 
     Arrays are (nx, ny, nz), vectors (nx, ny, nz, 3), tensors (nx, ny, nz, 3, 3); NaN where a mean has nothing to average over; None
-    what the frames did not hold. `units` and `long_names` have an entry for each. Definitions: docs/fields_theory.md.
+    what the frames did not hold. `units` and `long_names` have an entry for each. Definitions: docs/theory/fields_theory.md.
     """
 
     grid: Grid

@@ -79,9 +79,9 @@ def _call(case: Case, name: str, call: Callable[[Callable[..., Any]], Any]) -> M
             raise
         raise deck.failed(path, error) from error
     if not isinstance(found, Measurement):
-        raise DembarkError(f"{name} of {path} returned {type(found).__name__}", "", "return a Measurement, see docs/cases.md")
+        raise DembarkError(f"{name} of {path} returned {type(found).__name__}", "", "return a Measurement, see docs/how-to/cases.md")
     if wrong := next((f"{key} = {value!r}" for key, value in found.values.items() if not isinstance(value, Value)), ""):
-        raise DembarkError(f"{name} of {path} returned {wrong}", "", "give a Value with an Estimate, see docs/cases.md")
+        raise DembarkError(f"{name} of {path} returned {wrong}", "", "give a Value with an Estimate, see docs/how-to/cases.md")
     return found
 
 

@@ -15,7 +15,7 @@ from dembark.validation.runs.plan import Run
 
 # Wall time (s) between states unless another one is asked for.
 INTERVAL = 600.0
-# What the decks call their states; docs/restarts.md has the format of the mark beside each.
+# What the decks call their states; docs/how-to/restarts.md has the format of the mark beside each.
 BASE = "state"
 _ATTEMPTS = "attempts.json"
 

@@ -1,4 +1,4 @@
-"""LAMMPS as its users run it (docs/lammps_features.md): what works gives what the plain run gives, the rest is refused in one line."""
+"""LAMMPS as its users run it (docs/how-to/lammps_features.md): what works gives what the plain run gives, the rest is refused in one line."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -38,7 +38,7 @@ def test_documentation_promises_what_is_compiled():
     laws = {("finnie_rabinowicz", "off"), ("finnie_rabinowicz", "capillary"), ("history", "capillary")}
     assert {(n, t, c, r, "default") for n in normals.split("|") for r in rollings.split("|") for t, c in laws} == COMBINATIONS
     for page in ("tangential_finnie_rabinowicz", "cohesion_capillary"):
-        text = (ROOT / f"docs/liggghts_{page}.md").read_text(encoding="utf-8")
+        text = (ROOT / f"docs/reference/liggghts_{page}.md").read_text(encoding="utf-8")
         assert f"`model {normals}`" in text and f"`rolling_friction {rollings}`" in text and "`surface default`" in text
 
 

@@ -1,6 +1,6 @@
 """Scripts from YADE's own source tree: unchanged they do in the overlay what they do in stock YADE, and with dembark's law they run.
 
-The replacements are those of docs/migration.md; `LAW` stands for Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz, `IP2` for
+The replacements are those of docs/how-to/migration.md; `LAW` stands for Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz, `IP2` for
 Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys.
 """
 

@@ -12,7 +12,7 @@ from dembark.validation.campaigns.spec import shipped
 from dembark.validation.runs import schema
 from dembark.validation.runs.schema import TABLES
 
-PAGE = (Path(__file__).resolve().parents[3] / "docs/campaigns.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).resolve().parents[3] / "docs/how-to/campaigns.md").read_text(encoding="utf-8")
 
 
 def blocks(kind: str) -> list[str]:
