@@ -47,33 +47,6 @@ def read() -> dict[str, Array]:
     return {name: np.asarray(table[name]) for name in table.dtype.names}
 
 
-def summary(columns: dict[str, Array]) -> list[list[str]]:
-    """For each model the largest deviation in per cent, where the model has a bridge: of the force for each contact angle, from
-    V/R^3 = 1e-4 on up to 0.8 of the rupture distance and then over the whole grid, and of the rupture distance."""
-
-    def worst(values: Array) -> str:
-        value = 100.0 * float(values[np.argmax(np.abs(values))])
-        return f"{value:+.2g}" if abs(value) < 10 else f"{value:+.0f}" if abs(value) < 1000 else f"×{1.0 + 0.01 * value:.0f}"
-
-    angle, share = columns["contact_angle_deg"], columns["gap_over_rupture"]
-    # Rounding of the file must not decide about the end of the range.
-    usual = (columns["volume_over_R3"] > 0.99e-4) & (share <= 0.8)
-    rows = []
-    for model in CAPILLARY_MODELS:
-        deviation = columns[model]
-        held = (deviation > -1.0) & (share < 1.0)
-        near = [worst(deviation[(angle == a) & usual & held]) for a in ANGLES]
-        whole = [worst(deviation[(angle == a) & held]) for a in ANGLES]
-        rows.append([model, *near, *whole, worst(deviation[share == 1.0])])
-    return rows
-
-
-def markdown(rows: list[list[str]]) -> str:
-    """The table of the page docs/reference/liggghts_cohesion_capillary.md."""
-    lines = ["| model | 0° | 30° | 60° | whole, 0° | 30° | 60° | rupture |", "|---|---|---|---|---|---|---|---|"]
-    return "\n".join([*lines, *(f"| `{row[0]}` | " + " | ".join(row[1:]) + " |" for row in rows)])
-
-
 def main() -> None:
     """Solve for the grid and write the file."""
     FILE.parent.mkdir(exist_ok=True)
@@ -85,7 +58,6 @@ def main() -> None:
                 for share in GAPS:
                     writer.writerow(f"{value:.7g}" for value in row(angle, float(volume), float(share)))
                 writer.writerow(f"{value:.7g}" for value in rupture_row(angle, float(volume)))
-    print(markdown(summary(read())))
 
 
 if __name__ == "__main__":

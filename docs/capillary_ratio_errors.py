@@ -2,8 +2,7 @@
 
 The law for equal spheres of R = 2 R* (the approximation of Derjaguin) is what tables and formulas made for equal spheres can do; it is
 compared with `exact`, which takes the spheres as they are. `exact` is compared with dembark.physics.young_laplace. Run as a script it
-solves for the reference, some minutes, writes figures/capillary_ratio_reference.csv and figures/capillary_ratio_errors.csv beside it and
-prints the tables of the page.
+solves for the reference, some minutes, and writes figures/capillary_ratio_reference.csv and figures/capillary_ratio_errors.csv.
 """
 
 from __future__ import annotations
@@ -64,38 +63,6 @@ def law_errors(row: Sequence[float]) -> Array:
     return np.append(law / np.array(forces) - 1.0, rupture_distance(volume, theta, *pair) / end - 1.0)
 
 
-def _percent(values: Array, form=np.max) -> str:
-    value = 100.0 * float(form(np.abs(values)))
-    return f"{value:.2g}" if value < 10.0 else f"{value:.0f}"
-
-
-def _name(ratio: float) -> str:
-    return "wall" if ratio == 0.0 else f"1:{1.0 / ratio:.0f}"
-
-
-def table() -> str:
-    """Effective radius: largest and median deviation in per cent over all angles and volumes, for the page
-    docs/reference/liggghts_cohesion_capillary.md."""
-    lines = ["| radii | touching | median | gap to 0.6 of rupture | median | gap to 0.9 | median | rupture | median |", "|" + "---|" * 9]
-    for ratio in RATIOS:
-        forces, ends = (np.array(part) for part in zip(*(effective_radius_errors(ratio, angle) for angle in ANGLES), strict=True))
-        parts = (forces[..., 0], forces[..., (SHARES > 0.0) & (SHARES < 0.61)], forces[..., (SHARES > 0.0) & (SHARES < 0.91)], ends)
-        cells = [_percent(part, form) for part in parts for form in (np.max, np.median)]
-        lines.append("| " + " | ".join([_name(ratio), *cells]) + " |")
-    return "\n".join(lines)
-
-
-def law_table() -> str:
-    """`exact`: largest deviation from the reference in per cent for the same page."""
-    reference = read_reference()
-    lines = ["| radii | " + " | ".join("touching" if s == 0.0 else f"{s:g} of rupture" for s in REFERENCE_SHARES) + " | rupture |",
-             "|" + "---|" * 7]
-    for ratio in RATIOS:
-        errors = np.array([law_errors(row) for row in reference if row[0] == ratio])
-        lines.append("| " + " | ".join([_name(ratio), *(_percent(column) for column in errors.T)]) + " |")
-    return "\n".join(lines)
-
-
 def _write(name: str, header: Sequence[str], rows: Iterable[Sequence[float]]) -> None:
     with (FOLDER / name).open("w", newline="", encoding="ascii") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -116,14 +83,13 @@ def write_errors() -> None:
 
 
 def main() -> None:
-    """Solve for the reference, write the files, print the tables."""
+    """Solve for the reference and write the files."""
     FOLDER.mkdir(exist_ok=True)
     _write("capillary_ratio_reference.csv",
            ("radius_ratio", "contact_angle_deg", "volume_over_R3", "rupture_over_R", *(f"force_{s:g}" for s in REFERENCE_SHARES),
             "force_at_rupture"),
            (reference_row(ratio, angle, volume) for ratio in RATIOS for angle in ANGLES for volume in REFERENCE_VOLUMES))
     write_errors()
-    print(table(), law_table(), sep="\n")
 
 
 if __name__ == "__main__":

@@ -92,6 +92,23 @@ def _is_python(text: str) -> bool:
         return False
 
 
+def columns(page: Path, head: str) -> dict[str, list[str]]:
+    """Of each section of a page the cells of its tables in the columns whose head begins with `head`, where there are some."""
+    found: dict[str, list[str]] = {}
+    section, at = "", None
+    for line in page.read_text(encoding="utf-8").splitlines():
+        if line.startswith("## "):
+            section = line.removeprefix("## ")
+        cells = line.strip("|").split("|") if line.startswith("|") else []
+        if not cells:
+            at = None
+        elif at is None:
+            at = next((number for number, cell in enumerate(cells) if cell.strip().startswith(head)), -1)
+        elif at >= 0 and not line.startswith("|---"):
+            found.setdefault(section, []).append(cells[at].strip())
+    return found
+
+
 def logical_lines(text: str, continuation: str) -> list[str]:
     """Lines without comments, those that end with `continuation` joined to the next."""
     joined: list[str] = []

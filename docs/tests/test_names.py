@@ -6,8 +6,9 @@ import importlib
 import re
 from functools import cache
 
+import pytest
 import typer
-from blocks import PAGES, ROOT, blocks, commands, logical_lines
+from blocks import PAGES, ROOT, blocks, columns, commands, logical_lines
 
 from dembark.postproc import cli as postproc
 from dembark.validation import cli, engines
@@ -179,6 +180,18 @@ def test_keywords_of_liggghts_exist() -> None:
     assert len(registered) >= 4
     told = {name for text in TEXTS.values() for cell in rows(text, "keyword") for name in re.findall(r"`(\w+)`", cell)}
     assert set(registered) <= told
+
+
+@pytest.mark.parametrize(("engine", "folders"), [
+    ("LIGGGHTS", ("plugins/liggghts", "plugins/physics", "plugins/lammps_family")),
+    ("LAMMPS", ("plugins/lammps", "plugins/physics", "plugins/lammps_family")), ("Python", ("plugins/python/physics",))])
+def test_parameters_exist(engine: str, folders: tuple[str, ...]) -> None:
+    named = {name for cells in columns(ROOT / "docs/reference/parameters.md", engine).values() for cell in cells
+             for name in re.findall(r"`([a-z]\w+)`", cell)}
+    source = code(*folders)
+    # Those of the stock normal models.
+    named -= {"coefficientRestitution", "tangential_damping", "limitForce"} if engine == "LIGGGHTS" else set()
+    assert len(named) > 20 and [name for name in named if not re.search(rf'"{name}"|\b{name}: ', source)] == []
 
 
 def test_quantities_exist() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from blocks import PAGES, ROOT, Block, blocks
+from blocks import PAGES, ROOT, Block, blocks, columns
 
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
@@ -72,6 +72,11 @@ SAID = {"LcpImpact": "impacts: ", "CapillaryLiquid": "all liquid: 1e-09", "Energ
 # Headings of the pages of YADE below which a table of attributes or methods stands, and pages about one class.
 CLASSES = {"docs/reference/yade_lcp_impact.md": "LcpImpact", "docs/reference/yade_energy_account.md": "EnergyAccount",
            "docs/reference/yade_sph_fluid.md": "SphFluid"}
+PARAMETERS = ROOT / "docs/reference/parameters.md"
+PAIRS, CONTACTS = "Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys", "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz"
+# The class whose attributes a section of that page names.
+SECTIONS = {"Contact": PAIRS, "Options": CONTACTS, "Liquid": PAIRS, "Carried liquid": "CapillaryLiquid", "Impacts of logs": "LcpImpact",
+            "Fluid": "SphFluid"}
 # Words in the first column of other tables: of the dict for friction, and of a body's blocked degrees of freedom.
 NO_ATTRIBUTES = {"static", "kinetic", "slip", "strength", "area", "healing", "xyzXYZ", "XYZ", "zXY", "zXYZ"}
 
@@ -110,6 +115,10 @@ def classes() -> dict[str, list[str]]:
             elif line.startswith("| `") and name:
                 words = [word for word in re.findall(r"`(\w+)(?:\([^`]*\))?`", line.split("|")[1]) if word not in NO_ATTRIBUTES]
                 found.setdefault(name, []).extend(words)
+    for section, cells in columns(PARAMETERS, "YADE").items():
+        # Those of materials and of other bodies, and the value `none`, are no attributes of the class.
+        words = [word for cell in cells if " of the " not in cell for word in re.findall(r"`(\w+)`", cell) if word != "none"]
+        found.setdefault(SECTIONS[section], []).extend(words)
     return found
 
 
@@ -150,6 +159,6 @@ def test_classes_have_the_attributes_that_their_pages_name(results: dict[str, An
 
 
 def test_pages_name_all_attributes_of_their_classes(results: dict[str, Any]) -> None:
-    text = "\n".join(page.read_text(encoding="utf-8") for page in PAGES if page.name.startswith("yade_"))
+    text = "\n".join(page.read_text(encoding="utf-8") for page in PAGES if page == PARAMETERS or page.name.startswith("yade_"))
     untold = {name: [attribute for attribute in one["own"] if f"`{attribute}" not in text] for name, one in results["classes"].items()}
     assert {name: attributes for name, attributes in untold.items() if attributes} == {}
