@@ -2,7 +2,7 @@
 //
 //   exact         the stable axisymmetric bridge (equation of Young and Laplace, no gravity) between the spheres as they are, from tables
 //                 built once: about 70 ms of one core for equal spheres, and 0.25 s more with the first unequal pair or wall.
-//                 docs/reference/liggghts_cohesion_capillary.md has the errors. The tables span V/R^3 = 1e-9...1 and angles up to 90 degrees;
+//                 docs/theory/capillary.md has the errors. The tables span V/R^3 = 1e-9...1 and angles up to 90 degrees;
 //                 smaller volumes go on by similarity, larger ones act as V/R^3 = 1
 //   willett       closed form and
 //   willett_full  regression of Willett, Adams, Johnson & Seville, Langmuir 16 (2000) 9396

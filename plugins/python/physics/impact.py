@@ -2,7 +2,7 @@
 
 The scheme is that of the LIGGGHTS fix and the YADE engine; the C++ headers are the same. A log has its mass at the centre and a massless
 boundary on a spring; in every time step the gaps and normal forces of all contacts are one linear complementarity problem.
-Formulas: docs/reference/python_impact.md.
+Formulas: docs/theory/lcp.md.
 """
 
 from __future__ import annotations
