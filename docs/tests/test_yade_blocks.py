@@ -76,7 +76,7 @@ PARAMETERS = ROOT / "docs/reference/parameters.md"
 PAIRS, CONTACTS = "Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys", "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz"
 # The class whose attributes a section of that page names.
 SECTIONS = {"Contact": PAIRS, "Options": CONTACTS, "Liquid": PAIRS, "Carried liquid": "CapillaryLiquid", "Impacts of logs": "LcpImpact",
-            "Fluid": "SphFluid"}
+            "Energies": "EnergyAccount", "Fluid": "SphFluid"}
 # Words in the first column of other tables: of the dict for friction, and of a body's blocked degrees of freedom.
 NO_ATTRIBUTES = {"static", "kinetic", "slip", "strength", "area", "healing", "xyzXYZ", "XYZ", "zXY", "zXYZ"}
 
