@@ -91,7 +91,10 @@ def write(case: Case, engine: str, values: Mapping[str, Value], folder: Path) ->
     require_capable(case, engine, values)
     setup = prepare(case, values)
     folder.mkdir(parents=True, exist_ok=True)
+    # Parts of decks are in the decks already.
     for name, path in _companions(case).items():
+        if path.suffix == ".in":
+            continue
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(path, folder / name)
     for name, content in _files(case, engine, values, setup).items():

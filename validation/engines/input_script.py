@@ -28,7 +28,7 @@ class InputScript(Engine):
         width = max((len(name) for name in given), default=0)
         lines = [f"variable {name:{width}} index {text}" + (f" # {numbers[name].meaning}" if numbers[name].meaning else "")
                  for name, text in given.items()]
-        body = environment.from_string(source).render({name: number.value for name, number in numbers.items()})
+        body = environment.from_string(source).render({"engine": cls.facts.name} | {name: number.value for name, number in numbers.items()})
         # The opening comment of the source stays on top.
         top = re.match(r"(?:#.*\n)*", source)
         head = top.group() if top else ""
