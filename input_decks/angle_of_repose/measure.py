@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from dembark.input_decks.common.growth import ordered
 from dembark.input_decks.common.heaps import at_rest, flank, surface
+from dembark.input_decks.common.power_law import ordered
 from dembark.postproc.measurement import Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas, profile
 from dembark.postproc.studies import compared, fitted_exponent, measured, propagated
 

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dembark.input_decks.avalanche.slope_flow import Slope, front_law, layers, mean_power
-from dembark.input_decks.common.growth import Growth, ordered
 from dembark.input_decks.common.heaps import at_rest
 from dembark.input_decks.common.momentum import imbalance, impulses, left_to, walls_of
+from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc import GrainFrame
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import (
@@ -26,6 +25,8 @@ from dembark.postproc.measurement import (
     profile,
 )
 from dembark.postproc.studies import measured
+
+from .slope_flow import Slope, front_law, layers, mean_power
 
 ALONE = "one run of a chaotic motion says nothing about its spread"
 # Inclinations (rad) up to which a bed on the chute shall be at rest, and up to which it flows slowly.
@@ -212,6 +213,6 @@ def study(name: str, results: Points, along: str) -> Measurement:  # noqa: ARG00
     """Power of the depth with which the mean speed grows, over the depths that were measured."""
     results, _ = ordered(results, along)
     depth = np.array([measured(one, "bed_depth").value for one in results])
-    growth = Growth.of(results, "mean_speed", depth)
+    growth = PowerLawFit.of(results, "mean_speed", depth)
     return Measurement({"speed_power": Value(growth.exponent, exact(1.5))},
                        [growth.curve("mean_speed", "Mean speed on the chute", "depth of the bed over d", "over √(g d)")])

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dembark.input_decks.common.growth import Growth, ordered
+from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc.measurement import Array, Measurement, Points, Replica, Replicas, Value, exact, profile
 from dembark.postproc.studies import fitted_exponent, measured
 
@@ -56,7 +56,7 @@ def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001
     points, _ = ordered(points, along)
     force = np.array([_value(point, "peak_force") for point in points])
     speed = np.array([_value(point, "velocity") for point in points])
-    growth = Growth(force, speed, 0.0 * speed)
+    growth = PowerLawFit(force, speed, 0.0 * speed)
     return Measurement({"force_exponent": Value(exact(fitted_exponent(force, speed)), exact(1.0 / 6.0))},
                        [growth.curve("speed", "Speed of the wave", "largest force (N)", "m/s", 1.0 / 6.0, "∝ F^(1/6)")])
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from dembark.input_decks.common import momentum
-from dembark.input_decks.common.growth import Growth, ordered
 from dembark.input_decks.common.heaps import height, surface
+from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc import DumpError, GrainFrame
 from dembark.postproc.measurement import Array, Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas, profile
 
@@ -174,7 +174,7 @@ def measure(replicas: Replicas) -> Measurement:
 def study(_name: str, points: Points, along: str) -> Measurement:
     """Exponent of the step's energy error, with the interval that those of the errors give it."""
     points, steps = ordered(points, along)
-    errors = Growth.of(points, "step_error", steps)
+    errors = PowerLawFit.of(points, "step_error", steps)
     told = ", ".join(f"{error:.2e} at {step:g}" for step, error in zip(steps, errors.values, strict=True))
     return Measurement(
         {"order_step_error": Value(errors.exponent, exact(2.0), detail=f"errors {told} of the Rayleigh time")},

@@ -8,7 +8,7 @@ from types import SimpleNamespace as Parameters
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.input_decks.common.packing import Packing, largest
+from .packing import Packing, largest
 
 Number = float | int | str
 Array = NDArray[np.float64]

@@ -7,8 +7,8 @@ from types import SimpleNamespace as Parameters
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Array, rectangle
+from . import packing
+from .setup import Array, rectangle
 
 
 def trough(width: float, side: float, strips: int, depth: float) -> Array:

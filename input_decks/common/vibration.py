@@ -3,8 +3,9 @@
 import math
 
 from dembark.common.errors import DembarkError
-from dembark.input_decks.common.motion import amplitude
-from dembark.input_decks.common.setup import Number, Parameters, time_step
+
+from .motion import amplitude
+from .setup import Number, Parameters, time_step
 
 # Frames a period.
 PHASES = 8

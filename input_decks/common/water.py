@@ -2,7 +2,7 @@
 
 import math
 
-from dembark.input_decks.common.setup import Number, Parameters, Setup
+from .setup import Number, Parameters, Setup
 
 
 def fluid_setup(p: Parameters, box: tuple[float, float, float, float], rows: int = 400, **more: Number) -> Setup:

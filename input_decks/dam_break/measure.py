@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import linregress
 
-from dembark.input_decks.common.growth import Growth, ordered
-from dembark.input_decks.dam_break.water import common_values
+from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Numbers, Points, Replica, Replicas, Value, exact, profile
 from dembark.postproc.replica import once
 from dembark.postproc.statistics import student
 from dembark.postproc.studies import compared, measured, numerical
+
+from .water import common_values
 
 MEASURED = Path(__file__).with_name("reference") / "fronts.csv"
 NAMES = {"martin_moyce": "Martin & Moyce (1952)", "koshizuka_oka": "Koshizuka & Oka (1996)"}
@@ -99,7 +100,7 @@ def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001
             value = found[-1].value
             values[f"{what}_{source}"] = Value(Estimate(value, of_spacing, "spacing"), reference,
                                                detail=compared(value, reference, num=of_spacing).text)
-    curve = Growth(place, fronts, 0.0 * fronts).curve("front", "Front at T = 3", "particles across the column", "over a")
+    curve = PowerLawFit(place, fronts, 0.0 * fronts).curve("front", "Front at T = 3", "particles across the column", "over a")
     return Measurement(values, [curve])
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dembark.input_decks.common.growth import Growth, ordered
+from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc.convergence import convergence
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import Array, Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas, profile
@@ -119,11 +119,6 @@ def wetted(places: Array, width: float, dx: float) -> float:
     return float(grid.mean())
 
 
-def prepare(run: Replica) -> None:
-    """The frames are read while other runs go on."""
-    water(run)
-
-
 @once
 def moved(run: Replica) -> dict[str, float]:
     """What the history shows of the cubes and of energies; nan for what the run does not reach."""
@@ -205,7 +200,7 @@ def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001
     points, place = ordered(points, along)
     values, shown, remarks = {}, [], []
     for quantity, label, unit in CONVERGING:
-        growth = Growth.of(points, quantity, place)
+        growth = PowerLawFit.of(points, quantity, place)
         found, halves = growth.values.tolist(), growth.halves.tolist()
         between = exact(found[0] - found[1], float(np.hypot(halves[0], halves[1])))
         # A cube that stands falls at no time.

@@ -10,9 +10,10 @@ import math
 
 import numpy as np
 
-from dembark.input_decks.common.growth import Growth, ordered
-from dembark.input_decks.debarking_drum.drum_impacts import estimates, fields, profiles, read
+from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas, Value, pooled
+
+from .drum_impacts import estimates, fields, profiles, read
 
 CURVES = {"impacts_per_log": ("Impacts per log and revolution", "1"), "peak_force_mean": ("Mean peak force", "kN"),
           "peak_force_p99": ("Peak force that 1 % exceed", "kN"), "dissipated_energy": ("Energy dissipated per revolution", "kJ"),
@@ -52,7 +53,7 @@ def study(_name: str, points: Points, along: str) -> Measurement:
     label = {"filling": "filling", "drum_speed": "speed of the drum (rad/s)"}.get(along, along.replace("_", " "))
     values, curves = {}, []
     for quantity, (title, unit) in CURVES.items():
-        grown = Growth.of(points, quantity, place, 1e-3 if unit[0] == "k" else 1.0)
+        grown = PowerLawFit.of(points, quantity, place, 1e-3 if unit[0] == "k" else 1.0)
         values[f"{quantity}_exponent"] = Value(grown.exponent, detail=f"slope of a line through {len(points)} points on logarithmic axes")
         curves.append(grown.curve(quantity, title, label, title.lower() + ("" if unit == "1" else f" ({unit})")))
     remark = "All points are drums of the same size, each loaded separately and run in for the same number of revolutions."

@@ -6,11 +6,12 @@ from collections.abc import Callable
 import numpy as np
 
 from dembark.input_decks.common.drive_levels import acceleration
-from dembark.input_decks.common.growth import Growth, ordered
 from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
-from dembark.input_decks.drive_power.drive import Drive, phases, read, sticking_block, transients
+from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, over_replicas, profile
 from dembark.postproc.studies import measured
+
+from .drive import Drive, phases, read, sticking_block, transients
 
 # Up to this coefficient of restitution the bed counts as one that sticks.
 STICKS = 0.3
@@ -78,7 +79,7 @@ def study(name: str, points: Points, along: str) -> Measurement:
     bed shaken hard grow with the speed of the plate, at one frequency."""
     points, place = ordered(points, along)
     if name == "step":
-        gaps = Growth(place, np.array([abs(measured(point, "power_gap").value) for point in points]), np.zeros(len(points)))
+        gaps = PowerLawFit(place, np.array([abs(measured(point, "power_gap").value) for point in points]), np.zeros(len(points)))
         told = ", ".join(f"{gap:.2e} at {step:g}" for step, gap in zip(place, gaps.values, strict=True))
         return Measurement({"power_gap_order": Value(gaps.exponent, exact(2.0), detail=f"gaps {told} of the Rayleigh time")},
                            [gaps.convergence("power_gap", "Gap between both powers", "time step over the Rayleigh time", 2.0)])
@@ -86,7 +87,7 @@ def study(name: str, points: Points, along: str) -> Measurement:
         return Measurement({}, stiffness(points, place))
     dimensions = int(points[0]["parameters"]["dimensions"])
     speeds = np.array([measured(point, "speed").value for point in points])
-    rise, energy = (Growth.of(points, quantity, speeds) for quantity in ("rise", "kinetic_energy"))
+    rise, energy = (PowerLawFit.of(points, quantity, speeds) for quantity in ("rise", "kinetic_energy"))
     return Measurement(
         {f"rise_exponent_{dimensions}d": Value(rise.exponent, exact(RISE[dimensions])), "energy_exponent": Value(energy.exponent)},
         [rise.curve("rise", "Rise of the centre of mass", "V / √(g d)", "Δz / d", RISE[dimensions], f"∝ V^{RISE[dimensions]:g}"),

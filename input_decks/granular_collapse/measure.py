@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from dembark.input_decks.common.growth import Growth, ordered
 from dembark.input_decks.common.heaps import at_rest, column_height, front, height, power_law, surface
+from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc.measurement import Array, Estimate, Measurement, Points, Replica, Replicas, Value, over_replicas, profile
 from dembark.postproc.studies import compared, measured, propagated
 
@@ -67,7 +67,7 @@ def study(name: str, results: Points, along: str) -> Measurement:
         return _as_wide(results)
     if along == "aspect_ratio":
         place = np.array([measured(one, "aspect_ratio_measured").value for one in results])
-    growth = {quantity: Growth.of(results, quantity, place) for quantity in TITLES}
+    growth = {quantity: PowerLawFit.of(results, quantity, place) for quantity in TITLES}
     if along != "aspect_ratio":
         return Measurement({f"{quantity.removeprefix('final_')}_sensitivity": Value(one.exponent) for quantity, one in growth.items()},
                            [one.curve(f"{quantity}_{name}", TITLES[quantity], along.replace("_", " "), "over W")

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dembark.input_decks.common.growth import Growth, ordered
+from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.input_decks.plug_flow import channel
 from dembark.input_decks.plug_flow.channel import Channel, Mask, read_periodic
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, pooled, profile
@@ -95,16 +95,16 @@ def study(_name: str, points: Points, along: str) -> Measurement:
     points, widths = ordered(points, along)
     given, cells = points[0]["parameters"], widths / float(points[0]["parameters"]["grain_diameter"])
     speeds = np.sqrt(widths * float(given["gravity"]))
-    grown = {"greatest_velocity": Growth.of(points, "greatest_velocity", cells, speeds),
-             "slip_velocity": Growth.of(points, "slip_velocity", cells, speeds),
-             "thickness": Growth.of(points, "shear_zone_thickness", cells)}
+    grown = {"greatest_velocity": PowerLawFit.of(points, "greatest_velocity", cells, speeds),
+             "slip_velocity": PowerLawFit.of(points, "slip_velocity", cells, speeds),
+             "thickness": PowerLawFit.of(points, "shear_zone_thickness", cells)}
     reasons = [next(one["reason"] for one in point["quantities"] if one["name"] == "greatest_velocity") for point in points]
     broken = next((f"W = {width:.0f} d: {reason}" for width, reason in zip(cells, reasons, strict=True) if reason), "")
     short = f"the abstract refers to sufficiently wide channels without a width; these are {cells[0]:.0f} to {cells[-1]:.0f} d"
     scaled = [(np.array(one["place"], float), np.array(one["value"], float))
               for point in points for one in point["profiles"] if one["name"] == "scaled_velocity"]
     amplitude, worst = common_exponential(scaled)
-    ratio = Growth.of(points, "velocity_ratio", cells)
+    ratio = PowerLawFit.of(points, "velocity_ratio", cells)
     spread = Estimate(float(np.abs(ratio.values / ratio.values.mean() - 1.0).max()), float((ratio.halves / ratio.values).max()),
                       "largest of the widths")
     values = {
@@ -119,7 +119,7 @@ def study(_name: str, points: Points, along: str) -> Measurement:
     curves = [grown[name].curve(name, title, "width W / d", label, power, "proportional to " + ("√W" if power == 0.5 else "W"))
               for name, (title, label, power) in GROWN.items()]
     curves += scaled_curves(scaled, cells, amplitude)
-    core, wall = (Growth.of(points, name, cells).values for name in ("solid_fraction", "wall_solid_fraction"))
+    core, wall = (PowerLawFit.of(points, name, cells).values for name in ("solid_fraction", "wall_solid_fraction"))
     loose = ", ".join(f"{one:.3f} and {other:.3f} at {width:.0f} d" for one, other, width in zip(core, wall, cells, strict=True))
     return Measurement(values, curves, [
         (f"Solid fraction of the core and within two diameters of the walls: {loose}. Velocities proportional to √W require shear zones "

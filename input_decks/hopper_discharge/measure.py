@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.input_decks.common.growth import ordered
+from dembark.input_decks.common.power_law import ordered
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import (
     Array,

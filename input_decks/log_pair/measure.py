@@ -10,11 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from dembark.input_decks.common.growth import Growth, ordered
 from dembark.input_decks.common.log_run import read, solver_values
-from dembark.input_decks.log_pair.exact_motion import error, pair_curves, restitution, velocities
+from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.physics.exact.pairs import Pair
 from dembark.postproc.measurement import Measurement, Numbers, Points, Replicas, number
+
+from .exact_motion import error, pair_curves, restitution, velocities
 
 
 def pair(p: Numbers) -> Pair:
@@ -69,7 +70,7 @@ def study(_name: str, points: Points, along: str) -> Measurement:
     theta = points[0]["parameters"]["theta"]
     order, values, curves = 1.0 if theta > 0.5 else 2.0, {}, []
     for quantity, label in (("peak_force", "Error of the peak force"), ("velocity_curve_error", "Largest error of the velocity")):
-        errors = Growth(steps, np.array([error(point, quantity) for point in points]), np.zeros(len(steps)))
+        errors = PowerLawFit(steps, np.array([error(point, quantity) for point in points]), np.zeros(len(steps)))
         told = ", ".join(f"{error:.2e} at {step:.3g} s" for error, step in zip(errors.values, steps, strict=True))
         values[f"order_{quantity}"] = number(errors.exponent.value, order, detail=f"relative errors {told}")
         curves.append(errors.convergence(f"convergence_{quantity}", label, "τ (s)", order))

@@ -8,12 +8,7 @@ from dataclasses import replace
 
 from dembark.input_decks.silo import quantities
 from dembark.input_decks.silo.column import read
-from dembark.postproc.measurement import Measurement, Replica, Replicas
-
-
-def prepare(replica: Replica) -> None:
-    """What needs no other replica: done while they still run."""
-    quantities.scalars(read(replica))
+from dembark.postproc.measurement import Measurement, Replicas
 
 
 def measure(replicas: Replicas) -> Measurement:

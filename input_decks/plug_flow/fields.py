@@ -16,8 +16,6 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtr
 
-from dembark.input_decks.plug_flow.channel import Channel, free_grains
-from dembark.input_decks.plug_flow.channel import read as read_channel
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import CUTOFF
@@ -27,6 +25,9 @@ from dembark.postproc.measurement import Array, Measurement, Replica, Value
 from dembark.postproc.resampling import resampled
 from dembark.postproc.statistics import Estimate, TimeBlocks, block_mean, combined, over_replicas, student, time_blocks
 from dembark.postproc.walls import PlaneWall, wall_contacts
+
+from .channel import Channel, free_grains
+from .channel import read as read_channel
 
 WIDTH = 0.5  # of the kernel, in grain diameters: the layers at the walls stay apart
 _FIELDS = {

@@ -10,9 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from dembark.input_decks.common.liquid import liquid_values
-from dembark.input_decks.plug_flow import channel, fields
-from dembark.input_decks.plug_flow.channel import Channel
 from dembark.postproc.measurement import CONFIDENCE, Curve, Estimate, Measurement, Replicas, Value, block_mean, pooled
+
+from . import channel, fields
+from .channel import Channel
 
 # A wall zone whose velocity deficit is below this cannot be told from the core's own scatter.
 LEAST_DEFICIT = 0.02

@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.input_decks.common.growth import ordered
-from dembark.input_decks.rotating_drum.drum_flow import DrumFlow, estimates, layer_flux, read
+from dembark.input_decks.common.power_law import ordered
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, pooled, profile
 from dembark.postproc.statistics import jackknife
 from dembark.postproc.studies import compared, measured
+
+from .drum_profile import DrumFlow, estimates, layer_flux, read
 
 HERE = Path(__file__).with_name("reference")
 FLOW = ("surface_speed", "layer_depth", "layer_shape", "zero_crossing")

@@ -23,13 +23,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.input_decks.silo import janssen
-from dembark.input_decks.silo.container_geometry import Container, container
 from dembark.physics import capillary_force
 from dembark.postproc import ContactFrame, GrainFrame, profiles, stress
 from dembark.postproc.measurement import Array, Estimate, Replica, block_mean
 from dembark.postproc.replica import once
 from dembark.postproc.spheres import slice_volumes
+
+from . import janssen
+from .silo_geometry import Container, container
 
 Mask = NDArray[np.bool_]
 Bridges = Callable[[Array], Array]

@@ -14,9 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from dembark.input_decks.silo import column, janssen
-from dembark.input_decks.silo.column import Column, Mask
-from dembark.input_decks.silo.container_geometry import Cylinder, overlap
 from dembark.postproc import ContactFrame, GrainFrame
 from dembark.postproc.fields.rings import Fields, Rings, Zones, coarse_grain
 from dembark.postproc.labelled import labelled, variable, with_interval
@@ -27,6 +24,10 @@ from dembark.postproc.statistics import Estimate, TimeBlocks, block_mean, over_r
 from dembark.postproc.walls import CylinderWall, PlaneWall, wall_contacts
 from dembark.postproc.walls.patches import cylinder_patches
 from dembark.postproc.walls.stress import WallRecorder
+
+from . import column, janssen
+from .column import Column, Mask
+from .silo_geometry import Cylinder, overlap
 
 # Shares of the filling height that the radial profiles are averaged over.
 BANDS = ((0.2, 0.3), (0.45, 0.55), (0.7, 0.8))

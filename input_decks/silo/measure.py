@@ -7,15 +7,10 @@ with K of the contact stress and the friction that the wall was given; in the st
 from dataclasses import replace
 
 from dembark.input_decks.common.liquid import liquid_values
-from dembark.input_decks.silo import fields, quantities
-from dembark.input_decks.silo.column import read
-from dembark.postproc.measurement import Measurement, Points, Replica, Replicas
+from dembark.postproc.measurement import Measurement, Points, Replicas
 
-
-def prepare(replica: Replica) -> None:
-    """What needs no other replica: done while they still run."""
-    quantities.scalars(read(replica))
-    fields.read(replica)
+from . import fields, quantities
+from .column import read
 
 
 def measure(replicas: Replicas) -> Measurement:

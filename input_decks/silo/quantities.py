@@ -8,16 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from dembark.input_decks.common.growth import Growth, ordered
-from dembark.input_decks.silo import janssen
-from dembark.input_decks.silo.column import Column, Mask
-from dembark.input_decks.silo.container_geometry import overlap
+from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc.measurement import Array, Measurement, Value
 from dembark.postproc.replica import once
 from dembark.postproc.resampling import pooled, profile, resampled
 from dembark.postproc.statistics import Estimate, block_mean, exact, time_blocks
 from dembark.postproc.studies import measured as of_point
 from dembark.postproc.studies import propagated
+
+from . import janssen
+from .column import Column, Mask
+from .silo_geometry import overlap
 
 Fit = Callable[[Mask, Mask], Any]
 ZERO = Estimate(0.0, 0.0)
@@ -104,7 +105,7 @@ def predicted(points: Sequence[Mapping[str, Any]]) -> Measurement:
                           "K and μ_mob of dry")
 
     depth = np.array([height(point) for point in held])
-    base = Growth.of(held, "apparent_mass_ratio", depth)
+    base = PowerLawFit.of(held, "apparent_mass_ratio", depth)
     fitted = propagated(lambda values: janssen.fitted_friction(depth, values), base.values, base.halves, "the apparent masses")
     values = {"held_out_k_mu": Value(fitted, k_mu, detail=f"fitted to {len(held)} other silos; reference: K and μ_mob of dry alone")}
     for point, y in zip(held, depth, strict=True):
@@ -112,7 +113,7 @@ def predicted(points: Sequence[Mapping[str, Any]]) -> Measurement:
                                                             detail=f"filled {y:.2f} R high; reference: Janssen with K, μ_mob, ρ_b of dry")
     points = sorted(points, key=height)
     place = np.array([height(point) for point in points])
-    every = Growth.of(points, "apparent_mass_ratio", place, place)
+    every = PowerLawFit.of(points, "apparent_mass_ratio", place, place)
     if len({point["parameters"]["cylinder_radius"] for point in points}) == 1:
         pair = janssen.fitted_pair(place, every.values, [(2.0, 0.02), (2.0, 0.5)], ((0.05, 100.0), (0.0, 0.9 * place[-1])), 1.0)
         one = janssen.fitted_length(place, every.values, 2.0)
@@ -130,8 +131,8 @@ def mobilised(points: Sequence[Mapping[str, Any]]) -> Measurement:
     """How much of its kinetic friction the wall mobilises, over the static friction of the wall, which the results `points` differ in."""
     points, place = ordered(points, "wall_friction")
     kinetic = place * np.array([point["parameters"]["kinetic_friction_ratio"] for point in points], float)
-    share = Growth.of(points, "wall_mobilisation", place, 1.0 / kinetic)
-    sliding = Growth.of(points, "sliding_load", place)
+    share = PowerLawFit.of(points, "wall_mobilisation", place, 1.0 / kinetic)
+    sliding = PowerLawFit.of(points, "sliding_load", place)
     along = "static friction of the wall"
     return Measurement({}, [
         profile("mobilisation", "Mobilised friction", along, "μ_mob / kinetic friction", place, [share.values], half=share.halves,

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from dembark.input_decks.single_contact.impacts import Flight, Solutions, materials, worst
 from dembark.physics.exact.impacts import Impacts, Rebounds, sliding_throughout
 from dembark.postproc.measurement import Array, Value, number, profile
+
+from .impacts import Flight, Solutions, materials, worst
 
 Found = tuple[dict[str, Value], list[dict[str, Any]]]
 

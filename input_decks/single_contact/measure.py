@@ -10,10 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.input_decks.single_contact.impact_tests import head_on, mirrored, oblique, restitutions
-from dembark.input_decks.single_contact.impacts import Flight, Solutions, impacts, read, sweep
-from dembark.input_decks.single_contact.published_curves import beside_published
 from dembark.postproc.measurement import Measurement, Numbers, Replicas, number
+
+from .impact_tests import head_on, mirrored, oblique, restitutions
+from .impacts import Flight, Solutions, impacts, read, sweep
+from .published_curves import beside_published
 
 PUBLISHED = Path(__file__).with_name("reference") / "chung_ooi_2011.csv"
 LABELS = {"published": "Chung and Ooi (2011), DEM", "finite_elements": "Chung and Ooi (2011), finite elements"}

@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from dembark.input_decks.single_contact.impacts import worst
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.resampling import profile
 from dembark.postproc.statistics import Estimate
+
+from .impacts import worst
 
 
 def beside_published(found: Measurement, path: Path, variant: str, labels: Mapping[str, str]) -> Measurement:

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from dembark.input_decks.common.phases import read_phases
-from dembark.input_decks.common.vibrated_bed import Trough
+from dembark.input_decks.common.drive_phases import read_phases
 from dembark.input_decks.common.vibration import PHASES
+from dembark.input_decks.common.vibratory_trough import Trough
 from dembark.postproc import GrainsDump
 from dembark.postproc.tests.dumps import grains_text
 

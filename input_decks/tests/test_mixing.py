@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dembark.input_decks.common.phases import Phases
+from dembark.input_decks.common.drive_phases import Phases
 from dembark.input_decks.common.vibration import PHASES
 from dembark.input_decks.vibro_mixing.mixing import cells, lacey_index, lower_half, mixing_rate, rate, samples, segregation, wall_drift
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from dembark.input_decks.rotating_drum.drum_flow import read
+from dembark.input_decks.rotating_drum.drum_profile import read
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find

@@ -7,8 +7,8 @@ import pytest
 
 from dembark.input_decks.silo import janssen
 from dembark.input_decks.silo.column import wall_pull
-from dembark.input_decks.silo.container_geometry import Cylinder, Slab
 from dembark.input_decks.silo.quantities import moving_mean
+from dembark.input_decks.silo.silo_geometry import Cylinder, Slab
 
 
 @pytest.mark.parametrize("vessel", [Cylinder(0.025), Slab(0.05, 0.03)])

@@ -16,7 +16,7 @@ from dembark.common.errors import DembarkError
 from dembark.input_decks.common.momentum import CONTACT_PARTS
 from dembark.input_decks.common.trough import sites_within
 from dembark.input_decks.common.trough import trough as trough_mesh
-from dembark.input_decks.common.vibrated_bed import Trough, read
+from dembark.input_decks.common.vibratory_trough import Trough, read
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.input_decks.tests.synthetic_bed import trough
 from dembark.postproc.replica import Replica

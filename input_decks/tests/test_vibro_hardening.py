@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.input_decks.common import vibrated_bed
+from dembark.input_decks.common import vibratory_trough
 from dembark.input_decks.common.trough import polygon
 from dembark.input_decks.tests.measuring import defaults, judged, module, names
 from dembark.input_decks.tests.synthetic_bed import PERIOD, PERIODS, trough
 from dembark.input_decks.tests.test_vibro_finishing import account
-from dembark.input_decks.vibro_hardening.contact_record import ContactRecord, nearest, read_record
+from dembark.input_decks.vibro_hardening.part_impacts import ContactRecord, nearest, read_record
 from dembark.postproc.replica import Replica
 from dembark.postproc.tests.dumps import grains_text
 
@@ -62,7 +62,7 @@ def measured(folder: Path, booked: float = 1.0, lost: int = 0) -> dict[str, Any]
     # As heavy as the impacts on the part are strong.
     light = replace(run, rows=rows, weight=whole / (PERIODS * PERIOD))
     replica = Replica(Path(), {"parameters": defaults("vibro_hardening")})
-    replica.__dict__["_read"] = {vibrated_bed.read.__wrapped__: light, hardening.touches.__wrapped__: hits}
+    replica.__dict__["_read"] = {vibratory_trough.read.__wrapped__: light, hardening.touches.__wrapped__: hits}
     return judged("vibro_hardening", hardening.measure([replica]))
 
 

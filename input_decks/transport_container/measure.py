@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.input_decks.common.growth import ordered
 from dembark.input_decks.common.momentum import imbalance, impulses
 from dembark.input_decks.common.motion import about_y, motion
+from dembark.input_decks.common.power_law import ordered
 from dembark.postproc.measurement import (
     Array,
     Curve,

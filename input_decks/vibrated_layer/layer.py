@@ -9,12 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from dembark.input_decks.common.drive_levels import Level, levels
-from dembark.input_decks.common.phases import read_phases
+from dembark.input_decks.common.drive_phases import read_phases
 from dembark.input_decks.common.vibration import PHASES
-from dembark.input_decks.vibrated_layer.standing_waves import Waves, amplitude, onset, order_onset, surface_levels
 from dembark.postproc import DumpError
 from dembark.postproc.measurement import Array, Estimate, Replica, block_mean
 from dembark.postproc.replica import once
+
+from .standing_waves import Waves, amplitude, onset, order_onset, surface_levels
 
 # Power at f/2 over that of noise from which a level counts as one with waves.
 SEEN = 4.0

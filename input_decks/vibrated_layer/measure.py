@@ -6,13 +6,14 @@ from collections.abc import Callable
 import numpy as np
 import xarray as xr
 
-from dembark.input_decks.common.growth import ordered
 from dembark.input_decks.common.momentum import unexplained
+from dembark.input_decks.common.power_law import ordered
 from dembark.input_decks.common.vibration import PHASES
-from dembark.input_decks.vibrated_layer.layer import Layer, mean_power, read, wave_amplitude
-from dembark.input_decks.vibrated_layer.standing_waves import Waves, amplitude, rank_correlation
 from dembark.postproc.measurement import Curve, Estimate, Measurement, Numbers, Points, Replicas, Value, exact, over_replicas, profile
 from dembark.postproc.studies import measured
+
+from .layer import Layer, mean_power, read, wave_amplitude
+from .standing_waves import Waves, amplitude, rank_correlation
 
 # Accelerations (g) up to which a layer is flat, and those at which it has waves at f/2 and no others; not at the onset.
 FLAT, WAVY = 2.0, (2.75, 4.0)

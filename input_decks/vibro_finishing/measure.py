@@ -5,9 +5,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dembark.input_decks.common.growth import ordered
 from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
-from dembark.input_decks.common.vibrated_bed import Trough, drifts, read, spectra, spread
+from dembark.input_decks.common.power_law import ordered
+from dembark.input_decks.common.vibratory_trough import Trough, drifts, read, spectra, spread
 from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas, Value, exact, over_replicas
 from dembark.postproc.statistics import combined
 from dembark.postproc.studies import measured
@@ -33,7 +33,7 @@ def measure(replicas: Replicas) -> Measurement:
         "energy_balance": Value(exact(np.max([imbalance(one.rows, CONTACT_PARTS) for one in runs])), exact(0.0)),
         "circulation": over(Trough.turning, drive), "spin": over(Trough.spin, drive), "revolution": over(Trough.revolution, drive),
         "part_height": over(Trough.height, diameter), "power": over(lambda one: one.power("trough")),
-        "noise": once(lambda one: one.noise("trough")), "stirring": over(Trough.stirring),
+        "noise": once(lambda one: one.noise("trough")), "stirring": over(Trough.fluctuation_ratio),
         "agitation": over(Trough.agitation),
     }
     if p["part_diameter"] == diameter and p["part_density"] == p["grain_density"]:

@@ -6,16 +6,17 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from dembark.input_decks.common import vibrated_bed
-from dembark.input_decks.common.growth import Growth, ordered
+from dembark.input_decks.common import vibratory_trough
 from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
 from dembark.input_decks.common.motion import motion
+from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.input_decks.common.trough import polygon
-from dembark.input_decks.vibro_hardening.contact_record import ContactRecord, histogram, read_record
 from dembark.postproc.measurement import Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas
 from dembark.postproc.replica import once
 from dembark.postproc.statistics import combined
 from dembark.postproc.studies import measured
+
+from .part_impacts import ContactRecord, histogram, read_record
 
 ONE = "one run of a chaotic motion says nothing about its spread"
 WALLS = ("trough", "part")
@@ -36,7 +37,7 @@ def touches(replica: Replica) -> ContactRecord:
 
 def measure(replicas: Replicas) -> Measurement:
     """Values and curves of all replicas of a series."""
-    runs, records, p = [vibrated_bed.read(one) for one in replicas], [touches(one) for one in replicas], replicas[0].parameters
+    runs, records, p = [vibratory_trough.read(one) for one in replicas], [touches(one) for one in replicas], replicas[0].parameters
     drive = 2.0 * math.pi * p["motion_frequency"]
     mass = p["grain_density"] * math.pi / 6.0 * p["grain_diameter"] ** 3
     unit = 0.5 * mass * runs[0].speed**2
@@ -45,7 +46,7 @@ def measure(replicas: Replicas) -> Measurement:
         one = over_replicas(found)
         return Value(Estimate(one.value / scale, one.half / scale, one.basis))
 
-    def of_run(number: Callable[[vibrated_bed.Trough], float]) -> Value:
+    def of_run(number: Callable[[vibratory_trough.Trough], float]) -> Value:
         return over([Estimate(number(one), math.inf, ONE) for one in runs])
 
     values = {
@@ -54,12 +55,12 @@ def measure(replicas: Replicas) -> Measurement:
         "impact_rate": over([one.rate() for one in records]), "impact_energy": over([one.energy() for one in records], unit),
         "friction_power": over([one.friction() for one in records]), "circulation": over([one.turning() for one in runs], drive),
         "power": over([one.power(*WALLS) for one in runs]), "noise": of_run(lambda one: one.noise("trough")),
-        "stirring": over([one.stirring() for one in runs]), "agitation": over([one.agitation() for one in runs]),
+        "stirring": over([one.fluctuation_ratio() for one in runs]), "agitation": over([one.agitation() for one in runs]),
     }
-    return Measurement(values, [vibrated_bed.drifts(runs), vibrated_bed.spectra(runs, "trough"), histogram(records, unit)])
+    return Measurement(values, [vibratory_trough.drifts(runs), vibratory_trough.spectra(runs, "trough"), histogram(records, unit)])
 
 
-def missed(run: vibrated_bed.Trough, record: ContactRecord) -> float:
+def missed(run: vibratory_trough.Trough, record: ContactRecord) -> float:
     """Size of the difference between the impulse of the record and that of the force on the part, over the weight times the window."""
     whole = np.array([run.rows[f"part_j{axis}"][-1] - run.rows[f"part_j{axis}"][0] for axis in "xyz"])
     return float(np.linalg.norm(record.impulse() - whole) / (run.weight * run.periods * run.run.period))
@@ -73,8 +74,8 @@ def study(name: str, points: Points, along: str) -> Measurement:
         ratio = found[-1].value / found[0].value
         gain = Estimate(ratio, ratio * combined([one.half / one.value for one in (found[0], found[-1])]), "propagated from both runs")
         verdict = "pass" if gain.interval[0] > 1.0 else "fail" if gain.interval[1] <= 1.0 else "info"
-        curve = Growth.of(points, "stirring", place).curve("stirring", "Fluctuation over mean speed", "amplitude (m)", "")
+        curve = PowerLawFit.of(points, "stirring", place).curve("stirring", "Fluctuation over mean speed", "amplitude (m)", "")
         told = "passes when the whole interval is above 1"
         return Measurement({"stirring_gain": Value(gain, exact(1.0), verdict=verdict, detail=told)}, [curve])
-    return Measurement({f"{quantity}_change": Value(vibrated_bed.spread([measured(point, quantity) for point in points]), exact(0.0))
+    return Measurement({f"{quantity}_change": Value(vibratory_trough.spread([measured(point, quantity) for point in points]), exact(0.0))
                         for quantity in STEADY})

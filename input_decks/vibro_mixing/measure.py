@@ -7,19 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark.input_decks.common.drive_levels import acceleration
+from dembark.input_decks.common.drive_phases import Phases, read_phases
 from dembark.input_decks.common.momentum import unexplained
-from dembark.input_decks.common.phases import Phases, read_phases
-from dembark.input_decks.vibro_mixing.mixing import (
-    Kinds,
-    cells,
-    lacey_index,
-    lower_half,
-    mixing_rate,
-    rate,
-    samples,
-    segregation,
-    wall_drift,
-)
 from dembark.postproc.measurement import (
     Array,
     Curve,
@@ -34,6 +23,18 @@ from dembark.postproc.measurement import (
     profile,
 )
 from dembark.postproc.replica import once
+
+from .mixing import (
+    Kinds,
+    cells,
+    lacey_index,
+    lower_half,
+    mixing_rate,
+    rate,
+    samples,
+    segregation,
+    wall_drift,
+)
 
 # Width of a sample in mean diameters; labellings at random; phase at which the bed lies on the floor.
 SAMPLE, LABELLINGS, PHASE = 3.0, 16, 0

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.input_decks.common.phases import Phases
+from dembark.input_decks.common.drive_phases import Phases
 from dembark.input_decks.common.vibration import PHASES
 from dembark.postproc.measurement import Array, Estimate
 from dembark.postproc.statistics import block_mean, student

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.input_decks.common.growth import Growth, ordered
+from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.input_decks.dam_break.water import common_values, pressure
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import Array, Curve, Measurement, Points, Replica, Replicas, Value, exact, profile
@@ -171,4 +171,4 @@ def study(name: str, points: Points, along: str) -> Measurement:
                      "cylinder": ("added_mass", 1.0), "slot": ("slot_error", 0.0)}[name.removesuffix("_wide")]
     errors = np.abs([measured(point, quantity).value - due for point in points])
     return Measurement({f"{name}_converges": Value(exact(float(errors[-1] / errors[0])), exact(0.0))},
-                       [Growth(place, errors, 0.0 * errors).curve("error", "Error", "particles across", "deviation from theory")])
+                       [PowerLawFit(place, errors, 0.0 * errors).curve("error", "Error", "particles across", "deviation from theory")])

@@ -68,7 +68,7 @@ def test_a_process_keeps_the_modules_that_it_imported_and_sees_changes_of_other_
 
 
 @pytest.mark.parametrize(("case", "module"), [("silo", "silo/column.py"), ("plane_silo", "silo/column.py"),
-                                               ("plane_silo", "common/growth.py")])
+                                               ("plane_silo", "common/power_law.py")])
 def test_the_modules_of_a_case_are_inputs_of_its_measurement(case: str, module: str) -> None:
     measure = folders.find(case).folder / "measure.py"
     assert f"input_decks/{module}" in imports.dependencies(measure).files

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dembark.input_decks.common.phases import Phases, binned, read_phases
-from dembark.input_decks.common.vibration import PHASES
 from dembark.postproc.measurement import Array, Curve, Estimate, Replica, block_mean, profile
 from dembark.postproc.replica import once
 from dembark.postproc.statistics import combined, jackknife
+
+from .drive_phases import Phases, binned, read_phases
+from .vibration import PHASES
 
 # Width of the cells of the velocity field, in mean diameters.
 CELL = 4.0
@@ -114,7 +115,7 @@ class Trough:
         bounds = [(places[..., axis].min() / width, places[..., axis].max() / width) for axis in (0, 2)]
         return [width * np.arange(math.floor(low), math.ceil(high) + 1, dtype=np.float64) for low, high in bounds]
 
-    def stirring(self) -> Estimate:
+    def fluctuation_ratio(self) -> Estimate:
         """Fluctuation over mean speed: root mean square of the displacements in a period about the mean of their cell, over the mean size
         of the cells' means, both weighted by mass; resampled in blocks of time."""
         return self._resampled(lambda random, mean: random / mean)

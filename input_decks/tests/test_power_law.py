@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dembark.input_decks.common.growth import Growth, ordered
+from dembark.input_decks.common.power_law import PowerLawFit, ordered
 
 
 def points(widths, exponent, half):
@@ -16,14 +16,14 @@ def points(widths, exponent, half):
 def test_the_exponent_has_the_interval_that_those_of_the_values_give_it():
     rising, place = ordered(points([4.0, 1.0, 2.0], 0.7, 0.03), "width")
     assert place.tolist() == [1.0, 2.0, 4.0] and [one["parameters"]["width"] for one in rising] == place.tolist()
-    found = Growth.of(rising, "speed", place).exponent
+    found = PowerLawFit.of(rising, "speed", place).exponent
     assert found.value == pytest.approx(0.7)
     assert found.half == pytest.approx(0.01 * np.sqrt(2.0) / np.log(4.0))
 
 
 def test_factors_scale_values_and_intervals():
     rising, place = ordered(points([1.0, 2.0, 4.0], 0.5, 0.3), "width")
-    found = Growth.of(rising, "speed", place, np.sqrt(place))
+    found = PowerLawFit.of(rising, "speed", place, np.sqrt(place))
     np.testing.assert_allclose(found.values, 3.0 * place)
     np.testing.assert_allclose(found.halves, 0.3 * place)
     assert found.exponent.value == pytest.approx(1.0)
@@ -31,7 +31,7 @@ def test_factors_scale_values_and_intervals():
 
 def test_a_curve_lies_on_the_law_that_it_follows_and_not_on_another():
     rising, place = ordered(points([1.0, 2.0, 4.0], 2.0, 0.3), "width")
-    one = Growth.of(rising, "speed", place)
+    one = PowerLawFit.of(rising, "speed", place)
     drawn = one.curve("speed", "Speed", "width", "u", 2.0, "proportional to W²")
     assert drawn["reference"] == pytest.approx(drawn["value"]) and drawn["low"] == pytest.approx(2.7 * place**2)
     assert one.curve("speed", "Speed", "width", "u", 1.0)["reference"] != pytest.approx(drawn["value"], rel=0.1)
@@ -44,4 +44,4 @@ def test_without_an_interval_the_exponent_has_none():
     given = points([1.0, 2.0, 4.0], 0.5, 0.3)
     given[1]["quantities"][0]["interval"] = None
     rising, place = ordered(given, "width")
-    assert Growth.of(rising, "speed", place).exponent.half == np.inf
+    assert PowerLawFit.of(rising, "speed", place).exponent.half == np.inf

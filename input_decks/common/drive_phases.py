@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.input_decks.common.vibration import PHASES
 from dembark.postproc.dumptext import DumpError
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.measurement import Array
+
+from .vibration import PHASES
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dembark.input_decks.common.phases import binned, read_phases, velocity_field
+from dembark.input_decks.common.drive_phases import binned, read_phases, velocity_field
 from dembark.input_decks.common.vibration import PHASES
 from dembark.postproc import DumpError, GrainsDump
 from dembark.postproc.tests.dumps import grains_text

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dembark.input_decks.common.vibrated_bed import circulation, drifts, spectra, spectrum
 from dembark.input_decks.common.vibration import PHASES
+from dembark.input_decks.common.vibratory_trough import circulation, drifts, spectra, spectrum
 from dembark.input_decks.tests.synthetic_bed import PERIOD, D, trough
 
 
@@ -38,7 +38,7 @@ def test_a_part_like_a_grain_and_one_that_stays(tmp_path: Path) -> None:
 
 
 def test_stirring_grows_with_what_is_random(tmp_path: Path) -> None:
-    low, high = (trough(tmp_path, noise=noise).stirring().value for noise in (2e-5, 2e-4))
+    low, high = (trough(tmp_path, noise=noise).fluctuation_ratio().value for noise in (2e-5, 2e-4))
     assert low < 0.5 * high
 
 

@@ -19,7 +19,7 @@ def ordered(points: Sequence[Mapping[str, Any]], along: str) -> tuple[list[Mappi
 
 
 @dataclass(frozen=True)
-class Growth:
+class PowerLawFit:
     """A positive quantity over a parameter: `place`, `values` and the half-widths `halves` of their intervals, all (n,)."""
 
     place: Array
@@ -27,7 +27,7 @@ class Growth:
     halves: Array
 
     @classmethod
-    def of(cls, points: Sequence[Mapping[str, Any]], name: str, place: Array, factors: Array | float = 1.0) -> Growth:
+    def of(cls, points: Sequence[Mapping[str, Any]], name: str, place: Array, factors: Array | float = 1.0) -> PowerLawFit:
         """The quantity `name` of the results `points`, times `factors`, at `place`."""
         found = [measured(point, name) for point in points]
         values, halves = (factors * np.array([getattr(one, part) for one in found]) for part in ("value", "half"))
