@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,16 @@ CHANGES: dict[str, dict[str, Any]] = {"dry": {}, "wet": {"bridge_volume": 8e-11}
                                       "viscous": {"bridge_volume": 8e-11, "liquid_viscosity": 0.01}}
 VARIANTS = {"silo": ("dry", "wet"), "plane_silo": ("dry", "wet"), "plug_flow": ("dry", "wet", "rough"), "gravity_channel": ("dry", "wet"),
             "column_collapse": ("dry", "viscous")}
-RUNS = [(case, engine, variant) for case in CASES for engine in find(case).engines for variant in VARIANTS[case]]
+# One wet silo, one rough channel and one collapse are run by default, and all of them in all engines with --full.
+QUICK = {("silo", "liggghts", "wet"), ("plug_flow", "yade", "rough"), ("column_collapse", "lammps", "viscous")}
+
+
+def marked(*run: str) -> Any:
+    """A run that only --full includes, unless it is one of QUICK."""
+    return pytest.param(*run, marks=() if run in QUICK else pytest.mark.full)
+
+
+RUNS = [marked(case, engine, variant) for case in CASES for engine in find(case).engines for variant in VARIANTS[case]]
 ENGINES = [(case, engine) for case in CASES for engine in find(case).engines]
 
 
@@ -89,6 +99,7 @@ def test_outputs_have_the_common_schema(case: str, engine: str, variant: str, fi
     np.testing.assert_allclose(times["time"], times["step"] * run.setup.time_step, rtol=1e-8)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("case", CASES)
 def test_engines_start_from_the_same_grains(case: str, finished: Any) -> None:
     tables = []
@@ -101,7 +112,7 @@ def test_engines_start_from_the_same_grains(case: str, finished: Any) -> None:
         np.testing.assert_allclose(tables[0], table, rtol=1e-7)
 
 
-@pytest.mark.parametrize(("case", "engine", "variant"), [run for run in RUNS if run[0] != "column_collapse"])
+@pytest.mark.parametrize(("case", "engine", "variant"), [run for run in RUNS if run.values[0] != "column_collapse"])
 def test_forces_on_each_grain_add_up(case: str, engine: str, variant: str, finished: Any) -> None:
     """Contacts, walls and gravity make up the engine's own total; liquid bridges over a gap are contacts too.
 
@@ -123,6 +134,7 @@ def test_other_seed_makes_another_packing(case: str, engine: str, decks: Any, tm
     assert not np.allclose(np.sort(one.diameters), np.sort(other.diameters))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("engine", find("gravity_channel").engines)
 def test_the_gravity_channel_holds_its_solid_fraction(engine: str, finished: Any) -> None:
     """The period follows from the volume of the grains, and what was compressed stays in the channel (and jams, at this fraction)."""
@@ -137,8 +149,9 @@ def test_the_gravity_channel_holds_its_solid_fraction(engine: str, finished: Any
     assert np.abs((times["left_fz"] + times["right_fz"])[packed]).mean() < np.abs((times["left_fz"] + times["right_fz"])[~packed]).mean()
 
 
-@pytest.mark.parametrize("engine", find("column_collapse").engines)
-@pytest.mark.parametrize("variant", VARIANTS["column_collapse"])
+@pytest.mark.parametrize(("engine", "variant"), [
+    pytest.param(*one, marks=marked("column_collapse", *one).marks)
+    for one in product(find("column_collapse").engines, VARIANTS["column_collapse"])])
 def test_energies_of_a_collapse_balance(engine: str, variant: str, finished: Any) -> None:
     run = finished("column_collapse", engine, variant)
     case = find("column_collapse")
@@ -161,8 +174,9 @@ def test_viscosity_without_liquid_is_refused(decks: Any, tmp_path: Path) -> None
         decks("column_collapse", "liggghts", tmp_path, {"liquid_viscosity": 0.01})
 
 
-@pytest.mark.parametrize(("case", "engine"), [(path.parent.name, path.stem) for path in sorted(Path(__file__).parents[1].glob("*/*.in"))
-                                              if path.stem in names()])
+@pytest.mark.parametrize(("case", "engine"), [
+    pytest.param(path.parent.name, path.stem, marks=() if path.parent.name == "silo" else pytest.mark.full)
+    for path in sorted(Path(__file__).parents[1].glob("*/*.in")) if path.stem in names()])
 def test_a_template_that_is_run_as_it_is_says_what_to_do(case: str, engine: str, decks: Any, tmp_path: Path) -> None:
     """The engine shows the first command that it does not know."""
     one = decks("single_contact", engine, tmp_path, {})

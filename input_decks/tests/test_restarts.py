@@ -104,8 +104,9 @@ def both(prepared: Any) -> Callable[..., tuple[Run, Run, int]]:
 
 
 @pytest.mark.parametrize(("case", "values"), [
-    ("plug_flow", PLUG | {"grain_count": 120}), ("column_collapse", COLUMN),
-    ("plane_silo", {"grain_count": 120, "silo_width": 0.03, "slab_depth": 0.024, "settle_time": 0.1, "measure_time": 0.05, "frames": 3})])
+    ("plug_flow", PLUG | {"grain_count": 120}), pytest.param("column_collapse", COLUMN, marks=pytest.mark.full), pytest.param(
+        "plane_silo", {"grain_count": 120, "silo_width": 0.03, "slab_depth": 0.024, "settle_time": 0.1, "measure_time": 0.05, "frames": 3},
+        marks=pytest.mark.full)])
 def test_no_grain_falls_through_the_base_after_a_restart(case: str, values: dict[str, Any], prepared: Any) -> None:
     """Pairs that nearly touch are found anew whenever YADE goes on from a state, also those with a base that is larger than the period."""
     run = prepared(case, "yade", values | {"restart_every": 80})
@@ -116,12 +117,13 @@ def test_no_grain_falls_through_the_base_after_a_restart(case: str, values: dict
 
 
 @pytest.mark.parametrize(("case", "engine", "ranks", "values"), [
-    ("silo", "liggghts", 1, SILO), ("silo", "yade", 1, SILO), ("plug_flow", "liggghts", 2, PLUG),
-    ("gravity_channel", "liggghts", 2, CHANNEL), ("gravity_channel", "yade", 1, CHANNEL), ("log_pile", "liggghts", 1, PILE),
-    ("log_pile", "yade", 1, PILE), ("column_collapse", "liggghts", 2, COLUMN), ("column_collapse", "yade", 1, COLUMN),
-    ("angle_of_repose", "liggghts", 1, BED), ("angle_of_repose", "yade", 1, BED),
-    ("silo", "lammps", 2, SILO), ("plug_flow", "lammps", 1, PLUG), ("gravity_channel", "lammps", 1, CHANNEL),
-    ("log_pile", "lammps", 1, PILE), ("column_collapse", "lammps", 1, COLUMN)])
+    ("column_collapse", "liggghts", 2, COLUMN), ("column_collapse", "yade", 1, COLUMN), ("log_pile", "lammps", 1, PILE),
+    *(pytest.param(*one, marks=pytest.mark.full) for one in [
+        ("silo", "liggghts", 1, SILO), ("silo", "yade", 1, SILO), ("plug_flow", "liggghts", 2, PLUG),
+        ("gravity_channel", "liggghts", 2, CHANNEL), ("gravity_channel", "yade", 1, CHANNEL), ("log_pile", "liggghts", 1, PILE),
+        ("log_pile", "yade", 1, PILE), ("angle_of_repose", "liggghts", 1, BED), ("angle_of_repose", "yade", 1, BED),
+        ("silo", "lammps", 2, SILO), ("plug_flow", "lammps", 1, PLUG), ("gravity_channel", "lammps", 1, CHANNEL),
+        ("column_collapse", "lammps", 1, COLUMN)])])
 def test_killed_run_goes_on_to_the_same_bytes(case: str, engine: str, ranks: int, values: dict[str, Any], both: Any) -> None:
     whole, broken, step = both(case, engine, values, ranks)
     if case == "log_pile":

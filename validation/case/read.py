@@ -222,8 +222,14 @@ class CaseReader(TableReader):
         return parameter
 
     def changes(self, kind: str, tables: Mapping[str, Any], parameters: Mapping[str, Parameter]) -> dict[str, dict[str, Value]]:
-        """All tables [KIND.NAME], profiles or variants: changed parameters by name."""
-        return {name: self.overrides(f"{kind}.{name}", entry, parameters) for name, entry in tables.items()}
+        """All tables [KIND.NAME], profiles or variants: changed parameters by name; `like` names an earlier one that an entry starts from."""
+        found: dict[str, dict[str, Value]] = {}
+        for name, entry in tables.items():
+            table = f"{kind}.{name}"
+            own = dict(entry) if isinstance(entry, dict) else entry
+            base = found[self.pick(str(own.pop("like")), found, kind[:-1], table)] if isinstance(own, dict) and "like" in own else {}
+            found[name] = base | self.overrides(table, own, parameters)
+        return found
 
     def overrides(self, table: str, entry: Any, parameters: Mapping[str, Parameter]) -> dict[str, Value]:
         """One table of changed parameters."""
