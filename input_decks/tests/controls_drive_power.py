@@ -11,7 +11,7 @@ from dembark.input_decks.tests.test_drive_power import rise_study, shaken, spoil
 
 def controls(_folder: Path) -> Iterator[Control]:
     right = verdicts()
-    yield Control("a plate slower than told", right, verdicts(shaken(told=2.6)))
+    yield Control("a plate slower than prescribed", right, verdicts(shaken(told=2.6)))
     yield Control("a fiftieth of the plate's force lost", right, verdicts(spoiled(plate_work=0.98)))
     yield Control("a thirtieth of the damping that is not booked", right, verdicts(spoiled(normal_viscous=0.97)))
     yield Control("a gap of first order", step_study(2.0), step_study(1.0))

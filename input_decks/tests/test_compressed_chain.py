@@ -52,11 +52,6 @@ def test_an_exact_run_passes(tmp_path: Path) -> None:
     assert names(verdicts(tmp_path, 0.05), "pass") == {"phase_error", "contact_steps", "position_estimate", "velocity_estimate"}
 
 
-def test_wrong_runs_fail(tmp_path: Path) -> None:
-    assert "phase_error" in names(verdicts(tmp_path, longer=1.0 + 1e-6), "fail")
-    assert {"position_estimate", "velocity_estimate", "contact_steps"} <= names(verdicts(tmp_path, 0.2, told=1.05), "fail")
-
-
 def test_commensurate_steps_would_hide_the_error_of_an_impact(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without other lengths of the step the order of Hooke's impact looks like four."""
     monkeypatch.setattr(chain, "GOLDEN", 0.0)

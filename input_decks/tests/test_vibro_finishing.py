@@ -71,11 +71,6 @@ def test_a_large_part_is_not_taken_for_a_grain(tmp_path: Path) -> None:
     assert "likeness" not in measured(trough(tmp_path, noise=5e-5))
 
 
-def test_wrong_runs_fail(tmp_path: Path) -> None:
-    assert "energy_balance" in names(measured(trough(tmp_path), 0.99), "fail")
-    assert "likeness" in names(measured(trough(tmp_path, noise=5e-5, still=True), **GRAIN), "fail")
-
-
 @pytest.mark.parametrize(("values", "failed"), [
     ({}, set()), ({"back": 0.01}, {"reversal"}), ({"back": -0.006}, {"reversal"}), ({"none": 0.004}, {"vertical"}),
 ])

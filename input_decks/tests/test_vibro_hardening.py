@@ -100,12 +100,6 @@ def test_known_impacts_are_counted_and_weighed(tmp_path: Path) -> None:
     assert hits.friction().value == pytest.approx(0.2 * 60 * MASS * 2.0 * SPEED * SLIP / (PERIODS * PERIOD * area), rel=1e-6)
 
 
-def test_a_right_record_passes_and_wrong_ones_fail(tmp_path: Path) -> None:
-    assert names(measured(tmp_path / "right"), "pass") == {"energy_balance", "touch_balance"}
-    assert "touch_balance" in names(measured(tmp_path / "lost", lost=6), "fail")
-    assert "energy_balance" in names(measured(tmp_path / "booked", 0.99), "fail")
-
-
 @pytest.mark.parametrize(("low", "high", "half", "verdict"), [
     (1.0, 3.0, 0.02, "pass"), (1.0, 1.0, 0.02, "info"), (1.0, 0.8, 0.02, "fail"), (1.0, 1.2, 0.3, "info")])
 def test_hardening_stirs_more_than_finishing(low: float, high: float, half: float, verdict: str) -> None:
