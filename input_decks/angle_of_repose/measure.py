@@ -4,16 +4,16 @@ V&V 20: the error E = S − D of a simulated value S against the datum D is know
 U_D². U_input follows from the exponents with which the angle grows with each coefficient (fit of Zhou et al. to their simulations).
 """
 
-import csv
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from dembark.input_decks.common.estimates import over_chaotic, reference_rows, values_and_halves
 from dembark.input_decks.common.heaps import at_rest, flank, surface
 from dembark.input_decks.common.power_law import ordered
-from dembark.postproc.measurement import Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas, profile
+from dembark.postproc.measurement import Estimate, Measurement, Points, Replica, Replicas, Value, exact, profile
 from dembark.postproc.studies import compared, fitted_exponent, measured, propagated
 
 CODE = Path(__file__).with_name("reference") / "moose_dem.csv"
@@ -39,8 +39,7 @@ def wall_factor(confinement: float) -> float:
 
 def code(confinement: float | None = None) -> list[tuple[float, float, float]]:
     """What the other code found: (d/w, coefficient of rolling resistance, angle in degrees), rising; at one d/w if given."""
-    with CODE.open(encoding="utf-8") as file:
-        rows = [(float(row["confinement"]), float(row["rolling_friction"]), float(row["angle"])) for row in csv.DictReader(file)]
+    rows = [(float(row["confinement"]), float(row["rolling_friction"]), float(row["angle"])) for row in reference_rows(CODE)]
     return sorted(row for row in rows if confinement in (None, row[0]))
 
 
@@ -57,8 +56,7 @@ def flanks(replica: Replica) -> tuple[float, float, bool]:
 def measure(replicas: Replicas) -> Measurement:
     """The angle, mean of both flanks and of all packings."""
     p, found = replicas[0].parameters, [flanks(replica) for replica in replicas]
-    simulated = over_replicas([Estimate(0.5 * (left + right), math.inf, "one packing gives no scatter between packings")
-                               for left, right, _ in found])
+    simulated = over_chaotic(0.5 * (left + right) for left, right, _ in found)
     of_input = simulated.value * p["input_uncertainty"] * math.hypot(*EXPONENTS)
     plate = p["plate_width"] / p["grain_diameter"]
     narrow = f"the plate is {plate:.3g} d wide, that of the experiment and of the other code {PLATE:g} d" if plate < 0.99 * PLATE else ""
@@ -80,8 +78,7 @@ def measure(replicas: Replicas) -> Measurement:
 def study(name: str, results: Points, along: str) -> Measurement:
     """The wall factor, with the angle against d/w; or the exponent in rolling resistance, with the angle against it."""
     results, place = ordered(results, along)
-    angles = [measured(one, "angle") for one in results]
-    values, halves = (np.array([getattr(one, part) for one in angles]) for part in ("value", "half"))
+    values, halves = values_and_halves([measured(one, "angle") for one in results])
     if name == "rolling":
         _, rolling, other = np.array(code(0.25)).T
         return Measurement({"rolling_exponent": Value(propagated(lambda y: fitted_exponent(place, y), values, halves, "the angles"),

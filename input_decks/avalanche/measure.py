@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dembark.input_decks.common.estimates import over_chaotic
 from dembark.input_decks.common.heaps import at_rest
 from dembark.input_decks.common.momentum import imbalance, impulses, left_to, walls_of
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
@@ -13,7 +14,6 @@ from dembark.postproc.history import reached
 from dembark.postproc.measurement import (
     Array,
     Curve,
-    Estimate,
     Measurement,
     Points,
     Replica,
@@ -28,7 +28,6 @@ from dembark.postproc.studies import measured
 
 from .slope_flow import Slope, front_law, layers, mean_power
 
-ALONE = "one run of a chaotic motion says nothing about its spread"
 # Inclinations (rad) up to which a bed on the chute shall be at rest, and up to which it flows slowly.
 REST, SLOW = 0.25, 0.36
 
@@ -111,7 +110,7 @@ def _grip(replica: Replica, place: Slope, frame: GrainFrame) -> tuple[float, flo
 
 def _avalanche(replicas: Replicas) -> Measurement:
     runs = [read(replica) for replica in replicas]
-    values = {name: Value(over_replicas([Estimate(run.numbers[name], math.inf, ALONE) for run in runs])) for name in runs[0].numbers}
+    values = {name: Value(over_chaotic(run.numbers[name] for run in runs)) for name in runs[0].numbers}
     values["front_ratio"] = Value(values["front_ratio"].estimate, exact(1.0))
     remarks = [] if all(run.rests for run in runs) else ["The deposit still moves when the run ends."]
     if all(run.impulse[0] == 0.0 for run in runs):
@@ -190,7 +189,7 @@ def _chute(replicas: Replicas) -> Measurement:
         speed = np.array([float(np.average(frame.velocities[:, 0], weights=frame.masses)) for frame in frames]) / unit
         means.append(block_mean(speed))
         depth = float(np.mean([2.0 * np.average(frame.positions[:, 2], weights=frame.masses) for frame in frames]))
-        depths.append(Estimate(depth / d, math.inf, ALONE))
+        depths.append(depth / d)
         sums = [layers(frame, d) for frame in frames]
         count = max(len(mass) for mass, _ in sums)
         mass, momentum = (np.array([np.pad(one[k], (0, count - len(one[k]))) for one in sums]) for k in (0, 1))
@@ -200,7 +199,7 @@ def _chute(replicas: Replicas) -> Measurement:
         powers.append(mean_power(middles[inside] / depth, mass[:, inside], momentum[:, inside]))
         curves.append(profile(f"speed_{len(curves) + 1}", "Velocity profile", "z / H", "speed over √(g d)", middles[inside] / depth, [u],
                               vertical=True))
-    values = {"bed_depth": Value(over_replicas(depths)), "mean_speed": Value(over_replicas(means))}
+    values = {"bed_depth": Value(over_chaotic(depths)), "mean_speed": Value(over_replicas(means))}
     if p["slope_angle"] <= REST:
         last = max(abs(one.value) for one in means)
         values["rest_speed"] = Value(exact(last), exact(0.0))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Array, Parameters, Setup, contacts, rectangle, time_step
+from dembark.input_decks.common.setup import Array, Parameters, Setup, contacts, rectangle, rows_and_frames, time_step
 
 
 def setup(p: Parameters) -> Setup:
@@ -17,9 +17,7 @@ def setup(p: Parameters) -> Setup:
     the gate and of the obstacle.
     """
     step, d = time_step(p), p.grain_diameter
-    every = math.ceil(p.flow_time / step / (20 * (p.frames - 1)))
-    first, stride = every * max(1, math.ceil(p.settle_time / step / every)), 20 * every
-    steps = first + stride * (p.frames - 1)
+    output = rows_and_frames(step, p.settle_time, p.flow_time, p.frames)
     chute, slab = p.bed_height > 0, p.slab_depth > 0
     depth = p.slab_depth * d
     sites, speeds = (_bed(p) if chute else (_release(p), lambda _: np.empty(0)))
@@ -30,7 +28,7 @@ def setup(p: Parameters) -> Setup:
     lift = 3.0 * packing.largest(p)
     # The gate runs ahead of the grains, and then up along itself, out of their way.
     ahead, rise = min(20.0, 0.5 * p.gate_place) * d, (p.gate_height + 5.0) * d * (len(gate) > 0)
-    turned = first + math.ceil(ahead / (p.gate_speed * step))
+    turned = output["first"] + math.ceil(ahead / (p.gate_speed * step))
     if chute:
         box = [(0.0, p.chute_length * d), (0.0, depth), (-lift, float(sites[:, 2].max()) + 10.0 * d)]
     else:
@@ -46,14 +44,14 @@ def setup(p: Parameters) -> Setup:
         own = speeds(bodies.positions[:, 2]) if chute else np.full(len(bodies.positions), p.start_speed)
         bodies = replace(bodies, velocities=np.pad(own[:, None], ((0, len(glued)), (0, 2))))
     bodies = bodies.joined(glued, d, p.grain_density, 2)
-    numbers = {"grain_count": p.grain_count, "first": first, "stride": stride, "every": every,
+    numbers = {"grain_count": p.grain_count, **output,
                "turned": turned, "opened": turned + math.ceil(rise / (p.gate_speed * step)), "ahead_x": p.gate_speed * along[0],
                "ahead_z": p.gate_speed * along[2], "rise_x": p.gate_speed * up[0], "rise_z": p.gate_speed * up[2], "chute": int(chute),
                "slab": int(slab), "gravity_x": p.gravity * math.sin(p.slope_angle) * chute,
                "gravity_z": -p.gravity * (math.cos(p.slope_angle) if chute else 1.0), "back": -p.slope_length * d * along[0],
                "end": p.flat_length * d, "floor_count": len(floor), "gate_count": len(gate), "obstacle_count": len(obstacle)}
     meshes = {"ground": _strips(p)} if p.floor == "strips" else {}
-    return Setup(steps, step, bodies, {**numbers, **contacts(p, skin=0.2)}, meshes)
+    return Setup(output["steps"], step, bodies, {**numbers, **contacts(p, skin=0.2)}, meshes)
 
 
 def _slope(p: Parameters) -> tuple[Array, Array]:

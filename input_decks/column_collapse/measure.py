@@ -6,7 +6,6 @@ the row in which the gate begins to move.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from dembark.input_decks.common import momentum
+from dembark.input_decks.common.estimates import over_chaotic
 from dembark.input_decks.common.heaps import height, surface
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc import DumpError, GrainFrame
-from dembark.postproc.measurement import Array, Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas, profile
+from dembark.postproc.measurement import Array, Estimate, Measurement, Points, Replica, Replicas, Value, exact, profile
 
 # What takes the energy, with the titles of the curves; liquid does so in wet columns.
 WAYS = {"kinetic": "Kinetic energy", "friction": "Dissipated by friction", "normal_viscous": "Dissipated by normal damping",
@@ -138,7 +138,7 @@ def measure(replicas: Replicas) -> Measurement:
     ways = WAYS | (WET if replicas[0].parameters["bridge_volume"] > 0.0 else {})
 
     def over(number: Callable[[Collapse], float]) -> Estimate:
-        return over_replicas([Estimate(number(one), math.inf, "one run of a chaotic motion gives no scatter between runs") for one in runs])
+        return over_chaotic(number(one) for one in runs)
 
     def share(name: str) -> Value:
         return Value(over(lambda one: float(one.lost_in(name)[-1])))
@@ -175,8 +175,8 @@ def study(_name: str, points: Points, along: str) -> Measurement:
     """Exponent of the step's energy error, with the interval that those of the errors give it."""
     points, steps = ordered(points, along)
     errors = PowerLawFit.of(points, "step_error", steps)
-    told = ", ".join(f"{error:.2e} at {step:g}" for step, error in zip(steps, errors.values, strict=True))
+    listed = ", ".join(f"{error:.2e} at {step:g}" for step, error in zip(steps, errors.values, strict=True))
     return Measurement(
-        {"order_step_error": Value(errors.exponent, exact(2.0), detail=f"errors {told} of the Rayleigh time")},
+        {"order_step_error": Value(errors.exponent, exact(2.0), detail=f"errors {listed} of the Rayleigh time")},
         [errors.convergence("step_error", "Energy error of the time step", "time step over the Rayleigh time", 2.0)],
         ["Work and kinetic energy balance to round-off at each of these steps; the error shown is that of the time step."])

@@ -109,10 +109,10 @@ def read(replica: Replica) -> LogRun:
 def solver_values(run: LogRun) -> dict[str, Value]:
     """How well the complementarity problems of all steps were solved, and with how many pivots."""
     rows = run.history
-    told = f"largest at the frames: {rows['pivots'].max():.0f}, of {rows['contacts'].max():.0f} possible contacts"
+    detail = f"largest at the frames: {rows['pivots'].max():.0f}, of {rows['contacts'].max():.0f} possible contacts"
     return {
         "certificate": number(rows["worst_certificate"][-1], 0.0),
-        "pivots_per_step": number(rows["pivots_total"][-1] / float(rows["step"][-1]), detail=told),
+        "pivots_per_step": number(rows["pivots_total"][-1] / float(rows["step"][-1]), detail=detail),
     }
 
 

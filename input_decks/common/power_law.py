@@ -11,6 +11,8 @@ import numpy as np
 from dembark.postproc.measurement import Array, Estimate, profile
 from dembark.postproc.studies import fitted_exponent, measured, propagated
 
+from .estimates import values_and_halves
+
 
 def ordered(points: Sequence[Mapping[str, Any]], along: str) -> tuple[list[Mapping[str, Any]], Array]:
     """The results `points` in the order of their parameter `along`, and its values (n,)."""
@@ -29,9 +31,8 @@ class PowerLawFit:
     @classmethod
     def of(cls, points: Sequence[Mapping[str, Any]], name: str, place: Array, factors: Array | float = 1.0) -> PowerLawFit:
         """The quantity `name` of the results `points`, times `factors`, at `place`."""
-        found = [measured(point, name) for point in points]
-        values, halves = (factors * np.array([getattr(one, part) for one in found]) for part in ("value", "half"))
-        return cls(place, values, halves)
+        values, halves = values_and_halves([measured(point, name) for point in points])
+        return cls(place, factors * values, factors * halves)
 
     @property
     def exponent(self) -> Estimate:

@@ -48,6 +48,14 @@ def window(start: int, stride: int, frames: int, rows: int = 1000) -> dict[str, 
     return {"first": start + stride, "stride": stride, "steps": steps, "every": max(1, steps // rows)}
 
 
+def rows_and_frames(step: float, settling: float, duration: float, frames: int) -> dict[str, int]:
+    """Output steps after `settling` (s), in steps of `step` (s): `frames` dumps over `duration` (s), the first at its beginning, and 20
+    rows of time.csv from one to the next."""
+    every = math.ceil(duration / step / (20 * (frames - 1)))
+    first, stride = every * max(1, math.ceil(settling / step / every)), 20 * every
+    return {"first": first, "stride": stride, "every": every, "steps": first + stride * (frames - 1)}
+
+
 def strides(duration: float, time_step: float, count: int) -> dict[str, Number]:
     """Output steps: `count` equal strides that cover `duration` (s), or a little more, in steps of `time_step` (s)."""
     stride = math.ceil(duration / time_step / count)

@@ -20,9 +20,9 @@ def measure(replicas: Replicas) -> Measurement:
     p = SimpleNamespace(**run.parameters)
     count = p.grain_count - 2
     shape = np.sin(math.pi * count * np.arange(p.grain_count) / (count + 1))
-    told = np.loadtxt(run.folder / "monitor.txt", ndmin=2)[-1]
+    reported = np.loadtxt(run.folder / "monitor.txt", ndmin=2)[-1]
     lasts = math.pi * math.sqrt(2.0) * math.sin(0.5 * math.pi * count / (count + 1)) / p.phase
-    values = {"phase_error": phase_error(run, shape), "contact_steps": told[2] / lasts}
+    values = {"phase_error": phase_error(run, shape), "contact_steps": reported[2] / lasts}
     if p.phase > ESTIMATED:
         found = values | reference()
         due = {"adams_order": 4.0, "adams_estimate": 1.0, "adams_growth": 1.0, "impact_order_hooke": 2.0, "impact_order_hertz": 2.5,
@@ -30,7 +30,7 @@ def measure(replicas: Replicas) -> Measurement:
     else:
         size = p.amplitude * math.sqrt(float(np.mean(shape[1:-1] ** 2)))
         missed = size * verlet_errors(p.phase) * [1.0, run.derived["angular"]]
-        found = values | {"position_estimate": told[0] / missed[0], "velocity_estimate": told[1] / missed[1]}
+        found = values | {"position_estimate": reported[0] / missed[0], "velocity_estimate": reported[1] / missed[1]}
         due = dict.fromkeys(("position_estimate", "velocity_estimate", "contact_steps"), 1.0)
     return Measurement({name: Value(exact(float(value)), exact(due.get(name, 0.0))) for name, value in found.items()})
 

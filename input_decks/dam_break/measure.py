@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from pathlib import Path
 
 import numpy as np
 from scipy.stats import linregress
 
+from dembark.input_decks.common.estimates import reference_rows
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Numbers, Points, Replica, Replicas, Value, exact, profile
@@ -27,9 +27,7 @@ NOWHERE = Estimate(math.nan, math.inf, "the front did not get there")
 
 def published(source: str) -> tuple[Array, Array]:
     """Times T and fronts, over a."""
-    with MEASURED.open(encoding="utf-8") as file:
-        rows = [(float(row["time"]), float(row["front"])) for row in csv.DictReader(file) if row["source"] == source]
-    times, fronts = np.array(rows).T
+    times, fronts = np.array([(float(row["time"]), float(row["front"])) for row in reference_rows(MEASURED, source=source)]).T
     return times, fronts
 
 

@@ -1,6 +1,5 @@
 """Trajectories of the cubes beside the experiment, gaps and floor, and what must not happen."""
 
-import csv
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dembark.input_decks.common.estimates import reference_rows
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc.convergence import convergence
 from dembark.postproc.history import reached
@@ -31,8 +31,7 @@ JUDGED = ("three", "six")
 
 def published(cubes: str, axis: str) -> tuple[Array, Array]:
     """Times (s) and places (m) of the top cube; empty where there are none."""
-    with MEASURED.open(encoding="utf-8") as file:
-        rows = [(float(row["time"]), float(row["place"])) for row in csv.DictReader(file) if (row["cubes"], row["axis"]) == (cubes, axis)]
+    rows = [(float(row["time"]), float(row["place"])) for row in reference_rows(MEASURED, cubes=cubes, axis=axis)]
     times, places = np.array(rows).reshape(-1, 2).T
     return times, places
 

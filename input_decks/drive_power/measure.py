@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from dembark.input_decks.common.drive_levels import acceleration
+from dembark.input_decks.common.estimates import divided, over_chaotic, values_and_halves
 from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, over_replicas, profile
@@ -15,7 +16,6 @@ from .drive import Drive, phases, read, sticking_block, transients
 
 # Up to this coefficient of restitution the bed counts as one that sticks.
 STICKS = 0.3
-ONE = "one run of a chaotic motion says nothing about its spread"
 # Middle of the published range of the exponent, by the number of dimensions in which grains move.
 RISE = {2: 1.4, 3: 1.0}
 
@@ -29,14 +29,13 @@ def measure(replicas: Replicas) -> Measurement:
     diameter = p["grain_diameter"]
 
     def over(number: Callable[[Drive], Estimate], scale: float = 1.0) -> Estimate:
-        found = over_replicas([number(one) for one in runs])
-        return Estimate(found.value / scale, found.half / scale, found.basis)
+        return divided(over_replicas([number(one) for one in runs]), scale)
 
     def worst(number: Callable[[Drive], float]) -> Value:
         return Value(exact(max((number(one) for one in runs), key=lambda gap: np.inf if np.isnan(gap) else abs(gap))), exact(0.0))
 
     def once(number: Callable[[Drive], float]) -> Value:
-        return Value(over(lambda one: Estimate(number(one), math.inf, ONE)))
+        return Value(over_chaotic(number(one) for one in runs))
 
     def mean(number: Callable[[Drive], float]) -> Value:
         """Over the runs, with an interval where there are several."""
@@ -66,8 +65,7 @@ def stiffness(points: Points, moduli: Array) -> list[Curve]:
     block = sticking_block(acceleration(points[0]["parameters"]))
 
     def curve(quantity: str, title: str, axis: str) -> Curve:
-        found = [measured(point, quantity) for point in points]
-        values, halves = (np.array([getattr(one, part) for one in found]) for part in ("value", "half"))
+        values, halves = values_and_halves([measured(point, quantity) for point in points])
         return profile(quantity, title, "log₁₀ of Young's modulus (Pa)", axis, np.log10(moduli), [values], half=halves,
                        reference=np.full(len(points), getattr(block, quantity)) if block else None, reference_label="sticking block")
 
@@ -80,8 +78,8 @@ def study(name: str, points: Points, along: str) -> Measurement:
     points, place = ordered(points, along)
     if name == "step":
         gaps = PowerLawFit(place, np.array([abs(measured(point, "power_gap").value) for point in points]), np.zeros(len(points)))
-        told = ", ".join(f"{gap:.2e} at {step:g}" for step, gap in zip(place, gaps.values, strict=True))
-        return Measurement({"power_gap_order": Value(gaps.exponent, exact(2.0), detail=f"gaps {told} of the Rayleigh time")},
+        listed = ", ".join(f"{gap:.2e} at {step:g}" for step, gap in zip(place, gaps.values, strict=True))
+        return Measurement({"power_gap_order": Value(gaps.exponent, exact(2.0), detail=f"gaps {listed} of the Rayleigh time")},
                            [gaps.convergence("power_gap", "Gap between both powers", "time step over the Rayleigh time", 2.0)])
     if name == "stiffness":
         return Measurement({}, stiffness(points, place))

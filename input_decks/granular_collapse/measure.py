@@ -8,16 +8,16 @@ interval of S over packings, what the unknown width of the measured columns leav
 interval of the line through the measured points near a.
 """
 
-import csv
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from dembark.input_decks.common.estimates import over_chaotic, reference_rows, values_and_halves
 from dembark.input_decks.common.heaps import at_rest, column_height, front, height, power_law, surface
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
-from dembark.postproc.measurement import Array, Estimate, Measurement, Points, Replica, Replicas, Value, over_replicas, profile
+from dembark.postproc.measurement import Array, Estimate, Measurement, Points, Replica, Replicas, Value, profile
 from dembark.postproc.studies import compared, measured, propagated
 
 MEASURED = Path(__file__).with_name("reference") / "lajeunesse_2005.csv"
@@ -28,8 +28,7 @@ TITLES = {"run_out": "Run-out", "final_height": "Height at the back wall"}
 
 def points(quantity: str, low: float = 0.0, high: float = math.inf) -> list[tuple[float, float]]:
     """Measured (a, value) with `low` <= a <= `high`, rising in a."""
-    with MEASURED.open(encoding="utf-8") as file:
-        rows = [(float(row["a"]), float(row["value"])) for row in csv.DictReader(file) if row["quantity"] == quantity]
+    rows = [(float(row["a"]), float(row["value"])) for row in reference_rows(MEASURED, quantity=quantity)]
     return sorted(row for row in rows if low <= row[0] <= high)
 
 
@@ -52,8 +51,7 @@ def deposit(replica: Replica) -> dict[str, float]:
 def measure(replicas: Replicas) -> Measurement:
     """Run-out and height of columns of one width, and the surface of the deposit."""
     found = [deposit(replica) for replica in replicas]
-    alone = "one run of a chaotic motion gives no scatter between runs"
-    of = {name: over_replicas([Estimate(one[name], math.inf, alone) for one in found]) for name in ("aspect_ratio_measured", *TITLES)}
+    of = {name: over_chaotic(one[name] for one in found) for name in ("aspect_ratio_measured", *TITLES)}
     moving = "" if all(one["rests"] for one in found) else "The deposit is still moving at the end of the run. "
     return Measurement({name: Value(one) for name, one in of.items()}, [_surface(replicas)],
                        [f"{moving}Verdicts are given by the studies, which include the effect of the number of grains."])
@@ -91,8 +89,7 @@ def _as_wide(results: Points) -> Measurement:
     aspect = float(np.mean([measured(one, "aspect_ratio_measured").value for one in results]))
     values, curves = {}, []
     for quantity, title in TITLES.items():
-        found = [measured(one, quantity) for one in results]
-        sizes, halves = (np.array([getattr(one, part) for one in found]) for part in ("value", "half"))
+        sizes, halves = values_and_halves([measured(one, quantity) for one in results])
 
         def line(values: Array) -> Array:
             return np.polyfit(across, values, 1)

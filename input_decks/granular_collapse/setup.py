@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Parameters, Setup, contacts, strip, time_step
+from dembark.input_decks.common.setup import Parameters, Setup, contacts, rows_and_frames, strip, time_step
 
 
 def setup(p: Parameters) -> Setup:
@@ -15,9 +15,7 @@ def setup(p: Parameters) -> Setup:
     """
     step, d, d_max = time_step(p), p.grain_diameter, packing.largest(p)
     fall = math.sqrt(p.aspect_ratio * p.column_width / p.gravity)
-    every = math.ceil(p.collapse_time * fall / step / (20 * (p.frames - 1)))
-    first, stride = every * math.ceil(p.settle_time * fall / step / every), 20 * every
-    steps = first + stride * (p.frames - 1)
+    output = rows_and_frames(step, p.settle_time * fall, p.collapse_time * fall, p.frames)
     sites, height = packing.slab(p, p.column_width, p.column_depth, margin=0.15 * d_max, foot=0.1 * d + 0.15 * d_max)
     # 1.5 times as far as columns of glass beads run out.
     floor = p.column_width * (1.0 + 1.5 * min(1.8 * p.aspect_ratio, 2.3 * p.aspect_ratio ** (2.0 / 3.0))) + 10.0 * d
@@ -29,8 +27,8 @@ def setup(p: Parameters) -> Setup:
     # The gate ends above the glued grains, which it would push; the gap lets no grain through.
     foot = 0.15 * d
     gate = strip((p.column_width, 0.0, foot), (0.0, 0.0, top - foot), p.column_depth)
-    numbers = {"first": first, "stride": stride, "every": every, "gate_speed": speed, "opened": first + opened, "base": -0.5 * d}
-    return Setup(steps, step, bodies, {**numbers, **contacts(p, skin=0.4)}, {"gate": gate})
+    numbers = {**output, "gate_speed": speed, "opened": output["first"] + opened, "base": -0.5 * d}
+    return Setup(output["steps"], step, bodies, {**numbers, **contacts(p, skin=0.4)}, {"gate": gate})
 
 
 def glued(p: Parameters, far: float) -> packing.Array:

@@ -4,7 +4,6 @@ Times are counted from the moment at which 10 % of the mass have left: published
 E = S − D is known within U_val, U_val² = U_num² + U_input² + U_D²; studies of friction and stiffness find U_input and U_num.
 """
 
-import csv
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dembark.input_decks.common.estimates import reference_rows, values_and_halves
 from dembark.input_decks.common.power_law import ordered
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import (
@@ -78,11 +78,10 @@ def slope(times: Array, share: Array, high: float) -> Estimate:
 
 def published() -> dict[str, tuple[Array, Array]]:
     """Times (s) and shares of the digitisations of the published curve, by name."""
-    with PUBLISHED.open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    names = dict.fromkeys(row["digitisation"] for row in rows)
-    points = {name: np.array([(float(row["time"]), float(row["share"])) for row in rows if row["digitisation"] == name]) for name in names}
-    return {name: (one[:, 0], one[:, 1]) for name, one in points.items()}
+    points: dict[str, list[tuple[float, float]]] = {}
+    for row in reference_rows(PUBLISHED):
+        points.setdefault(row["digitisation"], []).append((float(row["time"]), float(row["share"])))
+    return {name: (one[:, 0], one[:, 1]) for name, table in points.items() for one in [np.array(table)]}
 
 
 def datum() -> dict[str, Estimate]:
@@ -166,8 +165,7 @@ def study(name: str, points: Points, along: str) -> Measurement:
         joint = Estimate(rate.value, math.hypot(rate.half, *varied.values()), "scatter and effect of the varied parameter")
         return Measurement({"rate": Value(joint, due, detail=compared(rate.value, due, sim=rate.half, **varied).text)},
                            [profile("rate", "Discharge rate", along, "1/s", places, [found])])
-    every = [measured(point, "mass_rate") for point in points]
-    rates, halves = (np.array([getattr(one, part) for one in every]) for part in ("value", "half"))
+    rates, halves = values_and_halves([measured(point, "mass_rate") for point in points])
     given = points[0]["parameters"]
     d, g = float(given["grain_diameter"]), float(given["gravity"])
     density = float(np.mean([measured(point, "bulk_density").value for point in points]))

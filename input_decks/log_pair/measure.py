@@ -71,8 +71,8 @@ def study(_name: str, points: Points, along: str) -> Measurement:
     order, values, curves = 1.0 if theta > 0.5 else 2.0, {}, []
     for quantity, label in (("peak_force", "Error of the peak force"), ("velocity_curve_error", "Largest error of the velocity")):
         errors = PowerLawFit(steps, np.array([error(point, quantity) for point in points]), np.zeros(len(steps)))
-        told = ", ".join(f"{error:.2e} at {step:.3g} s" for error, step in zip(errors.values, steps, strict=True))
-        values[f"order_{quantity}"] = number(errors.exponent.value, order, detail=f"relative errors {told}")
+        listed = ", ".join(f"{error:.2e} at {step:.3g} s" for error, step in zip(errors.values, steps, strict=True))
+        values[f"order_{quantity}"] = number(errors.exponent.value, order, detail=f"relative errors {listed}")
         curves.append(errors.convergence(f"convergence_{quantity}", label, "τ (s)", order))
     return Measurement(values, curves,
                        [f"θ = {theta:g}. Each impact begins at the end of a step, so that the errors depend on the step only."])

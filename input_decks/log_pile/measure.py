@@ -99,7 +99,7 @@ def at_rest(run: LogRun, stack: Loads, rest: slice) -> dict[str, Value]:
     net = np.linalg.norm(stack.net[rest].mean(axis=0) - down, axis=1) / weights
     rough, per_log, one = p["friction"] > 0.0, block_mean(stack.contacts[rest] / logs), exact(1.0)
     least = 1.5 if rough else 2.0
-    told = "3/2: three equations per log, two unknowns per contact" if rough else "2: two equations per log, one unknown per contact"
+    counted = "3/2: three equations per log, two unknowns per contact" if rough else "2: two equations per log, one unknown per contact"
     values = {
         "lift_over_weight": Value(block_mean(walls[:, :, 1].sum(axis=1)), one),
         "ground_share": Value(block_mean(walls[:, 0, 1]), one if p["stake_friction"] == 0.0 else None),
@@ -108,7 +108,7 @@ def at_rest(run: LogRun, stack: Loads, rest: slice) -> dict[str, Value]:
         "log_balance": number(net.max(), 0.0),
         "residual_speed": number(speed, 0.0),
         "contacts_per_log": Value(per_log, exact(least), verdict="pass" if per_log.value >= least - 0.5 / logs else "fail",
-                                  detail=f"at least {told}"),
+                                  detail=f"at least {counted}"),
     }
     return values | ({"mobilised": Value(block_mean(stack.mobilised[rest] / p["friction"]))} if rough else {})
 
@@ -140,9 +140,9 @@ def first_impacts(run: LogRun) -> dict[str, Value]:
         "first_place": rms(run.positions[frame, logs, :2] - run.positions[0, logs, :2]), "first_speed": speed,
         "first_spin": rms(run.spins[frame, logs]), "first_impulse": float(first[:, 5].mean()), "first_peak": float(first[:, 4].mean()),
     }
-    told = f"{len(first)} impacts, {len(logs)} logs, at {run.times[frame]:.4f} s"
-    return {name: number(value, scale=value, detail=told) for name, value in values.items()} | {
-        "first_sideways": number(sideways, scale=max(abs(sideways), speed), detail=told)}
+    detail = f"{len(first)} impacts, {len(logs)} logs, at {run.times[frame]:.4f} s"
+    return {name: number(value, scale=value, detail=detail) for name, value in values.items()} | {
+        "first_sideways": number(sideways, scale=max(abs(sideways), speed), detail=detail)}
 
 
 def curves(run: LogRun, stack: Loads) -> list[Curve]:

@@ -6,7 +6,6 @@ U_input, from spheres with changed inputs; the study of three time steps adds U_
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from dembark.input_decks.common.estimates import reference_rows
 from dembark.postproc.convergence import refinement
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.replica import Array, Replica
@@ -77,8 +77,7 @@ def measured() -> list[Datum]:
     U_D of e_t and spin comes from their misclosure, a velocity: its mean may lie in either of the two, so that both have all of it as a
     common part; its scatter about the mean is shared, half of the variance in each. U_D of the angles is that of the file, common to all.
     """
-    with MEASURED.open(encoding="utf-8") as file:
-        rows = [{key: text if key == "quantity" else float(text or 0.0) for key, text in row.items()} for row in csv.DictReader(file)]
+    rows = [{key: text if key == "quantity" else float(text or 0.0) for key, text in row.items()} for row in reference_rows(MEASURED)]
     open_by = misclosure(rows)
     common, scatter = abs(float(open_by.mean())), student(len(open_by) - 1) * float(open_by.std(ddof=1)) / math.sqrt(2.0)
 

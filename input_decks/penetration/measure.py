@@ -1,16 +1,14 @@
 """Penetration: the bed before the ball comes, and the height of the ball against time, compared with eight published codes."""
 
-import csv
-import math
 from pathlib import Path
 
 import numpy as np
 
+from dembark.input_decks.common.estimates import over_chaotic, reference_rows
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Replica, Replicas, Value, exact, over_replicas, profile
 from dembark.postproc.spheres import slice_volumes
 
 REFERENCE = Path(__file__).with_name("reference")
-ONE_RUN = "one packing gives no scatter between packings"
 # Quantities of the public bed.
 PUBLIC = {"deepest_point": "public_deepest", "rebound_speed": "public_rebound"}
 PUBLIC |= {f"height_{k}": f"public_{k}" for k in (22, 24, 26, 28, 29, 40)}
@@ -19,10 +17,8 @@ PUBLIC |= {f"height_{k}": f"public_{k}" for k in (22, 24, 26, 28, 29, 40)}
 def published() -> dict[str, list[float]]:
     """Means over the packings of each code that counts (see reference/README.md), by quantity."""
     found: dict[str, list[float]] = {}
-    with (REFERENCE / "dosta_2024.csv").open(encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            if row["counted"] == "1":
-                found.setdefault(row["quantity"], []).append(float(row["mean"]))
+    for row in reference_rows(REFERENCE / "dosta_2024.csv", counted="1"):
+        found.setdefault(row["quantity"], []).append(float(row["mean"]))
     return found
 
 
@@ -69,7 +65,7 @@ def flight(times: Array, heights: Array) -> dict[str, float]:
 def measure(replicas: Replicas) -> Measurement:
     """Each quantity over the packings against the mean of the codes' means; of the public bed, against three runs of it."""
     beds, runs = [bed(one) for one in replicas], [flight(one.times()["time"], one.times()["ball_height"]) for one in replicas]
-    values = {name: Value(over_replicas([Estimate(one[name], math.inf, ONE_RUN) for one in beds])) for name in beds[0]}
+    values = {name: Value(over_chaotic(one[name] for one in beds)) for name in beds[0]}
     values["free_flight"] = Value(exact(max(map(free_flight, replicas))), exact(0.0))
     if replicas[0].parameters["bed"] == "public":
         rows = table("dosta_2024_public.csv")
@@ -83,7 +79,7 @@ def measure(replicas: Replicas) -> Measurement:
         return Measurement(values, curves(replicas, rows[:, 0], rows[:, 1:].mean(axis=1), rows[:, 1:].T, "mean and range of three runs"))
     for name, codes in published().items():
         if all(name in run for run in runs):
-            values[name] = Value(over_replicas([Estimate(run[name], math.inf, ONE_RUN) for run in runs]),
+            values[name] = Value(over_chaotic(run[name] for run in runs),
                                  over_replicas([Estimate(mean, 0.0) for mean in codes]),
                                  detail=f"means of {len(codes)} codes: {min(codes):.6g} to {max(codes):.6g}")
     rows = table("dosta_2024_height.csv")

@@ -15,7 +15,7 @@ from dembark.postproc.measurement import CONFIDENCE, Curve, Estimate, Measuremen
 from . import channel, fields
 from .channel import Channel
 
-# A wall zone whose velocity deficit is below this cannot be told from the core's own scatter.
+# A wall zone whose velocity deficit is below this cannot be distinguished from the core's own scatter.
 LEAST_DEFICIT = 0.02
 # What nothing is said of when no steady part was found.
 JUDGED = ("core_flatness", "flux_error", "inertial_number", "force_balance_error")
@@ -67,8 +67,8 @@ def measure(replicas: Replicas) -> Measurement:
     values = {name: Value(one) for name, one in over.items()}
     values |= {name: Value(over[name], Estimate(0.0, 0.0), reason=unsteady) for name in JUDGED}
     values |= {name: Value(over[name], reason=faint, compared=not faint) for name in ("shear_zone_width", "shear_zone_width_90")}
-    told = f"the wall's static friction is {replicas[0].derived['wall_static']:g}"
-    values["wall_mobilisation"] = Value(over["wall_mobilisation"], detail=told)
+    detail = f"the wall's static friction is {replicas[0].derived['wall_static']:g}"
+    values["wall_mobilisation"] = Value(over["wall_mobilisation"], detail=detail)
     maps = fields.measured(replicas, unsteady)
     steady = f"The steady part holds {first.steady_share:.0%} of the measuring window (MSER-5 and a drift test on the wall friction)."
     d, window = first.diameter, first.levels[-1] - first.levels[0]

@@ -4,12 +4,12 @@ V&V 20: the error E = S − D of a simulated value S against the datum D is know
 how it scatters in time and the limits of the datum; the studies of friction and stiffness add U_input and U_num.
 """
 
-import csv
 import math
 from pathlib import Path
 
 import numpy as np
 
+from dembark.input_decks.common.estimates import reference_rows
 from dembark.input_decks.common.power_law import ordered
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, pooled, profile
 from dembark.postproc.statistics import jackknife
@@ -31,8 +31,7 @@ ALIZADEH = {"drum_radius": 0.12, "drum_speed": 1.2147, "solid_filling": 0.1962, 
 
 def tracked() -> tuple[Array, Array]:
     """n (m), ascending, and speed (m/s) of the tracked points, without one that is out of line by 0.05 m/s."""
-    with (HERE / "alizadeh_2013.csv").open(encoding="utf-8") as file:
-        rows = np.array(sorted((float(row["y"]), float(row["u"])) for row in csv.DictReader(file) if row["used"] == "1"))
+    rows = np.array(sorted((float(row["y"]), float(row["u"])) for row in reference_rows(HERE / "alizadeh_2013.csv", used="1")))
     return rows[:, 0], rows[:, 1]
 
 
@@ -78,9 +77,8 @@ def unbalanced() -> str:
 
 def other_code() -> dict[str, dict[str, float]]:
     """Rows of the table of Sunday et al. by variant: angle, its limit, depth of the layer; NaN where it has none."""
-    with (HERE / "sunday_2020.csv").open(encoding="utf-8") as file:
-        return {row["variant"]: {key: float(row[key] or "nan") for key in ("angle", "angle_limit", "layer", "centrifuging")}
-                for row in csv.DictReader(file)}
+    return {row["variant"]: {key: float(row[key] or "nan") for key in ("angle", "angle_limit", "layer", "centrifuging")}
+            for row in reference_rows(HERE / "sunday_2020.csv")}
 
 
 def measure(replicas: Replicas) -> Measurement:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import groupby
@@ -11,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from dembark.input_decks.common.estimates import reference_rows
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.resampling import profile
 from dembark.postproc.statistics import Estimate
@@ -27,8 +27,7 @@ def beside_published(found: Measurement, path: Path, variant: str, labels: Mappi
     most, of all materials. `labels`: who published, by method.
     """
     own = {one["name"]: one for one in found.profiles}
-    with path.open(encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["variant"] == variant and f"{row['quantity']}_{row['material']}" in own]
+    rows = [row for row in reference_rows(path, variant=variant) if f"{row['quantity']}_{row['material']}" in own]
     values, curves, excess = dict(found.values), list(found.profiles), dict[str, float]()
     for (method, quantity, material), group in groupby(rows, lambda row: (row["method"], row["quantity"], row["material"])):
         points = list(group)

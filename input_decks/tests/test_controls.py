@@ -15,6 +15,8 @@ from dembark.input_decks.tests.measuring import Control, names
 from dembark.validation.case.folders import find, load, package_root
 from dembark.validation.judge.measuring import declared
 
+# Cases whose controls take more than 10 s together: by default the first of each.
+SLOW = ("plug_flow", "single_contact")
 CASES = [path.parent.name for path in sorted(package_root().glob("*/case.toml"))]
 
 
@@ -25,7 +27,7 @@ def test_every_check_names_what_fails_it(case: str) -> None:
     assert not without, "these checks are not counted: [controls] names nothing that fails them"
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", [pytest.param(case, marks=pytest.mark.full if case in SLOW else ()) for case in CASES])
 def test_wrong_physics_fails_what_passes_without_it(case: str, tmp_path: Path) -> None:
     found = find(case)
     passed, caught = set[str](), {name: set[str]() for name in found.controls}
@@ -38,6 +40,14 @@ def test_wrong_physics_fails_what_passes_without_it(case: str, tmp_path: Path) -
         assert not silent, f"{name}: these do not fail, or do not pass without it"
     untouched = passed - set().union(*caught.values())
     assert not untouched, "these passed, and no control that names them fails them"
+
+
+@pytest.mark.parametrize("case", SLOW)
+def test_the_first_wrong_physics_of_a_slow_case_fails(case: str, tmp_path: Path) -> None:
+    found = find(case)
+    one = next(import_module(f"dembark.input_decks.tests.controls_{case}").controls(tmp_path))
+    caught = names(one.right, "pass") & names(one.wrong, "fail")
+    assert {declared(found, name)[0].name for name in caught} & set(found.controls[one.name])
 
 
 def test_a_control_that_fails_nothing_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

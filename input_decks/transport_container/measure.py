@@ -10,25 +10,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dembark.input_decks.common.estimates import over_chaotic, values_and_halves
 from dembark.input_decks.common.momentum import imbalance, impulses
 from dembark.input_decks.common.motion import about_y, motion
 from dembark.input_decks.common.power_law import ordered
 from dembark.postproc.measurement import (
     Array,
     Curve,
-    Estimate,
     Measurement,
     Points,
     Replica,
     Replicas,
     Value,
     exact,
-    over_replicas,
     profile,
 )
 from dembark.postproc.studies import measured
 
-ALONE = "one run of a chaotic packing says nothing about its spread"
 WALLS = ("left", "right", "base")
 # Slow pulses are at least so many ring periods long.
 SLOW = 20.0
@@ -136,7 +134,7 @@ def measure(replicas: Replicas) -> Measurement:
     runs = [read(replica) for replica in replicas]
     values = {"energy_balance": Value(exact(max(imbalance(replica.times()) for replica in replicas)), exact(0.0)),
               "impulse_error": Value(exact(max(run["impulse_error"] for run in runs)), exact(0.0))}
-    values |= {name: Value(over_replicas([Estimate(run[name], math.inf, ALONE) for run in runs])) for name in runs[0]
+    values |= {name: Value(over_chaotic(run[name] for run in runs)) for name in runs[0]
                if name != "impulse_error"}
     curves = [_history(replicas, wall) for wall in ("", "left", "right", "base")] + [_pressure(replicas, "left")]
     if "slide_slope" in runs[0]:
@@ -192,12 +190,12 @@ def study(name: str, results: Points, along: str) -> Measurement:
     results, place = ordered(results, along)
     quantity = "amplification" if name == "pulse" else "slide_slope"
     found = [measured(one, quantity) for one in results]
-    values, halves = (np.array([getattr(one, part) for one in found]) for part in ("value", "half"))
+    values, halves = values_and_halves(found)
     if name != "pulse":
         # The last one is tilted at the rate of the ramp.
         ramp, tilt = (_slopes(results[k]) for k in (0, -1))
-        ratios = [Estimate(float(one / other), math.inf, ALONE) for one, other in zip(ramp, tilt, strict=False)]
-        return Measurement({"sliding_onset": Value(over_replicas(ratios), exact(1.0))}, [
+        ratios = over_chaotic(float(one / other) for one, other in zip(ramp, tilt, strict=False))
+        return Measurement({"sliding_onset": Value(ratios, exact(1.0))}, [
             profile("onset", "Onset of sliding", "angular acceleration of tilting (rad/s²); 0: ramp", "slope of effective gravity", place,
                     [values], half=halves)])
     given = results[-1]["parameters"]

@@ -7,7 +7,7 @@ import numpy as np
 
 from dembark.input_decks.common import packing
 from dembark.input_decks.common.motion import about_y, motion
-from dembark.input_decks.common.setup import Parameters, Setup, contacts, rectangle, time_step
+from dembark.input_decks.common.setup import Parameters, Setup, contacts, rectangle, rows_and_frames, time_step
 from dembark.physics import WallMotion
 
 
@@ -15,11 +15,9 @@ def setup(p: Parameters) -> Setup:
     """The container is 0 < x < L, z > 0, with all centres at y = 0; it begins to move at the first frame. 20 rows of time.csv between
     two frames."""
     step, d, d_max = time_step(p), p.grain_diameter, packing.largest(p)
-    every = math.ceil(p.run_time / step / (20 * (p.frames - 1)))
-    first, stride = every * max(1, math.ceil(p.settle_time / step / every)), 20 * every
-    steps = first + stride * (p.frames - 1)
+    output = rows_and_frames(step, p.settle_time, p.run_time, p.frames)
     length = p.container_length * d
-    moving = motion(p, start=first * step, point=(0.5 * length, 0.0, 0.0))
+    moving = motion(p, start=output["first"] * step, point=(0.5 * length, 0.0, 0.0))
     cell = 1.15 * d_max
     count = int((length - 0.3 * d_max) / cell)
     layers = math.ceil(1.3 * p.grain_count / count)
@@ -31,12 +29,12 @@ def setup(p: Parameters) -> Setup:
     for name, x in (("left", 0.0), ("right", length)):
         meshes[name] = np.vstack([rectangle((x, -half, top * k / 4.0), wide, high) for k in range(4)])
     corners = np.array([(x, 0.0, z) for x in (0.0, length) for z in (0.0, top)])
-    reach = [_moved(moving, corners, t) for t in np.linspace(0.0, steps * step, 400)]
+    reach = [_moved(moving, corners, t) for t in np.linspace(0.0, output["steps"] * step, 400)]
     least, most = np.min(reach, axis=(0, 1)) - 2.0 * d, np.max(reach, axis=(0, 1)) + 2.0 * d
     bodies = packing.grains(p, places, [(least[0], most[0]), (-half - d, half + d), (least[2], most[2])])
     bodies = replace(bodies, positions=bodies.positions * np.array([1.0, 0.0, 1.0]))
-    numbers = {"grain_count": p.grain_count, "first": first, "stride": stride, "every": every, "length": length}
-    return Setup(steps, step, bodies, {**numbers, **contacts(p, skin=0.3)}, meshes, {"motion_words": moving.words})
+    numbers = {"grain_count": p.grain_count, **output, "length": length}
+    return Setup(output["steps"], step, bodies, {**numbers, **contacts(p, skin=0.3)}, meshes, {"motion_words": moving.words})
 
 
 def _moved(moving: WallMotion, corners: packing.Array, time: float) -> packing.Array:

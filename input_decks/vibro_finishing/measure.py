@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from dembark.input_decks.common.estimates import divided, over_chaotic
 from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
 from dembark.input_decks.common.power_law import ordered
 from dembark.input_decks.common.vibratory_trough import Trough, drifts, read, spectra, spread
@@ -12,7 +13,6 @@ from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas
 from dembark.postproc.statistics import combined
 from dembark.postproc.studies import measured
 
-ONE = "one run of a chaotic motion says nothing about its spread"
 # What must not depend on the numerics.
 STEADY = ("circulation", "spin", "revolution")
 
@@ -23,11 +23,10 @@ def measure(replicas: Replicas) -> Measurement:
     drive, diameter = 2.0 * math.pi * p["motion_frequency"], p["grain_diameter"]
 
     def over(number: Callable[[Trough], Estimate], scale: float = 1.0) -> Value:
-        found = over_replicas([number(one) for one in runs])
-        return Value(Estimate(found.value / scale, found.half / scale, found.basis))
+        return Value(divided(over_replicas([number(one) for one in runs]), scale))
 
     def once(number: Callable[[Trough], float]) -> Value:
-        return over(lambda one: Estimate(number(one), math.inf, ONE))
+        return Value(over_chaotic(number(one) for one in runs))
 
     values = {
         "energy_balance": Value(exact(np.max([imbalance(one.rows, CONTACT_PARTS) for one in runs])), exact(0.0)),

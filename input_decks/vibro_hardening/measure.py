@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from dembark.input_decks.common import vibratory_trough
+from dembark.input_decks.common.estimates import divided, over_chaotic
 from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
 from dembark.input_decks.common.motion import motion
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
@@ -18,7 +19,6 @@ from dembark.postproc.studies import measured
 
 from .part_impacts import ContactRecord, histogram, read_record
 
-ONE = "one run of a chaotic motion says nothing about its spread"
 WALLS = ("trough", "part")
 # What must not depend on the numerics.
 STEADY = ("circulation", "impact_energy")
@@ -43,11 +43,10 @@ def measure(replicas: Replicas) -> Measurement:
     unit = 0.5 * mass * runs[0].speed**2
 
     def over(found: list[Estimate], scale: float = 1.0) -> Value:
-        one = over_replicas(found)
-        return Value(Estimate(one.value / scale, one.half / scale, one.basis))
+        return Value(divided(over_replicas(found), scale))
 
     def of_run(number: Callable[[vibratory_trough.Trough], float]) -> Value:
-        return over([Estimate(number(one), math.inf, ONE) for one in runs])
+        return Value(over_chaotic(number(one) for one in runs))
 
     values = {
         "energy_balance": Value(exact(np.max([imbalance(one.rows, CONTACT_PARTS) for one in runs])), exact(0.0)),

@@ -1,6 +1,5 @@
 """Mixing and segregation in a vibrated vessel, at one phase of each period, at which the bed lies on the floor."""
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -8,6 +7,7 @@ from numpy.typing import NDArray
 
 from dembark.input_decks.common.drive_levels import acceleration
 from dembark.input_decks.common.drive_phases import Phases, read_phases
+from dembark.input_decks.common.estimates import over_chaotic
 from dembark.input_decks.common.momentum import unexplained
 from dembark.postproc.measurement import (
     Array,
@@ -38,7 +38,6 @@ from .mixing import (
 
 # Width of a sample in mean diameters; labellings at random; phase at which the bed lies on the floor.
 SAMPLE, LABELLINGS, PHASE = 3.0, 16, 0
-ALONE = "one run of a chaotic motion says nothing about its spread"
 
 
 @once
@@ -86,7 +85,7 @@ def equal(tracks: list[Array], diameter: float) -> tuple[dict[str, Value], list[
               "index_random": Value(exact(float(np.mean(labels))), exact(1.0)),
               "segregation_labels": Value(exact(float(np.mean(told))), exact(0.0))}
     for name, found in indices.items():
-        values[f"index_{name}"] = Value(over_replicas([Estimate(float(one[-1]), math.inf, ALONE) for one in found]))
+        values[f"index_{name}"] = Value(over_chaotic(float(one[-1]) for one in found))
         values[f"mixing_rate_{name}"] = Value(over_replicas([mixing_rate(one) for one in found]))
     return values, [curve(f"index_{name}", f"Mixing of the {name}", "Lacey's index", found) for name, found in indices.items()]
 
@@ -135,7 +134,7 @@ def until_top(heights: Array, tops: Array, ratio: float) -> Array:
 
 def over(series: list[Array], number: Callable[[Array], float]) -> Estimate:
     """A number of each run's series, over the runs."""
-    return over_replicas([Estimate(number(one), math.inf, ALONE) for one in series])
+    return over_chaotic(number(one) for one in series)
 
 
 def curve(name: str, title: str, across: str, series: list[Array]) -> Curve:

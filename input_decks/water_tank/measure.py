@@ -1,11 +1,11 @@
 """Hydrostatics, Archimedes, added mass, the contraction of a jet and what is conserved, beside a fluid of particles."""
 
-import csv
 import math
 from pathlib import Path
 
 import numpy as np
 
+from dembark.input_decks.common.estimates import reference_rows
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.input_decks.dam_break.water import common_values, pressure
 from dembark.postproc.history import reached
@@ -61,8 +61,7 @@ def floating(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
 def falling(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
     """The time between two places below the level, beside the experiment."""
     rows, depth = run.times(), run.derived["depth"]
-    with REFERENCE.open(encoding="utf-8") as file:
-        times, heights = np.array([(float(row["time"]), float(row["height"])) for row in csv.DictReader(file)]).T
+    times, heights = np.array([(float(row["time"]), float(row["height"])) for row in reference_rows(REFERENCE)]).T
     below = heights - LEVEL
 
     def between(t: Array, y: Array) -> float:
