@@ -62,7 +62,8 @@ def inputs(case: Case, engine: str, values: dict[str, Value], folder: Path) -> d
     return texts | {name: body} | {key: line for key, line in numbers.items() if re.search(use.replace("NAME", key), body)}
 
 
-@pytest.mark.parametrize(("case", "engine"), [(case, engine) for case in BASES for engine in find(case).engines])
+@pytest.mark.parametrize(("case", "engine"), [pytest.param(case, engine, marks=pytest.mark.full if case == "penetration" else ())
+                                              for case in BASES for engine in find(case).engines])
 def test_every_parameter_changes_the_input(case: str, engine: str, tmp_path: Path) -> None:
     found = find(case)
     values = portable(merged(found, None, None, BASES[case]))
