@@ -78,7 +78,7 @@ def test_restitution_of_the_models_of_lammps(tmp_path: Path) -> None:
         lammps = engines.find("lammps")
     except DembarkError as error:
         pytest.skip(str(error))
-    page = (Path(__file__).parents[1] / "migration.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[1] / "how-to/migration.md").read_text(encoding="utf-8")
     heads = ("| `hertz/material E e ν … damping", "| `restitution` |")
     tsuji = dict(zip(*(re.findall(r"0\.\d+", line) for line in page.splitlines() if line.startswith(heads)), strict=True))
     (block,) = re.findall(r"```python\n(import numpy as np\nfrom scipy.*?)```", page, re.DOTALL)
