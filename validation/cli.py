@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
-import atexit
 import fnmatch
 import os
 import sys
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from dembark.common.choices import pick
 from dembark.common.errors import DembarkError, RunError
-from dembark.validation import engines
-from dembark.validation.campaigns import cli as campaigns
+from dembark.common.units import seconds
+from dembark.postproc import cli as postproc
+from dembark.validation import doctor, engines, provenance, show
+from dembark.validation.campaigns.plan import Resources, series
 from dembark.validation.case import cli as cases
 from dembark.validation.case import folders
+from dembark.validation.case.resolve import resolve, settings
+from dembark.validation.judge import measuring
+from dembark.validation.judge.result import METRICS
+from dembark.validation.judge.tally import tally
+from dembark.validation.runs import cli as campaigns
+from dembark.validation.runs import restarts, workflow
+from dembark.validation.runs.folder import restore
+from dembark.validation.runs.steps import CAMPAIGN_FILE
 
 _ABOUT = f"""Granular contact laws and their validation, in {engines.titles("and")}.
 
@@ -37,8 +46,6 @@ Results = Annotated[Path, typer.Option(help="Folder of all results; each profile
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from dembark.validation import provenance
-
         facts = provenance.commit()
         changed = ", with changes" if facts["dirty"] else ""
         print(f"dembark {provenance.package_version('dembark')}"
@@ -79,11 +86,7 @@ def run(
     strict: Strict = False,
 ) -> None:
     """Run a case in one engine and measure it. Each quantity is shown with its reference and its verdict."""
-    from dembark.common.choices import pick
-    from dembark.validation.case.folders import find
-    from dembark.validation.case.resolve import resolve, settings
-
-    one = find(case)
+    one = folders.find(case)
     changes = settings(change or ())
     chosen = variant if variant is not None else next(iter(one.variants))
     pick(engine, engines.names(), "engine", "in --engine")
@@ -93,32 +96,20 @@ def run(
     resolve(one, profile, chosen, changes)
     if out is None and changes:
         raise DembarkError("--out is missing", "with --set the run is not the one of the profile", "name a folder for its results")
-    with ThreadPoolExecutor(1) as beside:
-        # To tell its version an engine starts, which takes as long as the imports of what runs and measures.
-        found = beside.submit(engines.find, engine)
-        from dembark.validation import show
-        from dembark.validation.judge import measuring
-        from dembark.validation.judge.result import METRICS
-        from dembark.validation.judge.tally import tally
-        from dembark.validation.runs import restarts
-        from dembark.validation.runs.job import cancelled_by_signal
-        from dembark.validation.runs.perform import perform_series
-        from dembark.validation.runs.plan import Resources, series
-
-        measuring.check(one)
-    planned = series(one, chosen, profile, found.result(), changes)
+    measuring.check(one)
+    planned = series(one, chosen, profile, engines.find(engine), changes)
     if restart_interval is not None and not restarts.supported(planned.runs[0]):
         raise DembarkError(f"--restart-interval {restart_interval}", f"{one.deck(engine)} writes no states to go on from",
                            "leave it out; see docs/how-to/restarts.md for what a deck needs")
     folder = (out or Path("results") / profile / planned.place).resolve()
     used = Resources(ranks, threads, restart_interval=interval)
-    result = perform_series(planned, folder, cancelled_by_signal(), used, jobs, force)
+    result = workflow.perform_series(planned, folder, workflow.cancelled_by_signal(), used, jobs, force)
     console = show.console()
     console.print(show.quantity_table(result, console.width))
     for line in show.open_lines(result):
         console.print(line, markup=False, soft_wrap=True)
-    told = [quantity.name for quantity in result.quantities]
-    if gone := [name for name, check in one.quantities.items() if check.tolerance is not None and not fnmatch.filter(told, name)]:
+    measured = [quantity.name for quantity in result.quantities]
+    if gone := [name for name, check in one.quantities.items() if check.tolerance is not None and not fnmatch.filter(measured, name)]:
         console.print(f"declared, not measured in this run: {', '.join(gone)}", markup=False, soft_wrap=True)
     counted = tally(result.quantities)
     show.print_tally(console, counted)
@@ -128,8 +119,6 @@ def run(
 
 def _interval(text: str | None) -> float | None:
     """Wall time (s) between states of a run, 0 for none; None when it is not said."""
-    from dembark.common.units import seconds
-
     if text is None:
         return None
     try:
@@ -148,12 +137,8 @@ def validate(
     strict: Strict = False,
 ) -> None:
     """Run all cases of a profile and build the report. Finished runs are kept."""
-    from dembark.validation.runs import perform
-    from dembark.validation.runs.job import cancelled_by_signal
-    from dembark.validation.show import show_outcome
-
-    outcome = perform.validate(profile, cancelled_by_signal(), cores, results, tuple(case or ()), tuple(engine or ()))
-    show_outcome(outcome, "the validation", "start again: what is finished is kept")
+    outcome = workflow.validate(profile, workflow.cancelled_by_signal(), cores, results, tuple(case or ()), tuple(engine or ()))
+    show.show_outcome(outcome, "the validation", "start again: what is finished is kept")
     _strictly(outcome.tally.failed, strict)
 
 
@@ -163,18 +148,16 @@ def make_report(
     profile: Profile = "quick",
     results: Results = Path("results"),
 ) -> None:
-    """Build the report again from existing results. They are those of a profile, or of a campaign's folder."""
-    from dembark.validation import show
-    from dembark.validation.campaigns.folder import restore
-    from dembark.validation.runs.steps import CAMPAIGN_FILE, build_report
-
+    """Build the report again from the results in a folder. What is finished but not measured yet is measured first."""
     folder = directory.resolve() if directory else results.resolve() / profile
     if (folder / CAMPAIGN_FILE).is_file():
         restore(folder)
-    if not any(folder.glob("*/*/*/metrics.json")):
+    if not any(folder.glob("*/*/*/metrics.json")) and not any(folder.glob("*/*/*/replica-*/run.json")):
         raise DembarkError(f"no results in {folder}", "", "give a campaign's folder; single runs have metrics.json" if directory else
                            f"run 'dembark validate --profile {profile}' first, or give --results")
-    build_report(folder)
+    outcome = workflow.conclude(folder, workflow.cancelled_by_signal(), os.cpu_count() or 1)
+    for line in outcome.problems:
+        show.console().print(f"problem: {line}", markup=False, style="red", soft_wrap=True)
     show.console().print(f"{folder / 'report.html'}\n{folder / 'report.pdf'}", markup=False, soft_wrap=True)
 
 
@@ -182,13 +165,10 @@ app.add_typer(cases.app)
 app.add_typer(campaigns.app)
 
 
-@app.command()
-def doctor() -> None:
+@app.command("doctor")
+def examine() -> None:
     """Show what is installed and what is missing. The exit code is 1 when something required is missing."""
-    from dembark.validation import show
-    from dembark.validation.doctor import examine
-
-    findings = examine()
+    findings = doctor.examine()
     show.console().print(show.finding_table(findings))
     if any(finding.required and not finding.found for finding in findings):
         raise typer.Exit(1)
@@ -200,9 +180,7 @@ _PASSED_ON = {"ignore_unknown_options": True, "allow_extra_args": True, "help_op
 def _on_dumps(name: str) -> Callable[[typer.Context], None]:
     """The command `name` of dembark.postproc, with the words given to it."""
     def work(context: typer.Context) -> None:
-        from dembark.postproc import cli
-
-        raise typer.Exit(cli.run([name, *context.args]))
+        raise typer.Exit(postproc.run([name, *context.args]))
 
     return work
 
@@ -252,20 +230,8 @@ def main(words: list[str] | None = None) -> int:
 
 
 def script() -> None:
-    """The console script: `main`, and the end of the process without that of the interpreter, which takes 0.4 s to free one by one the
-    modules and arrays of a process that is over (mypy does the same).
-
-    What else belongs to an end is done: functions registered for it, and what is written is flushed. Where that fails, as into a pipe that
-    was closed, the interpreter ends in its own way and tells.
-    """
-    code = main()
-    try:
-        atexit._run_exitfuncs()
-        sys.stdout.flush()
-        sys.stderr.flush()
-    except OSError:
-        sys.exit(code)
-    os._exit(code)
+    """The console script `dembark`."""
+    sys.exit(main())
 
 
 if __name__ == "__main__":

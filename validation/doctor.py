@@ -15,7 +15,7 @@ from dembark.common.errors import DembarkError
 from dembark.validation import engines, provenance
 from dembark.validation.case import folders
 
-_PACKAGES = ("numpy", "scipy", "MDAnalysis", "filelock", "typer", "rich", "pint", "jinja2", "matplotlib",
+_PACKAGES = ("numpy", "scipy", "MDAnalysis", "filelock", "typer", "rich", "pint", "pandas", "jinja2", "matplotlib",
              "weasyprint", "pyvista", "xarray", "h5netcdf", "h5py")
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from dembark.common.errors import RunError
 from dembark.common.files import read_json
+from dembark.postproc import field_figures, labelled
 from dembark.postproc.measurement import Measurement
 from dembark.postproc.replica import Replica
 from dembark.validation import analysis, engines, provenance
@@ -20,54 +21,31 @@ from dembark.validation.judge import inputs, measured, measuring
 from dembark.validation.judge.result import METRICS, Result, as_json, read
 
 
-class Early:
-    """Finished replicas that are read while others still run; `measure` goes on with what was read."""
-
-    def __init__(self) -> None:
-        self._read: dict[Path, Replica] = {}
-        # Numerical warnings on the way.
-        self.warnings: list[str] = []
-
-    def read(self, folder: Path) -> None:
-        """Read what of the finished replica in `folder` needs no other replica."""
-        record = read_json(folder / "run.json")
-        if record is not None:
-            self._read[folder] = one = Replica(folder, _whole(record))
-            with analysis.warnings_kept() as warnings:
-                measuring.prepare(find(record["case"]), one)
-            self.warnings += warnings
-
-    def chosen(self, one: Replica) -> Replica:
-        """The same replica as it was read; `one` itself when it was not."""
-        kept = self._read.get(one.folder)
-        return kept if kept == one else one
-
-
 def replicas(folder: Path) -> list[Replica]:
     """Finished replicas of `folder`, in the order of their numbers."""
-    found = [Replica(path.parent, _whole(record)) for path in folder.glob("replica-*/run.json") if (record := read_json(path)) is not None]
+    found = [Replica(path.parent, _complete(record)) for path in folder.glob("replica-*/run.json")
+             if (record := read_json(path)) is not None]
     return sorted(found, key=lambda one: int(one.record["replica"]))
 
 
-def _whole(record: dict[str, Any]) -> dict[str, Any]:
+def _complete(record: dict[str, Any]) -> dict[str, Any]:
     """The record with what those of earlier versions lack: how the engine counts bodies, and the numbers derived from the parameters."""
     derived = {} if "derived" in record else deck.derived(deck.prepare(find(record["case"]), record["parameters"]))
     return {"impact_id_offset": engines.facts(record["engine"]).impact_id_offset, "derived": derived, **record}
 
 
-def measure(folder: Path, wanted: int | None = None, early: Early | None = None) -> Result:
+def measure(folder: Path, wanted: int | None = None) -> Result:
     """Measure the replicas in `folder`, of which there are to be `wanted`, and judge what was measured; `measurement.json` keeps it, and
-    `fields.nc` its fields. What was measured before, or `early` has read, of the same inputs is neither measured nor read again.
+    `fields.nc` its fields. What was measured before of the same inputs is not measured again.
 
-    RunError when there is no finished replica, or one of their files cannot be read: a result is whole or not there.
+    RunError when there is no finished replica, or one of their files cannot be read: a result is complete or not there.
     """
-    early = early or Early()
-    runs = [early.chosen(one) for one in replicas(folder)]
+    runs = replicas(folder)
     if not runs:
         raise RunError(f"nothing to measure in {folder}", "it has no finished replica-*/run.json")
     first, case = runs[0].record, find(runs[0].record["case"])
     inputs_hash = inputs.of_measurement(case, [one.folder / "run.json" for one in runs])
-    kept = measured.read(folder, inputs_hash) or _measure(folder, case, runs, early, inputs_hash)
+    kept = measured.read(folder, inputs_hash) or _measure(folder, case, runs, inputs_hash)
     parameters = {key: value for key, value in first["parameters"].items() if key != "seed"}
     if wanted is not None and "replicas" in parameters:
         # Those of an earlier request for fewer or more are kept, and know its number.
@@ -81,18 +59,15 @@ def measure(folder: Path, wanted: int | None = None, early: Early | None = None)
         replicas_missing=tuple(number for number in range(1, (wanted or 0) + 1) if number not in numbers))
 
 
-def _measure(folder: Path, case: Case, runs: Sequence[Replica], early: Early, inputs_hash: str) -> measured.Measured:
+def _measure(folder: Path, case: Case, runs: Sequence[Replica], inputs_hash: str) -> measured.Measured:
     (folder / measured.FILE).unlink(missing_ok=True)
     fields = ""
     with analysis.warnings_kept() as warnings:
         found = measuring.measure(case, runs)
         if found.fields is not None:
-            # Labelled arrays take a second to import, which commands that measure nothing need not wait for.
-            from dembark.postproc import field_figures, labelled
-
             fields = field_figures.FILE
             labelled.write(folder / fields, found.fields)
-    noted = replace(found, remarks=[*found.remarks, *dict.fromkeys([*early.warnings, *warnings])], fields=None)
+    noted = replace(found, remarks=[*found.remarks, *dict.fromkeys(warnings)], fields=None)
     return measured.write(folder, measured.Measured(inputs_hash, noted, provenance.measured(), fields))
 
 

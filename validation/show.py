@@ -19,7 +19,7 @@ from dembark.validation.judge.result import Result
 from dembark.validation.judge.tally import Tally
 
 if TYPE_CHECKING:
-    from dembark.validation.runs.perform import Outcome
+    from dembark.validation.runs.workflow import Outcome
 
 _SHOWN = {"passed": "[green]pass[/]", "failed": "[bold red]FAIL[/]", "open": "[yellow]open[/]", "information": "",
           "uncontrolled": "not counted"}

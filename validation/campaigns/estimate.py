@@ -7,17 +7,17 @@ import socket
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
 
+import pandas as pd
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from dembark.common.units import core_hours, duration, size_text
-from dembark.validation import engines
-from dembark.validation.campaigns import store
+from dembark.validation import engines, results
 from dembark.validation.case import deck
-from dembark.validation.runs.plan import Plan, Series, finished
+
+from .plan import Plan, Series, finished
 
 
 @dataclass(frozen=True)
@@ -29,23 +29,30 @@ class Rate:
 
 
 class Rates:
-    """The rates to reckon with for a campaign whose store, if it has one yet, lies at `path`."""
+    """The rates to reckon with for a campaign that has measured some already in the folder `path`, if it is there."""
 
     def __init__(self, path: Path | None = None) -> None:
-        rows = store.read_runs(path, state="finished") if path is not None and path.is_file() else []
-        self._rows = [row for row in rows if row["particle_steps_per_second"] and row["ranks"] and row["threads"]]
+        self._runs = results.runs(path) if path is not None and path.is_dir() else pd.DataFrame()
+        if "provenance.particle_steps_per_second" in self._runs:
+            self._runs = self._runs.dropna(subset="provenance.particle_steps_per_second")
+            self._runs["cores"] = self._runs["provenance.ranks"] * self._runs["provenance.threads"]
 
     def of(self, case: str, engine: str, cores: int = 1) -> Rate:
         """Rate for runs of `case` in `engine` on `cores` cores.
 
-        The median of the store's runs of this case, those of this host and this number of cores before others; else the engine's facts.
+        The median of the folder's runs of this case, those of this host and this number of cores before others; else the engine's facts.
         """
-        rows = [row for row in self._rows if (row["case_name"], row["engine"]) == (case, engine)]
-        mine = [row for row in rows if row["host"] == socket.gethostname()]
-        alike = [row for row in mine or rows if row["ranks"] * row["threads"] == cores]
-        if chosen := alike or mine or rows:
-            value = median(row["particle_steps_per_second"] / (row["ranks"] * row["threads"]) for row in chosen)
-            return Rate(float(value), f"{len(chosen)} runs measured on {'this host' if mine else 'other hosts'}")
+        runs = self._runs
+        if "cores" in runs:
+            runs = runs[(runs["case"] == case) & (runs["engine"] == engine)]
+            mine = runs[runs["provenance.host"] == socket.gethostname()]
+            where = "this host" if len(mine) else "other hosts"
+            runs = mine if len(mine) else runs
+            alike = runs[runs["cores"] == cores]
+            runs = alike if len(alike) else runs
+        if len(runs) and "cores" in runs:
+            value = (runs["provenance.particle_steps_per_second"] / runs["cores"]).median()
+            return Rate(float(value), f"{len(runs)} runs measured on {where}")
         facts = engines.facts(engine)
         if case in facts.rates:
             return Rate(facts.rates[case], f"measured on {facts.measured_on}")
@@ -100,9 +107,9 @@ def wall_clock(costs: Sequence[tuple[float, int]], cores: int) -> float:
     return max(free)
 
 
-def warnings(plan: Plan, found: Iterable[Estimate], results: Path, room: float) -> list[str]:
+def warnings(plan: Plan, found: Iterable[Estimate], folder: Path, room: float) -> list[str]:
     """What is likely to go wrong: less free disk than the `room` (bytes) that is needed, and runs that need longer than they are given."""
-    there = next(place for place in (results, *results.parents) if place.exists())
+    there = next(place for place in (folder, *folder.parents) if place.exists())
     free = shutil.disk_usage(there).free
     lines = [f"{there} has {size_text(free)} free, less than the {size_text(room)} that are needed"] if free < room else []
     for one in found:
@@ -123,12 +130,12 @@ def rate_sources(found: Iterable[Estimate]) -> Mapping[str, Iterable[str]]:
     return sources
 
 
-def dry_run(console: Console, plan: Plan, found: Sequence[Estimate], results: Path, cores: int | None) -> None:
-    """The runs of a campaign with steps, cost and disk space; totals, of what is not finished in `results`; where the rates are from.
+def dry_run(console: Console, plan: Plan, found: Sequence[Estimate], folder: Path, cores: int | None) -> None:
+    """The runs of a campaign with steps, cost and disk space; totals, of what is not finished in `folder`; where the rates are from.
 
     `cores` of this machine give the time that it will take; None when the runs are jobs of a cluster.
     """
-    left = {one.series.place: sum(not finished(results / one.series.place / run.folder_name, run) for run in one.series.runs)
+    left = {one.series.place: sum(not finished(folder / one.series.place / run.folder_name, run) for run in one.series.runs)
             for one in found}
     console.print(runs_table(found, left))
     runs, to_do = sum(len(one.series.runs) for one in found), sum(left.values())
@@ -146,9 +153,9 @@ def dry_run(console: Console, plan: Plan, found: Sequence[Estimate], results: Pa
         console.print(f"on {cores} cores about {duration(wall_clock(costs, cores))}")
     for source, words in rate_sources(found).items():
         console.print(f"particle-steps per second and core {source}: {', '.join(words)}", markup=False, soft_wrap=True)
-    for line in warnings(plan, found, results, room):
+    for line in warnings(plan, found, folder, room):
         console.print(f"warning: {line}", markup=False, style="yellow", soft_wrap=True)
-    console.print(f"folder: {results}", markup=False, soft_wrap=True)
+    console.print(f"folder: {folder}", markup=False, soft_wrap=True)
 
 
 def runs_table(found: Sequence[Estimate], left: dict[Path, int]) -> Table:

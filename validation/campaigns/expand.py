@@ -14,10 +14,11 @@ from dembark.common.choices import Value, pick
 from dembark.common.errors import DembarkError
 from dembark.postproc.convergence import REFINEMENT
 from dembark.validation import engines
-from dembark.validation.campaigns.spec import CampaignSpec, SweepSpec, read
 from dembark.validation.case.model import checked
 from dembark.validation.case.resolve import merged, resolve
-from dembark.validation.runs.plan import Plan, Resources, Series, left_out, of_profile, series
+
+from .plan import Plan, Resources, Series, left_out, of_profile, series
+from .spec import CampaignSpec, SweepSpec
 
 LONGEST_NAME = 100
 MOST_RUNS = 20000
@@ -146,7 +147,7 @@ def _formal_orders(point: Point) -> dict[str, float]:
 
 
 def campaign(spec: CampaignSpec, only_cases: Sequence[str] = (), only_engines: Sequence[str] = ()) -> Plan:
-    """What a campaign runs, of all its cases and engines or only some; the engines that are needed have to be there."""
+    """What the campaign `spec` runs, of all its cases and engines or only some; the engines that are needed have to be there."""
     for name in only_cases:
         pick(name, {sweep.case.name for sweep in spec.sweeps}, "case", f"in {spec.path}")
     for name in only_engines:
@@ -164,16 +165,10 @@ def campaign(spec: CampaignSpec, only_cases: Sequence[str] = (), only_engines: S
             found[place] = series(point.sweep.case, point.base, point.sweep.profile, engines.find(engine), point.changes, point.variant)
             resources[place] = point.sweep.resources[engine]
     facts = {"campaign": spec.name, "description": spec.description, "sweeps": _sweeps(spec, all_points)}
-    return Plan(spec.name, tuple(sorted(found.values(), key=lambda one: -one.cost)), facts, ("--campaign", str(spec.path)), resources,
-                spec.retries, spec.measure, not (only_cases or only_engines))
+    return Plan(spec.name, tuple(sorted(found.values(), key=lambda one: -one.cost)), facts, resources, spec.retries, spec.measure)
 
 
-def plan(profile: str | None = None, file: Path | None = None, cases: Sequence[str] = (), engines: Sequence[str] = ()) -> Plan:
-    """What a profile, or else the campaign in `file`, runs: all of it, or that of some cases and engines."""
-    if file is not None and profile is None:
-        return campaign(read(file), cases, engines)
-    if profile is None or file is not None:
-        raise DembarkError("neither a profile nor a campaign is given, or both", "", "give --profile or --campaign")
-    runs, gone = tuple(of_profile(profile, cases, engines)), left_out(profile, cases, engines)
-    return Plan(profile, runs, {"profile": profile, **({"cases": list(cases)} if cases else {}), **({"left_out": gone} if gone else {})},
-                ("--profile", profile), whole=not (cases or engines or gone))
+def profile(name: str, cases: Sequence[str] = (), engines: Sequence[str] = ()) -> Plan:
+    """What the cases list for the profile `name`: all of it, or that of some cases and engines."""
+    runs, gone = tuple(of_profile(name, cases, engines)), left_out(name, cases, engines)
+    return Plan(name, runs, {"profile": name, **({"cases": list(cases)} if cases else {}), **({"left_out": gone} if gone else {})})

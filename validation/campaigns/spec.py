@@ -17,12 +17,13 @@ from dembark.validation.case.folders import discover, files, find
 from dembark.validation.case.model import Case
 from dembark.validation.case.resolve import merged
 from dembark.validation.case.tables import ORDER, TableReader, Types, load_toml
-from dembark.validation.runs.plan import RETRIES, Resources
+
+from .plan import RETRIES, Resources
 
 MEASURE = "measure"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 _PER_RUN = {"ranks": int, "threads": int, "memory": str, "time": str, "restart_interval": str}
-_MEASURING = {"memory": str, "time": str}
+_MEASURING = {"threads": int, "memory": str, "time": str}
 _SWEEP: dict[str, Types] = {
     "case": str, "name": str, "title": str, "profile": str, "variant": str, "variants": list, "engines": list, "grid": dict, "list": list,
     "fixed": dict, "derived": dict, "replicas": int, "resources": dict, "formal_order": ORDER}
@@ -63,14 +64,14 @@ class SweepSpec:
 
 @dataclass(frozen=True)
 class CampaignSpec:
-    """A checked campaign file; `measure` is what measuring may use as a job of its own, None when the submitting host measures."""
+    """A checked campaign file; `measure` is what the job of a cluster may use that measures and writes the report."""
 
     path: Path
     name: str
     description: str
     retries: int
     sweeps: tuple[SweepSpec, ...]
-    measure: Resources | None = None
+    measure: Resources
 
 
 def shipped() -> dict[str, Path]:
@@ -130,15 +131,14 @@ class _Reader(TableReader):
             self.pick(head["profile"], {name for case in discover().values() for name in case.profiles}, "profile", "campaign")
         self.least("campaign", head, replicas=1, retries=0)
         self.names("campaign", head, "engines", engines.names(), "engine")
-        measure = resources.get(MEASURE)
-        if measure is not None:
-            self.table(measure, f"resources.{MEASURE}", _MEASURING)
+        measure = resources.get(MEASURE, {})
+        self.table(measure, f"resources.{MEASURE}", _MEASURING)
         base = self.resources("resources", {key: value for key, value in resources.items() if key != MEASURE},
                               dict.fromkeys(engines.names(), Resources()))
         return CampaignSpec(
             self.path, head["name"], head.get("description", "").strip(), head.get("retries", RETRIES),
             tuple(self.sweep(f"sweeps {number}", number, entry, head, base) for number, entry in enumerate(data["sweeps"], start=1)),
-            None if measure is None else self.changed(f"resources.{MEASURE}", Resources(), measure))
+            self.changed(f"resources.{MEASURE}", Resources(), measure))
 
     def named(self, name: str) -> dict[str, str]:
         """Case and profile that the name of a campaign, CASE-PROFILE, gives to all sweeps that name none."""

@@ -1,116 +1,43 @@
 """The executor: runs with the longest first; measurements, studies, comparisons and the report as soon as what they need is there.
 
-A run that fails stops nothing else. One that was ended from outside is started again, up to the plan's number of retries; one that failed
-by its own fault is not. Steps work in a few processes that stay, so that what they import is imported once.
+A run that fails stops nothing else. One that was ended from outside is started again, up to a number of retries; one that failed by its own
+fault is not. The states are in memory only: what is finished is decided by the files, and found again from them by the next start.
 """
 
 from __future__ import annotations
 
 import multiprocessing
-import socket
 import threading
+import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Protocol
+from typing import Any
 
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.parallel import prepare_worker
-from dembark.validation.runs.plan import RETRIES, Resources, Run
-from dembark.validation.runs.simulate import Progress, simulate
-from dembark.validation.runs.steps import Step
-from dembark.validation.runs.table import Table
+from dembark.validation.campaigns.plan import RETRIES, Resources, Run, finished
+from dembark.validation.results import State
+
+from .simulate import simulate
+from .steps import Step
 
 _GRACE = 30.0
 _LOOK = 0.2
 
 
-class Backend(Protocol):
-    """Where simulations run; `here`: on this machine, whose cores they share with the steps."""
-
-    here: bool
-
-    def fits(self, used: Resources, busy: Sequence[Resources]) -> bool:
-        """Whether a run may start beside those that are under way (if `here`, also beside the steps)."""
-
-    def start(self, run: Run, out: Path, used: Resources, progress: Progress) -> Future[object]:
-        """Begin with a run; the future raises Killed when it was ended from outside, another DembarkError when it failed.
-
-        `progress` is called with what has changed of the run, `state` among it when that is queued or running.
-        """
-
-    def start_step(self, step: Step) -> Future[object] | None:
-        """Begin with a step if that is to work elsewhere than in a process of this machine."""
-
-    def close(self) -> None:
-        """End or take back what is under way and leave nothing behind; all futures end."""
-
-
-class Local:
-    """Each simulation in an engine process of its own on this machine, attended to by a thread of this process."""
-
-    here = True
-
-    def __init__(self, cores: int, memory: float | None, cancel: threading.Event) -> None:
-        self._cores, self._memory, self._cancel = cores, memory, cancel
-        self._pool = ThreadPoolExecutor(max(1, cores))
-
-    def fits(self, used: Resources, busy: Sequence[Resources]) -> bool:
-        """See Backend; it must not ask for more cores or memory than are left, unless nothing else is under way."""
-        memory = sum(one.memory or 0.0 for one in (used, *busy))
-        return not busy or (used.cores + sum(one.cores for one in busy) <= self._cores and (self._memory is None or memory <= self._memory))
-
-    def start(self, run: Run, out: Path, used: Resources, progress: Progress) -> Future[object]:
-        """See Backend; the run begins when a thread is free."""
-        progress(state="running", host=socket.gethostname())
-        return self._pool.submit(simulate, run, out, self._cancel, used, progress)
-
-    def start_step(self, step: Step) -> Future[object] | None:
-        """See Backend; all steps are left to processes of this machine."""
-        return None
-
-    def close(self) -> None:
-        """See Backend; it waits for what is under way."""
-        self._pool.shutdown()
-
-
-class Workers:
-    """A few processes that work on steps and stay, so that what they import is imported once."""
-
-    def __init__(self, count: int) -> None:
-        self._count = count
-        self._pool: ProcessPoolExecutor | None = None
-
-    def start(self, step: Step) -> Future[object]:
-        """Begin with a step; the future raises BrokenProcessPool when its process, or another one, was killed."""
-        try:
-            if self._pool is None:
-                self._pool = ProcessPoolExecutor(self._count, multiprocessing.get_context("spawn"), prepare_worker)
-            return self._pool.submit(step.call, *step.arguments)
-        except BrokenProcessPool:
-            self.close()
-            return self.start(step)
-
-    def close(self) -> None:
-        """End the processes, whatever they are at."""
-        if self._pool is not None:
-            self._pool.shutdown(wait=False, cancel_futures=True)
-            for process in multiprocessing.active_children():
-                process.terminate()
-            self._pool = None
-
-
 @dataclass(frozen=True)
 class Task:
-    """A run, the folder of its series and what it may use."""
+    """A run, the folder of its series, what it may use, and its expected wall time (s)."""
 
     run: Run
     out: Path
     used: Resources
+    estimate: float | None = None
 
     @property
     def name(self) -> str:
@@ -118,35 +45,55 @@ class Task:
         return self.run.name
 
 
-@dataclass
-class _Work:
-    """What is under way, what it uses, and whether it is this machine's."""
+class States:
+    """The states of runs and steps, in the order in which they were added; `listener` gets each state that changes. Safe to use from
+    several threads."""
 
-    item: Task | Step
-    used: Resources
-    here: bool
+    def __init__(self, tasks: Iterable[Task], steps: Iterable[Step] = ()) -> None:
+        self._states = {task.name: State(task.name, "finished" if finished(task.out / task.run.folder_name, task.run) else "waiting",
+                                         inputs=task.run.inputs, estimate=task.estimate) for task in tasks}
+        self._states |= {step.name: State(step.name, kind=step.kind) for step in steps}
+        self._guard = threading.RLock()
+        self.listener: Callable[[State], None] = lambda _: None
+
+    def __getitem__(self, name: str) -> State:
+        return self._states[name]
+
+    def all(self) -> list[State]:
+        """All states."""
+        with self._guard:
+            return list(self._states.values())
+
+    def change(self, name: str, **facts: object) -> None:
+        """Change fields of the state called `name`; with a new `state` also its times."""
+        with self._guard:
+            before = self._states[name]
+            changed = facts.get("state", before.state) != before.state
+            if changed and facts["state"] == "running":
+                facts = {"began": time.time(), "ended": 0.0, "message": "", "step": 0, **facts}
+            elif changed and before.state == "running":
+                facts = {"ended": time.time(), **facts}
+            after = self._states[name] = replace(before, **facts)  # type: ignore[arg-type]
+        if changed:
+            self.listener(after)
 
 
 class Executor:
-    """Executes what is waiting in `table`: runs in `backend`, at most `retries` times more when they were ended from outside, and steps on
-    `cores` cores of this machine.
+    """Runs on `cores` cores and `memory` (bytes; None: not looked at) of this machine, at most `retries` times more when they were ended
+    from outside, each engine attended to by a thread; steps in processes on the cores that are free."""
 
-    `before` is called before the report begins, `after` with each other step that was made.
-    """
-
-    def __init__(self, table: Table, backend: Backend, cancel: threading.Event, retries: int = RETRIES, cores: int = 1,
-                 before: Callable[[], None] = lambda: None, after: Callable[[Step], None] = lambda _: None) -> None:
-        self._table, self._backend, self._cancel, self._retries, self._cores = table, backend, cancel, retries, max(1, cores)
-        self._before, self._after = before, after
-        self._workers = Workers(self._cores)
-        self._under_way: dict[Future[object], _Work] = {}
+    def __init__(self, states: States, cancel: threading.Event, cores: int, memory: float | None = None, retries: int = RETRIES) -> None:
+        self._states, self._cancel, self._cores, self._memory, self._retries = states, cancel, max(1, cores), memory, retries
+        self._threads = ThreadPoolExecutor(self._cores)
+        self._processes: ProcessPoolExecutor | None = None
+        self._under_way: dict[Future[Any], Task | Step] = {}
         self._kills: Counter[str] = Counter()
         # Of all that came to no good end, in the order of its end.
         self.errors: dict[str, DembarkError] = {}
 
     def execute(self, tasks: Sequence[Task], steps: Sequence[Step]) -> None:
         """All `tasks` that are not finished, in their order, and all `steps` that are not up to date; Interrupted when cancelled."""
-        self._tasks = [task for task in tasks if self._table.state(task.name).state != "finished"]
+        self._tasks = [task for task in tasks if self._states[task.name].state != "finished"]
         self._steps = list(steps)
         self._open = {one.name for one in self._tasks} | {one.name for one in self._steps}
         try:
@@ -163,88 +110,90 @@ class Executor:
             raise
         finally:
             interrupted = self._cancel.is_set()
-            self._workers.close()
-            self._backend.close()
+            self._end_processes()
+            self._threads.shutdown()
             for future in wait(self._under_way, timeout=_GRACE).done:
-                self._end(future, again=False)
+                self._end(future)
         if interrupted:
             raise Interrupted("interrupted", "finished runs are kept and will not be repeated")
 
     def _start(self) -> None:
         # Steps first: they are short, and their numbers are what people wait for.
         for step in [one for one in self._steps if self._open.isdisjoint(one.needs)]:
-            if not self._room():
-                break
-            self._steps.remove(step)
-            self._start_step(step)
-        for task in [*self._tasks]:
-            busy = [work.used for work in self._under_way.values() if work.here == self._backend.here]
-            if self._backend.fits(task.used, busy):
+            if step.up_to_date():
+                self._open.discard(step.name)
+                self._steps.remove(step)
+            elif self._fits(Resources()):
+                self._steps.remove(step)
+                self._states.change(step.name, state="running")
+                self._under_way[self._start_step(step)] = step
+        for task in [one for one in self._tasks if self._fits(one.used)]:
+            if self._fits(task.used):
                 self._tasks.remove(task)
-                future = self._backend.start(task.run, task.out, task.used, partial(self._progress, task.name))
-                self._under_way[future] = _Work(task, task.used, self._backend.here)
+                self._states.change(task.name, state="running")
+                future = self._threads.submit(simulate, task.run, task.out, self._cancel, task.used, partial(self._follow, task.name))
+                self._under_way[future] = task
 
-    def _room(self) -> bool:
-        """Whether a core of this machine is free for a step."""
-        busy = [work.used.cores for work in self._under_way.values() if work.here]
-        return not busy or sum(busy) < self._cores
+    def _fits(self, used: Resources) -> bool:
+        """Whether there are cores and memory for it; one alone is started whatever it needs."""
+        busy = [one.used if isinstance(one, Task) else Resources() for one in self._under_way.values()]
+        memory = sum(one.memory or 0.0 for one in (used, *busy))
+        return not busy or (used.cores + sum(one.cores for one in busy) <= self._cores and (self._memory is None or memory <= self._memory))
 
-    def _start_step(self, step: Step) -> None:
-        if step.kind == "report":
-            self._before()
-        finished = self._table.state(step.name).state == "finished"
-        if step.up_to_date():
-            if not finished:
-                self._table.transition(step.name, "finished")
-            self._open.discard(step.name)
-            return
-        if finished:
-            self._table.transition(step.name, "waiting")
-        self._table.transition(step.name, "running", host=socket.gethostname())
-        elsewhere = self._backend.start_step(step)
-        self._under_way[elsewhere or self._workers.start(step)] = _Work(step, Resources(), elsewhere is None)
+    def _follow(self, name: str, **facts: object) -> None:
+        # Its end is known here when its future ends.
+        self._states.change(name, **{key: value for key, value in facts.items() if key in ("step", "steps", "time_step", "attempt",
+                                                                                         "resumed_from")})
 
-    def _progress(self, name: str, state: str = "", **facts: object) -> None:
-        if state and state != self._table.state(name).state:
-            self._table.transition(name, state, **facts)
-        elif facts:
-            self._table.note(name, **facts)
+    def _start_step(self, step: Step) -> Future[Any]:
+        """Begin with a step; the future raises BrokenProcessPool when its process, or another one, was killed."""
+        if self._processes is None:
+            self._processes = ProcessPoolExecutor(self._cores, multiprocessing.get_context("spawn"), prepare_worker)
+        try:
+            return self._processes.submit(step.call, *step.arguments)
+        except BrokenProcessPool:
+            self._end_processes()
+            return self._start_step(step)
 
-    def _end(self, future: Future[object], again: bool = True) -> None:
-        item = self._under_way.pop(future).item
+    def _end_processes(self) -> None:
+        if self._processes is not None:
+            self._processes.shutdown(wait=False, cancel_futures=True)
+            for process in multiprocessing.active_children():
+                process.terminate()
+            self._processes = None
+
+    def _end(self, future: Future[Any]) -> None:
+        item = self._under_way.pop(future)
         try:
             future.result()
         except (Killed, Interrupted, BrokenProcessPool, CancelledError) as error:
-            self._stopped(item, error, again and not self._cancel.is_set())
+            self._stopped(item, error if isinstance(error, DembarkError) else RunError(f"{item.name} was ended from outside"))
         except DembarkError as error:
             self._failed(item, error)
         else:
-            self._table.transition(item.name, "finished")
+            self._states.change(item.name, state="finished")
             self._open.discard(item.name)
-            if isinstance(item, Step):
-                self._after(item)
 
-    def _stopped(self, item: Task | Step, error: BaseException, again: bool) -> None:
-        told = error if isinstance(error, DembarkError) else RunError(f"{item.name} was ended from outside")
+    def _stopped(self, item: Task | Step, error: DembarkError) -> None:
         self._kills[item.name] += 1
-        if again and self._kills[item.name] > self._retries:
-            self._failed(item, told)
-            return
-        self._table.transition(item.name, "stopped", message=_without_name(item, told))
-        if not again:
-            self.errors[item.name] = told
-            return
-        self._table.transition(item.name, "waiting")
-        if isinstance(item, Task):
-            self._tasks.insert(0, item)
+        if self._cancel.is_set():
+            self.errors[item.name] = error
+            self._states.change(item.name, state="stopped", message=_reason(item, error))
+        elif self._kills[item.name] > self._retries:
+            self._failed(item, error)
         else:
-            self._steps.insert(0, item)
+            self._states.change(item.name, state="stopped", message=_reason(item, error))
+            self._states.change(item.name, state="waiting")
+            if isinstance(item, Task):
+                self._tasks.insert(0, item)
+            else:
+                self._steps.insert(0, item)
 
     def _failed(self, item: Task | Step, error: DembarkError) -> None:
         self.errors[item.name] = error
-        self._table.transition(item.name, "failed", message=_without_name(item, error))
+        self._states.change(item.name, state="failed", message=_reason(item, error))
         self._open.discard(item.name)
 
 
-def _without_name(item: Task | Step, error: DembarkError) -> str:
+def _reason(item: Task | Step, error: DembarkError) -> str:
     return str(error).removeprefix(f"{item.name} failed, ")

@@ -11,9 +11,10 @@ from pathlib import Path
 from dembark.common.choices import Value
 from dembark.common.errors import Killed, RunError
 from dembark.common.files import DISK_FULL, check_impacts, check_times, count_frames
+from dembark.validation.campaigns.plan import Run
 from dembark.validation.case.model import OUTPUTS
-from dembark.validation.runs.plan import Run
-from dembark.validation.runs.progress import OutputParser
+
+from .output import OutputParser
 
 _RESERVE = 4 << 20
 _DUMPS = {"grains": "ATOMS", "contacts": "ENTRIES"}

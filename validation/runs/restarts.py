@@ -11,7 +11,7 @@ from pathlib import Path
 
 from dembark.common.files import read_json, write_json
 from dembark.validation import engines
-from dembark.validation.runs.plan import Run
+from dembark.validation.campaigns.plan import Run
 
 # Wall time (s) between states unless another one is asked for.
 INTERVAL = 600.0

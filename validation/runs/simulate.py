@@ -10,11 +10,12 @@ import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,20 +24,45 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from dembark.common.choices import Value
-from dembark.common.errors import Interrupted, Killed, RunError
+from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import DISK_FULL, disk_error, move_into_place, sweep, write_json
 from dembark.common.lock import lock
 from dembark.validation import provenance
+from dembark.validation.campaigns.plan import Resources, Run, finished
 from dembark.validation.case import deck
 from dembark.validation.engines import end_with_parent
-from dembark.validation.runs import outcome, restarts
-from dembark.validation.runs.plan import Resources, Run, finished
-from dembark.validation.runs.progress import OutputParser
+from dembark.validation.results import State, lock_file, status_file
+
+from . import outcome, restarts
+from .output import OutputParser
 
 _RESUMED = re.compile(r"dembark: resumed at step (\d+) (exact|approximate)ly")
-# The callback of a run: it gets what has changed, of step, steps, time_step, attempt and resumed_from.
+# Gets the changed fields of a run's State.
 Progress = Callable[..., None]
 _GRACE = 5.0
+
+
+class Status:
+    """How far a run is, for whoever reads its status file: about once a second, and at once when its state changes. `follow` gets every
+    change."""
+
+    def __init__(self, run: Run, target: Path, follow: Progress) -> None:
+        self._path, self._follow, self._written = status_file(target), follow, 0.0
+        self._state = State(run.name, inputs=run.inputs, host=socket.gethostname())
+
+    def __call__(self, **facts: Any) -> None:
+        """Change fields of the State."""
+        self._state = replace(self._state, **facts)
+        self._follow(**facts)
+        if "state" in facts or time.monotonic() - self._written >= 1.0:
+            self._written = time.monotonic()
+            # Progress is never worth a run: a full disk is reported by what needs the space.
+            with suppress(DembarkError):
+                write_json(self._path, self._state.as_json())
+
+    def remove(self) -> None:
+        """The run is finished: its run.json says the rest."""
+        self._path.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -99,19 +125,29 @@ def no_progress(**facts: object) -> None:
     """The callback of callers that need no progress."""
 
 
-def simulate(run: Run, out: Path, cancel: threading.Event, used: Resources | None = None, progress: Progress = no_progress) -> bool:
-    """Run `run` into `out/replica-<k>`; False when its finished result stands there already.
+def simulate(run: Run, out: Path, cancel: threading.Event, used: Resources | None = None, follow: Progress = no_progress) -> bool:
+    """Run `run` into `out/replica-<k>`; False when its finished result is there already.
 
     Until the run is finished and checked, an earlier result in that folder stays as it is. When it fails, RunError says why
     in one line and the engine's log is kept in `out/failed`. `cancel` ends the engine and raises Interrupted. A run that was cancelled
-    or killed goes on from its last state when it is simulated again with the same inputs.
+    or killed goes on from its last state when it is simulated again with the same inputs. Its status file says meanwhile how far it is,
+    afterwards why it is not finished.
     """
     target = out / run.folder_name
-    with lock(out / f".{run.folder_name}.lock", f"{target} is being computed by another process", cancel) as lost:
+    with lock(lock_file(target), f"{target} is being computed by another process", cancel) as lost:
         sweep(target)
+        status = Status(run, target, follow)
         if finished(target, run):
+            status.remove()
             return False
-        _run_into(run, target, progress, cancel, lost, used or Resources())
+        status(state="running", began=time.time())
+        try:
+            _run_into(run, target, status, cancel, lost, used or Resources())
+        except DembarkError as error:
+            again = isinstance(error, Killed | Interrupted)
+            status(state="stopped" if again else "failed", message=str(error).removeprefix(f"{run.name} failed, "), ended=time.time())
+            raise
+        status.remove()
     return True
 
 

@@ -9,12 +9,7 @@ import sys
 import types
 
 
-class Early:
-    def read(self, folder):
-        pass
-
-
-def measure(folder, wanted, early=None):
+def measure(folder, wanted):
     from dembark.validation.judge.result import QuantityRecord, Result
 
     replicas = sorted(folder.glob("replica-*/run.json"))
@@ -58,7 +53,7 @@ def write(folder):
 # Only some of them where a test needs the real measurement.
 wanted = os.environ.get("STAND_INS", "verification metrics judge.compare report campaigns.report.build").split()
 for name, function in (("verification", write), ("metrics", measure), ("metrics", picture), ("metrics", study), ("judge.compare", compare),
-                       ("report", build), ("campaigns.report.build", build), ("metrics", Early)):
+                       ("report", build), ("campaigns.report.build", build)):
     if name not in wanted:
         continue
     module = sys.modules.setdefault(f"dembark.validation.{name}", types.ModuleType(f"dembark.validation.{name}"))

@@ -44,10 +44,6 @@ print("dembark: steps 100 time_step 1e-5", flush=True)
 if begin:
     print(f"dembark: resumed at step {begin} {behaviour.removeprefix('kill ') if behaviour.startswith('kill ') else 'exact'}ly", flush=True)
     behaviour = {"kill": "ok", "kill approximate": "ok", "hang": "ok", "full": "ok"}.get(behaviour, behaviour)
-# The third replica waits for a file, where a test says which, for a minute at most.
-deadline = time.monotonic() + 60.0
-while values["seed"] == "9" and not pathlib.Path(os.environ.get("GATE", "/")).exists() and time.monotonic() < deadline:
-    time.sleep(0.05)
 for step in range(begin, 101, 10):
     if every and step > begin and step % every == 0:
         name = f"state.{step}.{suffix}"

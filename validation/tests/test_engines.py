@@ -12,10 +12,10 @@ import pytest
 from dembark.common.errors import Interrupted, RunError
 from dembark.common.files import read_json
 from dembark.validation import engines, provenance
+from dembark.validation.campaigns.plan import Resources, Run, series
 from dembark.validation.case import folders
 from dembark.validation.case.folders import find
 from dembark.validation.engines.liggghts import Liggghts
-from dembark.validation.runs.plan import Resources, Run, series
 from dembark.validation.runs.simulate import simulate
 
 CASE = """

@@ -14,13 +14,13 @@ from dembark.common.errors import DembarkError, RunError
 from dembark.common.files import read_json
 from dembark.validation import doctor, engines
 from dembark.validation.campaigns import expand
+from dembark.validation.campaigns.plan import of_profile, series
 from dembark.validation.campaigns.spec import read
 from dembark.validation.case import deck, folders
 from dembark.validation.cli import main
 from dembark.validation.judge import result
 from dembark.validation.judge.compare import compare
 from dembark.validation.judge.result import QuantityRecord, Result
-from dembark.validation.runs.plan import of_profile, series
 from dembark.validation.runs.steps import compare_engines
 
 NEEDS = '[needs]\ncarried_liquid = "contact_angle < 0.2"\n[runs]\n'
@@ -55,8 +55,8 @@ def test_a_variant_runs_in_the_engines_that_can_do_it(third: Callable[[bool], Pa
     third(True)
     assert {str(one.place) for one in of_profile("quick")} == {
         "box/dry/liggghts", "box/dry/yade", "box/dry/third", "box/wet/liggghts", "box/wet/yade"}
-    plan = expand.plan("quick")
-    assert plan.whole and "left_out" not in plan.facts
+    plan = expand.profile("quick")
+    assert "left_out" not in plan.facts
 
 
 def test_an_engine_is_not_asked_for_what_it_cannot_do(third: Callable[[bool], Path], tmp_path: Path,
@@ -83,9 +83,8 @@ def test_an_engine_is_not_asked_for_what_it_cannot_do(third: Callable[[bool], Pa
 def test_an_optional_engine_that_is_not_there_is_left_out_and_named(third: Callable[[bool], Path], tmp_path: Path) -> None:
     third(False)
     assert {one.place.name for one in of_profile("quick")} == {"liggghts", "yade"}
-    plan = expand.plan("quick")
-    # What it computed at another time stays.
-    assert not plan.whole and "make third" in plan.facts["left_out"]["third"]
+    plan = expand.profile("quick")
+    assert "make third" in plan.facts["left_out"]["third"]
     with pytest.raises(DembarkError, match="the third engine not found"):
         of_profile("quick", only_engines=["third"])
     (finding,) = [one for one in doctor.examine() if one.what == "the third engine"]
@@ -94,7 +93,7 @@ def test_an_optional_engine_that_is_not_there_is_left_out_and_named(third: Calla
     campaign.write_text('[campaign]\nname = "sizes"\n[[sweeps]]\ncase = "box"\nprofile = "quick"\ngrid = { grain_count = [10, 20] }\n')
     # A campaign is the same on every machine: it has the engine only if it names it.
     found = expand.campaign(read(campaign))
-    assert {one.place.name for one in found.series} == {"liggghts", "yade"} and found.whole
+    assert {one.place.name for one in found.series} == {"liggghts", "yade"}
     campaign.write_text(campaign.read_text().replace('name = "sizes"', 'name = "sizes"\nengines = ["yade", "third"]'))
     with pytest.raises(DembarkError, match="the third engine not found"):
         expand.campaign(read(campaign))

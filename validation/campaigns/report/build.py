@@ -7,14 +7,15 @@ from typing import Any
 
 from dembark.common.errors import RunError
 from dembark.common.files import write_whole
-from dembark.validation.campaigns.report import figures, tables
-from dembark.validation.campaigns.report.sweeps import Point, Sweep, numerical_errors, sweeps
 from dembark.validation.judge.result import Comparison
 from dembark.validation.judge.tally import tally
 from dembark.validation.report.build import write
 from dembark.validation.report.figures import engine_name
 from dembark.validation.report.gather import Gathered, gather
 from dembark.validation.report.sections import embed
+
+from . import figures, tables
+from .sweeps import Point, Sweep, numerical_errors, sweeps
 
 # A page that shows everything shows nothing: the rest is in the tables.
 _PANELS = 9

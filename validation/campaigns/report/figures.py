@@ -11,9 +11,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from dembark.postproc.style import STYLE
-from dembark.validation.campaigns.report.sweeps import Sweep, words
 from dembark.validation.judge.result import QuantityRecord
 from dembark.validation.report.figures import INK, MARKS, WIDE, colour, engine_name, symbols
+
+from .sweeps import Sweep, words
 
 _DASHES = ["-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (8, 3))]
 COLUMNS = 3

@@ -92,7 +92,7 @@ class Sweep:
 
 
 def sweeps(facts: Sequence[Mapping[str, Any]], pages: Iterable[Page], cases: Mapping[str, Case]) -> list[Sweep]:
-    """The sweeps that `runs.json` tells of, with what was measured at their points."""
+    """The sweeps of `plan.json`, with what was measured at their points."""
     measured = {(page.case, page.variant): page.results for page in pages}
     return [_sweep(one, number, measured, cases.get(one["case"])) for number, one in enumerate(facts, start=1)]
 

@@ -7,11 +7,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dembark.validation.campaigns.report.sweeps import Sweep
 from dembark.validation.judge.result import QuantityRecord
 from dembark.validation.report.figures import engine_name, write_csv
 from dembark.validation.report.front import COLUMNS, cells
 from dembark.validation.report.numbers import deviation, with_interval, with_unit
+
+from .sweeps import Sweep
 
 _SPECIAL = {"&": r"\&", "%": r"\%", "#": r"\#", "_": r"\_", "$": r"\$", "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}",
             "^": r"\textasciicircum{}", "\\": r"\textbackslash{}", "−": "$-$", "±": r"$\pm$", "·": r"$\cdot$", "–": "--", "λ": r"$\lambda$",

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
+import socket
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -11,9 +14,9 @@ from harness import decks, stand_in  # noqa: F401
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
 from dembark.validation.campaigns.estimate import Rates, estimates
+from dembark.validation.campaigns.plan import Resources, series
 from dembark.validation.case.folders import discover, find
 from dembark.validation.case.resolve import resolve
-from dembark.validation.runs.plan import Resources, series
 
 
 def test_every_case_says_how_many_particles_it_has() -> None:
@@ -42,3 +45,18 @@ def test_steps_are_those_of_the_deck() -> None:
     (found,) = estimates(plan, Rates())
     stride = math.ceil(0.2 / found.time_step / planned.runs[0].values["frames"])
     assert found.steps == math.ceil(0.3 / found.time_step) + stride * planned.runs[0].values["frames"]
+
+
+def test_rates_are_those_of_the_folder_before_those_of_the_table(tmp_path: Path, decks: Path, stand_in: Path) -> None:
+    none, facts = Rates(tmp_path / "nothing"), engines.facts("yade")
+    assert none.of("silo", "yade").value == facts.rates["silo"] and none.of("box", "yade").value == facts.typical_rate
+    for number, (speed, cores, host) in enumerate([(400.0, 4, "a"), (300.0, 1, "a"), (50.0, 1, "b")], start=1):
+        place = tmp_path / f"box/dry/yade/replica-{number}"
+        place.mkdir(parents=True)
+        told = {"host": host, "ranks": 1, "threads": cores, "particle_steps_per_second": speed}
+        (place / "run.json").write_text(json.dumps({"inputs": "", "provenance": told}))
+    rates = Rates(tmp_path)
+    assert rates.of("box", "yade", 4).value == 100.0 and rates.of("box", "yade", 1).value == 175.0
+    assert "2 runs measured on other hosts" in rates.of("box", "yade", 1).source and rates.of("silo", "yade") == none.of("silo", "yade")
+    (place / "run.json").write_text(json.dumps({"inputs": "", "provenance": told | {"host": socket.gethostname()}}))
+    assert Rates(tmp_path).of("box", "yade", 1).value == 50.0

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from dembark.common.errors import DembarkError
 from dembark.validation.campaigns import expand
 from dembark.validation.campaigns.expand import LONGEST_NAME, campaign, points, variant_name
+from dembark.validation.campaigns.plan import of_profile
 from dembark.validation.campaigns.spec import read
-from dembark.validation.runs.plan import of_profile
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
@@ -158,17 +158,19 @@ def test_mistakes_in_derived_parameters(derived: str, expected: str, tmp_path: P
 
 def test_only_what_is_chosen(tmp_path: Path) -> None:
     spec = spec_of(tmp_path, '[[sweeps]]\ncase = "box"\ngrid = { grain_count = [10, 20] }\n[resources.yade]\nthreads = 2\n')
-    whole, chosen = expand.plan(file=spec.path), expand.plan(file=spec.path, engines=["yade"])
-    assert {one.place.name for one in chosen.series} == {"yade"} and len(expand.plan(file=spec.path, cases=["box"]).series) == 4
+    whole, chosen = campaign(spec), campaign(spec, only_engines=["yade"])
+    assert {one.place.name for one in chosen.series} == {"yade"} and len(campaign(spec, ["box"]).series) == 4
     assert {one.place.name: whole.resources[one.place].threads for one in whole.series} == {"liggghts": 1, "yade": 2}
     assert [one.place.name for one in whole.series] == ["yade", "yade", "liggghts", "liggghts"]  # the longest first
-    assert whole.facts["sweeps"][0]["axes"] == ["grain_count"] and whole.label == "boxes" and whole.whole and not chosen.whole
+    assert whole.facts["sweeps"][0]["axes"] == ["grain_count"] and whole.label == "boxes"
     with pytest.raises(DembarkError, match="did you mean box"):
-        expand.plan(file=spec.path, cases=["bxo"])
+        campaign(spec, ["bxo"])
 
 
-def test_a_plan_is_that_of_a_profile_or_a_campaign() -> None:
-    with pytest.raises(DembarkError, match="--profile or --campaign"):
-        expand.plan()
-    planned = expand.plan("quick")
-    assert planned.facts == {"profile": "quick"} and planned.label == "quick" and planned.words == ("--profile", "quick")
+def test_the_plan_of_a_profile() -> None:
+    planned = expand.profile("quick")
+    assert planned.facts == {"profile": "quick"} and planned.label == "quick"
+    assert expand.profile("quick", ["box"], ["yade"]).facts == {"profile": "quick", "cases": ["box"]}
+    written = planned.as_json({one.place: 5.0 for one in planned.series})
+    assert {run["folder"]: run["inputs"] for run in written["runs"]} == {place: run.inputs for place, run in planned.folders.items()}
+    assert {run["estimate"] for run in written["runs"]} == {5.0}

@@ -190,7 +190,7 @@ def test_a_mistake_gets_one_line_before_anything_starts(name: str, write, tmp_pa
     (["."], "is a folder"),
     (["small", "--executor", "slrum"], "--executor slrum is neither local, nor slurm, nor the file of a site"),
     (["small", "--jobs", "3"], "--jobs is for a cluster"),
-    (["wide", "--cores", "2"], "is to run on 3 cores, 2 are there"),
+    (["wide", "--cores", "2"], "is to run on 3 cores, there are 2"),
     (["large", "--cores", "2"], "is to have 1e+03 GB of memory"),
     (["smal"], "did you mean small?"),
 ])

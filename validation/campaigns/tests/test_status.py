@@ -1,68 +1,115 @@
-"""What is said of runs that go on: the time left, and states of runs that were ended without a word."""
+"""The state of runs, told by files alone: plan.json, run.json, status files and locks."""
 
 from __future__ import annotations
 
 import json
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from dembark.common.lock import lock
-from dembark.validation.campaigns import folder
-from dembark.validation.campaigns.folder import look
+from dembark.validation import results as tables
 from dembark.validation.cli import main
 from dembark.validation.judge.result import QuantityRecord, Result, write
-from dembark.validation.runs import schema
-from dembark.validation.runs.perform import LOCK
+from dembark.validation.results import State, lock_file, status_file
+from dembark.validation.runs.folder import look
 from dembark.validation.runs.steps import CAMPAIGN_FILE
+from dembark.validation.runs.workflow import LOCK
 
-CAMPAIGN = '[campaign]\nname = "boxes"\nprofile = "quick"\n'
+
+def status(results: Path, number: int, **facts: Any) -> None:
+    """Write a status file, as that of the run with this number."""
+    place = results / f"box/n={number // 10}/yade/replica-{number % 10}"
+    place.parent.mkdir(parents=True, exist_ok=True)
+    status_file(place).write_text(json.dumps(State("x", inputs=str(number), **facts).as_json()))
 
 
 @pytest.fixture
 def results(tmp_path: Path) -> Path:
-    """A campaign of four runs of two series, each estimated to take 100 s; the first one is finished and took 200 s."""
-    (tmp_path / CAMPAIGN_FILE).write_text(CAMPAIGN)
-    (tmp_path / folder.FACTS).write_text(json.dumps({"name": "boxes"}))
-    rows = [{"run_id": f"{n}{k}", "campaign": "boxes", "case_name": "box", "variant": f"n={n}", "engine": "yade", "replica": k,
-             "folder": f"box/n={n}/yade/replica-{k}", "state": "waiting", "estimated_time": 100.0} for n in (1, 2) for k in (1, 2)]
-    rows[0] |= {"state": "finished", "began": 1000.0, "ended": 1200.0, "step": 100, "steps": 100}
-    rows[1] |= {"state": "running", "began": time.time() - 50.0, "step": 60, "steps": 100, "resumed_from_step": 10, "attempts": 2}
-    old = {**rows[0], "run_id": "old", "state": "superseded"}
-    with schema.writing(tmp_path / schema.FILE) as connection:
-        schema.put(connection, "runs", [*rows, old])
-    done = tmp_path / str(rows[0]["folder"])
+    """A campaign of four runs of two series, each estimated to take 100 s; the first one is finished and took 200 s, the second one has
+    begun."""
+    (tmp_path / CAMPAIGN_FILE).write_text('[campaign]\nname = "boxes"\nprofile = "quick"\n')
+    runs = [{"folder": f"box/n={n}/yade/replica-{k}", "inputs": f"{n}{k}", "estimate": 100.0} for n in (1, 2) for k in (1, 2)]
+    (tmp_path / "plan.json").write_text(json.dumps({"campaign": "boxes", "runs": runs}))
+    done = tmp_path / "box/n=1/yade/replica-1"
     done.mkdir(parents=True)
-    (done / "run.json").write_text(json.dumps({"inputs": "11"}))
+    facts = {"wall_time": 200.0, "host": "n1", "ranks": 1, "threads": 1, "particle_steps_per_second": 50.0}
+    (done / "run.json").write_text(json.dumps({"inputs": "11", "steps": 100, "attempts": 2, "resumed_at": [40], "provenance": facts,
+                                               "case": "box", "parameters": {"n": 1}}))
+    status(tmp_path, 12, state="running", began=time.time() - 50.0, step=60, steps=100, resumed_from=10, attempt=2)
     return tmp_path
 
 
-def test_time_left_is_what_the_finished_ones_took_over_their_estimate(results: Path) -> None:
-    with lock(results / LOCK, "held"):
+def test_a_run_whose_lock_is_held_is_running_and_the_time_left_follows_the_finished_ones(results: Path) -> None:
+    record = json.loads((results / "box/n=1/yade/replica-1/run.json").read_text())
+    (results / "box/n=1/yade/replica-1/run.json").write_text(json.dumps(record | {"resumed_at": []}))
+    with lock(lock_file(results / "box/n=1/yade/replica-2"), "held"):
         found = look(results)
     assert found.running and [state.state for state in found.states] == ["finished", "running", "waiting", "waiting"]
+    assert (found.states[1].step, found.states[1].attempt, found.states[0].attempt) == (60, 2, 2)
     # Half of its own steps in 50 s: 40 s more; then two runs of twice their estimate, one at a time.
     assert found.left == pytest.approx(40.0 + 2 * 200.0, abs=3.0)
 
 
-def test_without_a_submitter_nothing_runs(results: Path) -> None:
+def test_without_a_lock_nothing_runs_and_reasons_are_kept(results: Path) -> None:
+    status(results, 21, state="failed", message="it blew up")
+    status(results, 22, state="stopped", message="killed")
     found = look(results)
-    assert not found.running and [state.state for state in found.states] == ["finished", "waiting", "waiting", "waiting"]
-    assert found.left is None and found.headline == "boxes: 1 of 4 done, 0 running, 3 waiting, 0 failed; nobody runs it now"
+    assert not found.running and [state.state for state in found.states] == ["finished", "stopped", "failed", "stopped"]
+    assert found.left is None and found.headline == "boxes: 1 of 4 done, 0 running, 2 waiting, 1 failed; nobody runs it now"
+    assert [state.message for state in found.states] == ["", "its process was ended", "it blew up", "killed"]
+    with lock(results / LOCK, "held"):
+        assert look(results).running
+
+
+def test_files_of_other_inputs_do_not_count(results: Path) -> None:
+    (results / "box/n=1/yade/replica-1/run.json").write_text(json.dumps({"inputs": "another"}))
+    for number in (11, 12, 21, 22):
+        place = results / f"box/n={number // 10}/yade/replica-{number % 10}"
+        place.parent.mkdir(parents=True, exist_ok=True)
+        status_file(place).write_text(json.dumps({"inputs": "old", "state": "failed", "message": "x"}))
+    assert [(state.state, state.message) for state in look(results).states] == [("waiting", "")] * 4
+    status_file(results / "box/n=1/yade/replica-1").write_text("{")
+    assert look(results).states[0].state == "waiting"
+
+
+CHECKS = (QuantityRecord("a", 1.0, "pass", interval=(0.5, 1.5), tolerance=0.1, evidence="identity", control="friction off"),
+          QuantityRecord("b", None, "fail", tolerance=0.1, evidence="experiment"))
 
 
 def test_status_counts_checks_by_kind_of_evidence(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    checks = (QuantityRecord("a", 1.0, "pass", tolerance=0.1, evidence="identity", control="friction off"),
-              QuantityRecord("b", 1.0, "fail", tolerance=0.1, evidence="experiment"))
-    write(results / "box/n=1/yade/metrics.json", Result("box", "n=1", "yade", checks))
+    write(results / "box/n=1/yade/metrics.json", Result("box", "n=1", "yade", CHECKS))
     assert main(["status", str(results)]) == 0
-    told = capsys.readouterr().out.splitlines()
-    assert told[told.index("1 series measured; 1 of 2 checks passed, 1 FAILED") + 1 :][:2] == [
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[lines.index("1 series measured; 1 of 2 checks passed, 1 FAILED") + 1 :][:2] == [
         "  experiment (measured values): 0 of 1 check passed, 1 FAILED",
         "  identity (conservation laws, the scheme against itself): 1 of 1 check passed, none failed"]
 
 
-def test_a_result_of_other_inputs_does_not_count(results: Path) -> None:
-    (results / "box/n=1/yade/replica-1/run.json").write_text(json.dumps({"inputs": "another"}))
-    assert [state.state for state in look(results).states].count("waiting") == 4
+def test_tables_hold_every_run_and_quantity(results: Path) -> None:
+    write(results / "box/n=1/yade/metrics.json", Result("box", "n=1", "yade", CHECKS, parameters={"n": 1, "name": "x"}))
+    runs, quantities = tables.runs(results), tables.quantities(str(results))
+    assert list(runs["state"]) == ["finished", "stopped", "waiting", "waiting"] and list(runs["replica"]) == [1, 2, 1, 2]
+    assert runs["provenance.wall_time"][0] == 200.0 and runs["parameters.n"][0] == 1 and runs["resumed_from"][0] == 40
+    assert list(quantities["name"]) == ["a", "b"] and list(quantities["parameters.name"]) == ["x", "x"]
+    assert quantities["low"][0] == 0.5 and quantities["value"].isna().tolist() == [False, True]
+    assert tables.comparisons(results).empty
+    # A single series has neither plan nor case in its path.
+    single = tables.quantities(results / "box/n=1/yade")
+    assert list(single["case"]) == ["box", "box"] and list(tables.runs(results / "box/n=1/yade")["state"]) == ["finished"]
+
+
+def test_export(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(results / "box/n=1/yade/metrics.json", Result("box", "n=1", "yade", CHECKS))
+    assert main(["export", str(results)]) == 0
+    assert capsys.readouterr().out.splitlines()[1].startswith("box,n=1,yade,")
+    assert main(["export", str(results), "--table", "runs", "--out", str(tmp_path / "runs.json")]) == 0
+    assert [row["state"] for row in json.loads((tmp_path / "runs.json").read_text())] == ["finished", "stopped", "waiting", "waiting"]
+    capsys.readouterr()
+    for words, expected in (((str(results), "--out", "x.xls"), ".csv, .json, .parquet"), ((str(results), "--table", "run"), "runs"),
+                            (("nowhere",), "nowhere")):
+        assert main(["export", *words]) == 2
+        error = capsys.readouterr().err
+        assert expected in error and error.count("\n") == 1

@@ -15,10 +15,10 @@ from harness import decks, dembark, engine_pid, environment, lives, stand_in, st
 
 from dembark.common.files import read_json
 from dembark.common.lock import lock
-from dembark.validation.campaigns import store
+from dembark.validation import results as tables
 from dembark.validation.campaigns.estimate import wall_clock
-from dembark.validation.campaigns.folder import look
 from dembark.validation.cli import main
+from dembark.validation.runs.folder import look
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
@@ -81,7 +81,7 @@ def test_faults_are_tried_again_and_a_changed_file_repeats_nothing(tmp_path: Pat
     code, out, error = dembark(tmp_path, environment, "submit", "c.toml")
     results = tmp_path / "results/campaigns/boxes"
     assert code == 1 and "4 of 5 runs finished" in out and "not finished: box dry_behaviour=exit liggghts 1: " in out, error + logs(results)
-    attempts = {(run["variant"], run["replica"]): (run["state"], run["attempts"]) for run in store.read_runs(results)}
+    attempts = {(run.variant, run.replica): (run.state, run.attempt) for run in tables.runs(results).itertuples()}
     assert attempts == {("dry_behaviour=ok", 1): ("finished", 1), ("dry_behaviour=kill", 1): ("finished", 2),
                         ("dry_behaviour=exit", 1): ("failed", 1), ("wet_grain_diameter=0.004", 1): ("finished", 1),
                         ("wet_grain_diameter=0.004", 2): ("finished", 1)}
@@ -92,23 +92,23 @@ def test_faults_are_tried_again_and_a_changed_file_repeats_nothing(tmp_path: Pat
     assert "box dry_behaviour=ok liggghts 1: finished in" in (results / "campaign.log").read_text()
     state = look(results)
     assert state.headline == "boxes: 4 of 5 done, 0 running, 0 waiting, 1 failed; nobody runs it now" and state.measured == 3
-    assert [row["value"] for row in store.read_quantities(results)] == [1, 1, 2]
-    assert {(row["variant"], row["value"]) for row in store.read(results, "points")} == {
-        *((f"dry_behaviour={word}", word) for word in ("kill", "exit", "ok")), ("wet_grain_diameter=0.004", 0.004)}
-    assert [sweep["title"] for sweep in read_json(results / "runs.json")["sweeps"]] == ["Behaviours", ""]
+    found = tables.quantities(results)
+    assert list(found["value"]) == [1, 1, 2] and list(found["parameters.behaviour"]) == ["kill", "ok", "ok"]
+    assert [sweep["title"] for sweep in read_json(results / "plan.json")["sweeps"]] == ["Behaviours", ""]
     made = {path: path.stat().st_mtime_ns for path in results.glob("*/*/*/replica-*/run.json")}
 
-    # The faulty point is taken out, another comes in, the store is lost: only the new run is made, and the store is whole again.
+    # The faulty point is taken out, another comes in, and what is derived is lost: only the new run is made.
     changed = CAMPAIGN.replace('"exit", ', "").replace('["4 mm"]', '["4 mm", "5 mm"]')
     (tmp_path / "c.toml").write_text(changed)
-    (results / "store.sqlite").unlink()
+    for path in (results / "plan.json", results / "report.html", *results.glob("*/*/*/metrics.json")):
+        path.unlink()
     code, out, error = dembark(tmp_path, environment, "submit", "c.toml")
     assert code == 0 and error.count("already finished; reusing") == 4 and "6 of 6 runs finished" in out, error
-    assert {path: path.stat().st_mtime_ns for path in made} == made and {run["state"] for run in store.read_runs(results)} == {"finished"}
-    assert len(store.read_runs(results)) == 6 and len(store.read_quantities(results)) == 4
-    facts = read_json(results / "campaign.json")
-    assert (results / "campaign.toml").read_text() == changed and len(facts["submissions"]) == 2
-    assert facts["name"] == "boxes" and facts["submissions"][0]["file"] == str(tmp_path / "c.toml")
+    assert {path: path.stat().st_mtime_ns for path in made} == made
+    assert list(tables.runs(results)["state"]) == ["finished"] * 6 and len(tables.quantities(results)) == 4
+    facts = read_json(results / "plan.json")
+    assert (results / "campaign.toml").read_text() == changed and facts["campaign"] == "boxes"
+    assert facts["submitted"]["file"] == str(tmp_path / "c.toml") and len(facts["runs"]) == 6
     assert look(results).complete and str(results / "report.html") in out
 
 
@@ -150,7 +150,7 @@ def test_a_folder_with_other_things_is_refused(tmp_path: Path, monkeypatch: pyte
     (tmp_path / "mine/thesis.tex").touch()
     for words, expected in ((("submit", "c.toml", "--out", "mine"), "not empty"), (("resume", "mine"), "no campaign's folder"),
                             (("status", "mine"), "no campaign's folder"), (("submit", "c.toml", "--out", "c.toml"), "is a file"),
-                            (("export", "mine"), "there is no store"), (("report", "mine"), "no results in")):
+                            (("export", "gone"), "gone is no folder"), (("report", "mine"), "no results in")):
         assert main(list(words)) == 2
         error = capsys.readouterr().err
         assert expected in error and error.count("\n") == 1
@@ -184,8 +184,7 @@ def test_a_campaign_goes_on_after_its_submitter_was_killed(
     code, out, error = dembark(tmp_path, environment, "resume", "o")
     assert code == 0 and "2 of 2 runs finished" in out, error + logs(results)
     assert record.stat().st_mtime_ns == made
-    assert [(run["state"], run["variant"]) for run in store.read_runs(results)].count(("finished", "dry_behaviour=hang")) == 1
-    assert len(store.read_runs(results)) == 2 and len(store.read_quantities(results)) == 2
+    assert list(tables.runs(results)["state"]) == ["finished"] * 2 and len(tables.quantities(results)) == 2
     code, _, error = dembark(tmp_path, environment, "submit", "d.toml", "--out", "o")
     assert code == 2 and "belongs to the campaign boxes" in error
 

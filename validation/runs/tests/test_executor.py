@@ -1,4 +1,4 @@
-"""The executor with backends and steps that stand in: order, limits, retries, what is done again, and that everything comes to an end."""
+"""The executor with runs and steps that stand in: order, limits, retries, what is done again, and that everything comes to an end."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -18,44 +16,30 @@ from harness import decks, stand_in  # noqa: F401
 
 from dembark.common.errors import Interrupted, Killed, RunError
 from dembark.common.files import write_json
+from dembark.validation.campaigns.plan import Resources, Run, of_profile
 from dembark.validation.judge.inputs import KEY, content, digest, stored
-from dembark.validation.runs import schema
-from dembark.validation.runs.executor import Executor, Local, Task
-from dembark.validation.runs.plan import Resources, Run, of_profile
-from dembark.validation.runs.simulate import Progress
+from dembark.validation.results import State
+from dembark.validation.runs import executor as executor_module
+from dembark.validation.runs.executor import Executor, States, Task
 from dembark.validation.runs.steps import Step
-from dembark.validation.runs.table import Table
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
 
-@dataclass
-class Scripted:
-    """A backend whose runs end as `script` says, one exception (or None) an attempt; at most `at_once` at a time."""
+@pytest.fixture
+def script(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[Exception | None]]:
+    """How the attempts of each run end, by its name; `started` lists the attempts."""
+    ends: dict[str, list[Exception | None]] = {}
+    started: list[Exception | None] = ends.setdefault("started", [])
 
-    script: dict[str, list[Exception | None]] = field(default_factory=dict)
-    at_once: int = 2
-    here: bool = True
-    started: list[str] = field(default_factory=list)
-    busy: list[int] = field(default_factory=list)
+    def simulate(run: Run, *rest: object) -> None:
+        started.append(run.name)  # type: ignore[arg-type]
+        time.sleep(0.05)
+        if error := (ends.get(run.name) or [None]).pop(0):
+            raise error
 
-    def fits(self, used: Resources, busy: Sequence[Resources]) -> bool:
-        self.busy.append(len(busy))
-        return len(busy) < self.at_once
-
-    def start(self, run: Run, out: Path, used: Resources, progress: Progress) -> Future[object]:
-        progress(state="running")
-        self.started.append(run.name)
-        future: Future[object] = Future()
-        error = self.script[run.name].pop(0) if self.script.get(run.name) else None
-        threading.Timer(0.05, (lambda: future.set_exception(error)) if error else (lambda: future.set_result(None))).start()
-        return future
-
-    def start_step(self, step: Step) -> Future[object] | None:
-        return None
-
-    def close(self) -> None:
-        pass
+    monkeypatch.setattr(executor_module, "simulate", simulate)
+    return ends
 
 
 def tasks(folder: Path) -> list[Task]:
@@ -84,30 +68,30 @@ def die(once: Path) -> None:
 def step(name: str, folder: Path, needs: Sequence[str], call: Callable[..., object] | None = None, *arguments: object,
          sources: Sequence[Path] = ()) -> Step:
     target = folder / f"{name}.json"
-    return Step(name, "measure", Path(), tuple(needs), target, partial(of, sources), call or write, arguments or (target, sources))
+    return Step(name, "measure", tuple(needs), target, partial(of, sources), call or write, arguments or (target, sources))
 
 
-def executor(folder: Path, backend: object, work: Sequence[Task], steps: Sequence[Step], retries: int = 2,
-             cancel: threading.Event | None = None, table: Table | None = None) -> tuple[Executor, Table]:
-    found = table or Table(folder)
-    found.enter({f"{task.name}": task.run for task in work}, folder, {one.name: one.kind for one in steps})
-    made = Executor(found, backend, cancel or threading.Event(), retries, cores=2)  # type: ignore[arg-type]
-    made.execute(work, steps)
+def execute(work: Sequence[Task], steps: Sequence[Step], cancel: threading.Event | None = None) -> tuple[Executor, dict[str, State]]:
+    states = States(work, steps)
+    made = Executor(states, cancel or threading.Event(), cores=2, retries=2)
+    try:
+        made.execute(work, steps)
+    finally:
+        found = {state.name: state for state in states.all()}
+        execute.last = found  # type: ignore[attr-defined]
     return made, found
 
 
-def test_what_was_killed_is_started_again_and_what_failed_is_not(tmp_path: Path) -> None:
+def test_what_was_killed_is_started_again_and_what_failed_is_not(tmp_path: Path, script: dict[str, list[Exception | None]]) -> None:
     work = tasks(tmp_path)
     one, two, three = (task.name for task in work)
-    backend = Scripted({one: [Killed("power"), None], two: [RunError(f"{two} failed, it blew up")], three: [Killed("x")] * 3})
-    measure = step("m", tmp_path, [one, two, three])
-    made, table = executor(tmp_path, backend, work, [measure])
-    assert {name: backend.started.count(name) for name in (one, two, three)} == {one: 2, two: 1, three: 3}
-    assert backend.started[:2] == [one, two]
-    states = {state.name: (state.state, state.message) for state in table.states()}
-    assert states == {one: ("finished", ""), two: ("failed", "it blew up"), three: ("failed", "x"), "m": ("finished", "")}
+    script |= {one: [Killed("power"), None], two: [RunError(f"{two} failed, it blew up")], three: [Killed("x")] * 3}
+    made, found = execute(work, [step("m", tmp_path, [one, two, three])])
+    assert {name: script["started"].count(name) for name in (one, two, three)} == {one: 2, two: 1, three: 3}  # type: ignore[arg-type]
+    assert set(script["started"][:2]) == {one, two}
+    assert {name: (state.state, state.message) for name, state in found.items()} == {
+        one: ("finished", ""), two: ("failed", "it blew up"), three: ("failed", "x"), "m": ("finished", "")}
     assert list(made.errors) == [two, three] and stored(tmp_path / "m.json")
-    assert max(backend.busy) <= 2
 
 
 def test_steps_are_made_again_when_what_they_read_has_changed(tmp_path: Path) -> None:
@@ -117,7 +101,7 @@ def test_steps_are_made_again_when_what_they_read_has_changed(tmp_path: Path) ->
 
     def made() -> set[str]:
         before = {name: (tmp_path / f"{name}.json").stat().st_mtime_ns for name in "ab" if (tmp_path / f"{name}.json").exists()}
-        executor(tmp_path, Scripted(), [], [first, second])
+        execute([], [first, second])
         return {name for name in "ab" if (tmp_path / f"{name}.json").stat().st_mtime_ns != before.get(name)}
 
     assert made() == {"a", "b"} and made() == set()
@@ -125,38 +109,41 @@ def test_steps_are_made_again_when_what_they_read_has_changed(tmp_path: Path) ->
     assert made() == {"b"}
     source.write_text("2")
     assert made() == {"a", "b"}
-    (tmp_path / schema.FILE).unlink()  # the files hold the hashes of their inputs, not the store
-    assert made() == set()
     (tmp_path / "a.json").write_text(json.dumps({KEY: "other"}))
     assert made() == {"a"}  # which was made as before, so that nothing follows from it
 
 
-def test_a_step_that_fails_stops_only_what_is_inputs_hash_it(tmp_path: Path) -> None:
+def test_a_step_that_fails_or_is_killed_stops_no_other(tmp_path: Path) -> None:
     once = tmp_path / "once"
     steps = [step("bad", tmp_path, [], fail, "no number"), step("killed", tmp_path, ["bad"], die, once), step("good", tmp_path, ["killed"])]
-    made, table = executor(tmp_path, Scripted(), [], steps)
-    assert {state.name: state.state for state in table.states()} == {"bad": "failed", "killed": "finished", "good": "finished"}
+    made, found = execute([], steps)
+    assert {name: state.state for name, state in found.items()} == {"bad": "failed", "killed": "finished", "good": "finished"}
     assert [str(error) for error in made.errors.values()] == ["no number"]
 
 
-def test_an_interruption_ends_runs_and_steps_at_once(tmp_path: Path) -> None:
-    cancel, table = threading.Event(), Table(tmp_path)
+def test_an_interruption_ends_steps_at_once(tmp_path: Path) -> None:
+    cancel = threading.Event()
     threading.Timer(3.0, cancel.set).start()
     began = time.monotonic()
     with pytest.raises(Interrupted):
-        executor(tmp_path, Local(2, None, cancel), [], [step("long", tmp_path, [], time.sleep, 600)], cancel=cancel, table=table)
-    assert time.monotonic() - began < 60 and table.state("long").state == "stopped"
+        execute([], [step("long", tmp_path, [], time.sleep, 600)], cancel)
+    assert time.monotonic() - began < 60 and execute.last["long"].state == "stopped"  # type: ignore[attr-defined]
 
 
-def test_cores_and_memory_of_this_machine_are_kept_to() -> None:
-    local = Local(4, 8e9, threading.Event())
-    assert local.fits(Resources(ranks=2), [Resources(threads=2)]) and not local.fits(Resources(ranks=2), [Resources(threads=3)])
-    assert local.fits(Resources(memory=4e9), [Resources(memory=4e9)]) and not local.fits(Resources(memory=5e9), [Resources(memory=4e9)])
-    assert local.fits(Resources(ranks=9, memory=1e12), [])  # one alone is let in, whatever it wants
-    local.close()
+def test_cores_and_memory_of_this_machine_are_kept_to(tmp_path: Path) -> None:
+    def fits(used: Resources, *busy: Resources) -> bool:
+        one = Executor(States(()), threading.Event(), 4, 8e9)
+        (task, *_) = tasks(tmp_path)
+        one._under_way = {number: Task(task.run, task.out, each) for number, each in enumerate(busy)}  # type: ignore[misc]
+        return one._fits(used)
+
+    assert fits(Resources(ranks=2), Resources(threads=2)) and not fits(Resources(ranks=2), Resources(threads=3))
+    assert fits(Resources(memory=4e9), Resources(memory=4e9)) and not fits(Resources(memory=5e9), Resources(memory=4e9))
+    assert fits(Resources(ranks=9, memory=1e12))  # one alone is started whatever it needs
 
 
-def test_a_defect_is_not_hidden(tmp_path: Path) -> None:
+def test_a_defect_is_not_hidden(tmp_path: Path, script: dict[str, list[Exception | None]]) -> None:
     work = tasks(tmp_path)[:1]
+    script[work[0].name] = [ZeroDivisionError()]
     with pytest.raises(ZeroDivisionError):
-        executor(tmp_path, Scripted({work[0].name: [ZeroDivisionError()]}), work, [])
+        execute(work, [])

@@ -14,10 +14,10 @@ from harness import decks, engine_pid, lives, stand_in, wait_for  # noqa: F401
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import read_json
 from dembark.validation import engines
+from dembark.validation.campaigns.plan import Resources, Run, series
 from dembark.validation.case import folders
 from dembark.validation.case.folders import find
 from dembark.validation.runs import restarts, simulate
-from dembark.validation.runs.plan import Resources, Run, series
 
 # The stand-in has ten grains and a hundred steps; this is a state every twenty of them.
 OFTEN = Resources(restart_interval=2e-4)
@@ -134,7 +134,7 @@ def test_killed_harness_leaves_what_the_next_attempt_needs(tmp_path: Path, engin
                                                            wait_for: Callable[..., object]) -> None:
     text = ("import sys, threading; from pathlib import Path; from dembark.validation import engines; "
             "from dembark.validation.runs import simulate; "
-            "from dembark.validation.case.folders import find; from dembark.validation.runs.plan import series; "
+            "from dembark.validation.case.folders import find; from dembark.validation.campaigns.plan import series; "
             "one = series(find('box'), 'dry', 'quick', engines.find('liggghts'), {'behaviour': 'hang'}).runs[0]; "
             "used = simulate.Resources(restart_interval=2e-4); "
             f"simulate.simulate(one, Path({str(tmp_path / 'out')!r}), threading.Event(), used)")

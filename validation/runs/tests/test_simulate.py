@@ -17,12 +17,13 @@ from harness import decks, engine_pid, environment, lives, stand_in, wait_for  #
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import read_json
 from dembark.validation import engines
+from dembark.validation.campaigns import plan as plans
+from dembark.validation.campaigns.plan import Run, series
 from dembark.validation.case import deck, folders
 from dembark.validation.case.folders import find
 from dembark.validation.judge.result import read
+from dembark.validation.results import status_file
 from dembark.validation.runs import outcome, simulate
-from dembark.validation.runs import plan as plans
-from dembark.validation.runs.plan import Run, series
 from dembark.validation.runs.steps import measure_series
 
 FindPid = Callable[[Path], int]
@@ -133,6 +134,8 @@ def test_failures_are_told_in_one_line_and_leave_earlier_results(tmp_path: Path,
     with pytest.raises(RunError) as caught:
         run(out, behaviour=behaviour)
     message, log = str(caught.value), out / "failed" / "replica-1.log"
+    status = read_json(status_file(folder))
+    assert status["state"] == ("stopped" if behaviour == "kill" else "failed") and status["message"] in message
     assert isinstance(caught.value, Killed) == (behaviour == "kill")
     assert "\n" not in message and str(log) in message and message.startswith("box dry liggghts 1 failed")
     for word in words:
@@ -141,7 +144,7 @@ def test_failures_are_told_in_one_line_and_leave_earlier_results(tmp_path: Path,
     assert {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
     assert not list(out.glob(".*work*"))
     run(out, pause=0.001)
-    assert not (out / "failed").exists()
+    assert not (out / "failed").exists() and not status_file(folder).exists()
 
 
 def test_cancelling_ends_the_engine_and_clears_up(tmp_path: Path, engine_pid: FindPid, lives: Lives) -> None:
@@ -159,7 +162,7 @@ def test_cancelling_ends_the_engine_and_clears_up(tmp_path: Path, engine_pid: Fi
     cancel.set()
     thread.join(20)
     assert caught and not lives(pid)
-    assert [path for path in out.iterdir() if "lock" not in path.name] == []
+    assert [path.name for path in out.iterdir() if "lock" not in path.name] == [".replica-1.status.json"]
 
 
 @pytest.fixture
@@ -244,7 +247,7 @@ def test_a_result_is_written_once_with_all_that_is_known_of_it(tmp_path: Path) -
     runs = series(find("box"), "dry", "quick", engines.find("liggghts"), {"replicas": 3}).runs
     for one in (runs[0], runs[2]):
         simulate.simulate(one, tmp_path, threading.Event())
-    found = measure_series(tmp_path, runs)
+    found = measure_series(tmp_path, "box", {run.folder_name: run.inputs for run in runs})
     assert read(tmp_path / "metrics.json") == found
     assert found.inputs == (runs[0].inputs, runs[2].inputs) and found.replicas_missing == (2,) and found.parameters["replicas"] == 3
     assert found.provenance["seeds"] == [7, 9] and "at" in found.measured

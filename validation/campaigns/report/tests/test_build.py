@@ -27,11 +27,13 @@ def fill(folder: Path, shift: float = 0.0, killed: str = "", broken: str = "") -
     runs = []
     for name, values in points.items():
         for engine in ("liggghts", "yade"):
-            runs.append({"case": "silo", "variant": name, "engine": engine, "replica": 1,
-                         "state": "failed" if name == killed else "finished",
-                         "message": "the engine was killed" if name == killed else ""})
+            runs.append({"folder": f"silo/{name}/{engine}/replica-1", "inputs": "a"})
             place = folder / "silo" / name / engine
-            place.mkdir(parents=True)
+            (place / "replica-1").mkdir(parents=True)
+            if name == killed:
+                (place / ".replica-1.status.json").write_text('{"state": "failed", "inputs": "a", "message": "the engine was killed"}')
+            else:
+                (place / "replica-1/run.json").write_text('{"inputs": "a"}')
             value = values["wall_friction"] * values["cylinder_radius"] + shift
             verdict = "fail" if engine == "yade" and name == broken else "pass"
             quantities = (QuantityRecord("k", value, "pass", "K_ratio", "1", (value - 1e-3, value + 1e-3), "", value * 1.02, None, -0.02,
@@ -41,7 +43,7 @@ def fill(folder: Path, shift: float = 0.0, killed: str = "", broken: str = "") -
             if name != killed:
                 result.write(place / "metrics.json", Result("silo", name, engine, quantities, parameters=values, provenance={
                     "commit": "a" * 40, "replicas": 1, "steps": 1000, "time_step": 1e-5, "wall_time": 2.0, "versions": {engine: "1.0"}}))
-    (folder / "runs.json").write_text(json.dumps({"campaign": "test", "description": "a known law", "sweeps": [sweep], "runs": runs}))
+    (folder / "plan.json").write_text(json.dumps({"campaign": "test", "description": "a known law", "sweeps": [sweep], "runs": runs}))
     return folder
 
 

@@ -3,31 +3,30 @@
 from __future__ import annotations
 
 import getpass
-import hashlib
 import os
 import socket
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from dembark.common.errors import DembarkError
-from dembark.common.files import read_json, write_json, write_whole
+from dembark.common.files import write_json, write_whole
 from dembark.common.lock import held
-from dembark.validation import engines, provenance
+from dembark.validation import engines, provenance, results
 from dembark.validation.campaigns.estimate import wall_clock
+from dembark.validation.campaigns.plan import Plan
 from dembark.validation.campaigns.spec import read
 from dembark.validation.case.folders import INSTEAD, VARIABLE, add_own_root, shipped_root, variables
+from dembark.validation.judge.result import METRICS
 from dembark.validation.judge.tally import Tally, of_folder
-from dembark.validation.runs import table
-from dembark.validation.runs.perform import LOCK
-from dembark.validation.runs.plan import Plan
-from dembark.validation.runs.progress import headline
-from dembark.validation.runs.steps import CAMPAIGN_FILE
-from dembark.validation.runs.table import State
+from dembark.validation.results import PLAN, State
 
-FACTS = "campaign.json"
+from .monitor import headline
+from .steps import CAMPAIGN_FILE
+from .workflow import LOCK
+
 LOG = "campaign.log"
 
 
@@ -62,8 +61,7 @@ def refuse_foreign(folder: Path, name: str) -> None:
 
 def read_name(folder: Path) -> str:
     """Name of the campaign whose folder it is."""
-    facts = read_json(folder / FACTS)
-    return str(facts["name"]) if facts and "name" in facts else read(folder / CAMPAIGN_FILE).name
+    return str(results.plan(folder).get("campaign") or read(folder / CAMPAIGN_FILE).name)
 
 
 def own_file(folder: Path) -> Path:
@@ -75,18 +73,14 @@ def own_file(folder: Path) -> Path:
     return copy.resolve()
 
 
-def _last(folder: Path, what: str) -> dict[str, Any]:
-    submissions = (read_json(folder / FACTS) or {}).get("submissions", [])
-    return dict(submissions[-1].get(what, {})) if submissions else {}
-
-
 def options(folder: Path) -> Options:
     """How the campaign was submitted last."""
-    return Options(**{key: value for key, value in _last(folder, "options").items() if key in Options.__dataclass_fields__})
+    given = results.plan(folder).get("submitted", {}).get("options", {})
+    return Options(**{key: value for key, value in given.items() if key in Options.__dataclass_fields__})
 
 
 def _variables() -> list[str]:
-    """What else says which engines and cases are meant; `resume` takes it over where the shell says nothing."""
+    """Environment variables that say which engines and cases are meant; `resume` sets them again where the shell does not."""
     return [*(variable for name in engines.names() for variable in engines.facts(name).variables), INSTEAD, VARIABLE,
             *dict.fromkeys(engines.facts(name).launcher for name in engines.names())]
 
@@ -94,7 +88,7 @@ def _variables() -> list[str]:
 def restore(folder: Path) -> None:
     """Set the variables for engines and cases as they were at the last submission, unless they are set; its folders of own cases are added
     to those that are named now. DembarkError when one of these is gone."""
-    for name, value in _last(folder, "environment").items():
+    for name, value in results.plan(folder).get("submitted", {}).get("environment", {}).items():
         if name == VARIABLE:
             for root in map(Path, filter(None, value.split(os.pathsep))):
                 if not root.is_dir():
@@ -104,19 +98,21 @@ def restore(folder: Path) -> None:
             os.environ.setdefault(name, value)
 
 
-def enter(folder: Path, file: Path, plan: Plan, chosen: Options) -> None:
-    """Write the copy of the campaign's file into `folder` and add to `campaign.json` who submits it, from where, with what."""
+def environment() -> dict[str, str]:
+    """What other processes need to find the same engines and cases: the variables that are set, paths made absolute."""
+    return {name: _absolute(os.environ[name]) for name in _variables() if name in os.environ} | variables()
+
+
+def enter(folder: Path, file: Path, plan: Plan, chosen: Options, estimates: Mapping[Path, float | None]) -> None:
+    """Write the copy of the campaign's file into `folder`, and plan.json: what is to be done, who submits it, from where, with what."""
     text = file.read_bytes()
     used = {run.engine.name: run.engine.version for one in plan.series for run in one.runs}
     write_whole(folder / CAMPAIGN_FILE, text)
-    facts = read_json(folder / FACTS) or {}
-    submission: dict[str, Any] = {
-        "at": datetime.now(UTC).isoformat(timespec="seconds"), "file": str(file), "sha256": hashlib.sha256(text).hexdigest(),
-        "options": asdict(chosen), "host": socket.gethostname(), "user": _user(), "decks": str(shipped_root()),
-        "environment": {name: _absolute(os.environ[name]) for name in _variables() if name in os.environ} | variables(),
-        **provenance.commit(), "versions": {"dembark": provenance.package_version("dembark"), **used}}
-    write_json(folder / FACTS, {"name": plan.label, "description": plan.facts["description"],
-                                "submissions": [*facts.get("submissions", []), submission]})
+    submitted: dict[str, Any] = {
+        "at": datetime.now(UTC).isoformat(timespec="seconds"), "file": str(file), "options": asdict(chosen), "host": socket.gethostname(),
+        "user": _user(), "decks": str(shipped_root()), "environment": environment(), **provenance.commit(),
+        "versions": {"dembark": provenance.package_version("dembark"), **used}}
+    write_json(folder / PLAN, {"submitted": submitted, **plan.as_json(estimates)})
 
 
 def _absolute(value: str) -> str:
@@ -154,27 +150,17 @@ class Status:
         return all(state.state == "finished" for state in self.states)
 
 
-def look(results: Path) -> Status:
-    """The state of the campaign in `results`, told from the folder alone; DembarkError when it is no campaign's."""
-    own_file(results)
-    found = table.read(results)
-    if not found:
-        raise DembarkError(f"the campaign in {results} has not been started", "", f"start it with 'dembark resume {results}'")
-    running = held(results / LOCK)
-    states = tuple(_as_the_files_say(results, state, running) for state in found)
-    report = results / "report.html"
-    measured = {Path(state.folder).parent for state in states if (results / state.folder).with_name("metrics.json").is_file()}
-    return Status(read_name(results), running, states, time_left(states), len(measured), of_folder(results),
+def look(folder: Path) -> Status:
+    """The state of the campaign in `folder`, from its files alone; DembarkError when it is no campaign's."""
+    own_file(folder)
+    states = tuple(results.states(folder))
+    if not states:
+        raise DembarkError(f"the campaign in {folder} has not been started", "", f"start it with 'dembark resume {folder}'")
+    running = held(folder / LOCK) or any(state.state == "running" for state in states)
+    report = folder / "report.html"
+    measured = {Path(state.folder).parent for state in states if (folder / state.folder).with_name(METRICS).is_file()}
+    return Status(read_name(folder), running, states, time_left(states), len(measured), of_folder(folder),
                   report if report.is_file() else None)
-
-
-def _as_the_files_say(results: Path, state: State, running: bool) -> State:
-    """A result counts before what the table says of it, and nothing runs when nobody runs the campaign."""
-    record = read_json(results / state.folder / "run.json")
-    if record is not None and record.get("inputs") == state.inputs:
-        return replace(state, state="finished")
-    gone = state.state == "finished" or (state.state in table.UNDER_WAY and not running)
-    return replace(state, state="waiting", step=0) if gone else state
 
 
 def time_left(states: Sequence[State]) -> float | None:
@@ -182,8 +168,8 @@ def time_left(states: Sequence[State]) -> float | None:
 
     A waiting run takes its estimate, times what the finished ones took over theirs.
     """
-    took = [(state.ended - state.began, state.estimate) for state in states
-            if state.state == "finished" and state.estimate and state.ended > state.began and not state.resumed_from]
+    took = [(state.took, state.estimate) for state in states
+            if state.state == "finished" and state.estimate and state.took > 0.0 and not state.resumed_from]
     factor = sum(real for real, _ in took) / sum(wall for _, wall in took) if took else 1.0
     left = []
     for state in states:

@@ -9,8 +9,11 @@ from pathlib import Path
 from rich.console import Console
 
 from dembark.common.units import duration
-from dembark.validation.runs.progress import Monitor, OutputParser, describe, headline, state_table
-from dembark.validation.runs.table import State, Table
+from dembark.validation.results import State
+from dembark.validation.runs.executor import States
+from dembark.validation.runs.monitor import Monitor, describe, headline, state_table
+from dembark.validation.runs.output import OutputParser
+from dembark.validation.runs.steps import Step
 
 
 def test_steps_are_read_and_other_numbers_are_not() -> None:
@@ -35,22 +38,20 @@ def test_remaining_time_follows_the_rate() -> None:
     assert [duration(s) for s in (5, 200, 7500)] == ["5 s", "3 min 20 s", "2 h 5 min"]
 
 
-def table(*names: str) -> Table:
-    """A table of waiting steps, in memory."""
-    made = Table()
-    made.enter({}, Path(), dict.fromkeys(names, "measure"))
-    return made
+def table(*names: str) -> States:
+    """Waiting steps."""
+    return States((), [Step(name, "measure", (), Path(), str, print, ()) for name in names])
 
 
 def test_plain_lines_tell_start_progress_and_end(tmp_path: Path) -> None:
     runs, text = table("one", "two"), io.StringIO()
-    with Monitor(runs.states, Console(file=text, width=200), interval=0.1, log=tmp_path / "log") as monitor:
+    with Monitor(runs.all, Console(file=text, width=200), interval=0.1, log=tmp_path / "log") as monitor:
         runs.listener = monitor.event
-        runs.transition("one", "running", steps=100, time_step=0.1)
-        runs.note("one", step=50)
+        runs.change("one", state="running", steps=100, time_step=0.1)
+        runs.change("one", step=50)
         time.sleep(0.3)
-        runs.transition("one", "finished")
-        runs.transition("two", "failed", message="no luck [here]")
+        runs.change("one", state="finished")
+        runs.change("two", state="failed", message="no luck [here]")
     lines = text.getvalue().splitlines()
     assert lines[0] == "dembark: one: started"
     assert any("step 50/100 (50 %), 5/10 s simulated" in line for line in lines)
@@ -62,8 +63,8 @@ def test_plain_lines_tell_start_progress_and_end(tmp_path: Path) -> None:
 
 def test_a_terminal_gets_a_table() -> None:
     text, runs = io.StringIO(), table("one", "two")
-    with Monitor(runs.states, Console(file=text, width=120, force_terminal=True)):
-        runs.transition("one", "running", step=50, steps=100, time_step=0.1)
+    with Monitor(runs.all, Console(file=text, width=120, force_terminal=True)):
+        runs.change("one", state="running", step=50, steps=100, time_step=0.1)
         time.sleep(0.8)
     assert "50 % of 100" in text.getvalue() and "1 running, 1 waiting" in text.getvalue()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +16,7 @@ from dembark.common.files import read_json
 from dembark.validation import engines
 from dembark.validation.case.deck import require_capable, require_measure, require_steps, sources
 from dembark.validation.case.folders import discover
-from dembark.validation.case.model import Case, Study
+from dembark.validation.case.model import Case
 from dembark.validation.case.resolve import for_replica, portable, resolve
 from dembark.validation.engines import Engine
 
@@ -60,7 +60,7 @@ class Run:
 
     @cached_property
     def inputs(self) -> str:
-        """Hash of what decides the outcome: parameters, deck and engine, but not where, on how many cores or beside how many replicas."""
+        """Hash of what decides the outcome: parameters, deck and engine, but not the host, the cores, or the number of replicas."""
         parameters = {key: value for key, value in self.values.items() if key != "replicas"}
         facts = {"parameters": parameters, "deck": sources(self.case, self.engine.name),
                  "engine": [self.engine.name, self.engine.version, self.engine.identity, self.engine.switches()]}
@@ -103,49 +103,30 @@ class Resources:
 
 
 @dataclass(frozen=True)
-class PlannedStudy:
-    """A study of one engine: the series of its variants, in the study's order."""
-
-    study: Study
-    series: tuple[Series, ...]
-
-    @property
-    def place(self) -> Path:
-        """Folder below results/<profile>: <case>/study-<name>/<engine>."""
-        first = self.series[0].place
-        return first.parent.parent / self.study.folder_name / first.name
-
-
-@dataclass(frozen=True)
 class Plan:
     """All that belongs into one results folder: a profile, or a campaign, and its series with the longest first.
 
-    `resources` are those of a series' runs by its place, `measure` those of a measurement that is to be a job of its own; `facts` go into
-    runs.json, `words` tell a job on another host which plan it belongs to. `whole`: nothing was left out of it by choice.
+    `facts` say for people and the report what was asked for; `resources` are those of a series' runs by its place, `measure` those of the
+    job that measures on a cluster.
     """
 
     label: str
     series: tuple[Series, ...]
     facts: Mapping[str, Any]
-    words: tuple[str, ...]
     resources: Mapping[Path, Resources] = field(default_factory=dict)
     retries: int = RETRIES
-    measure: Resources | None = None
-    whole: bool = True
+    measure: Resources = Resources()
 
+    @property
+    def folders(self) -> dict[str, Run]:
+        """The runs by their folders below that of the results."""
+        return {str(one.place / run.folder_name): run for one in self.series for run in one.runs}
 
-def studies(all_series: Iterable[Series]) -> list[PlannedStudy]:
-    """The studies that `all_series` hold all variants of, engine by engine."""
-    by_place = {one.place: one for one in all_series}
-    cases = {one.runs[0].case.name: one.runs[0].case for one in by_place.values()}
-    found = []
-    for case in cases.values():
-        for study in case.studies.values():
-            for engine in case.engines:
-                places = [Path(case.name, variant, engine) for variant in study.variants]
-                if all(place in by_place for place in places):
-                    found.append(PlannedStudy(study, tuple(by_place[place] for place in places)))
-    return found
+    def as_json(self, estimates: Mapping[Path, float | None] | None = None) -> dict[str, Any]:
+        """The content of plan.json; `estimates`: expected wall times (s) of a run by places of series."""
+        return {**self.facts, "runs": [{"folder": str(one.place / run.folder_name), "inputs": run.inputs,
+                                        **({"estimate": estimates.get(one.place)} if estimates else {})}
+                                       for one in self.series for run in one.runs]}
 
 
 def series(case: Case, variant: str, profile: str | None, engine: Engine, changes: Mapping[str, Value] | None = None,
@@ -195,12 +176,3 @@ def finished(folder: Path, run: Run) -> bool:
     """Whether `folder` holds the finished result of exactly this run."""
     record = read_json(folder / "run.json")
     return record is not None and record.get("inputs") == run.inputs
-
-
-def variants(all_series: Sequence[Series]) -> dict[Path, list[Series | PlannedStudy]]:
-    """Series, and studies, by the folder of their case and variant; those with more than one are compared."""
-    groups: dict[Path, list[Series | PlannedStudy]] = {}
-    every: list[Series | PlannedStudy] = [*all_series, *studies(all_series)]
-    for one in every:
-        groups.setdefault(one.place.parent, []).append(one)
-    return groups

@@ -11,8 +11,10 @@ import pytest
 from harness import decks, dembark, engine_pid, environment, lives, stand_in, start, wait_for  # noqa: F401
 
 from dembark.common.files import read_json
+from dembark.validation.campaigns.plan import of_profile
 from dembark.validation.case import folders
-from dembark.validation.runs.plan import of_profile, studies, variants
+from dembark.validation.results import states
+from dembark.validation.runs.steps import studies
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
 
@@ -67,12 +69,11 @@ def test_studies_are_planned_for_engines_that_run_all_their_variants(decks: Path
     path = decks / "box" / "case.toml"
     path.write_text(path.read_text().replace("[runs]\n", STUDY).replace(
         '{variant = "wet", engines = ["liggghts"]}', '{variant = "large"}, {variant = "huge", engines = ["yade"]}'))
-    planned = of_profile("quick")
-    assert [str(one.place) for one in studies(planned)] == ["box/study-size/yade"]
-    assert len(variants(planned)[Path("box/large")]) == 2 and len(variants(planned)[Path("box/study-size")]) == 1
+    assert [str(place) for _, place, _ in studies(one.place for one in of_profile("quick"))] == ["box/study-size/yade"]
     path.write_text(path.read_text().replace(', engines = ["yade"]', ""))
     folders.load.cache_clear()
-    assert len(variants(of_profile("quick"))[Path("box/study-size")]) == 2
+    assert [str(place) for _, place, _ in studies(one.place for one in of_profile("quick"))] == [
+        "box/study-size/liggghts", "box/study-size/yade"]
 
 
 def test_a_line_of_runs_may_give_an_engine_its_own_number_of_replicas(decks: Path) -> None:
@@ -109,8 +110,10 @@ def test_a_failed_run_is_missing_in_the_report_and_nothing_stale_takes_its_place
     assert "2 of 3 runs finished" in out and "not finished: box wet liggghts 1: " in out and "SIGKILL" in out
     assert "dembark: the validation is incomplete" in error
     assert reported(results) == ["box/dry/liggghts/metrics.json", "box/dry/yade/metrics.json"]
-    states = {(run["variant"], run["engine"]): run["state"] for run in read_json(results / "runs.json")["runs"]}
-    assert states == {("dry", "liggghts"): "finished", ("dry", "yade"): "finished", ("wet", "liggghts"): "failed"}
+    found = {state.folder: state for state in states(results)}
+    assert {place: state.state for place, state in found.items()} == {
+        "box/dry/liggghts/replica-1": "finished", "box/dry/yade/replica-1": "finished", "box/wet/liggghts/replica-1": "stopped"}
+    assert "SIGKILL" in found["box/wet/liggghts/replica-1"].message
     assert (results / "box/wet/liggghts/superseded/replica-1/run.json").is_file()
 
 

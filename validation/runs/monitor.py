@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 import threading
 import time
@@ -19,47 +18,15 @@ from rich.live import Live
 from rich.table import Table
 
 from dembark.common.units import duration
-from dembark.validation.runs.table import State
+from dembark.validation.results import State
 
 INTERVAL = 10.0
-_COLOURS = {"running": "cyan", "finished": "green", "failed": "bold red", "stopped": "yellow", "queued": "dim", "waiting": "dim"}
-_STEPS = re.compile(r"dembark: steps (\d+) time_step (\S+)")
-_STEP = re.compile(r"\s*(\d+)\s+[-+]?(?:\d|\.\d|nan|inf)")
-
-
-class OutputParser:
-    """Reads an engine's output: the line `dembark: steps N time_step dt`, lines that begin with the step, `dembark: finished`."""
-
-    def __init__(self) -> None:
-        self.steps, self.step, self.time_step, self.finished = 0, 0, 0.0, False
-        self._unfinished = b""
-
-    def feed(self, chunk: bytes) -> bool:
-        """Take some bytes of the output, lines or parts of them; True when something changed."""
-        *lines, self._unfinished = (self._unfinished + chunk).split(b"\n")
-        # Every line is read, also after one that changed something.
-        changes = [self.read(line.decode(errors="replace")) for line in lines]
-        return any(changes)
-
-    def read(self, line: str) -> bool:
-        """Take one line; True when something changed."""
-        announced = _STEPS.match(line)
-        if announced:
-            self.steps, self.time_step = int(announced.group(1)), float(announced.group(2))
-            return True
-        if line.startswith("dembark: finished"):
-            self.finished = True
-            return True
-        step = _STEP.match(line)
-        if step and self.steps and self.step < int(step.group(1)) <= self.steps:
-            self.step = int(step.group(1))
-            return True
-        return False
+_COLOURS = {"running": "cyan", "finished": "green", "failed": "bold red", "stopped": "yellow", "waiting": "dim"}
 
 
 def describe(state: State) -> str:  # noqa: PLR0911 - one return for each state
     """One plain line about a run."""
-    took = duration(state.ended - state.began)
+    took = duration(state.took)
     match state.state:
         case "running" if state.steps:
             eta = "" if state.left is None else f", about {duration(state.left)} left"
@@ -80,8 +47,7 @@ def describe(state: State) -> str:  # noqa: PLR0911 - one return for each state
 
 def headline(states: Sequence[State]) -> str:
     """`3 of 12 done, 2 running, 6 waiting, 1 failed`; a stopped run waits to be started again."""
-    same = {"queued": "waiting", "stopped": "waiting"}
-    count = Counter(same.get(state.state, state.state) for state in states)
+    count = Counter("waiting" if state.state == "stopped" else state.state for state in states)
     return f"{count['finished']} of {len(states)} done, {count['running']} running, {count['waiting']} waiting, {count['failed']} failed"
 
 
@@ -94,7 +60,7 @@ def state_table(states: Sequence[State], rows: int | None = None) -> Table:
                   pad_edge=False)
     shown = list(states)
     if rows is not None and len(states) > rows:
-        order = ("running", "failed", "stopped", "queued", "waiting", "finished")
+        order = ("running", "failed", "stopped", "waiting", "finished")
         first = sorted(range(len(states)), key=lambda index: (order.index(states[index].state), -states[index].ended, index))
         shown = [states[index] for index in sorted(first[:max(1, rows - 1)])]
     for state in shown:
@@ -102,7 +68,7 @@ def state_table(states: Sequence[State], rows: int | None = None) -> Table:
         done = state.steps if state.state == "finished" else state.step
         step = f"{100 * done // state.steps} % of {state.steps}" if state.steps else ""
         simulated = f"{done * state.time_step:.3g} s of {state.steps * state.time_step:.3g} s" if state.steps else ""
-        left = duration(state.left) if state.left is not None else duration(state.ended - state.began) if state.ended else ""
+        left = duration(state.left) if state.left is not None else duration(state.took) if state.ended else ""
         word = f"{state.state}, attempt {state.attempt}" if state.attempt > 1 else state.state
         table.add_row(state.name, f"[{_COLOURS[state.state]}]{word}[/]", step, simulated, left)
     if len(shown) < len(states):
@@ -149,9 +115,9 @@ class Monitor:
             self._update()
 
     def event(self, state: State) -> None:
-        """Tell that `state` has changed."""
+        """Print that `state` has changed."""
         self._shown[state.name] = (state, time.monotonic())
-        if state.state not in ("waiting", "queued"):
+        if state.state != "waiting":
             self._print(describe(replace(state, steps=0)), state)
 
     def _update(self) -> None:
@@ -175,7 +141,7 @@ class Monitor:
                 with self._log.open("a", encoding="utf-8") as file:
                     file.write(f"{datetime.now().astimezone().isoformat(timespec='seconds')} {line}\n")
             except OSError:
-                self._log = None  # telling the progress is never worth a run: a full disk is reported by what needs the space
+                self._log = None  # a log is never worth a run: a full disk is reported by what needs the space
 
     def _table(self) -> Table:
         return state_table(self._states(), max(3, self._console.height - 4))

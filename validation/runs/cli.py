@@ -1,0 +1,159 @@
+"""The commands for campaigns: `dembark campaigns`, `submit`, `resume`, `status`; and `export`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from dembark.common.errors import DembarkError
+from dembark.common.lock import lock
+from dembark.common.units import duration, size_text
+from dembark.validation import results, show
+from dembark.validation.campaigns import estimate, expand
+from dembark.validation.campaigns.plan import Plan
+from dembark.validation.campaigns.spec import locate, read, shipped
+
+from . import cluster, folder, site, workflow
+from .folder import Options
+from .monitor import state_table
+from .steps import CAMPAIGN_FILE
+
+File = Annotated[str, typer.Argument(metavar="CAMPAIGN", help="File of a campaign, or name of one of 'dembark campaigns'.")]
+Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of a campaign.")]
+Executor = Annotated[str | None, typer.Option(help="local, slurm, or the TOML file of a site.")]
+Cores = Annotated[int | None, typer.Option(min=1, help="Cores of this machine to use; default: all.")]
+Jobs = Annotated[int | None, typer.Option(min=1, help="Runs of an array at the same time; default: the value in the site's file.")]
+Out = Annotated[Path | None, typer.Option(help="Folder of the campaign; default: results/campaigns/<name>.")]
+Dry = Annotated[bool, typer.Option("--dry-run", help="Check the file and show the runs and their cost, without running them.")]
+
+app = typer.Typer()
+
+
+@app.command("campaigns")
+def show_campaigns() -> None:
+    """List the campaigns that come with the cases."""
+    table = Table("campaign", "cases", "points", "what", box=None, pad_edge=False)
+    for name, path in shipped().items():
+        spec = read(path)
+        cases = ", ".join(dict.fromkeys(sweep.case.name for sweep in spec.sweeps))
+        table.add_row(name, cases, str(len(expand.points(spec))), " ".join(spec.description.split()))
+    show.console().print(table)
+
+
+@app.command()
+def submit(campaign: File, dry_run: Dry = False, executor: Executor = None, out: Out = None, cores: Cores = None,
+           jobs: Jobs = None) -> None:
+    """Run a campaign here, or submit it to a cluster. It makes all runs, their measurements and the report; what is finished is kept."""
+    file = locate(campaign)
+    chosen = folder.choose(executor or "local", cores, jobs)
+    _prepare(chosen)
+    plan = expand.campaign(read(file))
+    target = (out or Path("results") / "campaigns" / plan.label).resolve()
+    if not dry_run:
+        _submit(plan, file, target, chosen)
+        return
+    folder.refuse_foreign(target, plan.label)
+    _check(chosen, plan)
+    found = estimate.estimates(plan, estimate.Rates(target))
+    estimate.dry_run(show.console(), plan, found, target, _cores(chosen) if chosen.executor == "local" else None)
+
+
+@app.command()
+def resume(directory: Folder, executor: Executor = None, cores: Cores = None, jobs: Jobs = None) -> None:
+    """Continue a campaign that was stopped. It uses the options of the submission unless others are given."""
+    target = directory.resolve()
+    file = folder.own_file(target)
+    folder.restore(target)
+    before = folder.options(target)
+    same = executor in (None, before.executor)
+    chosen = folder.choose(executor or before.executor, cores or before.cores, jobs or (before.jobs if same else None))
+    _prepare(chosen)
+    _submit(expand.campaign(read(file)), file, target, chosen)
+
+
+def _prepare(chosen: Options) -> None:
+    """Take over the environment that the preamble of the chosen site makes: with it the engines are found, here and in the jobs."""
+    if chosen.executor != "local":
+        os.environ.update(site.find(chosen.executor).environment())
+
+
+def _cores(chosen: Options) -> int:
+    return chosen.cores or os.cpu_count() or 1
+
+
+def _check(chosen: Options, plan: Plan) -> None:
+    """DembarkError for runs with more cores or memory than this machine has."""
+    if chosen.executor != "local":
+        return
+    if chosen.jobs is not None:
+        raise DembarkError("--jobs is for a cluster", "with --executor local", "use --cores for the runs of this machine")
+    for place, used in plan.resources.items():
+        if used.cores > _cores(chosen):
+            raise DembarkError(f"{place} is to run on {used.cores} cores", f"there are {_cores(chosen)}",
+                               "lower ranks or threads, or raise --cores")
+        if used.memory and used.memory > _memory():
+            raise DembarkError(f"{place} is to have {size_text(used.memory)} of memory", f"this machine has {size_text(_memory())}",
+                               "lower memory")
+
+
+def _memory() -> float:
+    return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+
+
+def _submit(plan: Plan, file: Path, target: Path, chosen: Options) -> None:
+    """Run or submit `plan`, that of the campaign `file`, in the folder `target`; refused while another process does."""
+    cancel = workflow.cancelled_by_signal() if chosen.executor == "local" else None
+    folder.refuse_foreign(target, plan.label)
+    _check(chosen, plan)
+    with lock(target / workflow.LOCK, f"the campaign in {target} is being run by another process"):
+        expected = {one.series.place: one.wall_time for one in estimate.estimates(plan, estimate.Rates(target))}
+        folder.enter(target, file, plan, chosen, expected)
+        if cancel is None:
+            lines = cluster.submit(plan, target, site.find(chosen.executor), chosen.jobs)
+        else:
+            # Its own copy counts from here on, whatever becomes of the file.
+            plan = expand.campaign(read(target / CAMPAIGN_FILE))
+            outcome = workflow.perform(plan, target, cancel, _cores(chosen), _memory(), target / folder.LOG, expected)
+    if cancel is None:
+        for line in (*lines, f"see 'dembark status {target}'; what ended too early is submitted again by 'dembark resume {target}'"):
+            print(f"dembark: {line}", file=sys.stderr)
+    else:
+        show.show_outcome(outcome, "the campaign", f"go on with 'dembark resume {target}': what is finished is kept")
+
+
+@app.command()
+def status(directory: Folder) -> None:
+    """Show the progress of a campaign. Each run is listed with its simulated time and the time left."""
+    found = folder.look(directory.resolve())
+    console = show.console()
+    console.print(state_table(found.states))
+    console.print(found.headline, markup=False, soft_wrap=True)
+    for state in found.states:
+        if state.message:
+            console.print(f"{state.state}: {state.name}: {state.message}", markup=False, style="red", soft_wrap=True)
+    if found.running and found.left:
+        console.print(f"about {duration(found.left)} left")
+    show.print_tally(console, found.tally, f"{found.measured} series measured; ")
+    if found.report:
+        console.print(str(found.report), markup=False, soft_wrap=True)
+    if not found.running and not found.complete:
+        console.print(f"go on with 'dembark resume {directory}'", markup=False, soft_wrap=True)
+
+
+@app.command()
+def export(
+    directory: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of results: of a profile, a campaign or a run.")],
+    table: Annotated[str, typer.Option(help="quantities, comparisons or runs.")] = "quantities",
+    out: Annotated[Path | None, typer.Option(help="File to write, .csv, .json or .parquet; default: CSV to standard output.")] = None,
+) -> None:
+    """Write the results in a folder as one table."""
+    text = results.export(directory, table, out)
+    if out is None:
+        print(text, end="")
+    else:
+        show.console().print(str(out), markup=False, soft_wrap=True)

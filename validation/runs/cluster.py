@@ -1,0 +1,70 @@
+"""A campaign as job arrays of a cluster's scheduler: the scripts are written and submitted, and nothing stays behind that watches them.
+
+Runs that may use the same resources form an array, each element of which is one run (`job.py`). The same array is submitted once more for
+each retry, to begin when the one before it has ended: elements whose run is finished return at once. The last job measures and writes the
+report. The locks of the runs see to it that no run is computed twice at the same time.
+"""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+from dembark.common.errors import DembarkError
+from dembark.common.files import write_whole
+from dembark.validation import results
+from dembark.validation.campaigns.plan import Plan, Resources
+
+from .folder import environment
+from .job import REPORT
+from .site import Site
+
+JOBS = ".jobs"
+
+
+def submit(plan: Plan, folder: Path, site: Site, at_a_time: int | None = None) -> list[str]:
+    """Submit the runs of `plan` in its results folder that are neither finished nor running, and the job that reports; returns lines for
+    people. DembarkError with the scheduler's own words when it refuses a job; those submitted before are named."""
+    kept = {state.folder for state in results.states(folder) if state.state in ("finished", "running")}
+    arrays: dict[Resources, list[str]] = {}
+    for place in plan.folders:
+        if place not in kept:
+            arrays.setdefault(replace(plan.resources[Path(place).parent], restart_interval=None), []).append(place)
+    stamp = f"dembark-{plan.label}-{datetime.now().astimezone():%y%m%d-%H%M%S}"
+    sent: list[tuple[str, str]] = []
+    last: list[tuple[str, str]] = []
+    try:
+        for used, places in arrays.items():
+            for first in range(0, len(places), site.largest_array):
+                chunk, after = places[first:first + site.largest_array], list[tuple[str, str]]()
+                for attempt in range(1 + plan.retries):
+                    name = f"{stamp}-{len(sent) + 1}"
+                    after = [(_send(folder, site, name, used, chunk, after, attempt > 0, at_a_time), name)]
+                    sent += after
+                last += after
+        name = f"{stamp}-{REPORT}"
+        sent.append((_send(folder, site, name, plan.measure, [REPORT], last, False, None), name))
+    except DembarkError as error:
+        before = ", ".join(job for job, _ in sent)
+        raise DembarkError(str(error), f"submitted before: {before}" if before else "nothing was submitted") from None
+    count = sum(map(len, arrays.values()))
+    return [f"submitted {count} runs in {len(sent)} jobs: {' '.join(job for job, _ in sent)}",
+            f"{len(plan.folders) - count} of {len(plan.folders)} runs are finished or running"]
+
+
+def _send(folder: Path, site: Site, name: str, used: Resources, places: list[str], after: list[tuple[str, str]], again: bool,
+          at_a_time: int | None) -> str:
+    jobs = folder / JOBS
+    jobs.mkdir(exist_ok=True)
+    elements, script = jobs / f"{name}.runs", jobs / f"{name}.sh"
+    write_whole(elements, "".join(f"{place}\n" for place in places).encode())
+    words = [sys.executable, "-m", "dembark.validation.runs.job", str(folder), str(elements), *(["--again"] if again else [])]
+    # Sites may start jobs without the environment of the submitter.
+    body = "".join(f"export {key}={shlex.quote(value)}\n" for key, value in environment().items())
+    body += f'exec {shlex.join(words)} --cores {used.cores} "{site.index}"'
+    write_whole(script, site.script(name, jobs / f"{name}.log", used, len(places), after, body, at_a_time).encode())
+    script.chmod(0o755)
+    return site.send(script)
