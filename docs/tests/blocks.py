@@ -146,13 +146,13 @@ SUBSTITUTES = (
 NOT_RUN = (
     (r"make .*|cd \$HOME/LIGGGHTS-PUBLIC/src.*", "builds or runs everything; `make -n` must know the target and the variables"),
     (r"dembark submit .*--executor.*|dembark (status|resume) /scratch/.*",
-     "needs a cluster; validation/campaigns/tests/test_slurm_campaign.py runs it on a Slurm of its own"),
+     "needs a cluster; validation/campaigns/tests/test_slurm.py runs it on a Slurm of its own"),
     (r"module load .*|sinfo .*|sacctmgr .*|srun .*", "programs of a cluster"),
     (r"export (?!DEMBARK_DECKS).*", "one's own engines and modules; test_names.py looks the variables up in the code"),
     (r"dembark validate .*|python docs/impact_table\.py .*", "a case in both engines takes minutes; input_decks/tests run it"),
     (r"apt-get install .*", "changes the system"),
     (r"cmake .*", "compiles LAMMPS or the plugin; plugins/lammps/tests/test_own_build.py configures it"),
-    (r".*pytest .*--slow.*", "starts a Slurm as root and takes minutes; the folder exists"),
+    (r".*pytest .*--(?:slow|full).*", "starts a Slurm as root and takes minutes; the folder exists"),
 )
 
 

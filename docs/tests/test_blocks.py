@@ -37,7 +37,7 @@ TAKEN_FOR = {"run.dump": "out/small/replica-1/grains.dump", "contacts.dump": "ou
              # What README.md has computed under another name is kept.
              "results/campaigns/silo-small": "study"}
 RUNNERS = {
-    "python": "test_docs.py", "cpp": "test_docs.py", "deck": "test_docs.py", "sql": "validation/campaigns/tests/test_docs.py",
+    "python": "test_docs.py", "cpp": "test_docs.py", "deck": "test_docs.py",
     "py": "validation/campaigns/tests/test_docs.py", "python yade": "test_yade_blocks.py", "YADE fragment": "test_yade_blocks.py",
     "LIGGGHTS fragment": "test_liggghts_blocks.py", "syntax": "test_liggghts_blocks.py", "python grains.bin": "test_liggghts_blocks.py",
     "LAMMPS deck": "test_lammps_blocks.py", "LAMMPS fragment": "test_lammps_blocks.py", "LAMMPS syntax": "test_lammps_blocks.py",
@@ -169,12 +169,12 @@ def test_toml(block: Block, tmp_path: Path) -> None:
             path.with_name(deck).touch()
         path.write_text(block.text)
         assert folders.load(path).name == "heap"
-    elif "[commands]" in block.text:
+    elif re.search("^submit = ", block.text, re.MULTILINE):
         from dembark.validation.runs import site
 
         path = tmp_path / "site.toml"
         path.write_text(block.text)
-        assert site.read(path).commands["submit"]
+        assert site.read(path).submit
     else:
         from dembark.validation.campaigns.spec import read
 

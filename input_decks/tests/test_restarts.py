@@ -18,9 +18,10 @@ from dembark.common.errors import DembarkError, Killed
 from dembark.common.files import check_times, count_frames, read_json
 from dembark.postproc import ContactsDump, GrainsDump, read_times
 from dembark.validation import engines
+from dembark.validation.campaigns import plan
+from dembark.validation.campaigns.plan import Resources
 from dembark.validation.case.folders import find
-from dembark.validation.runs import plan, restarts
-from dembark.validation.runs.plan import Resources
+from dembark.validation.runs import restarts
 from dembark.validation.runs.simulate import simulate
 
 OUTPUTS = ("time.csv", "grains.dump", "contacts.dump", "impacts.txt")

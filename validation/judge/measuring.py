@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from dembark.common.errors import DembarkError, RunError
 from dembark.postproc import DumpError
 from dembark.postproc.measurement import Measurement, Value
+from dembark.postproc.replica import Replica
 from dembark.postproc.statistics import Estimate, beyond
 from dembark.validation.case import deck
 from dembark.validation.case.expressions import Expression
@@ -22,9 +22,6 @@ from dembark.validation.case.read import citations
 from dembark.validation.judge.deciding import decides, packings
 from dembark.validation.judge.result import QuantityRecord
 
-if TYPE_CHECKING:
-    from dembark.postproc.replica import Replica
-
 # Keys of [picture] that are expressions in parameters and derived numbers.
 _NUMBERS = ("scale", "radius", "drum_radius", "drum_speed", "speed")
 
@@ -32,15 +29,6 @@ _NUMBERS = ("scale", "radius", "drum_radius", "drum_speed", "speed")
 def measure(case: Case, replicas: Sequence[Replica]) -> Measurement:
     """What the measure.py of the case returns for `replicas`; DembarkError or RunError in one line for whatever goes wrong in it."""
     return _call(case, "measure", lambda function: function(replicas))
-
-
-def prepare(case: Case, replica: Replica) -> None:
-    """Let the function `prepare` of the case's measure.py, where it has one, read a finished `replica` while others still run.
-
-    What goes wrong in it goes wrong again, and is told, when `measure` asks for the same.
-    """
-    with suppress(Exception):
-        getattr(check(case), "prepare", lambda _: None)(replica)
 
 
 def study(case: Case, planned: Study, points: Sequence[Mapping[str, Any]]) -> Measurement:
@@ -63,7 +51,7 @@ def check(case: Case) -> ModuleType:
 
 @cache
 def _loaded(path: Path, name: str, _changed: tuple[tuple[str, int, int], ...]) -> ModuleType:
-    """The module of a measure.py, loaded once until it or a module next to it changes: `measure` finds what `prepare` has read."""
+    """The module of a measure.py, loaded once until it or a module next to it changes."""
     return deck.load_module(path, f"dembark_measure_{name}")
 
 

@@ -14,8 +14,8 @@ from dembark.validation.case.model import EVIDENCE
 
 VERDICTS = ("pass", "fail", "info")
 METRICS, COMPARISON = "metrics.json", "comparison.json"
-# What the last command ran, with its result; see runs.perform.
-RUNS = "runs.json"
+# What was asked for in a results folder, and its planned runs; see validation.results.
+RUNS = "plan.json"
 
 Interval = tuple[float, float]
 Kind = TypeVar("Kind", bound="QuantityRecord | Result | Comparison")
@@ -226,7 +226,7 @@ def _value(content: Mapping[str, Any], kind: type[Kind], where: str, notes: dict
 
 
 def result_files(folder: Path) -> list[Path]:
-    """The files of all results and comparisons below a results folder, in the order of their places; where `runs.json` says that only some
+    """The files of all results and comparisons below a results folder, in the order of their places; where `plan.json` says that only some
     cases were asked for, theirs."""
     cases = (read_json(folder / RUNS) or {}).get("cases") or ["*"]
     return sorted(path for case in cases for name in (f"{case}/*/*/{METRICS}", f"{case}/*/{COMPARISON}") for path in folder.glob(name)

@@ -14,6 +14,7 @@ from dembark.validation.case.folders import files, load
 from dembark.validation.case.model import STUDY_PREFIX, Case
 from dembark.validation.judge.result import RUNS, ComparedRecord, Comparison, QuantityRecord, Result, results
 from dembark.validation.report.figures import engine_name
+from dembark.validation.results import states
 from dembark.validation.verification.item import Item
 
 _SINGLE = "Single runs: what else a profile would run is not listed here."
@@ -86,7 +87,7 @@ class Page:
 @dataclass(frozen=True)
 class Gathered:
     """A results folder: its `pages`, the verification of the instruments, `missing` runs and unreadable results in one line each, and
-    what `runs.json` says of the whole."""
+    what `plan.json` says of the whole."""
 
     folder: Path
     pages: list[Page]
@@ -120,7 +121,7 @@ class Gathered:
 
 
 def gather(folder: Path) -> Gathered:
-    """Everything that `runs.json` expects in a results folder, and everything that is there; without it, nothing is known to be missing."""
+    """Everything that `plan.json` expects in a results folder, and everything that is there; without it, nothing is known to be missing."""
     summary = read_json(folder / RUNS) or {"description": _SINGLE}
     cases, unread = _cases(summary.get("cases", ()))
     pages: dict[tuple[str, str], Page] = {}
@@ -128,7 +129,7 @@ def gather(folder: Path) -> Gathered:
     def page(case: str, variant: str) -> Page:
         return pages.setdefault((case, variant), Page(case, variant, folder / case / variant))
 
-    expected = list(_expected(folder, summary))
+    expected = list(_expected(folder))
     for case, variant, _, line in expected:
         page(case, variant).missing += [line] if line else []
     measured, compared, damaged = results(folder)
@@ -168,15 +169,13 @@ def _cases(only: Collection[str]) -> tuple[dict[str, Case], list[str]]:
     return found, unread
 
 
-def _expected(folder: Path, summary: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str]]:
-    """(case, variant, engine, why it is missing or '') of every run that should be there."""
-    for run in summary.get("runs", ()):
-        told = run.get("message") or run["state"]
-        if run["state"] == "finished" and run.get("inputs") and (read_json(folder / run["folder"] / "run.json") or {}).get(
-                "inputs") != run["inputs"]:
-            told = "its result is no longer there"
-        reason = "" if told == "finished" else f"{engine_name(run['engine'])}, replica {run['replica']}: {told}"
-        yield run["case"], run["variant"], run["engine"], reason
+def _expected(folder: Path) -> Iterator[tuple[str, str, str, str]]:
+    """(case, variant, engine, why it is missing or '') of every planned run."""
+    for state in states(folder):
+        case, variant, engine, replica = Path(state.folder).parts
+        told = state.message or ("missing" if state.state == "waiting" else state.state)
+        reason = "" if state.state == "finished" else f"{engine_name(engine)}, replica {replica.removeprefix('replica-')}: {told}"
+        yield case, variant, engine, reason
 
 
 @dataclass(frozen=True)

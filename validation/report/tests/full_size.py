@@ -49,6 +49,13 @@ def profile(number: int, seed: int) -> dict[str, object]:
             **({"reference": (1.0 - np.exp(-place / (2.0 + number))).tolist(), "reference_label": "Janssen"} if number % 2 else {})}
 
 
+def finished_run(place: Path, folder: Path) -> dict[str, str]:
+    """Write the record of a finished run; returns its entry in plan.json."""
+    (place / "replica-1").mkdir()
+    (place / "replica-1" / "run.json").write_text(json.dumps({"inputs": "a"}))
+    return {"folder": str((place / "replica-1").relative_to(folder)), "inputs": "a"}
+
+
 def write(folder: Path, cases: tuple[str, ...] = CASES, variants: int = 3, quantities: int = 18, profiles: int = 6,
           engines: tuple[str, ...] = ("liggghts", "yade")) -> Path:
     """A results folder with all runs finished; returns it."""
@@ -68,9 +75,9 @@ def write(folder: Path, cases: tuple[str, ...] = CASES, variants: int = 3, quant
                     references=({"short": "Janssen 1895", "citation": "H. A. Janssen.", "read": "", "statement": ""},),
                     provenance={"replicas": 5, "seeds": [None], "steps": 1000, "time_step": 1e-5, "wall_time": 10.0, "commit": "a" * 40}))
                 (place / pictures.PICTURE).write_bytes(picture)
-                runs.append({"case": case, "variant": variant, "engine": engine, "replica": 1, "state": "finished", "message": ""})
+                runs.append(finished_run(place, folder))
             result.write(folder / case / variant / "comparison.json", compare(folder / case / variant))
-    (folder / "runs.json").write_text(json.dumps({"profile": folder.name, "runs": runs}))
+    (folder / "plan.json").write_text(json.dumps({"profile": folder.name, "runs": runs}))
     verification.write(folder, [Item("mass", "Mass", "Mass is conserved.",
                                      [exact("mass_error", "mass", 0.0, "closed form", "a lost grain")])])
     return folder

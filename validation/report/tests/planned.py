@@ -102,9 +102,9 @@ def write(folder: Path) -> Path:
                 if case.name in FIELDS and not of_study:
                     drawn[case.name].to_netcdf(place / FILE, engine="h5netcdf")
                 if not of_study:
-                    runs.append({"case": case.name, "variant": variant, "engine": engine, "replica": 1, "state": "finished", "message": ""})
+                    runs.append(full_size.finished_run(place, folder))
             if len(names) > 1:
                 result.write(folder / case.name / variant / result.COMPARISON, compare(folder / case.name / variant))
-    (folder / "runs.json").write_text(json.dumps({"profile": folder.name, "runs": runs}))
+    (folder / "plan.json").write_text(json.dumps({"profile": folder.name, "runs": runs}))
     verification.write(folder, verified())
     return folder

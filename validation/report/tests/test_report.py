@@ -48,14 +48,16 @@ def results(tmp_path_factory):
                      label="lost energy", cause="the floor does not carry what it should")
     full_size.change(folder / "log_pile/variant_1/liggghts/metrics.json", "quantity_6", verdict="fail", tolerance=None,
                      label="too few contacts")
-    runs = json.loads((folder / "runs.json").read_text())
-    runs["runs"].append({"case": "plug_flow", "variant": "smooth", "engine": "yade", "replica": 1, "state": "failed",
-                         "message": "the engine was killed by SIGKILL <at> step 7"})
-    (folder / "runs.json").write_text(json.dumps(runs))
+    plan = json.loads((folder / "plan.json").read_text())
+    plan["runs"].append({"folder": "plug_flow/smooth/yade/replica-1", "inputs": "b"})
+    (folder / "plan.json").write_text(json.dumps(plan))
+    (folder / "plug_flow/smooth/yade").mkdir(parents=True)
+    (folder / "plug_flow/smooth/yade/.replica-1.status.json").write_text(json.dumps(
+        {"state": "failed", "inputs": "b", "message": "the engine was killed by SIGKILL <at> step 7"}))
     (folder / "silo/variant_1/yade/metrics.json").write_text('{"case": "silo"}')
     for place in (path.parent for path in folder.glob("*/*/*/metrics.json")):
-        (place / "replica-1").mkdir()
-        for name in ("grains.dump", "contacts.dump", "run.json", "time.csv"):
+        (place / "replica-1").mkdir(exist_ok=True)
+        for name in ("grains.dump", "contacts.dump", "time.csv"):
             (place / "replica-1" / name).write_text("not to be read")
     written = sorted(path for path in folder.rglob("*") if path.is_file())
     pages, opened = [], []
@@ -69,7 +71,8 @@ def results(tmp_path_factory):
 
 def test_no_trajectory_is_opened_and_no_result_is_written(results):
     folder, _, opened, written = results
-    assert any(path.endswith("metrics.json") for path in opened) and not [path for path in opened if "replica-" in path]
+    assert any(path.endswith("metrics.json") for path in opened)
+    assert not [path for path in opened if path.endswith((".dump", ".csv")) and "replica-" in path]
     made = {path for path in folder.rglob("*") if path.is_file()} - set(written)
     assert {path.parent.name for path in made} == {"figures", "quick"} and {path.name for path in made if path.parent == folder} == {
         "report.html", "report.pdf"}
@@ -244,7 +247,7 @@ def test_of_many_variants_the_pdf_shows_the_worst():
 def test_a_report_of_some_cases_shows_these_alone(tmp_path):
     folder = full_size.write(tmp_path / "quick", ("silo", "log_pile"), variants=1, quantities=2, profiles=0)
     assert {row.case for row in gather(folder).rows} == {"silo", "log_pile", "verification"}
-    (folder / "runs.json").write_text(json.dumps({"runs": [], "cases": ["silo"]}))
+    (folder / "plan.json").write_text(json.dumps({"runs": [], "cases": ["silo"]}))
     (folder / "verification.json").unlink()
     found = gather(folder)
     assert {row.case for row in found.rows} == set(found.cases) == {"silo"}
@@ -253,20 +256,15 @@ def test_a_report_of_some_cases_shows_these_alone(tmp_path):
 
 def test_without_a_list_of_runs_nothing_of_other_cases_is_missing(tmp_path):
     folder = full_size.write(tmp_path / "quick", ("silo",), variants=1, quantities=2, profiles=0)
-    (folder / "runs.json").unlink()
+    (folder / "plan.json").unlink()
     found = gather(folder)
     assert [page.case for page in found.pages] == ["silo"] and found.missing == [] and "Single runs" in found.summary["description"]
 
 
 def test_a_finished_run_that_was_deleted_is_missing(tmp_path):
     folder = full_size.write(tmp_path / "quick", ("silo",), variants=1, quantities=2, profiles=0)
-    record = {"case": "silo", "variant": "variant_0", "engine": "yade", "replica": 1, "state": "finished", "inputs": "a",
-              "folder": "silo/variant_0/yade/replica-1"}
-    (folder / "runs.json").write_text(json.dumps({"runs": [record]}))
-    assert gather(folder).missing == ["silo, variant 0: YADE, replica 1: its result is no longer there"]
-    (folder / record["folder"]).mkdir(parents=True)
-    (folder / record["folder"] / "run.json").write_text('{"inputs": "a"}')
-    assert gather(folder).missing == []
+    (folder / "silo/variant_0/yade/replica-1/run.json").unlink()
+    assert gather(folder).missing == ["silo, variant 0: YADE, replica 1: missing"]
 
 
 def test_a_case_that_cannot_be_read_is_named_and_the_others_keep_their_titles(tmp_path, monkeypatch):

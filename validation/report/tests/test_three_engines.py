@@ -49,6 +49,6 @@ def test_the_report_names_what_was_left_out(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr(engines, "ENGINES", (*engines.ENGINES, Third))
     folder = full_size.write(tmp_path / "quick", ("silo",), variants=1, quantities=1, profiles=0)
     assert gather(folder).left_out == ""
-    runs = read_json(folder / "runs.json")
-    write_json(folder / "runs.json", {**runs, "left_out": {"third": "not found"}})
+    plan = read_json(folder / "plan.json")
+    write_json(folder / "plan.json", {**plan, "left_out": {"third": "not found"}})
     assert gather(folder).left_out == "Left out, because not installed on this machine: The Third."
