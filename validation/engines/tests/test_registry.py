@@ -208,9 +208,9 @@ def stub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def test_a_new_engine_is_found_everywhere(stub: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     from dembark.validation.campaigns import estimate
+    from dembark.validation.campaigns.plan import series
     from dembark.validation.case import deck
     from dembark.validation.report.figures import look
-    from dembark.validation.campaigns.plan import series
 
     assert main(["cases"]) == 0 and "stub" in capsys.readouterr().out
     told = {finding.what: finding.found for finding in doctor.examine()}
