@@ -124,35 +124,18 @@ def render(scenes: Iterable[Scene], scale: tuple[float, float], pixels: int = _P
         return [np.asarray(Image.open(path)) for path in sorted(Path(folder).glob("scene-*.png"))]
 
 
-def warm() -> None:
-    """Start the process that the next `render` will use, which takes a second or two: it waits for scenes, or for the end of this one."""
-    _waiting.append(_start())
-
-
-_waiting: list[subprocess.Popen[str]] = []
-
-
-def _start() -> subprocess.Popen[str]:
+def _call(folder: str) -> None:
     environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
     environment["PYVISTA_OFF_SCREEN"] = "true"
-    return subprocess.Popen([sys.executable, str(Path(__file__).with_name("render_draw.py"))], env=environment, stdin=subprocess.PIPE,
-                            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace")
-
-
-def _call(folder: str) -> None:
+    command = [sys.executable, str(Path(__file__).with_name("render_draw.py"))]
     try:
-        process = _waiting.pop()
-    except IndexError:
-        process = _start()
-    try:
-        _, errors = process.communicate(folder, timeout=_TIMEOUT)
+        done = subprocess.run(command, input=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                              errors="replace", timeout=_TIMEOUT, check=False)
     except subprocess.TimeoutExpired:
-        process.kill()
-        process.communicate()
         raise RunError("the renderer did not come to its end", f"within {_TIMEOUT} s") from None
-    if process.returncode != 0:
-        said = [line.strip() for line in errors.splitlines() if line.strip()]
-        raise RunError(f"the renderer ended with code {process.returncode}", said[-1][:160] if said else "")
+    if done.returncode != 0:
+        said = [line.strip() for line in done.stderr.splitlines() if line.strip()]
+        raise RunError(f"the renderer ended with code {done.returncode}", said[-1][:160] if said else "")
 
 
 def picture(scene: Scene, scale: tuple[float, float] | None = None, height: float = 4.0) -> Figure:

@@ -115,6 +115,6 @@ def test_fragment(block: Block, tmp_path: Path) -> None:
 def test_syntax_is_that_of_lines_that_run(block: Block) -> None:
     run_here = [line for other in (*DECKS, *FRAGMENTS) for line in logical_lines(other.text, "&")]
     # What the decks of cases choose from.
-    run_here += re.findall(r'"([^"]+)"', (package_root() / "common" / "lammps" / "start.in").read_text())
+    run_here += re.findall(r'"([^"]+)"', (package_root() / "common" / "start.in").read_text())
     lines = [f" {' '.join(line.split())}" for line in run_here]
     assert not [line for line in logical_lines(block.text, "&") if not any(pattern(line).search(other) for other in lines)]

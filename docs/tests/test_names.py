@@ -76,8 +76,8 @@ def exists(name: str) -> bool:
 
 
 def test_table_of_modules_for_fields() -> None:
-    table = re.findall(r"^\| ((?:`[\w.]+`(?:, )?)+) \| (.*) \|$", TEXTS["docs/how-to/fields.md"].split("| module | what |")[1].split("\n\n")[0],
-                       re.MULTILINE)
+    modules = TEXTS["docs/how-to/fields.md"].split("| module | what |")[1].split("\n\n")[0]
+    table = re.findall(r"^\| ((?:`[\w.]+`(?:, )?)+) \| (.*) \|$", modules, re.MULTILINE)
     assert len(table) > 5
     for modules, what in table:
         full = [name if name.startswith("dembark") else f"dembark.postproc{name}" for name in re.findall(r"`([\w.]+)`", modules)]

@@ -1,1 +1,1 @@
-"""Fields on a grid: coarse graining, cell averages, stresses on the faces of cells. Definitions and sources: docs/theory/fields_theory.md."""
+"""Fields on a grid: coarse graining, cell averages, stresses on the faces of cells. Definitions: docs/theory/fields_theory.md."""

@@ -113,7 +113,8 @@ def require_steps(case: Case, values: Mapping[str, Value]) -> None:
 def require_measure(case: Case) -> None:
     """DembarkError when `case` has no measure.py: its runs could not be measured. Nothing is imported."""
     if not (case.folder / "measure.py").is_file():
-        raise DembarkError(f"case {case.name} has no measure.py", str(case.folder), "add one with measure(replicas), see docs/how-to/cases.md")
+        raise DembarkError(f"case {case.name} has no measure.py", str(case.folder),
+                           "add one with measure(replicas), see docs/how-to/cases.md")
 
 
 def require_capable(case: Case, engine: str, values: Mapping[str, Value]) -> None:

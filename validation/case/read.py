@@ -222,7 +222,7 @@ class CaseReader(TableReader):
         return parameter
 
     def changes(self, kind: str, tables: Mapping[str, Any], parameters: Mapping[str, Parameter]) -> dict[str, dict[str, Value]]:
-        """All tables [KIND.NAME], profiles or variants: changed parameters by name; `like` names an earlier one that an entry starts from."""
+        """All tables [KIND.NAME], profiles or variants: changed parameters by name; `like` names an earlier entry to start from."""
         found: dict[str, dict[str, Value]] = {}
         for name, entry in tables.items():
             table = f"{kind}.{name}"

@@ -1,4 +1,4 @@
-"""LAMMPS as its users run it (docs/how-to/lammps_features.md): what works gives what the plain run gives, the rest is refused in one line."""
+"""Features of LAMMPS (docs/how-to/lammps_features.md): those that work give the results of the plain run, the others are refused."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -17,8 +17,7 @@ class WallMotion:
     """A motion that no force changes, a sum of terms given in words; LIGGGHTS's `fix wall/motion` and YADE's `WallMotion` read the same.
 
     words : e.g. "harmonic amplitude 0 0 1e-3 frequency 20": harmonic, circular, rocking, rotation, uniform, jolts or table, each with its
-        keywords (SI units, rad; `docs/how-to/moving_walls.md` has all of them); nothing: at rest. Raises ValueError with one line about what is
-        wrong.
+        keywords (SI units, rad; `docs/how-to/moving_walls.md` has all of them); nothing: at rest. Raises ValueError in one line.
     folder : where the files of tables lie; by default the working directory
     begin : s, when the wall is given the motion: the time of the first step of a `fix wall/motion` or `WallMotion`. Terms without `start`
         start then

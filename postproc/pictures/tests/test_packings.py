@@ -32,15 +32,6 @@ def test_a_renderer_that_dies_gives_its_reason(monkeypatch):
         render.picture(render.Scene(np.zeros((1, 3)), np.ones(1), np.ones(1), "v"))
 
 
-def test_a_renderer_that_was_started_early_draws_the_same_and_is_used_once():
-    scene = render.Scene(np.eye(3), np.full(3, 0.4), np.arange(3.0), "v")
-    render.warm()
-    (early,) = render._waiting
-    images = [render.render([scene], (0.0, 2.0), pixels=100)[0] for _ in range(2)]
-    assert early.returncode == 0 and not render._waiting
-    np.testing.assert_array_equal(*images)
-
-
 def test_picture_is_drawn_without_a_display(monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     random = np.random.default_rng(1)
