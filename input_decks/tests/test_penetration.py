@@ -99,6 +99,7 @@ def test_a_bed_settles_and_the_ball_falls_freely_onto_it(engine: str, finished: 
     assert rows["ball_height"][-1] > SMALL["ball_height"] - 1.5 * 0.0242 - 4.905 * 0.0242**2 + 1e-4
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("wrong", WRONG)
 def test_wrong_physics_is_seen(wrong: str, finished: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Against the mean of right runs, which stands for the published ones here, and within the tolerances of those."""

@@ -1,7 +1,7 @@
 """Smoothed particle hydrodynamics: weakly compressible fluid with walls and rigid bodies, without an engine.
 
-The terms are those of `plugins/physics/sph`; docs/reference/python_sph.md has the formulas and what was verified. In the plane (positions with
-two components) masses, forces and energies are those of a metre of depth. All quantities are in SI units.
+The terms are those of `plugins/physics/sph`; docs/reference/python_sph.md has the formulas and what was verified.
+In the plane (positions with two components) masses, forces and energies are those of a metre of depth. All quantities are in SI units.
 """
 
 from __future__ import annotations

@@ -50,6 +50,7 @@ def laid_out(monkeypatch: pytest.MonkeyPatch):
     return lay_out
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("profile", LIMITS)
 def test_a_whole_profile_is_short_and_begins_with_its_verdicts(profile, laid_out, tmp_path):
     pages = laid_out(planned.write(tmp_path / profile))
@@ -60,6 +61,7 @@ def test_a_whole_profile_is_short_and_begins_with_its_verdicts(profile, laid_out
     assert [number for number, text in enumerate(pages) if not text.strip()] == []
 
 
+@pytest.mark.full
 def test_a_report_that_is_too_long_is_told(laid_out, tmp_path):
     """The negative control: more cases than pages."""
     cases = tuple(f"case_{number}" for number in range(8 * LIMITS["quick"]))

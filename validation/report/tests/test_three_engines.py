@@ -35,6 +35,7 @@ def laid_out(folder: Path, monkeypatch: pytest.MonkeyPatch, **size: object) -> l
     return pages
 
 
+@pytest.mark.full
 def test_a_report_of_three_engines_has_no_more_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     two = laid_out(tmp_path / "two/quick", monkeypatch)
     monkeypatch.setattr(engines, "ENGINES", (*engines.ENGINES, Third))
