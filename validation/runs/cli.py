@@ -87,8 +87,9 @@ def _cores(chosen: Options) -> int:
 
 
 def _check(chosen: Options, plan: Plan) -> None:
-    """DembarkError for runs with more cores or memory than this machine has."""
+    """DembarkError for runs with more cores or memory than this machine has, or that the scheduler would refuse."""
     if chosen.executor != "local":
+        cluster.check(plan, site.find(chosen.executor))
         return
     if chosen.jobs is not None:
         raise DembarkError("--jobs is for a cluster", "with --executor local", "use --cores for the runs of this machine")

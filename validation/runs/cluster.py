@@ -8,7 +8,9 @@ report. The locks of the runs see to it that no run is computed twice at the sam
 from __future__ import annotations
 
 import shlex
+import shutil
 import sys
+import tempfile
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -18,6 +20,7 @@ from dembark.common.files import write_whole
 from dembark.validation import results
 from dembark.validation.campaigns.plan import Plan, Resources
 
+from . import slurm
 from .folder import environment
 from .job import REPORT
 from .site import Site
@@ -53,6 +56,21 @@ def submit(plan: Plan, folder: Path, site: Site, at_a_time: int | None = None) -
     count = sum(map(len, arrays.values()))
     return [f"submitted {count} runs in {len(sent)} jobs: {' '.join(job for job, _ in sent)}",
             f"{len(plan.folders) - count} of {len(plan.folders)} runs are finished or running"]
+
+
+def check(plan: Plan, site: Site) -> None:
+    """DembarkError when the site's scheduler would refuse a job of `plan`, or would never start it. Only Slurm can be asked."""
+    if site.submit.split()[0] != "sbatch":
+        return
+    if not shutil.which("sbatch"):
+        raise DembarkError("sbatch not found", "on PATH", "start this on a machine that jobs are submitted from")
+    for used in {replace(used, restart_interval=None): None for used in (*plan.resources.values(), plan.measure)}:
+        with tempfile.TemporaryDirectory(prefix="dembark-") as folder:
+            script = Path(folder, "job.sh")
+            script.write_text(site.script("dembark", Path("/dev/null"), used, 1, [], "true"), encoding="utf-8")
+            if reason := slurm.refusal(script):
+                raise DembarkError("Slurm would refuse a job, or never start it", reason,
+                                   f"see the campaign's resources, and the header and defaults of {site.path}")
 
 
 def _send(folder: Path, site: Site, name: str, used: Resources, places: list[str], after: list[tuple[str, str]], again: bool,

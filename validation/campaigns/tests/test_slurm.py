@@ -151,7 +151,13 @@ def test_what_failed_by_its_own_fault_is_not_tried_again_before_the_next_submiss
     assert campaign.log().count("exit code 1") == 4
 
 
-def test_a_refusal_is_reported_in_one_line_with_what_was_submitted(campaign: Campaign) -> None:
-    campaign.file.write_text(CAMPAIGN.replace("threads = 2", "threads = 64"))
+@pytest.mark.parametrize(("before", "after", "words"), [
+    ("threads = 2", "threads = 64", "configuration is not available"),
+    ("threads = 2", 'threads = 2\ntime = "90 h"', "5400 min exceed the partition's limit of "),
+])
+def test_what_slurm_would_refuse_or_never_start_is_reported_in_one_line_before_anything_is_submitted(
+        campaign: Campaign, before: str, after: str, words: str) -> None:
+    campaign.file.write_text(CAMPAIGN.replace(before, after))
     error = campaign.end(campaign.submit(), 2)
-    assert error.count("\n") == 1 and "configuration is not available" in error
+    assert error.count("\n") == 1 and words in error
+    assert not campaign.jobs()
