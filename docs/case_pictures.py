@@ -1,4 +1,4 @@
-"""Makes the small pictures of the cases, images/cases/<case>.jpg, from the results of a profile:
+"""Makes the small pictures of the cases, images/cases/<case>.jpg, from the results of a profile.
 
     python docs/case_pictures.py results/quick
 
@@ -20,6 +20,7 @@ DECKS = Path(__file__).resolve().parents[1] / "input_decks"
 PICTURES = Path(__file__).with_name("images") / "cases"
 WIDTH, HEIGHT = 480, 360  # pixels, at most
 LARGEST = 40_000  # bytes
+STYLE = "@page { size: 480px 360px; margin: 0 } img { width: 480px; max-height: 360px; object-fit: contain }"
 
 
 def figure(results: Path, case: str) -> Image.Image | None:
@@ -28,8 +29,7 @@ def figure(results: Path, case: str) -> Image.Image | None:
     if not drawn:
         return None
     with tempfile.TemporaryDirectory() as folder:
-        page = f"<style>@page {{ size: 480px 360px; margin: 0 }} img {{ width: 480px; max-height: 360px; object-fit: contain }}</style>" \
-               f"<img src=\"{drawn[0].resolve().as_uri()}\">"
+        page = f'<style>{STYLE}</style><img src="{drawn[0].resolve().as_uri()}">'
         weasyprint.HTML(string=page).write_pdf(f"{folder}/figure.pdf")
         subprocess.run(["pdftoppm", "-r", "96", "-png", "-singlefile", f"{folder}/figure.pdf", f"{folder}/figure"], check=True)
         return Image.open(f"{folder}/figure.png").convert("RGB")

@@ -28,8 +28,8 @@ with (ROOT / "pyproject.toml").open("rb") as _file:
 
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
 root_doc = "docs/index"
-include_patterns = ["docs/**.md", "input_decks/*/README.md", "input_decks/*/reference/README.md", "README.md", "CONTRIBUTING.md", "CHANGELOG.md"]
-exclude_patterns = [".*", "build", "results", "dembark", "plugins", "postproc", "validation", "common", "benchmarks", "packaging", "docs/tests"]
+include_patterns = ["docs/**.md", "input_decks/*/README.md", "input_decks/*/reference/README.md", "*.md"]
+exclude_patterns = [".*", "build", "results", "dembark", "plugins", "postproc", "validation", "common", "benchmarks", "packaging"]
 
 html_theme = "furo"
 html_title = f"dembark {version}"

@@ -37,7 +37,7 @@ class Block:
 
 
 def blocks(*kinds: str) -> list[Block]:
-    """All blocks of these kinds (all kinds when none is named), in the order of the pages; those of tutorials are run by test_tutorials.py."""
+    """All blocks of these kinds (all kinds when none is named), in the order of the pages, without those of tutorials."""
     pages = [page for page in PAGES if page.parent.name != "tutorials"]
     return [block for page in pages for block in map(_of_engine, _of_page(page)) if not kinds or block.kind in kinds]
 
@@ -133,6 +133,7 @@ def commands(text: str) -> list[list[str]]:
 
 # What is run in place of a command as it is printed: pattern, replacement, and why.
 SUBSTITUTES = (
+    (r"(dembark run silo .*--set replicas)=3", r"\1=1", "one packing in place of three"),
     (r"(dembark run silo --engine (?:liggghts|yade) .*)", r"\1 --set replicas=1", "one packing in place of two"),
     (r"--grid 64,64,64", "--grid 16,16,16", "a hundredth of the cells"),
     (r"dembark (submit|run) silo-small\b", r"dembark \1 tiny.toml",

@@ -42,7 +42,7 @@ RUNNERS = {
     "LIGGGHTS fragment": "test_liggghts_blocks.py", "syntax": "test_liggghts_blocks.py", "python grains.bin": "test_liggghts_blocks.py",
     "LAMMPS deck": "test_lammps_blocks.py", "LAMMPS fragment": "test_lammps_blocks.py", "LAMMPS syntax": "test_lammps_blocks.py",
     "output": "test_liggghts_blocks.py, test_docs.py", "toml": "test_toml", "shell": "test_shell", "file": "test_shell",
-    "listing": "test_listing", "picture": "test_architecture.py",
+    "{toctree}": "make docs", "listing": "test_listing", "picture": "test_architecture.py",
 }
 SHELL_PAGES = list(dict.fromkeys(block.page for block in blocks("shell")))
 

@@ -194,12 +194,8 @@ def test_parameters_exist(engine: str, folders: tuple[str, ...]) -> None:
     assert len(named) > 20 and [name for name in named if not re.search(rf'"{name}"|\b{name}: ', source)] == []
 
 
-def test_quantities_exist() -> None:
-    names = {name for cell in rows(TEXTS["docs/validation.md"], "quantity") for name in re.findall(r"`([a-z_0-9…]+)`", cell)}
-    # Names of cases, studies and variants stand in the same column.
-    names -= {"log_pair", "log_cradle", "log_pile", "width", "step", "liquid_content", "test_5_partial_slip"}
-    # `_a` stands for the material that ends a name.
-    texts = {name.replace("*", "\0") for case in discover().values() for name in case.quantities}
-    known = [re.compile(re.escape(text).replace("\0", ".+")) for text in texts if re.search(r"[a-z]{3}", text) and " " not in text]
-    wrong = [name for name in names if not any(text.fullmatch(name.replace("…", "x") + end) for text in known for end in ("", "_a"))]
-    assert len(names) > 60 and not wrong
+def test_every_case_is_in_the_gallery_and_in_the_results() -> None:
+    cases = set(discover())
+    listed = " ".join(re.findall(r"<!-- cases: ([\w ]+) -->", TEXTS["docs/gallery.md"])).split()
+    assert sorted(listed) == sorted(cases)
+    assert {name for name in cases if f"input_decks/{name}/README.md" not in TEXTS["docs/validation.md"]} == set()
