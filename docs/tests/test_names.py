@@ -121,7 +121,7 @@ def test_options_in_the_text_exist() -> None:
     common = {option for parameter in typer.main.get_command(cli.app).params for option in parameter.opts}
     known = common.union(*subcommands().values()) | set(re.findall(r'"(--[a-z-]+)"', benchmarks))
     # Words of other programs: of Slurm, srun and pytest.
-    known |= {"--partition", "--mpi", "--me", "--slow", "--full"}
+    known |= {"--partition", "--mpi", "--me", "--test-only", "--slow", "--full"}
     unknown = {option for span in SPANS for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", span)} - known
     assert not unknown
 
