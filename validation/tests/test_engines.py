@@ -154,12 +154,12 @@ def final_energy(folder: Path) -> float:
 
 @pytest.mark.parametrize(("engine", "gravity"), [("liggghts", 9.81), ("liggghts", -2.0), ("yade", 2.0)])
 def test_both_engines_get_the_parameters_and_fall_as_they_say(tmp_path: Path, engine: str, gravity: float) -> None:
-    told: dict[str, object] = {}
-    simulate(plan(engine, gravity=gravity), tmp_path / "out", threading.Event(), progress=lambda **facts: told.update(facts))
+    reported: dict[str, object] = {}
+    simulate(plan(engine, gravity=gravity), tmp_path / "out", threading.Event(), follow=lambda **facts: reported.update(facts))
     folder = tmp_path / "out/replica-1"
     record = read_json(folder / "run.json")
     assert (record["steps"], record["time_step"], record["frames"]) == (1000, 1e-5, 2)
-    assert told["step"] == 1000
+    assert reported["step"] == 1000
     velocity = gravity * 1e-2
     density = 2500 if engine == "liggghts" else 1000
     mass = density * 4 / 3 * 3.141592653589793 * 0.05**3
