@@ -6,10 +6,12 @@ A block is fenced, or indented by four spaces. Fenced ones say what they are; of
 from __future__ import annotations
 
 import ast
+import importlib.util
 import re
 import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import ModuleType
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
@@ -169,3 +171,10 @@ def replaced(command: str) -> tuple[str, str]:
 def not_run(command: str) -> str:
     """Why a command is not run here; empty for those that are."""
     return next((why for pattern, why in NOT_RUN if re.fullmatch(pattern, command)), "")
+
+
+def load_script(name: str = "capillary_errors") -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, ROOT / f"docs/{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

@@ -9,10 +9,9 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import pytest
-from blocks import PAGES, ROOT, Block, blocks
+from blocks import PAGES, ROOT, Block, blocks, load_script
 
 from dembark.validation.engines import call
 
@@ -97,15 +96,6 @@ def test_cpp_snippet(block: Block, tmp_path: Path) -> None:
     eigen = shlex.split(subprocess.run(["pkg-config", "--cflags", "eigen3"], check=True, capture_output=True, text=True).stdout)
     subprocess.run([compiler, "-std=c++17", "-I.", *eigen, "main.cpp", "-o", "main"], cwd=tmp_path, check=True, timeout=300)
     assert float(subprocess.run(["./main"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout.split()[0]) > 0.0
-
-
-def load_script(name: str = "capillary_errors") -> ModuleType:
-    import importlib.util
-
-    spec = importlib.util.spec_from_file_location(name, ROOT / f"docs/{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_accuracy_of_closed_forms_is_what_the_page_says() -> None:

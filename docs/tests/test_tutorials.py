@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from test_docs import load_script
+from blocks import load_script
 
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
