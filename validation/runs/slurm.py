@@ -14,13 +14,14 @@ _TRIES, _PAUSE = 5, 2.0
 
 def refusal(script: Path) -> str:
     """Why Slurm would not take the job `script`, or would let it wait for ever; empty when it would run it."""
-    for _ in range(_TRIES):
-        done = _ask(["sbatch", "--test-only", str(script)])
-        if done is None:
-            return "sbatch does not answer"
-        if not done.returncode or "configuration is not available" not in done.stderr:
+    done = _ask(["sbatch", "--test-only", str(script)])
+    for _ in range(_TRIES - 1):
+        if done is None or "configuration is not available" not in done.stderr:
             break
         time.sleep(_PAUSE)
+        done = _ask(["sbatch", "--test-only", str(script)])
+    if done is None:
+        return "sbatch does not answer"
     if done.returncode:
         lines = [line.partition("error: ")[2] or line for line in done.stderr.strip().splitlines()]
         return "; ".join(lines[-2:]) or f"sbatch ends with {done.returncode}"
