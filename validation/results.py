@@ -21,9 +21,8 @@ from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json, write_whole
 from dembark.common.lock import held
-from dembark.validation.judge.result import COMPARISON, METRICS, RUNS, result_files
+from dembark.validation.judge.result import COMPARISON, METRICS, PLAN, result_files
 
-PLAN = RUNS
 RECORD = "run.json"
 
 
@@ -87,21 +86,35 @@ def plan(folder: Path) -> dict[str, Any]:
     return read_json(folder / PLAN) or {}
 
 
+def record(place: Path, inputs: str) -> dict[str, Any] | None:
+    """The run.json of the finished run with these `inputs` (their hash) at `place`; None when it is not finished."""
+    found = read_json(place / RECORD)
+    return found if found is not None and found.get("inputs") == inputs else None
+
+
 def states(folder: Path) -> list[State]:
     """The planned runs of a results folder in the order of the plan, as the files have them; empty without a plan."""
     return [_state(folder, run) for run in plan(folder).get("runs", ())]
+
+
+def state(folder: Path, place: str) -> State:
+    """The planned run at `place` in a results folder, without a look at the others; DembarkError when it is not in the plan."""
+    for run in plan(folder).get("runs", ()):
+        if run["folder"] == place:
+            return _state(folder, run)
+    raise DembarkError(f"{place} is no planned run", f"of {folder / PLAN}", "submit again")
 
 
 def _state(results: Path, run: Mapping[str, Any]) -> State:
     place = results / run["folder"]
     facts: dict[str, Any] = {"name": " ".join((*place.parts[-4:-1], run["folder"].rpartition("-")[2])),
                              "folder": run["folder"], "inputs": run["inputs"], "estimate": run.get("estimate")}
-    record = read_json(place / RECORD)
-    if record is not None and record.get("inputs") == run["inputs"]:
-        return State(**facts, state="finished", step=record.get("steps", 0), steps=record.get("steps", 0),
-                     time_step=record.get("time_step", 0.0), attempt=record.get("attempts", 1),
-                     resumed_from=([0, *record.get("resumed_at", [])])[-1], host=record.get("provenance", {}).get("host", ""),
-                     ended=record.get("provenance", {}).get("wall_time", 0.0))
+    done = record(place, run["inputs"])
+    if done is not None:
+        return State(**facts, state="finished", step=done.get("steps", 0), steps=done.get("steps", 0),
+                     time_step=done.get("time_step", 0.0), attempt=done.get("attempts", 1),
+                     resumed_from=([0, *done.get("resumed_at", [])])[-1], host=done.get("provenance", {}).get("host", ""),
+                     ended=done.get("provenance", {}).get("wall_time", 0.0))
     status = read_json(status_file(place)) or {}
     if status.get("inputs") != run["inputs"]:
         status = {}
@@ -125,17 +138,17 @@ def runs(folder: Path | str) -> pd.DataFrame:
                                        if "superseded" not in path.parts and not path.parent.parent.name.startswith("."))])
     rows = []
     for place in places:
-        record, state = read_json(folder / place / RECORD) or {}, planned.get(place)
-        if state is None:
-            row = {"folder": place, "state": "finished", "inputs": record.get("inputs", ""), "step": record.get("steps"),
-                   "attempt": record.get("attempts", 1)}
+        content, planned_state = read_json(folder / place / RECORD) or {}, planned.get(place)
+        if planned_state is None:
+            row = {"folder": place, "state": "finished", "inputs": content.get("inputs", ""), "step": content.get("steps"),
+                   "attempt": content.get("attempts", 1)}
         else:
-            row = {key: value for key, value in state.as_json().items() if key not in ("name", "kind", "host", "began", "ended")}
-            record = record if state.state == "finished" else {}
+            row = {key: value for key, value in planned_state.as_json().items() if key not in ("name", "kind", "host", "began", "ended")}
+            content = content if planned_state.state == "finished" else {}
         parts = (folder / place).parts
         named = dict(zip(("case", "variant", "engine"), parts[-4:-1], strict=True)) | {"replica": int(place.rpartition("-")[2])}
-        rows.append(named | row | {key: record[key] for key in ("case", "variant", "engine", "steps", "time_step", "resume", "parameters",
-                                                                "provenance") if key in record})
+        rows.append(named | row | {key: content[key] for key in ("case", "variant", "engine", "steps", "time_step", "resume", "parameters",
+                                                                "provenance") if key in content})
     return pd.json_normalize(rows)
 
 

@@ -12,8 +12,7 @@ from typing import Any
 
 from dembark.common.choices import Value, pick
 from dembark.common.errors import DembarkError
-from dembark.common.files import read_json
-from dembark.validation import engines
+from dembark.validation import engines, results
 from dembark.validation.case.deck import require_capable, require_measure, require_steps, sources
 from dembark.validation.case.folders import discover
 from dembark.validation.case.model import Case
@@ -174,5 +173,4 @@ def left_out(profile: str, only_cases: Sequence[str] = (), only_engines: Sequenc
 
 def finished(folder: Path, run: Run) -> bool:
     """Whether `folder` holds the finished result of exactly this run."""
-    record = read_json(folder / "run.json")
-    return record is not None and record.get("inputs") == run.inputs
+    return results.record(folder, run.inputs) is not None

@@ -15,7 +15,7 @@ from dembark.validation.case.model import EVIDENCE
 VERDICTS = ("pass", "fail", "info")
 METRICS, COMPARISON = "metrics.json", "comparison.json"
 # What was asked for in a results folder, and its planned runs; see validation.results.
-RUNS = "plan.json"
+PLAN = "plan.json"
 
 Interval = tuple[float, float]
 Kind = TypeVar("Kind", bound="QuantityRecord | Result | Comparison")
@@ -228,7 +228,7 @@ def _value(content: Mapping[str, Any], kind: type[Kind], where: str, notes: dict
 def result_files(folder: Path) -> list[Path]:
     """The files of all results and comparisons below a results folder, in the order of their places; where `plan.json` says that only some
     cases were asked for, theirs."""
-    cases = (read_json(folder / RUNS) or {}).get("cases") or ["*"]
+    cases = (read_json(folder / PLAN) or {}).get("cases") or ["*"]
     return sorted(path for case in cases for name in (f"{case}/*/*/{METRICS}", f"{case}/*/{COMPARISON}") for path in folder.glob(name)
                   if "superseded" not in path.relative_to(folder).parts)
 

@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from dembark.common.errors import DembarkError
-from dembark.common.files import read_json
 from dembark.validation import verification
 from dembark.validation.case.folders import files, load
 from dembark.validation.case.model import STUDY_PREFIX, Case
-from dembark.validation.judge.result import RUNS, ComparedRecord, Comparison, QuantityRecord, Result, results
+from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result, results
 from dembark.validation.report.figures import engine_name
-from dembark.validation.results import states
+from dembark.validation.results import plan, states
 from dembark.validation.verification.item import Item
 
 _SINGLE = "Single runs: what else a profile would run is not listed here."
@@ -122,7 +121,7 @@ class Gathered:
 
 def gather(folder: Path) -> Gathered:
     """Everything that `plan.json` expects in a results folder, and everything that is there; without it, nothing is known to be missing."""
-    summary = read_json(folder / RUNS) or {"description": _SINGLE}
+    summary = plan(folder) or {"description": _SINGLE}
     cases, unread = _cases(summary.get("cases", ()))
     pages: dict[tuple[str, str], Page] = {}
 

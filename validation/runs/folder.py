@@ -19,9 +19,9 @@ from dembark.validation.campaigns.estimate import wall_clock
 from dembark.validation.campaigns.plan import Plan
 from dembark.validation.campaigns.spec import read
 from dembark.validation.case.folders import INSTEAD, VARIABLE, add_own_root, shipped_root, variables
-from dembark.validation.judge.result import METRICS
+from dembark.validation.judge.result import METRICS, PLAN
 from dembark.validation.judge.tally import Tally, of_folder
-from dembark.validation.results import PLAN, State
+from dembark.validation.results import State
 
 from .monitor import headline
 from .steps import CAMPAIGN_FILE

@@ -34,7 +34,7 @@ def _arguments(words: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _simulate(folder: Path, place: str, again: bool, cancel: threading.Event) -> None:
-    (state,) = [state for state in results.states(folder) if state.folder == place]
+    state = results.state(folder, place)
     if state.state == "finished" or (again and state.state == "failed"):
         return
     case, _, engine, _ = Path(place).parts

@@ -50,7 +50,7 @@ class Site:
         done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL,
                               timeout=120, check=False)
         if done.returncode:
-            raise DembarkError(f"the preamble of {self.path} fails", _last_words(done), "correct it, or try it in a shell")
+            raise DembarkError(f"the preamble of {self.path} fails", last_words(done), "correct it, or try it in a shell")
         return dict(entry.split("=", 1) for entry in done.stdout.split("\0") if "=" in entry)
 
     def script(self, name: str, log: Path, used: Resources, count: int, after: list[tuple[str, str]], body: str,
@@ -75,11 +75,12 @@ class Site:
         except subprocess.TimeoutExpired:
             raise DembarkError("the scheduler does not answer", f"to {command}", "try again later with 'dembark resume'") from None
         if done.returncode or not done.stdout.strip():
-            raise DembarkError("the scheduler refused a job", _last_words(done), f"see {script} and {self.path}")
+            raise DembarkError("the scheduler refused a job", last_words(done), f"see {script} and {self.path}")
         return done.stdout.split()[0].partition(";")[0]
 
 
-def _last_words(done: subprocess.CompletedProcess[str]) -> str:
+def last_words(done: subprocess.CompletedProcess[str]) -> str:
+    """Why a command failed, in its own words: at most two lines as one."""
     lines = [line.partition("error: ")[2] or line for line in (done.stderr or done.stdout).strip().splitlines()]
     return "; ".join(lines[-2:]) or f"exit code {done.returncode} without a message"
 

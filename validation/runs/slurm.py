@@ -8,6 +8,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from .site import last_words
+
 # It refuses jobs also for some seconds after its own restart, until the nodes have registered.
 _TRIES, _PAUSE = 5, 2.0
 
@@ -23,8 +25,7 @@ def refusal(script: Path) -> str:
     if done is None:
         return "sbatch does not answer"
     if done.returncode:
-        lines = [line.partition("error: ")[2] or line for line in done.stderr.strip().splitlines()]
-        return "; ".join(lines[-2:]) or f"sbatch ends with {done.returncode}"
+        return last_words(done)
     text = script.read_text(encoding="utf-8")
     partition = re.search(r"^#SBATCH +(?:--partition[= ]|-p ?)(\S+)", text, re.MULTILINE)
     minutes = re.search(r"^#SBATCH +--time=(\d+)$", text, re.MULTILINE)

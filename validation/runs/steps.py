@@ -107,7 +107,7 @@ def _of_series(folder: Path, name: str, runs: Mapping[str, str]) -> str:
 
 def _finished(folder: Path, runs: Mapping[str, str]) -> list[str]:
     """Folder names of the `runs` (hash of the inputs by folder name) that are finished."""
-    return [name for name, of_run in runs.items() if (read_json(folder / name / RECORD) or {}).get("inputs") == of_run]
+    return [name for name, of_run in runs.items() if results.record(folder / name, of_run) is not None]
 
 
 def _of_study(folder: Path, study: Study, points: Iterable[Path]) -> str:

@@ -18,9 +18,9 @@ from dembark.common.lock import lock
 from dembark.validation import results
 from dembark.validation.campaigns import expand
 from dembark.validation.campaigns.plan import Plan, Resources, Series
-from dembark.validation.judge.result import METRICS, Result
+from dembark.validation.judge.result import METRICS, PLAN, Result
 from dembark.validation.judge.tally import Tally, of_folder
-from dembark.validation.results import PLAN, RECORD, State
+from dembark.validation.results import RECORD, State
 
 from .executor import Executor, States, Task
 from .monitor import Monitor

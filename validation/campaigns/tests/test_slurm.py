@@ -5,12 +5,11 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from harness import decks, environment, stand_in, wait_for  # noqa: F401
+from harness import decks, environment, stand_in, start, wait_for  # noqa: F401
 from slurm_cluster import Cluster
 
 from dembark.common.files import read_json
@@ -59,8 +58,7 @@ echo read by ${{SLURM_JOB_ID:-nobody}} >> "{folder}/preamble.log"
 export SITE=$UNSET'''))
 
     def start(self, *words: str) -> subprocess.Popen[str]:
-        return subprocess.Popen([sys.executable, "-m", "dembark.validation.cli", *words], cwd=self.folder, env=self.environment, text=True,
-                                stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        return start(self.folder, self.environment, *words)
 
     def submit(self) -> subprocess.Popen[str]:
         return self.start("submit", str(self.file), "--executor", str(self.folder / "my site.toml"), "--out", str(self.results))
