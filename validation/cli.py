@@ -20,7 +20,7 @@ from dembark.validation.campaigns.plan import Resources, series
 from dembark.validation.case import cli as cases
 from dembark.validation.case import folders
 from dembark.validation.case.resolve import resolve, settings
-from dembark.validation.judge import measuring
+from dembark.validation.judge import measurement
 from dembark.validation.judge.result import METRICS
 from dembark.validation.judge.tally import tally
 from dembark.validation.runs import cli as campaigns
@@ -96,7 +96,7 @@ def run(
     resolve(one, profile, chosen, changes)
     if out is None and changes:
         raise DembarkError("--out is missing", "with --set the run is not the one of the profile", "name a folder for its results")
-    measuring.check(one)
+    measurement.load(one)
     planned = series(one, chosen, profile, engines.find(engine), changes)
     if restart_interval is not None and not restarts.supported(planned.runs[0]):
         raise DembarkError(f"--restart-interval {restart_interval}", f"{one.deck(engine)} writes no states to go on from",

@@ -17,7 +17,7 @@ from dembark.validation import analysis, engines, provenance
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
 from dembark.validation.case.model import Case, Study
-from dembark.validation.judge import inputs, measured, measuring
+from dembark.validation.judge import inputs, measurement, measurement_file, verdict
 from dembark.validation.judge.result import METRICS, Result, as_json, read
 
 
@@ -45,40 +45,41 @@ def measure(folder: Path, wanted: int | None = None) -> Result:
         raise RunError(f"nothing to measure in {folder}", "it has no finished replica-*/run.json")
     first, case = runs[0].record, find(runs[0].record["case"])
     inputs_hash = inputs.of_measurement(case, [one.folder / "run.json" for one in runs])
-    kept = measured.read(folder, inputs_hash) or _measure(folder, case, runs, inputs_hash)
+    kept = measurement_file.read(folder, inputs_hash) or _measure(folder, case, runs, inputs_hash)
     parameters = {key: value for key, value in first["parameters"].items() if key != "seed"}
     if wanted is not None and "replicas" in parameters:
         # Those of an earlier request for fewer or more are kept, and know its number.
         parameters["replicas"] = wanted
     numbers = {int(one.record["replica"]) for one in runs}
     return Result(
-        case.name, first["variant"], first["engine"], measuring.quantities(case, kept.found, first["variant"]), first["profile"],
+        case.name, first["variant"], first["engine"], verdict.quantities(case, kept.found, first["variant"]), first["profile"],
         parameters=parameters, profiles=tuple(kept.found.profiles), remarks=_remarks(case, kept.found),
-        picture=measuring.picture(case, first), references=measuring.references(case), provenance=_provenance(runs), measured=kept.facts,
+        picture=case.picture_of({**first["parameters"], **first["derived"]}), references=case.references, provenance=_provenance(runs),
+        measured=kept.facts,
         inputs=tuple(one.record["inputs"] for one in runs if "inputs" in one.record),
         replicas_missing=tuple(number for number in range(1, (wanted or 0) + 1) if number not in numbers))
 
 
-def _measure(folder: Path, case: Case, runs: Sequence[Replica], inputs_hash: str) -> measured.Measured:
-    (folder / measured.FILE).unlink(missing_ok=True)
+def _measure(folder: Path, case: Case, runs: Sequence[Replica], inputs_hash: str) -> measurement_file.Measured:
+    (folder / measurement_file.FILE).unlink(missing_ok=True)
     fields = ""
     with analysis.warnings_kept() as warnings:
-        found = measuring.measure(case, runs)
+        found = measurement.measure(case, runs)
         if found.fields is not None:
             fields = field_figures.FILE
             labelled.write(folder / fields, found.fields)
     noted = replace(found, remarks=[*found.remarks, *dict.fromkeys(warnings)], fields=None)
-    return measured.write(folder, measured.Measured(inputs_hash, noted, provenance.measured(), fields))
+    return measurement_file.write(folder, measurement_file.Measured(inputs_hash, noted, provenance.measured(), fields))
 
 
 def picture(folder: Path) -> Mapping[str, Any] | None:
-    """How the report shows the replicas in `folder`, see `measuring.picture`."""
+    """How the report shows the replicas in `folder`, see `Case.picture_of`."""
     first = next(iter(replicas(folder)), None)
-    return measuring.picture(find(first.record["case"]), first.record) if first else None
+    return find(first.record["case"]).picture_of({**first.record["parameters"], **first.record["derived"]}) if first else None
 
 
 def _remarks(case: Case, found: Measurement) -> tuple[str, ...]:
-    return *found.remarks, *measuring.statements(case)
+    return *found.remarks, *(f"{one['short']}: {one['statement']}" for one in case.references if one["statement"])
 
 
 def study(planned: Study, folders: Sequence[Path]) -> Result:
@@ -91,11 +92,11 @@ def study(planned: Study, folders: Sequence[Path]) -> Result:
         raise RunError(f"study {planned.name} is incomplete", f"{absent[0]} has no {METRICS}", "every variant of a study is needed")
     points = [read(folder / METRICS) for folder in folders]
     first, case = points[0], find(points[0].case)
-    found = measuring.study(case, planned, [as_json(point) for point in points])
+    found = measurement.study(case, planned, [as_json(point) for point in points])
     return Result(
-        case.name, planned.folder_name, first.engine, measuring.quantities(case, found, planned.folder_name), first.profile,
+        case.name, planned.folder_name, first.engine, verdict.quantities(case, found, planned.folder_name), first.profile,
         planned.title, planned.description, profiles=tuple(found.profiles), remarks=_remarks(case, found),
-        references=measuring.references(case), provenance={"variants": list(planned.variants)}, measured=provenance.measured())
+        references=case.references, provenance={"variants": list(planned.variants)}, measured=provenance.measured())
 
 
 def worst(found: Sequence[Mapping[str, float]]) -> dict[str, float]:

@@ -58,7 +58,7 @@ def test_packages_import_only_what_the_table_says() -> None:
 
 
 def test_general_code_names_no_case() -> None:
-    """Prose, names and constants of modules and templates. Tables do: measured speeds of the engines, and statements of publications."""
+    """Prose, names and constants of modules and templates. Statements of publications do."""
     cases = {path.parent.name for path in ROOT.glob("input_decks/*/case.toml")}
     words = ["git", "ls-files", "common", "postproc", "validation"]
     files = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()

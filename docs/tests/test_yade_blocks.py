@@ -63,7 +63,7 @@ O.engines = [ForceResetter(), InsertionSortCollider([Bo1_Sphere_Aabb(){bounds}])
 O.dt = 1e-6
 O.run(10, True)
 """
-CASE = '[parameters.grain_count]\nvalue = 10\ntype = "int"\n'
+CASE = '[parameters.grain_count]\nvalue = 10\n'
 # What complete scripts print, by the class that they show.
 SAID = {"LcpImpact": "impacts: ", "CapillaryLiquid": "all liquid: 1e-09", "EnergyAccount": "balance: True",
         "IntegrationMonitor": "velocity 0.", "SphFluid": "front: 0.",

@@ -16,8 +16,8 @@ from dembark.postproc.replica import Replica
 from dembark.validation import metrics
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
-from dembark.validation.judge import compare as judge
-from dembark.validation.judge import measuring
+from dembark.validation.judge import comparison as judge
+from dembark.validation.judge import verdict
 from dembark.validation.judge.result import COMPARISON, METRICS, QuantityRecord, as_json, from_json, write
 
 # The measured quantities with their verdicts, by name.
@@ -51,7 +51,7 @@ def logs(case: str, run: LogRun) -> Measurement:
 
 def judged(case: str, found: Measurement) -> dict[str, dict[str, Any]]:
     """The measured quantities with their verdicts, by name."""
-    return {one.name: as_json(one) for one in measuring.quantities(find(case), found)}
+    return {one.name: as_json(one) for one in verdict.quantities(find(case), found)}
 
 
 def measure(folder: Path) -> dict[str, Any]:

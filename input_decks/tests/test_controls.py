@@ -13,7 +13,7 @@ import pytest
 
 from dembark.input_decks.tests.measuring import Control, names
 from dembark.validation.case.folders import find, load, package_root
-from dembark.validation.judge.measuring import declared
+from dembark.validation.judge.verdict import declared
 
 # Cases whose controls take more than 10 s together: by default the first of each.
 SLOW = ("plug_flow", "single_contact")

@@ -19,7 +19,7 @@ from dembark.validation.case.deck import derived, prepare, write
 from dembark.validation.case.folders import discover, find
 from dembark.validation.case.resolve import resolve
 from dembark.validation.engines import names
-from dembark.validation.judge import measuring
+from dembark.validation.judge import measurement, verdict
 
 WALLS = {"silo": ("side", "base"), "plane_silo": ("left", "right", "base"), "plug_flow": ("left", "right", "base"),
          "gravity_channel": ("left", "right"), "column_collapse": ("back", "base", "gate")}
@@ -156,7 +156,7 @@ def test_energies_of_a_collapse_balance(engine: str, variant: str, finished: Any
     run = finished("column_collapse", engine, variant)
     case = find("column_collapse")
     record = {"parameters": run.values, "time_step": run.setup.time_step, "engine": engine, "derived": derived(prepare(case, run.values))}
-    found = measuring.quantities(case, measuring.measure(case, [Replica(run.folder, record)]))
+    found = verdict.quantities(case, measurement.measure(case, [Replica(run.folder, record)]))
     measured = {one.name: one.value for one in found}
     verdicts = {one.name: one.verdict for one in found if one.tolerance is not None}
     assert verdicts == dict.fromkeys(("energy_balance", "potential_error", "dissipation_sign"), "pass"), measured

@@ -16,6 +16,7 @@ from rich.table import Table
 from dembark.common.units import core_hours, duration, size_text
 from dembark.validation import engines, results
 from dembark.validation.case import deck
+from dembark.validation.case.model import Case
 
 from .plan import Plan, Series, finished
 
@@ -37,14 +38,14 @@ class Rates:
             self._runs = self._runs.dropna(subset="provenance.particle_steps_per_second")
             self._runs["cores"] = self._runs["provenance.ranks"] * self._runs["provenance.threads"]
 
-    def of(self, case: str, engine: str, cores: int = 1) -> Rate:
+    def of(self, case: Case, engine: str, cores: int = 1) -> Rate:
         """Rate for runs of `case` in `engine` on `cores` cores.
 
         The median of the folder's runs of this case, those of this host and this number of cores before others; else the engine's facts.
         """
         runs = self._runs
         if "cores" in runs:
-            runs = runs[(runs["case"] == case) & (runs["engine"] == engine)]
+            runs = runs[(runs["case"] == case.name) & (runs["engine"] == engine)]
             mine = runs[runs["provenance.host"] == socket.gethostname()]
             where = "this host" if len(mine) else "other hosts"
             runs = mine if len(mine) else runs
@@ -54,8 +55,8 @@ class Rates:
             value = (runs["provenance.particle_steps_per_second"] / runs["cores"]).median()
             return Rate(float(value), f"{len(runs)} runs measured on {where}")
         facts = engines.facts(engine)
-        if case in facts.rates:
-            return Rate(facts.rates[case], f"measured on {facts.measured_on}")
+        if engine in case.rates:
+            return Rate(case.rates[engine], f"measured on {facts.measured_on}")
         return Rate(facts.typical_rate, f"of other cases, measured on {facts.measured_on}")
 
 
@@ -86,7 +87,7 @@ def estimates(plan: Plan, rates: Rates) -> list[Estimate]:
         if key not in known:
             setup = deck.prepare(run.case, run.values)
             known[key] = (setup.steps, setup.time_step)
-        rate = rates.of(run.case.name, run.engine.name, cores)
+        rate = rates.of(run.case, run.engine.name, cores)
         work = None if run.particles is None else float(run.particles) * known[key][0]
         time = None if work is None else work / rate.value
         found.append(Estimate(one, *known[key], rate, cores, work, time, None if time is None else time / cores, run.output_size))

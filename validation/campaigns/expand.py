@@ -72,7 +72,7 @@ def _changes(sweep: SweepSpec, base: str, row: Mapping[str, Value]) -> dict[str,
         if isinstance(value, bool | complex):
             raise DembarkError(f"{key} = {expression.text!r} is no number")
         # Grains are counted: what comes out is the next whole number.
-        whole = parameter.type == "int" and isinstance(value, float) and math.isfinite(value)
+        whole = parameter.is_whole and isinstance(value, float) and math.isfinite(value)
         changes[key] = checked(parameter, round(value) if whole else value)
     return changes
 

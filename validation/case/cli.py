@@ -17,7 +17,8 @@ app = typer.Typer()
 def show_cases(case: Annotated[str | None, typer.Argument(help="Show the keys, profiles and variants of this case.")] = None) -> None:
     """List the cases, or show one in detail."""
     from dembark.validation import show
-    from dembark.validation.case.folders import discover, find
+
+    from .folders import discover, find
 
     console = show.console()
     if case is None:
@@ -44,9 +45,10 @@ def deck(
     """Write a deck that runs without the harness. The folder holds the input script with all numbers, the packing and the meshes."""
     from dembark.common.choices import pick
     from dembark.validation import engines
-    from dembark.validation.case.deck import write
-    from dembark.validation.case.folders import find
-    from dembark.validation.case.resolve import portable, resolve, settings
+
+    from .deck import write
+    from .folders import find
+    from .resolve import portable, resolve, settings
 
     one = find(case)
     pick(engine, engines.names(), "engine", "in --engine")
@@ -72,7 +74,8 @@ def new_case(
 ) -> None:
     """Write a template of a case that runs."""
     from dembark.validation import engines
-    from dembark.validation.case.folders import package_root, shipped_root
+
+    from .folders import package_root, shipped_root
 
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise DembarkError(f"{name!r} is no name of a case", "", "take lower-case letters, digits and underscores, a letter first")

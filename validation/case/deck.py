@@ -20,12 +20,14 @@ import numpy as np
 from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
-from dembark.validation.case import imports
-from dembark.validation.case.folders import package_root
+
+from . import imports
+from .folders import package_root
 
 if TYPE_CHECKING:
     from dembark.input_decks.common.setup import Array, Setup
-    from dembark.validation.case.model import Case
+
+    from .model import Case
 
 PACKING = "packing.data"
 

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
-from dembark.validation.case.model import Case
+
+from .model import Case
 
 # Folders of the user's own cases, as in PATH; `dembark --cases FOLDER` adds to it.
 VARIABLE = "DEMBARK_CASES"
@@ -82,7 +83,8 @@ def find(name: str) -> Case:
 @cache
 def load(path: Path) -> Case:
     """Read and check one case.toml; raises DembarkError saying what is wrong in which table."""
-    from dembark.validation.case.read import CaseReader
-    from dembark.validation.case.tables import load_toml
+    # The reader finds the groups of parameters by this module.
+    from .reader import CaseReader
+    from .tables import load_toml
 
     return CaseReader(path).case(load_toml(path))

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
 from dembark.common.units import finite, to_si
 from dembark.validation import engines
-from dembark.validation.case.expressions import Expression
+
+from .expressions import Expression
 
 STUDY_PREFIX = "study-"
 # What a deck may be asked to write, and the file that it goes to; a case asks for the first three unless it says otherwise.
@@ -28,51 +31,54 @@ FIRST_ORDER = Expression("1")
 
 @dataclass(frozen=True)
 class Parameter:
-    """One key of a case: default (None = not set), unit of plain numbers (`1` = dimensionless), and what is allowed."""
+    """One key of a case: its default (None = not set), the unit of plain numbers ("1" = dimensionless), and what is allowed: from `min` to
+    `max`, `above` and `below` without the limit itself, or one of `values`."""
 
     name: str
-    type: str
     doc: str
     value: Value = None
     unit: str = "1"
-    optional: bool = False
     min: float | None = None
     max: float | None = None
-    exclusive_min: bool = False
-    exclusive_max: bool = False
+    above: float | None = None
+    below: float | None = None
     values: tuple[str, ...] = ()
+    optional: bool = False
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether its values are whole numbers, as its default is."""
+        return isinstance(self.value, int)
 
     @property
     def range(self) -> str:
-        """What is allowed, in words: `> 0`, `0 ... 1`, `smooth | rough`; empty when everything is."""
+        """What is allowed, in words: `> 0`, `>= 0 and <= 1`, `smooth | rough`; empty when everything is."""
         if self.values:
             return " | ".join(self.values)
-        lower = None if self.min is None else f"{'>' if self.exclusive_min else '>='} {self.min:g}"
-        upper = None if self.max is None else f"{'<' if self.exclusive_max else '<='} {self.max:g}"
-        return " and ".join(part for part in (lower, upper) if part)
+        limits = ((">", self.above), (">=", self.min), ("<", self.below), ("<=", self.max))
+        return " and ".join(f"{sign} {limit:g}" for sign, limit in limits if limit is not None)
 
 
 def checked(parameter: Parameter, value: Value) -> Value:
-    """`value` as the type that `parameter` declares, None when it is optional and not set; DembarkError when not allowed."""
+    """`value` as the type that `parameter` has, None when it is optional and not set; DembarkError when not allowed."""
     if value is None or (value == UNSET and UNSET not in parameter.values):
         if parameter.optional:
             return None
         raise DembarkError(f"{parameter.name} must have a value", parameter.range)
-    if parameter.type == "choice":
+    if parameter.values:
         if value not in parameter.values:
             raise DembarkError(f"{parameter.name} = {value!r} is not allowed", f"allowed are {parameter.range}")
         return value
     unlimited = value == "inf" == str(parameter.value)
     number = math.inf if unlimited else to_si(value, parameter.unit, parameter.name) if isinstance(value, str) else value
     # Only a case itself may mean "unlimited", by an infinite default; nan differs from everything.
-    if number != parameter.value or parameter.type == "int":
+    if number != parameter.value or parameter.is_whole:
         finite(number, parameter.name)
-    if parameter.type == "int" and number != int(number):
+    if parameter.is_whole and number != int(number):
         raise DembarkError(f"{parameter.name} = {number!r} is not a whole number", parameter.range)
-    number = int(number) if parameter.type == "int" else float(number)
-    low = parameter.min is not None and (number <= parameter.min if parameter.exclusive_min else number < parameter.min)
-    high = parameter.max is not None and (number >= parameter.max if parameter.exclusive_max else number > parameter.max)
-    if low or high:
+    number = int(number) if parameter.is_whole else float(number)
+    limits = ((operator.gt, parameter.above), (operator.ge, parameter.min), (operator.lt, parameter.below), (operator.le, parameter.max))
+    if not all(limit is None or within(number, limit) for within, limit in limits):
         unit = "" if parameter.unit == "1" else f" {parameter.unit}"
         raise DembarkError(f"{parameter.name} = {number:g}{unit} is out of range", f"allowed is {parameter.range}")
     return number
@@ -108,9 +114,9 @@ class Study:
 
     name: str
     title: str
-    description: str
     along: str
     variants: tuple[str, ...]
+    description: str = ""
     formal_order: Expression = FIRST_ORDER
 
     @property
@@ -167,7 +173,7 @@ class Case:
     `derived`: numbers that follow from the parameters, by expressions; a setup.py beside the case file may add others, and the packing.
     `controls`: wrong physics, in words, with the declared quantities whose checks it fails. `needs`: capabilities that an engine has to
     have where a condition between the parameters holds. `findings`: known causes of failures. `paired`: the initial packing decides what
-    comes out, so that engines are compared packing by packing.
+    comes out, and engines are compared packing by packing. `rates`: particle-steps per second and core that were measured, by engine.
     """
 
     name: str
@@ -187,11 +193,18 @@ class Case:
     derived: Mapping[str, Expression] = field(default_factory=dict)
     quantities: Mapping[str, Declared] = field(default_factory=dict)
     controls: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    references: tuple[str, ...] = ()
+    references: tuple[Mapping[str, str], ...] = ()
     picture: Mapping[str, Value] = field(default_factory=dict)
     needs: Mapping[str, Expression] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     paired: bool = False
+    rates: Mapping[str, float] = field(default_factory=dict)
+
+    def picture_of(self, values: Mapping[str, Value]) -> dict[str, Any] | None:
+        """How the report shows a run with these parameters and derived numbers: [picture] with its expressions evaluated; None without."""
+        words = ("cross_section", "colour_by")
+        return {key: Expression(value)(values) if isinstance(value, str) and key not in words else value
+                for key, value in self.picture.items()} or None
 
     def lacks(self, engine: str, values: Mapping[str, Value]) -> list[str]:
         """What `engine` has not of what a run with the parameters `values` needs, in words."""

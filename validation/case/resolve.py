@@ -7,7 +7,8 @@ from collections.abc import Iterable, Mapping
 
 from dembark.common.choices import Value, nearest, pick
 from dembark.common.errors import DembarkError
-from dembark.validation.case.model import Case, checked
+
+from .model import Case, checked
 
 UNLIMITED = 1e300
 

@@ -5,14 +5,18 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Any
+from types import UnionType
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from dembark.common.choices import Value, nearest, pick
 from dembark.common.errors import DembarkError
-from dembark.validation.case.expressions import Expression
-from dembark.validation.case.model import Parameter, checked
 
+from .expressions import Expression
+from .model import Parameter, checked
+
+Record = TypeVar("Record")
 Types = type | tuple[type, ...]
 # Of a formal order: a number, or an expression in the parameters.
 ORDER = (int, float, str)
@@ -95,8 +99,32 @@ class TableReader:
         for key, value in data.items():
             if key not in keys:
                 raise self.fail(name, f"unknown key {key!r}", nearest(key, keys), key)
-            if not isinstance(value, keys[key]) or (isinstance(value, bool) and keys[key] is not bool):
+            if not isinstance(value, keys[key]) or (isinstance(value, bool) and keys[key] not in (bool, (bool,))):
                 raise self.fail(name, f"{key} = {value!r} has the wrong type", f"wanted is {wanted(keys[key])}", key)
         for key in required:
             if key not in data:
                 raise self.fail(name, f"{key} is missing", f"wanted is {wanted(keys[key])}")
+
+    def texts(self, data: Mapping[str, Any], table: str, keys: Iterable[str]) -> None:
+        """DembarkError unless the lists `keys` of `data` hold texts only."""
+        for key in keys:
+            if any(not isinstance(one, str) for one in data.get(key, ())):
+                raise self.fail(table, f"{key} = {data[key]}", "a list of texts", key)
+
+    def record(self, kind: type[Record], data: Any, table: str, **given: Any) -> Record:
+        """The dataclass `kind` from the table `data`: keys are the fields that are not `given`, their types those of the fields, and a key
+        is required where the field has no default. Texts lose the space around them."""
+        own: list[Any] = [one for one in fields(kind) if one.name not in given]  # type: ignore[arg-type]
+        hints = get_type_hints(kind)
+        self.table(data, table, {one.name: _types(hints[one.name]) for one in own}, [one.name for one in own if one.default is MISSING])
+        self.texts(data, table, [one.name for one in own if get_origin(hints[one.name]) is tuple])
+        plain = {key: tuple(value) if isinstance(value, list) else value.strip() if isinstance(value, str) else value
+                 for key, value in data.items()}
+        return kind(**plain, **given)
+
+
+def _types(hint: Any) -> Types:
+    """The types in TOML of a field with this type hint."""
+    found = [get_origin(one) or one for one in (get_args(hint) if isinstance(hint, UnionType) else (hint,))]
+    kinds = [list if one is tuple else one for one in found if one is not type(None)]
+    return (*kinds, *([int] if float in kinds else []))

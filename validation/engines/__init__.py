@@ -14,10 +14,11 @@ from functools import cache
 
 from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
-from dembark.validation.engines.base import CAPABILITIES, DeckNumber, Engine, EngineFacts, call, end_with_parent, mpi_launcher
-from dembark.validation.engines.lammps import Lammps
-from dembark.validation.engines.liggghts import Liggghts
-from dembark.validation.engines.yade import Yade
+
+from .base import CAPABILITIES, DeckNumber, Engine, EngineFacts, call, end_with_parent, mpi_launcher
+from .lammps import Lammps
+from .liggghts import Liggghts
+from .yade import Yade
 
 __all__ = ["CAPABILITIES", "ENGINES", "DeckNumber", "Engine", "EngineFacts", "absent", "call", "end_with_parent", "facts", "find",
            "mpi_launcher", "names", "registered", "titles"]

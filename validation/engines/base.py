@@ -12,7 +12,7 @@ import tempfile
 import tomllib
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -20,8 +20,6 @@ from dembark.common.checkout import checkout
 from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
 
-# An environment variable for each engine: which program it was that told its version, and the version.
-_TOLD = "DEMBARK_TOLD_BY_"
 # Where the start of MPI programs is named, for engines without a launcher of their own.
 LAUNCHER = "DEMBARK_MPIRUN"
 # What dembark's part of the engines reads in the environment: how many contacts it computes at a time.
@@ -40,8 +38,8 @@ class EngineFacts:
 
     `name` stands in commands, files and folders, `title` in text and figures; `program` is what has to be installed. Rates are in
     particle-steps per second and core. `restart_rate` turns the wall time between restart files into steps: a fixed number, because a
-    measured one would make a run differ from host to host. `rates` are those measured for each case, `typical_rate` is for all others,
-    and `measured_on` says where and when. `relative_cost` is that of a particle-step. `capabilities` are names of CAPABILITIES. An
+    measured one would make a run differ from host to host. `typical_rate` is that of a case without measured rates, and `measured_on` says
+    where and when. `relative_cost` is that of a particle-step. `capabilities` are names of CAPABILITIES. An
     `optional` engine is left out of profiles where it is not installed, and they say so; campaigns run it where they name it.
     """
 
@@ -58,7 +56,6 @@ class EngineFacts:
     restart_rate: float = 1e5
     typical_rate: float = 1e5
     measured_on: str = ""
-    rates: Mapping[str, float] = field(default_factory=dict)
     capabilities: tuple[str, ...] = ()
     optional: bool = False
     # Environment variables that say which program is meant, its name, where it is built below `build` and by what command, and whether one
@@ -158,7 +155,9 @@ class Engine(ABC):
     def find(cls) -> Self:
         """The engine of this machine, asked for its version; DembarkError telling what to do if there is none."""
         bare = cls(cls.locate(), "", "")
-        return replace(bare, version=bare._version(), identity=digest(bare.own_files()))
+        command = [str(bare.executable), *cls.facts.version_words]
+        version = _first_match(cls.facts.version_pattern, command, bare.environment())
+        return replace(bare, version=version, identity=digest(bare.own_files()))
 
     @property
     def name(self) -> str:
@@ -199,17 +198,6 @@ class Engine(ABC):
         if os.geteuid() == 0:
             result |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
         return result
-
-    def _version(self) -> str:
-        """The version that the program tells; asked once by a process and those that it starts, for a start takes a second or two."""
-        facts, variable = self.executable.stat(), _TOLD + self.name.upper()
-        asked = f"{self.executable}:{facts.st_size}:{facts.st_mtime_ns}"
-        told = os.environ.get(variable, "").rpartition("=")
-        if told[0] == asked:
-            return told[2]
-        version = _first_match(self.facts.version_pattern, [str(self.executable), *self.facts.version_words], self.environment())
-        os.environ[variable] = f"{asked}={version}"
-        return version
 
 
 def texts(values: Mapping[str, Value]) -> dict[str, str]:

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from dembark.common.choices import Value
-from dembark.validation.engines.base import DECK_NOTE, DeckNumber, Engine, end_with_parent, texts
+
+from .base import DECK_NOTE, DeckNumber, Engine, end_with_parent, texts
 
 
 class InputScript(Engine):

@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from dembark.validation.engines.base import EngineFacts
-from dembark.validation.engines.input_script import InputScript
+from .base import EngineFacts
+from .input_script import InputScript
 
 
 class Lammps(InputScript):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dembark.validation.engines.base import EngineFacts
-from dembark.validation.engines.input_script import InputScript
+from .base import EngineFacts
+from .input_script import InputScript
 
 
 class Liggghts(InputScript):

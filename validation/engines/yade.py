@@ -8,7 +8,8 @@ from pathlib import Path
 
 from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
-from dembark.validation.engines.base import DECK_NOTE, DeckNumber, Engine, EngineFacts, texts
+
+from .base import DECK_NOTE, DeckNumber, Engine, EngineFacts, texts
 
 # Features of YADE's build, and what needs them.
 _FEATURES = {"VTK": "VTKRecorder", "QT5": "yade.qt, SnapshotEngine", "GTS": "pack.gtsSurface2Facets", "CGAL": "TesselationWrapper",

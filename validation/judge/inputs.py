@@ -20,7 +20,7 @@ from dembark.validation.case.model import Case
 
 _HERE = Path(__file__).parent
 KEY = "inputs_hash"
-# Of what `measured` keeps: another number measures everything anew.
+# Of what `measurement_file` keeps: another number measures everything anew.
 _FORMAT = 2
 
 
@@ -64,7 +64,7 @@ def of_pictures(case: Case, records: Iterable[Path]) -> str:
 
 def of_verdicts(case: Case) -> str:
     """That of the judgement of measured quantities, apart from what was measured."""
-    judging = imports.dependencies(_HERE / "measuring.py", _HERE.parent / "metrics.py").digest()
+    judging = imports.dependencies(_HERE / "verdict.py", _HERE.parent / "metrics.py").digest()
     return digest(judging, [asdict(one) for one in case.quantities.values()], [asdict(one) for one in case.findings],
                   case.references, case.paired)
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -148,38 +147,31 @@ class Comparison:
     inputs_hash: str = ""
 
 
+# Keys that JSON leaves out where they have their default.
+_OPTIONAL = ("deviation_half_width", "agreement", "independent", "chance", "family", "cause", "decides", "samples", "title", "description")
+
+
 def as_json(value: QuantityRecord | Result | Comparison) -> dict[str, Any]:
     """The value as JSON has it; what is optional and was not given is left out."""
-    content = {}
+    content: dict[str, Any] = {}
     for one in fields(value):
         item = getattr(value, one.name)
-        if one.name in _OPTIONAL and item == _default(one):
-            continue
         if one.name == "quantities":
             content[one.name] = [as_json(part) for part in item]
-        else:
+        elif one.name not in _OPTIONAL or item != one.default:
             content[one.name] = list(item) if isinstance(item, tuple) else item
     return content
 
 
-_OPTIONAL = ("deviation_half_width", "agreement", "independent", "chance", "family", "cause", "decides", "samples", "title", "description")
-
-
-def _default(one: dataclasses.Field[Any]) -> Any:
-    return one.default_factory() if one.default_factory is not dataclasses.MISSING else one.default
-
-
 def write(path: Path, value: Kind) -> Kind:
-    """Write `metrics.json` or `comparison.json`, whole or not at all; returns `value`."""
+    """Write `metrics.json` or `comparison.json`, completely or not at all; returns `value`."""
     write_json(path, as_json(value))
     return value
 
 
 def read(path: Path) -> Result:
-    """The Result in a `metrics.json`. RunError in one line when there is none or it lacks what every result has.
-
-    A file of another version of dembark is read as far as it goes; a remark tells which keys it lacks, or has more.
-    """
+    """The Result in a `metrics.json`. RunError in one line when there is none or it lacks what every result has; a remark names keys that
+    this version of dembark does not know."""
     return _read(path, Result)
 
 
@@ -192,36 +184,18 @@ def _read(path: Path, kind: type[Kind]) -> Kind:
 
 def from_json(content: Mapping[str, Any], kind: type[Kind], where: str = "") -> Kind:
     """The value that `as_json` wrote, see `read`; `where` is named in errors."""
-    notes: dict[str, None] = {}
-    found = _value(content, kind, where, notes)
-    if notes and isinstance(found, Result | Comparison):
-        note = f"This was written by another version of dembark: {', '.join(notes)}. Measure again for complete results."
-        found = dataclasses.replace(found, remarks=(*found.remarks, note))
-    return found
-
-
-# Fields of each kind by name, and whether all results have them.
-_KEYS: dict[type, dict[str, bool]] = {kind: {one.name: one.default is one.default_factory is dataclasses.MISSING for one in fields(kind)}
-         for kind in (QuantityRecord, ComparedRecord, Result, Comparison)}
-
-
-def _value(content: Mapping[str, Any], kind: type[Kind], where: str, notes: dict[str, None]) -> Kind:
-    known = _KEYS[kind]
-    missing = [key for key, needed in known.items() if needed and key not in content]
-    if missing:
+    known = {one.name: one.default is one.default_factory is MISSING for one in fields(kind)}
+    if missing := [key for key, needed in known.items() if needed and key not in content]:
         raise RunError(f"{where} has no {', '.join(missing)}", "it is not a result of this version of dembark", "measure it again")
-    notes |= {f"unknown {key!r} left out": None for key in content if key not in known}
-    if issubclass(kind, QuantityRecord) and "evidence" not in content:
-        notes |= {"no kind of evidence": None} if kind is QuantityRecord else {}
-    if kind is QuantityRecord and "control" not in content:
-        notes |= {"no negative controls": None}
-    given: dict[str, Any] = {}
-    for key in known.keys() & content.keys():
-        item = content[key]
-        if key == "quantities":
-            part = ComparedRecord if kind is Comparison else QuantityRecord
-            item = tuple(_value(one, part, where, notes) for one in item)
-        given[key] = tuple(item) if isinstance(item, list) else item
+    given: dict[str, Any] = {key: tuple(item) if isinstance(item, list) else item for key, item in content.items() if key in known}
+    if "quantities" in given:
+        part = ComparedRecord if kind is Comparison else QuantityRecord
+        given["quantities"] = tuple(from_json(one, part, where) for one in given["quantities"])
+        unknown = sorted({key for one in content["quantities"] for key in one.keys() - {field.name for field in fields(part)}}
+                         | (content.keys() - known))
+        if unknown:
+            note = f"Written by another version of dembark; left out: {', '.join(unknown)}. Measure again for complete results."
+            given["remarks"] = (*given.get("remarks", ()), note)
     return kind(**given)
 
 
@@ -231,6 +205,11 @@ def result_files(folder: Path) -> list[Path]:
     cases = (read_json(folder / PLAN) or {}).get("cases") or ["*"]
     return sorted(path for case in cases for name in (f"{case}/*/*/{METRICS}", f"{case}/*/{COMPARISON}") for path in folder.glob(name)
                   if "superseded" not in path.relative_to(folder).parts)
+
+
+def summary(folder: Path) -> dict[str, Any]:
+    """What the last command ran in a results folder, with its result, see `runs.perform`; empty when nothing is recorded."""
+    return read_json(folder / RUNS) or {}
 
 
 def results(folder: Path) -> tuple[list[Result], list[Comparison], list[str]]:

@@ -14,7 +14,8 @@ from typing import TypeVar
 
 from dembark.common.files import read_json
 from dembark.validation.case.model import EVIDENCE
-from dembark.validation.judge.result import QuantityRecord, from_json, results
+
+from .result import QuantityRecord, from_json, results
 
 Item = TypeVar("Item")
 

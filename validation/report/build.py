@@ -15,9 +15,10 @@ from dembark.common.errors import RunError
 from dembark.common.files import disk_error, write_whole
 from dembark.common.units import duration
 from dembark.validation.judge.result import Result
-from dembark.validation.report import facts, front, numbers, scatter, sections
-from dembark.validation.report.figures import colour, engine_name, subscripts
-from dembark.validation.report.gather import Gathered, gather
+
+from . import facts, front, numbers, scatter, sections
+from .figures import colour, engine_name, subscripts
+from .gather import Gathered, gather
 
 _HERE = Path(__file__).parent
 _SIGNS = {"passed": "✓ pass", "failed": "✗ FAIL", "open": "○ open", "information": "", "uncontrolled": "not counted"}

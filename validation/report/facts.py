@@ -8,7 +8,8 @@ from functools import cached_property
 
 from dembark.validation.judge.result import ComparedRecord, Interval
 from dembark.validation.judge.tally import ORDER
-from dembark.validation.report.gather import Row
+
+from .gather import Row
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,10 @@ from typing import Any
 from dembark.validation.case.model import EVIDENCE
 from dembark.validation.judge.result import QuantityRecord
 from dembark.validation.judge.tally import MEANING, Tally, families, tally
-from dembark.validation.report import figures, scatter
-from dembark.validation.report.facts import Fact, facts
-from dembark.validation.report.gather import Gathered, Row
+
+from . import figures, scatter
+from .facts import Fact, facts
+from .gather import Gathered, Row
 
 # Lines of each list that the PDF holds; what is left out is counted, and in the HTML.
 MOST = {"failed": 8, "open": 18, "missing": 6, "checks": 16}

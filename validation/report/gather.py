@@ -12,9 +12,10 @@ from dembark.validation import verification
 from dembark.validation.case.folders import files, load
 from dembark.validation.case.model import STUDY_PREFIX, Case
 from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result, results
-from dembark.validation.report.figures import engine_name
 from dembark.validation.results import plan, states
 from dembark.validation.verification.item import Item
+
+from .figures import engine_name
 
 _SINGLE = "Single runs: what else a profile would run is not listed here."
 # What stands for the case of quantities of the instruments.

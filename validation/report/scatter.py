@@ -16,8 +16,9 @@ from matplotlib.ticker import NullFormatter
 from dembark.postproc.statistics import Scatter, scatter
 from dembark.postproc.style import STYLE
 from dembark.validation.judge.result import QuantityRecord
-from dembark.validation.report.figures import INK, WIDE, look, shortened, symbols, text_width
-from dembark.validation.report.gather import Row
+
+from .figures import INK, WIDE, look, shortened, symbols, text_width
+from .gather import Row
 
 KINDS = ("experiment", "theory")
 # Lines that fit on the first pages; the others are in the table next to the report.

@@ -18,10 +18,11 @@ from dembark.postproc import field_figures, pictures
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
 from dembark.validation.judge.tally import Tally, tally
-from dembark.validation.report import figures, front
-from dembark.validation.report.facts import Fact, facts, quantities
-from dembark.validation.report.figures import engine_name
-from dembark.validation.report.gather import Gathered, Page, beside
+
+from . import figures, front
+from .facts import Fact, facts, quantities
+from .figures import engine_name
+from .gather import Gathered, Page, beside
 
 # Of a case in the PDF: variants with figures, and panels of a figure. Of the first variant all main figures are printed, of others none,
 # and of each study PANELS panels.

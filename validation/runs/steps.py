@@ -20,7 +20,7 @@ from dembark.validation import analysis, metrics, provenance, report, results, v
 from dembark.validation.campaigns.report import build as campaign_report
 from dembark.validation.case.folders import files, find
 from dembark.validation.case.model import Study
-from dembark.validation.judge import compare, inputs
+from dembark.validation.judge import comparison, inputs
 from dembark.validation.judge.result import COMPARISON, METRICS, Result, result_files, write
 from dembark.validation.judge.tally import VERIFICATION
 from dembark.validation.results import RECORD
@@ -117,7 +117,7 @@ def _of_study(folder: Path, study: Study, points: Iterable[Path]) -> str:
 
 
 def _of_comparison(sources: Iterable[Path]) -> str:
-    return inputs.digest(inputs.of_code("validation/judge/compare.py"), [inputs.content(path) for path in sources])
+    return inputs.digest(inputs.of_code("validation/judge/comparison.py"), [inputs.content(path) for path in sources])
 
 
 def _of_report(folder: Path) -> str:
@@ -207,7 +207,7 @@ def compare_engines(folder: Path, sources: Sequence[Path]) -> None:
         return
     target.unlink(missing_ok=True)
     with _in_one_line(f"{folder} could not be compared"):
-        write(target, replace(compare.compare(folder), measured=provenance.measured(), inputs_hash=inputs_hash))
+        write(target, replace(comparison.compare(folder), measured=provenance.measured(), inputs_hash=inputs_hash))
 
 
 def build_report(folder: Path) -> None:

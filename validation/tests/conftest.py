@@ -19,82 +19,32 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 CASE = """
 [case]
-name = "box"
 title = "A box"
 description = "Grains in a box."
 source = ["nobody"]
 engines = ["liggghts", "yade"]
 
-[parameters.grain_count]
-value = 10
-type = "int"
-min = 1
-doc = "number of grains"
+[parameters]
+grain_count = { value = 10, min = 1, doc = "number of grains" }
+contact_angle = { value = 0.35, unit = "rad", min = 0.0, max = 1.5707963267948966, doc = "angle" }
+static_friction = { optional = true, min = 0.0, doc = "static friction; not set = that of the material" }
+kinetic_friction = { optional = true, min = 0.0, doc = "kinetic friction" }
+strength = { value = inf, unit = "Pa", min = 0.0, doc = "strength" }
+pause = { value = 0.0, unit = "s", min = 0.0, doc = "rest between steps" }
+frames = { value = 3, min = 1, doc = "number of frames" }
+seed = { value = 7, doc = "seed" }
+replicas = { value = 1, min = 1, doc = "number of packings" }
 
 [parameters.grain_diameter]
 value = 0.005
 unit = "m"
-type = "float"
-min = 0.0
-exclusive_min = true
+above = 0.0
 doc = "diameter"
-
-[parameters.contact_angle]
-value = 0.35
-unit = "rad"
-type = "float"
-min = 0.0
-max = 1.5707963267948966
-doc = "angle"
-
-[parameters.static_friction]
-type = "float"
-optional = true
-min = 0.0
-doc = "static friction; not set = that of the material"
-
-[parameters.kinetic_friction]
-type = "float"
-optional = true
-min = 0.0
-doc = "kinetic friction"
-
-[parameters.strength]
-value = inf
-unit = "Pa"
-type = "float"
-min = 0.0
-doc = "strength"
 
 [parameters.behaviour]
 value = "ok"
-type = "choice"
 values = ["ok", "exit", "abort", "abort by signal", "kill", "kill approximate", "hang", "full", "truncate", "short", "unstable", "silent"]
 doc = "what the stand-in engine does"
-
-[parameters.pause]
-value = 0.0
-unit = "s"
-type = "float"
-min = 0.0
-doc = "rest between steps"
-
-[parameters.frames]
-value = 3
-type = "int"
-min = 1
-doc = "number of frames"
-
-[parameters.seed]
-value = 7
-type = "int"
-doc = "seed"
-
-[parameters.replicas]
-value = 1
-type = "int"
-min = 1
-doc = "number of packings"
 
 [derived]
 steps = "100"

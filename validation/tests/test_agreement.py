@@ -9,9 +9,9 @@ from dembark.postproc.measurement import Value
 from dembark.postproc.statistics import Estimate, exact
 from dembark.validation.case.folders import discover
 from dembark.validation.case.model import Declared
-from dembark.validation.judge.compare import pair
-from dembark.validation.judge.measuring import judged
+from dembark.validation.judge.comparison import pair
 from dembark.validation.judge.result import as_json
+from dembark.validation.judge.verdict import judged
 
 
 def entry(value, agreement, half=0.0):

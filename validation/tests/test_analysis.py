@@ -11,7 +11,7 @@ import pytest
 
 from dembark.common.errors import DembarkError
 from dembark.validation import analysis, metrics, show
-from dembark.validation.judge import measuring
+from dembark.validation.judge import measurement
 from dembark.validation.judge.result import QuantityRecord, Result
 
 HEADER = ("ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
@@ -38,18 +38,18 @@ def test_an_error_in_a_measurement_is_told_with_its_line(tmp_path: Path) -> None
     (tmp_path / "measure.py").write_text("def measure(replicas):\n    return 1 / 0\n\n"
                                          "def study(name, points, along):\n    return points[along]\n")
     with pytest.raises(ZeroDivisionError) as caught:
-        measuring.measure(case, [])
+        measurement.measure(case, [])
     told = f"{tmp_path / 'measure.py'}, line 2, ZeroDivisionError: division by zero"
     assert analysis.reasons(tmp_path, caught.value, case) == (told,)
     with pytest.raises(DembarkError, match=r"measure\.py, line 5, KeyError"):
-        measuring.study(case, SimpleNamespace(name="size", along="grain_count"), {})
+        measurement.study(case, SimpleNamespace(name="size", along="grain_count"), {})
     replica(tmp_path / "replica-1", 1, 2, 1.0)
     small = "the run may be too small or too short to be measured: 1 grain, 2 frames"
     assert analysis.reasons(tmp_path, caught.value, case) == (told, small)
     # Grains more or fewer do not mend a mistake.
     (tmp_path / "measure.py").write_text("def measure(replicas):\n    return foo\n\ndef study(name, points, along):\n    pass\n")
     with pytest.raises(NameError) as caught:
-        measuring.measure(case, [])
+        measurement.measure(case, [])
     assert analysis.reasons(tmp_path, caught.value, case) == (f"{tmp_path / 'measure.py'}, line 2, NameError: name 'foo' is not defined",)
 
 
@@ -58,7 +58,7 @@ def test_a_number_in_the_place_of_a_value_is_refused(tmp_path: Path) -> None:
     (tmp_path / "measure.py").write_text("from dembark.postproc.measurement import Measurement\n\n"
                                          "def measure(replicas):\n    return Measurement({'rebound': 0.8})\n")
     with pytest.raises(DembarkError, match=r"measure of .*measure\.py returned rebound = 0\.8, give a Value with an Estimate"):
-        measuring.measure(case, [])
+        measurement.measure(case, [])
 
 
 def test_numerical_warnings_become_remarks_and_stay_errors_where_they_are(capsys: pytest.CaptureFixture[str]) -> None:

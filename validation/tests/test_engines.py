@@ -20,25 +20,20 @@ from dembark.validation.runs.simulate import simulate
 
 CASE = """
 [case]
-name = "fall"
 title = "Two grains fall"
 engines = ["liggghts", "yade"]
 [parameters.grain_count]
 value = 2
-type = "int"
 doc = "grains"
 [parameters.gravity]
 value = 9.81
 unit = "m/s^2"
-type = "float"
 doc = "downward acceleration; may be negative"
 [parameters.steps]
 value = 1000
-type = "int"
 doc = "steps of 1e-5 s"
 [parameters.frames]
 value = 2
-type = "int"
 doc = "frames"
 [derived]
 time_step = "1e-5"
@@ -126,22 +121,6 @@ def test_output_that_is_no_text_is_kept(tmp_path: Path) -> None:
     done = engines.call(["printf", r"ERROR: too small\ntl\307\312\207U (input.cpp:327)\n"], tmp_path)
     assert done.returncode == 0
     assert done.stdout.splitlines()[0] == "ERROR: too small"
-
-
-def test_a_program_is_asked_for_its_version_once_by_all_processes_and_again_when_it_changes(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    program, asked = tmp_path / "liggghts-dembark", tmp_path / "asked"
-    monkeypatch.setenv("DEMBARK_LIGGGHTS", str(program))
-    monkeypatch.setenv("DEMBARK_TOLD_BY_LIGGGHTS", "/nowhere:1:1=0.1")
-    versions = []
-    for version in ("3.8.0", "3.8.0", "3.8.11"):
-        text = f"#!/bin/sh\necho x >> {asked}\necho '(Version LIGGGHTS-PUBLIC {version}, compiled)'\n"
-        if not program.exists() or program.read_text() != text:
-            program.write_text(text)
-            program.chmod(0o755)
-        engines.find.cache_clear()
-        versions.append(engines.find("liggghts").version)
-    assert versions == ["3.8.0", "3.8.0", "3.8.11"] and asked.read_text().count("x") == 2
 
 
 def plan(engine: str, **changes: object) -> Run:

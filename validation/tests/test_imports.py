@@ -6,7 +6,7 @@ import pytest
 
 import dembark
 from dembark.validation.case import deck, folders, imports
-from dembark.validation.judge import measuring
+from dembark.validation.judge import measurement
 
 
 @pytest.fixture
@@ -83,7 +83,7 @@ def test_a_module_next_to_an_own_measure_is_imported_hashed_kept_and_no_part_of_
     digests = []
     for text in ("NUMBER = 1.0\n", "NUMBER = 22.0\n"):
         (box / "helper.py").write_text(text)
-        assert measuring.measure(case, []).values["x"].estimate.value == float(text.split()[-1])
+        assert measurement.measure(case, []).values["x"].estimate.value == float(text.split()[-1])
         digests.append(imports.dependencies(box / "measure.py").digest())
     assert digests[0] != digests[1]
     assert "helper.py" not in before and deck.sources(case, "liggghts") == before

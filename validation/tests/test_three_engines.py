@@ -19,7 +19,7 @@ from dembark.validation.campaigns.spec import read
 from dembark.validation.case import deck, folders
 from dembark.validation.cli import main
 from dembark.validation.judge import result
-from dembark.validation.judge.compare import compare
+from dembark.validation.judge.comparison import compare
 from dembark.validation.judge.result import QuantityRecord, Result
 from dembark.validation.runs.steps import compare_engines
 

@@ -11,9 +11,9 @@ from dembark.common.errors import RunError
 from dembark.postproc.measurement import Value
 from dembark.postproc.statistics import Estimate, over_replicas, student
 from dembark.validation.case.model import Declared
-from dembark.validation.judge.compare import pair
-from dembark.validation.judge.measuring import judge, judged
+from dembark.validation.judge.comparison import pair
 from dembark.validation.judge.result import QuantityRecord, as_json
+from dembark.validation.judge.verdict import judge, judged
 from dembark.validation.metrics import measure
 
 

@@ -14,8 +14,9 @@ from typing import Any
 from dembark.common.files import read_json, write_json
 from dembark.validation.judge.result import QuantityRecord, from_json
 from dembark.validation.judge.tally import VERIFICATION as FILE
-from dembark.validation.verification import fields_balance, fields_exact, fields_rings, sph_flows
-from dembark.validation.verification.item import Curve, Item, Panel
+
+from . import fields_balance, fields_exact, fields_rings, sph_flows
+from .item import Curve, Item, Panel
 
 ITEMS: tuple[Callable[[], Item], ...] = (
     fields_exact.conservation,

@@ -11,9 +11,10 @@ from dembark.postproc.fields.sums import Fields
 from dembark.postproc.walls import PlaneWall
 from dembark.postproc.walls.patches import plane_patches
 from dembark.postproc.walls.stress import wall_stress
-from dembark.validation.verification import scenes
-from dembark.validation.verification.item import Curve, Item, Panel, exact, order
-from dembark.validation.verification.scenes import GRAVITY, Network
+
+from . import scenes
+from .item import Curve, Item, Panel, exact, order
+from .scenes import GRAVITY, Network
 
 _SPACINGS = np.array([0.1, 0.06, 0.04, 0.03])  # m, of a heap of 1 m
 _WIDTHS = {"lucy": 0.35, "gaussian": 0.15}

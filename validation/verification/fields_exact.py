@@ -9,8 +9,9 @@ from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import NAMES, Kernel
 from dembark.postproc.fields.sums import FieldSums
-from dembark.validation.verification import scenes
-from dembark.validation.verification.item import Array, Curve, Item, Panel, exact, order
+
+from . import scenes
+from .item import Array, Curve, Item, Panel, exact, order
 
 GOLDHIRSCH = "Goldhirsch 2010"
 

@@ -10,9 +10,10 @@ from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import CUTOFF
 from dembark.postproc.fields.rings import Fields, Rings
 from dembark.postproc.fields.rings import coarse_grain as ring_fields
-from dembark.validation.verification import scenes
-from dembark.validation.verification.item import Array, Curve, Item, Panel, exact
-from dembark.validation.verification.scenes import GRAVITY, Network
+
+from . import scenes
+from .item import Array, Curve, Item, Panel, exact
+from .scenes import GRAVITY, Network
 
 _WIDTH = 0.15
 _RADIUS = 0.75

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from dembark.postproc.measurement import Value
 from dembark.postproc.statistics import Estimate
 from dembark.validation.case.model import Declared
-from dembark.validation.judge.measuring import judged
 from dembark.validation.judge.result import QuantityRecord
+from dembark.validation.judge.verdict import judged
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,10 @@ from dembark.physics.sph import SphFluid, lattice, tank_walls
 from dembark.postproc.measurement import Value
 from dembark.postproc.statistics import Estimate
 from dembark.validation.case.model import Declared
-from dembark.validation.judge.measuring import judged
 from dembark.validation.judge.result import QuantityRecord
-from dembark.validation.verification.item import Array, Curve, Item, Panel
+from dembark.validation.judge.verdict import judged
+
+from .item import Array, Curve, Item, Panel
 
 GRAVITY = 9.81
 HYDROSTATICS = "hydrostatics"

@@ -26,12 +26,10 @@ NAMED = re.compile("liggghts|yade|lammps", re.IGNORECASE)
 CITATIONS = "references.py"
 CASE = """
 [case]
-name = "box"
 title = "A box"
 engines = ["stub"]
 [parameters.grain_count]
 value = 10
-type = "int"
 doc = "number of grains"
 [derived]
 steps = "10 * grain_count"
@@ -88,7 +86,7 @@ def test_a_registered_engine_fulfils_the_protocol(engine: type[Engine], tmp_path
     assert issubclass(engine, Engine) and isinstance(facts, EngineFacts) and engines.facts(facts.name) is facts
     assert facts.name.isidentifier() and facts.name == facts.name.lower() and facts.title and facts.program and facts.measured_on
     assert re.fullmatch("#[0-9A-F]{6}", facts.colour) and re.compile(facts.version_pattern).groups == 1
-    assert min(facts.relative_cost, facts.restart_rate, facts.typical_rate, *facts.rates.values()) > 0.0
+    assert min(facts.relative_cost, facts.restart_rate, facts.typical_rate) > 0.0
     assert all(re.fullmatch("DEMBARK_[A-Z_]+", variable) for variable in facts.variables)
     program = tmp_path / "overlay/bin/program"
     program.parent.mkdir(parents=True)
@@ -217,7 +215,7 @@ def test_a_new_engine_is_found_everywhere(stub: Path, capsys: pytest.CaptureFixt
     assert told["the stub"] == f"4.2 ({Stub.program})"
     assert (look("stub").title, look("stub").colour, look("stub").marker) == ("The Stub", "#000000", "x")
     assert look("gone").title == "gone" and look("gone").colour not in {facts.colour for facts in map(engines.facts, engines.names())}
-    assert estimate.Rates().of("box", "stub").value == 1e3
+    assert estimate.Rates().of(folders.find("box"), "stub").value == 1e3
     monkeypatch.chdir(stub)
     for words, expected in ((["--engine", "stbu"], "did you mean stub?"),
                             (["--engine", "stub", "--ranks", "2"], "with The Stub, use --threads")):

@@ -11,10 +11,10 @@ from dembark.postproc.measurement import Value
 from dembark.postproc.statistics import Estimate
 from dembark.validation.case.model import Declared
 from dembark.validation.judge import result
-from dembark.validation.judge.compare import pair
-from dembark.validation.judge.measuring import judge, judged
+from dembark.validation.judge.comparison import pair
 from dembark.validation.judge.result import QuantityRecord, Result
 from dembark.validation.judge.tally import of_folder, tally
+from dembark.validation.judge.verdict import judge, judged
 
 QUANTITIES = (
     QuantityRecord("a", 1.0, "pass", tolerance=0.1, evidence="identity", control="friction off"),

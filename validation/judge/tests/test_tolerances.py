@@ -15,7 +15,7 @@ from dembark.input_decks.tests.test_single_contact_measure import flown, paramet
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.statistics import Estimate, exact
 from dembark.validation.case.folders import discover, find
-from dembark.validation.judge import measuring
+from dembark.validation.judge import verdict
 
 
 def noisy(run: Any) -> Any:
@@ -60,9 +60,9 @@ def test_a_tolerance_from_the_run_s_own_interval_is_refused() -> None:
     case = find("log_pair")
     noise = Estimate(1.3, 0.4, "5 replicas")
     with pytest.raises(DembarkError, match="quantity peak_force has a bound and an interval"):
-        measuring.quantities(case, Measurement({"peak_force": Value(noise, exact(1.0), bound=noise.half)}))
+        verdict.quantities(case, Measurement({"peak_force": Value(noise, exact(1.0), bound=noise.half)}))
     with pytest.raises(DembarkError, match='quantity momentum_error has a bound, its tolerance is not the word "bound"'):
-        measuring.quantities(case, Measurement({"momentum_error": Value(noise, exact(0.0), bound=noise.half)}))
+        verdict.quantities(case, Measurement({"momentum_error": Value(noise, exact(0.0), bound=noise.half)}))
 
 
 def test_declared_tolerances_are_numbers_with_a_reason() -> None:

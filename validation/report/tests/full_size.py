@@ -14,7 +14,7 @@ from dembark.postproc import pictures
 from dembark.postproc.pictures import saved
 from dembark.validation import verification
 from dembark.validation.judge import result
-from dembark.validation.judge.compare import compare
+from dembark.validation.judge.comparison import compare
 from dembark.validation.judge.result import QuantityRecord, Result
 from dembark.validation.verification.item import Item, exact
 

@@ -20,8 +20,8 @@ from dembark.postproc.statistics import Estimate
 from dembark.validation import verification
 from dembark.validation.case.folders import discover
 from dembark.validation.case.model import Case, Declared
-from dembark.validation.judge import measuring, result
-from dembark.validation.judge.compare import compare
+from dembark.validation.judge import result, verdict
+from dembark.validation.judge.comparison import compare
 from dembark.validation.judge.result import QuantityRecord, Result
 from dembark.validation.verification.item import Item
 
@@ -45,7 +45,7 @@ def _record(name: str, label: str, one: Declared, random: np.random.Generator) -
     # A bound counts as a tolerance here, for it would allow no interval.
     given = replace(one, label=label, tolerance=None if tolerance is None else allowed)
     estimate = Estimate(due + deviation, 0.3 * allowed, "5 replicas")
-    return measuring.judged(given, Value(estimate, Estimate(due, 0.0) if one.evidence else None), name)
+    return verdict.judged(given, Value(estimate, Estimate(due, 0.0) if one.evidence else None), name)
 
 
 def fields(case: str) -> xarray.Dataset:
@@ -95,7 +95,7 @@ def write(folder: Path) -> Path:
                 of_study = variant in studies
                 result.write(place / result.METRICS, Result(
                     case.name, variant, engine, quantities(case, random), folder.name, parameters={"gravity": 9.81}, picture=None,
-                    profiles=tuple(full_size.profile(one, number) for one in range(4)), references=measuring.references(case),
+                    profiles=tuple(full_size.profile(one, number) for one in range(4)), references=case.references,
                     provenance={"replicas": 5, "seeds": [1, 2], "steps": 1000, "time_step": 1e-5, "wall_time": 10.0, "commit": "a" * 40}))
                 if case.picture and not of_study:
                     (place / pictures.PICTURE).write_bytes(picture)

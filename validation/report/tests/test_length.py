@@ -16,6 +16,7 @@ from dembark.validation import report
 from dembark.validation.report import figures
 from dembark.validation.report.build import write_pdf
 
+pytestmark = pytest.mark.full
 build_module = sys.modules[write_pdf.__module__]
 
 LIMITS = {"quick": 40, "standard": 80}

@@ -5,7 +5,7 @@ import pytest
 
 from dembark.postproc.resampling import profile
 from dembark.validation.judge import result
-from dembark.validation.judge.compare import compare
+from dembark.validation.judge.comparison import compare
 from dembark.validation.judge.result import QuantityRecord, Result
 from dembark.validation.report import sections
 from dembark.validation.report.figures import profile_figure, profile_table

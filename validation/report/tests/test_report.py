@@ -16,7 +16,7 @@ import pytest
 from dembark.common.errors import RunError
 from dembark.validation import report
 from dembark.validation.judge import result
-from dembark.validation.judge.compare import pair
+from dembark.validation.judge.comparison import pair
 from dembark.validation.judge.tally import of_folder as tally_of
 from dembark.validation.judge.tally import tally
 from dembark.validation.report import facts, figures, front, numbers, scatter, sections

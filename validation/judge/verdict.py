@@ -1,76 +1,18 @@
-"""Runs a case's measure.py and joins what it measured with what case.toml declares of each quantity."""
+"""Verdicts: what was measured, joined with what case.toml declares of each quantity."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
-from pathlib import Path
-from types import ModuleType
-from typing import Any
 
-from dembark.common.errors import DembarkError, RunError
-from dembark.postproc import DumpError
+from dembark.common.errors import DembarkError
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.replica import Replica
 from dembark.postproc.statistics import Estimate, beyond
-from dembark.validation.case import deck
-from dembark.validation.case.expressions import Expression
-from dembark.validation.case.model import Case, Declared, Study
-from dembark.validation.case.read import citations
-from dembark.validation.judge.deciding import decides, packings
-from dembark.validation.judge.result import QuantityRecord
+from dembark.validation.case.model import Case, Declared
 
-# Keys of [picture] that are expressions in parameters and derived numbers.
-_NUMBERS = ("scale", "radius", "drum_radius", "drum_speed", "speed")
-
-
-def measure(case: Case, replicas: Sequence[Replica]) -> Measurement:
-    """What the measure.py of the case returns for `replicas`; DembarkError or RunError in one line for whatever goes wrong in it."""
-    return _call(case, "measure", lambda function: function(replicas))
-
-
-def study(case: Case, planned: Study, points: Sequence[Mapping[str, Any]]) -> Measurement:
-    """What the measure.py of the case returns for the study `planned`; `points` are the contents of the variants' metrics.json."""
-    return _call(case, "study", lambda function: function(planned.name, points, planned.along))
-
-
-def check(case: Case) -> ModuleType:
-    """The measure.py of the case, loaded; DembarkError, with file and line, when it is missing or cannot be loaded."""
-    deck.require_measure(case)
-    path = case.folder / "measure.py"
-    facts = ((one.name, one.stat()) for one in sorted(path.parent.glob("*.py")))
-    module = _loaded(path, case.name, tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in facts))
-    for name in ("measure", *(["study"] if case.studies else [])):
-        if not callable(getattr(module, name, None)):
-            raise DembarkError(f"{path} has no function {name}", "",
-                               "it needs measure(replicas) and, with [studies], study(name, points, along)")
-    return module
-
-
-@cache
-def _loaded(path: Path, name: str, _changed: tuple[tuple[str, int, int], ...]) -> ModuleType:
-    """The module of a measure.py, loaded once until it or a module next to it changes."""
-    return deck.load_module(path, f"dembark_measure_{name}")
-
-
-def _call(case: Case, name: str, call: Callable[[Callable[..., Any]], Any]) -> Measurement:
-    path, module = case.folder / "measure.py", check(case)
-    try:
-        found = call(getattr(module, name))
-    except DumpError as error:
-        raise RunError(f"a run of case {case.name} could not be measured", str(error)) from None
-    except Exception as error:
-        # The caller of `measure` knows the runs and says what of them is too small.
-        if name == "measure" or isinstance(error, DembarkError):
-            raise
-        raise deck.failed(path, error) from error
-    if not isinstance(found, Measurement):
-        raise DembarkError(f"{name} of {path} returned {type(found).__name__}", "", "return a Measurement, see docs/how-to/cases.md")
-    if wrong := next((f"{key} = {value!r}" for key, value in found.values.items() if not isinstance(value, Value)), ""):
-        raise DembarkError(f"{name} of {path} returned {wrong}", "", "give a Value with an Estimate, see docs/how-to/cases.md")
-    return found
+from .decision import decides, packings
+from .result import QuantityRecord
 
 
 def quantities(case: Case, found: Measurement, variant: str = "") -> tuple[QuantityRecord, ...]:
@@ -106,15 +48,13 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
     """A quantity with its verdict, as results hold it (see QuantityRecord); numbers that are not finite become None.
 
     `name` is that of the measured quantity where the declared one has a `*`, for which `part` stands. DembarkError when the
-    value has a bound that the declaration does not ask for, or none where it does, or where the quantity has an interval.
+    value has a bound that the declaration does not name, or none where it does, or where the quantity has an interval.
     """
     name = name or one.name
-    tolerance, deviation, (own, of_reference) = _tolerance(one, value, name), None, _halves(value, one.absolute)
-    half = math.hypot(own, of_reference)
-    verdict, reason, reference, decided = value.verdict, value.inapplicable or value.reason, value.reference, ""
-    if reference is not None:
-        scale = 1.0 if one.absolute else reference.value
-        deviation = (value.estimate.value - reference.value) / scale if scale else math.nan
+    reference, scale, (own, of_reference) = value.reference, _scale(one, value), _halves(one, value)
+    tolerance, half = _tolerance(one, value, name), math.hypot(own, of_reference)
+    deviation = None if reference is None else (value.estimate.value - reference.value) / scale
+    verdict, reason, decided = value.verdict, value.inapplicable or value.reason, ""
     if not verdict:
         verdict = "info"
         if not reason and tolerance is not None and deviation is not None:
@@ -125,24 +65,29 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
         name=name, label=one.label.replace("*", part.replace("_", " ")), value=_finite(value.estimate.value), unit=one.unit,
         interval=_interval(value.estimate), basis=value.estimate.basis,
         reference=_finite(reference.value if reference else None), reference_interval=_interval(reference) if reference else None,
-        deviation=_finite(deviation),
-        deviation_kind="absolute" if one.absolute else "relative", tolerance=_finite(tolerance), verdict=verdict, reason=reason,
-        detail=value.detail or one.detail or one.why, source=one.source, evidence=one.evidence, compared=one.compared and value.compared,
-        control=one.control, decides=decided, samples=value.estimate.samples,
+        deviation=_finite(deviation), deviation_kind="absolute" if one.absolute else "relative", tolerance=_finite(tolerance),
+        verdict=verdict, reason=reason, detail=value.detail or one.detail or one.why, source=one.source, evidence=one.evidence,
+        compared=one.compared and value.compared, control=one.control, decides=decided, samples=value.estimate.samples,
         deviation_half_width=_finite(value.half), independent=one.independent and value.half is None,
         chance=chance(half, tolerance, packings(value.estimate.basis)),
         agreement=None if one.agreement is None else one.agreement * value.scale)
 
 
-def _halves(value: Value, absolute: bool) -> tuple[float, float]:
-    """Half-widths of the deviation that come from the value and from its reference; NaN where there is no relative deviation."""
+def _scale(one: Declared, value: Value) -> float:
+    """What a deviation is divided by; NaN where there is no relative deviation, because the reference is zero."""
+    return 1.0 if one.absolute or value.reference is None else value.reference.value or math.nan
+
+
+def _halves(one: Declared, value: Value) -> tuple[float, float]:
+    """Half-widths of the deviation that come from the value and from its reference."""
     if value.half is not None or value.reference is None:
         return value.estimate.half if value.half is None else value.half, 0.0
-    scale = 1.0 if absolute else abs(value.reference.value) or math.nan
+    scale = abs(_scale(one, value))
     return value.estimate.half / scale, value.reference.half / scale
 
 
 def _tolerance(one: Declared, value: Value, name: str) -> float | None:
+    """The largest deviation that is allowed; None where nothing is to be checked."""
     if one.tolerance != "bound":
         if value.bound is not None:
             raise DembarkError(f"quantity {name} has a bound", 'its tolerance is not the word "bound"', "remove the bound or declare it")
@@ -154,25 +99,6 @@ def _tolerance(one: Declared, value: Value, name: str) -> float | None:
         raise DembarkError(f"quantity {name} has a bound and an interval", "a bound is for runs in which nothing is random",
                            "declare its tolerance as a number, with the reason")
     return None if value.reference is None or value.inapplicable else value.bound
-
-
-def picture(case: Case, record: Mapping[str, Any]) -> dict[str, Any] | None:
-    """How the report shows the run with this `record`: the table [picture] with its expressions evaluated for the run's parameters and
-    derived numbers; None without one."""
-    if not case.picture:
-        return None
-    known = {**record["parameters"], **record["derived"]}
-    return {key: Expression(value)(known) if key in _NUMBERS and isinstance(value, str) else value for key, value in case.picture.items()}
-
-
-def references(case: Case) -> tuple[dict[str, str], ...]:
-    """The publications that the case names."""
-    return tuple(citations()[name] for name in case.references)
-
-
-def statements(case: Case) -> list[str]:
-    """What the publications of the case are cited for, a sentence each."""
-    return [f"{one['short']}: {one['statement']}" for one in references(case) if one["statement"]]
 
 
 def judge(deviation: float, half: float, tolerance: float) -> tuple[str, str]:

@@ -11,8 +11,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from dembark.postproc.statistics import replica_mean
-from dembark.validation.judge.deciding import decides
-from dembark.validation.judge.measuring import judge
+from dembark.validation.judge.decision import decides
+from dembark.validation.judge.verdict import judge
 
 
 @given(st.integers(3, 12), st.floats(-0.3, 0.3), st.floats(0.01, 3.0))

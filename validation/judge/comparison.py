@@ -29,9 +29,9 @@ import numpy as np
 from dembark.common.errors import RunError
 from dembark.postproc.statistics import CONFIDENCE as INTERVAL
 from dembark.postproc.statistics import joint_limit, replica_mean, rescaled
-from dembark.validation.judge import result
-from dembark.validation.judge.deciding import PACKINGS, packings, smallest
-from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result
+
+from .decision import PACKINGS, packings, smallest
+from .result import METRICS, ComparedRecord, Comparison, QuantityRecord, Result, read
 
 CAP = 0.10
 # Of all comparisons of a page together.
@@ -46,7 +46,7 @@ def compare(folder: Path) -> Comparison:
 
     Of each pair of engines the first in alphabetical order is the reference. What chance may do is shared by all pairs of the page.
     """
-    measured = sorted((result.read(path) for path in folder.glob(f"*/{result.METRICS}")), key=lambda one: one.engine)
+    measured = sorted((read(path) for path in folder.glob(f"*/{METRICS}")), key=lambda one: one.engine)
     if len(measured) < 2:
         raise RunError(f"nothing to compare in {folder}",
                        f"there is a measurement of {measured[0].engine if measured else 'no engine'} only")

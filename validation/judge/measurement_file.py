@@ -11,7 +11,8 @@ from typing import Any
 from dembark.common.files import read_json, write_json
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.statistics import Estimate
-from dembark.validation.judge.inputs import KEY
+
+from .inputs import KEY
 
 FILE = "measurement.json"
 _ESTIMATES = ("estimate", "reference")
