@@ -6,13 +6,13 @@ hold the fields.
 
 from typing import TYPE_CHECKING, Any
 
-from dembark.postproc.contacts import ContactFrame, ContactsDump
-from dembark.postproc.dumptext import DumpError, DumpWarning, TextDump, open_dump
-from dembark.postproc.grains import GrainFrame, GrainsDump
-from dembark.postproc.history import read_times
+from .contacts import ContactFrame, ContactsDump
+from .dumptext import DumpError, DumpWarning, TextDump, open_dump
+from .grains import GrainFrame, GrainsDump
+from .history import read_times
 
 if TYPE_CHECKING:
-    from dembark.postproc.trajectory import universe
+    from .trajectory import universe
 
 __all__ = ["ContactFrame", "ContactsDump", "DumpError", "DumpWarning", "GrainFrame", "GrainsDump", "TextDump", "open_dump", "read_times",
            "universe"]
@@ -21,7 +21,7 @@ __all__ = ["ContactFrame", "ContactsDump", "DumpError", "DumpWarning", "GrainFra
 def __getattr__(name: str) -> Any:
     """`universe`, when it is asked for: MDAnalysis takes longer to import than all else together, and few need it."""
     if name == "universe":
-        from dembark.postproc.trajectory import universe
+        from .trajectory import universe
 
         return universe
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import signal
 import sys
 import time as clock
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -16,11 +15,17 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from dembark.common.errors import DembarkError, Interrupted
-from dembark.postproc.contacts import ContactColumnsError
-from dembark.postproc.dumps.frames import ColumnsError, DensityError, DumpError, DumpWarning
+from dembark.common.extras import missing_extra
+
+from .cli_options import contact_columns, frame_numbers, length, positive
+from .contacts import ContactColumnsError
+from .dumps.frames import ColumnsError, DensityError, DumpError, DumpWarning
+from .grains import GrainFrame
+from .sources import mean_diameter, open_source, select
+from .walls.run import WallLoads, wall_lines
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False,
                   context_settings={"help_option_names": ["-h", "--help"]})
@@ -29,15 +34,17 @@ SourceArgument = Annotated[Path, typer.Argument(metavar="DUMP|RUN", help=(
     "A dump of grains, or the folder of a run (grains.dump, contacts.dump, run.json)."))]
 Contacts = Annotated[Path | None, typer.Option(help="Dump of contacts, written at the same steps; default: contacts.dump of the run.")]
 Frames = Annotated[str, typer.Option(help="Frames from 0, as in Python: 10:50, ::5, -20:, 3.")]
-TimeStep = Annotated[str | None, typer.Option(help="Time step of the simulation, turns steps into times; default: that of the run.")]
-Density = Annotated[str | None, typer.Option(help="Density of the grains' material, where the dump has no masses: '2500 kg/m^3'.")]
+TimeStep = Annotated[float | None, typer.Option(parser=positive("s", "--time-step"), metavar="TEXT", help=(
+    "Time step of the simulation, turns steps into times; default: that of the run."))]
+Density = Annotated[float | None, typer.Option(parser=positive("kg/m^3", "--density"), metavar="TEXT", help=(
+    "Density of the grains' material, where the dump has no masses: '2500 kg/m^3'."))]
 Columns = Annotated[str | None, typer.Option(help="Names of the columns of a binary dump of grains: 'id type x y z ...'.")]
-ContactColumns = Annotated[str | None, typer.Option(help=(
+ContactColumns = Annotated[dict[str, list[int | str]] | None, typer.Option(parser=contact_columns, metavar="TEXT", help=(
     "Columns of a foreign dump of contacts: 'first=1,2,3 second=4,5,6 ids=7,8 forces=10,11,12'."))]
-Units = Annotated[str | None, typer.Option(help="Unit style of dumps that do not name it (ITEM: UNITS): si, cgs, micro, ...; default: si.")]
+Units = Annotated[str, typer.Option(help="Unit style of dumps that do not name it (ITEM: UNITS): si, cgs, micro, ...; default: si.")]
 Walls = Annotated[list[str] | None, typer.Option("--wall", metavar="NAME:KIND[:KEY=VALUE...]", help=(
     "A wall, by the name of its columns f_force_NAME[1..3]; repeat for more. side:cylinder:radius=25mm, base:plane:normal=z, "
-    "lid:mesh:file=lid.stl:unit=mm, stone:inclusion:ids=1,5-9. Default: the walls of a case of dembark."))]
+    "lid:mesh:file=lid.stl:unit=mm, stone:inclusion:ids=1,5-9. Default: those in the record of the run."))]
 Plot = Annotated[Path | None, typer.Option(metavar="FOLDER", help="Draw plots (PNG) into this folder.")]
 
 
@@ -49,6 +56,8 @@ def run(words: Sequence[str]) -> int:
             # The summary says what was odd in the files.
             warnings.simplefilter("ignore", DumpWarning)
             code = app(args=list(words), prog_name="dembark", standalone_mode=False)
+    except ModuleNotFoundError as error:
+        raise missing_extra(error, f"dembark {words[0]}") from None
     except MemoryError:
         raise DembarkError("there is not enough memory", "", "take larger cells or patches, or fewer frames at a time") from None
     except ColumnsError as error:
@@ -60,7 +69,7 @@ def run(words: Sequence[str]) -> int:
     finally:
         signal.signal(signal.SIGTERM, before)
     if code == Interrupted.exit_code:
-        # Typer makes this of a KeyboardInterrupt, without a word.
+        # Typer makes this of a KeyboardInterrupt, without a message.
         raise Interrupted("interrupted")
     return code if isinstance(code, int) else 0
 
@@ -83,27 +92,51 @@ def fields(
         "With --cells: cells with fewer contacts in all averaged frames are masked."))] = 3000,
     only: Annotated[str | None, typer.Option("--fields", metavar="NAME,...", help="Write these only: density,velocity,stress.")] = None,
     out: Annotated[Path | None, typer.Option(help="NetCDF file of the fields, for xarray.")] = None,
-    vtkhdf: Annotated[Path | None, typer.Option(help="VTKHDF file of the fields, for ParaView.")] = None,
-    grains: Annotated[Path | None, typer.Option(help="VTKHDF file of the grains of the same frames.")] = None,
+    paraview: Annotated[Path | None, typer.Option(help="Collection of VTK files of the fields for ParaView, NAME.pvd.")] = None,
+    grains: Annotated[Path | None, typer.Option(help="The same of the grains of these frames.")] = None,
     plot: Plot = None,
     time_step: TimeStep = None,
     density: Density = None,
     columns: Columns = None,
     contact_columns: ContactColumns = None,
-    units: Units = None,
+    units: Units = "",
     threads: Annotated[int | None, typer.Option(min=1, help="Threads; default: all cores. The result does not depend on it.")] = None,
 ) -> None:
     """Stress, velocity, strain rate and more on a grid, from grains and contacts, by coarse graining or by cell averages."""
-    from dembark.postproc.fields.run import FieldJob, Words
-    from dembark.postproc.words import reading
+    from .fields.run import FieldAverages
+    from .output.netcdf import write_netcdf
+    from .output.paraview import TimeSeries, add_grains, write_fields
 
-    how = reading(time_step, density, columns, contact_columns, units)
-    words = Words(source, how, contacts, kernel, width, grid, spacing, box, frames, average, wall or [], cells, least_contacts, only,
-                  out, vtkhdf, grains, plot, threads)
-    job = FieldJob.plan(words, progress)
-    with progress("fields", len(job.numbers)) as advance:
-        job.run(advance, _provenance("fields", source))
-    _say(job.summary())
+    if not any((out, paraview, grains, plot)):
+        raise DembarkError("there is nothing to write", "", "name a file with --out or --paraview, or a folder with --plot")
+    _check_places(out, paraview, grains, plot=plot)
+    opened = open_source(source, contacts, time_step=time_step, density=density, columns=columns.split() if columns else None,
+                         contact_columns=contact_columns, units=units)
+    chosen = select(opened, frame_numbers(frames, len(opened.grains)))
+    averages = FieldAverages(
+        chosen, kernel=kernel, width=width, grid=grid, spacing=spacing, box=box, average=average, walls=wall or (), cells=cells,
+        least_contacts=least_contacts, only=only, threads=threads, show=progress)
+    about = _provenance("fields", source)
+    with progress("fields", len(chosen.numbers)) as advance, (TimeSeries(grains, about) if grains else nullcontext()) as points:
+        def done(frame: GrainFrame, time: float) -> None:
+            if points:
+                add_grains(points, frame, time)
+            advance()
+
+        data = averages.run(done)
+    data.attrs.update(about)
+    if out:
+        write_netcdf(out, data, averages.loads, timed=opened.timed)
+    if paraview:
+        write_fields(paraview, data)
+    written = [path for path in (out, paraview, grains) if path]
+    if plot:
+        from .plots import field_figures, save, wall_figures
+
+        assert averages.last
+        of_walls = {name: figure for load in averages.loads for name, figure in wall_figures(load).items()}
+        written += save(plot, field_figures(averages.last) | of_walls)
+    _say([*averages.summary(), *(f"written: {path}" for path in written)])
 
 
 @app.command()
@@ -114,24 +147,69 @@ def walls(
     patch: Annotated[str, typer.Option(help="Size of the patches: 2d (mean diameters), '5 mm'; those of a mesh are its triangles.")] = "2d",
     frames: Frames = ":",
     out: Annotated[Path | None, typer.Option(help="NetCDF file, a group for each wall, for xarray.")] = None,
-    vtkhdf: Annotated[Path | None, typer.Option(help=(
-        "VTKHDF file of the patches, for ParaView; with several walls _NAME is put behind its stem."))] = None,
+    paraview: Annotated[Path | None, typer.Option(help=(
+        "Collection of VTK files of the patches for ParaView, NAME.pvd; with several walls NAME_WALL.pvd."))] = None,
     plot: Plot = None,
     time_step: TimeStep = None,
     density: Density = None,
     columns: Columns = None,
     contact_columns: ContactColumns = None,
-    units: Units = None,
+    units: Units = "",
 ) -> None:
     """Normal and shear stress on walls and inclusions: distribution, time series, fluctuations, peaks."""
-    from dembark.postproc.walls.run import WallJob
-    from dembark.postproc.words import reading
+    _check_places(out, paraview, plot=plot)
+    opened = open_source(source, contacts, time_step=time_step, density=density, columns=columns.split() if columns else None,
+                         contact_columns=contact_columns, units=units)
+    chosen = select(opened, frame_numbers(frames, len(opened.grains)))
+    loads, diameters, written = WallLoads(wall or (), chosen), [], []
+    if not loads.walls:
+        known = ", ".join(chosen.first.wall_forces) or "none"
+        raise DembarkError("no wall is given", "; ".join([f"walls in the dump: {known}", *loads.notes]),
+                           "add --wall, such as side:cylinder:radius=25mm")
+    loads.record(length(patch, chosen.diameter, "--patch"))
+    with progress("walls", len(chosen.numbers)) as advance:
+        for grains, touching in opened.frames(chosen.numbers):
+            loads.check(grains)
+            loads.add(grains, touching, opened.time(grains))
+            diameters += mean_diameter(grains)
+            advance()
+    results, about = loads.results(), _provenance("walls", source)
+    if out:
+        import xarray
 
-    how = reading(time_step, density, columns, contact_columns, units)
-    job = WallJob.plan(source, contacts, wall or [], patch, frames, out, vtkhdf, plot, how)
-    with progress("walls", len(job.numbers)) as advance:
-        job.run(advance, _provenance("walls", source))
-    _say(job.summary())
+        from .output.netcdf import write_netcdf
+
+        written.append(write_netcdf(out, xarray.Dataset(attrs={"Conventions": "CF-1.11", **about}), results, timed=opened.timed))
+    if paraview:
+        from .output.paraview import write_wall
+
+        of = {one.wall.name: paraview.with_stem(f"{paraview.stem}_{one.wall.name}") if len(results) > 1 else paraview for one in results}
+        written += [write_wall(of[one.wall.name], one, about) for one in results]
+    if plot:
+        from .plots import save, wall_figures
+
+        written += save(plot, {name: figure for one in results for name, figure in wall_figures(one).items()})
+    _say([*chosen.lines(diameters), *loads.mesh_notes(), *(f"note: {one}; add --wall" for one in loads.notes),
+          *(line for one in results for line in wall_lines(one, opened)), *(f"written: {path}" for path in written)])
+
+
+def _check_places(out: Path | None, *collections: Path | None, plot: Path | None) -> None:
+    """DembarkError when an output cannot be where it shall be, or two are the same file."""
+    given = [path for path in (out, *collections) if path is not None]
+    for path in given:
+        if path.is_dir():
+            raise DembarkError(f"{path} is a folder", "", "name a file")
+        if not path.parent.is_dir():
+            raise DembarkError(f"there is no folder {path.parent}", f"for {path.name}", "make it first")
+        if given.count(path) > 1:
+            raise DembarkError(f"{path} is named twice", "", "give each output a file of its own")
+    if any(collections):
+        from .output.paraview import check_place
+
+        for path in filter(None, collections):
+            check_place(path)
+    if plot is not None and plot.exists() and not plot.is_dir():
+        raise DembarkError(f"{plot} is a file", "in --plot", "name a folder")
 
 
 def _provenance(command: str, source: Path) -> dict[str, str]:
@@ -147,26 +225,20 @@ def _say(lines: Sequence[str]) -> None:
 
 
 @contextmanager
-def progress(name: str, total: int, interval: float = 10.0) -> Iterator[Advance]:
-    """Shows how many of `total` frames are done: a bar in a terminal, else a plain line every `interval` s."""
+def progress(name: str, total: int, interval: float = 10.0) -> Iterator[Callable[[], None]]:
+    """Gives a function to call after each of `total` frames: it moves a bar in a terminal, and else prints a line every `interval` s."""
     console = Console(file=sys.stderr, highlight=False, soft_wrap=True)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("frames"), TimeRemainingColumn())
+    done, spoken = 0, clock.monotonic()
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        yield Advance(bar, bar.add_task(name, total=total), name, total, math.inf if console.is_terminal else interval)
+        task = bar.add_task(name, total=total)
 
+        def advance() -> None:
+            nonlocal done, spoken
+            done += 1
+            bar.advance(task)
+            if not console.is_terminal and clock.monotonic() - spoken >= interval:
+                spoken = clock.monotonic()
+                print(f"dembark: {name}: frame {done} of {total}", file=sys.stderr, flush=True)
 
-class Advance:
-    """Counts frames that are done."""
-
-    def __init__(self, bar: Progress, task: TaskID, name: str, total: int, interval: float) -> None:
-        self._bar, self._task, self._name, self._total, self._interval = bar, task, name, total, interval
-        self._done, self._told = 0, clock.monotonic()
-
-    def __call__(self) -> None:
-        """One more frame is done."""
-        self._done += 1
-        self._bar.advance(self._task)
-        now = clock.monotonic()
-        if now - self._told >= self._interval:
-            self._told = now
-            print(f"dembark: {self._name}: frame {self._done} of {self._total}", file=sys.stderr, flush=True)
+        yield advance

@@ -40,9 +40,7 @@ def labelled(variables: Mapping[str, Any], coordinates: Mapping[str, Any], **att
 
 
 def write(path: Path, dataset: xarray.Dataset) -> Path:
-    """Write `dataset` as NetCDF to `path`, whole or not at all; returns the path."""
-    from dembark.postproc.output.whole import WholeFile
+    """Write `dataset` as NetCDF to `path`, at once or not at all; returns the path."""
+    from dembark.postproc.output.netcdf import write_netcdf
 
-    with WholeFile(path) as part:
-        dataset.to_netcdf(part, engine="h5netcdf")
-    return path
+    return write_netcdf(path, dataset)

@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from dembark.postproc.replica import Array, Replica
-from dembark.postproc.resampling import pooled, profile
-from dembark.postproc.statistics import CONFIDENCE, Estimate, block_mean, exact, over_replicas
+from .replica import Array, Replica
+from .resampling import pooled, profile
+from .statistics import CONFIDENCE, Estimate, block_mean, exact, over_replicas
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -19,19 +19,21 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
-from dembark.common.files import disk_error
-from dembark.postproc.output.whole import Labelled, WholeFile
-from dembark.postproc.style import STYLE
-from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, PlaneWall
-from dembark.postproc.walls.peaks import Histogram
-from dembark.postproc.walls.stress import WallStress
+from dembark.common.files import disk_error, write_whole
+
+from .fields.field_set import FieldSet
+from .pictures import saved
+from .style import STYLE
+from .walls import CylinderWall, Inclusion, MeshWall, PlaneWall
+from .walls.peaks import Histogram
+from .walls.stress import WallStress
 
 Array = NDArray[np.float64]
 
 _AXES = "xyz"
 _MAP, _SIGNED_MAP, _EMPTY = "cividis", "RdBu_r", "#e3e6ea"
 _PAINT = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
-# What is drawn of fields when nothing else is asked for.
+# What is drawn of fields by default.
 _USUAL = ("solid_fraction", "density", "velocity:magnitude", "pressure", "stress:zz", "deviator", "temperature", "coordination")
 _SHEAR = {PlaneWall: ("shear along v", "shear along u"), CylinderWall: ("shear along the axis", "shear around it"),
           MeshWall: ("shear upwards", "shear sideways"), Inclusion: ("shear towards the axis' end", "shear around the axis")}
@@ -41,7 +43,7 @@ _NUMBERS = "{x:.4g}"
 _VIEWS = ((20.0, -60.0), (-20.0, 120.0))
 
 
-def scalar(fields: Labelled, name: str) -> tuple[Array, str, str]:
+def scalar(fields: FieldSet, name: str) -> tuple[Array, str, str]:
     """A scalar (nx, ny, nz) of the fields with its unit and a label; NaN in cells without it.
 
     `name` is that of a scalar field, `velocity:x`, `velocity:magnitude`, `stress:xz`, or `pressure` (a third of the stress's trace) or
@@ -54,10 +56,10 @@ def scalar(fields: Labelled, name: str) -> tuple[Array, str, str]:
         stress, unit = _known(fields, arrays, "stress")
         if base == "pressure":
             return np.trace(stress, axis1=-2, axis2=-1) / 3.0, unit, label
-        whole = np.isfinite(stress).all(axis=(-2, -1))
+        complete = np.isfinite(stress).all(axis=(-2, -1))
         values = np.full(stress.shape[:3], np.nan)
-        principal = np.linalg.eigvalsh(0.5 * (stress[whole] + np.swapaxes(stress[whole], -1, -2)))
-        values[whole] = 0.5 * (principal[:, -1] - principal[:, 0])
+        principal = np.linalg.eigvalsh(0.5 * (stress[complete] + np.swapaxes(stress[complete], -1, -2)))
+        values[complete] = 0.5 * (principal[:, -1] - principal[:, 0])
         return values, unit, "largest shear stress"
     values, unit = _known(fields, arrays, base)
     if values.ndim == 3 and not part:
@@ -71,13 +73,13 @@ def scalar(fields: Labelled, name: str) -> tuple[Array, str, str]:
     return values[component], unit, label
 
 
-def _known(fields: Labelled, arrays: Mapping[str, Array], name: str) -> tuple[Array, str]:
+def _known(fields: FieldSet, arrays: Mapping[str, Array], name: str) -> tuple[Array, str]:
     if name not in arrays:
         raise DembarkError(f"there is no field {name!r}", "", f"there are {', '.join(arrays)}")
     return arrays[name], fields.units[name]
 
 
-def slice_figure(fields: Labelled, names: Sequence[str], axis: str = "y", place: float | None = None) -> Figure:
+def slice_figure(fields: FieldSet, names: Sequence[str], axis: str = "y", place: float | None = None) -> Figure:
     """Maps of scalars (see `scalar`) in the layer of cells that holds `place` (m) along `axis`; in the middle when it is not given.
 
     Cells without a value, as masked thin ones, are grey.
@@ -94,7 +96,7 @@ def slice_figure(fields: Labelled, names: Sequence[str], axis: str = "y", place:
     columns = min(len(names), 4 if shape > 0.8 else 2 if shape > 0.25 else 1)
     rows = -(-len(names) // columns)
     with matplotlib.rc_context(STYLE):
-        # What is beside the map itself, ticks and colour scale, takes about an inch.
+        # Ticks and colour scale next to the map take about an inch.
         tall = float(np.clip(shape * (_WIDTH / columns - 1.0), 0.8, 4.5))
         figure = Figure(figsize=(_WIDTH, rows * (tall + 0.65)), layout="constrained")
         for number, name in enumerate(names):
@@ -133,7 +135,7 @@ def labelled(label: str, unit: str) -> str:
     return f"{label} / ({raised})" if " " in unit else f"{label} / {raised}"
 
 
-def profile_figure(fields: Labelled, names: Sequence[str], axis: str = "z") -> Figure:
+def profile_figure(fields: FieldSet, names: Sequence[str], axis: str = "z") -> Figure:
     """Scalars (see `scalar`) along `axis`, drawn upwards along z: means over the cells across it that are filled, those with a value
     and more than a tenth of the largest density. Beyond walls, where only the kernel reaches, nothing is to dilute them."""
     along = _AXES.index(axis)
@@ -203,7 +205,7 @@ def _paint(values: Array) -> dict[str, Any]:
 
 
 def _colour_bar(figure: Figure, paint: ScalarMappable, axes: Axes | list[Axes], label: str) -> None:
-    # Below the map and with the label at it: beside or above it would cover titles.
+    # Below the map and with the label at it: elsewhere it would cover titles.
     bar = figure.colorbar(paint, ax=axes, orientation="horizontal", pad=0.03, aspect=25, shrink=0.85)
     bar.outline.set_linewidth(0.4)
     bar.ax.tick_params(labelsize=6)
@@ -284,7 +286,7 @@ def _distribution(axes: Axes, histogram: Histogram, what: str, unit: str, wall: 
     axes.legend(fontsize=6.5)
 
 
-def field_figures(fields: Labelled) -> dict[str, Figure]:
+def field_figures(fields: FieldSet) -> dict[str, Figure]:
     """Slices through the middle and profiles along z of what there is of the usual scalars, by name."""
     arrays = fields.arrays()
     there = [name for name in _USUAL if ("stress" if name in ("pressure", "deviator") else name.partition(":")[0]) in arrays]
@@ -303,11 +305,6 @@ def save(folder: str | Path, figures: Mapping[str, Figure]) -> list[Path]:
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        found = []
-        for name, figure in figures.items():
-            with WholeFile(folder / f"{name}.png") as part, matplotlib.rc_context(STYLE):
-                figure.savefig(part, dpi=160, metadata={"Software": None})
-            found.append(folder / f"{name}.png")
     except OSError as error:
         raise disk_error(error, folder) from None
-    return found
+    return [write_whole(folder / f"{name}.png", saved(figure, dots=160.0)) for name, figure in figures.items()]

@@ -1,18 +1,19 @@
 """Pictures of grains and slices through fields, rendered off screen with PyVista, and short animations of them as GIF.
 
-A renderer may crash for want of graphics libraries, so it runs in a process of its own and its end is told in one line.
+A renderer may crash for want of graphics libraries: it runs in a process of its own, and its crash is an error in one line.
 """
 
 from __future__ import annotations
 
-import json
+import io
 import os
+import pickle
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -23,11 +24,13 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from dembark.common.errors import RunError
-from dembark.postproc.fields.coarse_graining import interpolate
-from dembark.postproc.grains import GrainFrame
-from dembark.postproc.output.whole import Labelled, WholeFile
-from dembark.postproc.plots import labelled, scalar
-from dembark.postproc.style import STYLE
+from dembark.common.files import write_whole
+
+from .fields.coarse_graining import interpolate
+from .fields.field_set import FieldSet
+from .grains import GrainFrame
+from .plots import labelled, scalar
+from .style import STYLE
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -52,7 +55,7 @@ class Scene:
     corner_values: Array | None = None
 
 
-def sample(fields: Labelled, name: str, places: Array) -> Array:
+def sample(fields: FieldSet, name: str, places: Array) -> Array:
     """A scalar of the fields (see `plots.scalar`) at `places` (n, 3) in m, linear between the centres of cells that have a value."""
     values, _, _ = scalar(fields, name)
     known = np.isfinite(values)
@@ -68,7 +71,7 @@ def grain_scene(frame: GrainFrame, values: Array | None = None, label: str = "",
     return Scene(frame.wrapped[chosen], frame.radii[chosen], np.asarray(values, float)[chosen], label)
 
 
-def field_scene(frame: GrainFrame, fields: Labelled, name: str, axis: str = "y", place: float | None = None) -> Scene:
+def field_scene(frame: GrainFrame, fields: FieldSet, name: str, axis: str = "y", place: float | None = None) -> Scene:
     """A scalar field cut across `axis` at `place` (m; in the middle when not given), and the grains behind the cut in its colours.
 
     The cells of the cut are shown on one half of it, where the density is more than a tenth of the largest; on the other half are the
@@ -103,39 +106,55 @@ def limits(scenes: Sequence[Scene]) -> tuple[float, float]:
 def render(scenes: Iterable[Scene], scale: tuple[float, float], pixels: int = _PIXELS) -> list[Picture]:
     """Pictures (height, width, 3) of scenes, all from the same camera, on the colour `scale` (low, high).
 
-    RunError in one line when there is nothing to show or the renderer does not come to its end.
+    RunError in one line when there is nothing to show or the renderer does not finish.
     """
-    with tempfile.TemporaryDirectory(prefix="dembark-render-") as folder:
-        low, high = np.full(3, np.inf), np.full(3, -np.inf)
-        count = 0
-        for one in scenes:
-            corners = np.zeros((0, 4, 3)) if one.corners is None else one.corners
-            np.savez(Path(folder, f"scene-{count:06d}.npz"), positions=one.positions, radii=one.radii, values=one.values, corners=corners,
-                     corner_values=np.zeros(0) if one.corner_values is None else one.corner_values)
-            for places, reach in ((one.positions, one.radii[:, None]), (corners.reshape(-1, 3), 0.0)):
-                low = np.minimum(low, (places - reach).min(axis=0, initial=np.inf))
-                high = np.maximum(high, (places + reach).max(axis=0, initial=-np.inf))
-            count += 1
-        if not np.isfinite(low).all():
-            raise RunError("there is nothing to render", f"{count} scenes without a grain or a slice")
-        view = {"low": low.tolist(), "high": high.tolist(), "scale": scale, "pixels": pixels, "map": _MAP}
-        Path(folder, "view.json").write_text(json.dumps(view), encoding="utf-8")
-        _call(folder)
-        return [np.asarray(Image.open(path)) for path in sorted(Path(folder).glob("scene-*.png"))]
-
-
-def _call(folder: str) -> None:
+    shown = list(scenes)
+    corners = [one.corners.reshape(-1, 3) for one in shown if one.corners is not None]
+    low = np.concatenate([np.full((1, 3), np.inf), *(one.positions - one.radii[:, None] for one in shown), *corners]).min(axis=0)
+    high = np.concatenate([np.full((1, 3), -np.inf), *(one.positions + one.radii[:, None] for one in shown), *corners]).max(axis=0)
+    if not np.isfinite(low).all():
+        raise RunError("there is nothing to render", f"{len(shown)} scenes without a grain or a slice")
     environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    environment["PYVISTA_OFF_SCREEN"] = "true"
-    command = [sys.executable, str(Path(__file__).with_name("render_draw.py"))]
     try:
-        done = subprocess.run(command, input=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-                              errors="replace", timeout=_TIMEOUT, check=False)
+        process = subprocess.run([sys.executable, "-m", __name__], input=pickle.dumps((shown, low, high, scale, pixels)),
+                                 env=environment | {"PYVISTA_OFF_SCREEN": "true"}, capture_output=True, timeout=_TIMEOUT, check=False)
     except subprocess.TimeoutExpired:
-        raise RunError("the renderer did not come to its end", f"within {_TIMEOUT} s") from None
-    if done.returncode != 0:
-        said = [line.strip() for line in done.stderr.splitlines() if line.strip()]
-        raise RunError(f"the renderer ended with code {done.returncode}", said[-1][:160] if said else "")
+        raise RunError("the renderer did not finish", f"within {_TIMEOUT} s") from None
+    if process.returncode != 0:
+        said = [line.strip() for line in process.stderr.decode(errors="replace").splitlines() if line.strip()]
+        raise RunError(f"the renderer ended with code {process.returncode}", said[-1][:160] if said else "")
+    return pickle.loads(process.stdout)
+
+
+def _draw(scene: Scene, low: Array, high: Array, scale: tuple[float, float], pixels: int) -> Picture:
+    """The picture of a scene from a camera that sees the box from `low` to `high` (3,) in m."""
+    import pyvista
+
+    size, middle = high - low, 0.5 * (high + low)
+    width, height = size[0] + 0.35 * size[1], size[2] + 0.18 * size[1]
+    window = [int(pixels * np.clip(width / max(height, 1e-300), 0.45, 2.2)), pixels]
+    style: dict[str, Any] = {"scalars": "value", "clim": scale, "cmap": _MAP, "nan_color": "#b9bec5", "show_scalar_bar": False}
+    plotter = pyvista.Plotter(off_screen=True, window_size=window)
+    plotter.background_color = pyvista.Color("white")
+    if len(scene.radii):
+        cloud = pyvista.PolyData(scene.positions)
+        cloud["diameter"], cloud["value"] = 2.0 * scene.radii, scene.values
+        detail = 18 if len(scene.radii) < 8000 else 10
+        ball = pyvista.Sphere(radius=0.5, theta_resolution=detail, phi_resolution=detail)
+        plotter.add_mesh(cloud.glyph(scale="diameter", orient=False, geom=ball), smooth_shading=True, ambient=0.25, diffuse=0.8,
+                         specular=0.15, **style)
+    if scene.corners is not None and scene.corner_values is not None and len(scene.corners):
+        faces = np.column_stack([np.full(len(scene.corners), 4), np.arange(4 * len(scene.corners)).reshape(-1, 4)])
+        surface = pyvista.PolyData(scene.corners.reshape(-1, 3), faces.ravel())
+        surface.cell_data["value"] = scene.corner_values
+        plotter.add_mesh(surface, lighting=False, **style)
+    plotter.camera.parallel_projection = True
+    plotter.camera_position = [tuple(middle + np.array([0.25, -1.0, 0.18]) * 10.0 * size.max()), tuple(middle), (0.0, 0.0, 1.0)]
+    plotter.camera.parallel_scale = 0.5 * max(height, width * window[1] / window[0]) * 1.06
+    plotter.enable_anti_aliasing("ssaa")
+    image = np.asarray(plotter.screenshot(return_img=True))
+    plotter.close()
+    return image
 
 
 def picture(scene: Scene, scale: tuple[float, float] | None = None, height: float = 4.0) -> Figure:
@@ -155,7 +174,12 @@ def picture(scene: Scene, scale: tuple[float, float] | None = None, height: floa
 
 def animate(path: str | Path, scenes: Iterable[Scene], scale: tuple[float, float], *, duration: int = 80, pixels: int = 400) -> Path:
     """Scenes one after the other as a GIF, each for `duration` ms, on one colour `scale`; returns the path."""
-    with WholeFile(path) as part:
-        images = [Image.fromarray(image).quantize(64) for image in render(scenes, scale, pixels)]
-        images[0].save(part, format="GIF", save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)
-    return Path(path)
+    images = [Image.fromarray(image).quantize(64) for image in render(scenes, scale, pixels)]
+    content = io.BytesIO()
+    images[0].save(content, format="GIF", save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)
+    return write_whole(Path(path), content.getvalue())
+
+
+if __name__ == "__main__":
+    _scenes, *_view = pickle.load(sys.stdin.buffer)
+    pickle.dump([_draw(_one, *_view) for _one in _scenes], sys.stdout.buffer)

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc import ContactFrame, ContactsDump, DumpError, GrainFrame, GrainsDump, read_times
+from . import ContactFrame, ContactsDump, DumpError, GrainFrame, GrainsDump, read_times
 
 Array = NDArray[np.float64]
 Source = TypeVar("Source")

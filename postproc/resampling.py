@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.replica import Array
-from dembark.postproc.statistics import ONE_SAMPLE, Estimate, TimeBlocks, jackknife, over_replicas
+from .replica import Array
+from .statistics import ONE_SAMPLE, Estimate, TimeBlocks, jackknife, over_replicas
 
 
 def resampled(

@@ -1,4 +1,4 @@
-"""What the commands read: a dump, or the folder of a run with its time step and walls."""
+"""What `dembark fields` and `dembark walls` read: a dump, or the folder of a run with its time step and walls."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ import numpy as np
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
-from dembark.postproc.contacts import ContactFrame, ContactsDump
-from dembark.postproc.dumptext import DumpError
-from dembark.postproc.grains import GrainFrame, GrainsDump
-from dembark.postproc.walls import CylinderWall, Motion, PlaneWall, Wall
+
+from .contacts import ContactFrame, ContactsDump
+from .dumptext import DumpError
+from .grains import GrainFrame, GrainsDump
+from .walls import CylinderWall, Motion, PlaneWall, Wall
 
 
 @dataclass(frozen=True)
@@ -62,46 +63,59 @@ class Source:
             grains = self.grains[number]
             yield grains, self.contacts.at_step(grains.step) if self.contacts is not None else None
 
-    def walls(self, names: Sequence[str]) -> list[Wall]:
-        """The walls of a case of dembark that carry one of `names`, told from its parameters; [] for other files."""
-        return _walls_of(self.record.get("parameters", {}), self.time_step, names)
+    def walls(self, names: Sequence[str]) -> tuple[list[Wall], list[str]]:
+        """Those walls of the run that carry one of `names`, as its record has them, and a line for each whose motion it does not know."""
+        if names and "case" in self.record and "walls" not in self.record:
+            return [], ["the run's record says nothing of its walls, as those of earlier versions"]
+        known = {name: wall for name, wall in self.record.get("walls", {}).items() if name in names}
+        moving = [name for name, wall in known.items() if wall.get("motion", "steady") != "steady"]
+        return ([self._wall(name, wall) for name, wall in known.items() if name not in moving],
+                [f"the wall {name} has a motion ({known[name]['motion']}) that is not known at each time" for name in moving])
+
+    def _wall(self, name: str, wall: Mapping[str, Any]) -> Wall:
+        since = float(wall.get("since", 0.0))
+        if self.time_step > 0.0:
+            # A motion begins with a step.
+            since = math.ceil(since / self.time_step) * self.time_step
+        motion = Motion(_vector(wall.get("velocity", (0.0, 0.0, 0.0))), since)
+        origin = _vector(wall.get("origin", (0.0, 0.0, 0.0)))
+        if wall["kind"] == "cylinder":
+            return CylinderWall(name, float(wall["radius"]), _vector(wall.get("axis", (0.0, 0.0, 1.0))), origin, motion=motion)
+        return PlaneWall(name, origin, _vector(wall.get("normal", (0.0, 0.0, 1.0))), motion)
 
 
-@dataclass(frozen=True)
-class Reading:
-    """How files are to be read that do not say it themselves: `time_step` (s), `density` (kg/m3) of grains without masses, names of the
-    `columns` of a binary dump, what the columns of a foreign dump of contacts are (see ContactsDump), and the unit style."""
-
-    time_step: float | None = None
-    density: float | None = None
-    columns: Sequence[str] | None = None
-    contact_columns: Mapping[str, Sequence[int | str]] | None = None
-    units: str = ""
+def _vector(values: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = map(float, values)
+    return x, y, z
 
 
-def open_source(path: Path, contacts: Path | None = None, reading: Reading | None = None) -> Source:
+def open_source(path: Path, contacts: Path | None = None, *, time_step: float | None = None, density: float | None = None,
+                columns: Sequence[str] | None = None, contact_columns: Mapping[str, Sequence[int | str]] | None = None,
+                units: str = "") -> Source:
     """Open a dump of grains, or a run folder with grains.dump; DembarkError or DumpError in one line when it is not there.
 
-    A last frame that was cut off is left out and told in `notes`.
+    For files that do not say it themselves: `time_step` (s), `density` (kg/m3) of grains without masses, names of the `columns` of a
+    binary dump, what the columns of a foreign dump of contacts are (see ContactsDump), and the unit style. A last frame that was cut off
+    is left out, as `notes` say.
     """
-    how = reading or Reading()
     folder = _run_folder(path)
     record = (read_json(folder / "run.json") or {}) if folder else {}
     file = folder / "grains.dump" if folder else path
     if contacts is None and folder and (folder / "contacts.dump").is_file():
         contacts = folder / "contacts.dump"
-    time_step = how.time_step if how.time_step is not None else float(record.get("time_step", math.nan))
+    if time_step is None:
+        time_step = float(record.get("time_step", math.nan))
 
     def grains_in(units: str) -> GrainsDump:
-        return GrainsDump(file, skip_truncated=True, columns=how.columns, density=how.density, units=units)
+        return GrainsDump(file, skip_truncated=True, columns=columns, density=density, units=units)
 
-    grains = grains_in(how.units)
+    grains = grains_in(units)
     if not len(grains):
-        raise DumpError(f"{file} has no whole frame")
+        raise DumpError(f"{file} has no complete frame")
     if contacts is None:
         return Source(path, grains, None, time_step, record)
     # Both are of one run: where only one of them names the units, they hold for the other.
-    touching = ContactsDump(contacts, skip_truncated=True, columns=how.contact_columns, units=how.units or grains.units)
+    touching = ContactsDump(contacts, skip_truncated=True, columns=contact_columns, units=units or grains.units)
     if touching.units and not grains.units:
         grains = grains_in(touching.units)
     return Source(path, grains, touching, time_step, record)
@@ -119,18 +133,37 @@ def _run_folder(path: Path) -> Path | None:
     raise DembarkError(f"{path} has no grains.dump", "", advice)
 
 
-def _walls_of(parameters: Mapping[str, Any], time_step: float, names: Sequence[str]) -> list[Wall]:
-    """dembark's cases have their walls where these parameters say: side, left and right stand, base lies at z = 0."""
-    found: dict[str, Wall] = {}
-    if "cylinder_radius" in parameters:
-        found["side"] = CylinderWall("side", float(parameters["cylinder_radius"]))
-    width = parameters.get("silo_width", parameters.get("channel_width"))
-    if width is not None:
-        found["left"] = PlaneWall("left", normal=(1.0, 0.0, 0.0))
-        found["right"] = PlaneWall("right", (float(width), 0.0, 0.0), (-1.0, 0.0, 0.0))
-    if parameters:
-        speed = float(parameters.get("base_speed", 0.0))
-        # A base that sinks begins to when the grains have settled.
-        since = math.ceil(float(parameters.get("settle_time", 0.0)) / time_step) * time_step if time_step > 0.0 else 0.0
-        found["base"] = PlaneWall("base", motion=Motion((0.0, 0.0, -speed), since))
-    return [wall for name, wall in found.items() if name in names]
+@dataclass(frozen=True)
+class Selection:
+    """Frames of a source by their `numbers`, the `first` of them that has grains, and the mean `diameter` (m) of that."""
+
+    source: Source
+    numbers: Sequence[int]
+    first: GrainFrame
+    diameter: float
+
+    def lines(self, diameters: Sequence[float]) -> list[str]:
+        """What was read; `diameters` (m) are the mean ones of the frames."""
+        source, numbers = self.source, self.numbers
+        first, last = (int(source.grains.steps[number]) for number in (numbers[0], numbers[-1]))
+        begin, end = (source.time(source.grains[number]) for number in (numbers[0], numbers[-1]))
+        when = f"{begin:.6g} to {end:.6g} s" if source.timed else "times are steps: give --time-step"
+        count = f"frame {numbers[0]}" if len(numbers) == 1 else f"{len(numbers)} frames, {numbers[0]} to {numbers[-1]}"
+        low, high = 1e3 * min(diameters, default=self.diameter), 1e3 * max(diameters, default=self.diameter)
+        changes = f"the mean diameter of the frames is {low:.4g} to {high:.4g} mm; d is that of the first with grains"
+        return [*(f"note: {one}" for one in (*source.notes, *([changes] if high > 1.01 * low else []))),
+                f"{count} of {len(source.grains)}; steps {first} to {last}, {when}; mean diameter d = {1e3 * self.diameter:.4g} mm"]
+
+
+def select(source: Source, numbers: Sequence[int]) -> Selection:
+    """The frames of `source` with these numbers; DembarkError when there are no grains in any of them."""
+    for number in numbers:
+        if diameter := mean_diameter(frame := source.grains[number]):
+            return Selection(source, numbers, frame, diameter[0])
+    raise DembarkError(f"there are no grains in frames {numbers[0]} to {numbers[-1]}", "those that are chosen",
+                       "choose others with --frames")
+
+
+def mean_diameter(frame: GrainFrame) -> list[float]:
+    """The mean diameter (m) of the grains of a frame, [] of none."""
+    return [2.0 * float(frame.radii.mean())] if len(frame.radii) else []

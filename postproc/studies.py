@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.convergence import SAFETY_UNSEEN_ORDER, convergence
-from dembark.postproc.statistics import Estimate, combined
+from .convergence import SAFETY_UNSEEN_ORDER, convergence
+from .statistics import Estimate, combined
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ from MDAnalysis.lib.util import store_init_arguments
 from MDAnalysis.topology.base import TopologyReaderBase
 from numpy.typing import NDArray
 
-from dembark.postproc.dumps.frames import Array, DumpError, cell
-from dembark.postproc.grains import GrainFrame, GrainsDump
+from .dumps.frames import Array, DumpError, cell
+from .grains import GrainFrame, GrainsDump
 
 _KEPT = ("columns", "density", "skip_truncated", "units", "varying")
 

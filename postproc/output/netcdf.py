@@ -1,4 +1,4 @@
-"""Fields and wall loads in NetCDF-4 with the attributes of the CF conventions (1.11), for xarray.
+"""Fields and wall loads as xarray Datasets, and in NetCDF-4 files with the attributes of the CF conventions (1.11).
 
 Coordinates are the centres of the cells, with the cells' faces in `x_bounds` and so on; `time` is the middle of the averaged span,
 `time_bounds` its ends. Vectors have the dimension `i`, tensors `i` and `j`, labelled x, y, z. Stress is positive in compression.
@@ -6,177 +6,82 @@ Coordinates are the centres of the cells, with the cells' faces in `x_bounds` an
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import io
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import h5netcdf
 import numpy as np
 import xarray
-from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
-from dembark.common.files import disk_error
-from dembark.postproc.fields.grid import Grid
-from dembark.postproc.output.whole import Labelled, SteadyFile, WholeFile, timed
-from dembark.postproc.walls.peaks import Histogram
-from dembark.postproc.walls.stress import COMPONENTS, WallStress
+from dembark.common.files import write_whole
 
-Array = NDArray[np.float64]
+from ..fields.field_set import FieldSet
+from ..walls.peaks import Histogram
+from ..walls.stress import COMPONENTS, WallStress
+
 Attributes = Mapping[str, str | float | int]
 
 _AXES = "xyz"
 _DIMENSIONS = ("time", "x", "y", "z", "i", "j")
-
-
-def dataset(fields: Labelled, time: float = 0.0, span: tuple[float, float] | None = None,
-            attributes: Attributes | None = None) -> xarray.Dataset:
-    """Fields of one time (s; `span` = first and last time averaged over) as a labelled xarray Dataset, as in the file of `write_netcdf`."""
-    bounds = (time, time) if span is None else span
-    variables = _coordinates(fields.grid)
-    variables["time"] = (("time",), np.array([time]), _TIME)
-    variables["time_bounds"] = (("time", "bounds"), np.array([bounds], float), {})
-    for name, values in fields.arrays().items():
-        variables[name] = (_DIMENSIONS[: values.ndim + 1], values[None], _attributes(fields, name))
-    coordinates = {name: variables.pop(name) for name in ("time", *_AXES, "i", "j")}
-    return xarray.Dataset(variables, coordinates, {"Conventions": "CF-1.11", **(attributes or {})})
-
-
-def write_netcdf(path: str | Path, fields: Labelled | Iterable[tuple[float, Labelled]], attributes: Attributes | None = None) -> Path:
-    """Write fields, or pairs (time in s, fields) of several times on one grid, taken one after the other; returns the path.
-
-    `attributes` are added to the file's own, for example kernel, width and provenance.
-    """
-    with FieldsNetcdf(path, attributes) as file:
-        for time, one in timed(fields):
-            file.add(one, time)
-    return Path(path)
-
-
-def write_wall_netcdf(
-    path: str | Path, walls: Iterable[WallStress], attributes: Attributes | None = None, *, timed: bool = True
-) -> Path:
-    """Write wall loads, a group for each wall by its name: `xarray.open_dataset(path, group="side")`; returns the path."""
-    with FieldsNetcdf(path, attributes, without_fields=True, timed=timed) as file:
-        file.add_walls(walls)
-    return Path(path)
-
-
-def _write_walls(file: Any, walls: Iterable[WallStress], timed: bool) -> None:
-    """Add a group for each wall; `wall_<name>` for one that is called like a field."""
-    taken = {*file.variables, *file.dimensions}
-    for stress in walls:
-        name = stress.wall.name
-        group = file.create_group(f"wall_{name}" if name in taken else name)
-        wall_dataset(stress, timed=timed).dump_to_store(xarray.backends.H5NetCDFStore(group))
-
-
-class FieldsNetcdf:
-    """A NetCDF file that grows by one time with each `add`; leaving the `with` block makes it whole, an error removes it.
-
-    `without_fields`: it may hold walls alone. Not `timed`: what is given as times are numbers of steps, and the file says so.
-    """
-
-    def __init__(
-        self, path: str | Path, attributes: Attributes | None = None, without_fields: bool = False, *, timed: bool = True
-    ) -> None:
-        self._timed = timed
-        self._whole = WholeFile(path)
-        try:
-            self._part = SteadyFile(self._whole.part)
-        except OSError as error:
-            raise disk_error(error, self._whole.path) from None
-        self._file: Any = h5netcdf.File(self._part, "w")
-        self._file.attrs.update({"Conventions": "CF-1.11", **(attributes or {})})
-        self._count = 0
-        self._may_be_empty = without_fields
-        self._grid: Grid | None = None
-        self._walls: list[WallStress] = []
-
-    def __enter__(self) -> Self:
-        return self
-
-    def add(self, fields: Labelled, time: float, span: tuple[float, float] | None = None) -> None:
-        """Add the fields of `time` (s), averages over `span` (s, s); DembarkError when they are others than before."""
-        arrays = fields.arrays()
-        try:
-            if self._grid is None:
-                self._begin(fields, arrays)
-            elif not self._grid.same(fields.grid) or any(name not in self._file.variables for name in arrays):
-                raise DembarkError(f"fields of another grid or kind at {time:g} s", f"for {self._whole.path}", "one file holds one kind")
-            self._file.resize_dimension("time", self._count + 1)
-            self._file.variables["time"][self._count] = time
-            self._file.variables["time_bounds"][self._count] = (time, time) if span is None else span
-            for name, values in arrays.items():
-                self._file.variables[name][self._count] = values
-            self._part.check()
-        except OSError as error:
-            raise disk_error(error, self._whole.path) from None
-        self._count += 1
-
-    def add_walls(self, walls: Iterable[WallStress]) -> None:
-        """Add the loads of walls, a group each."""
-        self._walls += walls
-
-    def update(self, attributes: Attributes) -> None:
-        """Add attributes of the file that are known only at the end."""
-        self._file.attrs.update(dict(attributes))
-
-    def _begin(self, fields: Labelled, arrays: Mapping[str, Array]) -> None:
-        file, self._grid = self._file, fields.grid
-        file.dimensions = {"time": None, **dict(zip(_AXES, fields.grid.shape, strict=True)), "i": 3, "j": 3, "bounds": 2}
-        for name, (dimensions, values, attributes) in _coordinates(fields.grid).items():
-            if values.dtype.kind == "U":
-                variable = file.create_variable(name, dimensions, h5netcdf.core.h5py.string_dtype())
-                variable[:] = values.astype(object)
-            else:
-                variable = file.create_variable(name, dimensions, values.dtype, data=values)
-            variable.attrs.update(attributes)
-        file.create_variable("time", ("time",), "f8").attrs.update(_TIME if self._timed else {**_STEPS, "bounds": "time_bounds"})
-        file.create_variable("time_bounds", ("time", "bounds"), "f8")
-        for name, values in arrays.items():
-            dimensions = _DIMENSIONS[: values.ndim + 1]
-            # One time is one piece, not packed: the digits of a mean are noise, which takes long to pack and stays as large.
-            variable = file.create_variable(name, dimensions, "f8", chunks=(1, *values.shape), fillvalue=np.nan)
-            variable.attrs.update(_attributes(fields, name))
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self._whole.settle(self._finish if kind is None else self._close, kind is None)
-
-    def _close(self) -> None:
-        self._file.close()
-        self._part.close()
-
-    def _finish(self) -> None:
-        try:
-            if self._count == 0 and not self._may_be_empty:
-                raise DembarkError(f"nothing to write to {self._whole.path}", "there is no field of any time")
-            _write_walls(self._file, self._walls, self._timed)
-        finally:
-            self._close()
-        self._part.check()
-
-
 _TIME = {"units": "s", "long_name": "simulated time, middle of the averaged span", "axis": "T", "standard_name": "time",
          "bounds": "time_bounds"}
 _STEPS = {"units": "1", "long_name": "number of the time step, for the time is not known", "axis": "T"}
 
 
-def _coordinates(grid: Grid) -> dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]:
-    result: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {}
+def dataset(fields: FieldSet, time: float = 0.0, span: tuple[float, float] | None = None, attributes: Attributes | None = None, *,
+            timed: bool = True) -> xarray.Dataset:
+    """Fields of one `time` (s; `span`: first and last time that they are averaged over), a variable for each with its unit and long name.
+
+    `attributes` describe all of it, for example kernel, width and provenance. Not `timed`: `time` is the number of a step.
+    """
+    grid = fields.grid
+    coordinates: dict[str, Any] = {"time": ("time", [time], _TIME if timed else {**_STEPS, "bounds": "time_bounds"})}
+    variables: dict[str, Any] = {"time_bounds": (("time", "bounds"), np.array([span or (time, time)], float))}
     for axis, name in enumerate(_AXES):
         edges = grid.edges(axis)
-        result[name] = ((name,), grid.centres(axis), {"units": "m", "long_name": f"{name} of the cells' centres", "axis": name.upper(),
-                                                      "bounds": f"{name}_bounds"})
-        result[f"{name}_bounds"] = ((name, "bounds"), np.column_stack([edges[:-1], edges[1:]]), {})
-    for name in ("i", "j"):
-        result[name] = ((name,), np.array(list(_AXES)), {"long_name": "component"})
-    return result
+        coordinates[name] = (name, grid.centres(axis), {"units": "m", "long_name": f"{name} of the cells' centres", "axis": name.upper(),
+                                                        "bounds": f"{name}_bounds"})
+        variables[f"{name}_bounds"] = ((name, "bounds"), np.column_stack([edges[:-1], edges[1:]]))
+    for name in "ij":
+        coordinates[name] = (name, list(_AXES), {"long_name": "component"})
+    for name, values in fields.arrays().items():
+        about = {"units": fields.units[name], "long_name": fields.long_names[name], "cell_methods": "time: mean"}
+        variables[name] = (_DIMENSIONS[: values.ndim + 1], values[None], about)
+    return xarray.Dataset(variables, coordinates, {"Conventions": "CF-1.11", **(attributes or {})})
 
 
-def _attributes(fields: Labelled, name: str) -> dict[str, str]:
-    return {"units": fields.units[name], "long_name": fields.long_names[name], "cell_methods": "time: mean"}
+def joined(datasets: Sequence[xarray.Dataset]) -> xarray.Dataset:
+    """The Datasets of several times as one; DembarkError when there is none, or when their grids or fields are different."""
+    if not datasets:
+        raise DembarkError("there is no field of any time")
+    odd = {str(name) for one in datasets for name in {*datasets[0].variables} ^ {*one.variables}}
+    try:
+        if odd:
+            raise ValueError(f"{', '.join(sorted(odd))} are not there at all times")
+        return xarray.concat(datasets, "time", data_vars="minimal", coords="minimal", compat="equals", join="exact",
+                             combine_attrs="override")
+    except ValueError as error:
+        raise DembarkError("fields of several times do not fit together", str(error).splitlines()[0],
+                           "all need the same grid and the same fields") from None
+
+
+def write_netcdf(path: str | Path, data: xarray.Dataset, walls: Iterable[WallStress] = (), *, timed: bool = True) -> Path:
+    """Write the fields `data`, and a group for each of the `walls` by its name, at once or not at all; returns the path.
+
+    Read them with `xarray.open_dataset(path)` and `xarray.open_dataset(path, group="side")`; the group of a wall that is called like a
+    field is `wall_<name>`. The file is made in memory: on a full disk the HDF5 library would crash. RunError when it cannot be written.
+    """
+    groups = {stress.wall.name: wall_dataset(stress, timed=timed) for stress in walls}
+    content = io.BytesIO()
+    with h5netcdf.File(content, "w") as file:
+        data.dump_to_store(xarray.backends.H5NetCDFStore(file))
+        for name, one in groups.items():
+            group = file.create_group(f"wall_{name}" if name in {*file.variables, *file.dimensions} else name)
+            one.dump_to_store(xarray.backends.H5NetCDFStore(group))
+    return write_whole(Path(path), content.getvalue())
 
 
 def wall_dataset(stress: WallStress, *, timed: bool = True) -> xarray.Dataset:

@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dembark.common.errors import RunError
+from dembark.common.extras import missing_extra
 from dembark.common.files import write_whole
-from dembark.postproc import DumpError
+
+from .. import DumpError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,9 +29,10 @@ def draw(folder: Path, wanted: Mapping[str, Any] | None) -> list[str]:
         (folder / name).unlink(missing_ok=True)
     if not wanted:
         return []
-    # Renderers take a second to import, which measurements without pictures need not wait for.
-    from dembark.postproc.pictures import packings, sections
-
+    try:
+        from . import packings, sections
+    except ModuleNotFoundError as error:
+        return [f"No picture: {missing_extra(error, 'it')}."]
     replica = next(iter(sorted(folder.glob("replica-*/grains.dump"))), None)
     if replica is None:
         return ["No picture: the run's grains.dump is no longer there."]
@@ -51,7 +54,7 @@ def saved(figure: Figure, kind: str = "png", dots: float = 180.0) -> bytes:
     """A figure as the content of a file of that `kind`, the same for the same data; images have so many `dots` an inch."""
     import matplotlib
 
-    from dembark.postproc.style import STYLE
+    from ..style import STYLE
 
     buffer = io.BytesIO()
     with matplotlib.rc_context(STYLE):

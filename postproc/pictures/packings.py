@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from dembark.postproc import ContactFrame, ContactsDump, GrainFrame, GrainsDump, render
-from dembark.postproc.fields.coarse_graining import WallContacts, rows_of
-from dembark.postproc.pictures import saved
-from dembark.postproc.spheres import volume
-from dembark.postproc.walls import CylinderWall, PlaneWall, wall_contacts
+from .. import ContactFrame, ContactsDump, GrainFrame, GrainsDump, render
+from ..fields.coarse_graining import WallContacts, rows_of
+from ..spheres import volume
+from ..walls import CylinderWall, PlaneWall, wall_contacts
+from . import saved
 
 HEIGHT = 3.3  # inches
 

@@ -18,13 +18,14 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from dembark.common.files import read_json
-from dembark.postproc import DumpError, GrainFrame, GrainsDump
-from dembark.postproc.dumptext import TextDump
-from dembark.postproc.history import read_times
-from dembark.postproc.pictures import saved
-from dembark.postproc.pictures.packings import HEIGHT
-from dembark.postproc.style import STYLE
-from dembark.postproc.walls.mesh import cut, read_stl
+
+from .. import DumpError, GrainFrame, GrainsDump
+from ..dumptext import TextDump
+from ..history import read_times
+from ..style import STYLE
+from ..walls.mesh import cut, read_stl
+from . import saved
+from .packings import HEIGHT
 
 _MAP = "cividis"
 _OVERSAMPLING = 3

@@ -233,7 +233,7 @@ def test_frames_without_grains_are_frames(here, command, wall):
     low = PLACES * [1, 1, 0] + [0, 0, 0.01]
     frames = [frame(step, low[:count], RADII[:count], walls={"base": np.ones((count, 3))}) for step, count in enumerate((0, 4, 0, 4))]
     (here / "g.dump").write_text("".join(frames))
-    more = {"walls": ["--patch", "0.5"], "fields": ["--grid", "9", "--width", "1d", "--grains", "g.vtkhdf"]}
+    more = {"walls": ["--patch", "0.5"], "fields": ["--grid", "9", "--width", "1d", "--grains", "g.pvd"]}
     assert main([command, "g.dump", "--wall", wall, "--out", "w.nc", *more[command]]) == 0
     with xarray.open_dataset("w.nc", group="base") as found:
         np.testing.assert_allclose(found.force.values, np.array([0, 4, 0, 4])[:, None] * np.ones(3))

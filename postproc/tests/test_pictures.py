@@ -133,7 +133,6 @@ def test_nothing_to_render_and_a_renderer_that_fails_are_told_in_one_line(packin
     assert render.limits([nothing]) == (0.0, 1.0)
     with pytest.raises(RunError, match="nothing to render"):
         render.render([nothing], (0.0, 1.0))
-    monkeypatch.setenv("PYTHONPATH", "")
     monkeypatch.setattr(render.sys, "executable", "/bin/false")
     with pytest.raises(RunError, match="ended with code 1"):
         render.render([render.grain_scene(packing[0])], (0.0, 1.0))

@@ -7,8 +7,8 @@ Everywhere a force is that of the wall on the grains. It is taken apart along a 
 the wall to the grains (a wall that is pressed has a positive normal stress), `shear_1` and `shear_2` along the wall.
 """
 
-from dembark.postproc.walls.contacts import into_box, touching, wall_contacts
-from dembark.postproc.walls.inclusion import Inclusion
-from dembark.postproc.walls.surfaces import CylinderWall, MeshWall, Motion, Places, PlaneWall, Wall
+from .contacts import into_box, touching, wall_contacts
+from .inclusion import Inclusion
+from .surfaces import CylinderWall, MeshWall, Motion, Places, PlaneWall, Wall
 
 __all__ = ["CylinderWall", "Inclusion", "MeshWall", "Motion", "Places", "PlaneWall", "Wall", "into_box", "touching", "wall_contacts"]

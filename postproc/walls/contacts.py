@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.dumps.frames import folded
-from dembark.postproc.dumptext import DumpError
-from dembark.postproc.fields.coarse_graining import WallContacts
-from dembark.postproc.grains import GrainFrame
-from dembark.postproc.walls.surfaces import Wall
+from ..dumps.frames import folded
+from ..dumptext import DumpError
+from ..fields.coarse_graining import WallContacts
+from ..grains import GrainFrame
+from .surfaces import Wall
 
 Array = NDArray[np.float64]
 

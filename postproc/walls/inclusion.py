@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
-from dembark.postproc.contacts import ContactFrame
-from dembark.postproc.dumptext import DumpError
-from dembark.postproc.fields.coarse_graining import rows_of
-from dembark.postproc.grains import GrainFrame
-from dembark.postproc.walls.surfaces import CylinderWall, Places
+
+from ..contacts import ContactFrame
+from ..dumptext import DumpError
+from ..fields.coarse_graining import rows_of
+from ..grains import GrainFrame
+from .surfaces import CylinderWall, Places
 
 Array = NDArray[np.float64]
 

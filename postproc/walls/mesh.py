@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark import _dumps
-from dembark.postproc.dumptext import DumpError
+
+from ..dumptext import DumpError
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
 from dembark.common.memory import check_memory
-from dembark.postproc.dumps.frames import cell
-from dembark.postproc.grains import GrainFrame
-from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, PlaneWall, Wall
+
+from ..dumps.frames import cell
+from ..grains import GrainFrame
+from . import CylinderWall, Inclusion, MeshWall, PlaneWall, Wall
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

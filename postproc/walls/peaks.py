@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.statistics import block_halves
+from ..statistics import block_halves
 
 Array = NDArray[np.float64]
 

@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
-from dembark.postproc.contacts import ContactFrame
-from dembark.postproc.dumptext import DumpError
-from dembark.postproc.grains import GrainFrame
-from dembark.postproc.walls import Inclusion, Places, Wall, into_box, touching
-from dembark.postproc.walls.patches import Patches
-from dembark.postproc.walls.peaks import Blocks, Histogram, PeakFinder
+
+from ..contacts import ContactFrame
+from ..dumptext import DumpError
+from ..grains import GrainFrame
+from . import Inclusion, Places, Wall, into_box, touching
+from .patches import Patches
+from .peaks import Blocks, Histogram, PeakFinder
 
 Array = NDArray[np.float64]
 

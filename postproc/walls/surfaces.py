@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
-from dembark.postproc.walls.mesh import PRECISION, TriangleTree, read_stl
+
+from .mesh import PRECISION, TriangleTree, read_stl
 
 Array = NDArray[np.float64]
 Vector = Sequence[float] | Array

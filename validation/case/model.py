@@ -172,8 +172,9 @@ class Case:
 
     `derived`: numbers that follow from the parameters, by expressions; a setup.py beside the case file may add others, and the packing.
     `controls`: wrong physics, in words, with the declared quantities whose checks it fails. `needs`: capabilities that an engine has to
-    have where a condition between the parameters holds. `findings`: known causes of failures. `paired`: the initial packing decides what
-    comes out, and engines are compared packing by packing. `rates`: particle-steps per second and core that were measured, by engine.
+    have where a condition between the parameters holds. `findings`: known causes of failures. `walls`: see `case.walls`. `paired`: the
+    initial packing decides what comes out, and engines are compared packing by packing. `rates`: particle-steps per second and core that
+    were measured, by engine.
     """
 
     name: str
@@ -195,6 +196,7 @@ class Case:
     controls: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     references: tuple[Mapping[str, str], ...] = ()
     picture: Mapping[str, Value] = field(default_factory=dict)
+    walls: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     needs: Mapping[str, Expression] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     paired: bool = False

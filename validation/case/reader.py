@@ -13,6 +13,7 @@ from dembark.common.errors import DembarkError
 from dembark.common.units import known_unit, si_unit
 from dembark.validation import engines
 
+from . import walls
 from .expressions import Expression
 from .folders import package_root
 from .model import (
@@ -33,7 +34,7 @@ from .tables import TableReader, Types, load_toml
 
 _TABLES: dict[str, Types] = {
     "case": dict, "parameters": dict, "profiles": dict, "variants": dict, "runs": dict, "constraints": dict, "studies": dict,
-    "derived": dict, "quantities": dict, "controls": dict, "picture": dict, "needs": dict, "findings": list}
+    "derived": dict, "quantities": dict, "controls": dict, "picture": dict, "walls": dict, "needs": dict, "findings": list}
 _CASE: dict[str, Types] = {
     "title": str, "description": str, "source": list, "engines": list, "outputs": list, "particles": str, "groups": list,
     "references": list, "paired": bool, "rates": dict}
@@ -82,6 +83,7 @@ class CaseReader(TableReader):
                               for text, message in table.get("constraints", {}).items()),
             studies={name: self.study(name, entry, parameters, variants) for name, entry in data.get("studies", {}).items()},
             derived=derived, controls=controls, picture=self.picture(data.get("picture", {})),
+            walls=walls.read(self, data.get("walls", {})),
             quantities={name: self.quantity(name, entry, [wrong for wrong, seen in controls.items() if name in seen])
                         for name, entry in quantities.items()},
             needs={self.pick(name, engines.CAPABILITIES, "capability", "needs"): self.expression("needs", text, parameters)

@@ -207,11 +207,6 @@ def result_files(folder: Path) -> list[Path]:
                   if "superseded" not in path.relative_to(folder).parts)
 
 
-def summary(folder: Path) -> dict[str, Any]:
-    """What the last command ran in a results folder, with its result, see `runs.perform`; empty when nothing is recorded."""
-    return read_json(folder / RUNS) or {}
-
-
 def results(folder: Path) -> tuple[list[Result], list[Comparison], list[str]]:
     """All results and comparisons below a results folder in the order of their places, and a line for each file that cannot be read."""
     found: list[Result] = []

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from dembark.common.errors import DembarkError
 from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.replica import Replica
 from dembark.postproc.statistics import Estimate, beyond
 from dembark.validation.case.model import Case, Declared
 

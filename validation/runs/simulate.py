@@ -29,7 +29,7 @@ from dembark.common.files import DISK_FULL, disk_error, move_into_place, sweep, 
 from dembark.common.lock import lock
 from dembark.validation import provenance
 from dembark.validation.campaigns.plan import Resources, Run, finished
-from dembark.validation.case import deck
+from dembark.validation.case import deck, walls
 from dembark.validation.engines import end_with_parent
 from dembark.validation.results import State, lock_file, status_file
 
@@ -168,7 +168,9 @@ def _run_into(run: Run, target: Path, progress: Progress, cancel: threading.Even
         setup = deck.write(run.case, run.engine.name, run.values, work) if step is None else deck.prepare(run.case, run.values)
         if replace(run).inputs != run.inputs:
             raise RunError("its deck was changed since this was planned", f"in {run.case.folder}", "start again")
-        record = _execute(run, work, step, progress, ended, used) | {"derived": deck.derived(setup)}
+        derived = deck.derived(setup)
+        about = {"derived": derived, "walls": walls.resolved(run.case, {**run.values, **derived})}
+        record = _execute(run, work, step, progress, ended, used) | about
         restarts.clear(run, work)
         deck.archive(run.case, work)
         write_json(work / "run.json", record)

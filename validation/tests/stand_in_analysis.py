@@ -52,8 +52,8 @@ def write(folder):
 
 # Only some of them where a test needs the real measurement.
 wanted = os.environ.get("STAND_INS", "verification metrics judge.comparison report campaigns.report.build").split()
-for name, function in (("verification", write), ("metrics", measure), ("metrics", picture), ("metrics", study), ("judge.comparison", compare),
-                       ("report", build), ("campaigns.report.build", build)):
+for name, function in (("verification", write), ("metrics", measure), ("metrics", picture), ("metrics", study),
+                       ("judge.comparison", compare), ("report", build), ("campaigns.report.build", build)):
     if name not in wanted:
         continue
     module = sys.modules.setdefault(f"dembark.validation.{name}", types.ModuleType(f"dembark.validation.{name}"))

@@ -1,13 +1,10 @@
 """Grains of a picture have the pressure that their contacts give them, and are drawn without a display."""
 
 import io
-import sys
 
 import numpy as np
-import pytest
 from PIL import Image
 
-from dembark.common.errors import RunError
 from dembark.postproc import render
 from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.postproc.pictures import packings, saved
@@ -24,12 +21,6 @@ def test_pressure_in_a_grain_between_two_others():
     np.testing.assert_allclose(packings.grain_pressure(frame, links), [0.5 * middle, middle, 0.5 * middle])
     wall = WallContacts(np.array([[-0.5, 0.0, 0.0]]), place[:1], np.array([[6.0, 0.0, 0.0]]))
     np.testing.assert_allclose(packings.grain_pressure(frame, links, [wall]), [middle, middle, 0.5 * middle])
-
-
-def test_a_renderer_that_dies_gives_its_reason(monkeypatch):
-    monkeypatch.setattr(sys, "executable", "/bin/false")
-    with pytest.raises(RunError, match="the renderer ended with code 1"):
-        render.picture(render.Scene(np.zeros((1, 3)), np.ones(1), np.ones(1), "v"))
 
 
 def test_picture_is_drawn_without_a_display(monkeypatch):

@@ -47,16 +47,17 @@ def test_steps_are_those_of_the_deck() -> None:
     assert found.steps == math.ceil(0.3 / found.time_step) + stride * planned.runs[0].values["frames"]
 
 
-def test_rates_are_those_of_the_folder_before_those_of_the_table(tmp_path: Path, decks: Path, stand_in: Path) -> None:
+def test_rates_are_those_of_the_folder_before_those_of_the_case(tmp_path: Path, decks: Path, stand_in: Path) -> None:
     none, facts = Rates(tmp_path / "nothing"), engines.facts("yade")
-    assert none.of("silo", "yade").value == facts.rates["silo"] and none.of("box", "yade").value == facts.typical_rate
+    silo, box = SimpleNamespace(name="silo", rates={"yade": 2e5}), SimpleNamespace(name="box", rates={})
+    assert none.of(silo, "yade").value == silo.rates["yade"] and none.of(box, "yade").value == facts.typical_rate
     for number, (speed, cores, host) in enumerate([(400.0, 4, "a"), (300.0, 1, "a"), (50.0, 1, "b")], start=1):
         place = tmp_path / f"box/dry/yade/replica-{number}"
         place.mkdir(parents=True)
         told = {"host": host, "ranks": 1, "threads": cores, "particle_steps_per_second": speed}
         (place / "run.json").write_text(json.dumps({"inputs": "", "provenance": told}))
     rates = Rates(tmp_path)
-    assert rates.of("box", "yade", 4).value == 100.0 and rates.of("box", "yade", 1).value == 175.0
-    assert "2 runs measured on other hosts" in rates.of("box", "yade", 1).source and rates.of("silo", "yade") == none.of("silo", "yade")
+    assert rates.of(box, "yade", 4).value == 100.0 and rates.of(box, "yade", 1).value == 175.0
+    assert "2 runs measured on other hosts" in rates.of(box, "yade", 1).source and rates.of(silo, "yade") == none.of(silo, "yade")
     (place / "run.json").write_text(json.dumps({"inputs": "", "provenance": told | {"host": socket.gethostname()}}))
-    assert Rates(tmp_path).of("box", "yade", 1).value == 50.0
+    assert Rates(tmp_path).of(box, "yade", 1).value == 50.0
