@@ -54,12 +54,7 @@ MANY_STEPS = {  # of 1000 logs, by their stiffness; 8 of the first is as long as
     64.0: {"penalty": (1.0,), "theta 1": (64.0, 128.0), "theta 1 sweeps 5": (64.0, 128.0)},
 }
 TOLERANCE = 0.1
-SHOWN = (0.1, 1.0, 4.0)  # steps in the guide's tables; the data file has all
-SHOWN_OF_MANY = {
-    1.0: {"penalty": (1.0,), "theta 1": (8.0,), "theta 0.5": (1.0, 4.0), "theta 1 sweeps 5": (8.0, 16.0)},
-    16.0: {"penalty": (1.0,), "theta 1": (32.0,)},
-    64.0: {"penalty": (1.0,), "theta 1": (64.0,)},
-}
+SHOWN = (0.1, 1.0, 4.0)  # steps in the guide's table; the data file has all
 
 
 def restitution(turn: float, law: str, phases: int = 64) -> tuple[float, float]:
@@ -292,18 +287,18 @@ def conclude(found: dict[str, Any]) -> None:
     found["usable_many"] = judge([one for one in found["many"] if one["stiffer"] == 1.0], MANY_LAWS)
 
 
-def cells(entry: dict[str, Any] | None, decimals: int = 0) -> list[str]:
+def cells(entry: dict[str, Any] | None) -> list[str]:
     """Moment, kinetic energy, largest force, microseconds per step and processor time per second of a turning drum."""
     if entry is None:
         return ["–"] * 5
     if "failed" in entry:
         return ["lost logs"] * 3 + ["–"] * 2
-    return [f"{mean:.{decimals}f} ± {half:.{decimals}f}" for mean, half in (entry[name] for name in ("moment", "kinetic", "force"))] + [
+    return [f"{mean:.0f} ± {half:.0f}" for mean, half in (entry[name] for name in ("moment", "kinetic", "force"))] + [
         f"{1e6 * entry['cost_of_a_step']:.0f}", f"{entry['cost']:.2g}"]
 
 
 def markdown(found: dict[str, Any]) -> str:
-    """The first table of the guide."""
+    """The table of the guide."""
     lines = [("| ωτ | law | energy error | torque (N m) | kinetic energy (J) | largest force (N) | µs per step "
               "| s per simulated second |"), "|---|---|---|---|---|---|---|---|"]
     for turn in SHOWN:
@@ -312,17 +307,6 @@ def markdown(found: dict[str, Any]) -> str:
             moving = next((one for one in found["turning"] if one["law"] == law and one["turn"] == turn), None)
             error = "–" if still is None else "lost logs" if still["error"] is None else f"{still['error']:.2g}"
             lines.append(f"| {turn:g} | {label} | {error} | " + " | ".join(cells(moving)) + " |")
-    return "\n".join(lines)
-
-
-def markdown_many(found: dict[str, Any]) -> str:
-    """The second: 1000 logs."""
-    lines = ["| stiffness | ωτ | law | torque (kN m) | kinetic energy (kJ) | largest force (kN) | µs per step | s per simulated second |",
-             "|---|---|---|---|---|---|---|---|"]
-    for one in (one for one in found["many"] if one["turn"] in SHOWN_OF_MANY[one["stiffer"]].get(one["law"], ())):
-        means = {name: [1e-3 * value for value in one[name]] for name in ("moment", "kinetic", "force") if name in one}
-        name = f"{one['stiffer']:g}"
-        lines.append(f"| {name} | {one['turn']:g} | {MANY_LAWS[one['law']]} | " + " | ".join(cells({**one, **means}, 2)) + " |")
     return "\n".join(lines)
 
 

@@ -25,9 +25,8 @@ def test_table_is_that_of_the_data(found: dict[str, Any]) -> None:
     assert page.split("<!-- drum_penalty.py -->\n")[1].split("\n<!-- end -->")[0] == drum_penalty.markdown(found)
 
 
-def test_table_of_many_logs_is_that_of_the_data_and_so_are_the_largest_steps(found: dict[str, Any]) -> None:
+def test_largest_steps_and_costs_of_many_logs_are_those_of_the_data(found: dict[str, Any]) -> None:
     page = (ROOT / "docs/how-to/log_impact_guide.md").read_text(encoding="utf-8")
-    assert page.split("<!-- drum_penalty.py, many -->\n")[1].split("\n<!-- end -->")[0] == drum_penalty.markdown_many(found)
     found = dict(found)
     drum_penalty.conclude(found)
     assert found["usable_many"] == {"theta 1": {"motion": 8.0, "forces": 0.2}, "theta 0.5": {"motion": 4.0, "forces": 1.0},
