@@ -95,8 +95,11 @@ def _is_python(text: str) -> bool:
         return False
 
 
-def columns(page: Path, head: str) -> dict[str, list[str]]:
-    """Of each section of a page the cells of its tables in the columns whose head begins with `head`, where there are some."""
+def parameter_names(page: Path, engine: str) -> dict[str, list[str]]:
+    """Of each section of a page the names in backticks that its tables give for an engine, in the column whose head names it.
+
+    "`a`; YADE: `b`" is `b` in YADE and `a` elsewhere.
+    """
     found: dict[str, list[str]] = {}
     section, at = "", None
     for line in page.read_text(encoding="utf-8").splitlines():
@@ -106,9 +109,15 @@ def columns(page: Path, head: str) -> dict[str, list[str]]:
         if not cells:
             at = None
         elif at is None:
-            at = next((number for number, cell in enumerate(cells) if cell.strip().startswith(head)), -1)
+            at = next((number for number, cell in enumerate(cells) if re.search(rf"\b{engine}\b", cell)), -1)
         elif at >= 0 and not line.startswith("|---"):
-            found.setdefault(section, []).append(cells[at].strip())
+            own, common = [], []
+            for part in cells[at].split(";"):
+                engines, colon, _ = part.partition(": ")
+                (own if engine in engines and colon else [] if colon else common).append(part)
+            # Those of materials and bodies are no names of the engine.
+            found.setdefault(section, []).extend(name for part in own or common if " of the " not in part
+                                                 for name in re.findall(r"`([a-z]\w+)`", part))
     return found
 
 

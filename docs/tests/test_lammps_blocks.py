@@ -76,11 +76,7 @@ def run(text: str, folder: Path) -> str:
 def test_complete_deck(block: Block, tmp_path: Path) -> None:
     assert block.text.startswith("# Complete deck")
     rows = [line.split() for line in run(block.text, tmp_path).splitlines() if re.fullmatch(r"\s*\d[\s\d.e+-]+", line)]
-    if "lcp/impact" in block.text:
-        # Impacts, a force that was the largest, and solutions to rounding.
-        _, logs, _, begun, largest, certificate = map(float, rows[-1])
-        assert len(rows) == 5 and logs == 12 and begun > 20 and largest > 100.0 and certificate < 1e-12
-    elif "integration/monitor" in block.text:
+    if "integration/monitor" in block.text:
         # Errors of positions and velocities, too few steps a contact, one impact.
         _, along, speed, steps, impacts = map(float, rows[-1])
         assert along > 0.0 and speed > 0.005 and 0.0 < steps < 10.0 and impacts == 1

@@ -86,6 +86,8 @@ def deck(lines: list[str]) -> str:
         mesh = MESH.format(scale=1) if "wall mesh" in hits else ""
         return LOGS.format(types=types) + mesh + "\n".join(lines) + "\nfix motion all nve/sphere\nrun 20\n"
     given = {match.group(1) for line in lines if (match := re.match(r"fix \S+ all property/global (\w+)", line))}
+    # With carried liquid a bridge volume is refused.
+    given |= {"bridgeVolume"} if "carried_liquid on" in " ".join(lines) else set()
     head = [line for line in lines if "property/global" in line]
     head += [f"fix default{n} all property/global {name} {value}" for n, (name, value) in enumerate(PROPERTIES.items())
              if name not in given]

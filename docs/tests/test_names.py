@@ -8,7 +8,7 @@ from functools import cache
 
 import pytest
 import typer
-from blocks import PAGES, ROOT, blocks, columns, commands, logical_lines
+from blocks import PAGES, ROOT, blocks, commands, logical_lines, parameter_names
 
 from dembark.postproc import cli as postproc
 from dembark.validation import cli, engines
@@ -186,8 +186,7 @@ def test_keywords_of_liggghts_exist() -> None:
     ("LIGGGHTS", ("plugins/liggghts", "plugins/physics", "plugins/lammps_family")),
     ("LAMMPS", ("plugins/lammps", "plugins/physics", "plugins/lammps_family")), ("Python", ("plugins/python/physics",))])
 def test_parameters_exist(engine: str, folders: tuple[str, ...]) -> None:
-    named = {name for cells in columns(ROOT / "docs/reference/parameters.md", engine).values() for cell in cells
-             for name in re.findall(r"`([a-z]\w+)`", cell)}
+    named = {name for section in parameter_names(ROOT / "docs/reference/parameters.md", engine).values() for name in section}
     source = code(*folders)
     # Those of the stock normal models.
     named -= {"coefficientRestitution", "tangential_damping", "limitForce"} if engine == "LIGGGHTS" else set()

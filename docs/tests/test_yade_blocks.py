@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from blocks import PAGES, ROOT, Block, blocks, columns
+from blocks import PAGES, ROOT, Block, blocks, parameter_names
 
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
@@ -115,10 +115,8 @@ def classes() -> dict[str, list[str]]:
             elif line.startswith("| `") and name:
                 words = [word for word in re.findall(r"`(\w+)(?:\([^`]*\))?`", line.split("|")[1]) if word not in NO_ATTRIBUTES]
                 found.setdefault(name, []).extend(words)
-    for section, cells in columns(PARAMETERS, "YADE").items():
-        # Those of materials and of other bodies, and the value `none`, are no attributes of the class.
-        words = [word for cell in cells if " of the " not in cell for word in re.findall(r"`(\w+)`", cell) if word != "none"]
-        found.setdefault(SECTIONS[section], []).extend(words)
+    for section, attributes in parameter_names(PARAMETERS, "YADE").items():
+        found.setdefault(SECTIONS[section], []).extend(name for name in attributes if name != "none")
     return found
 
 
