@@ -1,4 +1,4 @@
-"""Prints the two tables of docs/theory/single_impacts.md, which has the commands: Kharaz et al. (2001), this project and other codes."""
+"""Prints what docs/theory/single_impacts.md has of Kharaz et al. (2001): the judged quantities, and the points next to other codes."""
 
 from __future__ import annotations
 

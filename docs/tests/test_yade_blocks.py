@@ -67,7 +67,6 @@ CASE = '[parameters.grain_count]\nvalue = 10\n'
 # What complete scripts print, by the class that they show.
 SAID = {"LcpImpact": "impacts: ", "CapillaryLiquid": "all liquid: 1e-09", "EnergyAccount": "balance: True",
         "IntegrationMonitor": "velocity 0.", "SphFluid": "front: 0.",
-        "Ig2_Wall_Sphere_ScGeom": "stopped after 0.0071",
         "Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz": "bridges: 1"}
 # Headings of the pages of YADE below which a table of attributes or methods stands, and pages about one class.
 CLASSES = {"docs/reference/yade_lcp_impact.md": "LcpImpact", "docs/reference/yade_energy_account.md": "EnergyAccount",
