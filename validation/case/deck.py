@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from .model import Case
 
 PACKING = "packing.data"
+_INCLUDED = re.compile(r"{%-?\s*include\s+[\"'](.+?)[\"']")
 
 
 def load_module(path: Path, name: str) -> ModuleType:
@@ -151,6 +152,25 @@ def sources(case: Case, engine: str) -> dict[str, str]:
     return found | {f"derived {name}": expression.text for name, expression in case.derived.items()} | {"outputs": " ".join(case.outputs)}
 
 
+def included(case: Case, engine: str) -> dict[str, str]:
+    """The source of the deck of `engine` and of every file that it includes, directly or through others, by file name."""
+    found: dict[str, str] = {}
+    waiting = [engines.facts(engine).deck]
+    while waiting:
+        name = waiting.pop()
+        path = next((path for folder in _folders(case, engine) if (path := folder / name).is_file()), None)
+        if name not in found and path is not None:
+            found[name] = path.read_text(encoding="utf-8", errors="replace")
+            waiting += _INCLUDED.findall(found[name])
+    return found
+
+
+def _folders(case: Case, engine: str) -> list[Path]:
+    """Where what a deck of `engine` includes is looked for."""
+    shared = package_root() / "common"
+    return [case.folder, shared / engine, shared]
+
+
 def reference_files(case: Case) -> dict[str, Path]:
     """What the case is compared with, in its folder `reference`: data by their names in the case folder, without what only people read."""
     return {str(path.relative_to(case.folder)): path for path in sorted((case.folder / "reference").rglob("*"))
@@ -196,7 +216,7 @@ def _files(case: Case, engine: str, values: Mapping[str, Value], setup: Setup) -
     numbers = {name: engines.DeckNumber(value, _meaning(case, name)) for name, value in known.items()}
     numbers |= {name: engines.DeckNumber(tuple(map(_plain, row))) for name, row in setup.tables.items()}
     try:
-        deck = kind.deck_text(text, numbers, [source.parent, package_root() / "common" / engine, package_root() / "common"])
+        deck = kind.deck_text(text, numbers, _folders(case, engine))
     except jinja2.TemplateError as error:
         line = f", line {error.lineno}" if isinstance(error, jinja2.TemplateSyntaxError) else ""
         raise DembarkError(f"{source}{line}", str(error)) from None

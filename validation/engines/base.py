@@ -69,8 +69,9 @@ class EngineFacts:
     on_path: bool = False
     # What makes the ids in its impact files count from 1.
     impact_id_offset: int = 0
-    # What stands in the source of a deck that writes states to resume from.
+    # What stands in a deck, or in what it includes, when it writes states to resume from; and included files that exclude it.
     restart_words: tuple[str, ...] = ()
+    begun_anew: tuple[str, ...] = ()
     # File name patterns of what it leaves in a run's folder and no result needs.
     leftovers: tuple[str, ...] = ()
     # How the line begins that it writes when a signal makes it stop, if it writes one.

@@ -12,6 +12,7 @@ from pathlib import Path
 from dembark.common.files import read_json, write_json
 from dembark.validation import engines
 from dembark.validation.campaigns.plan import Run
+from dembark.validation.case import deck
 
 # Wall time (s) between states unless another one is asked for.
 INTERVAL = 600.0
@@ -35,9 +36,9 @@ class Attempts:
 
 
 def supported(run: Run) -> bool:
-    """Whether the deck writes states to resume from."""
-    text = run.case.deck(run.engine.name).read_text(encoding="utf-8", errors="replace")
-    return any(word in text for word in run.engine.facts.restart_words)
+    """Whether the deck, with all that it includes, writes states to resume from."""
+    facts, texts = run.engine.facts, deck.included(run.case, run.engine.name)
+    return not texts.keys() & set(facts.begun_anew) and any(word in text for text in texts.values() for word in facts.restart_words)
 
 
 def steps_between(run: Run, interval: float, cores: int) -> int:

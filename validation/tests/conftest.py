@@ -73,7 +73,7 @@ def decks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     root = tmp_path / "decks"
     (root / "box").mkdir(parents=True)
     (root / "box" / "case.toml").write_text(CASE)
-    (root / "box" / "liggghts.in").write_text("# A deck that knows restart_every and resume.\n")
+    (root / "box" / "liggghts.in").write_text("# A deck with fix resume/exact.\n")
     (root / "box" / "yade.py").write_text("p = dembark.parameters()\ndembark.run(p.steps)\n")
     # What measures stands in for the real thing, too.
     (root / "box" / "measure.py").write_text("from dembark.postproc.measurement import Measurement\ndef measure(replicas):\n"

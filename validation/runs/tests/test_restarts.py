@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ from dembark.common.files import read_json
 from dembark.validation import engines
 from dembark.validation.campaigns.plan import Resources, Run, series
 from dembark.validation.case import folders
-from dembark.validation.case.folders import find
+from dembark.validation.case.folders import find, load
 from dembark.validation.runs import restarts, simulate
 
 # The stand-in has ten grains and a hundred steps; this is a state every twenty of them.
@@ -101,6 +102,19 @@ def test_full_disk_costs_no_state(tmp_path: Path) -> None:
     with pytest.raises(RunError, match=r"disk is full.*goes on from step 40"):
         run(tmp_path, behaviour="full")
     assert run(tmp_path, behaviour="full")["resumed_at"] == [40]
+
+
+@pytest.mark.parametrize(("case", "deck", "states"), [
+    ("silo", None, True), ("dam_break_cubes", None, True), ("dam_break", None, False), ("water_tank", None, False),
+    ("silo", '{% include "deck.in" %}', False), ("silo", '{% include "resume.in" %}\nrun ${steps}', False)])
+def test_states_are_written_where_the_deck_or_what_it_includes_has_the_fix(tmp_path: Path, case: str, deck: str | None, states: bool) -> None:
+    found = load(folders.package_root() / case / "case.toml")
+    if deck:
+        (tmp_path / "liggghts.in").write_text(deck)
+        (tmp_path / "deck.in").write_text("variable restart_every index 0\nrun ${steps}\n")
+        found = replace(found, folder=tmp_path)
+    run = replace(plan(), case=found)
+    assert restarts.supported(run) is states
 
 
 def test_deck_that_knows_no_states_is_asked_for_none(tmp_path: Path, decks: Path) -> None:
