@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from dembark.common.errors import DembarkError
+from .errors import DembarkError
 
 EXTRAS = {**dict.fromkeys(("xarray", "h5netcdf", "h5py", "pyvista", "vtkmodules", "threadpoolctl"), "fields"),
           **dict.fromkeys(("matplotlib", "mpl_toolkits", "PIL", "weasyprint"), "report")}
 
 
+def advice(error: Exception) -> tuple[str, ...]:
+    """The library of an extra that an import did not find, and how to install it, as parts of an error line; empty for other errors."""
+    name = (error.name or "").partition(".")[0] if isinstance(error, ModuleNotFoundError) else ""
+    return (f"{name} is not installed", f"pip install 'dembark[{EXTRAS[name]}]'") if name in EXTRAS else ()
+
+
 def missing_extra(error: ModuleNotFoundError, what: str) -> DembarkError:
-    """One line for `what` that needs a library of an extra; raises `error` itself where the module is none of these."""
-    name = (error.name or "").partition(".")[0]
-    if name not in EXTRAS:
+    """The error for `what`, which needs a library of an extra; raises `error` itself for any other module."""
+    if not (found := advice(error)):
         raise error
-    return DembarkError(f"{what} needs {name}", "which is not installed", f"pip install 'dembark[{EXTRAS[name]}]'")
+    return DembarkError(f"{what} needs another package", *found)

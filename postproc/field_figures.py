@@ -14,9 +14,10 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from .labelled import FILE
+
 Array = NDArray[np.float64]
 
-FILE = "fields.nc"
 SEQUENTIAL, DIVERGING = "cividis", "RdBu_r"
 _EDGE = "#9aa1a9"
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import xarray
 
+FILE = "fields.nc"
 Variable = tuple[tuple[str, ...], NDArray[Any], dict[str, str]]
 
 

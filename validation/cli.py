@@ -13,6 +13,7 @@ import typer
 
 from dembark.common.choices import pick
 from dembark.common.errors import DembarkError, RunError
+from dembark.common.extras import missing_extra
 from dembark.common.units import seconds
 from dembark.postproc import cli as postproc
 from dembark.validation import doctor, engines, provenance, show
@@ -216,6 +217,9 @@ def main(words: list[str] | None = None) -> int:
     except DembarkError as error:
         print(f"dembark: {error}", file=sys.stderr)
         return error.exit_code
+    except ModuleNotFoundError as error:
+        print(f"dembark: {missing_extra(error, 'this command')}", file=sys.stderr)
+        return DembarkError.exit_code
     except (typer.Abort, KeyboardInterrupt):
         print("dembark: interrupted", file=sys.stderr)
         return 130

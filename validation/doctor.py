@@ -15,8 +15,9 @@ from dembark.common.errors import DembarkError
 from dembark.validation import engines, provenance
 from dembark.validation.case import folders
 
-_PACKAGES = ("numpy", "scipy", "MDAnalysis", "filelock", "typer", "rich", "pint", "pandas", "jinja2", "matplotlib",
-             "weasyprint", "pyvista", "xarray", "h5netcdf", "h5py")
+# By the extra that installs them; "" is without any.
+_PACKAGES = {"": ("numpy", "scipy", "pandas", "MDAnalysis", "filelock", "jinja2", "pint", "rich", "typer"),
+             "fields": ("xarray", "h5netcdf", "h5py", "pyvista", "threadpoolctl"), "report": ("matplotlib", "weasyprint")}
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,16 @@ def _engine(name: str) -> str:
     return f"{engine.version} ({engine.executable})"
 
 
+def _packages(extra: str, names: tuple[str, ...]) -> Finding:
+    """The packages of an extra with their versions; not found when one is absent."""
+    versions = {name: provenance.package_version(name) for name in names}
+    absent = [name for name, version in versions.items() if version is None]
+    title = f"Python packages for {extra}" if extra else "Python packages"
+    found = None if absent else ", ".join(f"{name} {version}" for name, version in versions.items())
+    right = f"pip install 'dembark[{extra}]'" if extra else "run 'make'"
+    return Finding(title, found, not extra, f"{', '.join(absent)} missing: {right}")
+
+
 def _parts(facts: engines.EngineFacts) -> list[Finding]:
     """What the engine lacks that its users may know from other builds; nothing where it is not installed."""
     try:
@@ -61,14 +72,11 @@ def _decks() -> str:
 
 def examine() -> list[Finding]:
     """All findings: Python and its packages, the engines, the cases, and what is useful but not required."""
-    packages = {name: provenance.package_version(name) for name in _PACKAGES}
-    absent = [name for name, version in packages.items() if version is None]
     mpirun, commit = shutil.which("mpirun"), provenance.commit()
     free = shutil.disk_usage(Path.cwd()).free
     return [
         Finding("Python", platform.python_version() if sys.version_info >= (3, 11) else None, advice="Python 3.11 or newer is needed"),
-        Finding("Python packages", None if absent else ", ".join(f"{name} {version}" for name, version in packages.items()),
-                advice=f"{', '.join(absent)} missing: run 'make'"),
+        *(_packages(extra, names) for extra, names in _PACKAGES.items()),
         *(finding for facts in map(engines.facts, engines.names())
           for finding in (_asked(facts.program, partial(_engine, facts.name), not facts.optional), *_parts(facts))),
         _asked("cases", _decks),

@@ -10,7 +10,7 @@ from typing import Any
 
 from dembark.common.errors import RunError
 from dembark.common.files import read_json
-from dembark.postproc import field_figures, labelled
+from dembark.postproc import labelled
 from dembark.postproc.measurement import Measurement
 from dembark.postproc.replica import Replica
 from dembark.validation import analysis, engines, provenance
@@ -66,7 +66,7 @@ def _measure(folder: Path, case: Case, runs: Sequence[Replica], inputs_hash: str
     with analysis.warnings_kept() as warnings:
         found = measurement.measure(case, runs)
         if found.fields is not None:
-            fields = field_figures.FILE
+            fields = labelled.FILE
             labelled.write(folder / fields, found.fields)
     noted = replace(found, remarks=[*found.remarks, *dict.fromkeys(warnings)], fields=None)
     return measurement_file.write(folder, measurement_file.Measured(inputs_hash, noted, provenance.measured(), fields))

@@ -19,6 +19,7 @@ import numpy as np
 
 from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
+from dembark.common.extras import advice
 from dembark.validation import engines
 
 from . import imports
@@ -56,7 +57,7 @@ def failed(path: Path, error: Exception) -> DembarkError:
     """One line about an `error` that came up in the Python file `path` of a case folder: what, file and line."""
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
     line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
-    return DembarkError(f"{path}{f', line {line}' if line else ''}", f"{type(error).__name__}: {error}")
+    return DembarkError(f"{path}{f', line {line}' if line else ''}", *(advice(error) or [f"{type(error).__name__}: {error}"]))
 
 
 @cache

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from dembark.common.errors import DembarkError, RunError
+from dembark.common.extras import advice
 from dembark.common.files import read_json, retire, write_json, write_whole
 from dembark.postproc import pictures
-from dembark.validation import analysis, metrics, provenance, report, results, verification
-from dembark.validation.campaigns.report import build as campaign_report
+from dembark.validation import analysis, metrics, provenance, results
 from dembark.validation.case.folders import files, find
 from dembark.validation.case.model import Study
 from dembark.validation.judge import comparison, inputs
@@ -136,7 +136,7 @@ def _name(kind: str, place: Path) -> str:
 
 
 def _kind_and_text(error: Exception) -> list[str]:
-    return [f"{type(error).__name__}: {error}"]
+    return [*advice(error)] or [f"{type(error).__name__}: {error}"]
 
 
 @contextmanager
@@ -212,18 +212,19 @@ def compare_engines(folder: Path, sources: Sequence[Path]) -> None:
 
 def build_report(folder: Path) -> None:
     """Write report.html and report.pdf into a results folder (results/<profile> or a campaign's); RunError when that fails."""
-    inputs_hash = _of_report(folder)
-    build = report.build
-    if (folder / CAMPAIGN_FILE).is_file():
-        build = campaign_report.build
-    # The report of a profile includes the verification of the instruments, that of some cases does not.
-    elif results.plan(folder).get("cases"):
-        (folder / VERIFICATION).unlink(missing_ok=True)
-    else:
-        verification.write(folder)
+    inputs_hash, page = _of_report(folder), folder / "report.html"
     # Better none than one of other results.
-    page = folder / "report.html"
     page.unlink(missing_ok=True)
     with _in_one_line(f"the report of {folder} could not be built"):
-        build(folder)
+        # Its libraries are those of an extra.
+        from dembark.validation import report, verification
+        from dembark.validation.campaigns.report import build as campaign_report
+
+        campaign = (folder / CAMPAIGN_FILE).is_file()
+        # The report of a profile includes the verification of the instruments, that of some cases does not.
+        if results.plan(folder).get("cases"):
+            (folder / VERIFICATION).unlink(missing_ok=True)
+        elif not campaign:
+            verification.write(folder)
+        (campaign_report if campaign else report).build(folder)
         write_whole(page, inputs.stamp(page.read_text(encoding="utf-8"), inputs_hash).encode())

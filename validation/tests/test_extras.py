@@ -1,0 +1,73 @@
+"""The package without the libraries of its extras: what is core works, and what is not says in one line which extra it needs."""
+
+import subprocess
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+
+from dembark.common.checkout import checkout
+from dembark.common.extras import EXTRAS
+from dembark.validation import doctor, provenance
+
+BLOCK = f"""
+import sys
+class Block:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {set(EXTRAS)}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+sys.meta_path.insert(0, Block())
+"""
+COMMAND = "from dembark.validation.cli import main; sys.exit(main(sys.argv[1:]))"
+
+
+def blocked(code, *words):
+    return subprocess.run([sys.executable, "-c", BLOCK + code, *map(str, words)], capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(("words", "seen"), [(["--help"], "validate"), (["cases"], "silo"), (["cases", "silo"], "grain_count"),
+                                             (["campaigns"], "silo"), (["doctor"], "Python packages")])
+def test_commands_of_the_core(words, seen):
+    done = blocked(COMMAND, *words)
+    assert seen in done.stdout and "Traceback" not in done.stderr, done.stderr
+
+
+def test_physics_and_dumps_are_of_the_core(tmp_path):
+    (tmp_path / "grains.dump").write_text("ITEM: TIMESTEP\n5\nITEM: NUMBER OF ATOMS\n1\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
+                                          "ITEM: ATOMS id type x y z vx vy vz radius mass\n1 1 .5 .5 .5 0 0 0 .1 2\n")
+    done = blocked("from dembark.physics import capillary_force; from dembark.postproc import GrainsDump\n"
+                   "print(capillary_force(1e-3, 1e-3, 0.0, 1e-12, 0.072, 0.3), GrainsDump(sys.argv[1])[0].radii[0])",
+                   tmp_path / "grains.dump")
+    assert done.returncode == 0, done.stderr
+    assert np.array(done.stdout.split(), float)[1] == 0.1
+
+
+def test_what_is_missing_is_one_line(tmp_path):
+    test_physics_and_dumps_are_of_the_core(tmp_path)
+    done = blocked(COMMAND, "fields", tmp_path / "grains.dump", "--out", tmp_path / "fields.nc")
+    assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
+    assert "xarray" in done.stderr and "pip install 'dembark[fields]'" in done.stderr
+
+
+def test_a_report_without_its_libraries_is_one_line(tmp_path):
+    (tmp_path / "plan.json").write_text('{"runs": []}')
+    done = blocked("from pathlib import Path; from dembark.validation.runs.steps import build_report\n"
+                   "try: build_report(Path(sys.argv[1]))\nexcept Exception as error: print(error)", tmp_path)
+    assert "matplotlib is not installed, pip install 'dembark[report]'" in done.stdout, done.stderr
+
+
+def test_the_doctor_names_the_extra_of_an_absent_package(monkeypatch):
+    known = provenance.package_version
+    monkeypatch.setattr(provenance, "package_version", lambda name: None if name in ("xarray", "scipy") else known(name))
+    core, fields, report = (one for one in doctor.examine() if one.what.startswith("Python packages"))
+    assert (core.found, core.required, fields.found, fields.required, bool(report.found)) == (None, True, None, False, True)
+    assert "scipy missing" in core.advice and "pip install 'dembark[fields]'" in fields.advice
+
+
+def test_the_extras_are_those_of_pyproject():
+    listed = tomllib.loads((checkout() / "pyproject.toml").read_text())["project"]
+    for extra, names in doctor._PACKAGES.items():
+        lines = listed["optional-dependencies"][extra] if extra else listed["dependencies"]
+        assert set(names) == {line.partition(">")[0] for line in lines}
+    assert set(EXTRAS.values()) == set(doctor._PACKAGES) - {""}
