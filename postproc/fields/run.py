@@ -20,7 +20,7 @@ from dembark.common.memory import check_memory
 from ..cli_options import counts, length, near, span
 from ..contacts import ContactFrame
 from ..grains import GrainFrame
-from ..output import dataset, joined
+from ..output.netcdf import dataset, joined
 from ..sources import Selection, mean_diameter
 from ..walls import Inclusion, wall_contacts
 from ..walls.run import WallLoads, wall_lines

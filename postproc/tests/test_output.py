@@ -13,7 +13,8 @@ from scenes import frame_of
 from dembark.common.errors import DembarkError, RunError
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
-from dembark.postproc.output import TimeSeries, dataset, joined, wall_dataset, write_fields, write_grains, write_netcdf, write_wall
+from dembark.postproc.output.netcdf import dataset, joined, wall_dataset, write_netcdf
+from dembark.postproc.output.paraview import TimeSeries, write_fields, write_grains, write_wall
 from dembark.postproc.walls import CylinderWall, MeshWall, Motion, PlaneWall
 from dembark.postproc.walls.patches import cylinder_patches, mesh_patches, plane_patches
 from dembark.postproc.walls.stress import wall_stress
