@@ -1,7 +1,7 @@
-"""Reading a text dump: dembark beside MDAnalysis's LAMMPSDUMP, numpy.loadtxt and numpy.fromstring, on the same file in turn.
+"""Reading a text dump: dembark and MDAnalysis's LAMMPSDUMP, numpy.loadtxt and numpy.fromstring, on the same file in turn.
 
 `python -m benchmarks.dump_parsing` prints and writes medians and the ratios to MDAnalysis of the same round. Every sample is taken in a
-process of its own, whose peak of memory above its start is told too; its numbers must be those that were written.
+process of its own, whose peak of memory above its start is measured too; its numbers must be those that were written.
 """
 
 from __future__ import annotations
@@ -10,44 +10,28 @@ import argparse
 import io
 import itertools
 import multiprocessing
-import os
 import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from datetime import UTC, datetime
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import MDAnalysis
 import numpy as np
 from MDAnalysis.coordinates.LAMMPS import DumpReader
-from rich.console import Console
-from rich.table import Table
 
-from benchmarks.measure import spread
+from benchmarks import frame
+from benchmarks.frame import Sample, spread
 from dembark.common.errors import DembarkError
-from dembark.common.files import write_json
 from dembark.postproc import GrainsDump, TextDump, universe
 
-ROOT = Path(__file__).resolve().parents[1]
 COLUMNS = "id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass"
 # The words of the decks' dump commands.
 FORMAT = "%d %d %.10g %.10g %.10g %d %d %d " + "%.7g " * 9 + "%.9g %.9g "
 REFERENCE = "MDAnalysis LAMMPSDUMP"
 GOAL = 10.0
-
-
-@dataclass(frozen=True)
-class Sample:
-    """Seconds elapsed and of processor time, peak of memory above the start (MB), and what was read."""
-
-    elapsed: float
-    processor: float
-    memory: float
-    checksum: float
 
 
 def write_dump(path: Path, grains: int, frames: int) -> float:
@@ -141,106 +125,74 @@ def _measure(name: str, path: Path, sender: multiprocessing.connection.Connectio
     Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
     before, start, used = _memory("VmRSS"), time.perf_counter(), time.process_time()
     checksum = SUBJECTS[name](path)
-    sender.send(Sample(time.perf_counter() - start, time.process_time() - used, max(_memory("VmHWM") - before, 0.0), checksum))
+    sender.send({"elapsed": time.perf_counter() - start, "processor": time.process_time() - used,
+                 "memory": max(_memory("VmHWM") - before, 0.0), "checksum": checksum})
 
 
-def sample(name: str, path: Path) -> Sample:
-    """One reading in a process of its own."""
+def sample(name: str, path: Path, expected: float) -> Sample:
+    """One reading in a process of its own: seconds elapsed and of processor time, peak of memory above the start (MB); DembarkError when
+    its numbers are not those `expected`."""
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
     child = context.Process(target=_measure, args=(name, path, sender))
     child.start()
     sender.close()
     try:
-        return receiver.recv()
+        found: dict[str, float] = receiver.recv()
     except EOFError:
         raise DembarkError(f"{name} did not read {path}") from None
     finally:
         child.join()
-
-
-def measure(path: Path, expected: float, rounds: int, say: Callable[[str], None]) -> dict[str, list[Sample]]:
-    """`rounds` samples of every subject, in turn; DembarkError when one reads other numbers."""
-    samples: dict[str, list[Sample]] = {name: [] for name in SUBJECTS}
-    for number in range(rounds):
-        # Every second round runs backwards, so that a machine that slows down steadily favours nobody.
-        for name in list(SUBJECTS)[:: 1 if number % 2 == 0 else -1]:
-            say(f"round {number + 1} of {rounds}: {name}")
-            one = sample(name, path)
-            # MDAnalysis keeps single precision.
-            if not abs(one.checksum - expected) <= 1e-6 * abs(expected):
-                raise DembarkError(f"{name} reads other numbers", f"their sum is {one.checksum:.9g} instead of {expected:.9g}")
-            samples[name].append(one)
-    return samples
-
-
-def rows(samples: dict[str, list[Sample]], megabytes: float) -> list[dict[str, Any]]:
-    """One entry a subject: times, how many times faster than the reference in the same round, peak of memory."""
-    found = []
-    for name, own in samples.items():
-        row: dict[str, Any] = {"subject": name, "memory": max(one.memory for one in own)}
-        for clock in ("elapsed", "processor"):
-            times = [getattr(one, clock) for one in own]
-            row[clock] = spread(times)
-            row[f"{clock}_ratio"] = spread([getattr(other, clock) / one for one, other in zip(times, samples[REFERENCE], strict=True)])
-        row["speed"] = megabytes / row["elapsed"]["median"]
-        row["met"] = row["elapsed_ratio"]["median"] >= GOAL if name.startswith("dembark TextDump") else None
-        found.append(row)
+    # MDAnalysis keeps single precision.
+    if not abs(found["checksum"] - expected) <= 1e-6 * abs(expected):
+        raise DembarkError(f"{name} reads other numbers", f"their sum is {found['checksum']:.9g} instead of {expected:.9g}")
     return found
 
 
-HEADS = ["reader", "elapsed / s", "MB/s", "times as fast", "processor / s", "times as fast (processor)", "peak memory / MB",
-         f"goal {GOAL:g} x"]
+HEADS = ("reader", "elapsed / s", "MB/s", "times as fast", "processor / s", "times as fast (processor)", "peak memory / MB",
+         f"goal {GOAL:g} x")
 
 
-def texts(row: dict[str, Any]) -> list[str]:
-    """Cells of a row as a reader wants them."""
-    def ratio(clock: str) -> str:
-        part = row[f"{clock}_ratio"]
-        return f"{part['median']:.3g} ({part['min']:.3g}-{part['max']:.3g})"
+def cells(row: Mapping[str, Any], megabytes: float) -> list[str]:
+    """A row of the table."""
+    fast = [f"{1.0 / row[f'{clock}_ratio_median']:.3g} ({1.0 / row[f'{clock}_ratio_max']:.3g}-{1.0 / row[f'{clock}_ratio_min']:.3g})"
+            for clock in ("elapsed", "processor")]
+    return [row["subject"], spread(row, "elapsed"), f"{megabytes / row['elapsed_median']:.3g}", fast[0], spread(row, "processor"), fast[1],
+            f"{row['memory_max']:.0f}", {True: "met", False: "MISSED", None: ""}[met(row)]]
 
-    goal = "" if row["met"] is None else "met" if row["met"] else "MISSED"
-    return [row["subject"], f"{row['elapsed']['median']:.3f}", f"{row['speed']:.3g}", ratio("elapsed"), f"{row['processor']['median']:.3f}",
-            ratio("processor"), f"{row['memory']:.0f}", goal]
+
+def met(row: Mapping[str, Any]) -> bool | None:
+    """Whether a subject with a goal reaches it."""
+    return 1.0 / row["elapsed_ratio_median"] >= GOAL if row["subject"].startswith("dembark TextDump") else None
 
 
 def parsed(words: list[str] | None) -> argparse.Namespace:
-    """The options of the command line; ends the program when one is wrong."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.dump_parsing", description=__doc__.splitlines()[0])
+    """The options of the command line."""
+    parser = frame.parser("dump_parsing", __doc__, rounds=3)
     parser.add_argument("--grains", type=int, default=50000, help="grains in a frame (default %(default)s)")
     parser.add_argument("--frames", type=int, default=3, help="frames (default %(default)s)")
-    parser.add_argument("--rounds", type=int, default=3, help="samples of each reader (default %(default)s)")
-    parser.add_argument("--out", type=Path, default=ROOT / "results/bench", help="folder of dump_parsing.json")
     given = parser.parse_args(words)
-    if min(given.grains, given.frames, given.rounds) < 1:
-        raise DembarkError("--grains, --frames and --rounds", "", "give whole numbers from 1 on")
+    frame.at_least_one(given, "grains", "frames")
     return given
 
 
+def measure(given: argparse.Namespace) -> int:
+    """Run, print and write the table; 1 when a goal is missed."""
+    with tempfile.TemporaryDirectory(prefix="dembark-") as folder:
+        path = Path(folder) / "grains.dump"
+        expected = write_dump(path, given.grains, given.frames)
+        size = path.stat().st_size / 1e6
+        samples = frame.in_turn("dump", {name: partial(sample, name, path, expected) for name in SUBJECTS}, given.rounds)
+    rows = frame.summary(samples, ("elapsed", "processor", "memory"))
+    frame.write(given.out, "dump_parsing", "Reading a text dump", [
+        f"{given.frames} frames of {given.grains} grains, {size:.0f} MB; median (least-greatest) of {given.rounds} rounds.",
+        frame.markdown(HEADS, (cells(row, size) for row in rows))], rows, frame.facts(("MDAnalysis", "numpy")))
+    return int(any(met(row) is False for row in rows))
+
+
 def main(words: list[str] | None = None) -> int:
-    """Run, print and write the table; the exit code is 1 when the goal is missed, 2 when an option is wrong."""
-    console = Console(width=None if sys.stdout.isatty() else 160)
-    try:
-        given = parsed(words)
-        with tempfile.TemporaryDirectory(prefix="dembark-") as folder:
-            path = Path(folder) / "grains.dump"
-            expected = write_dump(path, given.grains, given.frames)
-            size = path.stat().st_size / 1e6
-            found = rows(measure(path, expected, given.rounds, lambda line: print(line, file=sys.stderr)), size)
-    except DembarkError as error:
-        print(error, file=sys.stderr)
-        return error.exit_code
-    what = f"{given.frames} frames of {given.grains} grains, {size:.0f} MB; median (least-greatest) of {given.rounds} rounds"
-    table = Table(*HEADS, title=what)
-    for row in found:
-        table.add_row(*texts(row))
-    console.print(table)
-    given.out.mkdir(parents=True, exist_ok=True)
-    facts = {"date": datetime.now(UTC).isoformat(timespec="seconds"), "cores": os.cpu_count(), "load": os.getloadavg()[0],
-             "grains": given.grains, "frames": given.frames, "megabytes": size,
-             "mdanalysis": MDAnalysis.__version__, "numpy": np.__version__}
-    write_json(given.out / "dump_parsing.json", {"rows": found, "provenance": facts})
-    return 0 if all(row["met"] is not False for row in found) else 1
+    """The exit code is 1 when the goal is missed, 2 when an option is wrong."""
+    return frame.ended(lambda: measure(parsed(words)))
 
 
 if __name__ == "__main__":

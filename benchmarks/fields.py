@@ -2,33 +2,29 @@
 
 One frame of a dense disordered packing (a simple cubic lattice with jitter, three contacts a grain) is spread onto a grid. numpy gets a
 share of the contacts and grains, picked at random, for all of them would take minutes; times a contact are compared. Wall time counts, and
-processor time beside it, which says what a machine without other work would need at least.
+processor time is given, too, which says what a machine without other work would need at least.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-import resource
-import statistics
 import sys
 import time
-from collections.abc import Callable, Sequence
-from datetime import UTC, datetime
+from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from benchmarks import frame
+from benchmarks.frame import Sample, spread
 from dembark import _fields
 from dembark.common.errors import DembarkError
-from dembark.common.files import write_json
 from dembark.postproc.contacts import ContactFrame
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.grains import GrainFrame
-from dembark.validation.provenance import commit, cpu, package_version
 
 DIAMETER = 0.005
 CASES = (("gaussian", 1.5), ("gaussian", 0.75), ("gaussian", 3.0), ("lucy", 3.0), ("heaviside", 2.0))  # widths in diameters
@@ -65,83 +61,57 @@ def share(grains: GrainFrame, contacts: ContactFrame, part: float, seed: int = 2
     return grains.select(wanted), kept
 
 
-def timed(work: Callable[[], Any]) -> tuple[float, float]:
-    """Wall and processor seconds of `work`."""
+def timed(grains: GrainFrame, contacts: ContactFrame, grid: Grid, kernel: str, width: float, **how: object) -> Sample:
+    """Wall and processor seconds of one coarse graining, `width` in diameters, and wall time a contact (us)."""
     wall, processor = time.perf_counter(), time.process_time()
-    work()
-    return time.perf_counter() - wall, time.process_time() - processor
+    coarse_grain(grains, contacts, grid, kernel=kernel, width=width * DIAMETER, **how)  # type: ignore[arg-type]
+    wall = time.perf_counter() - wall
+    return {"wall": wall, "processor": time.process_time() - processor, "each": 1e6 * wall / len(contacts.ids)}
 
 
-def row(backend: str, kernel: str, width: float, threads: int, samples: Sequence[tuple[float, float]], contacts: int) -> dict[str, Any]:
-    """One line of the table; `width` in diameters."""
-    walls, processors = zip(*samples, strict=True)
-    wall = statistics.median(walls)
-    return {
-        "backend": backend, "kernel": kernel, "width": width, "threads": threads, "contacts": contacts, "wall": wall,
-        "wall_min": min(walls), "processor": statistics.median(processors), "microseconds_per_contact": 1e6 * wall / contacts,
-        "samples": len(samples),
-    }  # fmt: skip
-
-
-def measure(
-    edge: int, cells: int, cases: Sequence[tuple[str, float]], rounds: int, part: float, say: Callable[[str], None]
-) -> list[dict[str, Any]]:
-    """All rows: compiled on one and on all threads, and numpy on a `part` of the contacts."""
-    grains, contacts = packing(edge)
-    few_grains, few_contacts = share(grains, contacts, part)
-    grid = Grid(grains.low, grains.high, (cells,) * 3, (True,) * 3)
-    rows = []
+def measure(edge: int, cells: int, cases: Sequence[tuple[str, float]], rounds: int, part: float) -> pd.DataFrame:
+    """Samples of all kernels: compiled on one and on all threads, and numpy, once, on a `part` of the contacts."""
+    whole = packing(edge)
+    few = share(*whole, part)
+    grid = Grid(whole[0].low, whole[0].high, (cells,) * 3, (True,) * 3)
+    found = []
     for kernel, width in cases:
-        spread = partial(coarse_grain, kernel=kernel, width=width * DIAMETER)
-        for threads in sorted({1, len(os.sched_getaffinity(0))}):
-            say(f"{kernel}, {width:g} d, compiled on {threads}")
-            samples = [timed(partial(spread, grains, contacts, grid, threads=threads)) for _ in range(rounds)]
-            rows.append(row("native", kernel, width, threads, samples, len(contacts.ids)))
-        say(f"{kernel}, {width:g} d, numpy on {len(few_contacts.ids)} contacts")
-        samples = [timed(partial(spread, few_grains, few_contacts, grid, backend="numpy"))]
-        rows.append(row("numpy", kernel, width, 1, samples, len(few_contacts.ids)))
-    return rows
+        title = f"{kernel}, {width:g} d"
+        subjects = {f"compiled, {threads} threads": partial(timed, *whole, grid, kernel, width, threads=threads)
+                    for threads in sorted({1, len(os.sched_getaffinity(0))})}
+        found += [frame.in_turn(title, subjects, rounds),
+                  frame.in_turn(title, {"numpy": partial(timed, *few, grid, kernel, width, backend="numpy")}, 1)]
+    return pd.concat(found, ignore_index=True)
 
 
-def table(rows: Sequence[dict[str, Any]]) -> str:
-    """The rows as Markdown."""
-    lines = ["| kernel | width / d | by | threads | contacts | wall s | processor s | us a contact |", "|---|---|---|---|---|---|---|---|"]
-    lines += [
-        f"| {one['kernel']} | {one['width']:g} | {one['backend']} | {one['threads']} | {one['contacts']} | {one['wall']:.2f} | "
-        f"{one['processor']:.2f} | {one['microseconds_per_contact']:.2f} |" for one in rows]
-    return "\n".join(lines)
+def parsed(words: Sequence[str] | None) -> argparse.Namespace:
+    """The options of the command line."""
+    parser = frame.parser("fields", __doc__, rounds=3)
+    parser.add_argument("--edge", type=int, default=100, help="grains along an edge of the cube (100: 1e6 grains, 3e6 contacts)")
+    parser.add_argument("--cells", type=int, default=64, help="cells along an edge of the grid")
+    parser.add_argument("--part", type=float, default=0.005, help="share of the contacts that numpy gets")
+    given = parser.parse_args(words)
+    frame.at_least_one(given, "cells")
+    if given.edge < 3 or not 0.0 < given.part <= 1.0:
+        raise DembarkError("--edge or --part out of range", "", "edge >= 3, 0 < part <= 1")
+    return given
+
+
+def run(given: argparse.Namespace) -> None:
+    """Measure, print and write the table."""
+    samples = measure(given.edge, given.cells, CASES, given.rounds, given.part)
+    rows = frame.summary(samples, ("wall", "processor", "each"))
+    known = frame.facts(grains=given.edge**3, contacts=3 * given.edge**3, cells=given.cells**3, instruction_set=_fields.instruction_set())
+    table = frame.markdown(("kernel, width", "by", "wall s", "processor s", "us a contact"),
+                           ([row["comparison"], row["subject"], *(spread(row, part) for part in ("wall", "processor", "each"))]
+                            for row in rows))
+    frame.write(given.out, "fields", "Coarse graining", [table], rows, known)
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run and print; exit code."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.fields", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--edge", type=int, default=100, help="grains along an edge of the cube (100: 1e6 grains, 3e6 contacts)")
-    parser.add_argument("--cells", type=int, default=64, help="cells along an edge of the grid")
-    parser.add_argument("--rounds", type=int, default=3, help="samples of the compiled code")
-    parser.add_argument("--part", type=float, default=0.005, help="share of the contacts that numpy gets")
-    parser.add_argument("--out", type=Path, help="a JSON file for the figures")
-    given = parser.parse_args(words)
-    try:
-        if given.edge < 3 or given.cells < 1 or given.rounds < 1 or not 0.0 < given.part <= 1.0:
-            raise DembarkError("--edge, --cells, --rounds or --part out of range", "", "edge >= 3, cells >= 1, rounds >= 1, 0 < part <= 1")
-        load = os.getloadavg()[0]
-        rows = measure(given.edge, given.cells, CASES, given.rounds, given.part, lambda line: print(line, file=sys.stderr))
-        facts = {
-            "grains": given.edge**3, "contacts": 3 * given.edge**3, "cells": given.cells**3, "cpu": cpu(),
-            "cores": len(os.sched_getaffinity(0)), "instruction_set": _fields.instruction_set(), "load": load,
-            "load_after": os.getloadavg()[0], **commit(),
-            "version": package_version("dembark"), "peak_memory_bytes": 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
-            "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        }  # fmt: skip
-        print(table(rows))
-        print(", ".join(f"{name} {value}" for name, value in facts.items()))
-        if given.out:
-            write_json(given.out, {"facts": facts, "rows": rows})
-    except DembarkError as error:
-        print(f"dembark: {error}", file=sys.stderr)
-        return error.exit_code
-    return 0
+    """The exit code is 2 when an option is wrong."""
+    return frame.ended(lambda: run(parsed(words)))
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    sys.exit(main())

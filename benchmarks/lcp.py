@@ -1,31 +1,27 @@
-"""Measure the LCP solver beside Siconos's: `python -m benchmarks.lcp`, or `python -m benchmarks.run --only lcp`."""
+"""Measure the LCP solver and Siconos's: `python -m benchmarks.lcp`, or `python -m benchmarks.run --only lcp`."""
 
 from __future__ import annotations
 
-import argparse
-import csv
 import json
 import os
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
-from datetime import UTC, datetime
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from benchmarks import frame
+from benchmarks.frame import HERE, say
 from benchmarks.lcp_cases import Problem, certificate, coupled, network, sequence
 from dembark.common.errors import DembarkError, RunError
-from dembark.common.files import write_json
 from dembark.physics import LcpResult, LcpSolver, solve_lcp
-from dembark.validation.provenance import commit, cpu, package_version
 
-HERE = Path(__file__).parent
 SYSTEM_PYTHON = "/usr/bin/python3"
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 SIZES = (10, 25, 50, 100, 200, 400, 800)
@@ -48,21 +44,10 @@ def siconos_version() -> str | None:
     return named.stdout.strip() or "of unknown version"
 
 
-class Row:
-    """The samples of one solver on one problem."""
-
-    def __init__(self, case: str, contacts: int, solver: str) -> None:
-        self.case, self.contacts, self.solver = case, contacts, solver
-        self.seconds: list[float] = []
-        self.facts: dict[str, Any] = {}
-
-    def summary(self) -> dict[str, Any]:
-        """Median and spread, ready for JSON."""
-        return {"case": self.case, "contacts": self.contacts, "solver": self.solver, "median": statistics.median(self.seconds),
-                "min": min(self.seconds), "max": max(self.seconds), "samples": len(self.seconds), **self.facts}
+Row = dict[str, Any]
 
 
-def own(problem: Problem, clock: Callable[[], float], row: Row, **how: Any) -> LcpResult:
+def own(problem: Problem, clock: Callable[[], float], **how: Any) -> Row:
     """One cold call with all its checks; short ones are repeated until 20 ms are full."""
     count, before = 0, clock()
     while True:
@@ -71,162 +56,137 @@ def own(problem: Problem, clock: Callable[[], float], row: Row, **how: Any) -> L
         spent = clock() - before
         if spent > 0.02 or count == 200:
             break
-    row.seconds.append(spent / count)
-    row.facts = {"pivots": result.pivots, "block_steps": result.block_steps, "islands": result.islands,
-                 "used_fallback": result.used_fallback, "status": result.status, "active": int(result.active.sum()),
-                 "certificate": certificate(problem, result.z)}
-    return result
+    return {"seconds": spent / count, **_facts(result), "certificate": certificate(problem, result.z)}
 
 
-def peers(problem: Problem, rows: dict[str, Row], wall: bool) -> None:
-    """One process with Siconos that runs its methods once each."""
+def _facts(result: LcpResult) -> Row:
+    return {"pivots": result.pivots, "block_steps": result.block_steps, "status": result.status, "active": int(result.active.sum())}
+
+
+def peer(problem: Problem, name: str, wall: bool) -> Row:
+    """One call of a method of Siconos, in a process of its own."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "problem.npz"
-        dense = problem.M if isinstance(problem.M, np.ndarray) else problem.M.toarray()
-        np.savez(path, M=dense, q=problem.q)
-        command = [SYSTEM_PYTHON, str(HERE / "lcp_siconos.py"), str(path), "wall" if wall else "cpu", *rows]
+        np.savez(path, M=problem.dense, q=problem.q)
+        command = [SYSTEM_PYTHON, str(HERE / "lcp_siconos.py"), str(path), "wall" if wall else "cpu", name]
         done = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, **ONE_THREAD}, timeout=900)
     if done.returncode:
-        lines = done.stderr.strip().splitlines() or ["no message"]
-        raise RunError("Siconos", lines[-1], "run the command by hand: it must find siconos.numerics")
-    for name, found in json.loads(done.stdout.strip().splitlines()[-1]).items():
-        rows[name].seconds.append(found["seconds"])
-        rows[name].facts = {"iterations": found["iterations"], "status": "solved" if found["info"] == 0 else f"info {found['info']}",
-                            "certificate": certificate(problem, np.array(found["z"]))}
+        raise RunError("Siconos", (done.stderr.strip().splitlines() or ["no message"])[-1], "it must find siconos.numerics")
+    found = json.loads(done.stdout.strip().splitlines()[-1])[name]
+    status = "solved" if found["info"] == 0 else f"info {found['info']}"
+    return {"seconds": found["seconds"], "iterations": found["iterations"], "status": status,
+            "certificate": certificate(problem, np.array(found["z"]))}
 
 
-def beside(case: str, problem: Problem, rounds: int, wall: bool, with_peers: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
-    """A dense problem, dembark's methods and Siconos's in turn; every second round the other way round."""
+def rows_of(samples: pd.DataFrame, contacts: int) -> list[Row]:
+    """An entry for each solver: median and spread of its seconds, and the facts of its last call."""
+    found = []
+    for (case, solver), own_samples in samples.groupby(["comparison", "subject"], sort=False):
+        seconds, last = own_samples["seconds"], own_samples.iloc[-1].drop(["comparison", "subject", "round", "seconds"]).dropna()
+        found.append({"case": case, "contacts": contacts, "solver": solver, "median": float(seconds.median()), "min": float(seconds.min()),
+                      "max": float(seconds.max()), "samples": len(seconds), **{key: _plain(value) for key, value in last.items()}})
+    return found
+
+
+def _plain(value: Any) -> Any:
+    value = value.item() if isinstance(value, np.generic) else value
+    return int(value) if isinstance(value, float) and value.is_integer() and value else value
+
+
+def cold(case: str, problem: Problem, rounds: int, wall: bool, methods: Sequence[str], peers: Sequence[str]) -> list[Row]:
+    """A problem from nothing, by dembark's `methods` and by `peers`, in turn."""
     clock = time.perf_counter if wall else time.process_time
-    n = len(problem.q)
-    mine = {name: Row(case, n, f"dembark {name}") for name in ("auto", "energy", "block", "murty", "pgs")}
-    theirs = {name: Row(case, n, f"Siconos {name}") for name in PEERS}
-    say(f"{case}, {n} contacts: {rounds} rounds")
-    for turn in range(rounds):
-        tasks: list[Callable[[], object]] = [partial(own, problem, clock, row, method=name) for name, row in mine.items()]
-        if with_peers:
-            tasks.append(partial(peers, problem, theirs, wall))
-        for task in tasks if turn % 2 == 0 else reversed(tasks):
-            task()
-    return [row.summary() for row in [*mine.values(), *theirs.values()] if row.seconds]
+    subjects = {f"dembark {name}": partial(own, problem, clock, method=name) for name in methods}
+    subjects |= {f"Siconos {name}": partial(peer, problem, name, wall) for name in peers}
+    return rows_of(frame.in_turn(f"{case}", subjects, rounds), len(problem.q))
 
 
-def expected(row: dict[str, Any], contacts: int) -> float:
+def expected(row: Row, contacts: int) -> float:
     """Seconds of a peer at `contacts` from those at a smaller size: a sweep costs its square, a factorisation its cube."""
     return row["median"] * (contacts / row["contacts"]) ** (2 if row["solver"].endswith("pgs") else 3)
 
 
-def cold_networks(sizes: tuple[int, ...], rounds: int, wall: bool, with_peers: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
-    """Sparse planar networks from nothing: checks, islands, order, answer; the peers, which store them dense, once, while they can."""
-    clock = time.perf_counter if wall else time.process_time
-    rows: list[dict[str, Any]] = []
-    going: dict[str, dict[str, Any] | None] = dict.fromkeys(PEERS if with_peers else ())
+def cold_networks(sizes: Sequence[int], rounds: int, wall: bool, peers: Sequence[str]) -> list[Row]:
+    """Sparse planar networks; the peers, which store them dense, once, while they can."""
+    rows: list[Row] = []
+    going: dict[str, Row | None] = dict.fromkeys(peers)
     for n in sizes:
-        say(f"sparse network, {n} contacts: {rounds} rounds")
         problem = network(n)
-        pair = {name: Row("network, sparse", n, f"dembark {name}") for name in ("auto", "pgs")}
-        for _ in range(rounds):
-            for name, row in pair.items():
-                own(problem, clock, row, method=name)
-        rows += [row.summary() for row in pair.values()]
-        going = {name: last for name, last in going.items()
-                 if 8 * n**2 <= LARGEST and (last is None or expected(last, n) <= LONGEST)}
-        theirs = {name: Row("network, sparse", n, f"Siconos {name}") for name in going}
-        if theirs:
-            say(f"sparse network, {n} contacts, stored dense: Siconos {', '.join(theirs)}")
-            peers(problem, theirs, wall)
-        found = {name: row.summary() for name, row in theirs.items()}
-        going = {**found}
-        rows += found.values()
+        rows += cold("network, sparse", problem, rounds, wall, ("auto", "pgs"), ())
+        able = [name for name, last in going.items() if 8 * n**2 <= LARGEST and (last is None or expected(last, n) <= LONGEST)]
+        found = cold("network, sparse", problem, 1, wall, (), able) if able else []
+        going = dict(zip(able, found, strict=True))
+        rows += found
     return rows
 
 
-def warm(contacts: int, steps: int, wall: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
+def warm(contacts: int, steps: int, wall: bool) -> list[Row]:
     """Time steps of a network, each from the last one's active set, with and without the checks of the input."""
     clock = time.perf_counter if wall else time.process_time
     say(f"warm starts, {contacts} contacts: {steps} steps")
-    problems, rows = sequence(contacts, steps + 1), []
+    problems, found = sequence(contacts, steps + 1), []
     for check in (True, False):
-        row = Row("network, warm", contacts, f"dembark auto{'' if check else ', unchecked'}")
-        solver = LcpSolver()
+        solver, rows = LcpSolver(), []
         result = solver.solve(problems[0].M, problems[0].q)
-        work, worst, moved = 0, 0.0, 0
-        for problem in problems[1:]:
-            start = result.active
-            before = clock()
+        for step, problem in enumerate(problems[1:]):
+            start, before = result.active, clock()
             result = solver.solve(problem.M, problem.q, start=start, check=check)
-            row.seconds.append(clock() - before)
-            work += result.block_steps
-            moved += int((result.active != start).sum())
-            worst = max(worst, certificate(problem, result.z))
-        row.facts = {"block_steps": work / steps, "moved": moved / steps, "active": int(result.active.sum()), "pivots": result.pivots,
-                     "status": result.status, "certificate": worst}
-        rows.append(row.summary())
-    return rows
+            rows.append({"seconds": clock() - before, **_facts(result), "moved": int((result.active != start).sum()), "round": step,
+                         "certificate": certificate(problem, result.z)})
+        samples = pd.DataFrame(rows).assign(comparison="network, warm", subject=f"dembark auto{'' if check else ', unchecked'}")
+        mean = {name: float(samples[name].mean()) for name in ("block_steps", "moved")}
+        found.append(rows_of(samples, contacts)[0] | mean | {"certificate": float(samples["certificate"].max())})
+    return found
 
 
-def goals(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """What is asked of the largest problems, and what came out."""
+# Of the largest problems: case, contacts, solver, the one that it is compared with, and the least ratio, or else the most seconds.
+GOALS = (*((case, 800, solver, other, least) for case in ("coupled", "network, stored dense") for solver, other, least in (
+             ("dembark auto", "Siconos lemke", 10.0), ("dembark auto", "Siconos pgs", 1.0), ("dembark energy", "Siconos lemke", 2.0))),
+         ("network, sparse", 20000, "dembark auto", "", 0.25), ("network, warm", 1000, "dembark auto", "", 1e-3),
+         ("network, warm", 1000, "dembark auto, unchecked", "", 1e-3))
+
+
+def goals(rows: Sequence[Row]) -> list[Row]:
+    """What is aimed at, and what came out, where it was measured."""
     found = {(row["case"], row["contacts"], row["solver"]): row["median"] for row in rows}
     result = []
-
-    def ask(text: str, value: float | None, bound: float, more: bool) -> None:
-        if value is not None:
-            result.append({"goal": text, "value": value, "bound": bound, "met": bool(value >= bound if more else value <= bound)})
-
-    for case in ("coupled", "network, stored dense"):
-        def ratio(other: str, own_: str, case: str = case) -> float | None:
-            a, b = found.get((case, 800, other)), found.get((case, 800, own_))
-            return a / b if a and b else None
-
-        ask(f"{case}, 800: auto faster than Siconos's Lemke by", ratio("Siconos lemke", "dembark auto"), 10.0, True)
-        ask(f"{case}, 800: auto faster than Siconos's PGS by", ratio("Siconos pgs", "dembark auto"), 1.0, True)
-        ask(f"{case}, 800: energy faster than Siconos's Lemke by", ratio("Siconos lemke", "dembark energy"), 2.0, True)
-    ask("sparse network, 20000 contacts, cold, s", found.get(("network, sparse", 20000, "dembark auto")), 0.25, False)
-    ask("warm step of 1000 contacts, checked, s", found.get(("network, warm", 1000, "dembark auto")), 1e-3, False)
-    ask("warm step of 1000 contacts, unchecked, s", found.get(("network, warm", 1000, "dembark auto, unchecked")), 1e-3, False)
+    for case, contacts, solver, other, bound in GOALS:
+        mine, its = found.get((case, contacts, solver)), found.get((case, contacts, other), 1.0 if not other else None)
+        if mine and its:
+            value = its / mine if other else mine
+            how = f" faster than {other} by" if other else ", s"
+            text = f"{case}, {contacts}: {solver}{how}"
+            result.append({"goal": text, "value": value, "bound": bound, "met": bool(value >= bound if other else value <= bound)})
     return result
 
 
-def markdown(rows: list[dict[str, Any]], asked: list[dict[str, Any]], facts: dict[str, Any]) -> str:
-    """The table."""
-    heads = ["problem", "contacts", "solver", "median / ms", "least-greatest / ms", "pivots", "block steps", "certificate", "status"]
-    lines = ["# The LCP solver beside Siconos", "",
-             f"{facts['clock']}, medians of rounds in turn, one thread, calls from Python with all checks of the input; both to 1e-12.", "",
-             "| " + " | ".join(heads) + " |", "|" + " --- |" * len(heads)]
-    for row in rows:
-        steps = row.get("block_steps", "")
-        low, middle, high = (f"{row[which] * 1e3:.3f}" for which in ("min", "median", "max"))
-        cells = [row["case"], row["contacts"], row["solver"], middle, f"{low}-{high}", row.get("pivots", row.get("iterations", "")),
-                 f"{steps:.1f}" if isinstance(steps, float) else steps, f"{row['certificate']:.1e}", row["status"]]
-        lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
-    lines += ["", "| goal | value | asked | |", "| --- | --- | --- | --- |"]
-    lines += [f"| {goal['goal']} | {goal['value']:.3g} | {goal['bound']:g} | {'met' if goal['met'] else 'MISSED'} |" for goal in asked]
-    if not facts["versions"].get("siconos"):
-        lines += ["", ("Siconos's methods, and the goals that compare with them, are left out: the system's Python has no Siconos "
-                       "(python3-siconos, not in every release of Debian).")]
-    versions = ", ".join(f"{name} {version}" for name, version in facts["versions"].items() if version)
-    lines += ["", (f"{facts['date']}, {facts['cpu']}, {facts['cores']} cores, load {facts['load']:.1f} before and "
-                   f"{facts['load_after']:.1f} after, commit {facts['commit'] or 'none'}{' with changes' if facts['dirty'] else ''}, "
-                   f"{versions}."), ""]
-    return "\n".join(lines)
+HEADS = ("problem", "contacts", "solver", "median / ms", "least-greatest / ms", "pivots", "block steps", "certificate", "status")
+MISSING = ("Siconos's methods, and the goals that compare with them, are left out: the system's Python has no Siconos "
+           "(python3-siconos, not in every release of Debian).")
 
 
-def table(rows: list[dict[str, Any]], path: Path) -> None:
+def cells(row: Mapping[str, Any]) -> list[object]:
+    """A row of the table."""
+    low, middle, high = (f"{row[which] * 1e3:.3f}" for which in ("min", "median", "max"))
+    steps = row.get("block_steps", "")
+    return [row["case"], row["contacts"], row["solver"], middle, f"{low}-{high}", row.get("pivots", row.get("iterations", "")),
+            f"{steps:.1f}" if isinstance(steps, float) else steps, f"{row['certificate']:.1e}", row["status"]]
+
+
+def table(rows: Sequence[Row], path: Path) -> None:
     """What the figure shows, as CSV: a row for each problem and solver; seconds, and how many steps of its own kind the solver took."""
-    keys = ("case", "contacts", "solver", "median", "min", "max", "samples", "pivots", "block_steps", "iterations", "certificate", "status")
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, keys, extrasaction="ignore", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(row for row in rows if row["case"] != "network, warm")
+    keys = ["case", "contacts", "solver", "median", "min", "max", "samples", "pivots", "block_steps", "iterations", "certificate", "status"]
+    counts = dict.fromkeys(("pivots", "block_steps", "iterations"), "Int64")
+    kept = pd.DataFrame([row for row in rows if row["case"] != "network, warm"]).reindex(columns=keys).astype(counts)
+    kept.to_csv(path, index=False)
 
 
-def steps_of(row: dict[str, Any]) -> float:
+def steps_of(row: Row) -> float:
     """Steps of a solver: pivots and block steps of dembark's (sweeps of pgs), iterations of the others."""
     return float(row.get("iterations", row.get("pivots", 0)) + row.get("block_steps", 0))
 
 
-def plot(rows: list[dict[str, Any]], path: Path) -> None:
+def plot(rows: Sequence[Row], path: Path) -> None:
     """Time, and below it the steps that it took, against the number of contacts."""
     import matplotlib
 
@@ -256,70 +216,57 @@ def plot(rows: list[dict[str, Any]], path: Path) -> None:
     plt.close(figure)
 
 
-def measure(out: Path, rounds: int, wall: bool, say: Callable[[str], None], quick: bool = False) -> list[dict[str, Any]]:
-    """Run everything, write lcp.json, lcp.md and lcp.png into `out` and return the goals."""
+def measure(out: Path, rounds: int, wall: bool, quick: bool = False) -> list[Row]:
+    """Run everything, write lcp.json, lcp.md, lcp.csv and lcp.png into `out` and return the goals."""
     version = siconos_version()
-    if version is None:
-        say(f"{SYSTEM_PYTHON} has no Siconos (Debian: python3-siconos): its columns stay out")
-    facts = {**commit(), "date": datetime.now(UTC).isoformat(timespec="seconds"), "load": os.getloadavg()[0], "cpu": cpu(),
-             "cores": os.cpu_count(), "clock": "elapsed time" if wall else "processor time", "rounds": rounds,
-             "versions": {"dembark": package_version("dembark"), "siconos": version, "numpy": package_version("numpy")}}
+    peers = PEERS if version else ()
+    known = frame.facts(("numpy",), siconos=version, clock="elapsed time" if wall else "processor time", rounds=rounds)
     rows = []
     for n in SIZES[:3] if quick else SIZES:
-        rows += beside("coupled", coupled(n), rounds, wall, version is not None, say)
         planar = network(n)
-        rows += beside("network, stored dense", Problem(planar.dense, planar.q), rounds, wall, version is not None, say)
-    rows += cold_networks(NETWORKS[:1] if quick else NETWORKS, rounds, wall, version is not None, say)
-    rows += warm(200 if quick else 1000, 10 if quick else 100, wall, say)
-    facts["load_after"] = os.getloadavg()[0]
+        for case, problem in (("coupled", coupled(n)), ("network, stored dense", Problem(planar.dense, planar.q))):
+            rows += cold(case, problem, rounds, wall, ("auto", "energy", "block", "murty", "pgs"), peers)
+    rows += cold_networks(NETWORKS[:1] if quick else NETWORKS, rounds, wall, peers)
+    rows += warm(200 if quick else 1000, 10 if quick else 100, wall)
     asked = goals(rows)
-    out.mkdir(parents=True, exist_ok=True)
-    write_json(out / "lcp.json", {"rows": rows, "goals": asked, "provenance": facts})
-    (out / "lcp.md").write_text(markdown(rows, asked, facts), encoding="utf-8")
+    frame.write(out, "lcp", "The LCP solver and Siconos", [
+        "Medians of rounds in turn, one thread, calls from Python with all checks of the input; both to 1e-12.",
+        frame.markdown(HEADS, map(cells, rows)), *([] if version else [MISSING]),
+        frame.markdown(("goal", "value", "aim", ""), ([one["goal"], f"{one['value']:.3g}", f"{one['bound']:g}",
+                                                       "met" if one["met"] else "MISSED"] for one in asked))], rows, known)
     table(rows, out / "lcp.csv")
     plot(rows, out / "lcp.png")
-    say(f"wrote {out / 'lcp.md'}, lcp.json, lcp.csv and lcp.png")
     return asked
 
 
 def redraw(found: Path, figure: Path) -> None:
-    """Draw the lcp.json in the folder `found` again, as `figure` and a CSV file beside it."""
+    """Draw the lcp.json in the folder `found` again, as `figure` and a CSV file next to it."""
     path = found / "lcp.json"
     try:
         rows = json.loads(path.read_text(encoding="utf-8"))["rows"]
     except (OSError, ValueError, KeyError):
-        raise DembarkError("no measurement to draw", str(path), "run python -m benchmarks.run --only lcp first") from None
+        raise DembarkError("no measurement to draw", str(path), "run python -m benchmarks.lcp first") from None
     table(rows, figure.with_suffix(".csv"))
     plot(rows, figure)
 
 
-def report(asked: list[dict[str, Any]]) -> int:
-    """Print what was asked and what came out; the exit code."""
-    for goal in asked:
-        print(f"{goal['goal']}: {goal['value']:.3g} ({'met' if goal['met'] else 'MISSED'}, asked {goal['bound']:g})")
-    return 0
+def run(words: list[str] | None) -> None:
+    """Measure, or draw again."""
+    parser = frame.parser("lcp", __doc__, rounds=5)
+    parser.add_argument("--wall-clock", action="store_true", help="elapsed time; default: processor time")
+    parser.add_argument("--quick", action="store_true", help="small problems only")
+    parser.add_argument("--redraw", action="store_true", help="measure nothing, draw docs/figures/lcp_scaling from --out")
+    given = parser.parse_args(words)
+    frame.at_least_one(given)
+    if given.redraw:
+        redraw(given.out, HERE.parent / "docs/figures/lcp_scaling.png")
+    else:
+        measure(given.out, given.rounds, given.wall_clock, given.quick)
 
 
 def main(words: list[str] | None = None) -> int:
-    """Run and print the goals; the exit code is 1 when a run failed, 2 when something is missing."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.lcp", description=__doc__)
-    parser.add_argument("--rounds", type=int, default=5, help="samples of each solver (default %(default)s)")
-    parser.add_argument("--wall-clock", action="store_true", help="elapsed time; default: processor time")
-    parser.add_argument("--quick", action="store_true", help="small problems only")
-    parser.add_argument("--out", type=Path, default=HERE.parent / "results/bench", help="folder of lcp.json, lcp.md, lcp.csv and lcp.png")
-    given = parser.parse_args(words)
-
-    def say(line: str) -> None:
-        print(f"dembark: {line}", file=sys.stderr, flush=True)
-
-    try:
-        if given.rounds < 1:
-            raise DembarkError("--rounds", "", "give a whole number from 1 on")
-        asked = measure(given.out, given.rounds, given.wall_clock, say, given.quick)
-    except DembarkError as error:
-        say(str(error))
-        return error.exit_code
-    return report(asked)
+    """The exit code is 1 when a run failed, 2 when something is missing."""
+    return frame.ended(lambda: run(words))
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from benchmarks import dump_parsing
-from benchmarks.dump_parsing import SUBJECTS, Sample, measure, rows, write_dump
+from benchmarks.dump_parsing import SUBJECTS, sample, write_dump
 from dembark.common.errors import DembarkError
 
 
@@ -18,18 +18,7 @@ def test_every_reader_finds_the_sum_that_was_written(tmp_path):
 def test_other_numbers_are_not_timed(tmp_path):
     expected = write_dump(tmp_path / "a.dump", 5, 1)
     with pytest.raises(DembarkError, match="reads other numbers"):
-        measure(tmp_path / "a.dump", 1.01 * expected, 1, lambda line: None)
-
-
-def test_ratios_are_medians_over_the_rounds():
-    samples = {
-        dump_parsing.REFERENCE: [Sample(4.0, 4.0, 1.0, 0.0), Sample(8.0, 8.0, 2.0, 0.0), Sample(3.0, 3.0, 2.0, 0.0)],
-        "dembark TextDump": [Sample(0.2, 0.4, 3.0, 0.0), Sample(0.1, 0.2, 5.0, 0.0), Sample(0.1, 0.2, 4.0, 0.0)],
-    }
-    _, row = rows(samples, 10.0)
-    assert row["elapsed_ratio"]["median"] == pytest.approx(30.0)
-    assert row["processor_ratio"]["median"] == pytest.approx(15.0)
-    assert (row["memory"], row["met"], row["speed"]) == (5.0, True, pytest.approx(100.0))
+        sample("numpy.loadtxt", tmp_path / "a.dump", 1.01 * expected)
 
 
 def test_small_run_writes_its_table(tmp_path, capsys):

@@ -19,13 +19,12 @@ def test_packing_has_three_short_contacts_a_grain():
 
 def test_all_rows_are_measured(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(fields, "CASES", (("gaussian", 1.5), ("heaviside", 2.0)))
-    assert main(["--edge", "4", "--cells", "8", "--rounds", "1", "--part", "0.2", "--out", str(tmp_path / "a.json")]) == 0
-    found = json.loads((tmp_path / "a.json").read_text())
-    assert {(one["backend"], one["kernel"]) for one in found["rows"]} == {
-        (backend, kernel) for backend in ("native", "numpy") for kernel in ("gaussian", "heaviside")
-    }
-    assert all(one["wall"] > 0.0 for one in found["rows"]) and found["facts"]["grains"] == 64
-    assert "| gaussian | 1.5 | native | 1 | 192 |" in capsys.readouterr().out
+    assert main(["--edge", "4", "--cells", "8", "--rounds", "1", "--part", "0.2", "--out", str(tmp_path)]) == 0
+    found = json.loads((tmp_path / "fields.json").read_text())
+    assert {(one["comparison"], one["subject"].split(",")[0]) for one in found["rows"]} == {
+        (kernel, by) for by in ("compiled", "numpy") for kernel in ("gaussian, 1.5 d", "heaviside, 2 d")}
+    assert all(one["wall_median"] > 0.0 for one in found["rows"]) and found["provenance"]["grains"] == 64
+    assert "| gaussian, 1.5 d | compiled, 1 threads |" in capsys.readouterr().out
 
 
 def test_wrong_option(capsys):

@@ -41,14 +41,14 @@ def test_goals_are_ratios_of_medians():
             for solver, median in (("Siconos lemke", 0.3), ("Siconos pgs", 0.05), ("dembark auto", 0.02), ("dembark energy", 0.2))]
     rows.append({"case": "network, warm", "contacts": 1000, "solver": "dembark auto", "median": 5e-4})
     found = {goal["goal"]: (round(goal["value"], 9), goal["met"]) for goal in goals(rows)}
-    assert found == {"coupled, 800: auto faster than Siconos's Lemke by": (15.0, True),
-                     "coupled, 800: auto faster than Siconos's PGS by": (2.5, True),
-                     "coupled, 800: energy faster than Siconos's Lemke by": (1.5, False),
-                     "warm step of 1000 contacts, checked, s": (5e-4, True)}
+    assert found == {"coupled, 800: dembark auto faster than Siconos lemke by": (15.0, True),
+                     "coupled, 800: dembark auto faster than Siconos pgs by": (2.5, True),
+                     "coupled, 800: dembark energy faster than Siconos lemke by": (1.5, False),
+                     "network, warm, 1000: dembark auto, s": (5e-4, True)}
 
 
 def test_small_measurement(tmp_path):
-    assert measure(tmp_path, 1, wall=False, say=lambda line: None, quick=True) == []
+    assert measure(tmp_path, 1, wall=False, quick=True) == []
     text = (tmp_path / "lcp.md").read_text(encoding="utf-8")
     assert "| coupled | 10 | dembark energy |" in text
     assert {path.name for path in tmp_path.iterdir()} == {"lcp.csv", "lcp.json", "lcp.md", "lcp.png"}

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import lcp, run
+from benchmarks import lcp
 from dembark.common.errors import DembarkError
 
 
@@ -32,17 +32,10 @@ def test_redraw_writes_figure_and_data(tmp_path: Path) -> None:
 def test_nothing_to_draw_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(DembarkError, match="no measurement to draw"):
         lcp.redraw(tmp_path, tmp_path / "scaling.png")
-    assert run.main(["--redraw", "--out", str(tmp_path)]) == 2
-    assert "--only lcp" in capsys.readouterr().err
+    assert lcp.main(["--redraw", "--out", str(tmp_path)]) == 2
+    assert "benchmarks.lcp" in capsys.readouterr().err
 
 
 def test_a_peer_is_left_out_where_one_call_would_take_too_long() -> None:
     assert lcp.expected(row("Siconos lemke", 100), 1000) == pytest.approx(1e3 * 1e-4)
     assert lcp.expected(row("Siconos pgs", 100), 1000) == pytest.approx(1e2 * 1e-4)
-
-
-def test_without_siconos_the_table_says_what_is_left_out():
-    facts = {"clock": "elapsed time", "date": "today", "cpu": "one", "cores": 1, "load": 0.0, "load_after": 0.0, "commit": None,
-             "dirty": False}
-    said = [lcp.markdown([], lcp.goals([]), {**facts, "versions": {"dembark": "1", "siconos": version}}) for version in (None, "4.4.0")]
-    assert "are left out" in said[0] and "python3-siconos" in said[0] and "left out" not in said[1]
