@@ -21,7 +21,7 @@ from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json, write_whole
 from dembark.common.lock import held
-from dembark.validation.judge.result import COMPARISON, METRICS, PLAN, result_files
+from dembark.validation.judge.result import COMPARISON, METRICS, PLAN, as_row, result_files
 
 RECORD = "run.json"
 
@@ -174,10 +174,7 @@ def _rows(folder: Path, kind: str) -> Iterator[dict[str, Any]]:
         common = {key: content[key] for key in ("case", "variant", "engine", "profile") if key in content}
         further = {key: dict(content[key]) for key in ("parameters", "measured", "provenance") if key in content}
         for one in content.get("quantities", ()):
-            row = {key: value for key, value in one.items() if key not in ("interval", "reference_interval", "samples")}
-            for end in ("", "reference_"):
-                row[f"{end}low"], row[f"{end}high"] = one.get(f"{end}interval") or (None, None)
-            yield common | row | further
+            yield common | as_row(one) | further
 
 
 def _existing(folder: Path | str) -> Path:

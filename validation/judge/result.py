@@ -163,6 +163,14 @@ def as_json(value: QuantityRecord | Result | Comparison) -> dict[str, Any]:
     return content
 
 
+def as_row(quantity: Mapping[str, Any]) -> dict[str, Any]:
+    """A quantity as JSON has it as a row of a table: intervals as low, high, reference_low, reference_high, without samples."""
+    row = {key: value for key, value in quantity.items() if key not in ("interval", "reference_interval", "samples")}
+    for end in ("", "reference_"):
+        row[f"{end}low"], row[f"{end}high"] = quantity.get(f"{end}interval") or (None, None)
+    return row
+
+
 def write(path: Path, value: Kind) -> Kind:
     """Write `metrics.json` or `comparison.json`, completely or not at all; returns `value`."""
     write_json(path, as_json(value))

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from dembark.validation.case.model import EVIDENCE
-from dembark.validation.judge.result import QuantityRecord
+from dembark.validation.judge.result import as_json, as_row
 from dembark.validation.judge.tally import MEANING, Tally, families, tally
 
-from . import figures, scatter
+from . import scatter
 from .facts import Fact, facts
 from .gather import Gathered, Row
 
@@ -26,11 +28,6 @@ _WEIGHT = ("experiment", "theory", "identity", "", "code")
 UNKNOWN = "The cause is not known."
 
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-
-# Of a quantity in all tables, see `cells`.
-COLUMNS = ("quantity", "label", "unit", "value", "low", "high", "reference", "reference_low", "reference_high", "deviation",
-           "deviation_kind", "tolerance", "verdict", "evidence", "reason", "decides", "cause", "family", "detail",
-           "source", "control")
 
 
 @dataclass(frozen=True)
@@ -137,17 +134,15 @@ def context(gathered: Gathered) -> Mapping[str, Any]:
             "scatter_lines": len(scatter.lines(found)), "most": MOST}
 
 
-def cells(one: QuantityRecord) -> list[Any]:
-    """A quantity as part of the row of a table, see COLUMNS."""
-    return [one.name, one.label, one.unit, one.value, *(one.interval or (None, None)), one.reference,
-            *(one.reference_interval or (None, None)), one.deviation, one.deviation_kind, one.tolerance, one.verdict, one.evidence,
-            one.reason, one.decides, one.cause, one.family, one.detail, one.source, one.control]
-
-
 def write_tables(folder: Path, rows: Sequence[Row], found: Sequence[scatter.Point]) -> None:
     """quantities.csv and scatter.csv."""
-    figures.write_csv(folder / "quantities.csv", ("case", "variant", "engine", *COLUMNS),
-                      ([row.case, row.anchor.removeprefix(f"{row.case}-"), row.who, *cells(row.record)] for row in rows))
-    figures.write_csv(folder / "scatter.csv", ("case", "quantity", "engine", "evidence", "measured", "reference", "relative_half_width",
-                                               "reference_relative_half_width"),
-                      ((*one.line, one.engine, one.evidence, one.value, one.reference, one.half, one.reference_half) for one in found))
+    quantities = [{"case": row.case, "variant": row.anchor.removeprefix(f"{row.case}-"), "who": row.who} | as_row(as_json(row.record))
+                  for row in rows]
+    table = pd.DataFrame(quantities).drop(columns=["engine", "reference_engine"], errors="ignore")
+    table.rename(columns={"who": "engine", "name": "quantity"}).to_csv(folder / "quantities.csv", index=False)
+    points = [asdict(one) | dict(zip(("case", "quantity"), one.line, strict=True)) for one in found]
+    pd.DataFrame(points, columns=[*_POINTS]).rename(columns=_POINTS).to_csv(folder / "scatter.csv", index=False)
+
+
+_POINTS = {"case": "case", "quantity": "quantity", "engine": "engine", "evidence": "evidence", "value": "measured",
+           "reference": "reference", "half": "relative_half_width", "reference_half": "reference_relative_half_width"}

@@ -21,7 +21,6 @@ from dembark.validation.campaigns.spec import locate, read, shipped
 from . import cluster, folder, site, workflow
 from .folder import Options
 from .monitor import state_table
-from .steps import CAMPAIGN_FILE
 
 File = Annotated[str, typer.Argument(metavar="CAMPAIGN", help="File of a campaign, or name of one of 'dembark campaigns'.")]
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of a campaign.")]
@@ -49,18 +48,17 @@ def show_campaigns() -> None:
 def submit(campaign: File, dry_run: Dry = False, executor: Executor = None, out: Out = None, cores: Cores = None,
            jobs: Jobs = None) -> None:
     """Run a campaign here, or submit it to a cluster. It makes all runs, their measurements and the report; what is finished is kept."""
-    file = locate(campaign)
-    chosen = folder.choose(executor or "local", cores, jobs)
-    _prepare(chosen)
+    file, chosen = locate(campaign), folder.choose(executor or "local", cores, jobs)
+    where = _site(chosen)
     plan = expand.campaign(read(file))
     target = (out or Path("results") / "campaigns" / plan.label).resolve()
     if not dry_run:
-        _submit(plan, file, target, chosen)
+        _submit(plan, file, target, chosen, where)
         return
     folder.refuse_foreign(target, plan.label)
-    _check(chosen, plan)
+    _check(chosen, plan, where)
     found = estimate.estimates(plan, estimate.Rates(target))
-    estimate.dry_run(show.console(), plan, found, target, _cores(chosen) if chosen.executor == "local" else None)
+    estimate.dry_run(show.console(), plan, found, target, None if where else _cores(chosen))
 
 
 @app.command()
@@ -72,24 +70,27 @@ def resume(directory: Folder, executor: Executor = None, cores: Cores = None, jo
     before = folder.options(target)
     same = executor in (None, before.executor)
     chosen = folder.choose(executor or before.executor, cores or before.cores, jobs or (before.jobs if same else None))
-    _prepare(chosen)
-    _submit(expand.campaign(read(file)), file, target, chosen)
+    where = _site(chosen)
+    _submit(expand.campaign(read(file)), file, target, chosen, where)
 
 
-def _prepare(chosen: Options) -> None:
-    """Take over the environment that the preamble of the chosen site makes: with it the engines are found, here and in the jobs."""
-    if chosen.executor != "local":
-        os.environ.update(site.find(chosen.executor).environment())
+def _site(chosen: Options) -> site.Site | None:
+    """The chosen site, None for this machine; with the environment that its preamble makes, the engines are found, here and in the jobs."""
+    if chosen.executor == "local":
+        return None
+    found = site.find(chosen.executor)
+    os.environ.update(found.environment())
+    return found
 
 
 def _cores(chosen: Options) -> int:
     return chosen.cores or os.cpu_count() or 1
 
 
-def _check(chosen: Options, plan: Plan) -> None:
+def _check(chosen: Options, plan: Plan, where: site.Site | None) -> None:
     """DembarkError for runs with more cores or memory than this machine has, or that the scheduler would refuse."""
-    if chosen.executor != "local":
-        cluster.check(plan, site.find(chosen.executor))
+    if where:
+        cluster.check(plan, where)
         return
     if chosen.jobs is not None:
         raise DembarkError("--jobs is for a cluster", "with --executor local", "use --cores for the runs of this machine")
@@ -106,21 +107,19 @@ def _memory() -> float:
     return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
 
 
-def _submit(plan: Plan, file: Path, target: Path, chosen: Options) -> None:
+def _submit(plan: Plan, file: Path, target: Path, chosen: Options, where: site.Site | None) -> None:
     """Run or submit `plan`, that of the campaign `file`, in the folder `target`; refused while another process does."""
-    cancel = workflow.cancelled_by_signal() if chosen.executor == "local" else None
+    cancel = None if where else workflow.cancelled_by_signal()
     folder.refuse_foreign(target, plan.label)
-    _check(chosen, plan)
+    _check(chosen, plan, where)
     with lock(target / workflow.LOCK, f"the campaign in {target} is being run by another process"):
         expected = {one.series.place: one.wall_time for one in estimate.estimates(plan, estimate.Rates(target))}
         folder.enter(target, file, plan, chosen, expected)
-        if cancel is None:
-            lines = cluster.submit(plan, target, site.find(chosen.executor), chosen.jobs)
-        else:
-            # Its own copy counts from here on, whatever becomes of the file.
-            plan = expand.campaign(read(target / CAMPAIGN_FILE))
+        if where:
+            lines = cluster.submit(plan, target, where, chosen.jobs)
+        elif cancel:
             outcome = workflow.perform(plan, target, cancel, _cores(chosen), _memory(), target / folder.LOG, expected)
-    if cancel is None:
+    if where:
         for line in (*lines, f"see 'dembark status {target}'; what ended too early is submitted again by 'dembark resume {target}'"):
             print(f"dembark: {line}", file=sys.stderr)
     else:

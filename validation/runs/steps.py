@@ -15,7 +15,7 @@ from typing import Any
 
 from dembark.common.errors import DembarkError, RunError
 from dembark.common.extras import advice
-from dembark.common.files import read_json, retire, write_json, write_whole
+from dembark.common.files import retire, write_whole
 from dembark.postproc import pictures
 from dembark.validation import analysis, metrics, provenance, results
 from dembark.validation.case.folders import files, find
@@ -27,7 +27,6 @@ from dembark.validation.results import RECORD
 
 # A campaign's folder holds a copy of its file.
 CAMPAIGN_FILE = "campaign.toml"
-_DRAWN = "pictures.json"
 # What draws and lays out reports, and the code that verifies the instruments for them.
 _REPORTING = ("validation/report", "validation/campaigns/report", "validation/verification", "postproc/field_figures.py")
 
@@ -154,7 +153,7 @@ def measure_series(folder: Path, name: str, runs: Mapping[str, str]) -> Result:
     """Measure and judge the finished ones of `runs` (hash of the inputs by folder name) of the case `name`, draw them, and write
     `folder/metrics.json`.
 
-    Results of other inputs are put aside first. What was measured or drawn of the same inputs is kept. RunError when none is finished or
+    Results of other inputs are put aside first. What was measured of the same inputs is kept. RunError when none is finished or
     the measurement fails; then there is no metrics.json, rather than an old one.
     """
     done = _finished(folder, runs)
@@ -170,22 +169,9 @@ def measure_series(folder: Path, name: str, runs: Mapping[str, str]) -> Result:
     with _in_one_line(f"{folder} could not be measured", lambda error: analysis.reasons(folder, error, case)):
         # Another process renders: the thread only waits for it.
         with ThreadPoolExecutor(1) as thread:
-            drawn = thread.submit(_draw, folder, inputs.of_pictures(case, [folder / one / RECORD for one in done]))
+            drawn = thread.submit(pictures.draw, folder, metrics.picture(folder))
             found = metrics.measure(folder, len(runs))
         return write(target, replace(found, remarks=(*found.remarks, *drawn.result()), inputs_hash=inputs_hash))
-
-
-def _draw(folder: Path, inputs_hash: str) -> list[str]:
-    """Draw the pictures of the replicas in `folder` unless those there are of the same inputs; remarks where one cannot be drawn."""
-    record = folder / _DRAWN
-    kept = read_json(record) or {}
-    if kept.get(inputs.KEY) == inputs_hash and all((folder / name).is_file() for name in kept["files"]):
-        return list(kept["remarks"])
-    record.unlink(missing_ok=True)
-    remarks = pictures.draw(folder, metrics.picture(folder))
-    there = [name for name in (pictures.PICTURE, pictures.ANIMATION) if (folder / name).is_file()]
-    write_json(record, {inputs.KEY: inputs_hash, "files": there, "remarks": remarks})
-    return remarks
 
 
 def measure_study(folder: Path, study: Study, place: Path, points: Sequence[Path]) -> None:

@@ -95,22 +95,29 @@ def conclude(folder: Path, cancel: threading.Event, cores: int) -> Outcome:
 
 def _execute(folder: Path, tasks: Sequence[Task], todo: Sequence[Step], cancel: threading.Event, cores: int, memory: float | None = None,
              retries: int = 0, log: Path | None = None) -> Outcome:
+    states, errors = _watched(tasks, todo, cancel, cores, memory, retries, log)
+    unfinished = [f"{state.name}: {state.message or state.state}" for state in states.all()
+                  if state.kind == "run" and state.state != "finished"]
+    problems = dict.fromkeys(str(errors[step.name]) for step in todo if step.name in errors)
+    report = folder / "report.html"
+    return Outcome(len(tasks), tuple(unfinished), tuple(problems), of_folder(folder), report if report.is_file() else None,
+                   tuple(f"{name}: {why}" for name, why in results.plan(folder).get("left_out", {}).items()))
+
+
+def _watched(tasks: Sequence[Task], todo: Sequence[Step], cancel: threading.Event, cores: int, memory: float | None = None,
+             retries: int = 0, log: Path | None = None, reasons: bool = True) -> tuple[States, Mapping[str, DembarkError]]:
+    """Execute `tasks` and `todo` under a monitor: the states at the end, and the errors of what failed."""
     states = States(tasks, todo)
 
     def shown() -> list[State]:
         """All runs, and of the steps those that have begun: many need not be done again."""
         return [state for state in states.all() if state.kind == "run" or state.state == "running"]
 
-    with Monitor(shown, log=log) as monitor:
+    with Monitor(shown, log=log, reasons=reasons) as monitor:
         states.listener = monitor.event
         executor = Executor(states, cancel, cores, memory, retries)
         executor.execute(tasks, todo)
-    unfinished = [f"{state.name}: {state.message or state.state}" for state in states.all()
-                  if state.kind == "run" and state.state != "finished"]
-    problems = dict.fromkeys(str(executor.errors[step.name]) for step in todo if step.name in executor.errors)
-    report = folder / "report.html"
-    return Outcome(len(tasks), tuple(unfinished), tuple(problems), of_folder(folder), report if report.is_file() else None,
-                   tuple(f"{name}: {why}" for name, why in results.plan(folder).get("left_out", {}).items()))
+    return states, executor.errors
 
 
 def perform_series(one: Series, out: Path, cancel: threading.Event, used: Resources, jobs: int | None = None,
@@ -127,15 +134,10 @@ def perform_series(one: Series, out: Path, cancel: threading.Event, used: Resour
     except OSError as error:
         raise disk_error(error, out) from None
     cores = jobs * used.cores if jobs else max(used.cores, os.cpu_count() or 1)
-    tasks = [Task(run, out, used) for run in one.runs]
-    states = States(tasks)
     # Why a run failed is said once, at the end.
-    with Monitor(states.all, reasons=False) as monitor:
-        states.listener = monitor.event
-        executor = Executor(states, cancel, cores, retries=0)
-        executor.execute(tasks, ())
-    if executor.errors:
-        first, *others = executor.errors.values()
+    _, errors = _watched([Task(run, out, used) for run in one.runs], (), cancel, cores, reasons=False)
+    if errors:
+        first, *others = errors.values()
         for message in dict.fromkeys(map(str, others)):
             if message != str(first):
                 print(f"dembark: {message}", file=sys.stderr)

@@ -7,9 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dembark.validation.judge.result import QuantityRecord
-from dembark.validation.report.figures import engine_name, write_csv
-from dembark.validation.report.front import COLUMNS, cells
+import pandas as pd
+
+from dembark.validation.judge.result import QuantityRecord, as_json, as_row
+from dembark.validation.report.figures import engine_name
 from dembark.validation.report.numbers import deviation, with_interval, with_unit
 
 from .sweeps import Sweep
@@ -25,9 +26,10 @@ _POWERS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 def write_table_csv(path: Path, sweep: Sweep) -> None:
     """All quantities of a sweep: a row for each of each point and engine, a column for each swept parameter."""
-    write_csv(path, ["case", "variant", "engine", *sweep.axes, *COLUMNS],
-              ([sweep.case, point.variant, engine, *(point.values[axis] for axis in sweep.axes), *cells(one)]
-               for point in sweep.points for engine, result in sorted(point.results.items()) for one in result.quantities))
+    pd.DataFrame([{"case": sweep.case, "variant": point.variant, "engine": engine, **{axis: point.values[axis] for axis in sweep.axes}}
+                  | as_row(as_json(one))
+                  for point in sweep.points for engine, result in sorted(point.results.items()) for one in result.quantities],
+                 ).rename(columns={"name": "quantity"}).to_csv(path, index=False)
 
 
 def latex(sweep: Sweep, quantities: Sequence[QuantityRecord]) -> str:
