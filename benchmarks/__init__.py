@@ -1,1 +1,1 @@
-"""Measurements of dembark's styles beside the stock ones, in the same run and on the same settled bed."""
+"""Measurements of dembark's styles and of the stock ones, in the same run and on the same settled bed."""

@@ -239,8 +239,8 @@ def price(entries: Sequence[dict[str, Any]], seconds: float, *, turning: bool, c
                     stiffer = entry.get("stiffer", 1.0)
                     step = entry["turn"] / highest_frequency(stiffer)
                     decks = [deck(entry["law"], step, until, 0, turning=turning, count=count, stiffer=stiffer) for until in (seconds, 0.0)]
-                    whole, start = (spent_by(words, Path(name))[0] for words in decks)
-                    values.append((whole - start) / seconds)
+                    full, start = (spent_by(words, Path(name))[0] for words in decks)
+                    values.append((full - start) / seconds)
     for entry, values in zip(entries, spent, strict=True):
         if values:
             step = entry["turn"] / highest_frequency(entry.get("stiffer", 1.0))

@@ -3,7 +3,7 @@
     python -m benchmarks.drum_resume [--engine liggghts|yade] [--restart-every steps] [--out result.json] [key=value ...]
 
 The default is 200 logs for five revolutions. The engine gets SIGKILL, so nothing it has in memory survives. Compared are, byte for byte,
-`time.csv` (energies, forces and totals over the whole run), `impacts.txt` (one line per impact) and `grains.dump` (the last revolution).
+`time.csv` (energies, forces and totals over the run), `impacts.txt` (one line per impact) and `grains.dump` (the last revolution).
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Started:
 
 
 def last_step(folder: Path) -> int:
-    """Step of the last whole row of `time.csv`; 0 when there is none."""
+    """Step of the last complete row of `time.csv`; 0 when there is none."""
     try:
         rows = (folder / "time.csv").read_text().split("\n")[1:-1]
     except OSError:
@@ -76,11 +76,11 @@ def last_step(folder: Path) -> int:
 
 def compare(engine: str, values: Mapping[str, Value], restart_every: int, base: Path) -> dict[str, Any]:
     """Both runs in folders below `base`; what was found, with `same` telling for each file whether it is the same to the byte."""
-    whole, broken = base / "whole", base / "broken"
-    for folder in (whole, broken):
+    complete, broken = base / "complete", base / "broken"
+    for folder in (complete, broken):
         folder.mkdir(parents=True)
     began = time.monotonic()
-    run = Started(engine, whole, values, restart_every=restart_every)
+    run = Started(engine, complete, values, restart_every=restart_every)
     run.wait()
     seconds, steps = time.monotonic() - began, run.setup.steps
     # Not at a saved state: what came after the last one is lost and has to come again.
@@ -90,7 +90,7 @@ def compare(engine: str, values: Mapping[str, Value], restart_every: int, base: 
     went_on_from = newest(broken, engine)
     (broken / "engine.log").unlink()
     Started(engine, broken, values, restart_every=restart_every, resume="yes").wait()
-    table = np.genfromtxt(whole / "time.csv", delimiter=",", names=True)
+    table = np.genfromtxt(complete / "time.csv", delimiter=",", names=True)
     return {
         "engine": engine,
         "values": {**values, "restart_every": restart_every},
@@ -100,7 +100,7 @@ def compare(engine: str, values: Mapping[str, Value], restart_every: int, base: 
         "wall_time": seconds,
         "certificate_max": float(table["certificate"][-1]),
         "impacts": int(table["begun"][-1]),
-        "same": {name: (whole / name).read_bytes() == (broken / name).read_bytes() for name in FILES},
+        "same": {name: (complete / name).read_bytes() == (broken / name).read_bytes() for name in FILES},
     }
 
 

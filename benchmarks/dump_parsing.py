@@ -59,7 +59,7 @@ def _blocks(path: Path) -> Iterator[str]:
 
 
 def by_text_dump(path: Path) -> float:
-    """The reader of whole files."""
+    """The reader that maps the file."""
     return sum(float(raw.values[:, 2].sum()) for raw in TextDump(path))
 
 

@@ -71,13 +71,13 @@ def timed(grains: GrainFrame, contacts: ContactFrame, grid: Grid, kernel: str, w
 
 def measure(edge: int, cells: int, cases: Sequence[tuple[str, float]], rounds: int, part: float) -> pd.DataFrame:
     """Samples of all kernels: compiled on one and on all threads, and numpy, once, on a `part` of the contacts."""
-    whole = packing(edge)
-    few = share(*whole, part)
-    grid = Grid(whole[0].low, whole[0].high, (cells,) * 3, (True,) * 3)
+    everything = packing(edge)
+    few = share(*everything, part)
+    grid = Grid(everything[0].low, everything[0].high, (cells,) * 3, (True,) * 3)
     found = []
     for kernel, width in cases:
         title = f"{kernel}, {width:g} d"
-        subjects = {f"compiled, {threads} threads": partial(timed, *whole, grid, kernel, width, threads=threads)
+        subjects = {f"compiled, {threads} threads": partial(timed, *everything, grid, kernel, width, threads=threads)
                     for threads in sorted({1, len(os.sched_getaffinity(0))})}
         found += [frame.in_turn(title, subjects, rounds),
                   frame.in_turn(title, {"numpy": partial(timed, *few, grid, kernel, width, backend="numpy")}, 1)]

@@ -2,7 +2,7 @@
 
     yade -n -j1 -x yade_bed.py bed=FILE law=stock|dembark|PRESLIDING [loop=SphereContactLoop] [width=M] [step=S] ...
 
-Prints one line of JSON a sample: processor time of the whole loop and of the interaction loop (its share of the loop by the engine's
+Prints one line of JSON a sample: processor time of the loop and of the interaction loop (its share of the loop by the engine's
 own timers), in seconds.
 """
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
-from dembark.common.errors import DembarkError
+from .errors import DembarkError
 
 Value = float | int | str | None
 

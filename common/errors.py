@@ -1,4 +1,4 @@
-"""What a user is told when something cannot be done: one line, and the exit code that goes with it."""
+"""Errors for users: one line each, and the exit code."""
 
 
 class DembarkError(Exception):

@@ -1,4 +1,4 @@
-"""Files that are either whole or not there: atomic writing, folders moved into place, and checks of an engine's output."""
+"""Files that are either complete or absent: atomic writing, folders moved into place, and checks of an engine's output."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from dembark.common.errors import RunError
+from .errors import RunError
 
 DISK_FULL = "the disk is full"
 _TIMESTEP = b"ITEM: TIMESTEP\n"
@@ -29,7 +29,7 @@ def _sync(path: Path) -> None:
 
 
 def write_whole(path: Path, content: bytes) -> Path:
-    """Write `content` so that a reader sees the old file or the whole new one, also after a crash; returns the path."""
+    """Write `content` so that a reader sees the old file or the complete new one, also after a crash; returns the path."""
     part = path.with_name(f".{path.name}.part-{os.getpid()}")
     try:
         part.write_bytes(content)
@@ -78,7 +78,7 @@ def move_into_place(work: Path, target: Path) -> None:
 
 
 def retire(path: Path) -> None:
-    """Move a result that no longer belongs to the current runs into the folder `superseded` beside it."""
+    """Move a result that no longer belongs to the current runs into the folder `superseded` next to it."""
     if path.exists():
         aside = path.parent / "superseded" / path.name
         aside.parent.mkdir(exist_ok=True)
@@ -96,7 +96,7 @@ def sweep(target: Path) -> None:
 
 
 def count_frames(path: Path, count_key: str) -> int:
-    """Frames in a text dump whose size line is `ITEM: NUMBER OF <count_key>`; RunError unless every frame is whole."""
+    """Frames in a text dump whose size line is `ITEM: NUMBER OF <count_key>`; RunError unless every frame is complete."""
     if not path.is_file() or path.stat().st_size == 0:
         raise RunError(f"the engine wrote no {path.name}")
     pattern = re.compile(rb"\n\d+\nITEM: NUMBER OF " + count_key.encode() + rb"\n(\d+)\n")
@@ -126,10 +126,10 @@ def check_impacts(path: Path) -> int:
     rows = [line.split() for line in text.splitlines() if not line.startswith("#")]
     for number, row in enumerate(rows, start=1):
         try:
-            whole = len(row) == _IMPACT_COLUMNS and all(math.isfinite(float(word)) for word in row)
+            complete = len(row) == _IMPACT_COLUMNS and all(math.isfinite(float(word)) for word in row)
         except ValueError:
-            whole = False
-        if not whole:
+            complete = False
+        if not complete:
             raise RunError(f"{path.name} is truncated, or holds no finite number, in line {number} of its {len(rows)} impacts")
     if not text.endswith("\n"):
         raise RunError(f"{path.name} is truncated after {len(rows)} impacts")

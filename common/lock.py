@@ -11,8 +11,8 @@ from pathlib import Path
 
 from filelock import SoftFileLease, Timeout
 
-from dembark.common.errors import DembarkError, Interrupted
-from dembark.common.files import disk_error
+from .errors import DembarkError, Interrupted
+from .files import disk_error
 
 BEAT = 10.0
 # Longer than a beat and what a network file system may hold back.
@@ -69,7 +69,7 @@ def _acquire(lease: SoftFileLease, path: Path, cancel: threading.Event, beat: fl
 
 
 def held(path: Path, dead_after: float = DEAD_AFTER) -> bool:
-    """Whether a living process seems to hold the lock `path`; of one on another host its last beat tells."""
+    """Whether a living process seems to hold the lock `path`; for one on another host by its last beat."""
     lease = SoftFileLease(path, lease_duration=dead_after, heartbeat_interval=min(BEAT, 0.5 * dead_after))
     touched = _touched(path)
     if touched is None:

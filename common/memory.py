@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from dembark.common.errors import DembarkError
-from dembark.common.units import size_text
+from .errors import DembarkError
+from .units import size_text
 
 _SMALL = 1e8  # bytes that are asked for without a look at what there is
 _SHARE = 0.9  # of the free memory that may be asked for

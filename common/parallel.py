@@ -12,7 +12,7 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.process import BaseProcess
 from typing import TypeVar
 
-from dembark.common.errors import RunError
+from .errors import RunError
 
 Item = TypeVar("Item")
 Found = TypeVar("Found")

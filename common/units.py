@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, cast
 
-from dembark.common.errors import DembarkError
+from .errors import DembarkError
 
 if TYPE_CHECKING:
     import pint
@@ -125,7 +125,7 @@ def _converted(number: str, given: str, unit: str, head: str, shown: str) -> flo
         # 15 digits: 72 mN/m shall be the same input as 0.072 N/m.
         value = float(f"{quantity.to(target).magnitude:.15g}")
     except pint.UndefinedUnitError:
-        # People write m3 where the library wants m^3.
+        # People write m3 where the library needs m^3.
         mended = _POWER.sub(r"\1^\2", given)
         right = f"write the power with ^: '{number} {mended}'" if mended != given and known_unit(mended) else f"give e.g. {example(unit)}"
         raise DembarkError(f"{head}unknown unit {given!r} in {shown}; {right}") from None
@@ -176,9 +176,9 @@ def duration(seconds: float | None) -> str:
     """A duration for people, from s: `45 s`, `3 min 20 s`, `2 h 5 min`; `–` for none."""
     if seconds is None:
         return "–"
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    return f"{whole // 3600} h {whole % 3600 // 60} min"
+    rounded = round(seconds)
+    if rounded < 60:
+        return f"{rounded} s"
+    if rounded < 3600:
+        return f"{rounded // 60} min {rounded % 60} s"
+    return f"{rounded // 3600} h {rounded % 3600 // 60} min"

@@ -5,7 +5,7 @@
 
 Steps are separated by `--`. Their output goes into the log. `-j 0` of ninja becomes as many jobs as cores and memory allow (3 GB a
 compiler). The estimate is what the machine has shown: the time passed, over the share of the work that is done. What a step of ninja
-weighs beside the others was measured once (build_weights.txt); how fast this machine is was not.
+weighs next to the others was measured once (build_weights.txt); how fast this machine is was not.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Progress:
     """Progress lines on stderr: rewritten in a terminal, else one about every 20 s."""
 
     def __init__(self, name: str) -> None:
-        self.name, self.begun, self.told = name, time.monotonic(), time.monotonic()
+        self.name, self.begun, self.shown = name, time.monotonic(), time.monotonic()
         self.live, self.weights = sys.stderr.isatty(), weights()
         self.plan: list[float] = []
         self.done = self.base = 0.0
@@ -94,9 +94,9 @@ class Progress:
     def tell(self) -> None:
         """Write the line, if it is time for one."""
         now = time.monotonic()
-        if now - self.told < (1.0 if self.live else TELL_EVERY):
+        if now - self.shown < (1.0 if self.live else TELL_EVERY):
             return
-        self.told = now
+        self.shown = now
         words = f"dembark: {self.name}: {_span(now - self.begun)} passed"
         work = sum(self.plan)
         if work:

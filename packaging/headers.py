@@ -4,7 +4,7 @@
     packaging/headers.py [--packages FILE] FOLDER_OR_LIST ...
 
 A FOLDER is one that ninja built in: it keeps what each compilation included. A LIST is a file with one header a line. FILE holds the
-packages, one a line, in the place of those that system.sh names. A machine that has grown holds packages which a new one lacks; a build
+packages, one a line, instead of those that system.sh names. A machine that has grown holds packages which a new one lacks; a build
 that uses one of them works here and fails there.
 """
 

@@ -23,7 +23,7 @@ packages=(
   libpango-1.0-0 libpangoft2-1.0-0 libharfbuzz-subset0 fonts-dejavu-core
   libegl1 libgl1 libosmesa6 libxrender1 libxcursor1 libxft2 libxinerama1
 )
-# Siconos, the peer of the LCP solver in benchmarks, is no package of Debian 13: what is measured beside it is then left out.
+# Siconos, the peer of the LCP solver in benchmarks, is no package of Debian 13: comparisons with it are then left out.
 if [ "$(. /etc/os-release 2>/dev/null; echo "${ID:-}${VERSION_ID:-}")" != debian13 ]; then packages+=(python3-siconos python3-scipy); fi
 # YADE; a group's own brings what it needs.
 if "$here/yade.sh" --packaged; then
@@ -77,11 +77,11 @@ size=$(apt-get install --no-install-recommends --print-uris -y -qq "${missing[@]
        awk '{ n++; bytes += $3 } END { if (n) printf ": %d with what they need, %d MB to fetch", n, bytes / 1e6 + 0.5 }' || true)
 echo "dembark: installing ${#missing[@]} system packages$size" >&2
 DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}" >"$log" 2>&1 &
-pid=$! begun=$SECONDS told=$SECONDS
+pid=$! begun=$SECONDS shown=$SECONDS
 while kill -0 "$pid" 2>/dev/null; do
   sleep 1
-  if [ $((SECONDS - told)) -ge 20 ]; then
-    told=$SECONDS
+  if [ $((SECONDS - shown)) -ge 20 ]; then
+    shown=$SECONDS
     total=$(sed -nE 's/^.* ([0-9]+) newly installed.*/\1/p' "$log" | head -1)
     ready=$(grep -c '^Setting up ' "$log" || true) unpacked=$(grep -c '^Unpacking ' "$log" || true)
     echo "dembark: system packages: $((SECONDS - begun)) s passed, $unpacked unpacked and $ready set up of ${total:-many}" >&2

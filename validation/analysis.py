@@ -34,10 +34,10 @@ def warnings_kept() -> Iterator[list[str]]:
 def reasons(folder: Path, error: Exception, case: Case) -> tuple[str, ...]:
     """Parts of one line about `error`, which the measure.py of `case` raised for the runs in `folder`: the error, file and line, and what
     of the run is too small, unless the error is one of the program itself."""
-    told = str(failed(case.folder / "measure.py", error))
+    reason = str(failed(case.folder / "measure.py", error))
     small = () if isinstance(error, _MISTAKES) else (too_small(path) for path in sorted(folder.glob("replica-*")))
     worst = next(filter(None, small), "")
-    return (told, f"the run may be too small or too short to be measured: {worst}") if worst else (told,)
+    return (reason, f"the run may be too small or too short to be measured: {worst}") if worst else (reason,)
 
 
 def too_small(replica: Path) -> str:

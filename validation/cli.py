@@ -224,7 +224,7 @@ def main(words: list[str] | None = None) -> int:
         print("dembark: interrupted", file=sys.stderr)
         return 130
     except Exception as error:
-        # Typer's own usage errors are told apart by this method; everything else is a defect and keeps its trace.
+        # Typer's own usage errors have this method; everything else is a defect and keeps its trace.
         message = getattr(error, "format_message", None)
         if message is None:
             raise

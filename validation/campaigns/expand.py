@@ -52,7 +52,7 @@ def _word(value: Value) -> str:
 def variant_name(base: str, values: Mapping[str, Value], prefix: str = "") -> str:
     """Name of a folder for the variant `base` with `values`: `dry_wall_friction=0.2_cylinder_radius=0.04`, at most 100 letters.
 
-    A longer one is cut and ends in a checksum of the whole, so that different points have different names.
+    A longer one is cut and ends in a checksum of the full name: different points have different names.
     """
     name = "_".join([*([prefix] if prefix else []), base, *(f"{key}={_word(value)}" for key, value in values.items())])
     if len(name) <= LONGEST_NAME:
@@ -72,8 +72,8 @@ def _changes(sweep: SweepSpec, base: str, row: Mapping[str, Value]) -> dict[str,
         if isinstance(value, bool | complex):
             raise DembarkError(f"{key} = {expression.text!r} is no number")
         # Grains are counted: what comes out is the next whole number.
-        whole = parameter.is_whole and isinstance(value, float) and math.isfinite(value)
-        changes[key] = checked(parameter, round(value) if whole else value)
+        counted = parameter.is_whole and isinstance(value, float) and math.isfinite(value)
+        changes[key] = checked(parameter, round(value) if counted else value)
     return changes
 
 

@@ -132,7 +132,7 @@ def series(case: Case, variant: str, profile: str | None, engine: Engine, change
            name: str | None = None) -> Series:
     """The runs of one case, variant and engine; as many as the parameter `replicas` says (1 when the case has none).
 
-    With `changes` to the variant, `name` tells it from the variant itself; it has no part in the hash of the inputs.
+    With `changes` to the variant, `name` is the name of the changed variant; it has no part in the hash of the inputs.
     """
     require_measure(case)
     values = portable(resolve(case, profile, variant, changes))

@@ -1,4 +1,4 @@
-"""The file of a campaign: which cases, engines, parameters and replicas, and what a run may use. Read and checked as a whole."""
+"""The file of a campaign: which cases, engines, parameters and replicas, and what a run may use. Read and checked."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def load_module(path: Path, name: str) -> ModuleType:
     sys.modules |= {name: package, module.__name__: module}
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # noqa: BLE001 - the file may be the user's: whatever is wrong in it is told in one line
+    except Exception as error:  # noqa: BLE001 - the file may be the user's: whatever is wrong in it becomes one line
         raise failed(path, error) from None
     return module
 

@@ -1,4 +1,4 @@
-"""Where cases are: the folder that ships, and the user's own beside it."""
+"""Where cases are: the folder that ships, and the user's own."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .model import Case
 
 # Folders of the user's own cases, as in PATH; `dembark --cases FOLDER` adds to it.
 VARIABLE = "DEMBARK_CASES"
-# A folder in the place of the cases that ship.
+# A folder that replaces the cases that ship.
 INSTEAD = "DEMBARK_DECKS"
 
 

@@ -17,7 +17,7 @@ from dembark.validation import engines
 from .expressions import Expression
 
 STUDY_PREFIX = "study-"
-# What a deck may be asked to write, and the file that it goes to; a case asks for the first three unless it says otherwise.
+# What a deck can write, and the file of each; the first three are the default.
 OUTPUTS = {"grains": "grains.dump", "contacts": "contacts.dump", "times": "time.csv", "impacts": "impacts.txt"}
 STANDARD_OUTPUTS = ("grains", "contacts", "times")
 # Sizes of run that every case has; one that a case does not change has its own values.
@@ -121,7 +121,7 @@ class Study:
 
     @property
     def folder_name(self) -> str:
-        """Its place beside the variants in the results."""
+        """Its folder name, next to the variants."""
         return STUDY_PREFIX + self.name
 
 
@@ -170,7 +170,7 @@ class Finding:
 class Case:
     """A case folder: its parameters, profiles and variants (overrides of parameters by name), what a profile runs and what is measured.
 
-    `derived`: numbers that follow from the parameters, by expressions; a setup.py beside the case file may add others, and the packing.
+    `derived`: numbers that follow from the parameters, by expressions; a setup.py next to the case file may add others, and the packing.
     `controls`: wrong physics, in words, with the declared quantities whose checks it fails. `needs`: capabilities that an engine has to
     have where a condition between the parameters holds. `findings`: known causes of failures. `walls`: see `case.walls`. `paired`: the
     initial packing decides what comes out, and engines are compared packing by packing. `rates`: particle-steps per second and core that

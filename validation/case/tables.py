@@ -1,4 +1,4 @@
-"""Tables of a TOML file: read, and checked for unknown keys and wrong types, each mistake told with the table that it is in."""
+"""Tables of a TOML file: read, and checked for unknown keys and wrong types, each mistake is reported with its table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an engine is to the harness: the protocol that each module beside this one fulfils, and what several of them need."""
+"""What an engine is to the harness: the protocol that each module of an engine implements, and what several of them need."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from dembark.common.errors import DembarkError
 LAUNCHER = "DEMBARK_MPIRUN"
 # What dembark's part of the engines reads in the environment: how many contacts it computes at a time.
 SWITCHES = ("DEMBARK_LANES",)
-# What a case may need of an engine beside a deck, by the names that `[needs]` of case.toml and the facts of engines use.
+# What a case may need of an engine apart from a deck, by the names that `[needs]` of case.toml and the facts of engines use.
 CAPABILITIES = {"bridges": "liquid bridges", "carried_liquid": "liquid that grains own", "rolling_resistance": "couples against rolling",
                 "own_inertia": "moments of inertia but those of spheres",
                 "creeping_friction": "friction of boxes that has no spring"}

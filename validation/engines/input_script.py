@@ -1,4 +1,4 @@
-"""What engines with input scripts in LAMMPS's manner share: how a deck is made of its template, and the words that run it."""
+"""What engines with input scripts in LAMMPS's manner share: how a deck follows from its template, and the words that run it."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ class Lammps(InputScript):
     facts = EngineFacts.read("lammps")
 
     def launcher(self, ranks: int) -> list[str]:
-        """Words that start `ranks` processes: those that DEMBARK_LAMMPS_MPIRUN names, else the `lammps-mpiexec` beside the program."""
+        """Words that start `ranks` processes: those that DEMBARK_LAMMPS_MPIRUN names, else the `lammps-mpiexec` next to the program."""
         # Another MPI's launcher would start as many runs of one process each.
         if os.environ.get(self.facts.launcher):
             return super().launcher(ranks)
@@ -31,5 +31,5 @@ class Lammps(InputScript):
                 *self.executable.parent.parent.glob("lammps/plugin/*.so")]
 
     def build_folders(self) -> Iterable[Path]:
-        """The plugin is built in `lammps` beside the folder of the program."""
+        """The plugin is built in `lammps` next to the folder of the program."""
         return [self.executable.parent.parent / "lammps"]

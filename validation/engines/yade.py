@@ -1,4 +1,4 @@
-"""YADE, in an overlay of links to the system's YADE beside dembark's plugin and Python module."""
+"""YADE, in an overlay of links to the system's YADE and dembark's plugin and Python module."""
 
 from __future__ import annotations
 
@@ -59,5 +59,5 @@ class Yade(Engine):
         return [f"{name} ({needed_by})" for name, needed_by in _FEATURES.items() if named and name not in named[1].split()]
 
     def build_folders(self) -> Iterable[Path]:
-        """The plugin is built in `yade` beside the overlay."""
+        """The plugin is built in `yade` next to the overlay."""
         return [self.prefix.parent / "yade"]

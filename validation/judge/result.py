@@ -27,7 +27,7 @@ class QuantityRecord:
     `verdict` is pass, fail or info, with its `reason`; `tolerance` None means that nothing was due to be checked. `deviation` is value
     minus reference, over the reference when `deviation_kind` is "relative". `evidence`: what the reference is, one of EVIDENCE; "" is not
     stated. `compared`: the engines are to agree in it, within `agreement` (in `unit`) where nothing is random. `control`: wrong physics
-    that fails the check; a pass of a check that nothing is known to fail is not counted. `independent`: the reference is not made of other
+    that fails the check; a pass of a check that nothing is known to fail is not counted. `independent`: the reference is not from other
     numbers of the same run. `chance`: probability that the check fails by chance alone, None where there is no chance. `family`: the fact
     that is measured; checks of one family count as one, "" is a check by itself. `cause`: why it fails, where that is known. `decides`:
     what would decide an open check. `samples`: the values of the replicas, in their order, where

@@ -46,8 +46,8 @@ class Counts:
         """`12 checks passed, 1 FAILED, 3 open`."""
         plural = "s" if self.checks > 1 else ""
         failed = f"{self.failed} FAILED" if self.failed else "none failed"
-        told = f"{self.passed} of {self.checks} check{plural} passed, {failed}" if self.checks else "no checks"
-        return (told + (f", {self.open} open" if self.open else "")
+        text = f"{self.passed} of {self.checks} check{plural} passed, {failed}" if self.checks else "no checks"
+        return (text + (f", {self.open} open" if self.open else "")
                 + (f"; {self.uncontrolled} without a negative control not counted" if self.uncontrolled else ""))
 
 

@@ -94,19 +94,19 @@ class Fact:
     def label(self, member: Fact) -> str:
         """What `member` is among the others."""
         row = member.worst
-        told = [row.place] * (len(self.places) > 1) + [row.record.title] * (len(self.titles) > 1) + [_pair(row)] * bool(_pair(row))
-        return ", ".join(told) or row.record.name.replace("_", " ")
+        parts = [row.place] * (len(self.places) > 1) + [row.record.title] * (len(self.titles) > 1) + [_pair(row)] * bool(_pair(row))
+        return ", ".join(parts) or row.record.name.replace("_", " ")
 
     @property
     def notes(self) -> list[str]:
         """What is to be known of it: why it stands so, the reference, the intervals, and what fails it; each once."""
         worst, records = self.worst.record, [row.record for row in self.rows]
-        told = [worst.reason, worst.decides and f"decided by {worst.decides}", worst.cause if self.standing == "failed" else ""]
+        parts = [worst.reason, worst.decides and f"decided by {worst.decides}", worst.cause if self.standing == "failed" else ""]
         for one in records:
             # Of engines that are compared, these say nothing that the row does not.
-            told += [] if self.is_pair else [one.detail, one.source]
-            told += [one.control and f"fails with: {one.control}", one.basis and f"95 % intervals: {one.basis}"]
-        return list(dict.fromkeys(filter(None, told)))
+            parts += [] if self.is_pair else [one.detail, one.source]
+            parts += [one.control and f"fails with: {one.control}", one.basis and f"95 % intervals: {one.basis}"]
+        return list(dict.fromkeys(filter(None, parts)))
 
 
 def _rank(row: Row) -> tuple[int, float]:

@@ -87,7 +87,7 @@ class Page:
 @dataclass(frozen=True)
 class Gathered:
     """A results folder: its `pages`, the verification of the instruments, `missing` runs and unreadable results in one line each, and
-    what `plan.json` says of the whole."""
+    the content of `plan.json`."""
 
     folder: Path
     pages: list[Page]
@@ -173,13 +173,13 @@ def _expected(folder: Path) -> Iterator[tuple[str, str, str, str]]:
     """(case, variant, engine, why it is missing or '') of every planned run."""
     for state in states(folder):
         case, variant, engine, replica = Path(state.folder).parts
-        told = state.message or ("missing" if state.state == "waiting" else state.state)
-        reason = "" if state.state == "finished" else f"{engine_name(engine)}, replica {replica.removeprefix('replica-')}: {told}"
+        why = state.message or ("missing" if state.state == "waiting" else state.state)
+        reason = "" if state.state == "finished" else f"{engine_name(engine)}, replica {replica.removeprefix('replica-')}: {why}"
         yield case, variant, engine, reason
 
 
 @dataclass(frozen=True)
-class Beside:
+class Variation:
     """Two variants in one engine that differ in one parameter: its values `own` and `other`, and the quantities of both."""
 
     engine: str
@@ -190,7 +190,7 @@ class Beside:
     pairs: list[tuple[QuantityRecord, QuantityRecord]]
 
 
-def beside(page: Page, pages: list[Page]) -> list[Beside]:
+def variations(page: Page, pages: list[Page]) -> list[Variation]:
     """Variants of the same case that differ from `page` in one parameter only."""
     found = []
     for other in pages:
@@ -202,6 +202,6 @@ def beside(page: Page, pages: list[Page]) -> list[Beside]:
                        if one.parameters.get(key) != two.parameters.get(key) and key not in _REPEATS]
             if len(changed) == 1:
                 pairs = [(mine, its) for mine in one.quantities if mine.compared and (its := two.find(mine.name))]
-                found.append(Beside(engine, changed[0].replace("_", " "), one.parameters.get(changed[0]), two.parameters.get(changed[0]),
+                found.append(Variation(engine, changed[0].replace("_", " "), one.parameters.get(changed[0]), two.parameters.get(changed[0]),
                                     other.words, pairs))
     return found

@@ -65,7 +65,7 @@ def _has_ratio(one: QuantityRecord) -> bool:
 
 
 def left_out(rows: Iterable[Row]) -> int:
-    """How many checks are not among the points for nothing but their reference, which is made of other numbers of the same run."""
+    """How many checks are not among the points for nothing but their reference, which is computed from other numbers of the same run."""
     return sum(_has_ratio(row.record) and not row.record.independent for row in rows)
 
 

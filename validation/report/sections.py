@@ -22,7 +22,7 @@ from dembark.validation.judge.tally import Tally, tally
 from . import figures, front
 from .facts import Fact, facts, quantities
 from .figures import engine_name
-from .gather import Gathered, Page, beside
+from .gather import Gathered, Page, variations
 
 # Of a case in the PDF: variants with figures, and panels of a figure. Of the first variant all main figures are printed, of others none,
 # and of each study PANELS panels.
@@ -49,7 +49,7 @@ class Part:
     page: Page
     values: list[Fact]
     figures: list[Shown]
-    beside: list[Any]
+    variations: list[Any]
     remarks: list[str]
 
 
@@ -132,7 +132,7 @@ def _part(page: Page, pages: list[Page], shown: list[Shown], values: list[Fact])
     shared = [text for one in page.results.values() for text in one.remarks]
     remarks = [f"{engine_name(engine)}: {text}" if shared.count(text) < len(page.results) else text
                for engine, one in sorted(page.results.items()) for text in one.remarks]
-    return Part(page, values, shown, beside(page, pages), list(dict.fromkeys(remarks)))
+    return Part(page, values, shown, variations(page, pages), list(dict.fromkeys(remarks)))
 
 
 def _figures(page: Page, folder: Path) -> tuple[list[Shown], list[str]]:

@@ -48,10 +48,10 @@ def _tail(log: Path, size: int = 20000) -> list[str]:
 
 def reason(lines: list[str]) -> str:
     """The engine's message about what went wrong: the last line that looks like an error, else its last line."""
-    told = re.compile(r"^(?:dembark: (?!steps|finished|resumed|integration)|ERROR|\w*(?:Error|Exception)\b.*|.*[Nn]o space left)"
+    message = re.compile(r"^(?:dembark: (?!steps|finished|resumed|integration)|ERROR|\w*(?:Error|Exception)\b.*|.*[Nn]o space left)"
                       f"|{_OF_ONE_RANK.pattern}")
     spoken = [line.strip() for line in lines if line.strip()]
-    found = ((told.search(line), line) for line in reversed(spoken))
+    found = ((message.search(line), line) for line in reversed(spoken))
     return next((line[one.start():] for one, line in found if one), f"its last line: {spoken[-1]}" if spoken else "it printed nothing")
 
 
@@ -62,7 +62,7 @@ def judge(run: Run, code: int, parser: OutputParser, work: Path) -> None:
     if any("No space left" in line for line in lines):
         raise RunError(DISK_FULL, f"the engine stopped {where}")
     relayed = re.search(r"exited on signal (\d+)", "\n".join(lines)) if code else None
-    # srun tells of a signal as shells do, by 128 and its number.
+    # srun reports a signal as shells do, as 128 plus its number.
     number = -code if code < 0 else int(relayed.group(1)) if relayed else code - 128 if code - 128 in _STOPPED else 0
     # With an error of one rank the launcher ends the others by a signal.
     faulty = any(_OF_ONE_RANK.search(line) for line in lines)
@@ -82,12 +82,12 @@ def judge(run: Run, code: int, parser: OutputParser, work: Path) -> None:
 
 def integration(work: Path) -> dict[str, float]:
     """What the run's integration monitor found (largest errors of one step, fewest steps of a contact); empty where it had none."""
-    told = next((line for line in reversed(_tail(work / "engine.log")) if line.startswith("dembark: integration ")), "").split()[2:]
-    return {name: float(value) for name, value in zip(told[::2], told[1::2], strict=True)}
+    words = next((line for line in reversed(_tail(work / "engine.log")) if line.startswith("dembark: integration ")), "").split()[2:]
+    return {name: float(value) for name, value in zip(words[::2], words[1::2], strict=True)}
 
 
 def check_output(work: Path, outputs: Sequence[str], wanted: Value) -> int:
-    """Frames in the dumps (0 without any) of a run that wrote all of `outputs` whole; RunError otherwise."""
+    """Frames in the dumps (0 without any) of a run that wrote all of `outputs` completely; RunError otherwise."""
     try:
         counts = {kind: count_frames(work / OUTPUTS[kind], key) for kind, key in _DUMPS.items() if kind in outputs}
         if len(set(counts.values())) > 1:
@@ -100,7 +100,7 @@ def check_output(work: Path, outputs: Sequence[str], wanted: Value) -> int:
         if "impacts" in outputs:
             check_impacts(work / OUTPUTS["impacts"])
     except RunError as error:
-        # The engines do not notice a full disk: what tells is a file that was cut off and no room left.
+        # The engines do not notice a full disk; a file that was cut off and no free space are its signs.
         full = shutil.disk_usage(work).free < _RESERVE
         raise RunError(DISK_FULL if full else "", str(error)) from None
     return next(iter(counts.values()), 0)

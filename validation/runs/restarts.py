@@ -1,4 +1,4 @@
-"""States of unfinished runs: how often one is written, which is the newest whole one, and the folder they wait in for the next attempt."""
+"""States of unfinished runs: how often one is written, the newest complete one, and the folder they wait in for the next attempt."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from dembark.validation.case import deck
 
 # Wall time (s) between states unless another one is asked for.
 INTERVAL = 600.0
-# What the decks call their states; docs/how-to/restarts.md has the format of the mark beside each.
+# What the decks call their states; docs/how-to/restarts.md has the format of the mark next to each.
 BASE = "state"
 _ATTEMPTS = "attempts.json"
 
 
 @dataclass(frozen=True)
 class Attempts:
-    """What earlier attempts of a run left to be told: how many there were, at which steps and how they went on, and their time (s).
+    """What is known of earlier attempts of a run: how many there were, at which steps and how they went on, and their time (s).
 
     `ended`: the harness saw the last one end.
     """
@@ -47,7 +47,7 @@ def steps_between(run: Run, interval: float, cores: int) -> int:
     return max(1, round(interval * run.engine.facts.restart_rate * cores / max(1, run.particles or 1))) if interval > 0.0 else 0
 
 
-def _is_whole(path: Path) -> bool:
+def _is_complete(path: Path) -> bool:
     try:
         size, check_sum = path.with_name(path.name + ".crc").read_text(encoding="ascii").split()[:2]
         crc = 0
@@ -60,24 +60,24 @@ def _is_whole(path: Path) -> bool:
 
 
 def newest(folder: Path, engine: str) -> int | None:
-    """Step of the newest state of `engine` in `folder` that is whole; None when there is none."""
+    """Step of the newest state of `engine` in `folder` that is complete; None when there is none."""
     pattern = re.compile(rf"{BASE}\.(\d+)\.{re.escape(engines.facts(engine).restart_suffix)}")
     found = {int(match.group(1)): path for path in folder.glob(f"{BASE}.*") if (match := pattern.fullmatch(path.name))}
-    return next((step for step in sorted(found, reverse=True) if _is_whole(found[step])), None)
+    return next((step for step in sorted(found, reverse=True) if _is_complete(found[step])), None)
 
 
 def work_folder(run: Run, target: Path) -> Path:
-    """Hidden folder beside `target` where attempts of exactly this run work, one after the other."""
+    """Hidden folder next to `target` where attempts of exactly this run work, one after the other."""
     return target.with_name(f".{target.name}.work-{run.inputs[:12]}")
 
 
 def work_folders(target: Path) -> Iterator[Path]:
-    """All work folders beside `target`, whatever their inputs."""
+    """All work folders next to `target`, whatever their inputs."""
     return target.parent.glob(f".{target.name}.work-*")
 
 
 def begin(run: Run, work: Path) -> int | None:
-    """Make `work` ready for an attempt: the step to resume from, or None and an empty folder when there is no whole state."""
+    """Make `work` ready for an attempt: the step to resume from, or None and an empty folder when there is no complete state."""
     step = newest(work, run.engine.name) if work.is_dir() and supported(run) else None
     if step is None:
         before = attempts(work)

@@ -266,17 +266,17 @@ def _execute(run: Run, work: Path, step: int | None, progress: Progress, ended: 
     }
 
 
-def _with_log(work: Path, told: restarts.Attempts) -> restarts.Attempts:
+def _with_log(work: Path, known: restarts.Attempts) -> restarts.Attempts:
     """The same with what the engine's log says of the last attempt, unless that was read when it ended: a killed harness reads nothing."""
-    if told.ended or not (work / "engine.log").is_file():
-        return replace(told, ended=True)
+    if known.ended or not (work / "engine.log").is_file():
+        return replace(known, ended=True)
     with (work / "engine.log").open(encoding="utf-8", errors="replace") as log:
         found = next(filter(None, map(_RESUMED.match, log)), None)
     if not found:
-        return replace(told, ended=True)
-    # One approximate resumption makes the whole run approximate.
-    approximate = "approximate" in (found.group(2), told.resume)
-    return replace(told, resumed_at=(*told.resumed_at, int(found.group(1))), resume="approximate" if approximate else "exact", ended=True)
+        return replace(known, ended=True)
+    # One approximate resumption makes the run approximate.
+    approximate = "approximate" in (found.group(2), known.resume)
+    return replace(known, resumed_at=(*known.resumed_at, int(found.group(1))), resume="approximate" if approximate else "exact", ended=True)
 
 
 def _listen(process: subprocess.Popen[bytes], work: Path, parser: OutputParser, update: Callable[[], None],

@@ -1,4 +1,4 @@
-"""What is told when results cannot be measured."""
+"""What is reason when results cannot be measured."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ def test_an_error_in_a_measurement_is_told_with_its_line(tmp_path: Path) -> None
                                          "def study(name, points, along):\n    return points[along]\n")
     with pytest.raises(ZeroDivisionError) as caught:
         measurement.measure(case, [])
-    told = f"{tmp_path / 'measure.py'}, line 2, ZeroDivisionError: division by zero"
-    assert analysis.reasons(tmp_path, caught.value, case) == (told,)
+    reason = f"{tmp_path / 'measure.py'}, line 2, ZeroDivisionError: division by zero"
+    assert analysis.reasons(tmp_path, caught.value, case) == (reason,)
     with pytest.raises(DembarkError, match=r"measure\.py, line 5, KeyError"):
         measurement.study(case, SimpleNamespace(name="size", along="grain_count"), {})
     replica(tmp_path / "replica-1", 1, 2, 1.0)
     small = "the run may be too small or too short to be measured: 1 grain, 2 frames"
-    assert analysis.reasons(tmp_path, caught.value, case) == (told, small)
+    assert analysis.reasons(tmp_path, caught.value, case) == (reason, small)
     # Grains more or fewer do not mend a mistake.
     (tmp_path / "measure.py").write_text("def measure(replicas):\n    return foo\n\ndef study(name, points, along):\n    pass\n")
     with pytest.raises(NameError) as caught:

@@ -55,7 +55,7 @@ def balance() -> Item:
         "cell, t being the coarse-grained force of the base (Weinhart et al. 2012). The divergence is taken by central differences, which "
         "have an error that is second order in the spacing over the width of the kernel; there is no other error.",
         [order("balance_order", "residual (rms, Lucy's kernel): exponent of the spacing", _SPACINGS[-2:], fall[-2:], 2.0,
-               "central differences", "gravity doubled", "the two finest grids")],
+               "central differences", "gravity doubled", detail="the two finest grids")],
         [Panel("Residual against the spacing", "spacing / width", "rms of |∇·σ − ρ g − t| / max ρ g", [
             *(Curve(kernel, _SPACINGS / _WIDTHS[kernel], found[:, 1]) for kernel, found in by_spacing.items()),
             Curve("slope 2", _SPACINGS / _WIDTHS["lucy"], fall[0] * (_SPACINGS / _SPACINGS[0]) ** 2, theory=True)]),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,17 +60,20 @@ class Item:
     caption: str = ""
 
 
-def exact(name: str, label: str, error: float, source: str, control: str, *, tolerance: float = ROUND_OFF, detail: str = "",
-          unit: str = "1") -> QuantityRecord:
-    """An error that is due to be zero to `tolerance`; `control`: what fails it."""
-    declared = Declared(name, label, unit, "identity", tolerance, absolute=True, source=source, detail=detail, compared=False,
-                        control=control)
-    return judged(declared, Value(Estimate(float(error), 0.0), Estimate(0.0, 0.0)))
+def check(name: str, label: str, value: float, due: float, tolerance: float, *, evidence: str, source: str, control: str,
+          absolute: bool = True, **more: Any) -> QuantityRecord:
+    """A `value` that is due to be `due` within `tolerance`; `control`: what fails it. `more`: other fields of Declared."""
+    declared = Declared(name, label, evidence=evidence, tolerance=tolerance, absolute=absolute, source=source, compared=False,
+                        control=control, **more)
+    return judged(declared, Value(Estimate(float(value), 0.0), Estimate(float(due), 0.0)))
 
 
-def order(name: str, label: str, steps: Array, errors: Array, due: float, source: str, control: str, detail: str = "") -> QuantityRecord:
-    """Observed order of convergence, the slope of ln(error) over ln(step), against the one of theory; `control`: what fails it."""
+def exact(name: str, label: str, error: float, source: str, control: str, *, tolerance: float = ROUND_OFF, **more: Any) -> QuantityRecord:
+    """An error that is due to be zero to `tolerance`, see `check`."""
+    return check(name, label, error, 0.0, tolerance, evidence="identity", source=source, control=control, **more)
+
+
+def order(name: str, label: str, steps: Array, errors: Array, due: float, source: str, control: str, **more: Any) -> QuantityRecord:
+    """Observed order of convergence, the slope of ln(error) over ln(step), against the one of theory, see `check`."""
     slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
-    declared = Declared(name, label, "1", "theory", ORDER_TOLERANCE, absolute=True, source=source, detail=detail, compared=False,
-                        control=control)
-    return judged(declared, Value(Estimate(slope, 0.0), Estimate(due, 0.0)))
+    return check(name, label, slope, due, ORDER_TOLERANCE, evidence="theory", source=source, control=control, **more)

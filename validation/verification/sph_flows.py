@@ -5,23 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from dembark.physics.sph import SphFluid, lattice, tank_walls
-from dembark.postproc.measurement import Value
-from dembark.postproc.statistics import Estimate
-from dembark.validation.case.model import Declared
-from dembark.validation.judge.result import QuantityRecord
-from dembark.validation.judge.verdict import judged
 
-from .item import Array, Curve, Item, Panel
+from .item import Array, Curve, Item, Panel, check
 
 GRAVITY = 9.81
 HYDROSTATICS = "hydrostatics"
-
-
-def _compared(name: str, label: str, value: float, due: float, tolerance: float, *, evidence: str, source: str, why: str, control: str,
-              absolute: bool = False, unit: str = "1", detail: str = "") -> QuantityRecord:
-    declared = Declared(name, label, unit, evidence, tolerance, why=why, absolute=absolute, source=source, detail=detail, compared=False,
-                        control=control)
-    return judged(declared, Value(Estimate(float(value), 0.0), Estimate(float(due), 0.0)))
 
 
 def still_water() -> Item:
@@ -46,11 +34,12 @@ def still_water() -> Item:
         "SPH: water at rest",
         f"A tank {width:g} m wide is filled {depth:g} m deep, {round(depth / dx)} particles, and left at rest for two seconds. The "
         "pressure of the particles must correspond to their depth, and the walls must carry the weight.",
-        [_compared("pressure_rms", "pressure: rms deviation from ρ g depth, over ρ g H", np.sqrt(np.mean(squares)) / scale, 0.0, 0.01,
-                   absolute=True, evidence="theory", source=HYDROSTATICS, why="a fifth of the pressure of one layer of particles",
+        [check("pressure_rms", "pressure: rms deviation from ρ g depth, over ρ g H", np.sqrt(np.mean(squares)) / scale, 0.0, 0.01,
+                   evidence="theory", source=HYDROSTATICS, why="a fifth of the pressure of one layer of particles",
                    control="gravity a fiftieth too strong"),
-         _compared("wall_force", "mean force on the walls over the weight", -np.mean(forces) / (scale * width), 1.0, 0.01,
-                   evidence="theory", source=HYDROSTATICS, why="as for the pressure", control="gravity a fiftieth too strong")],
+         check("wall_force", "mean force on the walls over the weight", -np.mean(forces) / (scale * width), 1.0, 0.01,
+                   absolute=False, evidence="theory", source=HYDROSTATICS, why="as for the pressure",
+                   control="gravity a fiftieth too strong")],
         [Panel("Pressure after 2 s", "height (m)", "p / (ρ g H)", [
             Curve("particles", heights[bottom], pressures[bottom]),
             Curve("ρ g depth", [0.0, 0.98 * depth], [1.0, 0.02], theory=True)], linear=True)],
@@ -91,7 +80,8 @@ def added_mass() -> Item:
         "per metre (Lamb, Hydrodynamics, 6th ed. 1932, art. 69). No model adds it here: it follows from the acceleration of the "
         f"wall particles, which enters their pressure. The acceleration is ramped over {ramp:g} s to avoid sound waves; the mean "
         "force after that is compared. By then the cylinder has moved a tenth of a spacing: later the lattice of the water resists shear.",
-        [_compared("added_mass_ratio", "added mass over that of theory", found[times > ramp].mean() / due, 1.0, 0.05, evidence="theory",
+        [check("added_mass_ratio", "added mass over that of theory", found[times > ramp].mean() / due, 1.0, 0.05, absolute=False,
+                evidence="theory",
                    source="Lamb 1932, art. 69", why="steps of the lattice on both circles", control="water a tenth too light")],
         [Panel("Force", "time (s)", "force over acceleration (kg/m)", [
             Curve("particles", times.tolist(), np.maximum(found, 1.0)),
@@ -127,7 +117,7 @@ def floating() -> Item:
         "SPH: floating block",
         f"A block of {side:g} m side and {ratio:g} times the density of water is released, upright and without rotation, a tenth of "
         "its side above its floating position. Its mean draught in the second 0.7 s follows from its height and the volume of water.",
-        [_compared("displaced_volume", "displaced over total volume", float(np.mean(share[35:])), ratio, 0.02, absolute=True,
+        [check("displaced_volume", "displaced over total volume", float(np.mean(share[35:])), ratio, 0.02,
                    evidence="theory", source="Archimedes", why="a third of a layer of particles on 16", control="water a tenth too light")],
         [Panel("Draught", "time (s)", "displaced over total volume", [
             Curve("block", (0.02 * np.arange(1, 71)).tolist(), share.tolist()),
