@@ -11,14 +11,11 @@ import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-import pyvista
-import xarray
 from numpy.typing import NDArray
-from vtkmodules.vtkIOXML import vtkXMLImageDataWriter, vtkXMLPolyDataWriter
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import disk_error, move_into_place, write_whole
@@ -26,6 +23,10 @@ from dembark.common.files import disk_error, move_into_place, write_whole
 from ..grains import GrainFrame
 from ..walls.stress import COMPONENTS, WallStress
 from .netcdf import Attributes
+
+if TYPE_CHECKING:
+    import pyvista
+    import xarray
 
 Array = NDArray[Any]
 
@@ -55,6 +56,9 @@ class TimeSeries:
         data.field_data["units"] = [f"{name}: {unit}" for name, unit in units.items()]
         for name, value in self._attributes.items():
             data.field_data[name] = [value]
+        import pyvista
+        from vtkmodules.vtkIOXML import vtkXMLImageDataWriter, vtkXMLPolyDataWriter
+
         image = isinstance(data, pyvista.ImageData)
         writer = vtkXMLImageDataWriter() if image else vtkXMLPolyDataWriter()
         writer.SetInputData(data)
@@ -101,6 +105,8 @@ def check_place(path: Path) -> Path:
 
 def write_fields(path: str | Path, data: xarray.Dataset, attributes: Attributes | None = None) -> Path:
     """Write the fields of `netcdf.dataset`, of one or more times, as images; returns the path."""
+    import pyvista
+
     low, high = (np.array([float(data[f"{axis}_bounds"][end, end]) for axis in "xyz"]) for end in (0, -1))
     shape = np.array([data.sizes[axis] for axis in "xyz"])
     fields = {str(name): one for name, one in data.items() if one.dims[:4] == ("time", "x", "y", "z")}
@@ -129,6 +135,8 @@ def write_grains(path: str | Path, frames: Iterable[GrainFrame], time_step: floa
 
 def add_grains(file: TimeSeries, frame: GrainFrame, time: float) -> None:
     """Add the grains of a frame at `time` (s), with what the dump holds of them."""
+    import pyvista
+
     arrays = {name: (getattr(frame, attribute), unit) for attribute, (name, unit) in _GRAINS.items() if frame.has(attribute)}
     arrays |= {f"force_of_{wall}": (force, "N") for wall, force in frame.wall_forces.items()}
     arrays |= {name: (column, "as in the dump") for name, column in frame.extra.items()}
@@ -145,6 +153,8 @@ def write_wall(path: str | Path, stress: WallStress, attributes: Attributes | No
 
     A wall that moves is shown where it is at each time; without the series there is only the last one. Returns the path.
     """
+    import pyvista
+
     patches, owners = stress.patches, stress.patches.owners
     arrays: dict[str, tuple[Array, str]] = {"patch": (owners, "1"), "contact_count": (stress.contacts[owners], "1")}
     means = (("mean_stress", stress.mean), ("stress_deviation", stress.deviation), ("stress_half_width", stress.half))
